@@ -1,4 +1,4 @@
-"""What an episode is made of: its scene and its frames.
+"""What an episode is made of: its scene, its road and its frames.
 
 Geometry is metric and mathematical: x east, y north, heading 0 = east, counter-clockwise, radians,
 and every position is the centre of the actor's body. SUMO's own conventions (front bumper, compass
@@ -42,6 +42,37 @@ class Signal(IntEnum):
     GREEN = 1
     YELLOW = 2
     RED = 3
+
+
+class Lane(NamedTuple):
+    """A lane that cars may use, on a road or through a junction."""
+
+    id: str  # SUMO's
+    line: Floats  # 2 x p: x and y of its middle, in its direction, m
+    width_m: float
+    limit_mps: float
+    left: str  # the lane beside it, of the same direction; "" without one
+    right: str
+    may_change_left: bool  # whether the markings let a car change to that lane
+    may_change_right: bool
+    successors: tuple[str, ...]  # lanes of the same `Road` that it leads to
+    on_route: bool  # whether it leads on along the ego's route
+
+
+class StopLine(NamedTuple):
+    """A signal's stop line, at the end of a lane, for one of its successors."""
+
+    lane: str
+    leads_to: str  # the successor that the signal lets in
+    signal: str  # id of the traffic light
+    link: int  # index of its letter in the state of the light
+
+
+class Road(NamedTuple):
+    """The lanes around the ego's route, and the stop lines on it."""
+
+    lanes: tuple[Lane, ...] = ()
+    stop_lines: tuple[StopLine, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """Drives an ego: shows it what it perceives, and moves its car by its commands."""
 
 import math
+from functools import cache
 from itertools import compress
 
 import numpy as np
@@ -12,14 +13,31 @@ from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.ego import Belief
+from risk_sac.sim.lanes import road_around, signals_at
 from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import Motion
-from risk_sac.types import ACCEL, HEADING, LATERAL, OFFSET, SPEED, STEP_S, VX, VY, Bools, Floats, Frame, X, Y
+from risk_sac.types import (
+    ACCEL,
+    HEADING,
+    LATERAL,
+    OFFSET,
+    SPEED,
+    STEP_S,
+    VX,
+    VY,
+    Bools,
+    Floats,
+    Frame,
+    Road,
+    Signal,
+    X,
+    Y,
+)
 
 BRAKE_MPS2 = 9.0  # as SUMO's driver can, on dry asphalt
 
 
-def perceive(frame: Frame, belief: Belief, along: Along) -> Perceived:
+def perceive(frame: Frame, belief: Belief, along: Along, signals: tuple[Signal, ...]) -> Perceived:
     """Returns the actors of a frame that the ego knows of by its sensor and its memory."""
     known = belief.known
     path, station_m, offset_m = along
@@ -33,6 +51,7 @@ def perceive(frame: Frame, belief: Belief, along: Along) -> Perceived:
         offset_m=offset_m,
         signal=frame.signal,
         stop_line_m=frame.stop_line_m,
+        signals=signals,
     )
 
 
@@ -41,9 +60,11 @@ class EgoPilot:
 
     _vehicle: Vehicle
     _motion: Motion
+    _road: Road
 
     def __init__(self, ego: Guarded) -> None:
         self._ego = ego
+        self._net, self._road_around = "", cache(road_around)
 
     def begin(self, layout: Layout, seed: int, frame: Frame) -> Motion:
         """See `risk_sac.sim.pilot.Pilot.begin`."""
@@ -52,14 +73,19 @@ class EgoPilot:
         self._vehicle = Vehicle(length_m=length_m, width_m=width_m, brake_mps2=min(BRAKE_MPS2, grip), grip_mps2=grip)
         own = frame.state[[X, Y, HEADING, SPEED, ACCEL], 0].tolist()
         self._motion = Motion(*own)
+        if layout.net != self._net:  # another one may use the same names
+            self._net = layout.net
+            self._road_around.cache_clear()
+        route = layout.ego.route
+        self._road = self._road_around(route)
         self._ego.reset(
-            Episode(seed=seed, net=layout.net, route=layout.ego.route, vehicle=self._vehicle, step_s=STEP_S)
+            Episode(seed=seed, net=layout.net, route=route, vehicle=self._vehicle, step_s=STEP_S, road=self._road)
         )
         return self._motion
 
     def drive(self, frame: Frame, belief: Belief, along: Along) -> Motion:
         """See `risk_sac.sim.pilot.Pilot.drive`."""
-        command = self._ego.act(perceive(frame, belief, along))
+        command = self._ego.act(perceive(frame, belief, along, signals_at(self._road.stop_lines)))
         if isinstance(command, Trajectory):
             command = track(command, self._motion, self._vehicle)
         self._motion = advance(self._motion, command.accel_mps2, command.steering_rad, self._vehicle, STEP_S)

@@ -1,4 +1,4 @@
-"""Rows of a perceived path, and a driver's way of staying on it."""
+"""Rows of a perceived path, a driver's way of staying on it, and the edges of lanes."""
 
 import math
 
@@ -7,7 +7,7 @@ import numpy as np
 from risk_sac.egos.seam import Perceived, Vehicle
 from risk_sac.jit import compiled
 from risk_sac.sim.lookout import project
-from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
+from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, Lane, X, Y
 
 # Rows of a path, as in `risk_sac.sim.paths`.
 PATH_X, PATH_Y = 0, 1
@@ -18,6 +18,18 @@ LIMIT = 4  # the fastest to take it, m/s; bends are slow
 LOOKAHEAD_S, LEAST_LOOKAHEAD_M = 0.6, 5.0
 BEND_M = 5.0
 ASIDE_M = 0.3  # beside the ego's body: who is in there is in its way
+
+
+def lane_edges(lane: Lane) -> tuple[Floats, Floats]:
+    """Returns the left and the right edge of a lane, `2 x p` each: a point beside each of its middle."""
+    step = np.diff(lane.line, axis=1)
+    ahead = step / np.maximum(np.hypot(*step), 1e-9)
+    along = np.concatenate((ahead[:, :1], ahead[:, :-1] + ahead[:, 1:], ahead[:, -1:]), axis=1)
+    # In a bend a mitre: as far from either segment.
+    length = np.maximum(np.hypot(*along), 1e-9)
+    side = np.array((-along[1], along[0])) / length
+    side[:, 1:-1] *= 2.0 / np.maximum(length[1:-1], 1.0)
+    return lane.line + lane.width_m / 2 * side, lane.line - lane.width_m / 2 * side
 
 
 @compiled

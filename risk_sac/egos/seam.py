@@ -5,13 +5,13 @@ as much of a command as a car can. Units are metric: x east, y north, heading 0 
 position is the centre of a body.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.types import Floats, Signal
+from risk_sac.types import Floats, Road, Signal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +38,7 @@ class Episode:
     route: tuple[str, ...]  # edges of the net
     vehicle: Vehicle
     step_s: float  # between two perceived frames
+    road: Road = field(default_factory=Road)  # lanes and stop lines around the route
 
 
 class Perceived(NamedTuple):
@@ -58,6 +59,7 @@ class Perceived(NamedTuple):
     offset_m: float  # of its front bumper's middle from the path, positive to the left
     signal: Signal  # ahead of it
     stop_line_m: float  # from its front bumper to that signal's stop line; inf without one
+    signals: tuple[Signal, ...] = ()  # at each stop line of the episode's road
 
 
 class Control(NamedTuple):

@@ -40,7 +40,7 @@ class Along(NamedTuple):
     offset_m: float  # of its front bumper's middle from the line, positive to the left
 
 
-class StopLine(NamedTuple):
+class PathStopLine(NamedTuple):
     """A signal's stop line on a path."""
 
     station_m: float
@@ -52,7 +52,7 @@ class Way(NamedTuple):
     """A path and the stop lines on it."""
 
     path: Path
-    stop_lines: tuple[StopLine, ...]
+    stop_lines: tuple[PathStopLine, ...]
     complete: bool  # whether it ends where its route ends
     lane_m: float  # length of its first lane
     following: str | None  # the lane that follows this one
@@ -66,22 +66,22 @@ def way_of(route: Sequence[str], lane: str) -> Way:
     lanes = _lanes_ahead(route, lane)
     lines = [_line(route, lane) for lane in lanes]
     path = path_along(lines, [libsumo.lane.getMaxSpeed(lane) for lane in lanes])
-    controlled, stop_lines, station_m = _controlled(), [], 0.0
+    controlled, stop_lines, station_m = controlled_links(), [], 0.0
     for line, (before, following) in zip(lines, pairwise(lanes), strict=False):
         station_m += _length(line)
         signal = controlled.get((leading_lane(route, before), following))
         if signal is not None:
-            stop_lines.append(StopLine(station_m, *signal))
+            stop_lines.append(PathStopLine(station_m, *signal))
     return Way(
         path=path,
         stop_lines=tuple(stop_lines),
-        complete=_edge(lanes[-1]) == route[-1],
+        complete=edge_of(lanes[-1]) == route[-1],
         lane_m=_length(lines[0]),
         following=lanes[1] if len(lanes) > 1 else None,
     )
 
 
-def _controlled() -> dict[tuple[str, str], tuple[str, int]]:
+def controlled_links() -> dict[tuple[str, str], tuple[str, int]]:
     """Maps each lane, and the lane behind its stop line, to a signal and the index of its letter."""
     return {
         (before, via or after): (signal, index)
@@ -98,16 +98,21 @@ def leading_lane(route: Sequence[str], lane: str) -> str:
     return next((other for other in (f"{edge}_{i}" for i in beside) if leads_on(route, other)), lane)
 
 
+def car_may_use(lane: str) -> bool:
+    """Whether cars may use a lane."""
+    allowed = libsumo.lane.getAllowed(lane)  # empty: all classes but the disallowed ones
+    return CAR in allowed if allowed else CAR not in libsumo.lane.getDisallowed(lane)
+
+
 def leads_on(route: Sequence[str], lane: str) -> bool:
     """Whether cars may use a lane, and it leads to the route's next edge, if there is one."""
-    allowed = libsumo.lane.getAllowed(lane)  # empty: all classes but the disallowed ones
-    if CAR not in allowed if allowed else CAR in libsumo.lane.getDisallowed(lane):
+    if not car_may_use(lane):
         return False
-    edge = _edge(lane)
+    edge = edge_of(lane)
     if edge not in route[:-1]:
         return True
     following = route[route.index(edge) + 1]
-    return any(_edge(link[0]) == following for link in libsumo.lane.getLinks(lane))
+    return any(edge_of(link[0]) == following for link in libsumo.lane.getLinks(lane))
 
 
 def _line(route: Sequence[str], lane: str) -> Floats:
@@ -148,12 +153,12 @@ def _lanes_ahead(route: Sequence[str], lane: str) -> list[str]:
 
 
 def _next_lane(route: Sequence[str], lane: str) -> str | None:
-    edge, lane = _edge(lane), leading_lane(route, lane)
+    edge, lane = edge_of(lane), leading_lane(route, lane)
     links = libsumo.lane.getLinks(lane)
     following: tuple[str, ...] = ()
     if edge in route:
         following = tuple(route[route.index(edge) + 1 :])
-        links = [link for link in links if following and _edge(link[0]) == following[0]]
+        links = [link for link in links if following and edge_of(link[0]) == following[0]]
     if not links:
         return None
     # Of the lanes that one forks into, SUMO's drivers take the one that leads farthest; of equals the first, the right.
@@ -165,13 +170,14 @@ def _reach(edges: Sequence[str], lane: str) -> int:
     """Along how many of the edges that follow a lane leads."""
     lanes = {lane}
     for reached, edge in enumerate(edges):
-        lanes = {link[0] for id_ in lanes for link in libsumo.lane.getLinks(id_) if _edge(link[0]) == edge}
+        lanes = {link[0] for id_ in lanes for link in libsumo.lane.getLinks(id_) if edge_of(link[0]) == edge}
         if not lanes:
             return reached
     return len(edges)
 
 
-def _edge(lane: str) -> str:
+def edge_of(lane: str) -> str:
+    """Returns the edge of a lane."""
     return lane.rpartition("_")[0]
 
 

@@ -13,7 +13,7 @@ from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.lookout import project, stretch
-from risk_sac.sim.paths import STATION, Along, StopLine
+from risk_sac.sim.paths import STATION, Along, PathStopLine
 from risk_sac.sim.reading import EgoTold
 from risk_sac.sim.roads import Roads
 from risk_sac.types import Floats, Frame
@@ -62,7 +62,7 @@ class MovedEgo:
     inside: bool
     arrived: bool
     told: EgoTold
-    _stop_line: StopLine | None
+    _stop_line: PathStopLine | None
 
     def __init__(self, vehicle: str, motion: Motion, size_m: tuple[float, float], roads: Roads) -> None:
         """Takes over a vehicle; its size is length and width."""

@@ -24,39 +24,45 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1erisk_sac/egos/remote/ego.proto\x12\x10risk_sac.egos.v2\"\x97\x01\n\x0cStartRequest\x12\x10\n\x08protocol\x18\x01 \x01(\r\x12\x0f\n\x07session\x18\x02 \x01(\t\x12\x0c\n\x04seed\x18\x03 \x01(\x04\x12\x0b\n\x03net\x18\x04 \x01(\t\x12\r\n\x05route\x18\x05 \x03(\t\x12\x0e\n\x06step_s\x18\x06 \x01(\x01\x12*\n\x07vehicle\x18\x07 \x01(\x0b\x32\x19.risk_sac.egos.v2.Vehicle\"\xc8\x01\n\x07Vehicle\x12\x10\n\x08length_m\x18\x01 \x01(\x01\x12\x0f\n\x07width_m\x18\x02 \x01(\x01\x12\x13\n\x0bwheelbase_m\x18\x03 \x01(\x01\x12\x12\n\naccel_mps2\x18\x04 \x01(\x01\x12\x12\n\nbrake_mps2\x18\x05 \x01(\x01\x12\x17\n\x0f\x62rake_jerk_mps3\x18\x06 \x01(\x01\x12\x14\n\x0csteering_rad\x18\x07 \x01(\x01\x12\x1b\n\x13steering_rate_rad_s\x18\x08 \x01(\x01\x12\x11\n\tgrip_mps2\x18\t \x01(\x01\"\x1d\n\nStartReply\x12\x0f\n\x07version\x18\x01 \x01(\t\"\x89\x02\n\x0bObservation\x12\x0f\n\x07session\x18\x01 \x01(\t\x12\x0e\n\x06time_s\x18\x02 \x01(\x01\x12(\n\x06\x61\x63tors\x18\x03 \x01(\x0b\x32\x18.risk_sac.egos.v2.Actors\x12$\n\x04path\x18\x04 \x01(\x0b\x32\x16.risk_sac.egos.v2.Path\x12\x11\n\tstation_m\x18\x05 \x01(\x01\x12\x10\n\x08offset_m\x18\x06 \x01(\x01\x12(\n\x06signal\x18\x07 \x01(\x0e\x32\x18.risk_sac.egos.v2.Signal\x12\x13\n\x0bstop_line_m\x18\x08 \x01(\x01\x12\x11\n\tspeed_mps\x18\t \x01(\x01\x12\x12\n\naccel_mps2\x18\n \x01(\x01\"\xac\x01\n\x06\x41\x63tors\x12\n\n\x02id\x18\x01 \x03(\t\x12$\n\x04kind\x18\x02 \x03(\x0e\x32\x16.risk_sac.egos.v2.Kind\x12\x0b\n\x03x_m\x18\x03 \x03(\x01\x12\x0b\n\x03y_m\x18\x04 \x03(\x01\x12\x13\n\x0bheading_rad\x18\x05 \x03(\x01\x12\x0e\n\x06vx_mps\x18\x06 \x03(\x01\x12\x0e\n\x06vy_mps\x18\x07 \x03(\x01\x12\x10\n\x08length_m\x18\x08 \x03(\x01\x12\x0f\n\x07width_m\x18\t \x03(\x01\"[\n\x04Path\x12\x0b\n\x03x_m\x18\x01 \x03(\x01\x12\x0b\n\x03y_m\x18\x02 \x03(\x01\x12\x11\n\tstation_m\x18\x03 \x03(\x01\x12\x13\n\x0bheading_rad\x18\x04 \x03(\x01\x12\x11\n\tlimit_mps\x18\x05 \x03(\x01\"\x86\x01\n\x07\x43ommand\x12,\n\x07\x63ontrol\x18\x01 \x01(\x0b\x32\x19.risk_sac.egos.v2.ControlH\x00\x12\x32\n\ntrajectory\x18\x02 \x01(\x0b\x32\x1c.risk_sac.egos.v2.TrajectoryH\x00\x12\x0e\n\x06time_s\x18\x03 \x01(\x01\x42\t\n\x07\x63ommand\"3\n\x07\x43ontrol\x12\x12\n\naccel_mps2\x18\x01 \x01(\x01\x12\x14\n\x0csteering_rad\x18\x02 \x01(\x01\"I\n\nTrajectory\x12\x0e\n\x06time_s\x18\x01 \x03(\x01\x12\x0b\n\x03x_m\x18\x02 \x03(\x01\x12\x0b\n\x03y_m\x18\x03 \x03(\x01\x12\x11\n\tspeed_mps\x18\x04 \x03(\x01\"\x1f\n\x0c\x43loseRequest\x12\x0f\n\x07session\x18\x01 \x01(\t\"\x0c\n\nCloseReply*-\n\x04Kind\x12\x10\n\x0cKIND_VEHICLE\x10\x00\x12\x13\n\x0fKIND_PEDESTRIAN\x10\x01*N\n\x06Signal\x12\x0f\n\x0bSIGNAL_NONE\x10\x00\x12\x10\n\x0cSIGNAL_GREEN\x10\x01\x12\x11\n\rSIGNAL_YELLOW\x10\x02\x12\x0e\n\nSIGNAL_RED\x10\x03\x32\xd8\x01\n\x03\x45go\x12\x45\n\x05Start\x12\x1e.risk_sac.egos.v2.StartRequest\x1a\x1c.risk_sac.egos.v2.StartReply\x12\x43\n\x03\x41\x63t\x12\x1d.risk_sac.egos.v2.Observation\x1a\x19.risk_sac.egos.v2.Command(\x01\x30\x01\x12\x45\n\x05\x43lose\x12\x1e.risk_sac.egos.v2.CloseRequest\x1a\x1c.risk_sac.egos.v2.CloseReplyb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1erisk_sac/egos/remote/ego.proto\x12\x10risk_sac.egos.v2\"\xbd\x01\n\x0cStartRequest\x12\x10\n\x08protocol\x18\x01 \x01(\r\x12\x0f\n\x07session\x18\x02 \x01(\t\x12\x0c\n\x04seed\x18\x03 \x01(\x04\x12\x0b\n\x03net\x18\x04 \x01(\t\x12\r\n\x05route\x18\x05 \x03(\t\x12\x0e\n\x06step_s\x18\x06 \x01(\x01\x12*\n\x07vehicle\x18\x07 \x01(\x0b\x32\x19.risk_sac.egos.v2.Vehicle\x12$\n\x04road\x18\x08 \x01(\x0b\x32\x16.risk_sac.egos.v2.Road\"[\n\x04Road\x12$\n\x04lane\x18\x01 \x03(\x0b\x32\x16.risk_sac.egos.v2.Lane\x12-\n\tstop_line\x18\x02 \x03(\x0b\x32\x1a.risk_sac.egos.v2.StopLine\"\xc6\x01\n\x04Lane\x12\n\n\x02id\x18\x01 \x01(\t\x12\x0b\n\x03x_m\x18\x02 \x03(\x01\x12\x0b\n\x03y_m\x18\x03 \x03(\x01\x12\x0f\n\x07width_m\x18\x04 \x01(\x01\x12\x11\n\tlimit_mps\x18\x05 \x01(\x01\x12\x0c\n\x04left\x18\x06 \x01(\t\x12\r\n\x05right\x18\x07 \x01(\t\x12\x17\n\x0fmay_change_left\x18\x08 \x01(\x08\x12\x18\n\x10may_change_right\x18\t \x01(\x08\x12\x12\n\nsuccessors\x18\n \x03(\t\x12\x10\n\x08on_route\x18\x0b \x01(\x08\"H\n\x08StopLine\x12\x0c\n\x04lane\x18\x01 \x01(\t\x12\x10\n\x08leads_to\x18\x02 \x01(\t\x12\x0e\n\x06signal\x18\x03 \x01(\t\x12\x0c\n\x04link\x18\x04 \x01(\r\"\xc8\x01\n\x07Vehicle\x12\x10\n\x08length_m\x18\x01 \x01(\x01\x12\x0f\n\x07width_m\x18\x02 \x01(\x01\x12\x13\n\x0bwheelbase_m\x18\x03 \x01(\x01\x12\x12\n\naccel_mps2\x18\x04 \x01(\x01\x12\x12\n\nbrake_mps2\x18\x05 \x01(\x01\x12\x17\n\x0f\x62rake_jerk_mps3\x18\x06 \x01(\x01\x12\x14\n\x0csteering_rad\x18\x07 \x01(\x01\x12\x1b\n\x13steering_rate_rad_s\x18\x08 \x01(\x01\x12\x11\n\tgrip_mps2\x18\t \x01(\x01\"\x1d\n\nStartReply\x12\x0f\n\x07version\x18\x01 \x01(\t\"\xb4\x02\n\x0bObservation\x12\x0f\n\x07session\x18\x01 \x01(\t\x12\x0e\n\x06time_s\x18\x02 \x01(\x01\x12(\n\x06\x61\x63tors\x18\x03 \x01(\x0b\x32\x18.risk_sac.egos.v2.Actors\x12$\n\x04path\x18\x04 \x01(\x0b\x32\x16.risk_sac.egos.v2.Path\x12\x11\n\tstation_m\x18\x05 \x01(\x01\x12\x10\n\x08offset_m\x18\x06 \x01(\x01\x12(\n\x06signal\x18\x07 \x01(\x0e\x32\x18.risk_sac.egos.v2.Signal\x12\x13\n\x0bstop_line_m\x18\x08 \x01(\x01\x12\x11\n\tspeed_mps\x18\t \x01(\x01\x12\x12\n\naccel_mps2\x18\n \x01(\x01\x12)\n\x07signals\x18\x0b \x03(\x0e\x32\x18.risk_sac.egos.v2.Signal\"\xac\x01\n\x06\x41\x63tors\x12\n\n\x02id\x18\x01 \x03(\t\x12$\n\x04kind\x18\x02 \x03(\x0e\x32\x16.risk_sac.egos.v2.Kind\x12\x0b\n\x03x_m\x18\x03 \x03(\x01\x12\x0b\n\x03y_m\x18\x04 \x03(\x01\x12\x13\n\x0bheading_rad\x18\x05 \x03(\x01\x12\x0e\n\x06vx_mps\x18\x06 \x03(\x01\x12\x0e\n\x06vy_mps\x18\x07 \x03(\x01\x12\x10\n\x08length_m\x18\x08 \x03(\x01\x12\x0f\n\x07width_m\x18\t \x03(\x01\"[\n\x04Path\x12\x0b\n\x03x_m\x18\x01 \x03(\x01\x12\x0b\n\x03y_m\x18\x02 \x03(\x01\x12\x11\n\tstation_m\x18\x03 \x03(\x01\x12\x13\n\x0bheading_rad\x18\x04 \x03(\x01\x12\x11\n\tlimit_mps\x18\x05 \x03(\x01\"\x86\x01\n\x07\x43ommand\x12,\n\x07\x63ontrol\x18\x01 \x01(\x0b\x32\x19.risk_sac.egos.v2.ControlH\x00\x12\x32\n\ntrajectory\x18\x02 \x01(\x0b\x32\x1c.risk_sac.egos.v2.TrajectoryH\x00\x12\x0e\n\x06time_s\x18\x03 \x01(\x01\x42\t\n\x07\x63ommand\"3\n\x07\x43ontrol\x12\x12\n\naccel_mps2\x18\x01 \x01(\x01\x12\x14\n\x0csteering_rad\x18\x02 \x01(\x01\"I\n\nTrajectory\x12\x0e\n\x06time_s\x18\x01 \x03(\x01\x12\x0b\n\x03x_m\x18\x02 \x03(\x01\x12\x0b\n\x03y_m\x18\x03 \x03(\x01\x12\x11\n\tspeed_mps\x18\x04 \x03(\x01\"\x1f\n\x0c\x43loseRequest\x12\x0f\n\x07session\x18\x01 \x01(\t\"\x0c\n\nCloseReply*-\n\x04Kind\x12\x10\n\x0cKIND_VEHICLE\x10\x00\x12\x13\n\x0fKIND_PEDESTRIAN\x10\x01*N\n\x06Signal\x12\x0f\n\x0bSIGNAL_NONE\x10\x00\x12\x10\n\x0cSIGNAL_GREEN\x10\x01\x12\x11\n\rSIGNAL_YELLOW\x10\x02\x12\x0e\n\nSIGNAL_RED\x10\x03\x32\xd8\x01\n\x03\x45go\x12\x45\n\x05Start\x12\x1e.risk_sac.egos.v2.StartRequest\x1a\x1c.risk_sac.egos.v2.StartReply\x12\x43\n\x03\x41\x63t\x12\x1d.risk_sac.egos.v2.Observation\x1a\x19.risk_sac.egos.v2.Command(\x01\x30\x01\x12\x45\n\x05\x43lose\x12\x1e.risk_sac.egos.v2.CloseRequest\x1a\x1c.risk_sac.egos.v2.CloseReplyb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
 _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'risk_sac.egos.remote.ego_pb2', _globals)
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
-  _globals['_KIND']._serialized_start=1288
-  _globals['_KIND']._serialized_end=1333
-  _globals['_SIGNAL']._serialized_start=1335
-  _globals['_SIGNAL']._serialized_end=1413
+  _globals['_KIND']._serialized_start=1737
+  _globals['_KIND']._serialized_end=1782
+  _globals['_SIGNAL']._serialized_start=1784
+  _globals['_SIGNAL']._serialized_end=1862
   _globals['_STARTREQUEST']._serialized_start=53
-  _globals['_STARTREQUEST']._serialized_end=204
-  _globals['_VEHICLE']._serialized_start=207
-  _globals['_VEHICLE']._serialized_end=407
-  _globals['_STARTREPLY']._serialized_start=409
-  _globals['_STARTREPLY']._serialized_end=438
-  _globals['_OBSERVATION']._serialized_start=441
-  _globals['_OBSERVATION']._serialized_end=706
-  _globals['_ACTORS']._serialized_start=709
-  _globals['_ACTORS']._serialized_end=881
-  _globals['_PATH']._serialized_start=883
-  _globals['_PATH']._serialized_end=974
-  _globals['_COMMAND']._serialized_start=977
-  _globals['_COMMAND']._serialized_end=1111
-  _globals['_CONTROL']._serialized_start=1113
-  _globals['_CONTROL']._serialized_end=1164
-  _globals['_TRAJECTORY']._serialized_start=1166
-  _globals['_TRAJECTORY']._serialized_end=1239
-  _globals['_CLOSEREQUEST']._serialized_start=1241
-  _globals['_CLOSEREQUEST']._serialized_end=1272
-  _globals['_CLOSEREPLY']._serialized_start=1274
-  _globals['_CLOSEREPLY']._serialized_end=1286
-  _globals['_EGO']._serialized_start=1416
-  _globals['_EGO']._serialized_end=1632
+  _globals['_STARTREQUEST']._serialized_end=242
+  _globals['_ROAD']._serialized_start=244
+  _globals['_ROAD']._serialized_end=335
+  _globals['_LANE']._serialized_start=338
+  _globals['_LANE']._serialized_end=536
+  _globals['_STOPLINE']._serialized_start=538
+  _globals['_STOPLINE']._serialized_end=610
+  _globals['_VEHICLE']._serialized_start=613
+  _globals['_VEHICLE']._serialized_end=813
+  _globals['_STARTREPLY']._serialized_start=815
+  _globals['_STARTREPLY']._serialized_end=844
+  _globals['_OBSERVATION']._serialized_start=847
+  _globals['_OBSERVATION']._serialized_end=1155
+  _globals['_ACTORS']._serialized_start=1158
+  _globals['_ACTORS']._serialized_end=1330
+  _globals['_PATH']._serialized_start=1332
+  _globals['_PATH']._serialized_end=1423
+  _globals['_COMMAND']._serialized_start=1426
+  _globals['_COMMAND']._serialized_end=1560
+  _globals['_CONTROL']._serialized_start=1562
+  _globals['_CONTROL']._serialized_end=1613
+  _globals['_TRAJECTORY']._serialized_start=1615
+  _globals['_TRAJECTORY']._serialized_end=1688
+  _globals['_CLOSEREQUEST']._serialized_start=1690
+  _globals['_CLOSEREQUEST']._serialized_end=1721
+  _globals['_CLOSEREPLY']._serialized_start=1723
+  _globals['_CLOSEREPLY']._serialized_end=1735
+  _globals['_EGO']._serialized_start=1865
+  _globals['_EGO']._serialized_end=2081
 # @@protoc_insertion_point(module_scope)

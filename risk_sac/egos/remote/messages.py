@@ -7,7 +7,23 @@ import numpy as np
 
 from risk_sac.egos.remote import ego_pb2
 from risk_sac.egos.seam import Command, Control, Episode, Perceived, Trajectory, Vehicle
-from risk_sac.types import ACCEL, HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Floats, Signal, X, Y
+from risk_sac.types import (
+    ACCEL,
+    HEADING,
+    LENGTH,
+    OFFSET,
+    SPEED,
+    VX,
+    VY,
+    WIDTH,
+    Floats,
+    Lane,
+    Road,
+    Signal,
+    StopLine,
+    X,
+    Y,
+)
 
 PROTOCOL = 2
 SERVICE = "risk_sac.egos.v2.Ego"
@@ -23,7 +39,19 @@ VEHICLE = tuple(field.name for field in ego_pb2.Vehicle.DESCRIPTOR.fields)
 
 def start_request(episode: Episode, session: str) -> Any:
     """Returns the StartRequest of an episode."""
-    return ego_pb2.StartRequest(protocol=PROTOCOL, session=session, **asdict(episode))
+    return ego_pb2.StartRequest(
+        protocol=PROTOCOL,
+        session=session,
+        seed=episode.seed,
+        net=episode.net,
+        route=episode.route,
+        step_s=episode.step_s,
+        vehicle=asdict(episode.vehicle),
+        road={
+            "lane": [_lane_fields(lane) for lane in episode.road.lanes],
+            "stop_line": [line._asdict() for line in episode.road.stop_lines],
+        },
+    )
 
 
 def episode_of(request: Any) -> Episode:
@@ -34,7 +62,25 @@ def episode_of(request: Any) -> Episode:
         route=tuple(request.route),
         vehicle=Vehicle(**{name: getattr(request.vehicle, name) for name in VEHICLE}),
         step_s=request.step_s,
+        road=Road(
+            tuple(_lane_of(lane) for lane in request.road.lane),
+            tuple(
+                StopLine(**{name: getattr(line, name) for name in StopLine._fields}) for line in request.road.stop_line
+            ),
+        ),
     )
+
+
+def _lane_fields(lane: Lane) -> dict[str, Any]:
+    fields = lane._asdict()
+    fields["x_m"], fields["y_m"] = fields.pop("line").tolist()
+    return fields
+
+
+def _lane_of(message: Any) -> Lane:
+    line = np.array((message.x_m, message.y_m))
+    plain = {name: getattr(message, name) for name in Lane._fields if name not in ("line", "successors")}
+    return Lane(line=line, successors=tuple(message.successors), **plain)
 
 
 def observation(perceived: Perceived, session: str, new_path: bool) -> Any:
@@ -52,6 +98,7 @@ def observation(perceived: Perceived, session: str, new_path: bool) -> Any:
         stop_line_m=p.stop_line_m,
         speed_mps=p.state[SPEED, 0],
         accel_mps2=p.state[ACCEL, 0],
+        signals=map(int, p.signals),
     )
 
 
@@ -72,6 +119,7 @@ def perceived_of(message: Any, path: Floats) -> Perceived:
         offset_m=message.offset_m,
         signal=Signal(message.signal),
         stop_line_m=message.stop_line_m,
+        signals=tuple(map(Signal, message.signals)),
     )
 
 

@@ -13,15 +13,14 @@ from google.protobuf.message import DecodeError
 
 from risk_sac.egos.guard import Malformed
 from risk_sac.egos.remote import osi_pb2
+from risk_sac.egos.remote.osi_road import COLOURS, CONSTANT, lights, road_message
 from risk_sac.egos.road import PATH_X, PATH_Y, STATION, point_at
 from risk_sac.egos.seam import Episode, Perceived, Trajectory
-from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Signal, X, Y
+from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Road, X, Y
 
 VERSION = {"version_major": 3, "version_minor": 8, "version_patch": 0}
 # OSI's numbers.
 TYPE_VEHICLE, TYPE_PEDESTRIAN, TYPE_CAR, TYPE_HEAVY_TRUCK = 2, 3, 4, 7
-COLOURS = {Signal.RED: 2, Signal.YELLOW: 3, Signal.GREEN: 4}
-MODE_CONSTANT = 3
 TRAJECTORY = 1
 # Choice: what nothing of ours has. Heights are usual ones, and a long body is a truck.
 CAR_HEIGHT_M, TRUCK_HEIGHT_M, WALKER_HEIGHT_M = 1.5, 3.0, 1.75
@@ -38,8 +37,9 @@ class OsiEgo(ABC):
 
         Args:
           ground_truth: `osi3.GroundTruth` of what it perceives and of nothing else: its own car, `host_vehicle_id`, and
-            others as `moving_object`; the signal ahead as a `traffic_light` at its stop line; its way as the
-            `reference_line`.
+            others as `moving_object`; the signal ahead as the first `traffic_light`, at its stop line, then one for
+            each stop line of the road; its way as the `reference_line`; the road as `lane`, `lane_boundary` and, with
+            its speed limit, `logical_lane`.
 
         Returns:
           `osi3.MotionRequest` with a desired trajectory, or a desired state, of the middle of the rear axle.
@@ -49,17 +49,18 @@ class OsiEgo(ABC):
         """Begins an episode."""
         self._vehicle = episode.vehicle
         self._numbers: dict[str, int] = {}
+        self._road, self._lanes = episode.road, road_message(episode.road)
 
     def act(self, perceived: Perceived) -> Trajectory:
         """Answers one step in OSI."""
-        request = self.drive(ground_truth(perceived, self._numbers))
+        request = self.drive(ground_truth(perceived, self._numbers, self._road) + self._lanes)
         return trajectory_of(request, perceived, self._vehicle.wheelbase_m / 2)
 
     def close(self) -> None:  # noqa: B027 - whoever holds something overrides it
         """Holds nothing."""
 
 
-def ground_truth(perceived: Perceived, numbers: dict[str, int]) -> bytes:
+def ground_truth(perceived: Perceived, numbers: dict[str, int], road: Road) -> bytes:
     """Returns what an ego perceives as `osi3.GroundTruth`; new actors are added to the numbers by id."""
     p = perceived
     for id_ in p.ids:
@@ -72,7 +73,9 @@ def ground_truth(perceived: Perceived, numbers: dict[str, int]) -> bytes:
         "timestamp": {"seconds": seconds, "nanos": nanos},
         "host_vehicle_id": {"value": numbers[p.ids[0]]},
         "moving_object": [_moving(p, column, numbers[id_]) for column, id_ in enumerate(p.ids)],
-        "traffic_light": [_light(p)] if p.signal in COLOURS and math.isfinite(p.stop_line_m) else [],
+        "traffic_light": (
+            ([_light(p)] if p.signal in COLOURS and math.isfinite(p.stop_line_m) else []) + lights(road, p.signals)
+        ),
         "reference_line": [{"id": {"value": SIGNAL_ID + 1}, "poly_line": line, "type": 0}],
     }
     encoded: bytes = osi_pb2.GroundTruth(**truth).SerializeToString()
@@ -138,7 +141,7 @@ def _light(perceived: Perceived) -> Mapping[str, Any]:
     return {
         "id": {"value": SIGNAL_ID},
         "base": {"position": _vector(x, y)},
-        "classification": {"color": COLOURS[perceived.signal], "mode": MODE_CONSTANT},
+        "classification": {"color": COLOURS[perceived.signal], "mode": CONSTANT},
     }
 
 

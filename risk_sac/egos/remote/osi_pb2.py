@@ -24,7 +24,7 @@ _sym_db = _symbol_database.Default()
 
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1erisk_sac/egos/remote/osi.proto\x12\x0crisk_sac.osi\"W\n\x10InterfaceVersion\x12\x15\n\rversion_major\x18\x01 \x01(\r\x12\x15\n\rversion_minor\x18\x02 \x01(\r\x12\x15\n\rversion_patch\x18\x03 \x01(\r\"+\n\tTimestamp\x12\x0f\n\x07seconds\x18\x01 \x01(\x03\x12\r\n\x05nanos\x18\x02 \x01(\r\"\x1b\n\nIdentifier\x12\r\n\x05value\x18\x01 \x01(\x04\"+\n\x08Vector3d\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\t\n\x01z\x18\x03 \x01(\x01\"<\n\x0b\x44imension3d\x12\x0e\n\x06length\x18\x01 \x01(\x01\x12\r\n\x05width\x18\x02 \x01(\x01\x12\x0e\n\x06height\x18\x03 \x01(\x01\"9\n\rOrientation3d\x12\x0c\n\x04roll\x18\x01 \x01(\x01\x12\r\n\x05pitch\x18\x02 \x01(\x01\x12\x0b\n\x03yaw\x18\x03 \x01(\x01\"\xc0\x01\n\nBaseMoving\x12,\n\tdimension\x18\x01 \x01(\x0b\x32\x19.risk_sac.osi.Dimension3d\x12(\n\x08position\x18\x02 \x01(\x0b\x32\x16.risk_sac.osi.Vector3d\x12\x30\n\x0borientation\x18\x03 \x01(\x0b\x32\x1b.risk_sac.osi.Orientation3d\x12(\n\x08velocity\x18\x04 \x01(\x0b\x32\x16.risk_sac.osi.Vector3d\":\n\x0e\x42\x61seStationary\x12(\n\x08position\x18\x02 \x01(\x0b\x32\x16.risk_sac.osi.Vector3d\"%\n\x15VehicleClassification\x12\x0c\n\x04type\x18\x01 \x01(\x05\"\xaf\x01\n\x0cMovingObject\x12$\n\x02id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12&\n\x04\x62\x61se\x18\x02 \x01(\x0b\x32\x18.risk_sac.osi.BaseMoving\x12\x0c\n\x04type\x18\x03 \x01(\x05\x12\x43\n\x16vehicle_classification\x18\x06 \x01(\x0b\x32#.risk_sac.osi.VehicleClassification\"9\n\x1aTrafficLightClassification\x12\r\n\x05\x63olor\x18\x01 \x01(\x05\x12\x0c\n\x04mode\x18\x03 \x01(\x05\"\xa2\x01\n\x0cTrafficLight\x12$\n\x02id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12*\n\x04\x62\x61se\x18\x02 \x01(\x0b\x32\x1c.risk_sac.osi.BaseStationary\x12@\n\x0e\x63lassification\x18\x03 \x01(\x0b\x32(.risk_sac.osi.TrafficLightClassification\"X\n\x12ReferenceLinePoint\x12.\n\x0eworld_position\x18\x01 \x01(\x0b\x32\x16.risk_sac.osi.Vector3d\x12\x12\n\ns_position\x18\x02 \x01(\x01\"x\n\rReferenceLine\x12$\n\x02id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12\x33\n\tpoly_line\x18\x02 \x03(\x0b\x32 .risk_sac.osi.ReferenceLinePoint\x12\x0c\n\x04type\x18\x03 \x01(\x05\"\xb8\x02\n\x0bGroundTruth\x12/\n\x07version\x18\x01 \x01(\x0b\x32\x1e.risk_sac.osi.InterfaceVersion\x12*\n\ttimestamp\x18\x02 \x01(\x0b\x32\x17.risk_sac.osi.Timestamp\x12\x31\n\x0fhost_vehicle_id\x18\x03 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12\x31\n\rmoving_object\x18\x05 \x03(\x0b\x32\x1a.risk_sac.osi.MovingObject\x12\x31\n\rtraffic_light\x18\x07 \x03(\x0b\x32\x1a.risk_sac.osi.TrafficLight\x12\x33\n\x0ereference_line\x18\x11 \x03(\x0b\x32\x1b.risk_sac.osi.ReferenceLine\"\xc0\x01\n\x0c\x44\x65siredState\x12*\n\ttimestamp\x18\x01 \x02(\x0b\x32\x17.risk_sac.osi.Timestamp\x12(\n\x08position\x18\x02 \x02(\x0b\x32\x16.risk_sac.osi.Vector3d\x12\x30\n\x0borientation\x18\x03 \x02(\x0b\x32\x1b.risk_sac.osi.Orientation3d\x12(\n\x08velocity\x18\x04 \x02(\x0b\x32\x16.risk_sac.osi.Vector3d\"\x94\x01\n\nStatePoint\x12*\n\ttimestamp\x18\x01 \x02(\x0b\x32\x17.risk_sac.osi.Timestamp\x12(\n\x08position\x18\x02 \x02(\x0b\x32\x16.risk_sac.osi.Vector3d\x12\x30\n\x0borientation\x18\x03 \x02(\x0b\x32\x1b.risk_sac.osi.Orientation3d\"G\n\x11\x44\x65siredTrajectory\x12\x32\n\x10trajectory_point\x18\x01 \x03(\x0b\x32\x18.risk_sac.osi.StatePoint\"\xf9\x01\n\rMotionRequest\x12/\n\x07version\x18\x01 \x01(\x0b\x32\x1e.risk_sac.osi.InterfaceVersion\x12*\n\ttimestamp\x18\x02 \x01(\x0b\x32\x17.risk_sac.osi.Timestamp\x12\x1b\n\x13motion_request_type\x18\x03 \x01(\x05\x12\x31\n\rdesired_state\x18\x04 \x01(\x0b\x32\x1a.risk_sac.osi.DesiredState\x12;\n\x12\x64\x65sired_trajectory\x18\x05 \x01(\x0b\x32\x1f.risk_sac.osi.DesiredTrajectory')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\x1erisk_sac/egos/remote/osi.proto\x12\x0crisk_sac.osi\"W\n\x10InterfaceVersion\x12\x15\n\rversion_major\x18\x01 \x01(\r\x12\x15\n\rversion_minor\x18\x02 \x01(\r\x12\x15\n\rversion_patch\x18\x03 \x01(\r\"+\n\tTimestamp\x12\x0f\n\x07seconds\x18\x01 \x01(\x03\x12\r\n\x05nanos\x18\x02 \x01(\r\"\x1b\n\nIdentifier\x12\r\n\x05value\x18\x01 \x01(\x04\"+\n\x08Vector3d\x12\t\n\x01x\x18\x01 \x01(\x01\x12\t\n\x01y\x18\x02 \x01(\x01\x12\t\n\x01z\x18\x03 \x01(\x01\"<\n\x0b\x44imension3d\x12\x0e\n\x06length\x18\x01 \x01(\x01\x12\r\n\x05width\x18\x02 \x01(\x01\x12\x0e\n\x06height\x18\x03 \x01(\x01\"9\n\rOrientation3d\x12\x0c\n\x04roll\x18\x01 \x01(\x01\x12\r\n\x05pitch\x18\x02 \x01(\x01\x12\x0b\n\x03yaw\x18\x03 \x01(\x01\"\xc0\x01\n\nBaseMoving\x12,\n\tdimension\x18\x01 \x01(\x0b\x32\x19.risk_sac.osi.Dimension3d\x12(\n\x08position\x18\x02 \x01(\x0b\x32\x16.risk_sac.osi.Vector3d\x12\x30\n\x0borientation\x18\x03 \x01(\x0b\x32\x1b.risk_sac.osi.Orientation3d\x12(\n\x08velocity\x18\x04 \x01(\x0b\x32\x16.risk_sac.osi.Vector3d\":\n\x0e\x42\x61seStationary\x12(\n\x08position\x18\x02 \x01(\x0b\x32\x16.risk_sac.osi.Vector3d\"%\n\x15VehicleClassification\x12\x0c\n\x04type\x18\x01 \x01(\x05\"\xaf\x01\n\x0cMovingObject\x12$\n\x02id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12&\n\x04\x62\x61se\x18\x02 \x01(\x0b\x32\x18.risk_sac.osi.BaseMoving\x12\x0c\n\x04type\x18\x03 \x01(\x05\x12\x43\n\x16vehicle_classification\x18\x06 \x01(\x0b\x32#.risk_sac.osi.VehicleClassification\"m\n\x1aTrafficLightClassification\x12\r\n\x05\x63olor\x18\x01 \x01(\x05\x12\x0c\n\x04mode\x18\x03 \x01(\x05\x12\x32\n\x10\x61ssigned_lane_id\x18\x05 \x03(\x0b\x32\x18.risk_sac.osi.Identifier\"\xa2\x01\n\x0cTrafficLight\x12$\n\x02id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12*\n\x04\x62\x61se\x18\x02 \x01(\x0b\x32\x1c.risk_sac.osi.BaseStationary\x12@\n\x0e\x63lassification\x18\x03 \x01(\x0b\x32(.risk_sac.osi.TrafficLightClassification\"X\n\x12ReferenceLinePoint\x12.\n\x0eworld_position\x18\x01 \x01(\x0b\x32\x16.risk_sac.osi.Vector3d\x12\x12\n\ns_position\x18\x02 \x01(\x01\"x\n\rReferenceLine\x12$\n\x02id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12\x33\n\tpoly_line\x18\x02 \x03(\x0b\x32 .risk_sac.osi.ReferenceLinePoint\x12\x0c\n\x04type\x18\x03 \x01(\x05\"x\n\x0bLanePairing\x12\x34\n\x12\x61ntecessor_lane_id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12\x33\n\x11successor_lane_id\x18\x02 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\"\x8e\x03\n\x12LaneClassification\x12\x0c\n\x04type\x18\x01 \x01(\x05\x12*\n\ncenterline\x18\x03 \x03(\x0b\x32\x16.risk_sac.osi.Vector3d\x12\'\n\x1f\x63\x65nterline_is_driving_direction\x18\x04 \x01(\x08\x12\x37\n\x15left_adjacent_lane_id\x18\x05 \x03(\x0b\x32\x18.risk_sac.osi.Identifier\x12\x38\n\x16right_adjacent_lane_id\x18\x06 \x03(\x0b\x32\x18.risk_sac.osi.Identifier\x12/\n\x0clane_pairing\x18\x07 \x03(\x0b\x32\x19.risk_sac.osi.LanePairing\x12\x38\n\x16right_lane_boundary_id\x18\x08 \x03(\x0b\x32\x18.risk_sac.osi.Identifier\x12\x37\n\x15left_lane_boundary_id\x18\t \x03(\x0b\x32\x18.risk_sac.osi.Identifier\"f\n\x04Lane\x12$\n\x02id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12\x38\n\x0e\x63lassification\x18\x02 \x01(\x0b\x32 .risk_sac.osi.LaneClassification\"9\n\rBoundaryPoint\x12(\n\x08position\x18\x01 \x01(\x0b\x32\x16.risk_sac.osi.Vector3d\"*\n\x1aLaneBoundaryClassification\x12\x0c\n\x04type\x18\x01 \x01(\x05\"\xaa\x01\n\x0cLaneBoundary\x12$\n\x02id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12\x32\n\rboundary_line\x18\x02 \x03(\x0b\x32\x1b.risk_sac.osi.BoundaryPoint\x12@\n\x0e\x63lassification\x18\x03 \x01(\x0b\x32(.risk_sac.osi.LaneBoundaryClassification\"5\n\x10TrafficSignValue\x12\r\n\x05value\x18\x01 \x01(\x01\x12\x12\n\nvalue_unit\x18\x02 \x01(\x05\"G\n\nSpeedLimit\x12\x39\n\x11speed_limit_value\x18\x01 \x01(\x0b\x32\x1e.risk_sac.osi.TrafficSignValue\"W\n\x0bTrafficRule\x12\x19\n\x11traffic_rule_type\x18\x01 \x01(\x05\x12-\n\x0bspeed_limit\x18\x03 \x01(\x0b\x32\x18.risk_sac.osi.SpeedLimit\"K\n\x15PhysicalLaneReference\x12\x32\n\x10physical_lane_id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\"\xb8\x01\n\x0bLogicalLane\x12$\n\x02id\x18\x01 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12\x0c\n\x04type\x18\x02 \x01(\x05\x12\x44\n\x17physical_lane_reference\x18\x04 \x03(\x0b\x32#.risk_sac.osi.PhysicalLaneReference\x12/\n\x0ctraffic_rule\x18\x11 \x03(\x0b\x32\x19.risk_sac.osi.TrafficRule\"\xbe\x03\n\x0bGroundTruth\x12/\n\x07version\x18\x01 \x01(\x0b\x32\x1e.risk_sac.osi.InterfaceVersion\x12*\n\ttimestamp\x18\x02 \x01(\x0b\x32\x17.risk_sac.osi.Timestamp\x12\x31\n\x0fhost_vehicle_id\x18\x03 \x01(\x0b\x32\x18.risk_sac.osi.Identifier\x12\x31\n\rmoving_object\x18\x05 \x03(\x0b\x32\x1a.risk_sac.osi.MovingObject\x12\x31\n\rtraffic_light\x18\x07 \x03(\x0b\x32\x1a.risk_sac.osi.TrafficLight\x12\x31\n\rlane_boundary\x18\t \x03(\x0b\x32\x1a.risk_sac.osi.LaneBoundary\x12 \n\x04lane\x18\n \x03(\x0b\x32\x12.risk_sac.osi.Lane\x12\x33\n\x0ereference_line\x18\x11 \x03(\x0b\x32\x1b.risk_sac.osi.ReferenceLine\x12/\n\x0clogical_lane\x18\x13 \x03(\x0b\x32\x19.risk_sac.osi.LogicalLane\"\xc0\x01\n\x0c\x44\x65siredState\x12*\n\ttimestamp\x18\x01 \x02(\x0b\x32\x17.risk_sac.osi.Timestamp\x12(\n\x08position\x18\x02 \x02(\x0b\x32\x16.risk_sac.osi.Vector3d\x12\x30\n\x0borientation\x18\x03 \x02(\x0b\x32\x1b.risk_sac.osi.Orientation3d\x12(\n\x08velocity\x18\x04 \x02(\x0b\x32\x16.risk_sac.osi.Vector3d\"\x94\x01\n\nStatePoint\x12*\n\ttimestamp\x18\x01 \x02(\x0b\x32\x17.risk_sac.osi.Timestamp\x12(\n\x08position\x18\x02 \x02(\x0b\x32\x16.risk_sac.osi.Vector3d\x12\x30\n\x0borientation\x18\x03 \x02(\x0b\x32\x1b.risk_sac.osi.Orientation3d\"G\n\x11\x44\x65siredTrajectory\x12\x32\n\x10trajectory_point\x18\x01 \x03(\x0b\x32\x18.risk_sac.osi.StatePoint\"\xf9\x01\n\rMotionRequest\x12/\n\x07version\x18\x01 \x01(\x0b\x32\x1e.risk_sac.osi.InterfaceVersion\x12*\n\ttimestamp\x18\x02 \x01(\x0b\x32\x17.risk_sac.osi.Timestamp\x12\x1b\n\x13motion_request_type\x18\x03 \x01(\x05\x12\x31\n\rdesired_state\x18\x04 \x01(\x0b\x32\x1a.risk_sac.osi.DesiredState\x12;\n\x12\x64\x65sired_trajectory\x18\x05 \x01(\x0b\x32\x1f.risk_sac.osi.DesiredTrajectory')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -52,21 +52,43 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_MOVINGOBJECT']._serialized_start=672
   _globals['_MOVINGOBJECT']._serialized_end=847
   _globals['_TRAFFICLIGHTCLASSIFICATION']._serialized_start=849
-  _globals['_TRAFFICLIGHTCLASSIFICATION']._serialized_end=906
-  _globals['_TRAFFICLIGHT']._serialized_start=909
-  _globals['_TRAFFICLIGHT']._serialized_end=1071
-  _globals['_REFERENCELINEPOINT']._serialized_start=1073
-  _globals['_REFERENCELINEPOINT']._serialized_end=1161
-  _globals['_REFERENCELINE']._serialized_start=1163
-  _globals['_REFERENCELINE']._serialized_end=1283
-  _globals['_GROUNDTRUTH']._serialized_start=1286
-  _globals['_GROUNDTRUTH']._serialized_end=1598
-  _globals['_DESIREDSTATE']._serialized_start=1601
-  _globals['_DESIREDSTATE']._serialized_end=1793
-  _globals['_STATEPOINT']._serialized_start=1796
-  _globals['_STATEPOINT']._serialized_end=1944
-  _globals['_DESIREDTRAJECTORY']._serialized_start=1946
-  _globals['_DESIREDTRAJECTORY']._serialized_end=2017
-  _globals['_MOTIONREQUEST']._serialized_start=2020
-  _globals['_MOTIONREQUEST']._serialized_end=2269
+  _globals['_TRAFFICLIGHTCLASSIFICATION']._serialized_end=958
+  _globals['_TRAFFICLIGHT']._serialized_start=961
+  _globals['_TRAFFICLIGHT']._serialized_end=1123
+  _globals['_REFERENCELINEPOINT']._serialized_start=1125
+  _globals['_REFERENCELINEPOINT']._serialized_end=1213
+  _globals['_REFERENCELINE']._serialized_start=1215
+  _globals['_REFERENCELINE']._serialized_end=1335
+  _globals['_LANEPAIRING']._serialized_start=1337
+  _globals['_LANEPAIRING']._serialized_end=1457
+  _globals['_LANECLASSIFICATION']._serialized_start=1460
+  _globals['_LANECLASSIFICATION']._serialized_end=1858
+  _globals['_LANE']._serialized_start=1860
+  _globals['_LANE']._serialized_end=1962
+  _globals['_BOUNDARYPOINT']._serialized_start=1964
+  _globals['_BOUNDARYPOINT']._serialized_end=2021
+  _globals['_LANEBOUNDARYCLASSIFICATION']._serialized_start=2023
+  _globals['_LANEBOUNDARYCLASSIFICATION']._serialized_end=2065
+  _globals['_LANEBOUNDARY']._serialized_start=2068
+  _globals['_LANEBOUNDARY']._serialized_end=2238
+  _globals['_TRAFFICSIGNVALUE']._serialized_start=2240
+  _globals['_TRAFFICSIGNVALUE']._serialized_end=2293
+  _globals['_SPEEDLIMIT']._serialized_start=2295
+  _globals['_SPEEDLIMIT']._serialized_end=2366
+  _globals['_TRAFFICRULE']._serialized_start=2368
+  _globals['_TRAFFICRULE']._serialized_end=2455
+  _globals['_PHYSICALLANEREFERENCE']._serialized_start=2457
+  _globals['_PHYSICALLANEREFERENCE']._serialized_end=2532
+  _globals['_LOGICALLANE']._serialized_start=2535
+  _globals['_LOGICALLANE']._serialized_end=2719
+  _globals['_GROUNDTRUTH']._serialized_start=2722
+  _globals['_GROUNDTRUTH']._serialized_end=3168
+  _globals['_DESIREDSTATE']._serialized_start=3171
+  _globals['_DESIREDSTATE']._serialized_end=3363
+  _globals['_STATEPOINT']._serialized_start=3366
+  _globals['_STATEPOINT']._serialized_end=3514
+  _globals['_DESIREDTRAJECTORY']._serialized_start=3516
+  _globals['_DESIREDTRAJECTORY']._serialized_end=3587
+  _globals['_MOTIONREQUEST']._serialized_start=3590
+  _globals['_MOTIONREQUEST']._serialized_end=3839
 # @@protoc_insertion_point(module_scope)

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.egos import Lane, StopLine
 from risk_sac.egos.registry import SHIPPED
 from risk_sac.egos.remote.osi import OsiEgo, ground_truth, trajectory_of
 from risk_sac.egos.remote.osi_pb2 import GroundTruth, MotionRequest
+from risk_sac.egos.remote.osi_road import road_message
 from risk_sac.egos.seam import Perceived
 from risk_sac.env import RiskSacEnv
-from risk_sac.types import HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Kind, Signal, X, Y
+from risk_sac.types import HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Kind, Road, Signal, X, Y
 
 AHEAD_S, STEP_S = 2.0, 0.5
 
@@ -71,14 +73,63 @@ def perceived() -> Perceived:
 
 def test_what_is_told_is_an_osi_ground_truth() -> None:
     """The literal is what `osi3.GroundTruth.FromString` read, `SerializeToString` wrote again, byte for byte."""
-    assert ground_truth(perceived(), {}).hex() == GROUND_TRUTH
+    assert ground_truth(perceived(), {}, Road()).hex() == GROUND_TRUTH
+
+
+A, B, THROUGH = (
+    Lane("a_0", np.array([[0.0, 50.0], [0.0, 0.0]]), 4.0, 12.5, "a_1", "", True, False, (":j_0",), True),
+    Lane("a_1", np.array([[0.0, 50.0], [4.0, 4.0]]), 4.0, 12.5, "", "a_0", False, False, (), False),
+    Lane(":j_0", np.array([[50.0, 60.0], [0.0, 0.0]]), 4.0, 10.0, "", "", False, False, (), True),
+)
+ROAD = Road((A, B, THROUGH), (StopLine("a_0", ":j_0", "j", 0),))
+# Written by osi3.
+ROAD_MESSAGE = (
+    "4a4a0a06088080808040121d0a1b090000000000000000110000000000000040190000000000000000121d0a1b090000000000004940"
+    "1100000000000000401900000000000000001a0208044a4a0a06088180808040121d0a1b0900000000000000001100000000000000c0"
+    "190000000000000000121d0a1b0900000000000049401100000000000000c01900000000000000001a0208064a4a0a06088280808040"
+    "121d0a1b090000000000000000110000000000001840190000000000000000121d0a1b09000000000000494011000000000000184019"
+    "00000000000000001a0208064a4a0a06088380808040121d0a1b09000000000000000011000000000000004019000000000000000012"
+    "1d0a1b0900000000000049401100000000000000401900000000000000001a0208034a4a0a06088480808040121d0a1b090000000000"
+    "004940110000000000000040190000000000000000121d0a1b090000000000004e401100000000000000401900000000000000001a02"
+    "08024a4a0a06088580808040121d0a1b0900000000000049401100000000000000c0190000000000000000121d0a1b09000000000000"
+    "4e401100000000000000c01900000000000000001a020802526a0a06088080808020126008021a1b0900000000000000001100000000"
+    "000000001900000000000000001a1b09000000000000494011000000000000000019000000000000000020012a060881808080203a08"
+    "120608828080802042060881808080404a0608808080804052600a06088180808020125608021a1b0900000000000000001100000000"
+    "000010401900000000000000001a1b090000000000004940110000000000001040190000000000000000200132060880808080204206"
+    "0883808080404a0608828080804052620a06088280808020125808041a1b090000000000004940110000000000000000190000000000"
+    "0000001a1b090000000000004e4011000000000000000019000000000000000020013a080a0608808080802042060885808080404a06"
+    "0884808080409a01290a0708808080808001100222080a060880808080208a011108001a0d0a0b09000000000080464010039a01290a"
+    "0708818080808001100222080a060881808080208a011108001a0d0a0b09000000000080464010039a01290a07088280808080011002"
+    "22080a060882808080208a011108001a0d0a0b0900000000000042401003"
+)
+
+
+def test_the_road_is_told_as_osi_lanes() -> None:
+    """The literal is what `osi3.GroundTruth.FromString` read, `SerializeToString` wrote again, byte for byte."""
+    assert road_message(ROAD).hex() == ROAD_MESSAGE
+    own = ground_truth(perceived()._replace(signals=(Signal.YELLOW,)), {}, ROAD)
+    truth = GroundTruth.FromString(own + road_message(ROAD))
+    first, second, through = truth.lane
+    assert [each.value for each in first.classification.left_adjacent_lane_id] == [second.id.value]
+    assert first.classification.lane_pairing[0].successor_lane_id == through.id
+    assert through.classification.lane_pairing[0].antecessor_lane_id == first.id
+    left, right = truth.lane_boundary[:2]
+    assert [point.position.y for point in left.boundary_line] == [2.0, 2.0]
+    assert (left.classification.type, right.classification.type) == (4, 6)  # dashed, edge of the road
+    assert truth.lane_boundary[3].classification.type == 3  # solid
+    assert truth.logical_lane[0].traffic_rule[0].speed_limit.speed_limit_value.value == 45.0
+    ahead, at_line = truth.traffic_light
+    assert (ahead.classification.color, at_line.classification.color) == (2, 3)  # red, as perceived ahead; yellow
+    assert at_line.base.position.x == 50.0
+    assert list(at_line.classification.assigned_lane_id) == [through.id]
+    assert len(truth.moving_object) == 3
 
 
 def test_actors_keep_their_numbers() -> None:
     numbers: dict[str, int] = {}
-    ground_truth(perceived(), numbers)
+    ground_truth(perceived(), numbers, Road())
     later = perceived()._replace(ids=("ego", "walker", "new"))
-    told = GroundTruth.FromString(ground_truth(later, numbers))
+    told = GroundTruth.FromString(ground_truth(later, numbers, Road()))
     assert [each.id.value for each in told.moving_object] == [1, 3, 4]
     assert told.host_vehicle_id.value == 1
 

@@ -7,13 +7,14 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from typing import Any
 
 import grpc
 import numpy as np
 import pytest
 
-from risk_sac.egos import Control, Episode, Perceived, Trajectory
+from risk_sac.egos import Control, Episode, Lane, Perceived, Road, StopLine, Trajectory
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.remote.client import RemoteEgo
 from risk_sac.egos.remote.ego_pb2 import CloseReply, Command, Observation, StartReply
@@ -242,3 +243,43 @@ def test_thirty_sessions_are_served_at_a_time_and_end_with_their_streams() -> No
             assert closed.acquire(timeout=PATIENT_S)
         for ego in egos[20:]:
             ego._stream.close()
+
+
+LINE = np.array([[0.0, 50.0, 90.0], [1.5, 1.5, -2.0]])
+ROAD = Road(
+    (
+        Lane("a_0", LINE, 3.5, 13.9, "a_1", "", True, False, (":j_0",), True),
+        Lane("a_1", LINE + 3.5, 3.5, 13.9, "", "a_0", False, True, (), False),
+    ),
+    (StopLine("a_0", ":j_0", "j", 4),),
+)
+
+
+def test_a_served_ego_is_told_the_road_and_its_signals() -> None:
+    told: list[Episode] = []
+    seen: list[Perceived] = []
+
+    class Listening:
+        def reset(self, episode: Episode) -> None:
+            told.append(episode)
+
+        def act(self, perceived: Perceived) -> Control:
+            seen.append(perceived)
+            return Control(0.0)
+
+        def close(self) -> None:
+            pass
+
+    server, port = serve(Sessions(Listening, "1"), "127.0.0.1:0")
+    ego = RemoteEgo("far", f"127.0.0.1:{port}", "1", PATIENT_S)
+    try:
+        ego.reset(replace(EPISODE, road=ROAD))
+        ego.act(perceived(0.0)._replace(signals=(Signal.YELLOW,)))
+    finally:
+        ego.close()
+        server.stop(0)
+    for lane, sent in zip(told[0].road.lanes, ROAD.lanes, strict=True):
+        np.testing.assert_array_equal(lane.line, sent.line)
+        assert lane._replace(line=None) == sent._replace(line=None)
+    assert told[0].road.stop_lines == ROAD.stop_lines
+    assert seen[0].signals == (Signal.YELLOW,)
