@@ -4,6 +4,7 @@ Source: ASAM OSI 3.8, osi_lane.proto, osi_logicallane.proto and osi_trafficlight
 """
 
 from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 from risk_sac.egos.remote import osi_pb2
@@ -16,6 +17,7 @@ NO_LINE, SOLID, DASHED, ROAD_EDGE = 2, 3, 4, 6
 SPEED_LIMIT, KMH = 0, 3
 COLOURS = {Signal.RED: 2, Signal.YELLOW: 3, Signal.GREEN: 4}
 CONSTANT = 3
+PAIR = ("antecessor_lane_id", "successor_lane_id")
 # Ids beyond those of actors, which count from 1.
 LIGHT_ID, LANE_ID, BOUNDARY_ID, LOGICAL_ID = (1 << 32) + 2, 1 << 33, 1 << 34, 1 << 35
 
@@ -35,7 +37,7 @@ def road_message(road: Road) -> bytes:
 def lights(road: Road, signals: tuple[Signal, ...]) -> list[Mapping[str, Any]]:
     """Returns a light for each stop line, at its lane's end, assigned to the lane behind."""
     lanes = {lane.id: (number, lane) for number, lane in enumerate(road.lanes)}
-    found = []
+    found: list[Mapping[str, Any]] = []
     for number, (line, signal) in enumerate(zip(road.stop_lines, signals, strict=True)):
         assigned, _ = lanes[line.leads_to]
         _, before = lanes[line.lane]
@@ -51,11 +53,12 @@ def lights(road: Road, signals: tuple[Signal, ...]) -> list[Mapping[str, Any]]:
 
 def _lane(lane: Lane, numbers: Mapping[str, int], road: Road) -> Mapping[str, Any]:
     number = numbers[lane.id]
-    before = [numbers[other.id] for other in road.lanes if lane.id in other.successors]
-    after = [numbers[other] for other in lane.successors]
-    pairs = [(b, a) for b in before or [None] for a in after or [None] if (b, a) != (None, None)]
+    before: list[int | None] = [numbers[other.id] for other in road.lanes if lane.id in other.successors]
+    after: list[int | None] = [numbers[other] for other in lane.successors]
     pairing = [
-        {key: _id(LANE_ID + each) for key, each in zip(PAIR, pair, strict=True) if each is not None} for pair in pairs
+        {key: _id(LANE_ID + each) for key, each in zip(PAIR, pair, strict=True) if each is not None}
+        for pair in product(before or [None], after or [None])
+        if any(each is not None for each in pair)
     ]
     return {
         "id": _id(LANE_ID + number),
@@ -70,9 +73,6 @@ def _lane(lane: Lane, numbers: Mapping[str, int], road: Road) -> Mapping[str, An
             "right_lane_boundary_id": [_id(BOUNDARY_ID + 2 * number + 1)],
         },
     }
-
-
-PAIR = ("antecessor_lane_id", "successor_lane_id")
 
 
 def _boundaries(lane: Lane, numbers: Mapping[str, int]) -> list[Mapping[str, Any]]:
