@@ -126,16 +126,18 @@ def left_its_place(evidence: Evidence) -> int | None:
 def left_its_lane(evidence: Evidence, striker: int) -> int | None:
     """Finds the frame in which the ego left its lane and so came over to the striker; None if it did not.
 
-    Choice: it came over if it would not have touched the striker at the contact, or within 1 s after it, had it kept
-    its place.
+    Choice: it came over if it would not have touched the striker up to 1 s after the contact, had it kept its place.
     """
     left = left_its_place(evidence)
     if left is None:
         return None
-    path = lane_path(evidence, left - 1)
-    striking = at(recorded_motion(evidence, striker), len(path.s) - 1)
-    speed, size = float(evidence.speed_mps[-1, 0]), recorded_size(evidence, 0)
-    touches = time_to_touch(path, float(path.s[-1]), speed, size, striking, OVER_S) <= OVER_S
+    path, striking = lane_path(evidence, left - 1), recorded_motion(evidence, striker)
+    size, last = recorded_size(evidence, 0), len(path.s) - 1
+    for t in range(left, last):
+        if time_to_touch(path, float(path.s[t]), float(evidence.speed_mps[t, 0]), size, at(striking, t), 0.0) == 0.0:
+            return None
+    speed = float(evidence.speed_mps[last, 0])
+    touches = time_to_touch(path, float(path.s[last]), speed, size, at(striking, last), OVER_S) <= OVER_S
     return None if touches else left
 
 

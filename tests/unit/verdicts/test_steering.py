@@ -94,6 +94,14 @@ def test_who_comes_over_names_the_conflict(ego_mps: float, other_mps: float, exp
     assert judged(stage(ego, other)).conflict_type is expected
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_an_ego_that_swerves_away_from_a_passing_vehicle_did_not_come_over(side: int) -> None:
+    # Its rear corner has just left the ego's front; in its place the ego would have been touched 0.5 s before.
+    ego = sideways(straight(0.0, 0.0, 0.0, 12.0), 1.0, -side * 0.8, 0.5)
+    passing = sideways(straight(-3.95, side * LANE_M, 0.0, 14.0), 1.0, -side * 1.08, LANE_M)
+    assert judged(stage(ego, passing, contact=False, until_s=2.8)).conflict_type is ConflictType.CUT_IN
+
+
 def test_an_ego_that_swerves_away_from_a_cut_in_was_cut_in_on() -> None:
     beside = sideways(straight(3.0, LANE_M, 0.0, 12.0), 2.0, -1.8, 3 * LANE_M)
     swerves = sideways(straight(0.0, 0.0, 0.0, 12.0), 2.8, -0.9, LANE_M)
