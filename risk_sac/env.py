@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, RewardConfig, RunSpec, method_of
+from risk_sac.egos.defects.catalogue import settings_of
 from risk_sac.egos.pilot import EgoPilot
 from risk_sac.egos.registry import load
 from risk_sac.errors import InfeasibleScene, SimulationError
@@ -74,7 +75,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._perception = Perception(sensor.memory_s if sensor else 0.0, EVERYTHING)
         ego = load(problem.ego)
         self._pilot = None if ego is None else EgoPilot(ego)
-        self._sim = SumoSimulation(problem.ego, self._perception, self._pilot)
+        self._sim = SumoSimulation(problem.ego, self._perception, self._pilot, settings_of(problem.ego))
         self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, reward.softmin_sharpness)
         self._violated = ViolationDepth(problem.requirements)
         self._encoder = Encoder(problem.family, problem.space.dimension, len(problem.requirements))
@@ -176,6 +177,11 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         if collision is not None:
             info["collision"] = collision
         return self._observe(), reward, collision is not None, truncated, info
+
+    @property
+    def defect_reached_s(self) -> float | None:
+        """When a planted defect first changed a command, from the release; None if none has."""
+        return self._pilot.defect_reached_s if self._pilot and self.problem.ego.defects else None
 
     def signal_heads(self) -> bytes:
         """SUMO's letter of each link of each signal now, the signals in the order of their names."""

@@ -99,7 +99,7 @@ class Problem:
     def contact_alone_counts(self) -> bool:
         """Whether the ego can fail by contacts alone: SUMO's driver leaves no road and enters no junction on red."""
         counting = {each.name for each in self.requirements if each.counts == "failure"}
-        return self.ego.driver is None and counting <= SUMO_KEEPS | {NO_CONTACT}
+        return self.ego.driver is None and not self.ego.defects and counting <= SUMO_KEEPS | {NO_CONTACT}
 
     @property
     def speed_limit_mps(self) -> float:

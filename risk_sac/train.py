@@ -179,6 +179,7 @@ def _record(
         requirements=kept or {},
         violations=encounter.violations,
         collision=encounter.collision,
+        defect_reached_s=run.env.defect_reached_s if tally.steps else None,
     )
 
 

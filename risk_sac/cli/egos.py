@@ -15,6 +15,7 @@ from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, add_c
 from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_campaign, read_ego
+from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.egos.registry import SHIPPED, cards
 from risk_sac.machine import cores
 from risk_sac.metrics import COLUMNS as REQUIREMENT_COLUMNS
@@ -37,6 +38,7 @@ def add(commands: Commands) -> None:
     group = commands.add_parser("egos", help="who can drive, and how they compare")
     egos = group.add_subparsers(required=True, metavar="COMMAND")
     add_command(egos, "list", _list, "SUMO's models, the shipped egos, and those the operator has registered")
+    add_command(egos, "defects", _defects, "known faults that can be planted into an ego, such as idm-aeb+blind-right")
     summary = "the same search on equal budgets against each ego; the same command again goes on with it"
     ladder = add_command(egos, "ladder", _ladder, summary)
     names = ["default", *SHIPPED]
@@ -53,6 +55,14 @@ def _list(options: argparse.Namespace) -> int:
         table.add_row(name, "sumo", "", f"{response_s:g} s", "SUMO's models, named by `profile`")
     for card in cards():
         table.add_row(card.name, card.kind, card.version, f"{card.response_time_s:g} s", card.summary)
+    console.print(table)
+    return OK
+
+
+def _defects(options: argparse.Namespace) -> int:
+    table = Table("defect", "kind", "ego", "families", "sentence", box=SIMPLE_HEAD)
+    for name, defect in DEFECTS.items():
+        table.add_row(name, defect.kind, defect.base, " ".join(defect.families), defect.sentence)
     console.print(table)
     return OK
 

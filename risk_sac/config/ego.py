@@ -10,10 +10,11 @@ from risk_sac.errors import ConfigError
 
 CarFollowing = Literal["Krauss", "IDM", "EIDM", "ACC", "CACC"]
 EgoName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_-]{0,39}$")]
+MOST_DEFECTS = 10
 
 
 def _left_out(value: object) -> bool:
-    return value is None
+    return value in (None, ())
 
 
 class SensorConfig(Settings):
@@ -47,10 +48,13 @@ class EgoConfig(Settings):
     driver: Annotated[EgoName | None, Field(exclude_if=_left_out)] = None
     """Name of a registered ego, as `GET /v1/egos` lists them; null: SUMO's models drive."""
     version: Annotated[str | None, Field(exclude_if=_left_out, min_length=1, max_length=100)] = None
-    """Of the registered ego. It is filled in where a campaign is posted; a run refuses to go on with another one."""
+    """Of the registered ego and its defects. It is filled in where a campaign is posted; a run refuses to go on with
+    another one."""
     response_time_s: Annotated[float | None, Field(exclude_if=_left_out, ge=0.0, le=5.0)] = None
     """Time within which the ego responds, s; its time-to-collision requirement follows from it. By default what a
     registered ego declares, or `reaction_time_s`."""
+    defects: Annotated[tuple[EgoName, ...], Field(exclude_if=_left_out, max_length=MOST_DEFECTS)] = ()
+    """Known faults to plant into the ego, as `GET /v1/egos` lists them."""
 
     @property
     def response_s(self) -> float:
@@ -60,9 +64,12 @@ class EgoConfig(Settings):
     @model_validator(mode="before")
     @classmethod
     def _apply_profile(cls, data: object) -> object:
-        if isinstance(data, dict) and data.get("profile") == "perfect":
-            return {"reaction_time_s": 0.1, "sensor": None, **data}
-        return data
+        if not isinstance(data, dict):
+            return data
+        if isinstance(data.get("defects"), list):  # after this validator JSON's lists are no tuples any more
+            data = {**data, "defects": tuple(data["defects"])}
+        perfect = {"reaction_time_s": 0.1, "sensor": None} if data.get("profile") == "perfect" else {}
+        return {**perfect, **data}
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -72,8 +79,10 @@ class EgoConfig(Settings):
         if self.profile == "perfect" and (self.reaction_time_s > 0.1 or self.sensor is not None):
             remedy = "leave reaction_time_s and sensor out"
             raise ConfigError("profile", "'perfect', which has no delay and no sensor", "'default'", remedy)
-        if self.driver is None and self.version is not None:
+        if self.driver is None and not self.defects and self.version is not None:
             raise ConfigError("version", "a version without a driver", "that of a registered ego, which driver names")
+        if len(set(self.defects)) < len(self.defects):
+            raise ConfigError("defects", f"{list(self.defects)}", "each defect once")
         models = (self.profile, self.car_following, self.reaction_time_s)
         if self.driver is not None and models != ("default", "Krauss", 0.5):
             got = "a driver beside profile, car_following or reaction_time_s, which SUMO's drivers have"

@@ -48,14 +48,15 @@ def read_posted(file: Path | None, flags: Mapping[str, Any]) -> CampaignSpec | d
 
 
 def read_ego(text: str) -> EgoConfig:
-    """Returns the ego that a command line names: a profile, a registered ego, or a file with its fields.
+    """Returns the ego that a command line names: a profile or a registered ego, or a file with its fields.
 
-    Whether an ego of this name is registered is found out later.
+    Defects follow a name, such as `idm-aeb+blind-right`. Whether they and an ego of this name exist is found out later.
     """
-    if text in get_args(EgoConfig.model_fields["profile"].annotation):
-        return _validate(EgoConfig, {"profile": text})
-    if DRIVER.fullmatch(text) and not Path(text).exists():
-        return _validate(EgoConfig, {"driver": text})
+    name, *defects = text.split("+")
+    if name in get_args(EgoConfig.model_fields["profile"].annotation):
+        return _validate(EgoConfig, {"profile": name, "defects": defects})
+    if DRIVER.fullmatch(name) and not Path(text).exists():
+        return _validate(EgoConfig, {"driver": name, "defects": defects})
     return _validate(EgoConfig, read_fields(Path(text), "spec"))
 
 

@@ -56,6 +56,12 @@ class Guarded:
         with self._state if foreign else contextlib.nullcontext():
             self._ego = self._asked(make)
 
+    @property
+    def defect_reached_s(self) -> float | None:
+        """See `Planted.reached_s`, of an ego that has defects."""
+        reached_s: float | None = self._ego.reached_s  # type: ignore[attr-defined]
+        return reached_s
+
     def reset(self, episode: Episode) -> None:
         """Begins an episode.
 

@@ -91,6 +91,11 @@ class EgoPilot:
         self._motion = advance(self._motion, command.accel_mps2, command.steering_rad, self._vehicle, STEP_S)
         return self._motion
 
+    @property
+    def defect_reached_s(self) -> float | None:
+        """See `Planted.reached_s`, of an ego that has defects."""
+        return self._ego.defect_reached_s
+
     def close(self) -> None:
         """Closes the ego."""
         self._ego.close()

@@ -21,6 +21,8 @@ from risk_sac.config import EgoConfig, Settings
 from risk_sac.config.ego import EgoName
 from risk_sac.config.invalid import field_error
 from risk_sac.config.text import read_text
+from risk_sac.egos.defects.catalogue import planted, version_of
+from risk_sac.egos.defects.planted import Planted
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.seam import Ego
 from risk_sac.errors import ConfigError, EgoFailed
@@ -107,23 +109,30 @@ def card_of(name: str) -> EgoCard:
 
 
 def pinned(ego: EgoConfig) -> EgoConfig:
-    """Returns the ego with version and response time of the registered driver that it names.
+    """Returns the ego with version and response time of the registered driver that it names, and of its defects.
 
     Raises:
-      ConfigError: there is no such driver, or it has another version than the ego says.
+      ConfigError: there is no such driver or defect, a defect does not fit it, or it has another version than the ego
+        says.
     """
-    if ego.driver is None:
+    defects = planted(ego)
+    if ego.driver is None and not defects:
         return ego
-    card = card_of(ego.driver)
-    if ego.version not in (None, card.version):
+    card = None if ego.driver is None else card_of(ego.driver)
+    if defects and isinstance(card, RemoteCard):
+        got = f"{list(ego.defects)} for the ego {card.name!r}, which runs in a process of its own"
+        raise ConfigError("ego.defects", got, "a Python ego")
+    versions = ([card.version] if card else []) + ([version_of(ego)] if defects else [])
+    version = "+".join(versions)
+    if ego.version not in (None, version):
         raise ConfigError(
             "ego.version",
             f"{ego.version!r}",
-            f"{card.version!r}, of which the registered {card.name!r} is",
+            f"{version!r}, of which {card.name if card else 'the defects'!r} are here",
             "register the one that is wanted, or leave version out",
         )
-    response_s = card.response_time_s if ego.response_time_s is None else ego.response_time_s
-    return ego.model_copy(update={"version": card.version, "response_time_s": response_s})
+    response_s = card.response_time_s if card and ego.response_time_s is None else ego.response_time_s
+    return ego.model_copy(update={"version": version, "response_time_s": response_s})
 
 
 def load(ego: EgoConfig) -> Guarded | None:
@@ -141,8 +150,12 @@ def load(ego: EgoConfig) -> Guarded | None:
         remote = RemoteEgo(card.name, card.address, card.version, card.deadline_s)
         return Guarded(lambda: remote, card.deadline_s)
     point = _points()[card.name]
+    defects = planted(ego)
+
     try:
-        return Guarded(lambda: point.load()(), card.deadline_s, foreign=True)
+        return Guarded(
+            lambda: Planted(point.load(), defects) if defects else point.load()(), card.deadline_s, foreign=True
+        )
     except EgoFailed as failed:
         raise _wrong(point, str(failed)) from failed
 

@@ -32,6 +32,7 @@ class Played:
     violations: tuple[Violation, ...]  # without contact
     risk_return: float
     mean_cost: float
+    defect_reached_s: float | None
 
     @property
     def found(self) -> tuple[Collision | Violation, ...]:
@@ -53,6 +54,7 @@ class Played:
             "requirements": self.requirements,
             "violations": self.violations,
             "collision": self.collision,
+            "defect_reached_s": self.defect_reached_s,
         }
         return episode.model_copy(update=changes)
 
@@ -84,6 +86,7 @@ def play(env: RiskSacEnv, scene: Scene, seed: int, actions: Floats, policy: Poli
         violations=env.violations(requirements),
         risk_return=sum(rewards),
         mean_cost=sum(costs) / max(len(costs) - 1, 1),
+        defect_reached_s=env.defect_reached_s,
     )
 
 

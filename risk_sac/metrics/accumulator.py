@@ -23,6 +23,7 @@ FIELDS_ADDED_LATER = frozenset(
         "requirements",
         "violations",
         "failed",
+        "defect_reached_s",
     }
 )
 EMPTY: tuple[object, ...] = (None, (), {})

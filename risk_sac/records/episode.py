@@ -68,6 +68,8 @@ class EpisodeRecord(Record):
     violations: tuple[Violation, ...] = ()
     """Violations without contact of requirements that count."""
     collision: Collision | None = None
+    defect_reached_s: float | None = None
+    """When a planted defect first changed a command, from the release; null if none did, or SUMO drives the ego."""
 
     @property
     def valid_violations(self) -> tuple[Collision | Violation, ...]:

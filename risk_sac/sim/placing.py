@@ -1,5 +1,7 @@
 """Places an episode's vehicles and signal in SUMO."""
 
+from collections.abc import Mapping
+
 import libsumo
 
 from risk_sac.config import EgoConfig
@@ -7,6 +9,7 @@ from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.scenario.limits import GRAVITY_MPS2
 
 EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passenger cars
+LANE_CHANGE = "laneChangeModel."
 # So that the commanded lateral speed is the one driven; its limits are those of `risk_sac.sim.control`.
 STEERED = {"lcAccelLat": "100", "lcMaxSpeedLatStanding": "5", "lcMaxSpeedLatFactor": "1"}
 
@@ -16,13 +19,28 @@ def emergency_decel_mps2(friction: float) -> float:
     return min(EGO_EMERGENCY_DECEL_MPS2, friction * GRAVITY_MPS2)
 
 
-def place(layout: Layout, ego: EgoConfig) -> None:
-    """Places all vehicles of the layout; SUMO inserts them in its next step."""
+def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None:
+    """Places all vehicles of the layout; SUMO inserts them in its next step.
+
+    Args:
+      layout: of the episode.
+      ego: its driver.
+      settings: further ones of SUMO's driver of the ego: `tau`, or keys of SUMO's `vehicle.setParameter` for its
+        lane-change model, and of `vehicletype.setParameter` for the rest.
+    """
     ego_type = f"ego_{ego.car_following}"
     libsumo.vehicletype.setActionStepLength(ego_type, ego.reaction_time_s)
     libsumo.vehicletype.setEmergencyDecel(ego_type, emergency_decel_mps2(layout.friction))
     libsumo.vehicletype.setDecel(ego_type, min(EGO_DECEL_MPS2, layout.friction * GRAVITY_MPS2))
+    for name, value in settings.items():
+        if name == "tau":
+            libsumo.vehicletype.setTau(ego_type, value)
+        elif not name.startswith(LANE_CHANGE):
+            libsumo.vehicletype.setParameter(ego_type, name, f"{value:g}")
     _insert(layout.ego, ego_type)
+    for name, value in settings.items():
+        if name.startswith(LANE_CHANGE):
+            libsumo.vehicle.setParameter(layout.ego.id, name, f"{value:g}")
     for start in layout.vehicles:
         _insert(start, f"background_{start.body}")
     if layout.signal is not None:

@@ -47,13 +47,19 @@ class SumoSimulation:
     _reflex_mps2: float
     _moved: MovedEgo | None
 
-    def __init__(self, ego: EgoConfig, senses: Senses | None = None, pilot: Pilot | None = None) -> None:
+    def __init__(
+        self,
+        ego: EgoConfig,
+        senses: Senses | None = None,
+        pilot: Pilot | None = None,
+        settings: Mapping[str, float] | None = None,
+    ) -> None:
         """Starts nothing yet.
 
         Without senses the ego perceives everything. A pilot drives it in place of SUMO's models from `hand_over_ego`
-        on.
+        on. The settings are those of `place`.
         """
-        self._ego = ego
+        self._ego, self._settings = ego, settings or {}
         self._senses = senses or Perception(0.0, EVERYTHING)
         self._pilot = pilot
         self._walkers: dict[str, Walker] = {}
@@ -72,7 +78,7 @@ class SumoSimulation:
         options = ["-n", net, "-a", types, "--seed", str(seed), *OPTIONS]
         try:
             LIBSUMO.load(self, options)
-            place(layout, self._ego)
+            place(layout, self._ego, self._settings)
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise SimulationError(f"SUMO refused the layout of {layout.net}: {error}") from error

@@ -6,6 +6,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel
 
 from risk_sac.config import METHODS, EgoConfig, FamilyName, Method, MethodName, Odd, Requirement
+from risk_sac.egos.defects.catalogue import DEFECTS, DefectKind
 from risk_sac.egos.registry import cards
 from risk_sac.failures.export.formats import FORMATS, FormatName
 from risk_sac.records import Record
@@ -106,10 +107,23 @@ class Ego(Record):
     summary: str
 
 
+class Defect(Record):
+    """A known fault that `ego.defects` of a campaign plants into its ego."""
+
+    name: str
+    kind: DefectKind
+    """sumo: for SUMO's driver; the others: for egos of kind python."""
+    sentence: str
+    """What the ego does wrong."""
+    families: list[str]
+    """In which it matters."""
+
+
 class Egos(Record):
     """All egos; the operator registers them."""
 
     items: list[Ego]
+    defects: list[Defect]
 
 
 class Methods(Record):
@@ -153,7 +167,7 @@ def list_formats() -> ExportFormats:
 
 @router.get("/egos")
 def list_egos() -> Egos:
-    """Drivers of the ego: SUMO's models by profile, and the egos that the operator has registered."""
+    """Drivers of the ego: SUMO's models by profile, and egos that the operator has registered; and known faults."""
     models = [
         Ego(
             name=name,
@@ -165,7 +179,8 @@ def list_egos() -> Egos:
         )
         for name, summary in PROFILES.items()
     ]
-    return Egos(items=[*models, *(_told(Ego, card) for card in cards())])
+    defects = [_told(Defect, defect) for defect in DEFECTS.values()]
+    return Egos(items=[*models, *(_told(Ego, card) for card in cards())], defects=defects)
 
 
 @router.get("/methods")
