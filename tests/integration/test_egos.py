@@ -234,6 +234,31 @@ def test_a_request_names_only_what_is_registered(client):
     assert not any("address" in item for item in items.values())
 
 
+def test_a_request_names_only_defects_that_exist_and_fit(client):
+    body = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 1}}
+    for ego in ({"driver": "idm-aeb", "defects": ["blind"]}, {"defects": ["latency"]}):
+        refused = client.post("/v1/campaigns", json=body | {"ego": ego})
+        assert refused.status_code == 422
+        assert refused.json()["errors"][0]["field"] == "ego.defects"
+    listed = {item["name"]: item["kind"] for item in client.get("/v1/egos").json()["defects"]}
+    assert listed["latency"] == "perception"
+
+
+def test_an_ego_in_another_process_has_no_defects(tmp_path, monkeypatch):
+    register(monkeypatch, tmp_path, far='address = "127.0.0.1:1"\nversion = "1"\nresponse_time_s = 1.0\n')
+    with pytest.raises(ConfigError, match=r"ego\.defects: got \['latency'\] for the ego 'far'.*wanted a Python ego"):
+        pinned(EgoConfig(driver="far", defects=("latency",)))
+
+
+@pytest.mark.parametrize("ego", [{"driver": "idm-aeb", "defects": ("latency",)}, {"defects": ("sumo-short-headway",)}])
+def test_records_say_when_a_defect_was_reached_and_runs_repeat(ego, tmp_path):
+    spec = spec_of("idm-aeb", episodes=4).model_copy(update={"ego": EgoConfig.model_validate(ego)})
+    (first, records), (second, _) = play(spec, tmp_path / "first"), play(spec, tmp_path / "second")
+    assert first.digest == second.digest
+    reached = [record.defect_reached_s for record in records if record.steps]
+    assert all((reached_s is not None) is ("driver" in ego) for reached_s in reached)
+
+
 def test_a_campaign_keeps_the_version_of_its_ego_and_runs_with_it(shared):
     body = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 2}, "ego": {"driver": "idm-aeb"}}
     posted = shared.client.post("/v1/campaigns", json=body).raise_for_status().json()
