@@ -5,11 +5,12 @@ from collections import deque
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from risk_sac.egos.defects.defective import PEDESTRIAN, VEHICLE, Defective, moving, only
 from risk_sac.egos.seam import Perceived
 from risk_sac.geometry import Sight, frame_view, in_sight
-from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, X, Y
+from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, X, Y
 
 STANDING_MPS = 0.3
 
@@ -83,7 +84,7 @@ class MergesPedestrians(Defective):
         vehicles = np.flatnonzero(p.kind[1:] == VEHICLE) + 1
         return only(p, np.array([not self._beside(p, i, vehicles) for i in range(len(p.ids))]))
 
-    def _beside(self, p: Perceived, walker: int, vehicles: Bools) -> bool:
+    def _beside(self, p: Perceived, walker: int, vehicles: NDArray[np.intp]) -> bool:
         if p.kind[walker] != PEDESTRIAN:
             return False
         x, y = p.state[X, walker] - p.state[X, vehicles], p.state[Y, walker] - p.state[Y, vehicles]

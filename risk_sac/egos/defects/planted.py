@@ -17,6 +17,7 @@ class Planted:
     """
 
     reached_s: float | None
+    _began_s: float | None
 
     def __init__(self, make: Callable[[], Ego], defects: Sequence[Defect]) -> None:
         """Makes both egos; the first defect is the nearest to the ego."""
