@@ -160,13 +160,14 @@ def offences(violation: Collision | Violation) -> Iterator[str]:
     yield from (f"{actor}: {in_words(broke)}" for actor, broke in broken.items() if broke)
 
 
-OUTCOME = "outcome\ngrade\nseverity"
+OUTCOME = "outcome\ngrade\nseverity\nfault"
 
 
 def outcome(episode: EpisodeRecord, violation: Collision | Violation) -> str:
     """The cell below `OUTCOME`, with as many lines as there are."""
     severity = violation.severity if isinstance(violation, Collision) else None
-    return "\n".join(str(line) for line in (episode.outcome, violation.graded, severity) if line)
+    fault = f"fault: {violation.blamed}" if violation.blamed else None
+    return "\n".join(str(line) for line in (episode.outcome, violation.graded, severity, fault) if line)
 
 
 def in_words(names: Iterable[str]) -> str:

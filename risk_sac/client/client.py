@@ -25,10 +25,12 @@ from risk_sac.records import (
     Episode,
     EpisodePage,
     Failure,
+    Fault,
     Grade,
     Page,
     Record,
     Results,
+    Severity,
 )
 
 TIMEOUT_S = 30.0  # of silence within one answer
@@ -167,13 +169,15 @@ class Client:
         tier: Literal["valid", "raw"] = "valid",
         requirement: str | None = None,
         grade: Grade | None = None,
+        severity: Severity | None = None,
+        fault: Fault | None = None,
         broke: str | None = None,
         signature: str | None = None,
         page: int = PAGE,
     ) -> Iterator[Episode]:
         """Failures in the order of their arrival; read page by page as far as they are asked for."""
         query: Query = {"run": run, "tier": tier, "requirement": requirement, "grade": grade, "broke": broke}
-        query |= {"signature": signature, "limit": page}
+        query |= {"severity": severity, "fault": fault, "signature": signature, "limit": page}
         return self._items(EpisodePage, f"{_path(campaign_id)}/failures", query)
 
     def failure(self, campaign_id: str, failure_id: str) -> Failure:

@@ -188,6 +188,11 @@ class Violated(Record):
         raise NotImplementedError
 
     @property
+    def prevention(self) -> Mapping[str, bool]:
+        """Reference driver → whether it would have prevented it; empty where none was asked."""
+        raise NotImplementedError
+
+    @property
     def preventable(self) -> bool:
         """Whether it is valid and a reference driver would have prevented it."""
         return self.valid and self.graded is Grade.PREVENTABLE
@@ -240,6 +245,11 @@ class Violation(Violated):
     def blamed(self) -> Fault | None:
         """See `Violated.blamed`."""
         return self.fault
+
+    @property
+    def prevention(self) -> Mapping[str, bool]:
+        """See `Violated.prevention`."""
+        return self.drivers
 
     @property
     def event(self) -> str:
@@ -310,6 +320,11 @@ class Collision(Violated):
     def blamed(self) -> Fault | None:
         """See `Violated.blamed`."""
         return None if self.judgement is None else self.judgement.fault
+
+    @property
+    def prevention(self) -> Mapping[str, bool]:
+        """See `Violated.prevention`."""
+        return {name: each.avoids for name, each in self.judgement.drivers.items()} if self.judgement else {}
 
     @property
     def severity(self) -> Severity | None:

@@ -1,7 +1,5 @@
 """Makes the sentences of a verdict from its record; the page's `ui/verdicts.ts` says the same."""
 
-from collections.abc import Mapping
-
 from risk_sac.records import Collision, Judgement, Violation
 
 FULL_BRAKING = "full_braking"
@@ -16,22 +14,15 @@ DRIVERS = {
 
 def prevented_by(violation: Collision | Violation) -> str | None:
     """Returns, e.g., "the RSS driver would have prevented it"; None where no reference driver was asked."""
-    preventing = _preventing(violation)
-    if not preventing:
+    if not violation.prevention:
         return None
-    names = [name for name, prevents in preventing.items() if prevents]
+    names = [name for name, prevents in violation.prevention.items() if prevents]
     if names == [FULL_BRAKING]:
         return f"only {DRIVERS[FULL_BRAKING]} would have prevented it"
     told = [DRIVERS.get(name, f"the {name.replace('_', ' ')} driver") for name in names]
     *first, last = told or ["none of the reference drivers"]
     who = f"{', '.join(first)} and {last}" if first else last
     return f"{who} would have prevented it"
-
-
-def _preventing(violation: Collision | Violation) -> Mapping[str, bool]:
-    if isinstance(violation, Violation):
-        return violation.drivers
-    return {name: each.avoids for name, each in violation.judgement.drivers.items()} if violation.judgement else {}
 
 
 def known(collision: Collision) -> str:

@@ -9,7 +9,7 @@ from operator import attrgetter
 from sqlalchemy import ColumnElement, Select, select
 from sqlalchemy.orm import Session
 
-from risk_sac.records import RECORDED, Episode, Grade, Outcome
+from risk_sac.records import RECORDED, Episode, Fault, Grade, Outcome, Severity
 from service.errors import NotFoundError
 from service.store.stored import StoredPage, read_episode
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow
@@ -23,6 +23,8 @@ class Judged:
     valid: bool = False
     """Whether the requirement must be what makes the episode a failure, and not only violated in it."""
     grade: Grade | None = None
+    severity: Severity | None = None
+    fault: Fault | None = None
     broke: str | None = None
     signature: str | None = None
     iid: bool = True
@@ -33,12 +35,11 @@ class Judged:
         if self.requirement is not None:
             column = EpisodeRow.failed if self.valid else EpisodeRow.violated
             yield column.contains(f",{self.requirement},", autoescape=True)
-        if self.grade is not None:
-            yield EpisodeRow.grade == self.grade
+        for name in ("grade", "severity", "fault", "signature"):
+            if (wanted := getattr(self, name)) is not None:
+                yield getattr(EpisodeRow, name) == wanted
         if self.broke is not None:
             yield EpisodeRow.broke.contains(f",{self.broke},", autoescape=True)
-        if self.signature is not None:
-            yield EpisodeRow.signature == self.signature
         if not self.iid:
             yield EpisodeRow.phase != RECORDED["iid"]
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from risk_sac.config import FamilyName, MethodName
-from risk_sac.records import NO_CONTACT, ConflictType, Grade, Outcome, Real, Record, Severity, TriageState
+from risk_sac.records import NO_CONTACT, ConflictType, Fault, Grade, Outcome, Real, Record, Severity, TriageState
 from risk_sac.verdicts.distinct import Niche, cell
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
 
@@ -30,6 +30,8 @@ OF_CONTACT = (
 OF_JUDGEMENT = (
     "grade",
     "severity",
+    "injury_risk",
+    "fault",
     "conflict_type",
     "conflict_s",
     "hidden",
@@ -96,6 +98,12 @@ class FailureTable(Record):
     """Null where it is not valid, or was never judged."""
     severity: list[Severity | None]
     """How bad the contact is; null without one, or where that was never judged."""
+    injury_risk: list[Real]
+    """Of the pedestrian's death, or of an occupant's serious injury; null like `severity`."""
+    fault: list[Fault | None]
+    """Which party caused it; null like `grade`."""
+    prevented_by: list[list[str]]
+    """The reference drivers that would have prevented it."""
     distinct: list[bool]
     """Whether one of its valid violations is the first of its kind in its run and phase."""
     kind: list[int]
@@ -126,7 +134,7 @@ class FailureTable(Record):
     hidden: list[bool | None]
     """Whether the ego knew nothing of the striker when the conflict began, or at the violation."""
     ego_response: list[str | None]
-    """none | late_braking | braking | standing | starting"""
+    """none | late_braking | braking | standing | starting | accelerating"""
     ground: list[str | None]
     """lane | junction | crossing | beside_crossing"""
     broke: list[list[str]]
@@ -171,6 +179,12 @@ def violations_of(outcome: str, record: Plain) -> tuple[list[Plain], list[Plain]
 def is_preventable(violation: Plain) -> bool:
     """Whether a reference driver would have prevented a valid violation."""
     return bool(_judged(violation)["grade"] == Grade.PREVENTABLE)
+
+
+def prevented_by(violation: Plain) -> list[str]:
+    """The reference drivers that would have prevented it."""
+    drivers: Plain = _judged(violation).get("drivers", {})
+    return [name for name, each in drivers.items() if (each["avoids"] if isinstance(each, Mapping) else each)]
 
 
 def _judged(violation: Plain) -> Plain:
@@ -251,6 +265,7 @@ def _row(run: StoredRun, failure: PlainEpisode, violation: Plain) -> dict[str, A
         "requirement": _requirement(violation),
         "striker": violation["other_id"],
         "striker_kind": violation["other_kind"],
+        "prevented_by": prevented_by(violation),
         "refused_by": [rule for rule, passed in violation.get("verdicts", {}).items() if not passed],
         "repeats": None if repetition is None else "verified" if repetition.verified else "flaky",
     }

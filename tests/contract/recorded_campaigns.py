@@ -12,7 +12,18 @@ import pytest
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.metrics import results_digest
-from risk_sac.records import NO_CONTACT, Collision, EpisodeRecord, Grade, Judgement, Outcome, RequirementResult, State
+from risk_sac.records import (
+    NO_CONTACT,
+    Collision,
+    EpisodeRecord,
+    Fault,
+    Grade,
+    Judgement,
+    Outcome,
+    RequirementResult,
+    Severity,
+    State,
+)
 from risk_sac.report import FinishedRun
 from risk_sac.run_folder.results import (
     EPISODES,
@@ -43,11 +54,20 @@ def hit(judged: Judgement | None = None, broken: str = "", least_ttc_s: float = 
 
 OWN = {"name": "never_fast", "formula": "ego_speed_mps <= 5", "scale": 10.0}
 SLOW = violation(grade=Grade.PREVENTABLE, broke=("speeding",))
+LEADER = judgement(
+    Grade.FULL_BRAKING,
+    -0.5,
+    unresponsive=True,
+    signature="leader",
+    severity=Severity.SEVERE,
+    injury_risk=0.02,
+    fault=Fault.SHARED,
+)
 OUTCOMES = {
     ".": (Outcome.SAFE, "", None),
     "r": (Outcome.REJECTED, "sim_crash", None),
     "f": (Outcome.FAILURE, "", hit(judgement())),
-    "F": (Outcome.FAILURE, "", hit(judgement(Grade.FULL_BRAKING, -0.5, unresponsive=True, signature="leader"))),
+    "F": (Outcome.FAILURE, "", hit(LEADER)),
     "a": (Outcome.DEGENERATE, "inside_limits", hit(broken="inside_limits", least_ttc_s=math.inf)),
     "d": (Outcome.DEGENERATE, "ego_moving", hit(broken="ego_moving")),
     "v": (Outcome.FAILURE, "", None),  # with `SLOW`

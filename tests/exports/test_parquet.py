@@ -8,6 +8,7 @@ from pyarrow import compute, parquet
 
 from risk_sac.cli import main
 from risk_sac.failures.export.parquet import SPECS
+from risk_sac.records import Outcome
 from risk_sac.run_folder.results import EPISODES, records_from_lines
 
 RUNS = {"low": "random", "mixed": "random"}
@@ -57,6 +58,13 @@ def test_every_episode_of_every_run_is_a_row_with_its_fields(runs: Path, tmp_pat
             assert [each["requirement"] for each in row["violations"]] == [
                 each.requirement for each in record.violations
             ]
+            worst = record.worst_violation if record.outcome is Outcome.FAILURE else None
+            assert row["prevented_by"] == ([name for name, kept in worst.prevention.items() if kept] if worst else None)
+            assert row["fault"] == (worst.blamed if worst else None)
+            if worst is not None and worst is record.collision:
+                assert worst.judgement is not None
+                assert row["severity"] == worst.judgement.severity in ("minor", "moderate", "severe")
+                assert row["injury_risk"] == worst.judgement.injury_risk
             if record.collision is not None:
                 assert dict(row["collision"]["verdicts"]) == dict(record.collision.verdicts)
                 assert row["collision"]["early_min_ttc_s"] == record.collision.min_ttc_s

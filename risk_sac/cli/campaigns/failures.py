@@ -15,9 +15,10 @@ from risk_sac.cli.console import OK, OUTCOME, Commands, in_words, offences, or_d
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
-from risk_sac.records import Collision, Grade, Violation
+from risk_sac.records import Collision, Fault, Grade, Severity, Violation
 from risk_sac.terminal import notes, printable
 
+CLASSES = {"grade": Grade, "severity": Severity, "fault": Fault}
 FILTERS = {
     "run": "of this run",
     "requirement": "that violate this requirement, such as no_contact",
@@ -29,7 +30,8 @@ FILTERS = {
 def add(commands: Commands) -> None:
     """Add the commands."""
     parser = add_campaign_command(commands, "list", _list, "a campaign's failures, in the order they were found")
-    parser.add_argument("--grade", choices=[grade.value for grade in Grade], help="only of this grade")
+    for name, classes in CLASSES.items():
+        parser.add_argument(f"--{name}", choices=[each.value for each in classes], help=f"only of this {name}")
     for name, which in FILTERS.items():
         parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only those {which}")
     parser.add_argument("--raw", action="store_true", help="contacts and violations too that a rule refused")
@@ -59,7 +61,7 @@ def look_command(service_url: str, campaign_id: str, failure_id: str) -> str:
 
 
 def _list(options: argparse.Namespace) -> int:
-    filters = {name: getattr(options, name) for name in (*FILTERS, "grade")}
+    filters = {name: getattr(options, name) for name in (*FILTERS, *CLASSES)}
     with Client.from_environment(options.url) as client:
         found = client.failures(options.id, tier="raw" if options.raw else "valid", **filters)
         failures = list(itertools.islice(found, options.limit + 1))
@@ -90,7 +92,7 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def failures_table(failures: Sequence[Episode]) -> Table:
-    """Three lines per failure; 80 columns hold it."""
+    """At most four lines per failure; 80 columns hold it."""
     table = Table(box=SIMPLE_HEAD, padding=0)
     table.add_column("id, what it violates,\nand its kind", overflow="fold")
     table.add_column(OUTCOME, no_wrap=True)
@@ -128,6 +130,8 @@ def _violation(violation: Violation) -> Iterator[str]:
     )
     yield f"  kind       {printable(violation.signature)}"
     yield f"  grade      {_grade(violation)}"
+    if violation.fault:
+        yield f"  fault      {violation.fault}"
     yield f"  the ego    broke {in_words(violation.broke) or 'nothing'}"
 
 
@@ -146,5 +150,7 @@ def _contact(collision: Collision) -> Iterator[str]:
         yield f"  grade      {_grade(collision)}"
         if collision.severity_in_words:
             yield f"  severity   {collision.severity_in_words}"
+        if judgement.fault:
+            yield f"  fault      {judgement.fault}"
         yield f"  the ego    broke {in_words(judgement.ego_broke) or 'nothing'}"
         yield f"  the other  broke {in_words(judgement.broke) or 'nothing'}"

@@ -18,7 +18,7 @@ from pydantic import BaseModel
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.formats import Files
 from risk_sac.metrics import results_digest
-from risk_sac.records import EpisodeRecord
+from risk_sac.records import Collision, EpisodeRecord, Outcome
 from risk_sac.run_folder.results import EPISODES, Results, read_results, records_from_lines
 from risk_sac.run_folder.verified import read_verified
 
@@ -26,6 +26,12 @@ NAME = "episodes.parquet"
 OF_THE_RUN = [pa.field(name, pa.string(), nullable=False) for name in ("id", "run_id", "family", "method", "ego")]
 SEED = pa.field("run_seed", pa.int64(), nullable=False)
 SPECS = b"risk_sac.specs"  # key of the file's metadata: a JSON object from run to its spec
+OF_THE_VERDICT = [
+    pa.field("severity", pa.string()),
+    pa.field("injury_risk", pa.float64()),
+    pa.field("fault", pa.string()),
+    pa.field("prevented_by", pa.list_(pa.string())),
+]
 SCALARS: Mapping[Any, pa.DataType] = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.string()}
 
 
@@ -45,7 +51,7 @@ def files(runs: Sequence[Path]) -> Files:
         for digest, (_, each) in results.items()
     }
     specs = ", ".join(f'"{ids[digest]}": {each.spec.model_dump_json()}' for digest, (_, each) in results.items())
-    schema = pa.schema([*OF_THE_RUN, SEED, *_type(EpisodeRecord)], metadata={SPECS: f"{{{specs}}}".encode()})
+    schema = pa.schema([*OF_THE_RUN, SEED, *OF_THE_VERDICT, *_type(EpisodeRecord)], metadata={SPECS: f"{{{specs}}}".encode()})
     content = io.BytesIO()
     with parquet.ParquetWriter(content, schema, compression="zstd") as writer:
         for digest, (folder, each) in results.items():
@@ -73,9 +79,23 @@ def _rows(folder: Path, results: Results, id_: str) -> list[dict[str, Any]]:
         "ego": spec.ego.model_dump_json(),
     }
     return [
-        {"id": record.id_in(id_), **run, **record.model_dump()}
+        {"id": record.id_in(id_), **run, **_verdict(record), **record.model_dump()}
         for record in (verified.judged(records) if verified else records)
     ]
+
+
+def _verdict(record: EpisodeRecord) -> dict[str, Any]:
+    """Returns how bad a failure is, which party caused it, and what would have prevented it; nothing of others."""
+    worst = record.worst_violation if record.outcome is Outcome.FAILURE else None
+    if worst is None:
+        return {}
+    judged = worst.judgement if isinstance(worst, Collision) else None
+    return {
+        "severity": judged and judged.severity,
+        "injury_risk": judged and judged.injury_risk,
+        "fault": worst.blamed,
+        "prevented_by": [name for name, prevents in worst.prevention.items() if prevents],
+    }
 
 
 def _type(annotation: Any) -> pa.DataType:

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import Field
 
 from risk_sac.config.base import Settings
-from risk_sac.records import Episode, EpisodePage, Failure, Grade, Outcome, Triage, TriageState
+from risk_sac.records import Episode, EpisodePage, Failure, Fault, Grade, Outcome, Severity, Triage, TriageState
 from service.api.answers.pages import TIERS, Cursor, Limit, Tier
 from service.api.answers.representations import as_json
 from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN
@@ -72,6 +72,8 @@ def list_failures(
     ] = None,
     requirement: AskedRequirement = None,
     grade: Annotated[Grade | None, Query(description="Only failures of this grade.")] = None,
+    severity: Annotated[Severity | None, Query(description="Only contacts as bad as this.")] = None,
+    fault: Annotated[Fault | None, Query(description="Only those that this party caused.")] = None,
     broke: Annotated[
         str | None, Query(max_length=40, pattern="^[a-z_]+$", description="Only those whose striker broke this.")
     ] = None,
@@ -92,6 +94,8 @@ def list_failures(
             requirement=requirement,
             valid=tier == "valid",
             grade=grade,
+            severity=severity,
+            fault=fault,
             broke=broke,
             signature=signature,
             iid=run is not None,

@@ -15,7 +15,7 @@ from risk_sac.cli.show import _failures
 from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.execution.runs import run
-from risk_sac.records import ConflictType, Grade, Outcome, RunMetrics
+from risk_sac.records import ConflictType, Fault, Grade, Outcome, RunMetrics, Severity
 from risk_sac.run_folder.results import RecordedFailure, Results, read_results, write_results
 from tests.builders import judgement, violation
 from tests.unit.failures.staged import synthetic_contact
@@ -78,13 +78,15 @@ def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(
         conflict_s=-11.25,
         conflict_x_m=-1301.0,
         conflict_y_m=-1202.5,
+        severity=Severity.MODERATE,
+        fault=Fault.SHARED,
     )
     episode = synthetic_contact(judged).episode
     results = Results(spec=SPEC, spec_digest="", finished=True, failures=(RecordedFailure.of(SPEC.id, episode),))
     Console(width=80).print(_failures(results))
     printed = capsys.readouterr().out
     assert "…" not in printed
-    for word in (grade or "failure", "crossing vehicle", "-11.2, -1301 -1202", "wrong"):
+    for word in (grade or "failure", "crossing vehicle", "-11.2, -1301 -1202", "wrong", "moderate", "fault: shared"):
         assert word in printed
 
 

@@ -35,6 +35,16 @@ export function gradeOf(violation: Collision | Violation): Body<"Grade"> | null 
   return isContact(violation) ? (violation.judgement?.grade ?? null) : violation.grade;
 }
 
+/** Null without contact, and of a contact that was stored before it was judged. */
+export function severityOf(violation: Collision | Violation): Body<"Severity"> | null {
+  return isContact(violation) ? (violation.judgement?.severity ?? null) : null;
+}
+
+/** Which party caused it; null where that was not judged. */
+export function faultOf(violation: Collision | Violation): Body<"Fault"> | null {
+  return (isContact(violation) ? violation.judgement?.fault : violation.fault) ?? null;
+}
+
 /** Each reference driver, and whether it would have prevented the violation. */
 export function driversOf(violation: Collision | Violation): [string, boolean][] {
   if (!isContact(violation)) return Object.entries(violation.drivers);

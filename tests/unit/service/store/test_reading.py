@@ -4,7 +4,7 @@ import pytest
 from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec, EgoConfig
-from risk_sac.records import Grade, Outcome, RequirementResult, State, stored
+from risk_sac.records import Fault, Grade, Outcome, RequirementResult, Severity, State, stored
 from service.errors import NotFoundError
 from service.store.finding import Judged
 from tests.begun import start
@@ -106,14 +106,14 @@ def test_lists_are_filtered_by_state_family_method_and_label(store, ledger):
     assert found(family="mixed", method="random") == found(state=State.FAILED) == []
 
 
-def test_contacts_are_found_by_grade_by_what_was_broken_and_by_signature(store, ledger, episode):
+def test_contacts_are_found_by_grade_severity_fault_what_was_broken_and_signature(store, ledger, episode):
     campaign = ledger.create(SPEC)
     numbers = [start(store, ledger) for _ in range(2)]
     kinds = [
         judgement(),
-        judgement(Grade.FULL_BRAKING, broke=()),
+        judgement(Grade.FULL_BRAKING, broke=(), severity=Severity.MINOR, fault=Fault.SHARED),
         judgement(Grade.UNAVOIDABLE, broke=("wrong_direction",), signature="crossing, 50 % hidden"),
-        judgement(Grade.PREVENTABLE, broke=("speeding",)),
+        judgement(Grade.PREVENTABLE, broke=("speeding",), severity=Severity.SEVERE, fault=Fault.SHARED),
         None,
     ]
     for number in numbers:
@@ -131,6 +131,10 @@ def test_contacts_are_found_by_grade_by_what_was_broken_and_by_signature(store, 
     assert found(grade=Grade.PREVENTABLE) == [0, 3] * 2
     assert found(grade=Grade.PREVENTABLE, run_id="low-random-3") == [0, 3]
     assert found(grade=Grade.UNAVOIDABLE) == [2, 2]
+    assert found(severity=Severity.SEVERE) == [3, 3]
+    assert found(fault=Fault.SHARED) == [1, 3] * 2
+    assert found(fault=Fault.SHARED, severity=Severity.MINOR) == [1, 1]
+    assert found(fault=Fault.OTHER) == []
     assert found(broke="speeding") == [0, 3, 5] * 2
     assert found(broke="red_light", grade=Grade.PREVENTABLE) == [0, 0]
     assert found(broke="red-light") == found(broke="redXlight") == found(broke="red") == []

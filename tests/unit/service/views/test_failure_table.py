@@ -5,7 +5,7 @@ from dataclasses import replace
 from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Grade, Outcome, Repetition, TriageState, stored, wire
+from risk_sac.records import Grade, Outcome, Repetition, Severity, TriageState, stored, wire
 from risk_sac.verdicts.distinct import DistinctFailures
 from service.store.stored import PlainEpisode
 from service.views.failure_table import failure_table
@@ -33,7 +33,7 @@ def test_a_column_has_what_the_record_has(ledger):
         min_robustness=-0.123456,
         ego_speed_mps=math.nan,
         verdicts={"inside_limits": True, "ego_moving": False},
-        judgement=judgement(None, conflict_s=-math.inf),
+        judgement=judgement(None, conflict_s=-math.inf, severity=Severity.SEVERE, injury_risk=0.0123456, drivers={}),
     )
     table = told(failure_table(campaign, [plain(run, 7, hit, REFUSED, scene={"lead_gap_m": 12.34567})], {}))
     kinds, scenes = table.pop("kinds"), table.pop("scenes")
@@ -49,7 +49,10 @@ def test_a_column_has_what_the_record_has(ledger):
         "requirement": "no_contact",
         "failed": [],
         "grade": None,
-        "severity": None,
+        "severity": "severe",
+        "injury_risk": 0.0123,
+        "fault": None,
+        "prevented_by": [],
         "distinct": False,
         "kind": 0,
         "striker": "lead",
@@ -99,6 +102,7 @@ def test_distinct_are_those_that_the_run_counted(ledger):
     ]
     counted = DistinctFailures()
     table = failure_table(campaign, contacts, {})
+    assert table.prevented_by[2:6] == [["r157", "bound"], ["bound"], ["r157", "bound"], []]
     assert table.distinct == [*(counted.add(hit) for hit in hits), True, True, False]
     assert table.distinct[:6] == [True, False, True, True, True, True]
     assert [(kind.name, kind.failures, kind.distinct, kind.preventable) for kind in table.kinds] == [

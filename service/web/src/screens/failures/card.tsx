@@ -33,6 +33,7 @@ export function Card({ campaign, table, at, often, triage }: Props) {
         <span class="tag">{words(table.requirement[at]!)}</span>
         {table.valid[at] ? <GradeTag grade={table.grade[at] ?? "none"} /> : <Refusal rules={table.refused_by[at]!} />}
         {table.severity[at] && <span class="tag">{table.severity[at]}</span>}
+        {table.fault[at] && <span class="tag">fault: {table.fault[at]}</span>}
         <Repeats repeats={table.repeats[at]!} />
       </div>
       <div class="what">

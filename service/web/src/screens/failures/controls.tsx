@@ -7,7 +7,7 @@ import type { FailureTable } from "./wire";
 
 const TYPING_MS = 150;
 const SHOWN: Record<Filters["tab"], readonly Facet[]> = {
-  failures: ["requirement", "family", "method", "run", "grade", "severity", "kind", "striker", "broke", "ego_broke", "triage"],
+  failures: ["requirement", "family", "method", "run", "grade", "severity", "fault", "prevented_by", "kind", "striker", "broke", "ego_broke", "triage"],
   refused: ["requirement", "family", "method", "run", "rule", "severity", "kind", "striker", "broke", "ego_broke"],
 };
 

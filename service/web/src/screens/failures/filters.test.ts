@@ -31,6 +31,13 @@ test("facets narrow one another", () => {
   expect(left.length).toBeGreaterThan(0);
 });
 
+test("failures are found by severity, fault, and each driver that would have prevented them", () => {
+  const every = inTab(table, of("every=1"));
+  expect(passing(table, every, of("severity=minor&fault=ego"))).toEqual(every.filter((i) => i % 3 === 0));
+  expect(passing(table, every, of("prevented_by=full_braking"))).toEqual(every.filter((i) => i % 3 < 2));
+  expect(passing(table, every, of("prevented_by=nothing"))).toEqual(every.filter((i) => i % 3 === 2));
+});
+
 test("text is looked for word by word, in any case", () => {
   const every = inTab(table, of("every=1"));
   expect(passing(table, every, of("q=HIDING ped"))).toEqual(every.filter((i) => i % 2 === 1));

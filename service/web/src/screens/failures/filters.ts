@@ -5,7 +5,7 @@ import { SORTS, type Sort } from "./sorting";
 import type { FailureTable } from "./wire";
 
 /** Filters that want one value; the empty text wants any. */
-export const FACETS = ["requirement", "family", "method", "run", "grade", "severity", "kind", "striker", "triage", "broke", "ego_broke", "rule"] as const;
+export const FACETS = ["requirement", "family", "method", "run", "grade", "severity", "fault", "prevented_by", "kind", "striker", "triage", "broke", "ego_broke", "rule"] as const;
 export type Facet = (typeof FACETS)[number];
 
 export interface Filters extends Record<Facet, string> {
@@ -76,6 +76,10 @@ export function valuesOf(table: FailureTable, facet: Facet, i: number): readonly
       return [table.grade[i] ?? "none"];
     case "severity":
       return [table.severity[i] ?? "none"];
+    case "fault":
+      return [table.fault[i] ?? "none"];
+    case "prevented_by":
+      return table.prevented_by[i]!.length ? table.prevented_by[i]! : ["nothing"];
     case "kind":
       return [table.kinds[table.kind[i]!]!.name];
     case "striker":

@@ -1,7 +1,7 @@
 /** What can be filtered by, in words. */
 
 import { capital, words } from "../../ui/text";
-import { GRADE_WORDS, refusal, type GradeName } from "../../ui/verdicts";
+import { driverWords, GRADE_WORDS, refusal, type GradeName } from "../../ui/verdicts";
 import type { Facet } from "./filters";
 import type { TriageState } from "./wire";
 
@@ -19,6 +19,8 @@ export const FACET_LABELS: Record<Facet, string> = {
   run: "Run",
   grade: "Grade",
   severity: "Severity",
+  fault: "Fault",
+  prevented_by: "Prevented by",
   kind: "Kind",
   striker: "Striker",
   triage: "Triage",
@@ -34,6 +36,7 @@ export function valueWords(facet: Facet, value: string): string {
   if (facet === "grade" && Object.hasOwn(GRADE_WORDS, value)) return GRADE_WORDS[value as GradeName].short;
   if (facet === "triage" && Object.hasOwn(TRIAGE, value)) return TRIAGE[value as TriageState].toLowerCase();
   if (facet === "rule") return refusal(value);
+  if (facet === "prevented_by" && value !== "nothing") return driverWords(value);
   return WORDED.has(facet) ? words(value) : value;
 }
 

@@ -22,6 +22,14 @@ test("preventable ones come first, among them the fastest", () => {
   expect(closing).toEqual([...closing].sort((a, b) => b - a));
 });
 
+test("of equal grades the severe come first, and of those the ego's fault", () => {
+  const severity = (["minor", null, "moderate", "severe", "severe", "severe"] as const).slice();
+  const fault = (["ego", "ego", "ego", "other", null, "ego"] as const).slice();
+  const few = sample(6, { grade: Array(6).fill("preventable"), severity, fault });
+  const order = sorted(few, [0, 1, 2, 3, 4, 5], "grade", oftenOf(few));
+  expect(order).toEqual([5, 3, 4, 2, 1, 0]); // what touched nothing, 1, is no minor contact
+});
+
 test("who has no time to contact comes last", () => {
   expect(by("reaction").slice(0, 3)).toEqual([0, 1, 3]);
   expect(by("reaction").at(-1)).toBe(2);

@@ -7,7 +7,7 @@ export type Sort = keyof typeof SORTS;
 
 /** What people choose from; the first is meant where none is chosen. */
 export const SORTS = {
-  grade: "preventable first",
+  grade: "preventable and severe first",
   closing: "fastest closing",
   reaction: "least time to contact",
   newest: "newest",
@@ -21,16 +21,22 @@ export const SORTS_OF: Record<"failures" | "refused", readonly Sort[]> = {
   refused: ["closing", "reaction", "newest"],
 };
 
-const RANKS: Record<string, number> = { preventable: 0, full_braking: 1, unavoidable: 2 };
-const UNGRADED = 3;
+const GRADES: readonly (string | null)[] = ["preventable", "full_braking", "unavoidable", null];
+/** What has no severity touched nothing, and is no less than moderate. */
+const SEVERITIES: readonly (string | null)[] = ["severe", "moderate", null, "minor"];
+const FAULTS: readonly (string | null)[] = ["ego", "shared", "other", null];
 
-/** The failures in that order: a new list; who has no value comes last, the earlier one first among equals. */
+/** The failures in that order: a new list; those without a value come last, the earlier one first among equals. */
 export function sorted(table: FailureTable, failures: readonly number[], sort: Sort, often: ArrayLike<number>): number[] {
   const closing = (i: number) => -(table.relative_speed_mps[i] ?? -Infinity);
-  const worst = (first: (i: number) => number) => by(table, failures, first, closing);
+  const worst = (...first: ((i: number) => number)[]) => by(table, failures, ...first, closing);
   switch (sort) {
     case "grade":
-      return worst((i) => RANKS[table.grade[i] ?? ""] ?? UNGRADED);
+      return worst(
+        (i) => GRADES.indexOf(table.grade[i]!),
+        (i) => SEVERITIES.indexOf(table.severity[i]!),
+        (i) => FAULTS.indexOf(table.fault[i]!),
+      );
     case "closing":
       return worst(closing);
     case "reaction":

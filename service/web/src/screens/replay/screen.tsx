@@ -19,7 +19,7 @@ import { KeyList, Transport } from "../../stage/transport";
 import { Empty, Shown } from "../../ui/states";
 import { capital, words } from "../../ui/text";
 import { GRADE_WORDS } from "../../ui/verdicts";
-import { gradeOf, signatureOf, worstOf, type Collision, type Violation } from "../../ui/violations";
+import { faultOf, gradeOf, severityOf, signatureOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import { Actors } from "./actors";
 import { Take } from "./take";
 import { Verdict } from "./verdict";
@@ -72,7 +72,7 @@ function Head({ campaign, failure, query, known }: Props & { known: Body<"Failur
         <a href={`${address(["campaigns", campaign, "failures"])}${listed.query && `?${listed.query}`}`}>Failures</a> / {failure}
       </nav>
       <h1>{signature ? capital(signature) : `Failure ${failure}`}</h1>
-      {known && <Grade failure={known} />}
+      {known && <Tags failure={known} />}
       <span class="actions">
         {neighbour(query.get("prev") ?? listed.previous, "Previous")}
         {neighbour(query.get("next") ?? listed.next, "Next")}
@@ -142,8 +142,14 @@ function Replay({ campaign, path, known, series, violation, query }: Played) {
   );
 }
 
-function Grade({ failure }: { failure: Body<"Failure"> }) {
+function Tags({ failure }: { failure: Body<"Failure"> }) {
   const violation = worstOf(failure);
-  const grade = violation && gradeOf(violation);
-  return <span class={`tag ${grade ?? ""}`}>{grade ? GRADE_WORDS[grade].short : words(failure.outcome)}</span>;
+  const [grade, severity, fault] = violation ? [gradeOf(violation), severityOf(violation), faultOf(violation)] : [];
+  return (
+    <>
+      <span class={`tag ${grade ?? ""}`}>{grade ? GRADE_WORDS[grade].short : words(failure.outcome)}</span>
+      {severity && <span class="tag">{severity}</span>}
+      {fault && <span class="tag">fault: {fault}</span>}
+    </>
+  );
 }
