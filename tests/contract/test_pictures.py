@@ -231,7 +231,15 @@ def test_failures_are_listed_in_a_terminal_by_kind_and_grade(call, client):
     assert status == 0
     assert "…" not in printed.out
     assert max(map(len, printed.out.splitlines())) <= 80
-    for word in (f"{RUN}-train-1", f"{RUN}-train-2", "preventable", "full_braking", "severe", "fault: shared", "leader"):
+    for word in (
+        f"{RUN}-train-1",
+        f"{RUN}-train-2",
+        "preventable",
+        "full_braking",
+        "severe",
+        "fault: shared",
+        "leader",
+    ):
         assert word in printed.out
     _, printed = call("list", ENDED_ID, "--json")
     assert json.loads(printed.out) == client.get(FOLDER).json()["items"]
@@ -261,7 +269,13 @@ def test_a_failure_is_shown_in_words_and_drawn_without_the_folder_of_the_server(
     status, printed = call("show", ENDED_ID, f"{RUN}-train-2", "--out", file)
     assert status == 0
     assert file.read_bytes() == client.get(f"{FOLDER}/{RUN}-train-2/picture.png").content
-    words = (f"{RUN}-train-2: failure", "kind       leader", "grade      full_braking", "fault      shared", "the other  broke")
+    words = (
+        f"{RUN}-train-2: failure",
+        "kind       leader",
+        "grade      full_braking",
+        "fault      shared",
+        "the other  broke",
+    )
     assert all(word in printed.out for word in words)
     assert "of adversary 'lead'" in printed.out
     assert str(file) in printed.err

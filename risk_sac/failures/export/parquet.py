@@ -51,7 +51,9 @@ def files(runs: Sequence[Path]) -> Files:
         for digest, (_, each) in results.items()
     }
     specs = ", ".join(f'"{ids[digest]}": {each.spec.model_dump_json()}' for digest, (_, each) in results.items())
-    schema = pa.schema([*OF_THE_RUN, SEED, *OF_THE_VERDICT, *_type(EpisodeRecord)], metadata={SPECS: f"{{{specs}}}".encode()})
+    schema = pa.schema(
+        [*OF_THE_RUN, SEED, *OF_THE_VERDICT, *_type(EpisodeRecord)], metadata={SPECS: f"{{{specs}}}".encode()}
+    )
     content = io.BytesIO()
     with parquet.ParquetWriter(content, schema, compression="zstd") as writer:
         for digest, (folder, each) in results.items():
