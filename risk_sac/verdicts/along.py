@@ -65,22 +65,27 @@ def _along_rows(path: Path, speed: Floats, size: Size, other: Body[Floats]) -> F
     return rows
 
 
-def towards(across: F, offset: F, lane_width: float) -> F:
+@compiled
+def towards(across_m: float, offset_m: float, lane_width_m: float) -> float:
     """How far a vehicle is off the centre of the lane beside the ego's, towards the ego, m.
 
     SUMO's offset jumps by a lane's width when the vehicle passes to the next lane; where it stands across the ego's
     path tells which lane's centre is meant. Without a recorded offset (NaN) that place alone decides.
 
-    `across` is its centre's distance from the ego's path, positive to the left, `offset` that from its lane's centre.
+    `across_m` is its centre's distance from the ego's path, positive to the left, `offset_m` that from its lane's
+    centre.
     """
-    seen = lane_width - np.abs(across)
-    recorded = np.where(np.greater(across, 0.0), -offset, offset)
-    lanes = np.round((seen - recorded) / lane_width)
-    found: F = np.where(np.isnan(offset), seen, recorded + lane_width * lanes)
-    return found
+    seen = lane_width_m - abs(across_m)
+    if math.isnan(offset_m):
+        return seen
+    recorded = -offset_m if across_m > 0.0 else offset_m
+    return recorded + lane_width_m * round((seen - recorded) / lane_width_m)
 
 
-def lane_conflict(other: Along[F], speed: F, offset: F, accel: F, lane_width: float, wary: bool) -> tuple[Bools, Bools]:
+@compiled
+def lane_conflict(
+    other: Along[float], speed_mps: float, offset_m: float, accel_mps2: float, lane_width_m: float, wary: bool
+) -> tuple[bool, bool]:
     """Whether a conflict begins with a vehicle that drives the ego's way, and whether one goes on that had begun.
 
     A cut-in begins when the vehicle is more than 0.375 m off its lane's centre towards the ego, and less than 2 s
@@ -90,13 +95,28 @@ def lane_conflict(other: Along[F], speed: F, offset: F, accel: F, lane_width: fl
     alongside comes nearer if the sides would touch within 4 s, or it is half in the ego's lane. One that merely hangs
     over the line does not.
 
-    `speed` is the ego's, `accel` the vehicle's. For a wary driver a vehicle alongside counts if it comes nearer or not.
+    `speed_mps` is the ego's, `accel_mps2` the vehicle's. For a wary driver a vehicle alongside counts if it comes
+    nearer or not.
     """
-    in_lane = np.less_equal(np.abs(other.across_m), lane_width / 2)
-    coming = in_lane | np.greater(towards(other.across_m, offset, lane_width), WANDER_M)
-    alongside = np.less_equal(other.gap_m, 0.0) & np.less_equal(other.behind_m, 0.0)
-    alongside &= wary | in_lane | np.less(other.aside_s, HORIZON_S)
-    near = np.greater(other.gap_m, 0.0) & np.less_equal(other.gap_m, HORIZON_S * speed)
-    brakes = in_lane & near & np.less(accel, -LEADER_BRAKES_MPS2)
-    begins = brakes | (coming & (alongside | np.less(other.ttc_s, DANGER_TTC_S)))
-    return begins, begins | (coming & np.less(other.ttc_s, HORIZON_S))
+    in_lane = abs(other.across_m) <= lane_width_m / 2
+    coming = in_lane or towards(other.across_m, offset_m, lane_width_m) > WANDER_M
+    alongside = other.gap_m <= 0.0 and other.behind_m <= 0.0 and (wary or in_lane or other.aside_s < HORIZON_S)
+    near = 0.0 < other.gap_m <= HORIZON_S * speed_mps
+    brakes = in_lane and near and accel_mps2 < -LEADER_BRAKES_MPS2
+    begins = brakes or (coming and (alongside or other.ttc_s < DANGER_TTC_S))
+    return begins, begins or (coming and other.ttc_s < HORIZON_S)
+
+
+@compiled
+def lane_conflicts(
+    others: Along[Floats], speed_mps: Floats, offset_m: Floats, accel_mps2: Floats, lane_width_m: float, wary: bool
+) -> tuple[Bools, Bools]:
+    """`lane_conflict` in each of `T` frames."""
+    begins, lasts = np.empty(len(speed_mps), dtype=np.bool_), np.empty(len(speed_mps), dtype=np.bool_)
+    for t in range(len(speed_mps)):
+        o = others
+        other = Along(
+            o.gap_m[t], o.behind_m[t], o.ttc_s[t], o.across_m[t], o.turn_rad[t], o.speed_mps[t], o.aside_s[t]
+        )
+        begins[t], lasts[t] = lane_conflict(other, speed_mps[t], offset_m[t], accel_mps2[t], lane_width_m, wary)
+    return begins, lasts

@@ -13,7 +13,7 @@ from risk_sac.geometry import Size
 from risk_sac.jit import compiled
 from risk_sac.records import ConflictType
 from risk_sac.types import Bools, Floats, Kind
-from risk_sac.verdicts.along import WANDER_M, Along, lane_conflict
+from risk_sac.verdicts.along import WANDER_M, Along, lane_conflicts
 from risk_sac.verdicts.course import HORIZON_S, Body, at, entry_distance, time_to_touch, with_margin
 from risk_sac.verdicts.evidence import Evidence, inside, soon_inside
 from risk_sac.verdicts.path import Path
@@ -110,7 +110,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
 def _lane_conflicts(evidence: Evidence, striker: int, seen: Along[Floats], *, wary: bool) -> tuple[Bools, Bools]:
     e = evidence
     offset, accel = column(e.lane_offset_m, striker), column(e.accel_mps2, striker)
-    return lane_conflict(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, wary)
+    return lane_conflicts(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, wary)
 
 
 def left_its_place(evidence: Evidence) -> int | None:

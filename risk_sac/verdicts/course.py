@@ -27,6 +27,7 @@ class Body(NamedTuple, Generic[F]):
     size: Size
 
 
+@compiled
 def with_margin(size: Size) -> Size:
     """What an ego of this size takes up on its way, with a margin to either side."""
     return Size(size.half_length, size.half_width + CORRIDOR_M)
@@ -42,13 +43,24 @@ def at(motion: Body[Floats], t: int) -> Body[float]:
 def time_to_touch(path: Path, s: float, speed: float, size: Size, other: Body[float], horizon: float) -> float:
     """Time until the ego, keeping its speed along its path, touches a body that keeps its velocity, s; or inf.
 
-    The ego is at `s` on its path; `size` is its own, or its corridor's.
+    The ego is at `s` on its path; `size` is its own, or its corridor's. Looks at which the two are too far apart, even
+    if they came straight towards each other, are left out.
     """
-    for look in range(round(horizon / LOOK_S) + 1):
+    reach = size.half_length + size.half_width + other.size.half_length + other.size.half_width
+    nearer = (speed + math.hypot(other.vx, other.vy)) * LOOK_S  # from one look to the next, at most
+    look, last = 0, round(horizon / LOOK_S)
+    while look <= last:
         t = look * LOOK_S
-        pose = other.x + other.vx * t, other.y + other.vy * t, other.heading
-        if touches(pose_at(path, s + speed * t), size, pose, other.size):
-            return t
+        pose, own = (other.x + other.vx * t, other.y + other.vy * t, other.heading), pose_at(path, s + speed * t)
+        apart = math.hypot(pose[0] - own[0], pose[1] - own[1]) - reach
+        if apart <= nearer:
+            if touches(own, size, pose, other.size):
+                return t
+            look += 1
+        elif nearer * (last - look) < apart:
+            return math.inf
+        else:
+            look += int(apart / nearer)
     return math.inf
 
 

@@ -1,0 +1,210 @@
+"""The defensive driver: how much it speeds up, or how hard it brakes, for what it sees and for what it does not.
+
+1. It keeps a speed at which it can stop, at 3.4 m/s² after 0.75 s, before a place that it does not see and from which a
+   pedestrian could come into its way before it has passed: a crossing with 2 m of waiting area at either end, or the
+   kerb behind a vehicle that stands beside its path.
+2. Where a vehicle stops at the crossing in another lane of its direction, all of the crossing has to be in sight.
+3. It does not start or speed up while a pedestrian is within 1.5 m of its corridor, or a pedestrian or a crossing
+   vehicle would reach the corridor within 3 s. Before a pedestrian on the carriageway or at a crossing it can stop.
+4. It brakes for a conflict: with 3.4 m/s² after 0.75 s if that is enough, or else as R157's driver, until the conflict
+   has been over for 1 s.
+
+Choices: it creeps past what it cannot see, so that it never stands for ever. A pedestrian that stands off the
+carriageway on red, or has stood there for 4 s, waits; on the carriageway the driver creeps past one that has stood for
+4 s. A crossing is taken as empty while the ego's signal gives it priority. Vehicles ahead on its own lane that move
+hide nothing: they go through first.
+
+Sources: 3.4 m/s² and the 2.5 s of a driver that is not prepared: AASHTO, "A Policy on Geometric Design of Highways and
+Streets" (Green Book), stopping sight distance. 0.75 s and full braking: UN R157, Annex 3; the driver is prepared.
+Walking speed 1.2 m/s (4 ft/s): Highway Capacity Manual and MUTCD.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.jit import compiled
+from risk_sac.types import ACCEL, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
+from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, YIELDING_MPS2
+from risk_sac.verdicts.course import CORRIDOR_M, entry_distance, with_margin
+from risk_sac.verdicts.drivers import JERK_MPS3, R157_PERCEIVES_S, r157
+from risk_sac.verdicts.path import pose_at, project
+from risk_sac.verdicts.present import RED, OnPath, Street, body_of, conflict_in, must_yield, within
+from risk_sac.verdicts.unseen import Crossings, is_hidden, walls_of
+
+COMFORT_MPS2 = 3.4
+DELAY_S = 0.75
+WALKS_MPS = 1.2
+BEFORE_M = 1.0  # that it stops before a place
+CREEP_MPS = 2.0
+KERB_MPS = 8.33  # Choice: 30 km/h past standing vehicles, away from crossings
+BESIDE_M = 1.5  # of its corridor
+REACHES_S = 3.0
+AHEAD_M = 10.0  # it looks no less far ahead
+WAITS_S = 4.0
+STANDING_MPS = 0.3
+OVER_S = 1.0
+PASSABLE_M = 3.0  # a standing vehicle farther from the corridor hides nothing that could come out at once
+BEHIND_M = 1.0  # from a standing vehicle's end to the place where a pedestrian may stand unseen
+KERB_M = 2.0  # from its flank to where the kerb would be
+LANES_M = 6.0  # a vehicle farther beside is in no other lane of the ego's direction
+OWN_LANE_M = 1.2
+STOPS_BEFORE_M = 12.0  # a vehicle that stops for a crossing stands no farther before it
+TOUCHES_S = 0.25
+FREE_MPS2 = 3.0  # more than that restrains nothing
+SAME_WAY_COS, ONCOMING_COS = 0.5, -0.9
+
+# Rows of what the driver remembers of each actor.
+STOOD_S, SINCE_S, GONE_S = range(3)
+
+
+class Scene(NamedTuple):
+    """What the driver has before it."""
+
+    state: Floats  # rows x n, of a frame; the ego's column is not used
+    vehicle: Bools
+    link: NDArray[np.uint8]
+    seen: Bools
+    priority: bool  # whether the ego's signal lets it go before all others
+
+
+def nothing_remembered(n: int) -> Floats:
+    """The driver's memory at its beginning, for `n` actors."""
+    memory = np.zeros((3, n))
+    memory[SINCE_S] = -1.0
+    return memory
+
+
+@compiled
+def allowed_accel(
+    ego: OnPath, scene: Scene, street: Street, crossings: Crossings, memory: Floats, step_s: float
+) -> float:
+    """The most acceleration that the driver allows itself for the next step, m/s²; inf if nothing restrains it.
+
+    Args:
+      ego: on its path.
+      scene: what it sees.
+      street: where it is.
+      crossings: on its path.
+      memory: of the frames before, `3 x n`; it is brought up to date.
+      step_s: until it decides again.
+    """
+    n = len(scene.vehicle)
+    state, front = scene.state, ego.s + ego.size.half_length
+    placed, hides = np.empty((3, n)), np.zeros(n, dtype=np.bool_)
+    for i in range(1, n):
+        if math.isnan(state[X, i]):
+            continue
+        placed[0, i], placed[1, i], placed[2, i] = project(ego.path, ego.first, state[X, i], state[Y, i])
+        leads = abs(placed[1, i]) < OWN_LANE_M and placed[0, i] > ego.s and state[SPEED, i] > CREEP_MPS
+        hides[i] = scene.vehicle[i] and not leads
+    walls = walls_of(state, hides)
+    x, y, heading = pose_at(ego.path, ego.s)
+    eye_x, eye_y = x + ego.size.half_length * math.cos(heading), y + ego.size.half_length * math.sin(heading)
+    accel = math.inf
+    if not scene.priority:
+        accel = _at_crossings(ego, front, scene, crossings, placed, walls, eye_x, eye_y, step_s)
+    for i in range(1, n):
+        if math.isnan(state[X, i]) or not scene.seen[i]:
+            memory[STOOD_S, i] = memory[GONE_S, i] = 0.0
+            memory[SINCE_S, i] = -1.0
+            continue
+        memory[STOOD_S, i] = memory[STOOD_S, i] + step_s if state[SPEED, i] < STANDING_MPS else 0.0
+        where = (placed[0, i], placed[1, i], placed[2, i])
+        if not scene.vehicle[i]:
+            on_red = int(scene.link[i]) == RED
+            accel = min(accel, _beside(ego, front, state, i, on_red, where, street, crossings, memory, step_s))
+        else:
+            if state[SPEED, i] < STANDING_MPS:
+                accel = min(accel, _past_standing(ego, front, state, i, where, street, walls, eye_x, eye_y, step_s))
+            elif accel > 0.0 and _comes_across(ego, state, i, int(scene.link[i]), where):
+                accel = 0.0
+        touch_s = conflict_in(ego, state, i, scene.vehicle[i], int(scene.link[i]), street, False)
+        accel = min(accel, _in_conflict(ego.speed_mps, touch_s, street.grip_mps2, memory[:, i], step_s))
+    return accel
+
+
+@compiled
+def stopping_m(speed_mps: float) -> float:
+    """The way in which the driver stops at leisure."""
+    return speed_mps * DELAY_S + speed_mps**2 / (2.0 * COMFORT_MPS2)
+
+
+@compiled
+def fitting_mps(ahead_m: float) -> float:
+    """The speed from which it stops `BEFORE_M` before a place; `stopping_m` the other way round."""
+    reaction = COMFORT_MPS2 * DELAY_S
+    return math.sqrt(reaction**2 + 2.0 * COMFORT_MPS2 * max(ahead_m - BEFORE_M, 0.0)) - reaction
+
+
+@compiled
+def _held_to(
+    ego: OnPath, ahead_m: float, passes_m: float, aside_m: float, walks_mps: float, least_mps: float, step_s: float
+) -> float:
+    """The acceleration that keeps a fitting speed before a place from which a pedestrian may come.
+
+    Args:
+      ego: on its path.
+      ahead_m: from its front to the place.
+      passes_m: what it has to drive until it has passed it with its whole body.
+      aside_m: from the pedestrian to the corridor.
+      walks_mps: how fast it may come.
+      least_mps: the speed that it keeps anyway.
+      step_s: until it decides again.
+    """
+    speed = ego.speed_mps
+    if aside_m * speed >= walks_mps * passes_m and aside_m > 0.0:  # it has passed before anything could come
+        return math.inf
+    wanted = max(fitting_mps(ahead_m - speed * step_s), least_mps)
+    return max((wanted - speed) / step_s, -COMFORT_MPS2)
+
+
+@compiled
+def _at_crossings(
+    ego: OnPath,
+    front: float,
+    scene: Scene,
+    crossings: Crossings,
+    placed: Floats,
+    walls: Floats,
+    eye_x: float,
+    eye_y: float,
+    step_s: float,
+) -> float:
+    """Rules 1 and 2: what the driver cannot see of a crossing ahead."""
+    accel, looks_m = math.inf, stopping_m(ego.speed_mps) + AHEAD_M
+    for k in range(len(crossings.spots)):
+        spot_x, spot_y, crossing, aside = crossings.spots[k]
+        enters, leaves = crossings.entries[int(crossing)]
+        ahead = enters - front
+        if ahead < 0.0 or ahead > looks_m or not is_hidden(walls, eye_x, eye_y, spot_x, spot_y):
+            continue
+        if _is_stopped_for(scene, placed, enters):
+            aside = 0.0
+        passes = leaves - front + 2.0 * ego.size.half_length
+        accel = min(accel, _held_to(ego, ahead, passes, aside, WALKS_MPS, CREEP_MPS, step_s))
+    return accel
+
+
+@compiled
+def _is_stopped_for(scene: Scene, placed: Floats, enters_m: float) -> bool:
+    """Whether a vehicle in another lane of the ego's direction stands before a crossing, or brakes to stop there."""
+    state = scene.state
+    for i in range(1, len(scene.vehicle)):
+        if not scene.vehicle[i] or not scene.seen[i] or math.isnan(state[X, i]):
+            continue
+        along = state[SPEED, i] * 0.0 + math.cos(state[2, i] - placed[2, i])
+        beside = OWN_LANE_M < abs(placed[1, i]) < LANES_M
+        if not beside or along < SAME_WAY_COS or must_yield(int(scene.link[i])):
+            continue
+        room = enters_m - placed[0, i] - state[LENGTH, i] / 2
+        speed, braking = state[SPEED, i], -state[ACCEL, i]
+        stops_m = 0.0 if speed < STANDING_MPS else math.inf
+        if speed >= STANDING_MPS and braking >= BRAKES_MPS2:
+            stops_m = speed**2 / (2.0 * braking)
+        if -BEHIND_M <= room - (0.0 if stops_m == math.inf else stops_m) and room <= STOPS_BEFORE_M + 0.0 * stops_m:
+            if stops_m < math.inf:
+                return True
+    return False

@@ -1,0 +1,127 @@
+"""Places from which a pedestrian may come that the ego does not see: crossings on its path, and what hides them."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from risk_sac.jit import compiled
+from risk_sac.scenario.ground import Area
+from risk_sac.types import HEADING, LENGTH, WIDTH, Bools, Floats, X, Y
+from risk_sac.verdicts.course import CORRIDOR_M
+from risk_sac.verdicts.path import Path, pose_at
+
+WAITING_M = 2.0  # of sidewalk at either end of a crossing, on which pedestrians wait
+SPOT_M = 1.0  # between two places on a crossing that are looked at
+LOOK_M = 0.5  # between two places on the path that may be on a crossing
+ALONG_COS = math.cos(math.radians(45.0))
+
+
+class Crossings(NamedTuple):
+    """Pedestrian crossings on a path."""
+
+    entries: Floats  # k x 2: metres along the path at which it enters and leaves each
+    spots: Floats  # m x 4: x, y, the crossing, and metres beside the corridor
+
+
+def boxes_of(crossings: Sequence[Area]) -> Floats:
+    """Rectangles about crossings, `k x 6`: centre, direction of the longest side, half the size along it and across."""
+    found = np.empty((len(crossings), 6))
+    for row, area in zip(found, crossings, strict=True):
+        corners = np.array(_corners(area))
+        sides = np.roll(corners, -1, axis=0) - corners
+        direction = sides[np.hypot(*sides.T).argmax()]
+        direction /= np.hypot(*direction)
+        along, across = corners @ direction, corners @ (-direction[1], direction[0])
+        middle, aside = (along.max() + along.min()) / 2, (across.max() + across.min()) / 2
+        x, y = middle * direction[0] - aside * direction[1], middle * direction[1] + aside * direction[0]
+        row[:] = x, y, *direction, (along.max() - along.min()) / 2, (across.max() - across.min()) / 2
+    return found
+
+
+def _corners(area: Area) -> list[tuple[float, float]]:
+    """Where consecutive sides meet."""
+    found = []
+    for (ax, ay, a), (bx, by, b) in zip(area.sides, (*area.sides[1:], area.sides[0]), strict=True):
+        cross = ax * by - ay * bx
+        if abs(cross) > 1e-9:
+            found.append(((a * by - b * ay) / cross, (ax * b - bx * a) / cross))
+    return found
+
+
+@compiled
+def crossings_on(path: Path, from_m: float, to_m: float, boxes: Floats, half_width_m: float) -> Crossings:
+    """Finds the crossings on a path between two stations, and spots along each with its waiting areas."""
+    entries, count = np.empty((len(boxes), 2)), 0
+    spots, filled = np.empty((64 * len(boxes), 4)), 0
+    for k in range(len(boxes)):
+        x, y, ux, uy, half_u, half_v = boxes[k]
+        enters, leaves, at = math.nan, math.nan, from_m
+        while at <= to_m:
+            px, py, _ = pose_at(path, at)
+            dx, dy = px - x, py - y
+            if abs(dx * ux + dy * uy) <= half_u and abs(dy * ux - dx * uy) <= half_v:
+                if math.isnan(enters):
+                    enters = at
+                leaves = at
+            elif not math.isnan(enters):
+                break
+            at += max(LOOK_M, math.hypot(dx, dy) - half_u - half_v)
+        if math.isnan(enters):
+            continue
+        mx, my, heading = pose_at(path, (enters + leaves) / 2)
+        cos, sin = math.cos(heading), math.sin(heading)
+        wx, wy, half = ux, uy, half_u
+        if abs(cos * ux + sin * uy) > ALONG_COS:  # the path leads along its longest side
+            wx, wy, half = -uy, ux, half_v
+        half += WAITING_M
+        entries[count] = enters, leaves
+        steps = min(math.ceil(2.0 * half / SPOT_M), 63)
+        for j in range(steps + 1):
+            along = -half + 2.0 * half * j / steps
+            sx, sy = x + along * wx, y + along * wy
+            aside = abs((sy - my) * cos - (sx - mx) * sin) - half_width_m - CORRIDOR_M
+            spots[filled] = sx, sy, count, max(aside, 0.0)
+            filled += 1
+        count += 1
+    return Crossings(entries[:count], spots[:filled])
+
+
+@compiled
+def walls_of(state: Floats, hides: Bools) -> Floats:
+    """Bodies that hide what is behind them, `w x 6`: centre, cosine and sine of the heading, half the size."""
+    found, count = np.empty((len(hides), 6)), 0
+    for i in range(len(hides)):
+        if hides[i]:
+            heading = state[HEADING, i]
+            found[count, 0], found[count, 1] = state[X, i], state[Y, i]
+            found[count, 2], found[count, 3] = math.cos(heading), math.sin(heading)
+            found[count, 4], found[count, 5] = state[LENGTH, i] / 2, state[WIDTH, i] / 2
+            count += 1
+    return found[:count]
+
+
+@compiled
+def is_hidden(walls: Floats, eye_x: float, eye_y: float, x: float, y: float) -> bool:
+    """Whether a body lies between the eye and a place; one that stands on the place hides nothing there."""
+    for k in range(len(walls)):
+        cos, sin, half_length, half_width = walls[k, 2], walls[k, 3], walls[k, 4], walls[k, 5]
+        ex, ey = eye_x - walls[k, 0], eye_y - walls[k, 1]
+        px, py = x - walls[k, 0], y - walls[k, 1]
+        to_x, to_y = px * cos + py * sin, py * cos - px * sin
+        if abs(to_x) <= half_length and abs(to_y) <= half_width:
+            continue
+        from_x, from_y = ex * cos + ey * sin, ey * cos - ex * sin
+        enter, leave = 0.0, 1.0
+        for start, end, half in ((from_x, to_x, half_length), (from_y, to_y, half_width)):
+            step = end - start
+            if abs(step) < 1e-9:
+                if abs(start) > half:
+                    enter = 2.0
+                continue
+            first, last = (-half - start) / step, (half - start) / step
+            enter, leave = max(enter, min(first, last)), min(leave, max(first, last))
+        if enter < leave:
+            return True
+    return False
