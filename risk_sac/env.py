@@ -43,7 +43,7 @@ from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import collision_of
 from risk_sac.verdicts.keeping import History
-from risk_sac.verdicts.online import R157Reflex, conflicts_now
+from risk_sac.verdicts.online import conflicts_now, reflex_of
 from risk_sac.verdicts.path import Path, polyline
 from risk_sac.verdicts.validity import EpisodeFacts
 from risk_sac.verdicts.violation import requirement_results, violations_of
@@ -200,7 +200,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         limits = limits_from_odd(self.problem.odd, layout.friction)
         self._ground = Ground.of(layout, self.problem.speed_limit_mps)
         sumo_seed = int(self.np_random.integers(2**31 - 1))
-        self._reflex = R157Reflex(self._ground) if self.problem.ego.profile == "careful" else None
+        self._reflex = reflex_of(self.problem.ego.profile, self._ground)
         self._gauge.reset(carriageway_of(layout.net))
         self.trace = Trace(self._gauge.names)
         sensor = self.problem.ego.sensor

@@ -34,11 +34,11 @@ class EgoConfig(Settings):
     """SUMO's default driver with a driver's delay and view, or a driver that the operator has registered.
 
     The profile `perfect` reacts within one simulation step and sees everything; `careful` adds the braking of UN
-    R157's driver. A registered driver takes over at the adversaries' release
-    and has the same view.
+    R157's driver, `defensive` what the reference driver of that name does. A registered driver takes over at the
+    adversaries' release and has the same view.
     """
 
-    profile: Literal["default", "perfect", "careful"] = "default"
+    profile: Literal["default", "perfect", "careful", "defensive"] = "default"
     car_following: CarFollowing = "Krauss"
     reaction_time_s: Annotated[float, Field(ge=0.1, le=3.0)] = 0.5
     """Time between two decisions (SUMO's actionStepLength), s; a multiple of 0.1."""

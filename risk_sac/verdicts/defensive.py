@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.jit import compiled
-from risk_sac.types import ACCEL, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
+from risk_sac.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
 from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, YIELDING_MPS2
 from risk_sac.verdicts.course import CORRIDOR_M, entry_distance, with_margin
 from risk_sac.verdicts.drivers import JERK_MPS3, R157_PERCEIVES_S, r157
@@ -51,9 +51,10 @@ BEHIND_M = 1.0  # from a standing vehicle's end to the place where a pedestrian 
 KERB_M = 2.0  # from its flank to where the kerb would be
 LANES_M = 6.0  # a vehicle farther beside is in no other lane of the ego's direction
 OWN_LANE_M = 1.2
-STOPS_BEFORE_M = 12.0  # a vehicle that stops for a crossing stands no farther before it
+STOPS_BEFORE_M, STOPS_BEYOND_M = 12.0, 1.0  # a vehicle that stops for a crossing stands this near to its edge
+AT_CROSSING_M = 2.5  # from a spot of a crossing
 TOUCHES_S = 0.25
-FREE_MPS2 = 3.0  # more than that restrains nothing
+PRIORITY, PRIORITY_S = ord("G"), 4.0  # its signal, and how long it counts after the stop line
 SAME_WAY_COS, ONCOMING_COS = 0.5, -0.9
 
 # Rows of what the driver remembers of each actor.
@@ -195,16 +196,135 @@ def _is_stopped_for(scene: Scene, placed: Floats, enters_m: float) -> bool:
     for i in range(1, len(scene.vehicle)):
         if not scene.vehicle[i] or not scene.seen[i] or math.isnan(state[X, i]):
             continue
-        along = state[SPEED, i] * 0.0 + math.cos(state[2, i] - placed[2, i])
         beside = OWN_LANE_M < abs(placed[1, i]) < LANES_M
-        if not beside or along < SAME_WAY_COS or must_yield(int(scene.link[i])):
+        if not beside or math.cos(state[HEADING, i] - placed[2, i]) < SAME_WAY_COS or must_yield(int(scene.link[i])):
             continue
-        room = enters_m - placed[0, i] - state[LENGTH, i] / 2
-        speed, braking = state[SPEED, i], -state[ACCEL, i]
-        stops_m = 0.0 if speed < STANDING_MPS else math.inf
-        if speed >= STANDING_MPS and braking >= BRAKES_MPS2:
-            stops_m = speed**2 / (2.0 * braking)
-        if -BEHIND_M <= room - (0.0 if stops_m == math.inf else stops_m) and room <= STOPS_BEFORE_M + 0.0 * stops_m:
-            if stops_m < math.inf:
-                return True
+        room, speed, braking = enters_m - placed[0, i] - state[LENGTH, i] / 2, state[SPEED, i], -state[ACCEL, i]
+        if speed >= STANDING_MPS:
+            if braking < BRAKES_MPS2:
+                continue
+            room -= speed**2 / (2.0 * braking)
+        if -STOPS_BEYOND_M <= room <= STOPS_BEFORE_M:
+            return True
     return False
+
+
+@compiled
+def _past_standing(
+    ego: OnPath,
+    front: float,
+    state: Floats,
+    i: int,
+    where: tuple[float, float, float],
+    street: Street,
+    walls: Floats,
+    eye_x: float,
+    eye_y: float,
+    step_s: float,
+) -> float:
+    """Rule 1: the kerb behind a vehicle that stands beside the path."""
+    along, across, heading = where
+    cos, sin = abs(math.cos(state[HEADING, i] - heading)), abs(math.sin(state[HEADING, i] - heading))
+    half_length = state[LENGTH, i] / 2 * cos + state[WIDTH, i] / 2 * sin
+    half_width = state[LENGTH, i] / 2 * sin + state[WIDTH, i] / 2 * cos
+    aside = abs(across) - half_width - ego.size.half_width - CORRIDOR_M
+    end = along + half_length
+    if not 0.0 < aside < PASSABLE_M or not 0.0 < end - front < stopping_m(ego.speed_mps) + AHEAD_M:
+        return math.inf
+    x, y, way = pose_at(ego.path, end + BEHIND_M)
+    side = math.copysign(1.0, across)
+    kerb = across + side * (half_width + KERB_M)
+    kerb_x, kerb_y = x - kerb * math.sin(way), y + kerb * math.cos(way)
+    if len(street.roadway.sides) == 0 or within(street.roadway, kerb_x, kerb_y):
+        return math.inf
+    if not is_hidden(walls, eye_x, eye_y, x - across * math.sin(way), y + across * math.cos(way)):
+        return math.inf
+    passes = end + BEHIND_M - front + 2.0 * ego.size.half_length
+    return _held_to(ego, end - front, passes, aside, WALKS_MPS, KERB_MPS, step_s)
+
+
+@compiled
+def _beside(
+    ego: OnPath,
+    front: float,
+    state: Floats,
+    i: int,
+    on_red: bool,
+    where: tuple[float, float, float],
+    street: Street,
+    crossings: Crossings,
+    memory: Floats,
+    step_s: float,
+) -> float:
+    """Rule 3 for a pedestrian."""
+    along, across, heading = where
+    body = state[WIDTH, i] / 2
+    ahead, aside = along - body - front, abs(across) - body - ego.size.half_width - CORRIDOR_M
+    if ahead + 2.0 * body < 0.0 or ahead > stopping_m(ego.speed_mps) + AHEAD_M:
+        return math.inf
+    comes_mps = -math.copysign(1.0, across) * (state[VY, i] * math.cos(heading) - state[VX, i] * math.sin(heading))
+    if aside > BESIDE_M and aside > comes_mps * REACHES_S:
+        return math.inf
+    on_road = len(street.roadway.sides) == 0 or within(street.roadway, state[X, i], state[Y, i])
+    stood = memory[STOOD_S, i] >= WAITS_S - 1e-6
+    if not on_road and (stood or (on_red and memory[STOOD_S, i] > 0.0)):
+        return math.inf
+    leaves = comes_mps < -STANDING_MPS
+    if leaves or not (on_road or _is_at(crossings, state[X, i], state[Y, i])):
+        return 0.0
+    passes = ahead + 2.0 * (body + ego.size.half_length)
+    least = CREEP_MPS if stood and aside > 0.0 else 0.0
+    return min(_held_to(ego, ahead, passes, aside, max(comes_mps, WALKS_MPS), least, step_s), 0.0)
+
+
+@compiled
+def _is_at(crossings: Crossings, x: float, y: float) -> bool:
+    """Whether a place is on one of the crossings, or where pedestrians wait for it."""
+    for k in range(len(crossings.spots)):
+        if math.hypot(crossings.spots[k, 0] - x, crossings.spots[k, 1] - y) < AT_CROSSING_M:
+            return True
+    return False
+
+
+@compiled
+def _comes_across(ego: OnPath, state: Floats, i: int, link: int, where: tuple[float, float, float]) -> bool:
+    """Rule 3 for a vehicle from across: whether it would be in the corridor within 3 s.
+
+    One that has to yield and still can is expected to, and so is one that brakes already.
+    """
+    turn = math.cos(state[HEADING, i] - where[2])
+    if turn > SAME_WAY_COS or (turn < ONCOMING_COS and abs(where[1]) > OWN_LANE_M + state[WIDTH, i]):
+        return False
+    speed = state[SPEED, i]
+    reach = max(ego.speed_mps * REACHES_S, AHEAD_M)
+    apart = math.hypot(state[X, i] - state[X, 0], state[Y, i] - state[Y, 0])
+    if apart > reach + speed * REACHES_S + state[LENGTH, i] + 2.0 * ego.size.half_length:
+        return False
+    other = body_of(state, i)
+    times = np.arange(0.0, REACHES_S + TOUCHES_S / 2, TOUCHES_S)
+    x, y, heading = other.x + times * other.vx, other.y + times * other.vy, np.full(len(times), other.heading)
+    last = ego.s + ego.size.half_length + reach
+    gone, _ = entry_distance(ego.path, ego.first, last, with_margin(ego.size), x, y, heading, other.size)
+    yields = must_yield(link) and gone > speed**2 / (2.0 * YIELDING_MPS2)
+    yields = yields or (state[ACCEL, i] <= -BRAKES_MPS2 and gone > speed**2 / (2.0 * FIRM_MPS2))
+    return math.isfinite(gone) and not yields
+
+
+@compiled
+def _in_conflict(speed_mps: float, touch_s: float, grip_mps2: float, remembered: Floats, step_s: float) -> float:
+    """Rule 4, given when the ego would reach the actor; brings up to date what it remembers of that actor."""
+    if touch_s < math.inf:
+        remembered[SINCE_S] = 0.0 if remembered[SINCE_S] < 0.0 else remembered[SINCE_S] + step_s
+        remembered[GONE_S] = 0.0
+    elif remembered[SINCE_S] >= 0.0:
+        remembered[SINCE_S] += step_s
+        remembered[GONE_S] += step_s
+        if remembered[GONE_S] > OVER_S + 1e-6:
+            remembered[SINCE_S] = -1.0
+    since = remembered[SINCE_S]
+    if since < 0.0:
+        return math.inf
+    braking = min(max(JERK_MPS3 * (since - DELAY_S), 0.0), COMFORT_MPS2, grip_mps2)
+    if since >= R157_PERCEIVES_S and speed_mps / (2.0 * max(touch_s, 0.01)) > COMFORT_MPS2:
+        braking = max(braking, r157(since - R157_PERCEIVES_S, grip_mps2))
+    return -braking if braking > 0.0 else math.inf

@@ -4,18 +4,23 @@ The measures are those of `risk_sac.verdicts.present`.
 """
 
 import math
+from typing import Protocol
 
 import numpy as np
 
 from risk_sac.geometry import size_of
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.types import Bools, Frame, Kind
+from risk_sac.types import STEP_S, Bools, Frame, Kind
 from risk_sac.verdicts.course import HORIZON_S
+from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, Scene, allowed_accel, nothing_remembered
 from risk_sac.verdicts.drivers import R157_PERCEIVES_S, r157
 from risk_sac.verdicts.evidence import Ground
 from risk_sac.verdicts.path import Path
 from risk_sac.verdicts.present import OnPath, conflict_in, street_of
+from risk_sac.verdicts.unseen import crossings_on
 
+LEAST_MPS2 = 1e-6  # braking that only keeps the ego from speeding up
+LEAST_ACCEL_MPS2 = 0.5  # Choice: a restraint to more is none; SUMO's driver can be told to brake, not how to speed up
 OVER_S = 1.0  # a conflict that has been gone for so long is over
 
 
@@ -43,6 +48,18 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, war
     return found
 
 
+class Reflex(Protocol):
+    """Braking of an ego that SUMO drives, beside that of SUMO's models; one for each episode."""
+
+    def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
+        """How hard it brakes now, m/s²; 0 where SUMO's models may drive as they like."""
+
+
+def reflex_of(profile: str, ground: Ground) -> Reflex | None:
+    """The reflex of an ego's profile; None where it has none."""
+    return R157Reflex(ground) if profile == "careful" else DefensiveReflex(ground) if profile == "defensive" else None
+
+
 class R157Reflex:
     """R157's driver in the closed loop; one for each episode.
 
@@ -64,3 +81,35 @@ class R157Reflex:
         if self._since_s is None or now - self._since_s < R157_PERCEIVES_S:
             return 0.0
         return r157(now - self._since_s - R157_PERCEIVES_S, self._ground.friction * GRAVITY_MPS2)
+
+
+class DefensiveReflex:
+    """The defensive driver in the closed loop; one for each episode.
+
+    It drives as the ego does where `allowed_accel` restrains it less.
+    """
+
+    def __init__(self, ground: Ground) -> None:
+        self._street = street_of(ground, ground.friction * GRAVITY_MPS2)
+        self._ids: tuple[str, ...] = ()
+        self._memory = nothing_remembered(0)
+        self._priority_s = -math.inf  # when its signal last gave it priority
+
+    def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
+        """How hard it brakes now, m/s²; 0 where nothing restrains it. Arguments as of `conflicts_now`."""
+        if frame.ids != self._ids:
+            before, self._memory = self._memory, nothing_remembered(len(frame.ids))
+            for column, id_ in enumerate(frame.ids):
+                if id_ in self._ids:
+                    self._memory[:, column] = before[:, self._ids.index(id_)]
+            self._ids = frame.ids
+        if frame.link[0] == PRIORITY:
+            self._priority_s = frame.time_s
+        priority = frame.link[0] in (0, PRIORITY) and frame.time_s - self._priority_s <= PRIORITY_S
+        size = size_of(frame.state, 0)
+        ego = OnPath(path, 0, float(path.s[0]), frame.ego_speed_mps, size)
+        crossings = crossings_on(path, ego.s, float(path.s[-1]), self._street.boxes, size.half_width)
+        scene = Scene(frame.state, frame.kind == Kind.VEHICLE, frame.link, seen, priority)
+        accel = allowed_accel(ego, scene, self._street, crossings, self._memory, STEP_S)
+        # SUMO's driver speeds up by itself: the least braking keeps it from that.
+        return max(-accel, LEAST_MPS2) if accel < LEAST_ACCEL_MPS2 else 0.0

@@ -19,6 +19,7 @@ from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, KERB_S, SAME_WAY_
 from risk_sac.verdicts.course import HORIZON_S, Body, entry_distance, time_to_touch, with_margin
 from risk_sac.verdicts.evidence import KERB_STEPS, Ground
 from risk_sac.verdicts.path import Path
+from risk_sac.verdicts.unseen import boxes_of
 
 NEAR_S = 1.0  # two vehicles that pass a place no further apart in time are in each other's way
 AHEAD_M = 1.0  # between two foreseen poses
@@ -41,6 +42,7 @@ class Street(NamedTuple):
 
     roadway: Sides  # none: pedestrians are judged as if always on it
     walked: Sides  # roadway and crossings
+    boxes: Floats  # of the crossings, see `boxes_of`
     lane_width_m: float
     grip_mps2: float
 
@@ -49,7 +51,7 @@ class Street(NamedTuple):
 def street_of(ground: Ground, grip_mps2: float) -> Street:
     """What compiled code goes by of a ground."""
     roadway, walked = sides_of(ground.roadway), sides_of(ground.roadway + ground.crossings)
-    return Street(roadway, walked, ground.lane_width_m, grip_mps2)
+    return Street(roadway, walked, boxes_of(ground.crossings), ground.lane_width_m, grip_mps2)
 
 
 @compiled

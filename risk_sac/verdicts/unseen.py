@@ -82,7 +82,7 @@ def crossings_on(path: Path, from_m: float, to_m: float, boxes: Floats, half_wid
             along = -half + 2.0 * half * j / steps
             sx, sy = x + along * wx, y + along * wy
             aside = abs((sy - my) * cos - (sx - mx) * sin) - half_width_m - CORRIDOR_M
-            spots[filled] = sx, sy, count, max(aside, 0.0)
+            spots[filled] = sx, sy, float(count), max(aside, 0.0)
             filled += 1
         count += 1
     return Crossings(entries[:count], spots[:filled])

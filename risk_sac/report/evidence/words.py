@@ -11,6 +11,7 @@ PROFILES = {
     "default": "SUMO's driver with a delay and a line of sight",
     "perfect": "SUMO's driver, who reacts at once and sees everything",
     "careful": "the default with the braking of R157's driver on top",
+    "defensive": "the default held back by the defensive reference driver",
 }
 # Field of the ODD → what it is called, and its unit.
 FIELDS: Mapping[str, tuple[str, str]] = {

@@ -136,6 +136,7 @@ PROFILES = {
     "default": "SUMO's default driver, with a driver's delay and a driver's view.",
     "perfect": "The same, that reacts within a step and sees everything.",
     "careful": "The default, with the braking of UN R157's driver on top.",
+    "defensive": "The default, held back by the defensive reference driver.",
 }
 router = APIRouter(prefix="/v1", tags=["catalogue"])
 
