@@ -13,7 +13,7 @@ from risk_sac.failures.export.formats import FormatName
 from risk_sac.records import NO_CONTACT, Collision, EpisodeRecord, Record, Violation
 
 IDLE = "idle"
-Twin = Literal["idle", "default", "perfect", "careful"]
+Twin = Literal["idle", "default", "perfect", "careful", "defensive"]
 """What may be changed in a scene's twin: nobody attacks, or the profile of another ego."""
 Subject = Literal["bundle", "core", "region", "twin", "export"]
 REFUSED = 3  # exit status; the answer is why, in words

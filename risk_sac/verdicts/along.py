@@ -115,8 +115,6 @@ def lane_conflicts(
     begins, lasts = np.empty(len(speed_mps), dtype=np.bool_), np.empty(len(speed_mps), dtype=np.bool_)
     for t in range(len(speed_mps)):
         o = others
-        other = Along(
-            o.gap_m[t], o.behind_m[t], o.ttc_s[t], o.across_m[t], o.turn_rad[t], o.speed_mps[t], o.aside_s[t]
-        )
+        other = Along(o.gap_m[t], o.behind_m[t], o.ttc_s[t], o.across_m[t], o.turn_rad[t], o.speed_mps[t], o.aside_s[t])
         begins[t], lasts[t] = lane_conflict(other, speed_mps[t], offset_m[t], accel_mps2[t], lane_width_m, wary)
     return begins, lasts

@@ -22,6 +22,7 @@ from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import AHEAD, COS
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.types import ACCEL, HEADING, LATERAL, LENGTH, SPEED, STEP_S, VX, VY, Bools, Floats, Frame, Signal, X, Y
+from risk_sac.verdicts.anticipation import driven
 from risk_sac.verdicts.conflict import Conflict, left_its_place
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path, pose_at
@@ -82,7 +83,11 @@ def _keeps(name: str, gauge: Gauge, history: History, index: int, met: MetActor 
     in_lane = left - 1 if left is not None else index if met is None else met.conflict.frame
     stays = left is None and keeps_lane(e, in_lane)
     path = ego_path(e) if stays else lane_path(e, in_lane)
-    s, acts = _driven(name, e, path, met, after_steps=AFTER_CONTACT_STEPS * history.measures[-1].assessment.touched)
+    if name == "defensive":
+        s, acts = _anticipating(e, path, index if met is None else met.conflict.frame, index)
+    else:
+        touched = history.measures[-1].assessment.touched
+        s, acts = _braking(name, e, path, met, after_steps=AFTER_CONTACT_STEPS * touched)
     fast = np.flatnonzero(e.speed_mps[e.time_s > -STEP_S / 2, 0] > e.ground.speed_limit_mps + 1e-6)
     if len(fast):
         first = int(np.searchsorted(e.time_s, -STEP_S / 2)) + int(fast[0])
@@ -93,7 +98,13 @@ def _keeps(name: str, gauge: Gauge, history: History, index: int, met: MetActor 
     return _holds(gauge, history, path, s, acts)
 
 
-def _driven(name: str, e: Evidence, path: Path, met: MetActor | None, after_steps: int) -> tuple[Floats, int]:
+def _anticipating(e: Evidence, path: Path, began: int, index: int) -> tuple[Floats, int]:
+    """Drives the defensive driver along the path: metres per frame until 4 s after the violation, and when it acts."""
+    s, acts = driven(e.until(index), Path(*(each[: index + 1] for each in path)), began, index)
+    return (path.s.copy() if acts == index else s), acts
+
+
+def _braking(name: str, e: Evidence, path: Path, met: MetActor | None, after_steps: int) -> tuple[Floats, int]:
     """Drives along the path: metres per frame, NaN once the driver stands, and the frame from which it brakes."""
     last = len(e.time_s) - 1
     if met is None:

@@ -105,7 +105,7 @@ def conflict_in(ego: OnPath, state: Floats, i: int, vehicle: bool, link: int, st
 @compiled
 def must_yield(link: int) -> bool:
     """Whether a vehicle before this signal is expected to stop or to yield."""
-    return link == RED or link == UNCONTROLLED or link == YELLOW or link == GREEN_MINOR
+    return link in (RED, UNCONTROLLED, YELLOW, GREEN_MINOR)
 
 
 @compiled

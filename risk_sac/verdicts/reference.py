@@ -3,21 +3,23 @@
 Source: UN Regulation 157, 5.2.5 and Annex 3; the drivers in `risk_sac.verdicts.drivers`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
 from risk_sac.geometry import Size, contact_point, frame_view, zone
 from risk_sac.records import ConflictType, Grade, ReferenceOutcome
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.types import HEADING, LENGTH, WIDTH, X, Y
+from risk_sac.types import HEADING, LENGTH, WIDTH, Floats, X, Y
+from risk_sac.verdicts.anticipation import driven, meets
 from risk_sac.verdicts.conflict import Conflict
+from risk_sac.verdicts.course import Body
 from risk_sac.verdicts.drivers import R157_PERCEIVES_S
 from risk_sac.verdicts.endangering import enters_safely
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.path import Path
 from risk_sac.verdicts.recorded import ego_path, keeps_lane, lane_path, recorded_motion, recorded_size, seen_along
-from risk_sac.verdicts.rollout import FULL_BRAKING, FUZZY, HORIZON_S, R157, RSS, STANDING_MPS, Ending, drive
+from risk_sac.verdicts.rollout import DEFENSIVE, FULL_BRAKING, FUZZY, HORIZON_S, R157, RSS, STANDING_MPS, Ending, drive
 
 # The driver, and how long after the conflict began it perceives. Choice: fsm and rss look out from the beginning of the
 # conflict on, not before, and perceive what they themselves hold to be dangerous: all drivers judge the same conflict.
@@ -25,6 +27,7 @@ DRIVERS = {
     "r157": (R157, R157_PERCEIVES_S),
     "fsm": (FUZZY, 0.0),
     "rss": (RSS, 0.0),
+    "defensive": (DEFENSIVE, 0.0),
     "full_braking": (FULL_BRAKING, 0.0),
 }
 # What one of these avoids is preventable; full braking at once is a bound, and R157's rule for cut-ins knows no driver.
@@ -48,15 +51,16 @@ def reference_outcomes(evidence: Evidence, striker: int, conflict: Conflict) -> 
     if conflict.came_over or not keeps_lane(evidence, conflict.frame):
         kept = lane_path(evidence, conflict.in_lane)
     outcomes = {}
+    path = recorded if kept is None else kept
+    others = (striker,) if kept is None else (striker, *_met(evidence, kept, striker))
     for name, (driver, perceives_s) in DRIVERS.items():
-        if kept is None:
-            outcomes[name] = _outcome(evidence, recorded, striker, driver, conflict.frame, perceives_s)
+        if driver == DEFENSIVE:
+            latest = len(evidence.time_s) - 1 if kept is None else conflict.in_lane
+            endings = _anticipating(evidence, path, others, conflict.frame, latest)
         else:
-            each = (
-                _outcome(evidence, kept, other, driver, conflict.frame, perceives_s, kept=True)
-                for other in (striker, *_met(evidence, kept, striker))
-            )
-            outcomes[name] = next((outcome for outcome in each if not outcome.avoids), AVOIDED)
+            endings = (_braking(evidence, path, each, driver, conflict.frame, perceives_s) for each in others)
+        each = (_outcome(evidence, *ending, kept=kept is not None) for ending in zip(others, endings, strict=True))
+        outcomes[name] = next((outcome for outcome in each if not outcome.avoids), AVOIDED)
     if conflict.type is ConflictType.CUT_IN:
         outcomes["r157_ttc"] = _by_ttc(evidence, recorded, striker)
     return outcomes
@@ -78,24 +82,39 @@ def grade(keeps: Mapping[str, bool]) -> Grade:
     return Grade.FULL_BRAKING if keeps["full_braking"] else Grade.UNAVOIDABLE
 
 
-def _outcome(
-    evidence: Evidence, path: Path, other: int, driver: int, began: int, perceives_s: float, *, kept: bool = False
-) -> ReferenceOutcome:
-    """Drives against one actor; `kept`: on a path that the ego did not take."""
-    e, size, motion = evidence, recorded_size(evidence, 0), recorded_motion(evidence, other)
-    track = motion._replace(heading=np.unwrap(motion.heading))
+def _braking(evidence: Evidence, path: Path, other: int, driver: int, began: int, perceives_s: float) -> Ending | None:
+    """Drives against one actor with a driver that brakes; None if the ego is struck before it perceives."""
+    e, track = evidence, _track(evidence, other)
     first = began + round(perceives_s / e.step_s)
-    if first >= len(e.time_s) - 1:  # the ego is struck before the driver perceives
-        if kept:
-            return AVOIDED
-        speed = float(e.speed_mps[-1, 0])
-        pose, other_pose = ((each.x[-1], each.y[-1], each.heading[-1]) for each in (path, track))
-        ending = Ending(True, speed, pose, other_pose, lead_m=0.0, passing_mps=speed)
-    else:
-        speed = float(e.speed_mps[first, 0])
-        grip = e.ground.friction * GRAVITY_MPS2
-        ending = drive(driver, path, size, track, first, speed, grip, HORIZON_S - perceives_s, e.step_s, np.empty(0))
-    blameless = not ending.touched or ending.speed_mps <= STANDING_MPS or _from_behind(ending, size, track.size)
+    if first >= len(e.time_s) - 1:
+        return None
+    speed, size, grip = float(e.speed_mps[first, 0]), recorded_size(e, 0), e.ground.friction * GRAVITY_MPS2
+    return drive(driver, path, size, track, first, speed, grip, HORIZON_S - perceives_s, e.step_s, np.empty(0))
+
+
+def _anticipating(
+    evidence: Evidence, path: Path, others: Iterable[int], began: int, latest: int
+) -> Iterator[Ending | None]:
+    """Drives the defensive driver; None where it does as the ego did."""
+    s, acts = driven(evidence, path, began, latest)
+    for other in others:
+        if acts == len(evidence.time_s) - 1:
+            yield None
+        else:
+            yield meets(path, recorded_size(evidence, 0), _track(evidence, other), s, acts, evidence.step_s)
+
+
+def _track(evidence: Evidence, other: int) -> Body[Floats]:
+    motion = recorded_motion(evidence, other)
+    return motion._replace(heading=np.unwrap(motion.heading))
+
+
+def _outcome(evidence: Evidence, other: int, ending: Ending | None, *, kept: bool) -> ReferenceOutcome:
+    """What an ending means; `kept`: on a path that the ego did not take. None: as the ego fared."""
+    if ending is None:
+        return AVOIDED if kept else ReferenceOutcome(avoids=False, impact_speed_mps=float(evidence.speed_mps[-1, 0]))
+    size, other_size = recorded_size(evidence, 0), recorded_size(evidence, other)
+    blameless = not ending.touched or ending.speed_mps <= STANDING_MPS or _from_behind(ending, size, other_size)
     if blameless and (kept or ending.lead_m <= LEAD_M):
         return AVOIDED
     return ReferenceOutcome(avoids=False, impact_speed_mps=float(ending.passing_mps if blameless else ending.speed_mps))

@@ -29,7 +29,7 @@ from risk_sac.verdicts.drivers import (
 from risk_sac.verdicts.fuzzy import HARDEST_MPS2
 from risk_sac.verdicts.path import Path, pose_at
 
-R157, FULL_BRAKING, FUZZY, RSS = range(4)
+R157, FULL_BRAKING, FUZZY, RSS, DEFENSIVE = range(5)
 FINE_S = 0.01  # between two box tests; at 30 m/s of closing 0.3 m
 LOOK = 10  # fine steps, 0.1 s, between two looks of a driver that goes by what it sees
 HORIZON_S = 8.0  # from the beginning of the conflict
@@ -144,12 +144,13 @@ def _wanted(driver: int, path: Path, s: float, speed: float, braking: float, siz
 def stopping_distance(driver: int, speed: float, grip: float) -> float:
     """Metres in which a driver stops for what it has to perceive first, m.
 
-    Its reaction and braking are those of its reference model; R157 perceives before it reacts.
+    Its reaction and braking are those of its reference model; R157 perceives before it reacts. DEFENSIVE brakes as
+    hard if it has to.
     """
     gone, braking, since = 0.0, 0.0, 0.0
     while speed > STANDING_MPS:
         since += FINE_S
-        if driver == R157:
+        if driver in (R157, DEFENSIVE):
             braking = r157(since - R157_PERCEIVES_S, grip)
         elif driver == FULL_BRAKING:
             braking = full_braking(grip)

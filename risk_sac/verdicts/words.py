@@ -7,6 +7,7 @@ DRIVERS = {
     "r157": "R157's driver",
     "fsm": "the fuzzy safety model",
     "rss": "the RSS driver",
+    "defensive": "the defensive driver",
     FULL_BRAKING: "full braking at once",
     "r157_ttc": "R157's time-to-collision rule",
 }

@@ -71,7 +71,7 @@ def table(file: Path) -> str:
     """The figures by family, in Markdown."""
     with file.open(newline="") as lines:
         rows = list(csv.DictReader(lines))
-    text = ["| family | scenes | driver | contacts | stands for ever | mean travel time, s |", "|---|---|---|---|---|---|"]
+    text = ["| family | scenes | driver | contacts | stands for ever | travel time, s |", "|---|---|---|---|---|---|"]
     for family in FAMILIES:
         for profile in PROFILES:
             here = [row for row in rows if (row["family"], row["profile"]) == (family, profile)]

@@ -108,7 +108,7 @@ def test_who_is_struck_from_behind_has_avoided() -> None:
     evidence = stage(straight(0.0, 0.0, 0.0, 12.0), sideways(beside, 1.0, -1.0, LANE_M))
     behind = stage(straight(0.0, 0.0, 0.0, 12.0), straight(-20.0, 0.0, 0.0, 14.0))
     assert all(found.avoids for name, found in outcomes(behind).items() if name in ("r157", "full_braking"))
-    assert set(outcomes(evidence)) == {"r157", "fsm", "rss", "full_braking", "r157_ttc"}
+    assert set(outcomes(evidence)) == {"r157", "fsm", "rss", "defensive", "full_braking", "r157_ttc"}
 
 
 def test_who_has_passed_by_then_has_not_avoided() -> None:
@@ -144,7 +144,7 @@ def test_r157_measures_a_cut_in_at_the_intrusion(gap: float, avoids: bool, side:
 
 def test_r157_ttc_speaks_of_cut_ins_only() -> None:
     for evidence in (leader_brakes(), crossing_car(), pedestrian_crosses()):
-        assert set(outcomes(evidence)) == {"r157", "fsm", "rss", "full_braking"}
+        assert set(outcomes(evidence)) == {"r157", "fsm", "rss", "defensive", "full_braking"}
 
 
 @pytest.mark.parametrize(

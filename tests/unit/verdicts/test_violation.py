@@ -76,7 +76,7 @@ KEEPS_APART = own("vehicle_gap_m >= 4")
 def test_a_careful_driver_keeps_a_distance_that_the_ego_did_not() -> None:
     found = violated(closes_in(), KEEPS_APART)
     assert found.grade is Grade.PREVENTABLE
-    assert set(found.drivers) == {"r157", "fsm", "rss", "full_braking"}
+    assert set(found.drivers) == {"r157", "fsm", "rss", "defensive", "full_braking"}
     assert (found.other_id, found.other_kind, found.other_role) == ("actor_1", "vehicle", "adversary")
     assert found.signature == "own violated; ego goes straight, vehicle ahead"
     assert found.time_s == pytest.approx(3.75, abs=0.15)  # it stands 10 m ahead at 3.15 s

@@ -26,6 +26,7 @@ export const DRIVERS: Record<string, string> = {
   r157: "R157's driver",
   fsm: "the fuzzy safety model",
   rss: "the RSS driver",
+  defensive: "the defensive driver",
   [FULL_BRAKING]: "full braking at once",
   [TTC_RULE]: "R157's time-to-collision rule",
 };

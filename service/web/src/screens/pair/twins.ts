@@ -15,6 +15,7 @@ export const TWINS: Record<string, string> = {
   default: "Default ego",
   perfect: "Perfect ego",
   careful: "Careful ego",
+  defensive: "Defensive ego",
 };
 
 const DEFAULT_SENSOR: Sensor = { range_m: 80, field_of_view_rad: 2 * Math.PI, occlusion: true };

@@ -1,0 +1,200 @@
+"""The defensive driver in the ego's place: from when it would have driven slower until 4 s after the contact.
+
+It is followed along the ego's path while all others move as recorded. On the record it is asked in every frame since
+the release how much it would allow itself; where that is less than what the ego did, the two part. It takes over at the
+beginning of the last stretch of restraint, which must last until the contact: one that has been unrestrained for more
+than 1 s has let the ego drive as it did.
+
+Choices: until the conflict begins it drives no faster than the ego did at the same time; having been slower, it speeds
+up by 2 m/s² at most. From then on it may keep the ego's speed at that moment, or what the ego speeds up to: the ego's
+braking in the conflict is not its own. It sees what no vehicle hides from it and has been in the ego's sight before.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.geometry import Size, frame_view, line_of_sight, touches
+from risk_sac.jit import compiled
+from risk_sac.scenario.limits import GRAVITY_MPS2
+from risk_sac.types import HEADING, VX, VY, Bools, Floats, Kind, X, Y
+from risk_sac.verdicts.course import Body
+from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, Scene, allowed_accel, nothing_remembered
+from risk_sac.verdicts.drivers import JERK_MPS3
+from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
+from risk_sac.verdicts.path import Path, pose_at
+from risk_sac.verdicts.present import OnPath, Street, street_of
+from risk_sac.verdicts.recorded import recorded_size
+from risk_sac.verdicts.rollout import FINE_S, Ending
+from risk_sac.verdicts.unseen import Crossings, crossings_on
+
+LOOKS_M = 60.0  # beyond the path's end, for crossings
+AFTER_S = 4.0
+BRIDGE_S = 1.0
+SLOWER_MPS2 = 0.3  # Choice: less is no difference between two drivers
+SPEEDS_UP_MPS2 = 2.0
+RESTRAINED_MPS2 = 2.0  # one that may speed up by more is not
+
+
+class Record(NamedTuple):
+    """An episode as compiled code needs it: `T` frames, `n` actors."""
+
+    states: Floats  # T x rows x n
+    vehicle: Bools
+    link: NDArray[np.uint8]  # T x n
+    known: Bools  # T x n
+    priority: Bools  # T
+    step_s: float
+
+
+def driven(evidence: Evidence, path: Path, conflict_frame: int, latest: int) -> tuple[Floats, int]:
+    """Drives the defensive driver along a path.
+
+    Args:
+      evidence: of the episode.
+      path: with a point per frame.
+      conflict_frame: in which the conflict begins.
+      latest: the frame from which it drives in any case; on another path than the ego's, where they part.
+
+    Returns:
+      Metres along the path per frame, until 4 s after the last, and the frame from which it drives; the last one if it
+      does as the ego did, and then nothing is driven after it.
+    """
+    e = evidence
+    released = int(np.searchsorted(e.time_s, -e.step_s / 2))
+    record, size = _record(e), recorded_size(e, 0)
+    street = street_of(e.ground, e.ground.friction * GRAVITY_MPS2)
+    crossings = crossings_on(path, float(path.s[0]), float(path.s[-1]) + LOOKS_M, street.boxes, size.half_width)
+    memory = nothing_remembered(len(e.ids))
+    speed = np.ascontiguousarray(e.speed_mps[:, 0])
+    acts = _acts(path, size, record, street, crossings, speed, released, latest, memory)
+    if acts == len(path.s) - 1:
+        return path.s.copy(), acts
+    after = round(AFTER_S / e.step_s)
+    return _drive(path, size, record, street, crossings, speed, acts, conflict_frame, memory, after), acts
+
+
+def _record(e: Evidence) -> Record:
+    sizes = (np.broadcast_to(each, e.x_m.shape) for each in (e.length_m, e.width_m))
+    states = np.stack([*(getattr(e, name) for name in PER_ACTOR), *sizes], axis=1)
+    link = np.nan_to_num(e.link).astype(np.uint8)
+    ahead = link[:, 0]
+    latest = np.maximum.accumulate(np.where(ahead == PRIORITY, e.time_s, -np.inf))
+    priority = ((ahead == 0) | (ahead == PRIORITY)) & (e.time_s - latest <= PRIORITY_S)
+    return Record(states, e.kind == int(Kind.VEHICLE), link, np.ascontiguousarray(e.known), priority, e.step_s)
+
+
+@compiled
+def _acts(
+    path: Path,
+    size: Size,
+    record: Record,
+    street: Street,
+    crossings: Crossings,
+    speed: Floats,
+    released: int,
+    latest: int,
+    memory: Floats,
+) -> int:
+    """The frame from which the driver drives; `memory` is then what it remembers there."""
+    last, step_s = len(path.s) - 1, record.step_s
+    slower, free = np.zeros(last, dtype=np.bool_), np.ones(last, dtype=np.bool_)
+    remembered = np.empty((last, memory.shape[0], memory.shape[1]))
+    for t in range(released, last):
+        remembered[t] = memory
+        ego = OnPath(path, t, path.s[t], speed[t], size)
+        scene = Scene(record.states[t], record.vehicle, record.link[t], record.known[t], record.priority[t])
+        accel = allowed_accel(ego, scene, street, crossings, memory, step_s)
+        free[t] = accel > RESTRAINED_MPS2
+        possible = max(speed[t] + accel * step_s, 0.0) if accel < math.inf else math.inf
+        slower[t] = possible < speed[t + 1] - SLOWER_MPS2 * step_s
+    found, unrestrained = last, 0
+    for t in range(last - 1, released - 1, -1):
+        unrestrained = unrestrained + 1 if free[t] else 0
+        if unrestrained * step_s > BRIDGE_S + 1e-6:
+            break
+        if slower[t]:
+            found = t
+    found = min(found, max(latest, released))
+    if found < last:
+        memory[:] = remembered[found]
+    return found
+
+
+@compiled
+def _drive(
+    path: Path,
+    size: Size,
+    record: Record,
+    street: Street,
+    crossings: Crossings,
+    recorded_mps: Floats,
+    first: int,
+    conflict_frame: int,
+    memory: Floats,
+    after: int,
+) -> Floats:
+    """Metres along the path per frame, `after` frames beyond the last."""
+    last, step_s = len(path.s) - 1, record.step_s
+    found = np.empty(last + 1 + after)
+    found[: first + 1] = path.s[: first + 1]
+    s, speed, point = path.s[first], recorded_mps[first], first
+    before = (speed - recorded_mps[max(first - 1, 0)]) / step_s
+    kept_mps = recorded_mps[min(max(conflict_frame, first), last)]
+    known = np.zeros(len(record.vehicle), dtype=np.bool_)
+    for t in range(first):
+        known |= record.known[t]
+    for t in range(first, last + after):
+        frame = min(t, last)
+        state = record.states[frame].copy()
+        known |= record.known[frame]
+        beyond_s = (t - frame) * step_s
+        for i in range(1, state.shape[1]):
+            state[X, i] += beyond_s * state[VX, i]
+            state[Y, i] += beyond_s * state[VY, i]
+        x, y, heading = pose_at(path, s)
+        state[X, 0], state[Y, 0], state[HEADING, 0] = x, y, heading
+        seen = known.copy()
+        seen[1:] &= line_of_sight(frame_view(state), record.vehicle[1:])
+        while point < last and path.s[point + 1] <= s:
+            point += 1
+        ego = OnPath(path, point, s, speed, size)
+        scene = Scene(state, record.vehicle, record.link[frame], seen, record.priority[frame])
+        accel = allowed_accel(ego, scene, street, crossings, memory, step_s)
+        wanted = recorded_mps[min(t + 1, last)]
+        if t + 1 > conflict_frame:
+            wanted = max(wanted, kept_mps)
+        accel = min(accel, (wanted - speed) / step_s, SPEEDS_UP_MPS2)
+        accel = max(accel, min(before, 0.0) - JERK_MPS3 * step_s)
+        slower = max(speed + accel * step_s, 0.0)
+        s += (speed + slower) / 2 * step_s
+        speed, before = slower, accel
+        found[t + 1] = s
+    return found
+
+
+@compiled
+def meets(path: Path, size: Size, track: Body[Floats], s: Floats, acts: int, step_s: float) -> Ending:
+    """Whether what was driven along a path touches an actor, which goes on with its last velocity."""
+    last = len(track.x) - 1
+    frames = Path(track.x, track.y, track.heading, np.arange(last + 1).astype(np.float64))
+    lead, passing = 0.0, 0.0
+    pose, other, speed = pose_at(path, s[acts]), pose_at(frames, float(acts)), 0.0
+    fine = round(step_s / FINE_S)
+    for step in range(1, (len(s) - 1 - acts) * fine + 1):
+        frame = acts + step / fine
+        k = min(int(frame), len(s) - 2)
+        at = s[k] + (frame - k) * (s[k + 1] - s[k])
+        speed = (s[k + 1] - s[k]) / step_s
+        if frame <= last:
+            r = min(k, last - 1)
+            lead, passing = at - path.s[r] - (frame - r) * (path.s[r + 1] - path.s[r]), speed
+        pose, other = pose_at(path, at), pose_at(frames, min(frame, float(last)))
+        if frame > last:
+            beyond_s = (frame - last) * step_s
+            other = other[0] + beyond_s * track.vx[last], other[1] + beyond_s * track.vy[last], other[2]
+        if touches(pose, size, other, track.size):
+            return Ending(True, speed, pose, other, lead, passing)
+    return Ending(False, speed, pose, other, lead, passing)
