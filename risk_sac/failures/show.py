@@ -18,7 +18,7 @@ from risk_sac.failures.recording import Recording
 from risk_sac.records import Collision, Violation
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.types import STEP_S, Floats
-from risk_sac.verdicts.words import began, known, prevented_by
+from risk_sac.verdicts.words import began, ego_did, known, prevented_by
 
 CAPTION_WIDTH = 120  # characters
 SEEN_COLOUR, RELEASE_COLOUR, HIDDEN_COLOUR, ALSO_COLOUR = "tab:green", "tab:purple", "0.9", "tab:brown"
@@ -55,6 +55,8 @@ def _contact(collision: Collision) -> Iterator[str]:
         if collision.severity_in_words:
             yield collision.severity_in_words
         yield f"{began(collision, judgement)}{_grade(collision)}"
+        if judgement.fault is not None and judgement.ego_part is not None:
+            yield f"fault: {judgement.fault} · the ego {ego_did(judgement.ego_part)}"
         yield (
             f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'} · "
             f"by the ego: {_words(', '.join(judgement.ego_broke)) or 'nothing'}"
@@ -69,7 +71,8 @@ def _violation(violation: Violation) -> Iterator[str]:
     yield f"the ego, at {violation.ego_speed_mps:.1f} m/s, violated {violation.requirement}; {met}"
     yield violation.signature
     yield f"least robustness: {violation.robustness:.2f}{_grade(violation)}"
-    yield f"the ego's offences: {_words(', '.join(violation.broke)) or 'none'}"
+    fault = f" · fault: {violation.fault}" if violation.fault is not None else ""
+    yield f"the ego's offences: {_words(', '.join(violation.broke)) or 'none'}{fault}"
 
 
 def _grade(violation: Collision | Violation) -> str:

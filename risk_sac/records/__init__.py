@@ -29,19 +29,22 @@ from risk_sac.records.episode import (
     Triage,
     TriageState,
 )
-from risk_sac.records.run import FINAL, Counts, Funnel, RequirementCounts, Run, RunMetrics, RunResult, RunSummary, State
-from risk_sac.records.violation import (
-    ARTEFACT_RULES,
-    NO_CONTACT,
-    REPEATS,
-    Collision,
+from risk_sac.records.judgement import (
+    GAINS_MPS,
     ConflictType,
     EgoPart,
     Fault,
     Grade,
     Judgement,
     ReferenceOutcome,
-    RequirementResult,
     Severity,
+)
+from risk_sac.records.run import FINAL, Counts, Funnel, RequirementCounts, Run, RunMetrics, RunResult, RunSummary, State
+from risk_sac.records.violation import (
+    ARTEFACT_RULES,
+    NO_CONTACT,
+    REPEATS,
+    Collision,
+    RequirementResult,
     Violation,
 )

@@ -1,12 +1,12 @@
-"""Violations of requirements, with and without contact, and how they were judged."""
+"""Violations of requirements, with and without contact."""
 
 from collections.abc import Mapping
-from enum import StrEnum
 from typing import Annotated, Any
 
 from pydantic import AliasChoices, BeforeValidator, Field
 
 from risk_sac.records.base import Least, Real, Record
+from risk_sac.records.judgement import Fault, Grade, Judgement, Severity, drivers_renamed
 
 REPEATS = "repeats"  # rule that a violation fails if its replay goes another way; asked of nothing else
 # Rules among a collision's verdicts that are about the simulator or the control, not about fault.
@@ -27,133 +27,9 @@ ARTEFACT_RULES = frozenset(
 NO_CONTACT = "no_contact"  # the requirement that a contact violates
 
 
-class ConflictType(StrEnum):
-    """How the striker came into the ego's way, or the ego into the striker's."""
-
-    CUT_IN = "cut_in"
-    MERGE = "merge"  # the ego came over to a vehicle beside it, which kept its lane
-    LEADER = "leader"
-    PEDESTRIAN = "pedestrian"
-    CROSSING = "crossing_vehicle"
-
-
-class Grade(StrEnum):
-    """Whether a reference driver would have prevented a valid failure; PCR counts `PREVENTABLE`."""
-
-    PREVENTABLE = "preventable"  # by at least one of `risk_sac.verdicts.reference.PREVENTING`
-    FULL_BRAKING = "full_braking"  # only by full braking at once
-    UNAVOIDABLE = "unavoidable"
-
-    @classmethod
-    def _missing_(cls, value: object) -> "Grade | None":
-        """Reads what definitions 6 and older called them."""
-        return {"careful": cls.PREVENTABLE, "ideal": cls.FULL_BRAKING}.get(str(value))
-
-
-class Fault(StrEnum):
-    """Which party caused a valid failure; see `risk_sac.verdicts`, README.md."""
-
-    EGO = "ego"
-    SHARED = "shared"
-    OTHER = "other"
-
-
-class Severity(StrEnum):
-    """How bad a contact is, by closing speed and risk of injury; see `risk_sac.verdicts.severity`."""
-
-    MINOR = "minor"  # between vehicles that close at less than 2 m/s
-    MODERATE = "moderate"
-    SEVERE = "severe"  # a risk of 1 % or more that a pedestrian dies, or an occupant is seriously injured
-
-
 def _early(name: str) -> Any:
     """A minimum that ends 1 s before the contact is called so; under its plain name in what was stored before."""
     return Field(validation_alias=AliasChoices(f"early_{name}", name), serialization_alias=f"early_{name}")
-
-
-def _renamed(drivers: Any) -> Any:
-    """Reads what definitions 6 and older called the reference drivers."""
-    names = {"careful": "r157", "ideal": "full_braking"}
-    return {names.get(name, name): each for name, each in drivers.items()} if isinstance(drivers, Mapping) else drivers
-
-
-class ReferenceOutcome(Record):
-    """How a reference driver fares in the ego's place."""
-
-    avoids: bool
-    """No contact, or it stands when it is struck, or is struck from behind; false if it passed the striker before."""
-    impact_speed_mps: Real
-    """The reference driver's speed at its contact, or where it has passed the ego; 0 if it avoids."""
-
-
-class EgoPart(Record):
-    """What the ego did about the striker: facts, from the frames up to the contact."""
-
-    seen_s: Real
-    """How long it had seen the striker without a break."""
-    braked_after_s: float | None
-    """From the beginning of the conflict to its first braking of 1.5 m/s² or more; null if it never braked so."""
-    braking_mps2: Real
-    """Its hardest braking in the conflict."""
-    possible_mps2: Real
-    """The hardest that car and road allow."""
-    gained_mps: Real
-    """Speed that it gained during the conflict while it saw the striker; 0 if none."""
-    started: bool
-    """Whether it stood, and started while it saw the striker."""
-    sight_mps: float | None
-    """The speed from which it could have stopped within its sight when the striker came into view; null where the
-    striker was in view before."""
-    left_first: str | None
-    """ego | striker: which first left RSS's proper response; null if neither did."""
-
-
-class Judgement(Record):
-    """How a contact came about, and which reference driver would have prevented it. Times count from the release."""
-
-    definitions: int
-    """Version of the definitions it was judged by."""
-    conflict_type: ConflictType
-    """How the striker came into the ego's way."""
-    conflict_s: Real
-    """When the conflict began; negative before the release."""
-    noticed_s: float | None = None
-    """The same for a wary driver, for which an actor that hangs over its line or could not stop gently is in conflict;
-    `conflict_after_release` goes by it. Null in older records."""
-    conflict_x_m: Real
-    """Where the striker was then, on the map."""
-    conflict_y_m: Real
-    position: str
-    """ahead | alongside: the striker, seen from the ego, when the conflict began."""
-    hidden: bool
-    """Whether the ego knew nothing of the striker when the conflict began."""
-    ego_manoeuvre: str
-    """straight | left_turn | right_turn | lane_change"""
-    ego_response: str
-    """In the last second before the contact: none | late_braking | braking | standing | starting | accelerating"""
-    ground: str
-    """lane | junction | crossing | beside_crossing: where the striker was struck."""
-    broke: tuple[str, ...]
-    """What the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red, unsafe_lane_change,
-    brake_check, turned_into_path."""
-    ego_broke: tuple[str, ...] = ()
-    """What the ego broke: red_light, priority, wrong_direction, speeding, off_road. Empty in older records."""
-    severity: Severity | None = None
-    """minor | moderate | severe. Null in older records."""
-    injury_risk: float | None = None
-    """Risk that the pedestrian dies, or an occupant is seriously injured (MAIS 3 or more). Null in older records."""
-    unresponsive: bool
-    """A visible collision course of 1.5 s or more during which the ego never braked."""
-    grade: Grade | None
-    """preventable | full_braking (by that only) | unavoidable; null where it is not valid."""
-    drivers: Annotated[Mapping[str, ReferenceOutcome], BeforeValidator(_renamed)]
-    """Reference driver → how it fares; empty where the contact is not valid."""
-    ego_part: EgoPart | None = None
-    """What the ego did about the striker. Null where the contact is not valid, and in older records."""
-    fault: Fault | None = None
-    """ego | shared | other. Null where the contact is not valid, and in older records."""
-    signature: str
-    """The class of failures it belongs to, in words; what differs in it is distinct."""
 
 
 class Violated(Record):
@@ -227,7 +103,7 @@ class Violation(Violated):
     """The ego's own offences up to that time."""
     grade: Grade | None
     """preventable | full_braking (by that only) | unavoidable; null where it is not valid."""
-    drivers: Annotated[Mapping[str, bool], BeforeValidator(_renamed)]
+    drivers: Annotated[Mapping[str, bool], BeforeValidator(drivers_renamed)]
     """Reference driver → whether it keeps the requirement in the same encounter; empty where it is not valid."""
     fault: Fault | None = None
     """ego | shared | other. Null where it is not valid, and in older records."""

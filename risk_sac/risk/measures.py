@@ -88,6 +88,11 @@ class Gauge:
         return gauge
 
     @property
+    def signals(self) -> Sequence[str]:
+        """Names of the signals that the requirements speak about."""
+        return self._monitor.signals
+
+    @property
     def carriageway(self) -> Carriageway:
         """The carriageway of the net."""
         return self._own.carriageway

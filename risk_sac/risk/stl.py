@@ -66,7 +66,7 @@ class Monitor:
         self.shapes = np.array([requirement.shapes for requirement in requirements])  # M; which are part of φ
         self._operators: list[Any] = []  # of rtamt, to be reset
         trees = [parsed(index, requirement, step_s, horizon_steps) for index, requirement in enumerate(requirements)]
-        self._signals = sorted(set[str]().union(*map(signals_of, trees)))
+        self.signals = sorted(set[str]().union(*map(signals_of, trees)))
         self._outputs = [
             (self._compile(tree), 1.0 / each.scale) for tree, each in zip(trees, requirements, strict=True)
         ]
@@ -87,7 +87,7 @@ class Monitor:
           starts in the past is still empty, `historically` holds and `once` and `since` do not.
         """
         # One check for all: the signals are far too small to overflow together.
-        if not math.isfinite(sum([signals[name] for name in self._signals])):
+        if not math.isfinite(sum([signals[name] for name in self.signals])):
             raise NotFinite(f"the signals are {dict(signals)}; wanted finite numbers")
         robustness = [evaluate(signals) * per_scale for evaluate, per_scale in self._outputs]
         return np.array([min(max(value, -ROBUSTNESS_CLIP), ROBUSTNESS_CLIP) for value in robustness])

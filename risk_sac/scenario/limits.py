@@ -7,6 +7,7 @@ from functools import cached_property
 from risk_sac.config import Interval, Odd
 
 GRAVITY_MPS2 = 9.81
+EMERGENCY_DECEL_MPS2 = 9.0  # SUMO's default for passenger cars
 HEADROOM = 0.95  # share of the friction circle that is used; the rest is for what a step of 0.1 s cannot resolve
 CORNERING = 0.6  # of the circle, for the curve of the lane: drivers leave more, but brake in curves
 CHANGING_LANE = 0.3  # of the circle at most, for moving across the lane; at least 0.43 are left for braking
@@ -81,3 +82,8 @@ def limits_from_odd(odd: Odd, friction: float) -> Limits:
 
 def _high(interval: Interval | None, default: float) -> float:
     return default if interval is None else interval.high
+
+
+def emergency_decel_mps2(friction: float) -> float:
+    """Computes the hardest braking of a car on a road of this friction."""
+    return min(EMERGENCY_DECEL_MPS2, friction * GRAVITY_MPS2)

@@ -9,11 +9,11 @@ import math
 import libsumo
 
 from risk_sac.scenario.layout import Layout
+from risk_sac.scenario.limits import emergency_decel_mps2
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.lookout import project, targets
 from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import MovedEgo
-from risk_sac.sim.placing import emergency_decel_mps2
 from risk_sac.sim.reading import Reading
 from risk_sac.sim.roads import Roads
 from risk_sac.types import STEP_S, Bools, Floats, Role

@@ -6,17 +6,12 @@ import libsumo
 
 from risk_sac.config import EgoConfig
 from risk_sac.scenario.layout import Layout, VehicleStart
-from risk_sac.scenario.limits import GRAVITY_MPS2
+from risk_sac.scenario.limits import GRAVITY_MPS2, emergency_decel_mps2
 
-EGO_DECEL_MPS2, EGO_EMERGENCY_DECEL_MPS2 = 4.5, 9.0  # SUMO's defaults for passenger cars
+EGO_DECEL_MPS2 = 4.5  # SUMO's default for passenger cars
 LANE_CHANGE = "laneChangeModel."
 # So that the commanded lateral speed is the one driven; its limits are those of `risk_sac.sim.control`.
 STEERED = {"lcAccelLat": "100", "lcMaxSpeedLatStanding": "5", "lcMaxSpeedLatFactor": "1"}
-
-
-def emergency_decel_mps2(friction: float) -> float:
-    """Hardest braking of SUMO's cars on a road of this friction."""
-    return min(EGO_EMERGENCY_DECEL_MPS2, friction * GRAVITY_MPS2)
 
 
 def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None:

@@ -11,8 +11,10 @@ from risk_sac.sim.collision import Contact
 from risk_sac.types import STEP_S, Frame, Kind, Role
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.definitions import DEFINITIONS
+from risk_sac.verdicts.ego_part import ego_part
 from risk_sac.verdicts.endangering import endangered_ego
 from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.fault import fault, has_to_yield, parts_of_contact
 from risk_sac.verdicts.labels import ground, manoeuvre, response, signature
 from risk_sac.verdicts.offences import ego_offences, striker_offences
 from risk_sac.verdicts.reference import grade, reference_outcomes
@@ -78,6 +80,10 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
     broke = striker_offences(evidence, striker, crossing=crossing) + endangered_ego(evidence, striker, conflict)
     ego_broke = ego_offences(evidence, striker, crossing=crossing)
     drivers = reference_outcomes(evidence, striker, conflict) if valid else {}
+    avoids = {name: each.avoids for name, each in drivers.items()}
+    graded = grade(avoids) if valid else None
+    yields = has_to_yield(conflict.type, where, broke, ego_broke)
+    part = ego_part(evidence, striker, conflict, yields)
     severity, injury_risk = severity_of(evidence, striker)
     return Judgement(
         definitions=DEFINITIONS,
@@ -96,8 +102,22 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
         severity=severity,
         injury_risk=injury_risk,
         unresponsive=unresponsive(evidence, conflict),
-        grade=grade({name: each.avoids for name, each in drivers.items()}) if valid else None,
+        grade=graded,
         drivers=drivers,
+        ego_part=part if valid else None,
+        fault=graded
+        and fault(
+            parts_of_contact(
+                part,
+                conflict.type,
+                yields=yields,
+                broke=broke,
+                ego_broke=ego_broke,
+                avoids=avoids,
+                grade=graded,
+                lasted_s=float(evidence.time_s[-1]) - conflict.time_s,
+            )
+        ),
         signature=signature(
             evidence,
             striker,

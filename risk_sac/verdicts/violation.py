@@ -6,17 +6,19 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from risk_sac.config import Requirement
-from risk_sac.records import NO_CONTACT, RequirementResult, Violation
+from risk_sac.records import NO_CONTACT, ConflictType, Fault, Grade, RequirementResult, Violation
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import AHEAD, ASIDE, ENCOUNTER
 from risk_sac.risk.ttc import ENCOUNTER_CAP_S
 from risk_sac.types import STEP_S, Frame, Kind, Role
 from risk_sac.verdicts.conflict import SAME_WAY_COS, find_conflict
 from risk_sac.verdicts.definitions import DEFINITIONS
+from risk_sac.verdicts.endangering import endangered_ego
 from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.fault import fault, has_to_yield, parts_of_violation
 from risk_sac.verdicts.keeping import NO_RED_LIGHT_ENTRY, ON_CARRIAGEWAY, History, MetActor, kept_by
-from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, manoeuvre
-from risk_sac.verdicts.offences import ego_offences
+from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, ground, manoeuvre
+from risk_sac.verdicts.offences import ego_offences, striker_offences
 from risk_sac.verdicts.overlap import overlaps_before_contact
 from risk_sac.verdicts.recorded import lane_heading
 from risk_sac.verdicts.reference import grade
@@ -24,6 +26,19 @@ from risk_sac.verdicts.reference import grade
 # Of `ARTEFACT_RULES`, those that the episode tells; `solid_bodies` is read from its record.
 RULES = ("no_teleport", "inside_limits")
 VIOLATED = {NO_RED_LIGHT_ENTRY: "red light entered", ON_CARRIAGEWAY: "carriageway left"}
+# Signals that others bring about too; all others are the ego's own driving.
+OF_OTHERS = frozenset(
+    {
+        "ttc_s",
+        "encounter_s",
+        "rss_margin",
+        "pedestrian_gap_m",
+        "vehicle_gap_m",
+        "headway_s",
+        "ego_braking_mps2",
+        "ego_jerk_mps3",
+    }
+)
 SAME_OFFENCES = {NO_RED_LIGHT_ENTRY: ("red_light",), ON_CARRIAGEWAY: ("off_road", "wrong_direction")}
 
 
@@ -101,7 +116,9 @@ def _violation(
     if requirement.name == NO_RED_LIGHT_ENTRY:  # it may be violated before the line, when the ego cannot stop any more
         broke = tuple(dict.fromkeys(("red_light", *broke)))
     hidden = met is not None and met.conflict.hidden
-    drivers = kept_by(requirement, gauge.of(requirement), history, index, met) if all(verdicts.values()) else {}
+    own_gauge = gauge.of(requirement)
+    drivers = kept_by(requirement, own_gauge, history, index, met) if all(verdicts.values()) else {}
+    graded = grade(drivers) if drivers else None
     actor = "nobody near" if nearest is None else _actor(frame, measures, nearest, evidence) + ", hidden" * hidden
     violated = VIOLATED.get(requirement.name, f"{requirement.name} violated")
     others = tuple(name for name in broke if name not in SAME_OFFENCES.get(requirement.name, ()))
@@ -117,11 +134,25 @@ def _violation(
         hidden=hidden,
         broke=broke,
         verdicts=verdicts,
-        grade=grade(drivers) if drivers else None,
+        grade=graded,
         drivers=drivers,
+        fault=None if graded is None else _fault(own_gauge.signals, evidence, met, broke, graded),
         signature=f"{violated}; {ego_in_words(driven, others)}, {actor}",
         definitions=DEFINITIONS,
     )
+
+
+def _fault(
+    signals: Sequence[str], evidence: Evidence, met: MetActor | None, broke: Sequence[str], graded: Grade
+) -> Fault:
+    """Judges a violation of a requirement on `signals`; one on the ego's own driving is the ego's."""
+    if met is None or OF_OTHERS.isdisjoint(signals):
+        return fault(parts_of_violation(own=True, yields=None, other_broke=(), broke=broke, grade=graded))
+    conflict, other = met.conflict, met.column
+    other_broke = striker_offences(evidence, other, crossing=conflict.type is ConflictType.CROSSING)
+    other_broke += endangered_ego(evidence, other, conflict)
+    yields = has_to_yield(conflict.type, ground(evidence, other), other_broke, broke)
+    return fault(parts_of_violation(own=False, yields=yields, other_broke=other_broke, broke=broke, grade=graded))
 
 
 def _soonest_met(measures: Measures) -> int | None:

@@ -1,6 +1,6 @@
 """Makes the sentences of a verdict from its record; the page's `ui/verdicts.ts` says the same."""
 
-from risk_sac.records import Collision, Judgement, Violation
+from risk_sac.records import Collision, EgoPart, Judgement, Violation
 
 FULL_BRAKING = "full_braking"
 DRIVERS = {
@@ -46,3 +46,27 @@ def began(collision: Collision, judged: Judgement) -> str:
     if collision.visible_for_s <= 0.0:
         return "the conflict was hidden until the contact"
     return f"the conflict began in hiding and came into sight {before_s:.1f} s before the contact"
+
+
+def ego_did(part: EgoPart) -> str:
+    """Returns, e.g., "braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s²"; it follows "the ego"."""
+    told = [_braked(part)]
+    if part.started:
+        told.append("drove on though it saw the striker there")
+    if part.sped_up:
+        told.append(f"gained {part.gained_mps:.1f} m/s though it saw the striker")
+    if part.too_fast:
+        told.append(f"drove at {part.sighted_mps:.1f} m/s where its sight allowed {part.sight_mps:.1f} m/s")
+    if part.left_first == "ego":
+        told.append("was the first to leave RSS's proper response")
+    return " and ".join((", ".join(told[:-1]), told[-1])) if len(told) > 1 else told[0]
+
+
+def _braked(part: EgoPart) -> str:
+    if part.braked_after_s is None:
+        return "did not brake in the conflict"
+    if part.braked_after_s == 0.0:
+        when = "was braking when the conflict began"
+    else:
+        when = f"braked {part.braked_after_s:.1f} s after the conflict began"
+    return f"{when}, by {part.braking_mps2:.1f} of {part.possible_mps2:.1f} m/s²"

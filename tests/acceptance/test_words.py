@@ -127,3 +127,36 @@ def test_what_the_ego_does_is_what_it_did_in_the_last_second(
             first = np.flatnonzero(since <= -BRAKES_MPS2)[0] / 10
             assert float(late[1]) == pytest.approx(first - 0.4 - 0.75, abs=0.151)
             assert ", brakes late" in each.title
+
+
+def test_the_fault_and_what_the_ego_did_agree_with_the_series(
+    contacts: list[tuple[Told, Collision, Judgement]],
+) -> None:
+    assert any(judged.fault for _, _, judged in contacts)
+    for each, hit, judged in contacts:
+        told = re.search(r"fault: (\w+) · the ego (.*?) (?:broken by|$)", each.title)
+        assert (told and told[1]) == (judged.fault and str(judged.fault))
+        if not told:
+            assert not hit.valid
+            continue
+        speed, accel = (each.series[name][:, 0] for name in ("speed_mps", "accel_mps2"))
+        conflict = min(round((hit.time_s - judged.conflict_s) * 10) + 1, len(accel))
+        braked = np.flatnonzero(accel[-conflict:] <= -BRAKES_MPS2) / 10
+        after = re.search(
+            r"(?:braked ([\d.]+) s after|was braking when) the conflict began, by ([\d.]+) of ([\d.]+) m", told[2]
+        )
+        assert bool(after) == bool(len(braked)) != ("did not brake" in told[2])
+        if after:
+            assert float(after[1] or 0.0) == pytest.approx(braked[0], abs=0.151)
+            assert float(after[2]) == pytest.approx(-accel[-conflict:].min(), abs=0.051)
+            assert float(after[2]) <= float(after[3]) + 0.1
+        rises = np.maximum.accumulate(speed[::-1])[::-1] - speed
+        if "drove on" in told[2]:
+            assert judged.ego_part is not None
+            assert judged.ego_part.seen_s > 0.0
+            assert rises[-41:].max() >= STANDS_MPS
+            assert min(speed[-41:].min(), accel[-41:].min() + 2.0) < STANDS_MPS
+        gained = re.search(r"gained ([\d.]+) m/s", told[2])
+        assert not gained or rises.max() >= float(gained[1]) - 0.051
+        fast = re.search(r"drove at ([\d.]+) m/s where its sight allowed ([\d.]+) m/s", told[2])
+        assert not fast or float(fast[1]) > float(fast[2])

@@ -2,8 +2,8 @@ from collections.abc import Mapping
 
 import pytest
 
-from risk_sac.records import ReferenceOutcome
-from risk_sac.verdicts.words import began, known, prevented_by
+from risk_sac.records import EgoPart, ReferenceOutcome
+from risk_sac.verdicts.words import began, ego_did, known, prevented_by
 from tests.builders import collision, judgement, violation
 
 NONE = {"r157": False, "fsm": False, "rss": False, "full_braking": False}
@@ -53,3 +53,41 @@ def test_what_the_ego_knew_is_said_once(hidden: bool, visible_for_s: float, told
     judged = judgement(hidden=hidden, conflict_s=2.4)
     hit = collision(time_s=3.5, visible_for_s=visible_for_s, judgement=judged)
     assert (known(hit), began(hit, judged)) == (told, f"the conflict {when}")
+
+
+PART = EgoPart(
+    seen_s=2.3,
+    braked_after_s=1.1,
+    braking_mps2=4.0,
+    possible_mps2=7.6,
+    gained_mps=0.2,
+    started=False,
+    sight_mps=None,
+    sighted_mps=None,
+    left_first="striker",
+)
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({}, "braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s²"),
+        ({"braked_after_s": 0.0}, "was braking when the conflict began, by 4.0 of 7.6 m/s²"),
+        (
+            {"braked_after_s": None, "started": True, "gained_mps": 1.4},
+            "did not brake in the conflict, drove on though it saw the striker there and gained 1.4 m/s though it saw "
+            "the striker",
+        ),
+        (
+            {"sight_mps": 5.8, "sighted_mps": 13.6},
+            "braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s² and drove at 13.6 m/s where its sight allowed "
+            "5.8 m/s",
+        ),
+        (
+            {"braked_after_s": None, "sight_mps": 13.0, "sighted_mps": 13.6, "left_first": "ego"},
+            "did not brake in the conflict and was the first to leave RSS's proper response",
+        ),
+    ],
+)
+def test_what_the_ego_did_about_the_striker(changes: Mapping[str, object], told: str) -> None:
+    assert ego_did(PART.model_copy(update=changes)) == told

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { knownOf, preventedBy } from "./verdicts";
+import { faultOf, knownOf, preventedBy } from "./verdicts";
 import type { Collision, Violation } from "./violations";
 
 function broken(...preventing: string[]): Violation {
@@ -26,4 +26,22 @@ test("what the ego knew is said once, of hiding and time together", () => {
   expect(knownOf(contact(true, 1.2))).toBe("The ego came to know of lead only 1.2 s before the contact.");
   expect(knownOf(contact(true, 0))).toBe("The ego did not know of lead when the conflict began, nor at the contact.");
   expect(knownOf(contact(false, 0))).toBe("The ego did not know of lead at the contact, but when the conflict began.");
+});
+
+const PART = { seen_s: 2.3, braked_after_s: 1.1, braking_mps2: 4, possible_mps2: 7.6, gained_mps: 0.2, started: false, sight_mps: null, sighted_mps: null, left_first: "striker" };
+
+function judged(fault: string | null, changes: Partial<typeof PART> | Record<string, unknown> | null): Collision {
+  return { judgement: { fault, ego_part: changes && { ...PART, ...changes } } } as unknown as Collision;
+}
+
+test("the fault is told with what the ego did", () => {
+  expect(faultOf(judged("shared", {}))).toBe("Fault: shared. The ego braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s².");
+  expect(faultOf(judged("ego", { braked_after_s: null, started: true, gained_mps: 1.4 }))).toBe(
+    "Fault: ego. The ego did not brake in the conflict, drove on though it saw the striker there and gained 1.4 m/s though it saw the striker.",
+  );
+  expect(faultOf(judged("ego", { braked_after_s: 0, sight_mps: 5.8, sighted_mps: 13.6, left_first: "ego" }))).toBe(
+    "Fault: ego. The ego was braking when the conflict began, by 4.0 of 7.6 m/s², drove at 13.6 m/s where its sight allowed 5.8 m/s and was the first to leave RSS's proper response.",
+  );
+  expect(faultOf(judged(null, null))).toBeNull();
+  expect(faultOf({ requirement: "never_fast", fault: "ego" } as unknown as Violation)).toBe("Fault: ego.");
 });

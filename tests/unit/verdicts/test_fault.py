@@ -1,0 +1,198 @@
+"""Whose fault a contact is: the rule line by line, and failures as an engineer and a court would judge them."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from risk_sac.records import ConflictType, Fault, Grade, Judgement, Severity
+from risk_sac.scenario.ground import Area
+from risk_sac.types import Kind
+from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.fault import Parts, fault, has_to_yield, parts_of_violation
+from risk_sac.verdicts.judge import judge
+from tests.unit.verdicts.staged import (
+    CAR_M,
+    LANE_M,
+    STREET,
+    Motion,
+    crossing_car,
+    cut_in,
+    leader_brakes,
+    merge,
+    mirrored,
+    pedestrian_crosses,
+    sideways,
+    stage,
+    straight,
+)
+
+WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
+JUNCTION = (Area.box(50.0, 70.0, -10.0, 10.0),)
+
+
+def judged(evidence: Evidence) -> Judgement:
+    """The verdict, which is the same in the mirror."""
+    found, mirror = (judge(each, "actor_1", valid=True) for each in (evidence, mirrored(evidence)))
+    assert (found.fault, found.ego_part) == (mirror.fault, mirror.ego_part)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("parts", "expected"),
+    [
+        (Parts(drove_into=True, other_erred=True), Fault.EGO),
+        (Parts(other_erred=True, ego_erred=True), Fault.SHARED),
+        (Parts(other_erred=True), Fault.OTHER),
+        (Parts(other_erred=True, ego_yields=True, left_rss=True), Fault.OTHER),
+        (Parts(ego_erred=True), Fault.EGO),
+        (Parts(ego_yields=True), Fault.EGO),
+        (Parts(left_rss=True), Fault.EGO),
+        (Parts(), Fault.OTHER),
+    ],
+)
+def test_the_first_line_of_the_rule_that_holds_decides(parts: Parts, expected: Fault) -> None:
+    assert fault(parts) is expected
+
+
+@pytest.mark.parametrize(
+    ("conflict", "ground", "broke", "ego_broke", "expected"),
+    [
+        (ConflictType.PEDESTRIAN, "crossing", (), (), "ego"),
+        (ConflictType.PEDESTRIAN, "crossing", ("pedestrian_on_red",), (), "striker"),
+        (ConflictType.PEDESTRIAN, "lane", (), (), "striker"),
+        (ConflictType.CROSSING, "junction", ("red_light",), (), "striker"),
+        (ConflictType.CROSSING, "junction", (), ("priority",), "ego"),
+        (ConflictType.CROSSING, "junction", (), (), None),
+        (ConflictType.LEADER, "lane", ("brake_check",), (), "ego"),
+        (ConflictType.CUT_IN, "lane", ("unsafe_lane_change",), (), None),
+    ],
+)
+def test_who_has_to_yield(
+    conflict: ConflictType, ground: str, broke: tuple[str, ...], ego_broke: tuple[str, ...], expected: str | None
+) -> None:
+    assert has_to_yield(conflict, ground, broke, ego_broke) == expected
+
+
+@pytest.mark.parametrize(
+    ("own", "other_broke", "grade", "expected"),
+    [
+        (True, ("red_light",), Grade.FULL_BRAKING, Fault.EGO),
+        (True, (), Grade.UNAVOIDABLE, Fault.OTHER),
+        (False, (), Grade.PREVENTABLE, Fault.EGO),
+        (False, ("unsafe_lane_change",), Grade.PREVENTABLE, Fault.SHARED),
+        (False, ("unsafe_lane_change",), Grade.FULL_BRAKING, Fault.OTHER),
+        (False, (), Grade.UNAVOIDABLE, Fault.OTHER),
+    ],
+)
+def test_a_violation_without_contact(own: bool, other_broke: tuple[str, ...], grade: Grade, expected: Fault) -> None:
+    parts = parts_of_violation(own=own, yields=None, other_broke=other_broke, broke=(), grade=grade)
+    assert fault(parts) is expected
+
+
+def past_a_pedestrian(accel: float) -> Evidence:
+    """A pedestrian stands 0.3 m beside the ego's way and steps on 0.7 s before it; the ego speeds up from 1 s on."""
+    ego = straight(0.0, 0.0, 0.0, 8.0, (1.0, accel), start_s=0.0)
+    meets_s = next(t / 100 for t in range(1000) if ego(t / 100)[0] + CAR_M[0] / 2 >= 40.0)
+    beside = straight(40.0, CAR_M[1] / 2 + 0.25 + 0.3, -math.pi / 2, 1.5, start_s=meets_s - 0.7)
+    stands: Motion = lambda t: beside(max(t, meets_s - 0.7))  # noqa: E731
+    return stage(ego, stands, kinds=WALKING, from_s=0.0, ground=replace(STREET, crossings=()))
+
+
+def test_an_ego_that_speeds_up_past_a_pedestrian_it_sees_at_its_way() -> None:
+    found = judged(past_a_pedestrian(1.5))
+    assert found.ego_part is not None
+    assert found.ego_part.sped_up
+    assert (found.fault, found.ego_response) == (Fault.EGO, "accelerating")
+
+
+def test_an_ego_that_keeps_its_speed_there_shares_the_fault_of_a_pedestrian_that_has_to_yield() -> None:
+    found = judged(past_a_pedestrian(0.0))
+    assert (found.grade, found.fault) == (Grade.PREVENTABLE, Fault.SHARED)
+
+
+def starts_into(entered_s: float) -> Evidence:
+    """The ego stands at 50, a car comes from the right on red, waits at its way from 1 s on, and both start."""
+    ego = straight(45.0, 0.0, 0.0, 0.0, (3.0, 2.3))
+    car = straight(60.0, -5.5, math.pi / 2, 0.0, (4.0, 2.5))
+    evidence = stage(ego, car, ground=replace(STREET, junctions=JUNCTION))
+    link = np.zeros_like(evidence.link)
+    link[evidence.time_s < entered_s, 1] = ord("r")
+    return replace(evidence, link=link)
+
+
+def test_an_ego_that_stands_and_starts_into_a_crossing_car_it_sees() -> None:
+    found = judged(starts_into(entered_s=1.0))
+    assert found.ego_part is not None
+    assert (found.ego_part.started, found.fault, found.ego_response) == (True, Fault.EGO, "starting")
+
+
+def test_a_car_that_runs_a_red_light_into_an_ego_that_has_just_started() -> None:
+    ego = straight(45.0, 0.0, 0.0, 0.0, (3.0, 2.3))
+    car = straight(60.0, -12.0 * 6.4, math.pi / 2, 12.0, start_s=0.0)
+    evidence = stage(ego, car, from_s=0.0, ground=replace(STREET, junctions=JUNCTION))
+    link = np.zeros_like(evidence.link)
+    link[evidence.y_m[:, 1] < -12.0, 1] = ord("r")
+    found = judged(replace(evidence, link=link))
+    assert found.ego_part is not None
+    assert "red_light" in found.broke
+    assert (found.ego_part.started, found.fault) == (False, Fault.SHARED)  # it speeds up until the contact
+
+
+def test_an_ego_that_passes_a_vehicle_at_a_crossing_from_behind_which_a_pedestrian_comes() -> None:
+    found = judged(pedestrian_crosses(speed=13.9, seen_from_s=6.3))
+    assert found.ego_part is not None
+    assert found.ego_part.too_fast
+    assert (found.fault, found.grade) == (Fault.EGO, Grade.UNAVOIDABLE)
+
+
+def test_flanks_that_touch_at_a_crawl_are_minor() -> None:
+    found = judged(cut_in(gap=-3.0, ego=2.0, other=2.0, rate=0.4))
+    assert found.severity is Severity.MINOR
+
+
+def test_an_unsafe_cut_in_before_an_ego_that_brakes_at_once() -> None:
+    ego = straight(0.0, 0.0, 0.0, 14.0, (2.6, -7.5))
+    beside = straight(14.0 * 3.5 + CAR_M[0] - 1.0 - 9.0 * 3.5, LANE_M, 0.0, 9.0)
+    found = judged(stage(ego, sideways(beside, 2.0, -1.2, LANE_M)))
+    assert found.broke == ("unsafe_lane_change",)
+    assert found.fault is Fault.OTHER
+
+
+def test_an_unsafe_cut_in_that_the_ego_had_the_time_to_answer() -> None:
+    ego, start = straight(0.0, 0.0, 0.0, 14.0), (14.0 - 12.0) * 3.5 + CAR_M[0] + 4.5
+    found = judged(stage(ego, sideways(straight(start, LANE_M, 0.0, 12.0), 2.0, -0.5, LANE_M)))
+    assert found.broke == ("unsafe_lane_change",)
+    assert (found.grade, found.fault) == (Grade.PREVENTABLE, Fault.SHARED)
+
+
+def test_a_brake_check_before_an_ego_that_brakes_at_once() -> None:
+    ego, leader = straight(0.0, 0.0, 0.0, 14.0, (2.5, -8.0)), straight(CAR_M[0] + 2.0, 0.0, 0.0, 14.0, (2.0, -8.0))
+    found = judged(stage(ego, leader))
+    assert (found.broke, found.fault) == (("brake_check",), Fault.OTHER)
+
+
+def test_a_follower_that_does_not_brake_shares_the_fault_of_a_brake_check() -> None:
+    assert judged(leader_brakes()).fault is Fault.SHARED
+
+
+def test_an_ego_that_drives_into_a_standing_leader() -> None:
+    found = judged(stage(straight(0.0, 0.0, 0.0, 12.0), straight(75.0, 0.0, 0.0, 0.0)))
+    assert (found.broke, found.fault) == ((), Fault.EGO)
+
+
+def test_an_ego_that_comes_over_to_its_neighbour() -> None:
+    assert judged(merge()).fault is Fault.EGO
+
+
+def test_a_crossing_car_without_rules_is_judged_by_the_proper_response() -> None:
+    found = judged(crossing_car(ego=12.0, other=12.0))
+    assert found.broke == found.ego_broke == ()
+    assert found.grade is Grade.PREVENTABLE
+    assert found.fault is Fault.EGO
+
+
+def test_what_is_not_valid_has_no_fault() -> None:
+    found = judge(cut_in(), "actor_1", valid=False)
+    assert (found.fault, found.ego_part) == (None, None)
