@@ -38,6 +38,7 @@ from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries, shares_of
 from risk_sac.sim.ego import EVERYTHING, Perception, sight
+from risk_sac.sim.recorded import RecordedAdversaries
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.types import STEP_S, Bools, Frame, Kind, Scene
 from risk_sac.verdicts.evidence import Evidence, Ground
@@ -111,7 +112,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
         Args:
           seed: reseeds the generator that SUMO's seed, and a scene where none is given, are drawn from.
-          options: `{"scene": Scene}` to start from that scene.
+          options: `{"scene": Scene}` to start from that scene; with `"motions"`, an episode's time series, its
+            adversaries repeat these.
 
         Raises:
           InfeasibleScene: the given scene breaks a rule of C_hard.
@@ -121,7 +123,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """
         super().reset(seed=seed)
         if options and "scene" in options:
-            return self._start(options["scene"])
+            return self._start(options["scene"], options.get("motions"))
         for _ in range(FEASIBLE_TRIES):
             try:
                 return self._start(self.problem.space.from_unit(self.np_random.random(self.problem.space.dimension)))
@@ -194,7 +196,9 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         if self._pilot is not None:
             self._pilot.close()
 
-    def _start(self, scene: Scene) -> tuple[Observation, dict[str, Any]]:
+    def _start(
+        self, scene: Scene, motions: Mapping[str, NDArray[Any]] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
         self._unit_scene = self.problem.space.to_unit(scene)
         layout = self.layout = self.problem.family.layout(scene.values)
         limits = limits_from_odd(self.problem.odd, layout.friction)
@@ -211,7 +215,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._contact_s = None
         self._lead_in(self._sim.reset(layout, sumo_seed), scene)
         self._released_s = self._frame.time_s
-        self._adversaries = Adversaries(self.problem.family, limits, self._frame)
+        started = self.problem.family, limits, self._frame
+        self._adversaries = Adversaries(*started) if motions is None else RecordedAdversaries(*started, motions)
         refuse_danger(self._measures.assessment, scene, in_conflict=self._r157_driver_in_conflict())
         self._violated.begin(self._measures.robustness)
         self._sim.hand_over_ego()

@@ -59,15 +59,23 @@ class Played:
         return episode.model_copy(update=changes)
 
 
-def play(env: RiskSacEnv, scene: Scene, seed: int, actions: Floats, policy: Policy | None = None) -> Played:
+def play(
+    env: RiskSacEnv,
+    scene: Scene,
+    seed: int,
+    actions: Floats,
+    policy: Policy | None = None,
+    motions: Series | None = None,
+) -> Played:
     """Plays an episode with actions, `T x a`.
 
-    A policy acts once the actions have ended, up to the horizon; without one the episode ends with them.
+    A policy acts once the actions have ended, up to the horizon; without one the episode ends with them. Where there
+    are motions, of an episode's time series, the adversaries repeat these before they act.
 
     Raises:
       InfeasibleScene, SimulationError, SceneError: it does not begin.
     """
-    observation, info = env.reset(seed=seed, options={"scene": scene})
+    observation, info = env.reset(seed=seed, options={"scene": scene, "motions": motions})
     heads, rewards, costs = [env.signal_heads()], [0.0], [0.0]
     for step in range(env.problem.family.horizon_steps if policy else len(actions)):
         action = actions[step] if policy is None or step < len(actions) else policy(observation)

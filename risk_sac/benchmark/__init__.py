@@ -1,0 +1,1 @@
+"""How soon search methods detect egos with known faults."""

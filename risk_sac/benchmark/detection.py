@@ -1,0 +1,116 @@
+"""Runs a search until it detects the planted defect of its ego, or has spent its budget of environment steps."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from risk_sac.config import Budget, RunSpec
+from risk_sac.failures.detected import candidates, detected
+from risk_sac.records import EpisodeRecord, Record, RunMetrics, SeriesFile
+from risk_sac.run_folder.durable import replace_file
+from risk_sac.run_folder.results import FAILURES
+from risk_sac.run_folder.series import read_series
+from risk_sac.train import train
+
+ANSWER = "detection.json"
+MOST_EPISODES = 20_000  # scenes that are refused cost no steps
+
+
+class Detection(Record):
+    """Outcome of a run against an ego with defects. Times are environment steps up to the end of an episode."""
+
+    defects: tuple[str, ...]
+    family: str
+    method: str
+    seed: int
+    budget_steps: int
+    """What the run might have spent."""
+    steps: int
+    """What it has spent."""
+    episodes: int
+    reached: int | None
+    """Until a defect first changed a command; null if none did, or SUMO drives the ego."""
+    triggered: int | None
+    """Until a requirement was first validly violated; null if none was."""
+    detected: int | None
+    """Until a failure first showed the defect, see `failures.detected`; null if none did."""
+    refuted: int
+    """Candidates that the ego without the defects has too."""
+    signature: str
+    """Of the failure that detected it; empty without one."""
+    episode: EpisodeRecord | None
+    """In which that happened; its time series is in the folder."""
+
+
+@dataclass(slots=True)
+class _Candidates:
+    """Observer that stops a run at each failure that may detect a defect, and once the budget is spent."""
+
+    spec: RunSpec
+    budget_steps: int
+    records: list[EpisodeRecord] = field(default_factory=list)
+    candidate: tuple[EpisodeRecord, SeriesFile] | None = None
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
+        """Takes an episode; those of a resumed run are repeated."""
+        if record.index < len(self.records):
+            return
+        self.records.append(record)
+        if series is not None and candidates(self.spec, record):
+            self.candidate = record, series
+
+    def should_stop(self) -> bool:
+        """See `Observer.should_stop`."""
+        return self.candidate is not None or self.spent
+
+    @property
+    def spent(self) -> bool:
+        """Whether the budget is spent."""
+        return bool(self.records) and self.records[-1].environment_steps >= self.budget_steps
+
+
+def first_detection(spec: RunSpec, folder: Path, budget_steps: int) -> Detection:
+    """Returns how soon a run detects its ego's defects; from the folder if it says so already.
+
+    Args:
+      spec: of the run; its budget of episodes counts for undisturbed scenes alone.
+      folder: of the run, kept up to the detection. An interrupted run goes on from it.
+      budget_steps: environment steps after which it ends.
+    """
+    answer = folder / ANSWER
+    if answer.exists():
+        return Detection.model_validate_json(answer.read_bytes())
+    if not spec.iid:
+        spec = spec.model_copy(update={"budget": Budget(episodes=MOST_EPISODES)})
+    seen, found, refuted, failure = _Candidates(spec, budget_steps), None, 0, None
+    while found is None:
+        seen.candidate = None
+        train(spec, folder, seen)  # goes on where it stopped; libsumo is free in between
+        if seen.candidate is None:
+            break
+        record, series = seen.candidate
+        failure = detected(spec, record, read_series(folder / FAILURES / series.name))
+        found, refuted = (record, refuted) if failure else (None, refuted + 1)
+        if seen.spent:
+            break
+    detection = Detection(
+        defects=spec.ego.defects,
+        family=spec.family,
+        method=spec.method,
+        seed=spec.seed,
+        budget_steps=budget_steps,
+        steps=seen.records[-1].environment_steps,
+        episodes=len(seen.records),
+        reached=_first(each for each in seen.records if each.defect_reached_s is not None),
+        triggered=_first(each for each in seen.records if each.failed),
+        detected=None if found is None else found.environment_steps,
+        refuted=refuted,
+        signature="" if failure is None else failure.signature,
+        episode=found,
+    )
+    replace_file(answer, detection.model_dump_json(indent=2).encode())
+    return detection
+
+
+def _first(records: Iterable[EpisodeRecord]) -> int | None:
+    return next((record.environment_steps for record in records), None)
