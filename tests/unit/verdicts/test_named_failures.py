@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import pytest
 
-from risk_sac.records import Judgement, Severity
+from risk_sac.records import Grade, Judgement, Severity
 from risk_sac.verdicts.judge import judge
 from tests.unit.verdicts.recorded import recorded
 from tests.unit.verdicts.staged import mirrored
@@ -14,22 +14,23 @@ from tests.unit.verdicts.staged import mirrored
 class Expected(NamedTuple):
     """What an engineer says of a contact."""
 
+    grade: Grade
     response: str
     severity: Severity
 
 
 NAMED = {
     # It passes a pedestrian on red that stands 0.5 m beside its way and speeds up, then brakes for 0.4 s.
-    "dense_267": Expected("braking", Severity.MODERATE),
+    "dense_267": Expected(Grade.PREVENTABLE, "braking", Severity.MODERATE),
     # It stops in its turn, sees the crossing car for 7.7 s, and starts into it.
-    "dense_263": Expected("starting", Severity.MODERATE),
+    "dense_263": Expected(Grade.PREVENTABLE, "starting", Severity.MODERATE),
     # It passes a vehicle that stops at an unsignalled crossing, at 14 m/s; a pedestrian comes from behind that vehicle.
-    "mixed_71": Expected("braking", Severity.MODERATE),
+    "mixed_71": Expected(Grade.PREVENTABLE, "braking", Severity.MODERATE),
     # Two vehicles side by side creep at 2 m/s, and their flanks touch.
-    "mixed_294": Expected("braking", Severity.MINOR),
+    "mixed_294": Expected(Grade.FULL_BRAKING, "braking", Severity.MINOR),
     # A vehicle that overtakes comes over from alongside, twice; the ego rolls on, or brakes late.
-    "low_267": Expected("none", Severity.MODERATE),
-    "low_198": Expected("late_braking", Severity.MODERATE),
+    "low_267": Expected(Grade.PREVENTABLE, "none", Severity.MODERATE),
+    "low_198": Expected(Grade.PREVENTABLE, "late_braking", Severity.MODERATE),
 }
 
 
@@ -41,7 +42,7 @@ def verdict(name: str) -> Judgement:
 @pytest.mark.parametrize("name", NAMED)
 def test_what_an_engineer_says(name: str) -> None:
     found, expected = verdict(name), NAMED[name]
-    assert (found.ego_response, found.severity) == expected
+    assert (found.grade, found.ego_response, found.severity) == expected
 
 
 @pytest.mark.parametrize("name", NAMED)
