@@ -14,9 +14,10 @@ from risk_sac.metrics.metric import (
     Ratio,
     estimate,
     mean_over_runs,
+    pcr_by_driver,
     pooled_bins,
     pooled_counts,
-    pooled_signatures,
+    pooled_names,
 )
 from risk_sac.metrics.requirements import COLUMNS, pooled_requirements, requirement_cells
 from risk_sac.metrics.rows import METRICS, RATIOS, MetricName

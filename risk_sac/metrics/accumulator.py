@@ -9,7 +9,7 @@ from risk_sac.metrics.rows import METRICS, steps_per_distinct_failure
 from risk_sac.metrics.tally import Tally
 from risk_sac.records import Counts, EpisodeRecord, Record, RunMetrics
 
-HISTOGRAMS = ("signatures", "conflicts_by_second", "contacts_by_second")
+HISTOGRAMS = ("prevented_by", "by_severity", "by_fault", "signatures", "conflicts_by_second", "contacts_by_second")
 
 # Fields that records have had since they were first digested. Those from before, which lack them, keep their digests.
 FIELDS_ADDED_LATER = frozenset(
@@ -19,11 +19,13 @@ FIELDS_ADDED_LATER = frozenset(
         "ego_broke",
         "severity",
         "injury_risk",
+        "fault",
+        "ego_part",
+        "defect_reached_s",
         "script",
         "requirements",
         "violations",
         "failed",
-        "defect_reached_s",
     }
 )
 EMPTY: tuple[object, ...] = (None, (), {})

@@ -1,13 +1,13 @@
 """What a row of the metrics says: names, formula, and how runs are pooled. Pure."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
 
 from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, wilson_interval
-from risk_sac.records import Counts, RunMetrics
+from risk_sac.records import Counts, DriverPcr, RunMetrics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,12 +90,22 @@ def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
     return Counts(**{name: sum(getattr(each, name) for each in metrics) for name in Counts.model_fields})
 
 
-def pooled_signatures(metrics: Sequence[RunMetrics]) -> dict[str, int]:
-    """Valid violations per signature over the runs, in the order in which the runs first met them."""
+def pooled_names(counts: Sequence[Mapping[str, int]]) -> dict[str, int]:
+    """Counts by name summed over the runs, in the order in which the runs first met the names."""
     pooled: Counter[str] = Counter()
-    for each in metrics:
-        pooled.update(each.signatures)
+    for each in counts:
+        pooled.update(each)
     return dict(pooled)
+
+
+def pcr_by_driver(metrics: Sequence[RunMetrics]) -> dict[str, DriverPcr]:
+    """Each reference driver's own PCR, over the runs whose contacts the drivers were asked for."""
+    asked = [each for each in metrics if each.prevented_by or not each.collisions]
+    driven, pooled = sum(each.driven for each in asked), {}
+    for name, prevented in pooled_names([each.prevented_by for each in asked]).items():
+        low, high = wilson_interval(prevented, driven)
+        pooled[name] = DriverPcr(prevented=prevented, pcr=prevented / driven, pcr_low=low, pcr_high=high)
+    return pooled
 
 
 def pooled_bins(histograms: Sequence[Sequence[int]]) -> tuple[int, ...]:

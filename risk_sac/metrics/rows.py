@@ -180,7 +180,7 @@ METRICS = (
 MetricName = Annotated[
     str,
     Field(
-        description=f"{' | '.join(metric.name for metric in METRICS)}; the markdown table defines them.",
+        description="Such as `ecr`; the markdown table lists and defines them.",
         examples=[METRICS[0].name],
     ),
 ]

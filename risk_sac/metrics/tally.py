@@ -44,6 +44,12 @@ class Tally(Counts):
     """Valid contacts among them."""
     newest_preventable: int = 0
     """Those that a reference driver would have prevented."""
+    prevented_by: Counter[str] = Field(default_factory=Counter)
+    """Reference driver → valid contacts that it would have prevented."""
+    by_severity: Counter[str] = Field(default_factory=Counter)
+    """Severity → valid contacts."""
+    by_fault: Counter[str] = Field(default_factory=Counter)
+    """Fault → failures, each by its worst violation."""
     signatures: Counter[str] = Field(default_factory=Counter)
     """Signature → valid violations."""
     kinds: set[FailureKind] = Field(default_factory=set)
@@ -109,6 +115,8 @@ class Tally(Counts):
     def _add_violations(self, record: EpisodeRecord) -> None:
         self.failures += 1
         self.preventable += preventable(record)
+        if record.worst_violation is not None and record.worst_violation.blamed is not None:
+            self.by_fault[record.worst_violation.blamed] += 1
         for violation in record.valid_violations:
             new, new_preventable = self._requirement(violation.requirement, "failure").add(violation)
             self.distinct_failures += new
@@ -130,6 +138,9 @@ class Tally(Counts):
         self.collisions += 1
         self.preventable_collisions += collision.preventable
         self.avoidable += collision.avoidable
+        self.prevented_by.update({name: int(prevents) for name, prevents in collision.prevention.items()})
+        if collision.severity is not None:
+            self.by_severity[collision.severity] += 1
         if judged is not None:
             self.kinds.add(kind_of(collision, judged))
             self.unresponsive += judged.unresponsive

@@ -39,7 +39,18 @@ from risk_sac.records.judgement import (
     ReferenceOutcome,
     Severity,
 )
-from risk_sac.records.run import FINAL, Counts, Funnel, RequirementCounts, Run, RunMetrics, RunResult, RunSummary, State
+from risk_sac.records.run import (
+    FINAL,
+    Counts,
+    DriverPcr,
+    Funnel,
+    RequirementCounts,
+    Run,
+    RunMetrics,
+    RunResult,
+    RunSummary,
+    State,
+)
 from risk_sac.records.violation import (
     ARTEFACT_RULES,
     NO_CONTACT,

@@ -5,7 +5,7 @@ from datetime import datetime
 
 from risk_sac.config import CampaignSpec
 from risk_sac.records.base import Adjustment, Page, Record
-from risk_sac.records.run import Counts, Family, RequirementCounts, Run, RunResult, SearchMethod, State
+from risk_sac.records.run import Counts, DriverPcr, Family, RequirementCounts, Run, RunResult, SearchMethod, State
 from risk_sac.series import Real
 
 
@@ -133,12 +133,18 @@ class Total(Counts):
     """Of the sums."""
     unresponsive_share: Real
     """Of the valid contacts; null without one."""
+    pcr_by_driver: Mapping[str, DriverPcr] = {}
+    """Reference driver → its own PCR, over all runs."""
+    by_severity: Mapping[str, int] = {}
+    """Severity → valid contacts."""
+    by_fault: Mapping[str, int] = {}
+    """Fault → failures."""
     requirements: Mapping[str, RequirementCounts] = {}
     """Requirement → its funnel, summed over the runs; empty for older runs."""
     signatures: Mapping[str, int]
     """Signature → valid violations."""
     conflicts_by_second: list[int]
-    """Valid contacts by the second after the release in which the conflict began."""
+    """Valid contacts by the second in which the conflict began."""
     contacts_by_second: list[int]
     """The same by the second of the contact."""
 

@@ -23,23 +23,23 @@ class Counts(Record):
     collisions: int = 0
     """Valid contacts."""
     failures: int = 0
-    """Episodes with a valid violation of a requirement that counts."""
+    """Episodes with a valid violation that counts."""
     distinct_failures: int = 0
-    """Valid violations that resemble no earlier one of their run."""
+    """Valid violations unlike every earlier one of their run."""
     preventable: int = 0
-    """Failures that a reference driver would have prevented."""
+    """Failures that a reference driver prevents."""
     preventable_collisions: int = 0
-    """Valid contacts that it would have prevented."""
+    """Valid contacts that it prevents."""
     avoidable: int = 0
-    """Valid contacts that it, or full braking at once, would have prevented."""
+    """Valid contacts that it, or full braking at once, prevents."""
     distinct_preventable: int = 0
-    """Distinct violations that it would have prevented."""
+    """Distinct violations that it prevents."""
     artefacts: int = 0
-    """Contacts that the simulator or the control made."""
+    """Contacts made by simulator or control."""
     unresponsive: int = 0
-    """Valid contacts after 1.5 s or more of a visible collision course without braking."""
+    """Valid contacts after 1.5 s of visible collision course without braking."""
     invalid: int = 0
-    """Episodes in which the ego failed to drive; in no rate."""
+    """Those in which the ego failed to drive; in no rate."""
     environment_steps: int = 0
 
     @model_validator(mode="before")
@@ -68,7 +68,7 @@ class RequirementCounts(Record):
     """Of these, the valid ones of a requirement that counts."""
     distinct: int = 0
     preventable: int = 0
-    """Distinct violations that a reference driver would have prevented."""
+    """Distinct violations that a reference driver prevents."""
     rate: Real = 0.0
     """`valid` / episodes; `violated` / episodes where it is reported only."""
     rate_low: Real = 0.0
@@ -79,6 +79,16 @@ class RequirementCounts(Record):
     def in_rate(self) -> int:
         """The episodes that `rate` counts."""
         return self.valid if self.counts == "failure" else self.violated
+
+
+class DriverPcr(Record):
+    """Valid contacts that one reference driver prevents, and their share of all episodes."""
+
+    prevented: int
+    pcr: Real
+    pcr_low: Real
+    """95 % interval of Wilson."""
+    pcr_high: Real
 
 
 class RunMetrics(Counts):
@@ -114,10 +124,16 @@ class RunMetrics(Counts):
     """Cells of the fixed taxonomy of contacts that a valid one lies in."""
     signatures: Mapping[str, int] = {}
     """Signature → valid violations, in the order in which they were first met."""
+    prevented_by: Mapping[str, int] = {}
+    """Reference driver → valid contacts that it prevents."""
+    by_severity: Mapping[str, int] = {}
+    """Severity → valid contacts."""
+    by_fault: Mapping[str, int] = {}
+    """Fault → failures, each by its worst violation."""
     requirements: Mapping[str, RequirementCounts] = {}
     """Requirement → its funnel; empty in what was stored before requirements were counted."""
     conflicts_by_second: tuple[int, ...] = ()
-    """Valid contacts by the second after the release in which the conflict began."""
+    """Valid contacts by the second in which the conflict began."""
     contacts_by_second: tuple[int, ...] = ()
     """The same by the second of the contact."""
 
@@ -133,7 +149,7 @@ class Funnel(Record):
     """Failures."""
     distinct: int
     preventable: int
-    """Distinct violations that a reference driver would have prevented."""
+    """Distinct violations that a reference driver prevents."""
 
     @classmethod
     def of(cls, metrics: RunMetrics) -> "Funnel":

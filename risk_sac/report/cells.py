@@ -11,12 +11,13 @@ from risk_sac.metrics import (
     Metric,
     MetricName,
     estimate,
+    pcr_by_driver,
     pooled_bins,
     pooled_counts,
+    pooled_names,
     pooled_requirements,
-    pooled_signatures,
 )
-from risk_sac.records import Counts, Phase, RequirementCounts
+from risk_sac.records import Counts, DriverPcr, Phase, RequirementCounts
 from risk_sac.report.runs import FinishedRun
 
 
@@ -48,12 +49,18 @@ class Cell(Counts):
     """Infeasible scenes / episodes."""
     unresponsive_share: float | None
     """`unresponsive` / valid contacts."""
+    pcr_by_driver: Mapping[str, DriverPcr]
+    """Reference driver → its own PCR, over all seeds."""
+    by_severity: Mapping[str, int]
+    """Severity → valid contacts."""
+    by_fault: Mapping[str, int]
+    """Fault → failures."""
     requirements: Mapping[str, RequirementCounts]
     """Requirement → its funnel, summed over the runs; empty for older runs."""
     signatures: Mapping[str, int]
     """Signature → valid violations."""
     conflicts_by_second: tuple[int, ...]
-    """Valid contacts by the second after the release in which the conflict began."""
+    """Valid contacts by the second in which the conflict began."""
     contacts_by_second: tuple[int, ...]
     """The same by the second of the contact."""
 
@@ -74,8 +81,11 @@ def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
         **ratios,
         estimates={metric.name: estimate(metric, metrics) for metric in metrics_of(phase)},
         cpu_s_per_distinct_failure=cpu_s / distinct if distinct and phase == "search" else None,
+        pcr_by_driver=pcr_by_driver(metrics),
+        by_severity=pooled_names([each.by_severity for each in metrics]),
+        by_fault=pooled_names([each.by_fault for each in metrics]),
         requirements=pooled_requirements(metrics),
-        signatures=pooled_signatures(metrics),
+        signatures=pooled_names([each.signatures for each in metrics]),
         conflicts_by_second=pooled_bins([each.conflicts_by_second for each in metrics]),
         contacts_by_second=pooled_bins([each.contacts_by_second for each in metrics]),
     )

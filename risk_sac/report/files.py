@@ -13,7 +13,7 @@ from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.failures.clusters import Overview
 from risk_sac.failures.studied import Studied
 from risk_sac.metrics import METRICS
-from risk_sac.records import Phase, Record, RunMetrics
+from risk_sac.records import Fault, Phase, Record, RunMetrics, Severity
 from risk_sac.report.cells import Cell
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.figures import FORMATS, figure_files, figure_names
@@ -153,7 +153,7 @@ def table_csv(comparison: Comparison) -> str:
     """`table.csv`; empty where there is no value."""
     text = io.StringIO()
     names = ["family", "method", "phase", "runs", *_PLAIN]
-    names += dict.fromkeys(name for cell in comparison.cells for name in _requirements(cell))
+    names += dict.fromkeys(name for cell in comparison.cells for name in _by_name(cell))
     for metric in METRICS:
         names += [metric.name, f"{metric.name}_low", f"{metric.name}_high", f"{metric.name}_runs"]
     writer = csv.DictWriter(text, names, restval="", lineterminator="\n")
@@ -162,14 +162,17 @@ def table_csv(comparison: Comparison) -> str:
     return text.getvalue()
 
 
-def _requirements(cell: Cell) -> dict[str, Any]:
-    """A column for each figure of each requirement."""
-    return {f"{name}.{figure}": value for name, found in cell.requirements.items() for figure, value in found}
+def _by_name(cell: Cell) -> dict[str, Any]:
+    """A column for each severity and fault, and for each figure of each reference driver and requirement."""
+    columns: dict[str, Any] = {f"severity.{each}": cell.by_severity.get(each, 0) for each in Severity}
+    columns |= {f"fault.{each}": cell.by_fault.get(each, 0) for each in Fault}
+    figures = {**cell.pcr_by_driver, **cell.requirements}.items()
+    return columns | {f"{name}.{figure}": value for name, found in figures for figure, value in found}
 
 
 def _cell_row(cell: Cell) -> dict[str, Any]:
     row: dict[str, Any] = {"family": cell.family, "method": cell.method, "phase": cell.phase, "runs": len(cell.seeds)}
-    row |= {name: getattr(cell, name) for name in _PLAIN} | _requirements(cell)
+    row |= {name: getattr(cell, name) for name in _PLAIN} | _by_name(cell)
     for name, estimate in cell.estimates.items():
         row |= {
             name: estimate.mean,

@@ -19,6 +19,7 @@ from risk_sac.report.comparison import DECLARED, REFERENCE, RIVALS, Comparison, 
 from risk_sac.report.page import DASH, interval, number, percent, platform_in_words, table, versions_in_words
 from risk_sac.report.paired import LEVEL, PairedTest, power_of
 from risk_sac.report.runs import HEADLINE, LIMITS, FinishedRun, found_within
+from risk_sac.report.verdicts import RowsOf, class_rows, driver_rows
 
 CONTROL = "no-adversary"
 MOST_CLUSTERS = 12  # rows of their table
@@ -60,7 +61,9 @@ def _template() -> Template:
     environment.filters["defined"] = lambda name: f"{symbol(name)}: {ROWS[name].meaning}."
     environment.tests["declared"] = declared
     environment.globals |= {
+        "class_rows": class_rows,
         "declared_metrics": DECLARED,
+        "driver_rows": driver_rows,
         "headline": HEADLINE,
         "level": f"{LEVEL:g}",
         "metrics": METRICS,
@@ -115,6 +118,12 @@ class Tables:
             for cell in self._comparison.group(family, phase)
         )
         return _filled(columns, rows)
+
+    def by_method(self, rows_of: RowsOf, family: FamilyName, phase: Phase) -> str:
+        """A row for each method."""
+        cells = self._comparison.group(family, phase)
+        columns, rows = rows_of(cells)
+        return _filled(["method", *columns], ([cell.method, *row] for cell, row in zip(cells, rows, strict=False)))
 
     def requirements(self, family: FamilyName, phase: Phase) -> str:
         """The funnel of each requirement, summed over seeds."""

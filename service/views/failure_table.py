@@ -97,13 +97,13 @@ class FailureTable(Record):
     grade: list[Grade | None]
     """Null where it is not valid, or was never judged."""
     severity: list[Severity | None]
-    """How bad the contact is; null without one, or where that was never judged."""
+    """Null without contact, or where it was never judged."""
     injury_risk: list[Real]
-    """Of the pedestrian's death, or of an occupant's serious injury; null like `severity`."""
+    """As in Judgement; null like `severity`."""
     fault: list[Fault | None]
     """Which party caused it; null like `grade`."""
     prevented_by: list[list[str]]
-    """The reference drivers that would have prevented it."""
+    """Reference drivers."""
     distinct: list[bool]
     """Whether one of its valid violations is the first of its kind in its run and phase."""
     kind: list[int]

@@ -12,10 +12,11 @@ from risk_sac.metrics import (
     RATIOS,
     estimate,
     mean_over_runs,
+    pcr_by_driver,
     pooled_bins,
     pooled_counts,
+    pooled_names,
     pooled_requirements,
-    pooled_signatures,
 )
 from risk_sac.records import Adjustment, Results, RunMetrics, Total
 from service.errors import OutdatedError
@@ -61,7 +62,10 @@ def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
             "method": method,
             "runs": len(group),
             "requirements": pooled_requirements(group),
-            "signatures": pooled_signatures(group),
+            "pcr_by_driver": pcr_by_driver(group),
+            "by_severity": pooled_names([metrics.by_severity for metrics in group]),
+            "by_fault": pooled_names([metrics.by_fault for metrics in group]),
+            "signatures": pooled_names([metrics.signatures for metrics in group]),
             "conflicts_by_second": pooled_bins([metrics.conflicts_by_second for metrics in group]),
             "contacts_by_second": pooled_bins([metrics.contacts_by_second for metrics in group]),
         }

@@ -1,11 +1,12 @@
 """Sections of a report on what the search found."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from risk_sac.config import FamilyName
 from risk_sac.failures.clusters import Cluster
 from risk_sac.metrics import COLUMNS, requirement_cells
 from risk_sac.records import Collision, EpisodeRecord, Violation
+from risk_sac.report.cells import Cell
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.document import Block, Card, Cards, Commands, Section, Table
 from risk_sac.report.evidence.origin import Origin, draw
@@ -13,6 +14,7 @@ from risk_sac.report.evidence.words import ego_in_words
 from risk_sac.report.markdown import verified
 from risk_sac.report.page import DASH
 from risk_sac.report.runs import FinishedRun
+from risk_sac.report.verdicts import class_rows, driver_rows
 from risk_sac.verdicts.words import began, known, prevented_by
 
 MOST_CARDS = 12  # of a family
@@ -87,7 +89,26 @@ def funnel(comparison: Comparison) -> Section:
             "another is of valid ones:",
             Table("the funnel by requirement", ["family", "method", *COLUMNS], requirements, left=4),
         ]
+    blocks += _verdicts([cell for cell in comparison.cells if cell.phase == "search"])
     return Section("funnel", "The funnel", blocks)
+
+
+def _verdicts(cells: Sequence[Cell]) -> Iterator[Block]:
+    """What each reference driver would have prevented, how bad the contacts are, and which party caused them."""
+    (drivers, pcr), (classes, counts) = driver_rows(cells), class_rows(cells)
+    named = [[cell.family, cell.method] for cell in cells]
+    if drivers:
+        yield (
+            "PCR by reference driver: valid contacts that this one would have prevented per episode, with the 95 % "
+            "interval of Wilson. full_braking brakes at once, and makes nothing preventable; r157_ttc is a rule for "
+            "cut-ins, and is asked of these alone."
+        )
+        rows = [[*name, *row] for name, row in zip(named, pcr, strict=True)]
+        yield Table("PCR by reference driver", ["family", "method", *drivers], rows, left=2)
+    if classes:
+        yield "Valid contacts by severity, and failures by fault, with the shares of those that were judged:"
+        rows = [[*name, *row] for name, row in zip(named, counts, strict=True)]
+        yield Table("severity and fault", ["family", "method", *classes], rows, left=2)
 
 
 def clusters(comparison: Comparison, origin: Origin) -> Section:

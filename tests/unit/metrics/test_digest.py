@@ -10,7 +10,13 @@ from risk_sac.metrics import results_digest
 from tests.builders import judgement
 from tests.unit.metrics.episodes import RUN, episode
 
-NEWER = ("script", "failed", "requirements", "violations")  # fields of an episode that older records lack
+NEWER = (
+    "script",
+    "failed",
+    "requirements",
+    "violations",
+    "defect_reached_s",
+)  # fields of an episode that older records lack
 
 
 def test_digest_is_the_hash_of_canonical_json():
@@ -35,7 +41,7 @@ def test_records_that_are_judged_without_the_moment_of_notice_keep_their_digest(
     old = json.loads(json.dumps(judged.model_dump(mode="json", by_alias=False)))
     for name in NEWER:
         del old[name]
-    for name in ("noticed_s", "ego_broke", "severity", "injury_risk"):
+    for name in ("noticed_s", "ego_broke", "severity", "injury_risk", "fault", "ego_part"):
         del old["collision"]["judgement"][name]
     line = json.dumps(old, sort_keys=True, separators=(",", ":")).encode() + b"\n"
     assert results_digest([judged]) == hashlib.sha256(line).hexdigest()

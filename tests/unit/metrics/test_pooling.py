@@ -7,12 +7,14 @@ from risk_sac.metrics import (
     bootstrap_interval,
     estimate,
     mean_over_runs,
+    pcr_by_driver,
     pooled_bins,
     pooled_counts,
-    pooled_signatures,
+    pooled_names,
     wilson_interval,
 )
-from tests.unit.metrics.episodes import JUDGED, RUN, feed
+from risk_sac.records import DriverPcr
+from tests.unit.metrics.episodes import JUDGED, RUN, episode, feed
 
 
 def test_runs_are_pooled_by_sums_and_signatures_keep_their_order():
@@ -21,11 +23,20 @@ def test_runs_are_pooled_by_sums_and_signatures_keep_their_order():
     assert (counts.episodes, counts.raw_collisions, counts.failures) == (13, 11, 7)
     assert (counts.distinct_failures, counts.preventable, counts.distinct_preventable) == (6, 4, 3)
     assert (counts.artefacts, counts.unresponsive, counts.environment_steps) == (2, 2, 518 + 380)
-    assert list(pooled_signatures(metrics).items()) == [
+    assert list(pooled_names([each.signatures for each in metrics]).items()) == [
         ("cut-in, straight", 3),
         ("pedestrian, straight", 2),
         ("unjudged adversary vehicle", 2),
     ]
+
+
+def test_each_drivers_pcr_is_over_the_runs_that_asked_it():
+    asked = feed(JUDGED[:4] + [episode()])  # r157 prevents 3 of 4 contacts in 5 episodes
+    clean, old = feed([episode()] * 3), feed(JUDGED).model_copy(update={"prevented_by": {}})
+    pooled = pcr_by_driver([asked, clean, old])
+    low, high = wilson_interval(3, 8)
+    assert pooled["r157"] == DriverPcr(prevented=3, pcr=3 / 8, pcr_low=low, pcr_high=high)
+    assert pcr_by_driver([old]) == pcr_by_driver([clean]) == pcr_by_driver([]) == {}
 
 
 def test_histograms_of_runs_from_before_there_were_any_add_nothing():

@@ -4,7 +4,7 @@ import pytest
 
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.metrics import results_digest
-from risk_sac.records import Collision, Grade, Judgement, Outcome, RequirementResult
+from risk_sac.records import Collision, Fault, Grade, Judgement, Outcome, RequirementResult, Severity
 from risk_sac.report import FinishedRun
 from tests.builders import collision, episode_record, judgement, violation
 
@@ -14,14 +14,22 @@ def hit(speed: float = 10.0, broken: str = "", judged: Judgement | None = None) 
     return collision(relative_speed_mps=speed, verdicts=verdicts, judgement=judged)
 
 
+LEADER = judgement(
+    Grade.FULL_BRAKING,
+    -0.5,
+    unresponsive=True,
+    signature="leader, straight",
+    severity=Severity.SEVERE,
+    fault=Fault.SHARED,
+)
 OUTCOMES = {
     ".": (Outcome.SAFE, None),
     "r": (Outcome.REJECTED, None),
     "f": (Outcome.FAILURE, hit(judged=judgement(conflict_s=1.5))),
-    # Another failure than f, which no careful driver would have prevented.
+    # Another failure than f, which only full braking at once would have prevented.
     "F": (
         Outcome.FAILURE,
-        hit(speed=20.0, judged=judgement(Grade.FULL_BRAKING, -0.5, unresponsive=True, signature="leader, straight")),
+        hit(speed=20.0, judged=LEADER),
     ),
     "a": (Outcome.DEGENERATE, hit(broken="inside_limits")),
     "d": (Outcome.DEGENERATE, hit(broken="ego_moving")),

@@ -10,7 +10,7 @@ import pytest
 from risk_sac.config import METHODS
 from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Core, Extent, Region, Share, Studied
-from risk_sac.metrics import results_digest
+from risk_sac.metrics import results_digest, wilson_interval
 from risk_sac.report import (
     compare,
     figure_bytes,
@@ -74,6 +74,28 @@ def test_page_has_the_funnel_of_every_method(comparison):
         "| no-adversary | 8 | 1 | 0 | 0 | 0 | 0 | – | – |",
     ]
     assert "### Requirements" not in table_markdown(comparison)  # runs from before they were counted
+
+
+def test_page_json_and_csv_say_which_driver_prevents_how_bad_it_is_and_whose_fault(spec, finished):
+    only = spec.model_copy(update={"methods": ("sac",), "seeds": (0,)})
+    run = finished(only.runs()[0], "fF..", ".")
+    compared = compare(only, [run], "risk-sac evaluate")
+    page = table_markdown(compared)
+    low, high = wilson_interval(1, 4)
+    share = f"0.250 [{low:.3f}, {high:.3f}]"
+    assert section(page, "### PCR by reference driver: low, search") == [
+        "| method | r157 | bound |",
+        "| --- | ---: | ---: |",
+        f"| sac | {share} | 0.500 [0.150, 0.850] |",
+    ]
+    assert section(page, "### Severity and fault: low, search")[2] == (
+        "| sac | 1 (100 %) | 0 (0 %) | 0 (0 %) | 0 (0 %) | 1 (100 %) | 0 (0 %) |"
+    )
+    cell, _ = json.loads(table_json(compared))["cells"]
+    assert cell["pcr_by_driver"]["r157"] == {"prevented": 1, "pcr": 0.25, "pcr_low": low, "pcr_high": high}
+    assert (cell["by_severity"], cell["by_fault"]) == ({"severe": 1}, {"shared": 1})
+    row, _ = csv.DictReader(io.StringIO(table_csv(compared)))
+    assert (row["r157.prevented"], row["severity.severe"], row["fault.ego"]) == ("1", "1", "0")
 
 
 def test_page_json_and_csv_have_the_funnel_of_every_requirement(spec, finished):

@@ -13,6 +13,7 @@ import { Funnels, Measures, Methods } from "./methods";
 import { ByRequirement } from "./requirements";
 import { rowOfCell } from "./rows";
 import { Tests } from "./tests";
+import { Verdicts } from "./verdicts";
 
 type Table = Body<"Table">;
 type Phase = Body<"Cell">["phase"];
@@ -124,6 +125,7 @@ function Family({ id, table, family, phase }: { id: string; table: Table; family
       </h2>
       <Methods what="Method" family={family} rows={rows} />
       <Funnels rows={rows} />
+      <Verdicts what="Method" family={family} rows={rows} />
       <ByRequirement what="Method" family={family} rows={rows} />
       <Measures what="Method" family={family} rows={rows} />
       <Tests tests={headline} family={family} reference={headline[0]?.reference ?? table.reference} caption={`Declared beforehand: ${headline[0]?.metric}`} />

@@ -23,6 +23,10 @@ export interface Row {
   distinct_preventable: number;
   /** Requirement -> its funnel; none in what was stored before requirements were counted. */
   requirements: Requirements;
+  /** Reference driver -> its own PCR. */
+  pcr_by_driver: Record<string, Body<"DriverPcr">>;
+  by_severity: Record<string, number>;
+  by_fault: Record<string, number>;
   ecr: Estimate;
   pcr: Estimate;
   more: More;
@@ -41,7 +45,7 @@ export interface More {
   environment_steps: number;
 }
 
-const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "requirements"] as const;
+const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "requirements", "pcr_by_driver", "by_severity", "by_fault"] as const;
 const FURTHER = ["artefacts", "unresponsive_share", "preventable", "environment_steps", "steps_per_distinct_failure"] as const;
 const NOTHING: Estimate = { mean: null, low: null, high: null };
 

@@ -13,6 +13,7 @@ import { csv, json, markdown, type Line } from "./export";
 import { Funnels, Measures, Methods } from "./methods";
 import { ByRequirement } from "./requirements";
 import { rowOfTotal } from "./rows";
+import { Verdicts } from "./verdicts";
 
 interface One {
   id: string;
@@ -65,6 +66,7 @@ export function Several({ ids }: { ids: string[] }) {
             <h2 id={`family-${family}`}>Family {family}</h2>
             <Methods what="Campaign" family={family} rows={rows} />
             <Funnels rows={rows} />
+            <Verdicts what="Campaign" family={family} rows={rows} />
             <ByRequirement what="Campaign" family={family} rows={rows} />
             <Measures what="Campaign" family={family} rows={rows} />
           </section>
