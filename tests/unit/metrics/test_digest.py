@@ -10,13 +10,8 @@ from risk_sac.metrics import results_digest
 from tests.builders import judgement
 from tests.unit.metrics.episodes import RUN, episode
 
-NEWER = (
-    "script",
-    "failed",
-    "requirements",
-    "violations",
-    "defect_reached_s",
-)  # fields of an episode that older records lack
+# Fields of an episode that older records lack.
+NEWER = ("script", "failed", "requirements", "violations", "defect_reached_s")
 
 
 def test_digest_is_the_hash_of_canonical_json():

@@ -31,7 +31,7 @@ def test_runs_are_pooled_by_sums_and_signatures_keep_their_order():
 
 
 def test_each_drivers_pcr_is_over_the_runs_that_asked_it():
-    asked = feed(JUDGED[:4] + [episode()])  # r157 prevents 3 of 4 contacts in 5 episodes
+    asked = feed([*JUDGED[:4], episode()])  # r157 prevents 3 of 4 contacts in 5 episodes
     clean, old = feed([episode()] * 3), feed(JUDGED).model_copy(update={"prevented_by": {}})
     pooled = pcr_by_driver([asked, clean, old])
     low, high = wilson_interval(3, 8)
