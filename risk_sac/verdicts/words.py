@@ -51,15 +51,14 @@ def began(collision: Collision, judged: Judgement) -> str:
 def ego_did(part: EgoPart) -> str:
     """Returns, e.g., "braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s²"; it follows "the ego"."""
     told = [_braked(part)]
-    if part.started:
-        told.append("drove on though it saw the striker there")
-    if part.sped_up:
-        told.append(f"gained {part.gained_mps:.1f} m/s though it saw the striker")
+    gained = f"gained {part.gained_mps:.1f} m/s" if part.sped_up else ""
+    if part.started or part.sped_up:
+        told.append(" and ".join(filter(None, ("drove on" * part.started, gained))) + " though it saw the striker")
     if part.too_fast:
         told.append(f"drove at {part.sighted_mps:.1f} m/s where its sight allowed {part.sight_mps:.1f} m/s")
     if part.left_first == "ego":
         told.append("was the first to leave RSS's proper response")
-    return " and ".join((", ".join(told[:-1]), told[-1])) if len(told) > 1 else told[0]
+    return "; it ".join(told)
 
 
 def _braked(part: EgoPart) -> str:

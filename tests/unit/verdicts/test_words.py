@@ -75,17 +75,16 @@ PART = EgoPart(
         ({"braked_after_s": 0.0}, "was braking when the conflict began, by 4.0 of 7.6 m/s²"),
         (
             {"braked_after_s": None, "started": True, "gained_mps": 1.4},
-            "did not brake in the conflict, drove on though it saw the striker there and gained 1.4 m/s though it saw "
-            "the striker",
+            "did not brake in the conflict; it drove on and gained 1.4 m/s though it saw the striker",
         ),
         (
             {"sight_mps": 5.8, "sighted_mps": 13.6},
-            "braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s² and drove at 13.6 m/s where its sight allowed "
+            "braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s²; it drove at 13.6 m/s where its sight allowed "
             "5.8 m/s",
         ),
         (
             {"braked_after_s": None, "sight_mps": 13.0, "sighted_mps": 13.6, "left_first": "ego"},
-            "did not brake in the conflict and was the first to leave RSS's proper response",
+            "did not brake in the conflict; it was the first to leave RSS's proper response",
         ),
     ],
 )

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { faultOf, knownOf, preventedBy } from "./verdicts";
+import { faultWords, knownOf, preventedBy } from "./verdicts";
 import type { Collision, Violation } from "./violations";
 
 function broken(...preventing: string[]): Violation {
@@ -35,13 +35,13 @@ function judged(fault: string | null, changes: Partial<typeof PART> | Record<str
 }
 
 test("the fault is told with what the ego did", () => {
-  expect(faultOf(judged("shared", {}))).toBe("Fault: shared. The ego braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s².");
-  expect(faultOf(judged("ego", { braked_after_s: null, started: true, gained_mps: 1.4 }))).toBe(
-    "Fault: ego. The ego did not brake in the conflict, drove on though it saw the striker there and gained 1.4 m/s though it saw the striker.",
+  expect(faultWords(judged("shared", {}))).toBe("Fault: shared. The ego braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s².");
+  expect(faultWords(judged("ego", { braked_after_s: null, started: true, gained_mps: 1.4 }))).toBe(
+    "Fault: ego. The ego did not brake in the conflict; it drove on and gained 1.4 m/s though it saw the striker.",
   );
-  expect(faultOf(judged("ego", { braked_after_s: 0, sight_mps: 5.8, sighted_mps: 13.6, left_first: "ego" }))).toBe(
-    "Fault: ego. The ego was braking when the conflict began, by 4.0 of 7.6 m/s², drove at 13.6 m/s where its sight allowed 5.8 m/s and was the first to leave RSS's proper response.",
+  expect(faultWords(judged("ego", { braked_after_s: 0, sight_mps: 5.8, sighted_mps: 13.6, left_first: "ego" }))).toBe(
+    "Fault: ego. The ego was braking when the conflict began, by 4.0 of 7.6 m/s²; it drove at 13.6 m/s where its sight allowed 5.8 m/s; it was the first to leave RSS's proper response.",
   );
-  expect(faultOf(judged(null, null))).toBeNull();
-  expect(faultOf({ requirement: "never_fast", fault: "ego" } as unknown as Violation)).toBe("Fault: ego.");
+  expect(faultWords(judged(null, null))).toBeNull();
+  expect(faultWords({ requirement: "never_fast", fault: "ego" } as unknown as Violation)).toBe("Fault: ego.");
 });

@@ -2,7 +2,7 @@
 
 import { number, words } from "./text";
 import type { Body } from "../api/types";
-import { driversOf, isContact, type Collision, type Violation } from "./violations";
+import { driversOf, faultOf, isContact, type Collision, type Violation } from "./violations";
 
 export const GRADES = ["preventable", "full_braking", "unavoidable", "none"] as const;
 export type GradeName = (typeof GRADES)[number];
@@ -58,10 +58,10 @@ export function knownOf({ visible_for_s, other_id, judgement }: Collision): stri
   return `The ego did not know of ${other_id} at the contact${judgement ? ", but when the conflict began" : ""}.`;
 }
 
-/** Whose fault it was, and what the ego did about the striker; null of a refused or an older one. */
-export function faultOf(violation: Collision | Violation): string | null {
-  const fault = isContact(violation) ? violation.judgement?.fault : violation.fault;
-  if (fault == null) return null;
+/** The fault, and what the ego did about the striker; null of a refused or an older one. */
+export function faultWords(violation: Collision | Violation): string | null {
+  const fault = faultOf(violation);
+  if (fault === null) return null;
   const part = isContact(violation) ? violation.judgement?.ego_part : null;
   return `Fault: ${fault}.${part == null ? "" : ` The ego ${egoDid(part)}.`}`;
 }
@@ -71,20 +71,17 @@ const TOO_FAST = 1.1;
 
 /** What the ego did about the striker; as `risk_sac/verdicts/words.py` says it. */
 function egoDid({ braked_after_s, braking_mps2, possible_mps2, gained_mps, started, sight_mps, sighted_mps, left_first }: Body<"EgoPart">): string {
-  const by = `, by ${number(braking_mps2, 1)} of ${number(possible_mps2, 1)} m/s²`;
-  const told = [
-    braked_after_s === null
-      ? "did not brake in the conflict"
-      : braked_after_s === 0
-        ? `was braking when the conflict began${by}`
-        : `braked ${number(braked_after_s, 1)} s after the conflict began${by}`,
-  ];
-  if (started) told.push("drove on though it saw the striker there");
-  if ((gained_mps ?? 0) >= GAINS_MPS) told.push(`gained ${number(gained_mps, 1)} m/s though it saw the striker`);
+  const told = [braked(braked_after_s, `by ${number(braking_mps2, 1)} of ${number(possible_mps2, 1)} m/s²`)];
+  const sped = [...(started ? ["drove on"] : []), ...((gained_mps ?? 0) >= GAINS_MPS ? [`gained ${number(gained_mps, 1)} m/s`] : [])];
+  if (sped.length > 0) told.push(`${sped.join(" and ")} though it saw the striker`);
   if (sight_mps !== null && (sighted_mps ?? 0) > TOO_FAST * sight_mps) told.push(`drove at ${number(sighted_mps, 1)} m/s where its sight allowed ${number(sight_mps, 1)} m/s`);
   if (left_first === "ego") told.push("was the first to leave RSS's proper response");
-  const last = told.pop()!;
-  return told.length > 0 ? `${told.join(", ")} and ${last}` : last;
+  return told.join("; it ");
+}
+
+function braked(after_s: number | null, by: string): string {
+  if (after_s === null) return "did not brake in the conflict";
+  return after_s === 0 ? `was braking when the conflict began, ${by}` : `braked ${number(after_s, 1)} s after the conflict began, ${by}`;
 }
 
 /** Why a violation was refused: what a rule found. */

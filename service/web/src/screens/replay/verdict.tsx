@@ -2,7 +2,7 @@
 
 import type { Body } from "../../api/types";
 import { capital, number } from "../../ui/text";
-import { TTC_RULE, driverWords, faultOf, knownOf } from "../../ui/verdicts";
+import { TTC_RULE, driverWords, faultWords, knownOf } from "../../ui/verdicts";
 import { gradeOf, isContact, requirementOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import * as say from "./words";
 
@@ -28,7 +28,7 @@ export function Verdict({ failure }: { failure: Failure }) {
         </div>
       )}
       <p>{say.happenedOf(violation)}</p>
-      {faultOf(violation) && <p>{faultOf(violation)}</p>}
+      {faultWords(violation) && <p>{faultWords(violation)}</p>}
       {isContact(violation) ? <OfContact collision={violation} /> : <OfViolation violation={violation} />}
       {others.length > 0 && <p class="faint">The episode violated too: {others.join("; ")}.</p>}
       <p class={flaky ? "bad" : "faint"}>{say.repetitionOf(failure)}</p>
