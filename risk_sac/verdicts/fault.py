@@ -105,7 +105,7 @@ def parts_of_violation(
       grade: of the violation.
     """
     if own:
-        return Parts(ego_erred=grade is not Grade.UNAVOIDABLE)
+        return Parts(ego_erred=grade is Grade.PREVENTABLE)
     return Parts(
         ego_erred=bool(broke) or grade is Grade.PREVENTABLE,
         other_erred=bool(other_broke),

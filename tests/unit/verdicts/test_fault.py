@@ -78,7 +78,8 @@ def test_who_has_to_yield(
 @pytest.mark.parametrize(
     ("own", "other_broke", "grade", "expected"),
     [
-        (True, ("red_light",), Grade.FULL_BRAKING, Fault.EGO),
+        (True, ("red_light",), Grade.PREVENTABLE, Fault.EGO),
+        (True, (), Grade.FULL_BRAKING, Fault.OTHER),
         (True, (), Grade.UNAVOIDABLE, Fault.OTHER),
         (False, (), Grade.PREVENTABLE, Fault.EGO),
         (False, ("unsafe_lane_change",), Grade.PREVENTABLE, Fault.SHARED),

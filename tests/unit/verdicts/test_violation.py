@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from risk_sac.config import Requirement
-from risk_sac.records import Grade, Violation
+from risk_sac.records import Fault, Grade, Violation
 from risk_sac.risk.measures import Gauge
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.scenario.carriageway import Carriageway
@@ -81,11 +81,12 @@ def test_a_careful_driver_keeps_a_distance_that_the_ego_did_not() -> None:
     assert found.signature == "own violated; ego goes straight, vehicle ahead"
     assert found.time_s == pytest.approx(3.75, abs=0.15)  # it stands 10 m ahead at 3.15 s
     assert found.robustness < 0.0
-    assert (found.broke, found.hidden, found.valid) == ((), False, True)
+    assert (found.broke, found.hidden, found.valid, found.fault) == ((), False, True, Fault.SHARED)  # a brake check
 
 
 def test_a_distance_that_nobody_could_keep_is_unavoidable() -> None:
-    assert violated(closes_in(gap_m=4.2), KEEPS_APART).grade is Grade.UNAVOIDABLE
+    found = violated(closes_in(gap_m=4.2), KEEPS_APART)
+    assert (found.grade, found.fault) == (Grade.UNAVOIDABLE, Fault.EGO)  # a follower has to keep its distance
 
 
 def test_followers_would_have_kept_their_distance() -> None:
@@ -103,7 +104,7 @@ def test_a_driver_acts_too_late_if_it_acts_after_the_violation() -> None:
 def test_a_reference_driver_keeps_the_limit() -> None:
     speeds_up = staged(straight(0.0, 0.0, 0.0, 13.0, (2.0, 1.5)), straight(900.0, 0.0, 0.0, 13.0))
     found = violated(speeds_up, own("ego_speed_mps <= 15.5"))
-    assert (found.grade, found.broke) == (Grade.PREVENTABLE, ("speeding",))
+    assert (found.grade, found.broke, found.fault) == (Grade.PREVENTABLE, ("speeding",), Fault.EGO)
     assert found.signature == "own violated; ego goes straight speeding, nobody near"
 
 
@@ -151,6 +152,7 @@ def test_a_reference_driver_stops_at_red_where_it_can(yellow_m: float, red_m: fl
     assert found.grade is grade
     assert found.signature == "red light entered; ego goes straight, nobody near"
     assert found.broke == ("red_light",)
+    assert found.fault is (Fault.EGO if grade is Grade.PREVENTABLE else Fault.OTHER)
 
 
 def test_a_reference_driver_stays_on_the_carriageway() -> None:
