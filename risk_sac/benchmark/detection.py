@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from risk_sac.config import Budget, RunSpec
+from risk_sac.config import Budget, RunMethod, RunSpec
 from risk_sac.failures.detected import candidates, detected
 from risk_sac.records import EpisodeRecord, Record, RunMetrics, SeriesFile
 from risk_sac.run_folder.durable import replace_file
@@ -21,7 +21,7 @@ class Detection(Record):
 
     defects: tuple[str, ...]
     family: str
-    method: str
+    method: RunMethod
     seed: int
     budget_steps: int
     """What the run might have spent."""

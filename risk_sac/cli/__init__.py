@@ -8,7 +8,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from risk_sac import __version__
-from risk_sac.cli import campaigns, egos, export, places, regress, replay, report, run, serve, show, understand
+from risk_sac.cli import (
+    benchmark,
+    campaigns,
+    egos,
+    export,
+    places,
+    regress,
+    replay,
+    report,
+    run,
+    serve,
+    show,
+    understand,
+)
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
@@ -68,6 +81,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"risk-sac {__version__}")
     parser.set_defaults(on_error=FAILED)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for module in (run, places, egos, show, replay, understand, export, regress, report, serve, campaigns):
+    for module in (run, places, egos, show, replay, understand, export, regress, report, benchmark, serve, campaigns):
         module.add(commands)
     return parser

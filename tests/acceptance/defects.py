@@ -8,29 +8,29 @@ and the undisturbed scenes do not.
 """
 
 import argparse
-import csv
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 from risk_sac.benchmark.detection import ANSWER, Detection, first_detection
+from risk_sac.benchmark.runs import ego_with, folder_of
+from risk_sac.benchmark.table import detections_csv
 from risk_sac.config import Budget, RunSpec
-from risk_sac.config.spec_file import read_ego
-from risk_sac.egos.defects.catalogue import DEFECTS, version_of
+from risk_sac.egos.defects.catalogue import DEFECTS
+from risk_sac.egos.registry import pinned
+from risk_sac.run_folder.durable import replace_file
 
 UNDISTURBED, METHODS, FIRST_SEED = "iid-undisturbed", ("archive", "random"), 501
-COLUMNS = ("defect", "family", "method", "seed", "steps", "episodes", "reached", "triggered", "detected", "refuted")
 
 
 def played(name: str, family: str, options: argparse.Namespace) -> Iterator[Detection]:
     """Yields the undisturbed run of a defect in a family, and then searches up to a detection."""
-    ego = read_ego(f"{DEFECTS[name].base}+{name}")
+    ego = pinned(ego_with(DEFECTS[name]))
     searches = [(method, FIRST_SEED + k) for k in range(options.seeds) for method in METHODS]
     for method, seed in [(UNDISTURBED, FIRST_SEED), *searches]:
         spec = RunSpec(family=family, method=method, seed=seed, ego=ego, budget=Budget(episodes=options.scenes))
-        budget = f"{options.scenes}-scenes" if spec.iid else f"{options.steps}-steps"
-        folder = options.out / "-".join((name, version_of(ego), spec.id, budget))
+        folder = folder_of(spec, options.out, options.scenes if spec.iid else options.steps)
         detection = first_detection(spec, folder, sys.maxsize if spec.iid else options.steps)
         for path in folder.iterdir():  # what a finished run leaves
             if path.name != ANSWER:
@@ -50,21 +50,16 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=1, help="of each search (default: %(default)s)")
     options = parser.parse_args()
     found: list[Detection] = []
-    pairs = [(name, family) for name in options.defects for family in DEFECTS[name].families]
+    pairs = [
+        (name, DEFECTS[name].families[k])  # so that each defect is soon played in some family
+        for k in range(3)
+        for name in options.defects
+        if k < len(DEFECTS[name].families)
+    ]
     for name, family in pairs:
         for detection in played(name, family, options):
             found.append(detection)
-            write(options.out / "admission.csv", found)
-
-
-def write(file: Path, found: Sequence[Detection]) -> None:
-    """Writes a row for each run."""
-    with file.open("w", newline="") as opened:
-        writer = csv.writer(opened)
-        writer.writerow((*COLUMNS, "signature"))
-        for each in found:
-            told = each.model_dump() | {"defect": "+".join(each.defects)}
-            writer.writerow(told[name] for name in (*COLUMNS, "signature"))
+            replace_file(options.out / "admission.csv", detections_csv(found))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from risk_sac.benchmark.detection import Detection, first_detection
+from risk_sac.cli import main
 from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.env import RiskSacEnv
@@ -72,3 +73,19 @@ def test_a_search_that_detects_nothing_ends_with_its_budget(tmp_path: Path) -> N
     found = first_detection(spec, tmp_path, 300)
     assert (found.detected, found.reached, found.signature) == (None, None, "")
     assert 300 <= found.steps < 500
+
+
+def test_the_benchmark_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["benchmark", "--methods", "random", "--defects", "kerb-waits", "sumo-assertive", "--steps", "200"]
+    command += ["--jobs", "1", "--out", str(tmp_path)]
+    assert main([*command, "--seeds", "1"]) == 0
+    answers = {file: file.stat().st_mtime_ns for file in tmp_path.glob("*/detection.json")}
+    assert len(answers) == 2
+    assert main([*command, "--seeds", "1"]) == 0  # plays nothing
+    assert {file: file.stat().st_mtime_ns for file in tmp_path.glob("*/detection.json")} == answers
+    assert len((tmp_path / "detections.csv").read_text().splitlines()) == 3
+    assert (tmp_path / "curves.svg").read_bytes().startswith(b"<?xml")
+    assert "falsification rate" in (tmp_path / "benchmark.md").read_text()
+    capsys.readouterr()
+    assert main([*command, "--defects", "kerb-wait"]) == 2
+    assert "ego.defects: got 'kerb-wait'" in capsys.readouterr().err

@@ -1,0 +1,59 @@
+"""`risk-sac benchmark`: how soon methods detect egos with known faults."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import get_args
+
+from rich.progress import Progress
+
+from risk_sac.cli.console import OK, Commands, add_command, number
+from risk_sac.config import MethodName
+from risk_sac.egos.defects.catalogue import DEFECTS
+from risk_sac.machine import cores
+from risk_sac.terminal import console
+
+METHODS: Sequence[MethodName] = ("random", "archive", "risk-sac-diverse")
+SEEDS, STEPS = 10, 20_000
+
+
+def add(commands: Commands) -> None:
+    """Add the command."""
+    summary = "how soon methods detect egos with known faults; the same command again goes on with it"
+    parser = add_command(commands, "benchmark", _benchmark, summary)
+    known = get_args(MethodName)
+    names = f"of {', '.join(known)} (default: {' '.join(METHODS)})"
+    parser.add_argument("--methods", nargs="+", choices=known, default=METHODS, metavar="NAME", help=names)
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--defects", nargs="+", metavar="NAME", help="(default: the whole catalogue)")
+    which.add_argument("--test-set", action="store_true", help="the defects that nothing was tuned on")
+    parser.add_argument("--seeds", type=number(int, 1, 1000), default=SEEDS, metavar="N", help="(default: %(default)s)")
+    parser.add_argument("--first-seed", type=number(int, 0), default=0, metavar="S", help="(default: %(default)s)")
+    steps = "environment steps of a run without a detection (default: %(default)s)"
+    parser.add_argument("--steps", type=number(int, 1, 10_000_000), default=STEPS, metavar="N", help=steps)
+    parser.add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help="runs at a time (default: one per core)")
+    out = "a folder for each run, and detections.csv, benchmark.md and curves.svg of those that have ended"
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help=out)
+
+
+def _benchmark(options: argparse.Namespace) -> int:
+    # Here, because loading the simulator takes seconds.
+    from risk_sac.benchmark.runs import Benchmark, play
+    from risk_sac.benchmark.table import methods_table, write
+
+    test_set = [name for name, defect in DEFECTS.items() if defect.test_set]
+    benchmark = Benchmark(
+        methods=tuple(options.methods),
+        defects=tuple(test_set if options.test_set else options.defects or DEFECTS),
+        seeds=tuple(range(options.first_seed, options.first_seed + options.seeds)),
+        budget_steps=options.steps,
+    )
+    found = []
+    with Progress(console=console) as bar:
+        task = bar.add_task("runs", total=len(list(benchmark.specs())))
+        for detection in play(benchmark, options.out, options.jobs or cores()):
+            found.append(detection)
+            bar.advance(task)
+            write(found, options.out, options.typed)
+    console.print(methods_table(found), markup=False, soft_wrap=True)
+    return OK
