@@ -34,6 +34,12 @@ SHIPPED = {
     "idm-aeb": "risk_sac.egos.idm_aeb:IdmAeb",
     "broken": "risk_sac.egos.broken:Broken",
 }
+PLANNERS = {  # shipped too, where the extra `planners` is installed
+    "fop": "risk_sac.egos.planners.fiss:Fop",
+    "fiss": "risk_sac.egos.planners.fiss:Fiss",
+    "fiss-plus": "risk_sac.egos.planners.fiss:FissPlus",
+}
+PLANNERS_PACKAGE = "fiss_planner"
 HASH_DIGITS = 12
 PYTHON_DEADLINE_S = 60.0  # generous: in our own process the first answer waits for a compiler, on whatever machine
 
@@ -104,6 +110,9 @@ def card_of(name: str) -> EgoCard:
         return python_card(points[name])
     if name in remotes:
         return remotes[name]
+    if name in PLANNERS:
+        remedy = "pip install 'risk-sac[planners]', for the service and its workers"
+        raise ConfigError("ego.driver", f"{name!r}, whose planner is not installed", "an ego that is installed", remedy)
     registered = ", ".join(sorted((*points, *remotes)))
     raise ConfigError("ego.driver", f"{name!r}", f"one of {registered}, which are registered")
 
@@ -181,7 +190,8 @@ def make(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
 
 
 def _points() -> Mapping[str, EntryPoint]:
-    found = {name: EntryPoint(name=name, value=value, group=GROUP) for name, value in SHIPPED.items()}
+    shipped = SHIPPED | (PLANNERS if find_spec(PLANNERS_PACKAGE) else {})
+    found = {name: EntryPoint(name=name, value=value, group=GROUP) for name, value in shipped.items()}
     for point in entry_points(group=GROUP):
         if found.setdefault(point.name, point).value != point.value:
             raise ConfigError(GROUP, f"two egos as {point.name!r}", "names of their own")

@@ -31,7 +31,7 @@ from risk_sac.egos.remote.messages import (
 )
 from risk_sac.egos.seam import Ego, Episode, Vehicle
 from risk_sac.errors import ConfigError, EgoFailed
-from risk_sac.types import STEP_S, Kind, Signal
+from risk_sac.types import STEP_S, Kind, Lane, Road, Signal
 
 MOST_SESSIONS = 64  # the oldest goes: a client that never acted closed nothing
 SPARE_THREADS = 16  # beside one for each session: to start and to close them
@@ -98,8 +98,10 @@ def _told(context: Any) -> Iterator[None]:
 
 def warm_up(ego: Guarded) -> None:
     """Lets an ego drive one step on a straight road, so that compiling costs no deadline."""
-    ego.reset(Episode(seed=0, net="", route=(), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=STEP_S))
     along, still = np.array([0.0, 50.0, 100.0]), np.zeros(3)
+    lane = Lane("lane", np.array([along, still]), 3.3, 13.9, "", "", False, False, (), True)
+    car = Vehicle(length_m=4.6, width_m=1.85)
+    ego.reset(Episode(seed=0, net="", route=(), vehicle=car, step_s=STEP_S, road=Road((lane,))))
     path = np.array([along, still, along, still, np.full(3, 13.9), np.cos(still), np.sin(still)])
     actors = ego_pb2.Actors(
         id=["ego", "lead", "walker"],

@@ -259,6 +259,13 @@ def test_records_say_when_a_defect_was_reached_and_runs_repeat(ego, tmp_path):
     assert all((reached_s is not None) is ("driver" in ego) for reached_s in reached)
 
 
+@pytest.mark.parametrize("family", ["low", "dense"])
+def test_a_planner_drives_a_run(tmp_path, family):
+    results, records = play(spec_of("fiss-plus", family=family, episodes=2), tmp_path / "run")
+    assert results.metrics.environment_steps > 100
+    assert all(record.outcome is not Outcome.INVALID for record in records)
+
+
 def test_a_campaign_keeps_the_version_of_its_ego_and_runs_with_it(shared):
     body = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 2}, "ego": {"driver": "idm-aeb"}}
     posted = shared.client.post("/v1/campaigns", json=body).raise_for_status().json()

@@ -1,0 +1,155 @@
+"""Planners of the package `fiss-planner`, which sample in a Frenet frame, as its documentation runs them.
+
+Source: Sun et al. 2022, "FISS: A Trajectory Planning Framework Using Fast Iterative Search and Sampling Strategy for
+Autonomous Driving"; Sun et al. 2023, "FISS+"; for FOP Werling et al. 2010. Settings are the package's own, where no
+comment says otherwise. From its adapters come the numbers below.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import fiss_planner as fp
+import numpy as np
+
+from risk_sac.egos.planners.route import in_pieces, lanes_ahead, stops
+from risk_sac.egos.road import lane_edges
+from risk_sac.egos.seam import Control, Episode, Perceived, Vehicle
+from risk_sac.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Road, X, Y
+
+SPACING_M = 2.0  # of points along lanes
+PIECE_M = 50.0  # of a lane; the planner's step takes as long as the lanes near it are
+GROWN_M = 0.2  # by which others are longer and wider
+MOVING_MPS = 0.5  # from which another's heading is that of its velocity
+MOST_BRAKING_MPS2 = 8.0  # that a plan may have; in an emergency the car brakes as it can
+BEYOND_S = 0.5  # by which predictions reach beyond the longest plan
+
+
+class FrenetPlanner:
+    """The package's local planner on the road that the seam tells, and its tracking controller."""
+
+    kind: ClassVar[str]
+    _told: Road | None = None
+
+    def reset(self, episode: Episode) -> None:
+        """Begins an episode; a ValueError if it has no road, as from a client that knows none."""
+        if not episode.road.lanes:
+            raise ValueError("the episode has no road, without which this planner cannot plan")
+        if episode.road is not self._told:  # the same object on the same road, within a process
+            self._told, self._road = episode.road, in_pieces(episode.road, PIECE_M, SPACING_M)
+            self._numbers = {lane.id: number for number, lane in enumerate(self._road.lanes)}
+            self._map = road_map(self._road, self._numbers)
+        self._step_s, self._car = episode.step_s, episode.vehicle
+        self._planner: Any = None
+        self._ids: dict[str, int] = {}
+        self._heading: float | None = None
+
+    def act(self, perceived: Perceived) -> Control:
+        """Plans, and follows the plan."""
+        ego = self._ego(perceived)
+        if self._planner is None:
+            self._start(ego)
+        for number, active in enumerate(stops(self._road, perceived)):
+            self._planner.set_stop_line_active(number, active)
+        plan = self._planner.step(perceived.time_s, ego, self._obstacles(perceived))
+        if len(plan.trajectory) < 2:
+            return Control(-self._car.brake_mps2)
+        command = self._controller.compute(ego, plan.trajectory, 0.0)
+        return Control(-self._car.brake_mps2 if plan.emergency else command.accel, command.steer)
+
+    def close(self) -> None:
+        """Releases nothing."""
+
+    def _start(self, ego: Any) -> None:
+        """Makes the planner, and routes it from the lane that the ego is on."""
+        config = fp.LocalPlannerConfig()
+        config.planner.type = fp.planner_type_from_string(self.kind)
+        config.desired_speed = max(lane.limit_mps for lane in self._road.lanes)  # so that each lane's limit decides
+        config.emergency_decel = self._car.brake_mps2
+        config.planner.collision.ignore_rear_in_lane = True  # as it drives in CARLA: those behind react
+        self._reach_s = config.planner.sampling.max_t + BEYOND_S
+        self._planner = fp.LocalPlanner(config, vehicle_params(self._car, min(self._car.brake_mps2, MOST_BRAKING_MPS2)))
+        start = self._map.locate(ego.x, ego.y, ego.yaw)
+        if start < 0:
+            raise ValueError(f"the ego begins on no lane of its road: at {ego.x:.1f}, {ego.y:.1f}")
+        way = lanes_ahead(self._road, self._road.lanes[start].id)
+        self._planner.set_map(self._map, [self._numbers[id_] for id_ in way])
+        self._controller = fp.make_controller("mpc", vehicle_params(self._car, self._car.brake_mps2))
+
+    def _ego(self, perceived: Perceived) -> Any:
+        x_m, y_m, heading, speed, accel = perceived.state[[X, Y, HEADING, SPEED, ACCEL], 0].tolist()
+        turned = 0.0 if self._heading is None else math.remainder(heading - self._heading, math.tau)
+        self._heading = heading
+        curvature = turned / (speed * self._step_s) if speed > 1.0 else 0.0
+        return fp.EgoState(x_m, y_m, heading, speed, accel, curvature)
+
+    def _obstacles(self, perceived: Perceived) -> list[Any]:
+        """Predicts vehicles along their lanes, and all else at its velocity."""
+        rows = perceived.state[[X, Y, HEADING, VX, VY, LENGTH, WIDTH], 1:].T.tolist()
+        found = []
+        for id_, kind, (x, y, heading, vx, vy, length, width) in zip(
+            perceived.ids[1:], perceived.kind[1:].tolist(), rows, strict=True
+        ):
+            speed = math.hypot(vx, vy)
+            yaw = math.atan2(vy, vx) if speed > MOVING_MPS else heading
+            number = self._ids.setdefault(id_, len(self._ids))
+            told = (number, x, y, yaw, speed, length + GROWN_M, width + GROWN_M, self._reach_s, self._step_s)
+            if kind == Kind.VEHICLE:
+                found.append(fp.predict_lane_following(self._map, *told))
+            else:
+                found.append(fp.predict_constant_velocity(*told))
+        return found
+
+
+def road_map(road: Road, numbers: Mapping[str, int]) -> Any:
+    """Returns the package's map of a road; its lanes have these numbers, its stop lines their places in the road."""
+    found = fp.RoadMap()
+    for each in road.lanes:
+        lane, (left, right) = fp.MapLane(), lane_edges(each)
+        lane.id, lane.speed_limit = numbers[each.id], each.limit_mps
+        lane.centerline, lane.left, lane.right = (np.ascontiguousarray(line.T) for line in (each.line, left, right))
+        if each.left:
+            lane.left_neighbor, lane.can_change_left = numbers[each.left], each.may_change_left
+        if each.right:
+            lane.right_neighbor, lane.can_change_right = numbers[each.right], each.may_change_right
+        lane.successors = [numbers[id_] for id_ in each.successors]
+        found.add_lane(lane)
+    for number, line in enumerate(road.stop_lines):
+        lane = found.lane(numbers[line.lane])
+        found.add_stop_line(fp.StopLine(number, lane.id, lane.length(), False))
+    found.finalize()
+    return found
+
+
+def vehicle_params(car: Vehicle, most_braking_mps2: float) -> Any:
+    """Returns the package's parameters of the car; the limits that are not given here are the package's."""
+    found = fp.VehicleParams()
+    found.length, found.width, found.wheelbase = car.length_m, car.width_m, car.wheelbase_m
+    found.rear_axle_to_center = car.wheelbase_m / 2
+    found.max_accel, found.max_decel = car.accel_mps2, most_braking_mps2
+    found.max_steer, found.max_steer_rate = car.steering_rad, car.steering_rate_rad_s
+    return found
+
+
+class Fop(FrenetPlanner):
+    """Frenet optimal planner: generates every candidate, keeps the cheapest valid one (fiss-planner 1.0.0)."""
+
+    version = "1.0.0"
+    response_time_s = 0.5
+    kind = "fop_plus"  # chooses as `fop` does, but validates in order of cost: a fifth of the time
+
+
+class Fiss(FrenetPlanner):
+    """FISS: searches the end states iteratively, guided by the previous plan (fiss-planner 1.0.0)."""
+
+    version = "1.0.0"
+    response_time_s = 0.5
+    kind = "fiss"
+
+
+class FissPlus(FrenetPlanner):
+    """FISS+: explores the best end states first, and refines them (fiss-planner 1.0.0)."""
+
+    version = "1.0.0"
+    response_time_s = 0.5
+    kind = "fiss_plus"

@@ -1,0 +1,103 @@
+"""Chooses the lanes that a planner drives along, and the stop lines that hold for it; cuts long lanes."""
+
+import math
+from collections.abc import Mapping
+from heapq import heappop, heappush
+
+import numpy as np
+
+from risk_sac.egos.driving import LAST_STOP_MPS2
+from risk_sac.egos.seam import Perceived
+from risk_sac.types import HEADING, LENGTH, SPEED, Floats, Lane, Road, Signal, X, Y
+
+
+def lanes_ahead(road: Road, start: str) -> list[str]:
+    """Returns the lanes along the route from a lane on, with as few changes to a lane beside as possible.
+
+    It ends on the lane from which the route leads no farther. If the route is out of reach, it is the first lane alone.
+    """
+    lanes = {lane.id: lane for lane in road.lanes}
+    ways: list[tuple[int, int, list[str]]] = [(0, 0, [start])]  # changes, order of finding, lanes
+    seen: set[str] = set()
+    while ways:
+        changes, order, way = heappop(ways)
+        if way[-1] in seen:
+            continue
+        seen.add(way[-1])
+        lane = lanes[way[-1]]
+        following = [each for each in lane.successors if lanes[each].on_route]
+        if lane.on_route and not following:
+            return way
+        beside = [lane.left] * lane.may_change_left + [lane.right] * lane.may_change_right
+        for cost, each in [*((0, each) for each in following), *((1, each) for each in beside)]:
+            order += 1
+            heappush(ways, (changes + cost, order, [*way, each]))
+    return [start]
+
+
+def stops(road: Road, perceived: Perceived) -> list[bool]:
+    """Returns for each stop line whether its signal stops the ego.
+
+    A yellow one does where the ego can still stop. Of a lane on the route, the signal for the route's direction counts.
+    """
+    p, lanes = perceived, {lane.id: lane for lane in road.lanes}
+    x_m, y_m, heading, speed, half_m = p.state[[X, Y, HEADING, SPEED, LENGTH], 0].tolist()
+    front = x_m + half_m / 2 * math.cos(heading), y_m + half_m / 2 * math.sin(heading)
+    found = []
+    for line, signal in zip(road.stop_lines, p.signals, strict=True):
+        ahead_m = math.dist(front, lanes[line.lane].line[:, -1])
+        holds = lanes[line.leads_to].on_route or not lanes[line.lane].on_route
+        yellow = signal is Signal.YELLOW and speed * speed <= 2.0 * LAST_STOP_MPS2 * ahead_m
+        found.append(holds and (yellow or signal is Signal.RED))
+    return found
+
+
+def in_pieces(road: Road, piece_m: float, spacing_m: float) -> Road:
+    """Returns the road with long lanes cut into pieces, and a point every so many metres along each.
+
+    A planner may work on whole lanes wherever the ego is. Pieces of lanes beside each other are cut alike.
+    """
+    lanes = {lane.id: lane for lane in road.lanes}
+    count = {id_: max(math.ceil(_length(_rightmost(lane, lanes)) / piece_m), 1) for id_, lane in lanes.items()}
+    pieces = []
+    for lane in road.lanes:
+        last = count[lane.id] - 1
+        for k in range(last + 1):
+            following = tuple(piece(id_, 0) for id_ in lane.successors) if k == last else (piece(lane.id, k + 1),)
+            pieces.append(
+                lane._replace(
+                    id=piece(lane.id, k),
+                    line=_cut(lane, k / (last + 1), (k + 1) / (last + 1), spacing_m),
+                    left=lane.left and piece(lane.left, k),
+                    right=lane.right and piece(lane.right, k),
+                    successors=following,
+                )
+            )
+    stop_lines = tuple(
+        line._replace(lane=piece(line.lane, count[line.lane] - 1), leads_to=piece(line.leads_to, 0))
+        for line in road.stop_lines
+    )
+    return Road(tuple(pieces), stop_lines)
+
+
+def piece(lane: str, number: int) -> str:
+    """Returns the id of a piece of a lane."""
+    return f"{lane}/{number}"
+
+
+def _rightmost(lane: Lane, lanes: Mapping[str, Lane]) -> Lane:
+    while lane.right:
+        lane = lanes[lane.right]
+    return lane
+
+
+def _cut(lane: Lane, first: float, last: float, spacing_m: float) -> Floats:
+    """Returns a lane's line between two shares of its length."""
+    station = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(lane.line, axis=1)))))
+    first_m, last_m = first * station[-1], last * station[-1]
+    at = np.linspace(first_m, last_m, max(round((last_m - first_m) / spacing_m), 1) + 1)
+    return np.array([np.interp(at, station, row) for row in lane.line])
+
+
+def _length(lane: Lane) -> float:
+    return float(np.hypot(*np.diff(lane.line, axis=1)).sum())

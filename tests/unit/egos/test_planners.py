@@ -1,0 +1,184 @@
+"""The planners of `fiss-planner` on roads drawn by hand, from either side."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import pytest
+
+from risk_sac.egos import registry
+from risk_sac.egos.bicycle import advance
+from risk_sac.egos.guard import Guarded
+from risk_sac.egos.planners.route import in_pieces, lanes_ahead, stops
+from risk_sac.egos.seam import Episode, Perceived, Trajectory, Vehicle
+from risk_sac.errors import ConfigError
+from risk_sac.sim.pilot import Motion
+from risk_sac.types import (
+    ACCEL,
+    HEADING,
+    LENGTH,
+    SPEED,
+    STEP_S,
+    VX,
+    VY,
+    WIDTH,
+    Kind,
+    Lane,
+    Road,
+    Signal,
+    StopLine,
+    X,
+    Y,
+)
+
+PLANNERS = ("fop", "fiss", "fiss-plus")
+VEHICLE = Vehicle(length_m=4.6, width_m=1.85)
+WIDTH_M, LIMIT_MPS, END_M = 3.3, 13.9, 400.0
+Other = Callable[[float], tuple[float, float, float]]  # its x, y and speed along x at a time
+
+
+def two_lanes(*, right: bool = True, change: bool = True, stop_line: bool = False) -> Road:
+    """A straight road along x whose lane at y = 0 has a lane to the right or to the left, and goes on beyond 300 m."""
+    side = -WIDTH_M if right else WIDTH_M
+    names = ("own", "beside") if right else ("beside", "own")  # from left to right
+    lanes = []
+    for part, first_m, last_m in (("a", 0.0, 300.0), ("b", 300.0, END_M)):
+        for name, y in (("own", 0.0), ("beside", side)):
+            line = np.array([[first_m, last_m], [y, y]])
+            left, other = ("", f"{part}_{names[1]}") if name == names[0] else (f"{part}_{names[0]}", "")
+            after = (f"b_{name}",) if part == "a" else ()
+            may = bool(left) and change, bool(other) and change
+            lanes.append(Lane(f"{part}_{name}", line, WIDTH_M, LIMIT_MPS, left, other, *may, after, True))
+    lines = tuple(StopLine(f"a_{name}", f"b_{name}", "signal", i) for i, name in enumerate(("own", "beside")))
+    return Road(tuple(lanes), lines if stop_line else ())
+
+
+def perceived(motion: Motion, time_s: float, others: list[tuple[float, float, float]], signal: Signal) -> Perceived:
+    state = np.full((WIDTH + 1, 1 + len(others)), np.nan)
+    cos, sin = math.cos(motion.heading_rad), math.sin(motion.heading_rad)
+    own = (motion.x_m, motion.y_m, motion.heading_rad, motion.speed_mps * cos, motion.speed_mps * sin, motion.speed_mps)
+    columns = [own, *((x, y, 0.0, speed, 0.0, abs(speed)) for x, y, speed in others)]
+    state[[X, Y, HEADING, VX, VY, SPEED]] = np.array(columns).T
+    state[[LENGTH, WIDTH]] = [[VEHICLE.length_m], [VEHICLE.width_m]]
+    state[ACCEL, 0] = motion.accel_mps2
+    kind = np.full(state.shape[1], Kind.VEHICLE, dtype=np.int8)
+    ids = ("ego", *(f"other{i}" for i in range(len(others))))
+    return Perceived(time_s, ids, kind, state, np.empty((7, 0)), 0.0, 0.0, signal, math.inf, (signal,) * 2)
+
+
+def drive(
+    name: str,
+    road: Road,
+    others: tuple[Other, ...] = (),
+    *,
+    steps: int = 120,
+    start: Motion,
+    signal: Signal = Signal.NONE,
+) -> list[Motion]:
+    """Motions of an ego among others that nothing stops."""
+    make, _ = registry.make(name, "ego")
+    ego, motions = Guarded(make, math.inf), [start]
+    ego.reset(Episode(seed=0, net="", route=(), vehicle=VEHICLE, step_s=STEP_S, road=road))
+    for step in range(steps):
+        seen = [other(step * STEP_S) for other in others]
+        lit = signal if road.stop_lines else Signal.NONE
+        view = perceived(motions[-1], step * STEP_S, seen, lit)
+        command = ego.act(view if road.stop_lines else view._replace(signals=()))
+        assert not isinstance(command, Trajectory)
+        motions.append(advance(motions[-1], *command, VEHICLE, STEP_S))
+    return motions
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+@pytest.mark.parametrize("signal", [Signal.RED, Signal.GREEN])
+def test_it_stops_before_a_red_light_only(name: str, signal: Signal) -> None:
+    start = Motion(220.0, 0.0, 0.0, 12.0)
+    last = drive(name, two_lanes(stop_line=True), steps=130, start=start, signal=signal)[-1]
+    front_m = last.x_m + VEHICLE.length_m / 2
+    if signal is Signal.RED:
+        assert 290.0 < front_m <= 300.0
+        assert last.speed_mps < 0.3
+    else:
+        assert front_m > 310.0
+
+
+def slow(time_s: float, x_m: float = 60.0, speed_mps: float = 3.0) -> tuple[float, float, float]:
+    return x_m + speed_mps * time_s, 0.0, speed_mps
+
+
+@pytest.mark.parametrize("name", ["fop", "fiss-plus"])  # FISS stays behind it
+@pytest.mark.parametrize("right", [True, False])
+@pytest.mark.parametrize("change", [True, False])
+def test_it_overtakes_where_the_markings_let_it(name: str, right: bool, change: bool) -> None:
+    motions = drive(name, two_lanes(right=right, change=change), (slow,), start=Motion(20.0, 0.0, 0.0, 12.0))
+    aside_m = max(motion.y_m * (-1.0 if right else 1.0) for motion in motions)
+    ahead_m = motions[-1].x_m - slow(12.0)[0]
+    if change:
+        assert aside_m == pytest.approx(WIDTH_M, abs=0.6)
+        assert ahead_m > VEHICLE.length_m
+    else:
+        assert abs(motions[-1].y_m) < 0.7
+        assert ahead_m < -VEHICLE.length_m
+
+
+def test_a_mirrored_scene_is_driven_mirrored() -> None:
+    left, right = (
+        drive("fiss-plus", two_lanes(right=side), (slow,), start=Motion(20.0, 0.0, 0.0, 12.0)) for side in (False, True)
+    )
+    np.testing.assert_allclose([m.x_m for m in left], [m.x_m for m in right], atol=0.5)
+    np.testing.assert_allclose([m.y_m for m in left], [-m.y_m for m in right], atol=0.3)
+
+
+@pytest.mark.parametrize("name", PLANNERS)
+def test_it_brakes_as_hard_as_the_car_can_where_it_finds_no_plan(name: str) -> None:
+    wall = partial(slow, x_m=42.0, speed_mps=0.0)
+    motions = drive(name, two_lanes(change=False), (wall,), steps=20, start=Motion(20.0, 0.0, 0.0, 13.0))
+    assert min(motion.accel_mps2 for motion in motions) == pytest.approx(-VEHICLE.brake_mps2)
+
+
+def test_it_drives_the_same_again() -> None:
+    road, start = two_lanes(), Motion(20.0, 0.0, 0.0, 12.0)
+    assert drive("fiss-plus", road, (slow,), steps=60, start=start) == drive(
+        "fiss-plus", road, (slow,), steps=60, start=start
+    )
+
+
+def test_the_lanes_ahead_change_to_one_that_leads_on() -> None:
+    road = two_lanes()
+    lanes = tuple(
+        each._replace(successors=(), on_route=False) if each.id == "a_beside" else each for each in road.lanes
+    )
+    assert lanes_ahead(road._replace(lanes=lanes), "a_beside") == ["a_beside", "a_own", "b_own"]
+    assert lanes_ahead(road, "a_beside") == ["a_beside", "b_beside"]
+
+
+def test_pieces_of_lanes_keep_their_neighbours_and_order() -> None:
+    road = in_pieces(two_lanes(stop_line=True), 50.0, 2.0)
+    lanes = {each.id: each for each in road.lanes}
+    assert len(lanes) == 2 * (6 + 2)
+    assert lanes["a_own/5"].successors == ("b_own/0",)
+    assert (lanes["a_own/2"].successors, lanes["a_own/2"].right) == (("a_own/3",), "a_beside/2")
+    np.testing.assert_allclose(lanes["a_own/2"].line[0], np.arange(100.0, 151.0, 2.0))
+    assert [line.lane for line in road.stop_lines] == ["a_own/5", "a_beside/5"]
+
+
+@pytest.mark.parametrize(("ahead_m", "stopped"), [(25.0, True), (10.0, False)])
+def test_a_yellow_light_stops_it_where_it_can_still_stop(ahead_m: float, stopped: bool) -> None:
+    motion = Motion(300.0 - ahead_m - VEHICLE.length_m / 2, 0.0, 0.0, 12.0)  # from 12 m/s, 4.5 m/s² take 16 m
+    view = perceived(motion, 0.0, [], Signal.YELLOW)
+    assert stops(two_lanes(stop_line=True), view)[0] is stopped
+
+
+def test_the_signal_of_another_direction_does_not_count() -> None:
+    road = two_lanes(stop_line=True)
+    lanes = tuple(each._replace(on_route=each.id != "b_own") for each in road.lanes)
+    view = perceived(Motion(250.0, 0.0, 0.0, 12.0), 0.0, [], Signal.RED)
+    assert stops(road._replace(lanes=lanes), view) == [False, True]
+
+
+def test_a_planner_that_is_not_installed_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "PLANNERS_PACKAGE", "no_such_package")
+    with pytest.raises(ConfigError, match=r"ego\.driver.*fiss-plus.*pip install 'risk-sac\[planners\]'"):
+        registry.card_of("fiss-plus")
+    assert not {card.name for card in registry.cards()} & set(PLANNERS)
