@@ -22,6 +22,7 @@ NAMES = {
     "R157's driver": "r157",
     "the fuzzy safety model": "fsm",
     "the RSS driver": "rss",
+    "the defensive driver": "defensive",
     "full braking at once": "full_braking",
     "R157's time-to-collision rule": "r157_ttc",
 }
