@@ -7,13 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from risk_sac.geometry import Size, touches
+from risk_sac.records import Judgement
 from risk_sac.scenario.ground import Area
 from risk_sac.types import STEP_S, Floats, Kind, Role
 from risk_sac.verdicts.evidence import Evidence, Ground
+from risk_sac.verdicts.judge import judge
 from risk_sac.verdicts.validity import EpisodeFacts
 
 CAR_M = (4.6, 1.85)
 PERSON_M = (0.5, 0.5)
+WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
 LANE_M = 3.3
 STREET = Ground(
     friction=1.0,
@@ -143,6 +146,14 @@ def mirrored(evidence: Evidence) -> Evidence:
     )
 
 
+def judged(evidence: Evidence) -> Judgement:
+    """Judges a valid contact with `actor_1`; in the mirror the verdict has to be the same."""
+    first, second = (judge(each, "actor_1", valid=True) for each in (evidence, mirrored(evidence)))
+    sides = {"conflict_y_m": first.conflict_y_m, "signature": first.signature}
+    assert second.model_copy(update=sides) == first
+    return first
+
+
 # The recurring cast: the ego in the lane along y = 0, whose left neighbour is y = 3.3.
 def pedestrian_crosses(
     speed: float = 12.0, walk: float = 1.4, seen_from_s: float = -math.inf, side: int = 1
@@ -151,8 +162,7 @@ def pedestrian_crosses(
     reach_s = (100.0 - CAR_M[0] / 2) / speed
     ego = straight(0.0, 0.0, 0.0, speed, start_s=0.0)
     walker = straight(100.0, side * walk * reach_s, -side * math.pi / 2, walk, start_s=0.0)
-    kinds = (Kind.VEHICLE, Kind.PEDESTRIAN)
-    return stage(ego, walker, kinds=kinds, seen_from_s=seen_from_s, from_s=0.0)
+    return stage(ego, walker, kinds=WALKING, seen_from_s=seen_from_s, from_s=0.0)
 
 
 def cut_in(

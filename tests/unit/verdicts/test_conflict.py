@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ConflictType
-from risk_sac.types import Kind
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.evidence import Evidence
 from tests.unit.verdicts.staged import (
     LANE_M,
+    WALKING,
     crossing_car,
     cut_in,
     hangs_over,
@@ -24,7 +24,6 @@ from tests.unit.verdicts.staged import (
     straight,
 )
 
-WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
 Staged = Callable[..., Evidence]
 
 

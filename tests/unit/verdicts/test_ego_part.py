@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from risk_sac.records import EgoPart
-from risk_sac.types import Kind
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.ego_part import ego_part
 from risk_sac.verdicts.evidence import Evidence
@@ -14,6 +13,7 @@ from tests.unit.verdicts.staged import (
     CAR_M,
     LANE_M,
     STREET,
+    WALKING,
     crossing_car,
     cut_in,
     leader_brakes,
@@ -24,8 +24,6 @@ from tests.unit.verdicts.staged import (
     stage,
     straight,
 )
-
-WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
 
 
 def part(evidence: Evidence, yields: str | None = None) -> EgoPart:

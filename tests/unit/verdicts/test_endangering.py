@@ -10,6 +10,7 @@ from risk_sac.verdicts.evidence import Evidence
 from tests.unit.verdicts.staged import (
     CAR_M,
     LANE_M,
+    WALKING,
     Motion,
     crossing_car,
     cut_in,
@@ -21,8 +22,6 @@ from tests.unit.verdicts.staged import (
     stage,
     straight,
 )
-
-WALKER = (Kind.VEHICLE, Kind.PEDESTRIAN)
 
 
 def named(evidence: Evidence) -> tuple[str, ...]:
@@ -94,7 +93,7 @@ def walks(x_m: float, y_m: float, turn_rad: float, at_s: float) -> Motion:
 
 def test_a_pedestrian_that_turns_into_the_way() -> None:
     ego, walker = straight(0.0, 0.0, 0.0, 8.0), walks(50.0, 3.2, math.pi / 2, 2.5)
-    seen, unseen = stage(ego, walker, kinds=WALKER), stage(ego, walker, kinds=WALKER, seen_from_s=2.7)
+    seen, unseen = stage(ego, walker, kinds=WALKING), stage(ego, walker, kinds=WALKING, seen_from_s=2.7)
     assert named(seen) == ("turned_into_path",)
     assert named(unseen) == ()  # it could not see the ego when it turned
 

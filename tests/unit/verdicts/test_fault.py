@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.records import ConflictType, Fault, Grade, Judgement, Severity
+from risk_sac.records import ConflictType, Fault, Grade, Severity
 from risk_sac.scenario.ground import Area
-from risk_sac.types import Kind
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.fault import Parts, fault, has_to_yield, parts_of_violation
 from risk_sac.verdicts.judge import judge
@@ -16,27 +15,20 @@ from tests.unit.verdicts.staged import (
     CAR_M,
     LANE_M,
     STREET,
+    WALKING,
     Motion,
     crossing_car,
     cut_in,
+    judged,
     leader_brakes,
     merge,
-    mirrored,
     pedestrian_crosses,
     sideways,
     stage,
     straight,
 )
 
-WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
 JUNCTION = (Area.box(50.0, 70.0, -10.0, 10.0),)
-
-
-def judged(evidence: Evidence) -> Judgement:
-    """The verdict, which is the same in the mirror."""
-    found, mirror = (judge(each, "actor_1", valid=True) for each in (evidence, mirrored(evidence)))
-    assert (found.fault, found.ego_part) == (mirror.fault, mirror.ego_part)
-    return found
 
 
 @pytest.mark.parametrize(

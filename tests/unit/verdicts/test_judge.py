@@ -5,12 +5,13 @@ import pytest
 
 from risk_sac.records import ConflictType, Grade, Judgement
 from risk_sac.scenario.ground import Area
-from risk_sac.types import Kind, Role
+from risk_sac.types import Role
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import DEFINITIONS, judge
 from tests.unit.verdicts.staged import (
     LANE_M,
     STREET,
+    WALKING,
     crossing_car,
     cut_in,
     leader_brakes,
@@ -20,8 +21,6 @@ from tests.unit.verdicts.staged import (
     stage,
     straight,
 )
-
-WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
 
 
 def judged(evidence: Evidence) -> Judgement:

@@ -12,6 +12,7 @@ from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.offences import ego_offences, striker_offences
 from tests.unit.verdicts.staged import (
     STREET,
+    WALKING,
     Motion,
     crossing_car,
     cut_in,
@@ -173,7 +174,7 @@ def test_a_pedestrian_on_a_crossing_has_priority_unless_it_stepped_out_on_red(
 
 def test_a_pedestrian_that_walks_into_an_ego_on_the_crossing_has_lost_nothing() -> None:
     ego, walker = straight(96.0, 0.0, 0.0, 2.0, start_s=0.0), straight(100.0, 8.0, -np.pi / 2, 2.6, start_s=0.0)
-    evidence = stage(ego, walker, kinds=(Kind.VEHICLE, Kind.PEDESTRIAN), from_s=0.0)
+    evidence = stage(ego, walker, kinds=WALKING, from_s=0.0)
     assert evidence.x_m[-1, 0] > 99.0
     assert of_ego(evidence) == ()
 

@@ -9,7 +9,6 @@ from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from risk_sac.records import Grade, ReferenceOutcome
-from risk_sac.types import Kind
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.reference import grade, reference_outcomes
@@ -17,6 +16,7 @@ from tests.unit.verdicts.staged import (
     CAR_M,
     LANE_M,
     STREET,
+    WALKING,
     crossing_car,
     cut_in,
     leader_brakes,
@@ -27,8 +27,6 @@ from tests.unit.verdicts.staged import (
     straight,
     waiting,
 )
-
-WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
 
 
 def outcomes(evidence: Evidence) -> Mapping[str, ReferenceOutcome]:

@@ -6,11 +6,18 @@ import numpy as np
 import pytest
 
 from risk_sac.records import Severity
-from risk_sac.types import Kind
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import judge
 from risk_sac.verdicts.severity import delta_v_mps, fatality_risk, mass_kg, serious_injury_risk, severity
-from tests.unit.verdicts.staged import crossing_car, leader_brakes, mirrored, pedestrian_crosses, stage, straight
+from tests.unit.verdicts.staged import (
+    WALKING,
+    crossing_car,
+    leader_brakes,
+    mirrored,
+    pedestrian_crosses,
+    stage,
+    straight,
+)
 
 MPH = 0.44704  # m/s
 
@@ -65,7 +72,7 @@ def follows(closing_mps: float) -> Evidence:
 def stands_in_the_way(speed: float) -> Evidence:
     """A pedestrian that stands in the ego's way."""
     walker = straight(8.0, 0.2, math.pi / 2, 0.0)
-    return stage(straight(0.0, 0.0, 0.0, speed), walker, kinds=(Kind.VEHICLE, Kind.PEDESTRIAN))
+    return stage(straight(0.0, 0.0, 0.0, speed), walker, kinds=WALKING)
 
 
 @pytest.mark.parametrize(

@@ -6,32 +6,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.records import ConflictType, Grade, Judgement
+from risk_sac.records import ConflictType, Grade
 from risk_sac.types import Kind
 from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.judge import judge
 from risk_sac.verdicts.recorded import keeps_lane, lane_path
 from tests.unit.verdicts.staged import (
     CAR_M,
     LANE_M,
     STREET,
+    WALKING,
     crossing_car,
     cut_in,
+    judged,
     leader_brakes,
     merge,
-    mirrored,
     pedestrian_crosses,
     sideways,
     stage,
     straight,
 )
-
-
-def judged(evidence: Evidence) -> Judgement:
-    first, second = judge(evidence, "actor_1", valid=True), judge(mirrored(evidence), "actor_1", valid=True)
-    sides = {"conflict_y_m": first.conflict_y_m, "signature": first.signature}
-    assert second.model_copy(update=sides) == first
-    return first
 
 
 def shifted(evidence: Evidence, lanes: int) -> Evidence:
@@ -139,7 +132,7 @@ def test_the_lane_that_an_ego_leaves_goes_on_round_the_bend(recorded: bool, next
     x, y, heading = bend(6.0)
     post = straight(x + 3.5 * math.sin(heading), y - 3.5 * math.cos(heading), heading, 0.0)
     ground = replace(STREET, roadway=())
-    evidence = stage(leaves, post, kinds=(Kind.VEHICLE, Kind.PEDESTRIAN), ground=ground)
+    evidence = stage(leaves, post, kinds=WALKING, ground=ground)
     leaving = evidence.time_s > 2.0 + 1e-9
     lateral, offset = evidence.lateral_mps.copy(), evidence.lane_offset_m.copy()
     lateral[:, 0] = np.where(leaving, -1.0, 0.0)
@@ -160,7 +153,7 @@ def test_the_lane_that_an_ego_leaves_goes_on_round_the_bend(recorded: bool, next
 def leaves_the_road(walker_y: float = -9.0) -> Evidence:
     """The ego leaves the road (y = ±6.6) to the right, where a pedestrian stands."""
     ego = sideways(straight(0.0, 0.0, 0.0, 10.0), 2.0, -3.0, 9.0)
-    return stage(ego, straight(60.0, walker_y, math.pi / 2, 0.0), kinds=(Kind.VEHICLE, Kind.PEDESTRIAN))
+    return stage(ego, straight(60.0, walker_y, math.pi / 2, 0.0), kinds=WALKING)
 
 
 def test_a_pedestrian_beside_the_road_is_struck_by_an_ego_that_left_it() -> None:

@@ -16,9 +16,7 @@ from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
 from risk_sac.verdicts.keeping import History
 from risk_sac.verdicts.violation import requirement_results, violations_of
 from tests.builders import frame_of
-from tests.unit.verdicts.staged import CAR_M, LANE_M, Motion, mirrored, sideways, stage, straight
-
-WALKING = (Kind.VEHICLE, Kind.PEDESTRIAN)
+from tests.unit.verdicts.staged import CAR_M, LANE_M, WALKING, Motion, mirrored, sideways, stage, straight
 
 
 def own(formula: str, name: str = "own") -> Requirement:
