@@ -11,6 +11,7 @@ from risk_sac.types import Lane, Road, Signal, StopLine
 
 REACH_M = 600.0  # of the route; no episode drives farther
 LEFT, RIGHT = 1, -1
+SHOWN = COLOURS | {letter.upper(): colour for letter, colour in COLOURS.items()}
 
 
 def road_around(route: Sequence[str]) -> Road:
@@ -36,10 +37,9 @@ def road_around(route: Sequence[str]) -> Road:
 
 def signals_at(stop_lines: Sequence[StopLine]) -> tuple[Signal, ...]:
     """Returns what the signal of each stop line shows now."""
-    letters = {line.signal: "" for line in stop_lines}
-    for signal in letters:
-        letters[signal] = libsumo.trafficlight.getRedYellowGreenState(signal)
-    return tuple(COLOURS.get(letters[line.signal][line.link].lower(), Signal.NONE) for line in stop_lines)
+    signals = {line.signal for line in stop_lines}
+    states = {signal: libsumo.trafficlight.getRedYellowGreenState(signal) for signal in signals}
+    return tuple([SHOWN.get(states[signal][link], Signal.NONE) for _, _, signal, link in stop_lines])
 
 
 def _edges_near(route: Sequence[str]) -> Iterable[str]:

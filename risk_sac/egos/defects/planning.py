@@ -54,7 +54,9 @@ class CommitsToYellow(Defective):
             self._committed = p.state[SPEED, 0] ** 2 > 2.0 * self.value * max(p.stop_line_m, 0.01)
         self._before = p.signal
         self._committed &= p.signal in (Signal.YELLOW, Signal.RED)
-        return p._replace(signal=Signal.GREEN) if self._committed else p
+        if not self._committed:
+            return p
+        return p._replace(signal=Signal.GREEN, signals=(Signal.GREEN,) * len(p.signals))
 
 
 class ShortGap(Defective):
