@@ -11,6 +11,7 @@ from risk_sac.types import Lane, Road, Signal, StopLine
 
 REACH_M = 600.0  # of the route; no episode drives farther
 LEFT, RIGHT = 1, -1
+NONE = Signal.NONE  # to look it up in the class takes longer than all else in `signals_at`
 SHOWN = COLOURS | {letter.upper(): colour for letter, colour in COLOURS.items()}
 
 
@@ -39,7 +40,7 @@ def signals_at(stop_lines: Sequence[StopLine]) -> tuple[Signal, ...]:
     """Returns what the signal of each stop line shows now."""
     signals = {line.signal for line in stop_lines}
     states = {signal: libsumo.trafficlight.getRedYellowGreenState(signal) for signal in signals}
-    return tuple([SHOWN.get(states[signal][link], Signal.NONE) for _, _, signal, link in stop_lines])
+    return tuple([SHOWN.get(states[signal][link], NONE) for _, _, signal, link in stop_lines])
 
 
 def _edges_near(route: Sequence[str]) -> Iterable[str]:
