@@ -63,7 +63,7 @@ def _failures(results: Results) -> Table:
         "id",
         OUTCOME,
         "other",
-        "ego's\nother's\nm/s",
+        "speed\nof ego,\nother,\nm/s",
         "ego's\nother's\nzone",
         "requirement, or\nconflict; began\nat s, x y m",
         "failed rules,\nor offences",

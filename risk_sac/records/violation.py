@@ -163,6 +163,7 @@ class Collision(Violated):
     other_zone: str
     """The same on the other body."""
     ego_speed_mps: Real
+    """The ego's impact speed."""
     other_speed_mps: Real
     relative_speed_mps: Real
     """The closing speed: of either body as seen from the other."""
@@ -220,8 +221,8 @@ class Collision(Violated):
 
     @property
     def event(self) -> str:
-        """What the ego does, such as "touches lead at 9.0 m/s"."""
-        return f"touches {self.other_id} at {self.ego_speed_mps:.1f} m/s"
+        """What the ego does, such as "touches lead with an impact speed of 9.0 m/s"; the speed is its own."""
+        return f"touches {self.other_id} with an impact speed of {self.ego_speed_mps:.1f} m/s"
 
     @property
     def signature(self) -> str:

@@ -1,6 +1,6 @@
 """When, where and how the conflict with the striker began.
 
-Sources: UN Regulation 157, Annex 3, for cut-ins and leaders; for pedestrians and crossing vehicles a careful driver
+Sources: UN Regulation 157, Annex 3, for cut-ins and leaders; for pedestrians and crossing vehicles R157's driver
 after Engström et al., "Modeling road user response timing in naturalistic traffic conflicts" (arXiv 2208.08651).
 """
 

@@ -2,14 +2,14 @@
 
 from risk_sac.records import Collision, EgoPart, Judgement, Violation
 
-FULL_BRAKING = "full_braking"
+FULL_BRAKING, TTC_RULE = "full_braking", "r157_ttc"
 DRIVERS = {
     "r157": "R157's driver",
     "fsm": "the fuzzy safety model",
     "rss": "the RSS driver",
     "defensive": "the defensive driver",
     FULL_BRAKING: "full braking at once",
-    "r157_ttc": "R157's time-to-collision rule",
+    TTC_RULE: "R157's time-to-collision rule",
 }
 
 
@@ -17,13 +17,14 @@ def prevented_by(violation: Collision | Violation) -> str | None:
     """Returns, e.g., "the RSS driver would have prevented it"; None where no reference driver was asked."""
     if not violation.prevention:
         return None
-    names = [name for name, prevents in violation.prevention.items() if prevents]
+    names = [name for name, prevents in violation.prevention.items() if prevents and name != TTC_RULE]
+    by_rule = f"; by {DRIVERS[TTC_RULE]} it is preventable" if violation.prevention.get(TTC_RULE) else ""
     if names == [FULL_BRAKING]:
-        return f"only {DRIVERS[FULL_BRAKING]} would have prevented it"
+        return f"only {DRIVERS[FULL_BRAKING]} would have prevented it{by_rule}"
     told = [DRIVERS.get(name, f"the {name.replace('_', ' ')} driver") for name in names]
     *first, last = told or ["none of the reference drivers"]
-    who = f"{', '.join(first)} and {last}" if first else last
-    return f"{who} would have prevented it"
+    told_of = f"{', '.join(first)} and {last}" if first else last
+    return f"{told_of} would have prevented it{by_rule}"
 
 
 def known(collision: Collision) -> str:

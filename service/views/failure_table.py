@@ -123,6 +123,7 @@ class FailureTable(Record):
     ego_speed_mps: list[Real]
     other_speed_mps: list[Real]
     relative_speed_mps: list[Real]
+    """The closing speed."""
     lateral_offset_m: list[Real]
     """The striker's centre across the ego's axis."""
     min_ttc_s: list[Real]

@@ -68,17 +68,16 @@ def test_exactly_the_drivers_of_the_table_that_prevent_it_are_named(told: list[T
     graded = [each for each in told if each.violation.graded is not None]
     assert graded
     for each in graded:
-        table = each.violation.drivers if isinstance(each.violation, Violation) else outcomes(each.violation)
-        said = re.search(r"grade \w+: (only )?(.*?) would have prevented it", each.title)
+        said = re.search(
+            r"grade (\w+): (only )?(.*?) would have prevented it(; by (.*?) it is preventable)?", each.title
+        )
         assert said
-        names = {NAMES[name] for name in re.split(", | and ", said[2]) if name != "none of the reference drivers"}
-        assert names == {name for name, prevents in table.items() if prevents}
-        assert not said[1] or names == {"full_braking"}
-
-
-def outcomes(hit: Collision) -> dict[str, bool]:
-    assert hit.judgement is not None
-    return {name: each.avoids for name, each in hit.judgement.drivers.items()}
+        names = {NAMES[name] for name in re.split(", | and ", said[3]) if name != "none of the reference drivers"}
+        assert names | ({NAMES[said[5]]} if said[4] else set()) == {
+            name for name, prevents in each.violation.prevention.items() if prevents
+        }
+        assert bool(said[2]) == (names == {"full_braking"}) == (said[1] == "full_braking")
+        assert (not names) == (said[1] == "unavoidable")
 
 
 def test_what_the_ego_knew_and_when_agrees_with_the_series(

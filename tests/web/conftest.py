@@ -134,7 +134,7 @@ def _leaves(url: str) -> bool:
 
 @pytest.fixture
 def page_at(new_page: Callable[..., "Page"], service: Service) -> Callable[..., "Page"]:
-    """A page at a place, such as `campaigns/ID/failures?grade=careful`."""
+    """A page at a place, such as `campaigns/ID/failures?grade=preventable`."""
 
     def open_at(place: str = "", **options: object) -> "Page":
         page = new_page(**options)

@@ -96,7 +96,7 @@ def failures_table(failures: Sequence[Episode]) -> Table:
     table = Table(box=SIMPLE_HEAD, padding=0)
     table.add_column("id, what it violates,\nand its kind", overflow="fold")
     table.add_column(OUTCOME, no_wrap=True)
-    table.add_column("ego's, other's\nm/s", no_wrap=True, justify="right")
+    table.add_column("speed of ego,\nother, m/s", no_wrap=True, justify="right")
     table.add_column("failed rules,\nor offences")
     for failure in failures:
         worst = failure.worst_violation

@@ -22,13 +22,20 @@ def contact(drivers: Mapping[str, bool]) -> str | None:
         ("R157's driver", ["r157"]),
         ("the RSS driver and full braking at once", ["rss", "full_braking"]),
         ("R157's driver, the fuzzy safety model and full braking at once", ["r157", "fsm", "full_braking"]),
-        ("R157's time-to-collision rule", ["r157_ttc"]),
         ("full braking at once and the far sighted driver", ["full_braking", "far_sighted"]),
     ],
 )
 def test_all_drivers_that_would_have_prevented_it_are_named(who: str, preventing: list[str]) -> None:
     drivers = NONE | dict.fromkeys(preventing, True)
     assert contact(drivers) == prevented_by(violation(drivers=drivers)) == f"{who} would have prevented it"
+
+
+def test_the_rule_for_cut_ins_is_told_apart_from_the_drivers() -> None:
+    by_rule = "by R157's time-to-collision rule it is preventable"
+    assert contact(NONE | {"r157_ttc": True}) == f"none of the reference drivers would have prevented it; {by_rule}"
+    braking = {"full_braking": True, "r157_ttc": True}
+    assert contact(NONE | braking) == f"only full braking at once would have prevented it; {by_rule}"
+    assert contact(NONE | {"r157_ttc": False}) == "none of the reference drivers would have prevented it"
 
 
 def test_nothing_is_said_where_no_driver_was_asked() -> None:

@@ -4,7 +4,7 @@ import { faultWords, knownOf, preventedBy } from "./verdicts";
 import type { Collision, Violation } from "./violations";
 
 function broken(...preventing: string[]): Violation {
-  const drivers = Object.fromEntries(["r157", "fsm", "rss", "full_braking"].map((name) => [name, preventing.includes(name)]));
+  const drivers = Object.fromEntries(["r157", "fsm", "rss", "full_braking", "r157_ttc"].map((name) => [name, preventing.includes(name)]));
   return { requirement: "never_fast", drivers } as unknown as Violation;
 }
 
@@ -17,6 +17,8 @@ test("all drivers that would have prevented it are named", () => {
   expect(preventedBy(broken("full_braking"))).toBe("only full braking at once would have prevented it");
   expect(preventedBy(contact(false, 1))).toBe("the RSS driver and full braking at once would have prevented it");
   expect(preventedBy(broken("r157", "fsm", "full_braking"))).toBe("R157's driver, the fuzzy safety model and full braking at once would have prevented it");
+  expect(preventedBy(broken("r157_ttc"))).toBe("none of the reference drivers would have prevented it; by R157's time-to-collision rule it is preventable");
+  expect(preventedBy(broken("full_braking", "r157_ttc"))).toBe("only full braking at once would have prevented it; by R157's time-to-collision rule it is preventable");
   expect(preventedBy(broken())).toBe("none of the reference drivers would have prevented it");
   expect(preventedBy({ requirement: "x", drivers: {} } as unknown as Violation)).toBeNull();
 });

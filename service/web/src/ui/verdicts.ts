@@ -20,7 +20,7 @@ export const GRADE_WORDS: Record<GradeName, GradeWords> = {
 };
 
 const FULL_BRAKING = "full_braking";
-/** It drives nowhere, so it has no impact speed. */
+/** A rule and no driver: it makes nothing preventable, and has no impact speed. */
 export const TTC_RULE = "r157_ttc";
 
 export const DRIVERS: Record<string, string> = {
@@ -40,11 +40,12 @@ export function driverWords(name: string): string {
 export function preventedBy(violation: Collision | Violation): string | null {
   const drivers = driversOf(violation);
   if (drivers.length === 0) return null;
-  const names = drivers.flatMap(([name, prevents]) => (prevents ? [name] : []));
-  if (names.length === 1 && names[0] === FULL_BRAKING) return `only ${DRIVERS[FULL_BRAKING]} would have prevented it`;
+  const names = drivers.flatMap(([name, prevents]) => (prevents && name !== TTC_RULE ? [name] : []));
+  const byRule = drivers.some(([name, prevents]) => prevents && name === TTC_RULE) ? `; by ${DRIVERS[TTC_RULE]} it is preventable` : "";
+  if (names.length === 1 && names[0] === FULL_BRAKING) return `only ${DRIVERS[FULL_BRAKING]} would have prevented it${byRule}`;
   const told = names.length > 0 ? names.map(driverWords) : ["none of the reference drivers"];
   const last = told.pop()!;
-  return `${told.length > 0 ? `${told.join(", ")} and ${last}` : last} would have prevented it`;
+  return `${told.length > 0 ? `${told.join(", ")} and ${last}` : last} would have prevented it${byRule}`;
 }
 
 /** Since when the ego knew of the striker. */

@@ -22,8 +22,8 @@ interface Outcome {
 const OUTCOMES: Record<string, Outcome> = {
   closing: { label: "closing speed", unit: "m/s", of: (t, i) => t.relative_speed_mps[i]! },
   reaction: { label: "conflict to contact", unit: "s", of: reactionOf },
-  ego_speed: { label: "ego at that time", unit: "m/s", of: (t, i) => t.ego_speed_mps[i]! },
-  striker_speed: { label: "striker at contact", unit: "m/s", of: (t, i) => t.other_speed_mps[i]! },
+  ego_speed: { label: "ego's speed then", unit: "m/s", of: (t, i) => t.ego_speed_mps[i]! },
+  striker_speed: { label: "striker's speed then", unit: "m/s", of: (t, i) => t.other_speed_mps[i]! },
   seen: { label: "striker seen for", unit: "s", of: (t, i) => t.visible_for_s[i]! },
   braking: { label: "ego's peak braking", unit: "m/s²", of: (t, i) => t.ego_peak_braking_mps2[i]! },
   robustness: { label: "least robustness", unit: "", of: (t, i) => t.min_robustness[i]! },

@@ -3,7 +3,7 @@
 import type { Body } from "../../api/types";
 import { capital, number } from "../../ui/text";
 import { TTC_RULE, driverWords, faultWords, knownOf } from "../../ui/verdicts";
-import { gradeOf, isContact, requirementOf, worstOf, type Collision, type Violation } from "../../ui/violations";
+import { driversOf, gradeOf, isContact, requirementOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import * as say from "./words";
 
 type Failure = Body<"Failure">;
@@ -30,6 +30,7 @@ export function Verdict({ failure }: { failure: Failure }) {
       <p>{say.happenedOf(violation)}</p>
       {faultWords(violation) && <p>{faultWords(violation)}</p>}
       {isContact(violation) ? <OfContact collision={violation} /> : <OfViolation violation={violation} />}
+      <Drivers violation={violation} />
       {others.length > 0 && <p class="faint">The episode violated too: {others.join("; ")}.</p>}
       <p class={flaky ? "bad" : "faint"}>{say.repetitionOf(failure)}</p>
       <Triage failure={failure} />
@@ -47,43 +48,24 @@ function OfContact({ collision }: { collision: Collision }) {
         {say.responseOf(judgement, collision.ego_peak_braking_mps2)} {knownOf(collision)}
       </p>
       <p class={judgement.broke.length + judgement.ego_broke.length > 0 ? "verdict-broke" : ""}>{say.brokeOf(judgement)}</p>
-      <Drivers drivers={judgement.drivers} />
     </>
   );
 }
 
 function OfViolation({ violation }: { violation: Violation }) {
-  const rows = Object.entries(violation.drivers);
   return (
     <>
       <p>The ego {say.manoeuvreOf(violation.ego_manoeuvre)}.</p>
       <p class={violation.broke.length > 0 ? "verdict-broke" : ""}>{say.egoBrokeOf(violation.broke)}</p>
-      {rows.length > 0 && (
-        <table class="verdict-drivers">
-          <caption>In the ego's place</caption>
-          <thead>
-            <tr>
-              <th scope="col">Driver</th>
-              <th scope="col">Would</th>
-            </tr>
-          </thead>
-          <tbody>
-            {rows.map(([name, keeps]) => (
-              <tr key={name}>
-                <th scope="row">{capital(driverWords(name))}</th>
-                <td>{keeps ? <span class="good">✓ keep the requirement</span> : <span class="bad">✗ violate it</span>}</td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
-      )}
     </>
   );
 }
 
-function Drivers({ drivers }: { drivers: Record<string, Body<"ReferenceOutcome">> }) {
-  const rows = Object.entries(drivers);
+/** What each reference driver would have done; of one that touches the striker, how fast it is itself then. */
+function Drivers({ violation }: { violation: Collision | Violation }) {
+  const rows = driversOf(violation);
   if (rows.length === 0) return null;
+  const struck = isContact(violation) ? violation.judgement?.drivers : undefined;
   return (
     <table class="verdict-drivers">
       <caption>In the ego's place</caption>
@@ -91,17 +73,21 @@ function Drivers({ drivers }: { drivers: Record<string, Body<"ReferenceOutcome">
         <tr>
           <th scope="col">Driver</th>
           <th scope="col">Would</th>
-          <th scope="col" class="number">
-            Its impact speed
-          </th>
+          {struck && (
+            <th scope="col" class="number">
+              Its impact speed
+            </th>
+          )}
         </tr>
       </thead>
       <tbody>
-        {rows.map(([name, { avoids, impact_speed_mps }]) => (
-          <tr>
+        {rows.map(([name, prevents]) => (
+          <tr key={name}>
             <th scope="row">{capital(driverWords(name))}</th>
-            <td>{avoids ? <span class="good">✓ prevent it</span> : <span class="bad">✗ strike</span>}</td>
-            <td class="number">{avoids || name === TTC_RULE ? "–" : `${number(impact_speed_mps, 1)} m/s`}</td>
+            <td>
+              <span class={prevents ? "good" : "bad"}>{say.wouldOf(name, prevents, struck !== undefined)}</span>
+            </td>
+            {struck && <td class="number">{prevents || name === TTC_RULE ? "–" : `${number(struck[name]!.impact_speed_mps, 1)} m/s`}</td>}
           </tr>
         ))}
       </tbody>
@@ -109,7 +95,7 @@ function Drivers({ drivers }: { drivers: Record<string, Body<"ReferenceOutcome">
   );
 }
 
-/** What somebody noted about it, where the service keeps such notes. */
+/** What was noted about it, where the service keeps such notes. */
 function Triage({ failure }: { failure: Failure }) {
   const { triage } = failure;
   if (triage === null) return null;

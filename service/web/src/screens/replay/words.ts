@@ -2,7 +2,7 @@
 
 import type { Body } from "../../api/types";
 import { capital, number, words } from "../../ui/text";
-import { preventedBy, refusal } from "../../ui/verdicts";
+import { preventedBy, refusal, TTC_RULE } from "../../ui/verdicts";
 import { isContact, worstOf, type Collision, type Violation } from "../../ui/violations";
 
 type Failure = Body<"Failure">;
@@ -77,16 +77,23 @@ export function othersOf({ requirements }: Failure, named: string): string[] {
   );
 }
 
+/** What a reference driver would have done. */
+export function wouldOf(driver: string, prevents: boolean, contact: boolean): string {
+  if (driver === TTC_RULE) return prevents ? "✓ call it preventable" : "✗ call it unpreventable";
+  if (prevents) return contact ? "✓ prevent it" : "✓ keep the requirement";
+  return contact ? "✗ strike" : "✗ violate it";
+}
+
 function contactOf(collision: Collision): string {
   const { ego_zone, ego_speed_mps, other_zone, other_role, other_id, other_speed_mps } = collision;
   return (
-    `The ego's ${ego_zone} touched the ${other_zone} of the ${other_role} ${other_id}. At the contact the ego's speed was ` +
-    `${number(ego_speed_mps, 1)} m/s, the striker's ${number(other_speed_mps, 1)} m/s. ${severityOf(collision)}`
+    `The ego's ${ego_zone} touched the ${other_zone} of the ${other_role} ${other_id}. The ego's impact speed was ` +
+    `${number(ego_speed_mps, 1)} m/s, the striker's ${number(other_speed_mps, 1)} m/s. ${severityInWords(collision)}`
   );
 }
 
 /** How fast the bodies closed, and how bad that is. */
-function severityOf({ relative_speed_mps, other_kind, judgement }: Collision): string {
+function severityInWords({ relative_speed_mps, other_kind, judgement }: Collision): string {
   const closing = `The closing speed was ${number(relative_speed_mps, 1)} m/s`;
   if (judgement?.severity == null || judgement.injury_risk == null) return `${closing}.`;
   const harm = other_kind === "pedestrian" ? "death" : "serious injury";
