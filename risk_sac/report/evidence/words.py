@@ -44,7 +44,8 @@ def ego_in_words(ego: EgoConfig) -> str:
             f"car-following model {ego.car_following}",
             f"decides every {ego.reaction_time_s:g} s",
         ]
-    return ", ".join([*parts, *_sight(ego)])
+    planted = [f"with the planted defects {' and '.join(ego.defects)}"] if ego.defects else []
+    return ", ".join([*parts, *_sight(ego), *planted])
 
 
 def _sight(ego: EgoConfig) -> Iterator[str]:

@@ -67,10 +67,12 @@ class Listener:
     def close(self) -> None: ...
 
 
+def decorator_of(name: str) -> Any:
+    return getattr(import_module(f"risk_sac.egos.defects.{DEFECTS[name].kind}"), DEFECTS[name].decorator)
+
+
 def begun(name: str, ego: Listener, grip: float = 9.81) -> Any:
-    defect = DEFECTS[name]
-    module = import_module(f"risk_sac.egos.defects.{defect.kind}")
-    found = getattr(module, defect.decorator)(ego, defect.parameter.value)
+    found = decorator_of(name)(ego, DEFECTS[name].parameter.value)
     vehicle = Vehicle(length_m=4.6, width_m=1.85, grip_mps2=grip)
     found.reset(Episode(seed=0, net="", route=(), vehicle=vehicle, step_s=0.1))
     return found
@@ -300,6 +302,19 @@ def test_a_defect_that_does_not_exist_or_fit_is_refused_in_a_line(ego: str, mess
     with pytest.raises(ConfigError, match=message) as raised:
         pinned(read_ego(ego))
     assert "\n" not in str(raised.value)
+
+
+def test_a_third_of_each_kind_is_the_test_set() -> None:
+    assert len(DEFECTS) >= 28
+    for kind in {defect.kind for defect in DEFECTS.values()}:
+        names = sorted(name for name, defect in DEFECTS.items() if defect.kind == kind)
+        assert [name for name in names if DEFECTS[name].test_set] == names[2::3], kind
+
+
+def test_a_row_says_the_value_that_it_sets() -> None:
+    for defect in DEFECTS.values():
+        assert bool(defect.decorator) != bool(defect.settings), defect.name
+        assert not defect.settings or defect.parameter.value in defect.settings.values(), defect.name
 
 
 def test_an_ego_with_a_defect_is_of_another_version() -> None:

@@ -11,6 +11,7 @@ from risk_sac.scenario.families import FAMILIES
         ({}, ("profile default", "Krauss", "every 0.5 s", "80 m far over 360°", "not through vehicles")),
         ({"profile": "perfect"}, ("profile perfect", "every 0.1 s", "sees everything")),
         ({"sensor": {"range_m": 30, "occlusion": False, "field_of_view_rad": 3.1416}}, ("30 m far over 180°", "too")),
+        ({"driver": "idm", "defects": ("latency", "speeds")}, ("with the planted defects latency and speeds",)),
         ({"driver": "idm", "version": "2"}, ("registered driver idm", "responds within 0.5 s", "80 m far")),
     ],
 )
