@@ -1,14 +1,18 @@
-"""`risk-sac benchmark`: how soon methods detect egos with known faults."""
+"""`risk-sac benchmark` and `power`: how soon methods detect egos with known faults, and what a budget is worth."""
 
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
 
+from rich.box import SIMPLE_HEAD
 from rich.progress import Progress
+from rich.table import Table
 
+from risk_sac.benchmark.power import MEASURED, in_words, power, runs_of
 from risk_sac.cli.console import OK, Commands, add_command, number
-from risk_sac.config import MethodName
+from risk_sac.config import SHIPPED, MethodName
+from risk_sac.config.text import read_text
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.machine import cores
 from risk_sac.terminal import console
@@ -18,7 +22,7 @@ SEEDS, STEPS = 10, 20_000
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
+    """Add the commands."""
     summary = "how soon methods detect egos with known faults; the same command again goes on with it"
     parser = add_command(commands, "benchmark", _benchmark, summary)
     known = get_args(MethodName)
@@ -34,6 +38,12 @@ def add(commands: Commands) -> None:
     parser.add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help="runs at a time (default: one per core)")
     out = "a folder for each run, and detections.csv, benchmark.md and curves.svg of those that have ended"
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help=out)
+    worth = add_command(commands, "power", _power, "how many known faults a method finds with a budget, as measured")
+    worth.add_argument("--families", nargs="+", choices=SHIPPED, default=SHIPPED, metavar="low|mixed|dense")
+    worth.add_argument("--method", choices=known, default="archive", metavar="NAME", help="(default: %(default)s)")
+    worth.add_argument("--steps", type=number(int, 1), default=STEPS, metavar="N", help="(default: %(default)s)")
+    measured = "detections.csv of a benchmark (default: the one that is shipped)"
+    worth.add_argument("--measured", type=Path, metavar="FILE", help=measured)
 
 
 def _benchmark(options: argparse.Namespace) -> int:
@@ -56,4 +66,15 @@ def _benchmark(options: argparse.Namespace) -> int:
             bar.advance(task)
             write(found, options.out, options.typed)
     console.print(methods_table(found), markup=False, soft_wrap=True)
+    return OK
+
+
+def _power(options: argparse.Namespace) -> int:
+    text = MEASURED.read_text(encoding="utf-8") if options.measured is None else read_text(options.measured, "measured")
+    found = power(runs_of(text), options.families, options.method, options.steps)
+    table = Table("defect", "family", "detected", "runs", box=SIMPLE_HEAD)
+    for each in found:
+        table.add_row(each.defect, each.family, str(each.detected), str(each.runs))
+    console.print(table)
+    console.print(in_words(found), markup=False, soft_wrap=True)
     return OK
