@@ -7,7 +7,7 @@ from risk_sac.egos.defects.prediction import SAME_WAY, offsets
 from risk_sac.egos.driving import Driver, idm, stop_at_signal, time_to_collision
 from risk_sac.egos.road import LIMIT
 from risk_sac.egos.seam import Command, Control, Perceived
-from risk_sac.types import SPEED, WIDTH, Signal
+from risk_sac.types import SPEED, WIDTH
 
 EMERGENCY_MPS2, GENTLE_MPS2 = 3.5, 1.0
 ASIDE_M = 0.4  # room beside its body
@@ -39,24 +39,6 @@ class RestartsEarly(Defective):
         if p.state[SPEED, 0] > self.value:
             return p
         return only(p, np.abs(offsets(p)) < (p.state[WIDTH, 0] + p.state[WIDTH]) / 2 + ASIDE_M)
-
-
-class CommitsToYellow(Defective):
-    """Passes a signal that it could not stop for when that became yellow, however long that takes."""
-
-    def begin(self) -> None:
-        """Has not met the signal yet."""
-        self._before, self._committed = Signal.NONE, False
-
-    def sees(self, p: Perceived) -> Perceived:
-        """Takes the signal for green once it has decided to pass."""
-        if p.signal is Signal.YELLOW and self._before is Signal.GREEN:
-            self._committed = p.state[SPEED, 0] ** 2 > 2.0 * self.value * max(p.stop_line_m, 0.01)
-        self._before = p.signal
-        self._committed &= p.signal in (Signal.YELLOW, Signal.RED)
-        if not self._committed:
-            return p
-        return p._replace(signal=Signal.GREEN, signals=(Signal.GREEN,) * len(p.signals))
 
 
 class ShortGap(Defective):
