@@ -27,7 +27,8 @@ def detected(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Collision
     """Returns the failure of an episode that detects its ego's defects; None without one.
 
     A reference driver would have prevented it, and the same ego without its defects does not violate the requirement
-    when the adversaries repeat their recorded motions.
+    validly when the adversaries repeat their recorded motions. Blind as these are, they may run into an ego that is
+    elsewhere by then, from behind or while it stands: that is none of its failures. An artefact tells nothing.
 
     Raises:
       SimulationError: SUMO failed in the repetition.
@@ -36,9 +37,10 @@ def detected(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Collision
     if not failures:
         return None
     try:
-        violated = {each.requirement for each in without_defects(spec, episode, series).found}
+        found = without_defects(spec, episode, series).found
     except InfeasibleScene:
         return None
+    violated = {each.requirement for each in found if each.valid or each.artefact}
     return next((each for each in failures if each.requirement not in violated), None)
 
 
