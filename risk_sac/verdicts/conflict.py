@@ -90,7 +90,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     course_from = _since(course & known, course & known)
     if same_way and unseen_if_wary == len(course) - 1:  # neither led nor cut in
         frame, unseen = course_from, _since(course, course)
-    left = left_its_lane(evidence, striker)
+    left = None if same_way and came_further(evidence, striker, seen) else left_its_lane(evidence, striker)
     if left is not None:
         frame, noticed, unseen = (max(left, each) for each in (frame, noticed, unseen))
     return Conflict(
@@ -139,6 +139,15 @@ def left_its_lane(evidence: Evidence, striker: int) -> int | None:
     speed = float(evidence.speed_mps[last, 0])
     touches = time_to_touch(path, float(path.s[last]), speed, size, at(striking, last), OVER_S) <= OVER_S
     return None if touches else left
+
+
+def came_further(evidence: Evidence, striker: int, seen: Along[Floats]) -> bool:
+    """Tells whether the striker moved further across in the last 3 s, towards the ego, than the ego towards it."""
+    e, first = evidence, evidence.since(TURN_WINDOW_S)
+    side = math.copysign(1.0, seen.across_m[-1])
+    own = front_moved_across(e)
+    other = float(e.lateral_mps[first + 1 :, striker].sum()) * e.step_s
+    return -side * other > side * float(own[-1] - own[first])
 
 
 def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:

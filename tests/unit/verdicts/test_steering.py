@@ -95,6 +95,14 @@ def test_an_ego_that_swerves_away_from_a_passing_vehicle_did_not_come_over(side:
     assert judged(stage(ego, passing, contact=False, until_s=2.8)).conflict_type is ConflictType.CUT_IN
 
 
+@pytest.mark.parametrize(("other_m", "expected"), [(1.2, ConflictType.CUT_IN), (0.0, ConflictType.MERGE)])
+def test_an_ego_that_drifts_comes_over_if_its_neighbour_came_less_far(other_m: float, expected: ConflictType) -> None:
+    # The neighbour passes 0.4 m beside the ego's place, into which the ego moves at last.
+    ego = sideways(straight(0.0, 0.0, 0.0, 12.0), 2.5, 0.8, 0.6)
+    passing = sideways(straight(-12.0, 2.25 + other_m, 0.0, 15.0), 1.0, -0.8, other_m)
+    assert judged(stage(ego, passing)).conflict_type is expected
+
+
 def test_an_ego_that_swerves_away_from_a_cut_in_was_cut_in_on() -> None:
     beside = sideways(straight(3.0, LANE_M, 0.0, 12.0), 2.0, -1.8, 3 * LANE_M)
     swerves = sideways(straight(0.0, 0.0, 0.0, 12.0), 2.8, -0.9, LANE_M)
