@@ -3,8 +3,8 @@
     python -m tests.acceptance.ego_ladder OUT [--families NAME ...] [--seeds N] [--steps N]
 
 plays what OUT lacks, seed by seed, and writes OUT/ladder.csv and OUT/ladder.md from the runs that have ended. A run
-ends with the episode in which it has spent its steps. A headline failure is distinct, preventable, not minor, and was
-the same again in a process of its own.
+ends with the episode in which it has spent its steps; without its ladder.json it is counted again, by the rules of now.
+A headline failure is distinct, preventable, not minor, and was the same again in a process of its own.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import SimulationError
 from risk_sac.failures.play import repeated
+from risk_sac.failures.recording import Series
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, EpisodeRecord, RunMetrics, SeriesFile, Severity, Violation
 from risk_sac.run_folder.durable import replace_file
@@ -29,6 +30,8 @@ from risk_sac.run_folder.results import EPISODES, FAILURES, records_from_lines, 
 from risk_sac.run_folder.series import read_series
 from risk_sac.train import train
 from risk_sac.verdicts.distinct import DistinctFailures
+from risk_sac.verdicts.judge import judge
+from tests.acceptance.verdict_shares import evidence_of
 
 EGOS = {
     "broken": EgoConfig(driver="broken"),
@@ -86,8 +89,8 @@ def play(spec: RunSpec, folder: Path, steps: int) -> None:
 
 
 def count(spec: RunSpec, folder: Path) -> Mapping[str, int]:
-    """Counts the steps of the funnel, from valid to headline."""
-    records = records_from_lines((folder / EPISODES).read_bytes())
+    """Counts the steps of the funnel, from valid to headline; contacts are judged again by the rules of now."""
+    records = [judged_now(spec, each, folder) for each in records_from_lines((folder / EPISODES).read_bytes())]
     valid = [(record, each) for record in records for each in record.valid_violations]
     preventable = [(record, each) for record, each in valid if each.preventable]
     bad = [(record, each) for record, each in preventable if not _minor(each)]
@@ -99,13 +102,27 @@ def count(spec: RunSpec, folder: Path) -> Mapping[str, int]:
     return dict(zip(COUNTS, (len(records), sum(record.steps for record in records), *found), strict=True))
 
 
+def judged_now(spec: RunSpec, record: EpisodeRecord, folder: Path) -> EpisodeRecord:
+    """Judges the valid contact of an episode again from its recording."""
+    hit = record.collision
+    if hit is None or not hit.valid:
+        return record
+    evidence = evidence_of(spec, record, _series(record, folder))
+    judgement = judge(evidence, hit.other_id, valid=True)
+    return record.model_copy(update={"collision": hit.model_copy(update={"judgement": judgement})})
+
+
+def _series(record: EpisodeRecord, folder: Path) -> Series:
+    return read_series(folder / FAILURES / series_name(record.index))
+
+
 def _minor(violation: Collision | Violation) -> bool:
     return isinstance(violation, Collision) and violation.severity is Severity.MINOR
 
 
 def _repeats(env: RiskSacEnv, spec: RunSpec, record: EpisodeRecord, folder: Path) -> bool:
     try:
-        repeated(env, spec, record, read_series(folder / FAILURES / series_name(record.index)))
+        repeated(env, spec, record, _series(record, folder))
     except SimulationError:
         return False
     return True
@@ -119,7 +136,8 @@ def play_all(out: Path, families: Sequence[str], seeds: int, steps: int) -> None
                 folder = out / f"{family}-{ego.replace(' ', '-')}-{seed}"
                 if not (folder / DONE).exists():
                     spec = spec_of(family, ego, seed, steps)
-                    in_own_process(play, spec, folder, steps)
+                    if not (folder / EPISODES).exists():
+                        in_own_process(play, spec, folder, steps)
                     counts = in_own_process(count, spec, folder)
                     row = {"family": family, "ego": ego, "seed": seed} | counts
                     replace_file(folder / DONE, json.dumps(row).encode())
