@@ -39,7 +39,7 @@ Actor = Learner | RandomAgent | ScriptedAgent | ScriptFollower
 """A joint policy that drives all adversaries."""
 GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
 STEP_COSTS = 1.0, 8.0  # processor time of an environment step: of the guide, and of a policy with its share of updates
-NEW, NEW_PREVENTABLE = 1.0, 4.0  # worth of a distinct failure, and what is added if it is preventable
+NEW, NEW_CANDIDATE = 1.0, 4.0  # worth of a distinct failure, and what is added for a candidate for the headline
 # Scripts that find a failure in one episode of thirty may find none in fifty and still be worth their time.
 DISCOUNT = 0.995
 PRIOR_WORTH, PRIOR_STEPS = 0.05, 1000.0
@@ -166,7 +166,7 @@ class Turns:
         self._bandit = DiscountedBandit(
             discount=DISCOUNT, prior_worth=PRIOR_WORTH, prior_cost=PRIOR_STEPS, least=LEAST, unit_costs=STEP_COSTS
         )
-        self._found, self._preventable = DistinctFailures(), DistinctFailures()
+        self._found, self._candidates = DistinctFailures(), DistinctFailures()
 
     def draw(self) -> int:
         """Draws the arm of the next episode."""
@@ -177,6 +177,6 @@ class Turns:
         worth = 0.0
         for violation in violations:
             worth += NEW * self._found.add(violation)
-            if violation.preventable:
-                worth += NEW_PREVENTABLE * self._preventable.add(violation)
+            if violation.headline_candidate:
+                worth += NEW_CANDIDATE * self._candidates.add(violation)
         self._bandit.tell(arm, worth, steps)

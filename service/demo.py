@@ -16,6 +16,7 @@ from pathlib import Path
 from risk_sac.cli.campaigns.gate import Bounds
 from risk_sac.cli.campaigns.output import results_table
 from risk_sac.cli.campaigns.watch import shown
+from risk_sac.cli.console import headline
 from risk_sac.client import Campaign, Client, ClientError, Episode, Results, Unreachable
 from risk_sac.records import State
 from risk_sac.run_folder.results import FAILURES, series_name
@@ -174,8 +175,9 @@ def conclude(campaign: Campaign) -> int:
     if progress.distinct_failures == 0:
         console.print("no valid failure was found; try more --episodes or another --seeds", style="bold red")
         return 1
-    preventable = f"a reference driver would have prevented: {progress.distinct_preventable}"
-    console.print(f"distinct failures: {progress.distinct_failures}; {preventable}", style="bold green")
+    found = headline(progress.headline, progress.headline_candidates)
+    of = f"of {progress.distinct_failures} distinct ones, {progress.distinct_preventable} preventable"
+    console.print(f"headline failures: {found} ({of})", style="bold green")
     return 0
 
 

@@ -18,6 +18,7 @@ from risk_sac.records import (
     Outcome,
     ReferenceOutcome,
     RunMetrics,
+    Severity,
     Violation,
 )
 from risk_sac.types import Floats, Frame, Kind, Role, Row, Signal
@@ -127,6 +128,8 @@ def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, 
         "ego_response": "late_braking",
         "ground": "lane",
         "broke": ("red_light", "speeding"),
+        "severity": Severity.MODERATE,
+        "injury_risk": 0.005,
         "unresponsive": False,
         "drivers": {
             "r157": AVOIDS if grade is Grade.PREVENTABLE else TOUCHES,

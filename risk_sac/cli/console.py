@@ -150,6 +150,11 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
+def headline(found: int | None, candidates: int) -> str:
+    """How many headline failures there are; before they were replayed, how many there may be."""
+    return f"at most {candidates}" if found is None and candidates else f"{found or 0}"
+
+
 def offences(violation: Collision | Violation) -> Iterator[str]:
     """What the ego and the other broke, on a line each."""
     if isinstance(violation, Violation):

@@ -7,6 +7,7 @@ from pathlib import Path
 from risk_sac.cli.console import FAILED, OK, Commands, add_command, counted
 from risk_sac.errors import ConfigError, SimulationError
 from risk_sac.machine import cores
+from risk_sac.metrics import pooled_headline
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import TIMES, distinct_failures
 from risk_sac.terminal import complain, console, printable
@@ -75,13 +76,19 @@ def _replay(options: argparse.Namespace) -> int:
 def _verify(options: argparse.Namespace) -> int:
     from risk_sac.execution.verify import verify
 
-    specs = {folder: read_results(folder).spec for folder in options.runs}
+    for folder in options.runs:
+        read_results(folder)  # refuses what is no run before anything is played
     found = verify(options.runs, options.times, cores())
-    if missing := [folder for folder in specs if folder not in found]:
+    if missing := [folder for folder in options.runs if folder not in found]:
         raise SimulationError(f"{missing[0]} was not verified: its run is unfinished, or cannot be replayed")
     for folder, verified in found.items():
         repeated = len(verified.episodes) - len(verified.flaky)
-        console.print(f"{specs[folder].id}: {repeated} of {counted(len(verified.episodes), 'distinct failure')} repeat")
+        results = read_results(folder)
+        headline = pooled_headline(each for each in (results.metrics, results.evaluation) if each is not None)
+        console.print(
+            f"{results.spec.id}: {counted(headline or 0, 'headline failure')}; "
+            f"{repeated} of {counted(len(verified.episodes), 'distinct failure')} repeat"
+        )
         for index in sorted(verified.flaky):
             repetition = verified.episodes[index]
             console.print(f"  flaky: episode {index}, {repetition.same} of {repetition.times} times the same")

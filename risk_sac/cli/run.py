@@ -28,6 +28,7 @@ from risk_sac.cli.console import (
     Commands,
     add_command,
     counted,
+    headline,
     or_dash,
     progress_bar,
     requirements_table,
@@ -104,6 +105,8 @@ def _run(options: argparse.Namespace) -> int:
     if requirements is not None:
         console.print(requirements)
     console.print(f"Results: {options.out}/results.json")
+    if any(metrics.headline is None and metrics.headline_candidates for metrics in found.values()):
+        console.print(f"Count its headline failures: risk-sac verify {options.out}", soft_wrap=True)
     return OK
 
 
@@ -130,12 +133,14 @@ def _summary(spec: RunSpec, results: Results, phases: Mapping[str, RunMetrics]) 
 def _figures(metrics: RunMetrics) -> dict[str, str]:
     shown = (metric for metric in METRICS if not metric.search_only)
     return {
+        "headline failures": headline(metrics.headline, metrics.headline_candidates),
         "episodes": f"{metrics.episodes} ({metrics.rejected} rejected)",
         "contacts": f"{metrics.raw_collisions} ({counted(metrics.artefacts, 'artefact')})",
         "valid contacts": f"{metrics.collisions} ({metrics.unresponsive} unresponsive)",
         "failures of any requirement": f"{metrics.failures}",
         "distinct violations": f"{metrics.distinct_failures}",
         "distinct and preventable": f"{metrics.distinct_preventable}",
+        "of these, not minor": f"{metrics.headline_candidates}",
         **dict(_figure(metric, metrics) for metric in shown),
         "steps per distinct failure": or_dash(metrics.steps_per_distinct_failure, ".0f"),
     }

@@ -6,7 +6,18 @@ from pathlib import Path
 
 from rich.table import Table
 
-from risk_sac.cli.console import EGO, OK, OUTCOME, Commands, add_command, in_words, narrow_table, offences, outcome
+from risk_sac.cli.console import (
+    EGO,
+    OK,
+    OUTCOME,
+    Commands,
+    add_command,
+    headline,
+    in_words,
+    narrow_table,
+    offences,
+    outcome,
+)
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
@@ -33,6 +44,10 @@ def add(commands: Commands) -> None:
 def _show(options: argparse.Namespace) -> int:
     results = read_results(options.results)
     if options.failure is None:
+        for phase in (results.metrics, results.evaluation):
+            if phase is not None:
+                name = "headline failures" if phase is results.metrics else "headline failures of the evaluation"
+                console.print(f"{name}: {headline(phase.headline, phase.headline_candidates)}")
         console.print(_failures(results))
         return OK
     failure = results.failure(options.failure)

@@ -89,9 +89,11 @@ class RewardConfig(Settings):
     violation: Weight = 10.0
     """Bonus for each scale by which a requirement that counts is violated without contact, up to one."""
     unpreventable: Fraction = 0.5
-    """Share of that bonus where only full braking at once would have prevented it."""
+    """Share of `valid_collision` where only full braking at once would have prevented it."""
     unavoidable: Fraction = 0.25
-    """Share of that bonus where that would not have, either."""
+    """Share of `valid_collision` where that would not have, either."""
+    minor: Fraction = 0.5
+    """Share of either where it is minor."""
     degenerate_collision: Weight = 4.0
     """Penalty for contact that a validity rule refuses."""
     ttc_weight: Weight = 0.2

@@ -13,6 +13,7 @@ from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import set_aside
 from risk_sac.run_folder.results import EPISODES, RESULTS, RecordedFailure, Results, read_results, write_results
+from risk_sac.run_folder.verified import read_verified, with_headline
 from risk_sac.train import Observer
 
 logger = logging.getLogger(__name__)
@@ -61,21 +62,21 @@ class Recorder:
     def finish(self, summary: RunSummary) -> Results:
         """Writes down what the run came to; its episodes first, so that no digest stands without them."""
         os.fsync(self._episodes.fileno())
-        self._write(
-            replace(
-                self.results,
-                finished=summary.finished,
-                metrics=summary.metrics,
-                evaluation=summary.evaluation,
-                digest=summary.digest,
-                versions=summary.versions,
-                device=summary.device,
-                wall_s=self.results.wall_s + summary.wall_s,
-                cpu_s=self.results.cpu_s + summary.cpu_s,
-                episode_cpu_s=summary.episode_cpu_s,
-                failures=tuple(self._failures),
-            )
+        results = replace(
+            self.results,
+            finished=summary.finished,
+            metrics=summary.metrics,
+            evaluation=summary.evaluation,
+            digest=summary.digest,
+            versions=summary.versions,
+            device=summary.device,
+            wall_s=self.results.wall_s + summary.wall_s,
+            cpu_s=self.results.cpu_s + summary.cpu_s,
+            episode_cpu_s=summary.episode_cpu_s,
+            failures=tuple(self._failures),
         )
+        verified = read_verified(self._folder, summary.digest)  # by an earlier invocation
+        self._write(with_headline(results, verified) if verified else results)
         return self.results
 
     def _write(self, results: Results) -> None:

@@ -11,8 +11,15 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.failures.bundle import code_digest, versions
 from risk_sac.records import Repetition
-from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.verified import TIMES, Verified, distinct_failures, read_verified, write_verified
+from risk_sac.run_folder.results import Results, read_results, write_results
+from risk_sac.run_folder.verified import (
+    TIMES,
+    Verified,
+    distinct_failures,
+    read_verified,
+    with_headline,
+    write_verified,
+)
 
 logger = logging.getLogger(__name__)
 
@@ -21,6 +28,8 @@ def verify(
     folders: Sequence[Path], times: int = TIMES, jobs: int = 1, stopping: Callable[[], bool] = lambda: False
 ) -> Mapping[Path, Verified]:
     """Replays the distinct failures of finished runs, each in `times` processes, and notes what came of it.
+
+    Each run's results.json then has its headline failures.
 
     What was verified as often before, by the same code, is not replayed again. Of a run whose series cannot be read
     nothing is noted, and of none whose replay was interrupted; the log says so.
@@ -33,10 +42,10 @@ def verify(
     """
     if times < 1:
         raise ConfigError("times", f"{times}", "at least 1")
-    code, found = code_digest(), dict[Path, Verified]()
+    code, found, runs = code_digest(), dict[Path, Verified](), dict[Path, Results]()
     missing: dict[Path, Verified] = {}  # with nothing replayed yet
     for folder in folders:
-        results = read_results(folder)
+        results = runs[folder] = read_results(folder)
         if results.digest is None:
             continue
         known = read_verified(folder, results.digest)
@@ -59,6 +68,10 @@ def verify(
             del missing[folder]
     for folder, verified in missing.items():
         write_verified(folder, verified)
+    for folder, verified in (found | missing).items():
+        results = with_headline(runs[folder], verified)
+        if results != runs[folder]:
+            write_results(folder, results)
     return found | missing
 
 

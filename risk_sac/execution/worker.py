@@ -165,23 +165,25 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int,
     from risk_sac.execution.recorder import Recorder  # here, so that the slow import happens with a heartbeat
     from risk_sac.execution.verify import verify
     from risk_sac.report.runs import read_run
-    from risk_sac.run_folder.verified import Verified
+    from risk_sac.run_folder.verified import Verified, with_headline
     from risk_sac.train import train
 
     if memory_bytes:
         limit_memory(memory_bytes)  # from here on: where it ends while libsumo is loaded, the process crashes
     with closing(Recorder(spec, folder, reporter)) as recorder:
         summary = train(spec, folder, recorder)
-        recorder.finish(summary)
+        results = recorder.finish(summary)
     found, finished = dict[Path, Verified](), summary.finished
     if finished and replays:
         reporter.keep_going()
         found |= verify([folder], replays, stopping=lambda: reporter.stopping)
         finished = not reporter.stopping or folder in found  # else the next worker finds all played, and replays it
+    if folder in found:
+        results = with_headline(results, found[folder])
     last = Finished(
         finished=finished,
-        metrics=summary.metrics,
-        evaluation=summary.evaluation,
+        metrics=results.metrics or summary.metrics,
+        evaluation=results.evaluation,
         digest=summary.digest,
         versions=summary.versions,
         wall_s=summary.wall_s,

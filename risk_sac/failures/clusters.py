@@ -48,7 +48,7 @@ class Overview(Record):
     covered: int
     """Cells of the taxonomy of contacts with a failure in them."""
     cells: int
-    """Of the taxonomy; most of them hold what no ego and no road allows."""
+    """Of the taxonomy; most can hold nothing."""
 
 
 def overview(episodes: Iterable[tuple[str, EpisodeRecord]]) -> Overview:

@@ -17,6 +17,7 @@ from risk_sac.metrics.metric import (
     pcr_by_driver,
     pooled_bins,
     pooled_counts,
+    pooled_headline,
     pooled_names,
 )
 from risk_sac.metrics.requirements import COLUMNS, pooled_requirements, requirement_cells

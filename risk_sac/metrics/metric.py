@@ -1,7 +1,7 @@
 """What a row of the metrics says: names, formula, and how runs are pooled. Pure."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
@@ -88,6 +88,12 @@ def _values(metric: Metric, metrics: Sequence[RunMetrics]) -> list[float]:
 def pooled_counts(metrics: Sequence[RunMetrics]) -> Counts:
     """Each count summed over the runs; what two runs found alike counts twice."""
     return Counts(**{name: sum(getattr(each, name) for each in metrics) for name in Counts.model_fields})
+
+
+def pooled_headline(metrics: Iterable[RunMetrics]) -> int | None:
+    """Headline failures of several runs: what they found alike counts once; None if none was replayed."""
+    replayed = [each for each in metrics if each.headline is not None]
+    return len({kind for each in replayed for kind in each.headline_kinds}) if replayed else None
 
 
 def pooled_names(counts: Sequence[Mapping[str, int]]) -> dict[str, int]:

@@ -11,7 +11,7 @@ from risk_sac.metrics.features import Spread, outcome_features
 from risk_sac.metrics.requirements import RequirementTally
 from risk_sac.records import Collision, Counts, EpisodeRecord, Outcome, RequirementCounts
 from risk_sac.types import STEP_S
-from risk_sac.verdicts.distinct import FailureKind, distinct_failures, kind_of
+from risk_sac.verdicts.distinct import DistinctFailures, FailureKind, distinct_failures, kind_of
 
 STEPS_PER_S = round(1 / STEP_S)
 WINDOW = 100  # episodes of the sliding ECR and PCR
@@ -58,6 +58,7 @@ class Tally(Counts):
     """Valid contacts by the second in which they began."""
     contacts_by_second: list[int] = Field(default_factory=list)
     """The same by the second of the contact."""
+    _candidates: DistinctFailures = PrivateAttr(default_factory=DistinctFailures)
     _newest: deque[tuple[bool, bool]] = PrivateAttr(default_factory=lambda: deque(maxlen=WINDOW))
     _spread: Spread = PrivateAttr(default_factory=Spread)
     _requirements: dict[str, RequirementTally] = PrivateAttr(default_factory=dict)
@@ -121,6 +122,7 @@ class Tally(Counts):
             new, new_preventable = self._requirement(violation.requirement, "failure").add(violation)
             self.distinct_failures += new
             self.distinct_preventable += new_preventable  # whichever of its kind came first
+            self.headline_candidates += violation.headline_candidate and self._candidates.add(violation)
             self.signatures[violation.signature] += 1
 
     def _requirement(self, name: str, counts: str) -> RequirementTally:

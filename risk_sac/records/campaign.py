@@ -15,6 +15,8 @@ class Progress(Record):
     episodes_done: int
     """Of the i.i.d. phase too, if there is one; what follows the totals is of the searches alone."""
     episodes_total: int
+    headline: int | None = None
+    """Distinct, preventable, not minor, and the same when replayed; each kind once over all runs. Null before that."""
     failures: int
     """Episodes with a valid violation of a requirement that counts."""
     raw_collisions: int
@@ -26,9 +28,11 @@ class Progress(Record):
     """Failures that a reference driver would have prevented, repetitions included."""
     distinct_preventable: int
     """The distinct ones among them; sum over the runs."""
+    headline_candidates: int = 0
+    """Those without minor contacts; sum over the runs."""
     window_ecr: Real
-    """ECR over each run's newest 100 episodes: mean over the runs at work, or over all once none is. Controls are left
-    out, unless the campaign has nothing else."""
+    """ECR over each run's newest 100 episodes: mean over the runs at work, or all once none is; without
+    controls, unless there is nothing else."""
     window_pcr: Real
     """PCR, averaged the same way."""
     dual_variable: Real
@@ -117,6 +121,8 @@ class Total(Counts):
     family: Family
     method: SearchMethod
     runs: int
+    headline: int | None = None
+    """Each kind once."""
     ecr: Real
     ecr_low: Real
     """95 % interval: Wilson for one run, bootstrap over the seeds for more."""
@@ -140,7 +146,7 @@ class Total(Counts):
     by_fault: Mapping[str, int] = {}
     """Fault → failures."""
     requirements: Mapping[str, RequirementCounts] = {}
-    """Requirement → its funnel, summed over the runs; empty for older runs."""
+    """Requirement → its funnel; empty for older runs."""
     signatures: Mapping[str, int]
     """Signature → valid violations."""
     conflicts_by_second: list[int]
@@ -158,5 +164,6 @@ class Results(Record):
     """Whether these are the final results."""
     adjustments: tuple[Adjustment, ...] = ()
     """What its episodes use otherwise than it was asked for, such as an ODD beyond what a family supports."""
+    headline: int | None = None  # as in the campaign's progress
     runs: list[RunResult]
     totals: list[Total]

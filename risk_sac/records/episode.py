@@ -38,10 +38,10 @@ class EpisodeRecord(Record):
     scene: Mapping[str, Real]
     outcome: Outcome
     reason: str
-    """Rule that rejected the scene, validity rules that refused its violations, sim_crash, ego_deadline, ego_malformed
-    or ego_crash; else empty."""
+    """What rejected the scene, rules that refused its violations, sim_crash, ego_deadline, ego_malformed, ego_crash, or
+    empty."""
     failed: tuple[str, ...] = ()
-    """Requirements that count and were validly violated: what makes it a failure. Empty in older records."""
+    """Requirements that count and were validly violated. Empty in older records."""
     steps: int
     risk_return: Real
     """Σ R_risk, of the risk reward alone."""
@@ -50,9 +50,9 @@ class EpisodeRecord(Record):
     mean_cost: Real
     """Mean C_soft over the executed steps."""
     min_ttc_s: Least
-    """Over the whole episode, so 0 if there is a contact; null in a record without any."""
+    """Over the whole episode; 0 with a contact, null without any."""
     min_robustness: Least
-    """Soft minimum of the requirements, over the whole episode too."""
+    """Soft minimum of the requirements."""
     objective: float | None
     """f_e; null before the scene optimiser has it."""
     dual_variable: Real
@@ -62,14 +62,14 @@ class EpisodeRecord(Record):
     environment_steps: int
     """Of the run, up to and including this episode."""
     script: tuple[float, ...] | None = None
-    """Genes of the scripts that the adversaries followed; null where a policy drove them."""
+    """Genes of the adversaries' scripts; null where a policy drove."""
     requirements: Mapping[str, RequirementResult] = {}
-    """Requirement → how far it was kept; empty where nothing was played, and in older records."""
+    """Requirement → how far it was kept; empty in older records."""
     violations: tuple[Violation, ...] = ()
     """Violations without contact of requirements that count."""
     collision: Collision | None = None
     defect_reached_s: float | None = None
-    """When a planted defect first changed a command, from the release; null if none did, or SUMO drives the ego."""
+    """When a planted defect first changed a command, from the release; null if none did."""
 
     @property
     def valid_violations(self) -> tuple[Collision | Violation, ...]:
@@ -167,7 +167,7 @@ class Episode(EpisodeRecord):
     run_id: str
     wall_s: float
     funnel: Funnel | None = None
-    """What the run's phase had found up to and including this episode; null in older records."""
+    """What the run's phase has found so far; null in older records."""
     repetition: Repetition | None = None
     """Of the first failure of its kind, once the run has ended."""
 

@@ -34,6 +34,7 @@ class Counts(Record):
     """Valid contacts that it, or full braking at once, prevents."""
     distinct_preventable: int = 0
     """Distinct violations that it prevents."""
+    headline_candidates: int = 0  # distinct and preventable ones without minor contacts
     artefacts: int = 0
     """Contacts made by simulator or control."""
     unresponsive: int = 0
@@ -96,6 +97,9 @@ class RunMetrics(Counts):
 
     # Fields with a default can be read from what was stored before they were counted.
 
+    headline: int | None = None
+    """Candidates that were the same when replayed; null before that."""
+    headline_kinds: tuple[str, ...] = ()  # requirement, signature and cell of each
     ecr: Real
     """Effective collision rate: valid contacts / episodes."""
     ecr_low: Real
@@ -199,7 +203,7 @@ class RunSummary(Record):
     reason: str | None
     """Why it failed, is paused, or waits again."""
     metrics: RunMetrics | None
-    """Of the search, or of the i.i.d. phase that the run is; null before the first episode."""
+    """Of the search or the i.i.d. phase; null before an episode."""
 
 
 class Run(RunSummary):
@@ -231,7 +235,7 @@ class RunResult(RunSummary):
     versions: Mapping[str, str]
     """Software that produced the results."""
     verified: int = 0
-    """Distinct failures that were the same each time they were replayed; none before the run has ended."""
+    """Distinct failures that were the same each time they were replayed."""
     flaky: int = 0
     """Those that were not."""
     busy_s: float

@@ -74,6 +74,11 @@ class Violated(Record):
         return self.valid and self.graded is Grade.PREVENTABLE
 
     @property
+    def headline_candidate(self) -> bool:
+        """Whether it is preventable and not minor: a headline failure once its replay is the same."""
+        return self.preventable
+
+    @property
     def avoidable(self) -> bool:
         """Whether it is valid, and a reference driver or full braking at once would have prevented it."""
         return self.valid and self.graded in (Grade.PREVENTABLE, Grade.FULL_BRAKING)
@@ -102,13 +107,13 @@ class Violation(Violated):
     broke: tuple[str, ...]
     """The ego's own offences up to that time."""
     grade: Grade | None
-    """preventable | full_braking (by that only) | unavoidable; null where it is not valid."""
+    """preventable | full_braking | unavoidable; null where it is not valid."""
     drivers: Annotated[Mapping[str, bool], BeforeValidator(drivers_renamed)]
     """Reference driver → whether it keeps the requirement in the same encounter; empty where it is not valid."""
     fault: Fault | None = None
     """ego | shared | other. Null where it is not valid, and in older records."""
     signature: str
-    """The class of failures it belongs to, in words; what differs in it is distinct."""
+    """Its class of failures, in words."""
     definitions: int
     """Version of the definitions it was judged by."""
 
@@ -207,6 +212,11 @@ class Collision(Violated):
     def severity(self) -> Severity | None:
         """How bad it is; None in older records."""
         return None if self.judgement is None else self.judgement.severity
+
+    @property
+    def headline_candidate(self) -> bool:
+        """See `Violated.headline_candidate`; false where the severity is unknown, as in older records."""
+        return self.preventable and self.severity in (Severity.MODERATE, Severity.SEVERE)
 
     @property
     def severity_in_words(self) -> str:

@@ -14,6 +14,7 @@ from risk_sac.metrics import (
     pcr_by_driver,
     pooled_bins,
     pooled_counts,
+    pooled_headline,
     pooled_names,
     pooled_requirements,
 )
@@ -34,6 +35,8 @@ class Cell(Counts):
     phase: Phase
     seeds: tuple[int, ...]
     """Of the runs that are counted."""
+    headline: int | None
+    """Each kind once."""
     estimates: Mapping[MetricName, Estimate]
     """By the name of the metric."""
     steps_per_distinct_failure: float | None
@@ -56,7 +59,7 @@ class Cell(Counts):
     by_fault: Mapping[str, int]
     """Fault → failures."""
     requirements: Mapping[str, RequirementCounts]
-    """Requirement → its funnel, summed over the runs; empty for older runs."""
+    """Requirement → its funnel; empty for older runs."""
     signatures: Mapping[str, int]
     """Signature → valid violations."""
     conflicts_by_second: tuple[int, ...]
@@ -77,6 +80,7 @@ def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
         method=method,
         phase=phase,
         seeds=tuple(run.spec.seed for run in runs),
+        headline=pooled_headline(metrics),
         **dict(counts),
         **ratios,
         estimates={metric.name: estimate(metric, metrics) for metric in metrics_of(phase)},

@@ -7,14 +7,14 @@ from itertools import groupby
 from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunMethod, RunSpec
 from risk_sac.failures.clusters import Overview, overview
 from risk_sac.failures.studied import Studied
-from risk_sac.metrics import MetricName
+from risk_sac.metrics import MetricName, pooled_headline
 from risk_sac.records import RECORDED, EpisodeRecord, Phase
 from risk_sac.report.cells import Cell, cell_of, metrics_of
 from risk_sac.report.paired import PairedTest, corrected, paired_tests
-from risk_sac.report.runs import HEADLINE, PAID_FOR, FinishedRun, found_within
+from risk_sac.report.runs import PAID_FOR, TESTED, FinishedRun, found_within
 
 REFERENCE: MethodName = "risk-sac"
-HEADLINER: MethodName = "risk-sac-diverse"
+PAID_REFERENCE: MethodName = "risk-sac-diverse"
 RIVALS: tuple[MethodName, ...] = ("sac", "ddpg")
 DECLARED: tuple[MetricName, ...] = ("ecr", "pcr")
 """What the reference is to have more of than its rivals."""
@@ -44,7 +44,19 @@ class Comparison:
     overviews: Mapping[FamilyName, Overview]  # of the failures of all methods that repeat; families with runs alone
     drawn: tuple[FinishedRun, ...]  # of the i.i.d. phase; in no cell, no test and no overview
     undrawn: tuple[MissingRun, ...]  # of the i.i.d. phase too
-    headline: tuple[PairedTest, ...]  # what a user pays for, by family; declared before any run, so corrected by itself
+    paid_tests: tuple[
+        PairedTest, ...
+    ]  # what a user pays for, by family; declared before any run, so corrected by itself
+
+    @property
+    def headline(self) -> int | None:
+        """Headline failures of all searches; what several found alike counts once. None before one was replayed."""
+        return pooled_headline(metrics for run in self.runs for metrics in run.metrics.values())
+
+    @property
+    def headline_candidates(self) -> int:
+        """Those that each search found by itself, verified or not."""
+        return sum(metrics.headline_candidates for run in self.runs for metrics in run.metrics.values())
 
     @property
     def reference(self) -> MethodName:
@@ -122,7 +134,7 @@ def compare(
         overviews={family: overview(_failures(family, kept)) for family in families},
         drawn=tuple(found[run.digest] for run in spec.drawn() if run.digest in found),
         undrawn=missing(spec.drawn()),
-        headline=tuple(_headline(spec, methods, kept)),
+        paid_tests=tuple(_paid_tests(spec, methods, kept)),
     )
 
 
@@ -161,9 +173,9 @@ def declared(test: PairedTest) -> bool:
     return test.reference == REFERENCE and test.method in RIVALS and test.metric in DECLARED
 
 
-def _headline(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[FinishedRun]) -> Iterator[PairedTest]:
+def _paid_tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[FinishedRun]) -> Iterator[PairedTest]:
     """Our own search against every other one, corrected per family; the first method where it does not take part."""
-    first = HEADLINER if HEADLINER in methods else methods[0]
+    first = PAID_REFERENCE if PAID_REFERENCE in methods else methods[0]
     for family in spec.families:
         values = {
             method: {run.spec.seed: _paid(run) for run in of_method}
@@ -174,8 +186,8 @@ def _headline(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[
 
 def _paid(run: FinishedRun) -> float | None:
     """What a user pays for."""
-    found = found_within(run, HEADLINE)
-    return None if found is None else float(found.preventable)
+    found = found_within(run, TESTED)
+    return None if found is None else float(found.headline)
 
 
 def _by_method(

@@ -25,7 +25,7 @@ from risk_sac.run_folder.durable import replace_file
 FIGURES = "figures"
 FORMAT_VERSION = 1
 _PLAIN = tuple(
-    name for name, each in Cell.model_fields.items() if each.annotation in (int, float, float | None)
+    name for name, each in Cell.model_fields.items() if each.annotation in (int, int | None, float, float | None)
 )  # a column each
 
 
@@ -82,8 +82,9 @@ class Table(Record):
     cells: list[Cell]
     """By family, phase and method, the reference first; none before a run has finished."""
     tests: list[PairedTest]
-    headline: list[PairedTest]
-    """Distinct preventable failures within 30 processor seconds; declared beforehand, so corrected by themselves."""
+    headline: int | None  # each kind once over all searches
+    paid_tests: list[PairedTest]
+    """Headline failures within 30 processor seconds; declared beforehand, so corrected by themselves."""
     failures: Mapping[FamilyName, Overview]
     """The kinds of failures that all methods have found together."""
     studies: Mapping[FamilyName, Mapping[str, Studied]]
@@ -123,7 +124,8 @@ def table_of(comparison: Comparison) -> Table:
         reference=comparison.reference,
         cells=list(comparison.cells),
         tests=list(comparison.tests),
-        headline=list(comparison.headline),
+        headline=comparison.headline,
+        paid_tests=list(comparison.paid_tests),
         failures=comparison.overviews,
         studies={family: comparison.studies(family) for family in comparison.overviews},
         runs=[
@@ -152,7 +154,7 @@ def table_json(comparison: Comparison) -> str:
 def table_csv(comparison: Comparison) -> str:
     """`table.csv`; empty where there is no value."""
     text = io.StringIO()
-    names = ["family", "method", "phase", "runs", *_PLAIN]
+    names = list(dict.fromkeys(("family", "method", "phase", "runs", "headline", *_PLAIN)))
     names += dict.fromkeys(name for cell in comparison.cells for name in _by_name(cell))
     for metric in METRICS:
         names += [metric.name, f"{metric.name}_low", f"{metric.name}_high", f"{metric.name}_runs"]

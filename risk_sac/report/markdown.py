@@ -18,7 +18,7 @@ from risk_sac.report.cells import Cell, metrics_of
 from risk_sac.report.comparison import DECLARED, REFERENCE, RIVALS, Comparison, declared
 from risk_sac.report.page import DASH, interval, number, percent, platform_in_words, table, versions_in_words
 from risk_sac.report.paired import LEVEL, PairedTest, power_of
-from risk_sac.report.runs import HEADLINE, LIMITS, FinishedRun, found_within
+from risk_sac.report.runs import LIMITS, TESTED, FinishedRun, found_within
 from risk_sac.report.verdicts import RowsOf, class_rows, driver_rows
 
 CONTROL = "no-adversary"
@@ -64,7 +64,6 @@ def _template() -> Template:
         "class_rows": class_rows,
         "declared_metrics": DECLARED,
         "driver_rows": driver_rows,
-        "headline": HEADLINE,
         "level": f"{LEVEL:g}",
         "metrics": METRICS,
         "most_clusters": MOST_CLUSTERS,
@@ -73,6 +72,7 @@ def _template() -> Template:
         "rivals": RIVALS,
         "run_command": run_command,
         "test_table": test_table,
+        "tested_limit": TESTED,
     }
     return environment.from_string((files(__package__) / "table.md.jinja").read_text(encoding="utf-8"))
 
@@ -104,14 +104,16 @@ class Tables:
 
     def funnel(self, family: FamilyName, phase: Phase) -> str:
         """Contacts, and failures of any requirement down to what is worth a person's time, summed over seeds."""
-        columns = ["method", "episodes", "contacts", "valid contacts"]
-        columns += ["failures", "distinct", "preventable", "verified"]
+        columns = ["method", "headline", "episodes", "contacts", "valid contacts"]
+        columns += ["failures", "distinct", "preventable", "not minor", "verified"]
         columns.append(symbol("unresponsive_share"))
         rows = (
             [
                 cell.method,
+                number(cell.headline, "d"),
                 *map(str, (cell.episodes, cell.raw_collisions, cell.collisions)),
                 *map(str, (cell.failures, cell.distinct_failures, cell.distinct_preventable)),
+                str(cell.headline_candidates),
                 verified(self._comparison.of_cell(family, cell.method), phase),
                 DASH if cell.unresponsive_share is None else percent(cell.unresponsive_share),
             ]
@@ -143,7 +145,9 @@ class Tables:
                 found = [each for each in (found_within(run, limit) for run in runs) if each is not None]
                 if found:
                     rows.append([method, limit.name, str(len(found)), *map(_spread, zip(*found, strict=True))])
-        return _filled(["method", "within", "runs", "preventable", "distinct", symbol("covered")], rows, left=2)
+        return _filled(
+            ["method", "within", "runs", "headline", "preventable", "distinct", symbol("covered")], rows, left=2
+        )
 
     def times(self, family: FamilyName, phase: Phase) -> str:
         """How long after the release conflicts and contacts come."""

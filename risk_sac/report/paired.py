@@ -26,7 +26,7 @@ class PairedTest:
     family: FamilyName
     phase: Phase
     metric: MetricName
-    """Or what a user pays for, `preventable within 30 CPU s`."""
+    """Or what a user pays for, `headline failures within 30 CPU s`."""
     reference: MethodName
     method: MethodName
     pairs: int

@@ -21,6 +21,7 @@ from risk_sac.scenario.families import family_named
 class Found(NamedTuple):
     """By one run's search."""
 
+    headline: int  # failures; without a replay, those that may be
     preventable: int  # distinct violations
     distinct: int  # of those that are valid
     covered: int  # cells of the taxonomy
@@ -59,7 +60,8 @@ class FinishedRun:
             for record in records:
                 accumulator.add(record)
             if records:
-                found[phase] = accumulator.metrics()
+                metrics = accumulator.metrics()
+                found[phase] = self.verified.headlined(metrics, records) if self.verified else metrics
         return found
 
     @cached_property
@@ -68,7 +70,8 @@ class FinishedRun:
         tally, found = Tally(horizon_steps=family_named(self.spec.family).horizon_steps), []
         for record in self.phase("search"):
             tally.add(record)
-            found.append(Found(tally.distinct_preventable, tally.distinct_failures, len(tally.kinds)))
+            kinds = tally.headline_candidates, tally.distinct_preventable, tally.distinct_failures
+            found.append(Found(*kinds, len(tally.kinds)))
         return tuple(found)
 
 
@@ -113,7 +116,7 @@ def read_records(file: Path) -> tuple[EpisodeRecord, ...]:
         raise ConfigError("", f"{file} was not written by a run: {error.errors()[0]['msg']}") from error
 
 
-NOTHING = Found(0, 0, 0)
+NOTHING = Found(0, 0, 0, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,9 +138,9 @@ def cpu_s(run: FinishedRun) -> Sequence[float]:
     return run.episode_cpu_s[: len(run.phase("search"))]
 
 
-HEADLINE = Limit("30 CPU s", cpu_s, 30.0)
-PAID_FOR = f"preventable within {HEADLINE.name}"
-LIMITS = (Limit("10 CPU s", cpu_s, 10.0), HEADLINE, Limit("300 episodes", episodes, 300.0))
+TESTED = Limit("30 CPU s", cpu_s, 30.0)
+PAID_FOR = f"headline failures within {TESTED.name}"
+LIMITS = (Limit("10 CPU s", cpu_s, 10.0), TESTED, Limit("300 episodes", episodes, 300.0))
 
 
 def found_within(run: FinishedRun, limit: Limit) -> Found | None:

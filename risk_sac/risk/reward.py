@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 from risk_sac.config import LearnerConfig, Method, Requirement, RewardConfig
-from risk_sac.records import NO_CONTACT, Collision
+from risk_sac.records import NO_CONTACT, Collision, Severity
 from risk_sac.types import Floats
 
 if TYPE_CHECKING:
@@ -86,12 +86,16 @@ class ViolationDepth:
 
 
 def worth(collision: Collision, config: RewardConfig) -> float:
-    """The share of the bonus for valid collisions that one is paid, in [0, 1]."""
+    """The share of the bonus for valid collisions that one is paid, in [0, 1].
+
+    Choice: a minor one is paid less, since no headline counts it.
+    """
     if not collision.valid:
         return 0.0
+    share = config.minor if collision.severity is Severity.MINOR else 1.0
     if collision.preventable:
-        return 1.0
-    return config.unpreventable if collision.avoidable else config.unavoidable
+        return share
+    return share * (config.unpreventable if collision.avoidable else config.unavoidable)
 
 
 def penalised_reward(risk_reward: Value, cost: Value, dual_variable: float) -> Value:

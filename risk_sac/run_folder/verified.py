@@ -2,15 +2,16 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pydantic.dataclasses import dataclass
 
 from risk_sac.errors import DamagedError
-from risk_sac.records import REPEATS, EpisodeRecord, Repetition
+from risk_sac.records import REPEATS, EpisodeRecord, Repetition, RunMetrics
 from risk_sac.run_folder.durable import read_sealed, write_sealed
 from risk_sac.run_folder.results import Results
-from risk_sac.verdicts.distinct import DistinctFailures, Niche, niche_of
+from risk_sac.verdicts.distinct import DistinctFailures, Niche, kind_name, niche_of
 
 VERIFIED = "verified.json"
 TIMES = 3  # that a failure is replayed, if nobody says otherwise
@@ -46,6 +47,28 @@ class Verified:
             for each in records
         )
 
+    def headlined(self, metrics: RunMetrics, judged: Sequence[EpisodeRecord]) -> RunMetrics:
+        """Adds the headline to the metrics of a phase, whose episodes are `judged`."""
+        repeating = self.episodes.keys() - self.flaky
+        candidates = (each for episode in judged if episode.index in repeating for each in episode.valid_violations)
+        kinds = tuple(dict.fromkeys(kind_name(each) for each in candidates if each.headline_candidate))
+        return metrics.model_copy(update={"headline": len(kinds), "headline_kinds": kinds})
+
+
+def with_headline(results: Results, verified: Verified) -> Results:
+    """The results of a run with the headline failures of each phase in its metrics."""
+    judged = verified.judged([failure.episode for failure in results.failures])
+
+    def told(metrics: RunMetrics | None, *, evaluating: bool) -> RunMetrics | None:
+        episodes = [each for each in judged if each.evaluating is evaluating]
+        return None if metrics is None else verified.headlined(metrics, episodes)
+
+    return replace(
+        results,
+        metrics=told(results.metrics, evaluating=False),
+        evaluation=told(results.evaluation, evaluating=True),
+    )
+
 
 def _kinds(episode: EpisodeRecord) -> Mapping[tuple[str, Niche], str]:
     """Phase and niche of each valid violation of an episode → its requirement."""
@@ -53,13 +76,17 @@ def _kinds(episode: EpisodeRecord) -> Mapping[tuple[str, Niche], str]:
 
 
 def distinct_failures(results: Results) -> list[EpisodeRecord]:
-    """Episodes with the first violation of a kind in their phase, or the first preventable one, in their order."""
-    found: defaultdict[tuple[str, bool], DistinctFailures] = defaultdict(DistinctFailures)
+    """Episodes with the first violation of a kind in their phase, the first preventable one, or the first candidate.
+
+    A candidate is one for the headline. The episodes come in their order.
+    """
+    found: defaultdict[tuple[str, str], DistinctFailures] = defaultdict(DistinctFailures)
     episodes = []
     for episode in (failure.episode for failure in results.failures):
         valid = episode.valid_violations
-        new = [found[episode.phase, False].add(each) for each in valid]
-        new += [found[episode.phase, True].add(each) for each in valid if each.preventable]
+        new = [found[episode.phase, "valid"].add(each) for each in valid]
+        new += [found[episode.phase, "preventable"].add(each) for each in valid if each.preventable]
+        new += [found[episode.phase, "candidate"].add(each) for each in valid if each.headline_candidate]
         if any(new):
             episodes.append(episode)
     return episodes

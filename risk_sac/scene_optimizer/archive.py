@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.records import NO_CONTACT, Collision, Violation
+from risk_sac.records import NO_CONTACT, Collision, Severity, Violation
 from risk_sac.scene_optimizer.base import Encounter, SceneOptimizer, State
 from risk_sac.types import Floats
 from risk_sac.verdicts.distinct import niche_of
@@ -26,9 +26,10 @@ CROSSED, CROSSING_DEVIATION = 0.5, 0.2  # how often, and how far, it also moves 
 PREVENTABLE_WORTH = 1.0
 ALMOST_WORTH, IMPACT_MPS = 0.4, 5.0  # where R157's driver only just touches; a third of it where at 5.5 m/s
 LEAST_WORTH = 0.02  # of a failure
+MINOR_SHARE = 0.25  # of its worth that a minor contact has
 NEAR_MISS_WORTH = 0.1
 NEAR_MARGIN = 0.3  # of a requirement, in scales: what undisturbed traffic keeps is about 1
-NEW, NEW_PREVENTABLE = 0.5, 2.0  # credit of a parent for a distinct failure, and for a preventable one
+NEW, NEW_CANDIDATE = 0.5, 2.0  # credit of a parent for a distinct failure, and for a candidate for the headline
 
 
 @dataclass(slots=True, kw_only=True)
@@ -50,7 +51,7 @@ class Elites:
     def __init__(self) -> None:
         self._failures: dict[str, Elite] = {}  # by niche
         self._misses: dict[str, Elite] = {}  # by target
-        self._preventable: set[str] = set()  # niches
+        self._candidates: set[str] = set()  # niches with a candidate for the headline
 
     @property
     def failures(self) -> int:
@@ -79,10 +80,10 @@ class Elites:
         known = self._failures.get(niche)
         worth = _worth(violation)
         if parent is not None:
-            new_preventable = violation.preventable and niche not in self._preventable
-            parent.credit += NEW * (known is None) + NEW_PREVENTABLE * new_preventable
-        if violation.preventable:
-            self._preventable.add(niche)
+            new_candidate = violation.headline_candidate and niche not in self._candidates
+            parent.credit += NEW * (known is None) + NEW_CANDIDATE * new_candidate
+        if violation.headline_candidate:
+            self._candidates.add(niche)
         if known is None or known.worth < worth:
             target = violation.other_id if isinstance(violation, Collision) else violation.requirement
             self._failures[niche] = Elite(point=point, worth=worth, target=target, kind=kind)
@@ -109,14 +110,14 @@ class Elites:
         return {
             "failures": {niche: _plain(elite) for niche, elite in self._failures.items()},
             "misses": {name: _plain(elite) for name, elite in self._misses.items()},
-            "preventable": sorted(self._preventable),
+            "candidates": sorted(self._candidates),
         }
 
     def load(self, state: State) -> None:
         """Continues from `state()`."""
         self._failures = {niche: _elite(elite) for niche, elite in state["failures"].items()}
         self._misses = {name: _elite(elite) for name, elite in state["misses"].items()}
-        self._preventable = set(state["preventable"])
+        self._candidates = set(state["candidates"])
 
 
 def _plain(elite: Elite) -> State:
@@ -128,7 +129,15 @@ def _elite(plain: State) -> Elite:
 
 
 def _worth(violation: Collision | Violation) -> float:
-    """1 for what is preventable; of other contacts the more, the slower R157's driver would have touched."""
+    """1 for what is preventable; of other contacts the more, the slower R157's driver would have touched.
+
+    Choice: a minor contact has a share of it, so that a niche prefers what the headline counts.
+    """
+    share = MINOR_SHARE if isinstance(violation, Collision) and violation.severity is Severity.MINOR else 1.0
+    return share * _worth_of_any(violation)
+
+
+def _worth_of_any(violation: Collision | Violation) -> float:
     if violation.preventable:
         return PREVENTABLE_WORTH
     if isinstance(violation, Violation):

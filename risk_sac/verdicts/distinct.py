@@ -60,6 +60,12 @@ def niche_of(violation: Collision | Violation) -> Niche:
     return violation.requirement, violation.signature, cell_of(violation)
 
 
+def kind_name(violation: Collision | Violation) -> str:
+    """Name of a violation's niche: equal for violations that are not distinct."""
+    requirement, signature, cell = niche_of(violation)
+    return f"{requirement}: {signature} [{'-'.join(map(str, cell))}]"
+
+
 class DistinctFailures:
     """Counts distinct failures, one by one; a policy that repeats its one way to make the ego fail is paid once."""
 

@@ -36,6 +36,14 @@ COUNTERS = {
         "risk_sac_distinct_preventable_failures",
         "Distinct violations that a reference driver would have prevented.",
     ),
+    "headline_candidates": (
+        "risk_sac_headline_candidates",
+        "Distinct preventable violations that are no minor contacts.",
+    ),
+    "headline": (
+        "risk_sac_headline_failures",
+        "Of these, those whose replay was the same; of each run by itself.",
+    ),
 }
 # The funnel of each requirement; by the column that is summed up.
 OF_REQUIREMENTS = {
@@ -106,7 +114,7 @@ class CampaignMetrics(Collector):
         for counted, (name, meaning) in COUNTERS.items():
             sums = Counts[tuple[str, ...]]()
             for tally in statistics.tallies:
-                sums[tally.family, tally.method] += getattr(tally, counted)
+                sums[tally.family, tally.method] += getattr(tally, counted) or 0  # null where none was replayed
             yield self._counters[counted].family(name, meaning, sums)
         yield from self._requirements(statistics)
         for name, rate in RATES.items():

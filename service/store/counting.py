@@ -36,8 +36,10 @@ def count(run: RunRow, row: EpisodeRow, sign: int) -> None:
 def tally(run: RunRow) -> None:
     """Copies order-dependent counts from the run's metrics."""
     phases = [from_json(text) for text in (run.metrics, run.evaluation) if text is not None]
-    for name in ("distinct_failures", "preventable", "distinct_preventable"):
+    for name in ("distinct_failures", "preventable", "distinct_preventable", "headline_candidates"):
         setattr(run, name, sum(phase.get(name, 0) for phase in phases))
+    replayed = [phase for phase in phases if phase.get("headline") is not None]
+    run.headline = len({kind for phase in replayed for kind in phase["headline_kinds"]}) if replayed else None
     funnels = [phase.get("requirements", {}) for phase in phases]
     for name in dict.fromkeys(name for each in funnels for name in each):
         row = run.requirements.setdefault(name, RequirementRow(name=name))

@@ -9,6 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import from_json
 
 from risk_sac.config import IID_METHODS, CampaignSpec, RunSpec
+from risk_sac.metrics import pooled_headline
 from risk_sac.records import CampaignHead, Episode, Repetition, Run, RunMetrics, RunResult, State
 from service.errors import OutdatedError
 from service.store.tables import Base, CampaignRow, EpisodeRow, RunRow
@@ -22,6 +23,7 @@ class StoredRun(Run, RunResult):
     campaign_id: str
     repetitions: Mapping[int, Repetition]
     """Of its distinct failures, by index of the episode; none if not replayed."""
+    headline_candidates: int = 0
 
     @classmethod
     def from_row(cls, row: RunRow, campaign_id: str) -> Self:
@@ -76,6 +78,12 @@ class StoredCampaign(CampaignHead):
     def searches(self) -> tuple[StoredRun, ...]:
         """Its runs without those of the i.i.d. phase."""
         return tuple(run for run in self.runs if not run.iid)
+
+    @property
+    def headline(self) -> int | None:
+        """Headline failures of search and evaluation; what several runs found alike counts once."""
+        phases = (phase for run in self.searches for phase in (run.metrics, run.evaluation) if phase is not None)
+        return pooled_headline(phases)
 
     @property
     def ego(self) -> dict[str, Any]:

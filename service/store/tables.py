@@ -18,6 +18,8 @@ TALLIED = (
     "distinct_failures",
     "preventable",
     "distinct_preventable",
+    "headline_candidates",
+    "headline",
 )
 
 
@@ -91,6 +93,8 @@ class RunRow(Base):
     distinct_failures: Mapped[int] = mapped_column(default=0)
     preventable: Mapped[int] = mapped_column(default=0)
     distinct_preventable: Mapped[int] = mapped_column(default=0)
+    headline_candidates: Mapped[int] = mapped_column(default=0)
+    headline: Mapped[int | None]  # null before its failures were replayed
     busy_s: Mapped[float] = mapped_column(default=0.0)
     attempts: Mapped[int] = mapped_column(default=0)
     metrics: Mapped[str | None] = mapped_column(Text)

@@ -104,6 +104,8 @@ class FailureTable(Record):
     """Which party caused it; null like `grade`."""
     prevented_by: list[list[str]]
     """Reference drivers."""
+    headline: list[bool]
+    """Whether it is the first of a kind in the headline."""
     distinct: list[bool]
     """Whether one of its valid violations is the first of its kind in its run and phase."""
     kind: list[int]
@@ -188,6 +190,12 @@ def prevented_by(violation: Plain) -> list[str]:
     return [name for name, each in drivers.items() if (each["avoids"] if isinstance(each, Mapping) else each)]
 
 
+def is_headline_candidate(violation: Plain) -> bool:
+    """Whether a valid violation is preventable, and no minor contact."""
+    grave = "requirement" in violation or _judged(violation).get("severity") in (Severity.MODERATE, Severity.SEVERE)
+    return grave and is_preventable(violation)
+
+
 def _judged(violation: Plain) -> Plain:
     """What was judged of a violation, which a contact keeps apart."""
     if "requirement" in violation:
@@ -219,14 +227,18 @@ def failure_table(
     """The table of these failures of the campaign, in their order; one without a triage is new."""
     runs = {run.number: run for run in campaign.runs}
     found: defaultdict[tuple[int, str], Kinds] = defaultdict(Kinds)
+    headline = Kinds()
     failures, naming, rows = list(failures), [], []
     for each in failures:
         valid, every = violations_of(each.outcome, each.record)
         naming.append(next(iter(valid or every)))
         kinds = found[each.run_number, each.phase]
+        row = _row(runs[each.run_number], each, naming[-1])
+        candidates = filter(is_headline_candidate, valid if row["repeats"] == "verified" else [])
         rows.append(
-            _row(runs[each.run_number], each, naming[-1])
+            row
             | {"failed": [_requirement(violation) for violation in valid]}
+            | {"headline": sum(map(headline.add, candidates)) > 0}
             | {"distinct": sum(map(kinds.add, valid)) > 0}
         )
     kinds_found = _kinds(naming, rows)

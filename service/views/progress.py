@@ -10,7 +10,7 @@ from service.store.stored import StoredCampaign, StoredRun
 from service.store.tables import TALLIED
 
 OF_ALL = ("episodes_total", "episodes_done")
-OF_SEARCHES = ("rejected", *(name for name in TALLIED if name not in OF_ALL))
+OF_SEARCHES = ("rejected", *(name for name in TALLIED if name not in (*OF_ALL, "headline")))
 AVERAGED = ("window_ecr", "window_pcr", "dual_variable", "temperature")
 LOOKS = 20  # polls of a client from now to the end of a campaign
 SOONEST_S, LATEST_S = 1, 30
@@ -39,7 +39,7 @@ def progress(campaign: StoredCampaign, workers: int) -> Progress:
     sums |= {name: sum(getattr(run, name) for run in searches) for name in OF_SEARCHES}
     means = {name: _mean([getattr(metrics, name) for metrics in present]) for name in AVERAGED}
     eta = 0.0 if campaign.state.final else eta_s(runs, workers)
-    return Progress.model_validate(sums | means | {"eta_s": eta})
+    return Progress.model_validate(sums | means | {"headline": campaign.headline, "eta_s": eta})
 
 
 def retry_after_s(campaign: StoredCampaign, workers: int) -> int | None:

@@ -15,6 +15,7 @@ from risk_sac.metrics import (
     pcr_by_driver,
     pooled_bins,
     pooled_counts,
+    pooled_headline,
     pooled_names,
     pooled_requirements,
 )
@@ -29,6 +30,7 @@ def results(campaign: StoredCampaign) -> Results:
         campaign_id=campaign.id,
         state=campaign.state,
         complete=campaign.state.final,
+        headline=campaign.headline,
         adjustments=_adjustments(campaign),
         runs=campaign.runs,
         totals=totals(campaign.searches),
@@ -61,6 +63,7 @@ def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
             "family": family,
             "method": method,
             "runs": len(group),
+            "headline": pooled_headline(group),
             "requirements": pooled_requirements(group),
             "pcr_by_driver": pcr_by_driver(group),
             "by_severity": pooled_names([metrics.by_severity for metrics in group]),

@@ -39,8 +39,8 @@ def test_the_command_it_ends_with_draws_a_failure(tmp_path, capsys, monkeypatch)
 
 
 def test_its_last_line_counts_what_is_worth_a_persons_time_and_no_repeats(capsys):
-    assert conclude(campaign(distinct_failures=14, distinct_preventable=3)) == 0
-    assert capsys.readouterr().out == "distinct failures: 14; a reference driver would have prevented: 3\n"
+    assert conclude(campaign(headline=2, distinct_failures=14, distinct_preventable=3, headline_candidates=3)) == 0
+    assert capsys.readouterr().out == "headline failures: 2 (of 14 distinct ones, 3 preventable)\n"
 
 
 def test_it_offers_to_draw_a_preventable_failure_where_there_is_one():

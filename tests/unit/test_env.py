@@ -25,7 +25,7 @@ from risk_sac.env import RiskSacEnv, make_default
 from risk_sac.errors import InfeasibleScene, SceneError, SimulationError
 from risk_sac.geometry import relative_view
 from risk_sac.problem import Problem
-from risk_sac.records import Collision, Grade
+from risk_sac.records import Collision, Grade, Severity
 from risk_sac.risk.rss import LATERAL_CAP_M, LONGITUDINAL_CAP_M
 from risk_sac.risk.ttc import time_to_encounter
 from risk_sac.scenario.families import FAMILIES
@@ -342,6 +342,7 @@ def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low: Ri
                     Grade.UNAVOIDABLE: config.unavoidable,
                 }
                 worth = shares[collision.judgement.grade]
+                worth *= config.minor if collision.severity is Severity.MINOR else 1.0
                 bonus = worth * config.valid_collision if collision.valid else -config.degenerate_collision
             at = LEAD_IN_STEPS + step
             assert reward == pytest.approx(reward_by_hand(series, at, config, bonus), abs=1e-9)

@@ -12,7 +12,7 @@ from pyarrow import parquet
 from tests.server import Service, servers
 from tests.web.conftest import LONG_MS
 
-STEPS = ("failures", "distinct_failures", "distinct_preventable")
+STEPS = ("failures", "distinct_failures", "distinct_preventable", "headline_candidates", "headline")
 
 
 def funnel(page: Page) -> list[str]:
@@ -40,7 +40,10 @@ def test_the_numbers_on_the_screen_are_the_services(
         shown = dict(
             zip(card(page, run["id"]).locator("dt").all_inner_texts(), _values(card(page, run["id"])), strict=True)
         )
-        assert [shown[name] for name in ("failures", "distinct", "preventable")] == [str(run[name]) for name in STEPS]
+        assert [shown[name] for name in ("failures", "distinct", "preventable")] == [
+            str(run[name]) for name in STEPS[:3]
+        ]
+        assert shown["headline"] == str(run["metrics"]["headline"])
         for name in ("ecr", "pcr"):
             assert _number(shown[name.upper()]) == pytest.approx(100 * run["metrics"][name], abs=0.0501)
         expect(card(page, run["id"])).to_contain_text(f"{run['raw_collisions']} contacts")

@@ -50,17 +50,16 @@ def test_the_numbers_of_a_report_are_the_services(
         row = row_of(page, cell["method"])
         expect(row).to_be_visible()
         shown = row.locator("td").all_inner_texts()
-        counts = [text.strip() for text in (*shown[:2], *shown[4:])]
-        assert counts == [
-            str(value)
-            for value in (cell["distinct_failures"], cell["distinct_preventable"], len(cell["seeds"]), cell["episodes"])
-        ]
-        for name, text in zip(("ecr", "pcr"), shown[2:4], strict=True):
+        counts = [text.strip() for text in (*shown[:3], *shown[5:])]
+        named = [cell[name] for name in ("headline", "distinct_failures", "distinct_preventable")]
+        assert counts == [str(value) for value in (*named, len(cell["seeds"]), cell["episodes"])]
+        for name, text in zip(("ecr", "pcr"), shown[3:5], strict=True):
             estimate = cell["estimates"][name]
             assert numbers(text) == per_cent(estimate["mean"], estimate["low"], estimate["high"])
         funnel = page.get_by_role("group", name=f"Funnel of {cell['method']}")
         assert funnel.locator("b").all_inner_texts() == [
-            str(cell[name]) for name in ("failures", "distinct_failures", "distinct_preventable")
+            str(cell[name])
+            for name in ("failures", "distinct_failures", "distinct_preventable", "headline_candidates", "headline")
         ]
     tests = page.get_by_role("region", name=f"{table['reference']} against the others").locator("tbody tr")
     assert tests.count() == sum(test["family"] == "low" for test in table["tests"])
@@ -169,8 +168,8 @@ def _check_total(row: Locator, letter: str, total: dict[str, Any]) -> None:
     for name, text in zip(("ecr", "pcr"), row.locator("td.rate").all_inner_texts(), strict=True):
         assert numbers(text) == per_cent(total[name], total[f"{name}_low"], total[f"{name}_high"])
     shown = [text.strip() for text in row.locator("td").all_inner_texts()]
-    named = ("distinct_failures", "distinct_preventable", "runs", "episodes")
-    assert [*shown[:2], *shown[4:]] == [str(total[name]) for name in named]
+    named = ("headline", "distinct_failures", "distinct_preventable", "runs", "episodes")
+    assert [*shown[:3], *shown[5:]] == [str(total[name]) for name in named]
 
 
 def _saved(page: Page, button: Locator, folder: Path) -> Path:

@@ -12,7 +12,7 @@ from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 
 from risk_sac.cli.campaigns.failures import look_command
 from risk_sac.cli.campaigns.gate import Bounds, Comparison, Measured, comparisons, excesses, measured
-from risk_sac.cli.console import counted
+from risk_sac.cli.console import counted, headline
 from risk_sac.client import Episode, Results, RunResult, Total
 from risk_sac.metrics import COLUMNS, requirement_cells
 from risk_sac.records import State
@@ -31,7 +31,9 @@ def junit(
     for family in dict.fromkeys(run.family for run in results.runs):
         suite = TestSuite(family)
         runs = [run for run in results.runs if run.family == family]
-        properties = {"campaign": results.campaign_id, "url": url, **_versions(runs)}
+        candidates = sum(total.headline_candidates for total in results.totals)
+        properties = {"headline failures": headline(results.headline, candidates)}
+        properties |= {"campaign": results.campaign_id, "url": url, **_versions(runs)}
         for name, value in properties.items():
             suite.add_property(printable(name), printable(value))
         suite.add_testcases([_case(run, names.of_run(run)) for run in runs])
@@ -53,9 +55,10 @@ def _case(run: RunResult, named: str) -> TestCase:
             case.add_property(name, printable(value))
     if (found := run.metrics) is not None:
         funnel = (
+            f"headline failures: {headline(found.headline, found.headline_candidates)}; "
             f"{counted(found.raw_collisions, 'contact')}, {found.collisions} valid; "
             f"{counted(found.failures, 'failure')}; {counted(found.distinct_failures, 'distinct violation')}, "
-            f"{found.distinct_preventable} preventable"
+            f"{found.distinct_preventable} preventable, {found.headline_candidates} of them not minor"
         )
         case.add_property("funnel", funnel)
     if named:

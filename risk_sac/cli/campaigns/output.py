@@ -16,6 +16,7 @@ from risk_sac.cli.console import (
     Commands,
     add_command,
     counted,
+    headline,
     number,
     on_one_line,
     or_dash,
@@ -27,7 +28,7 @@ from risk_sac.metrics import pooled_requirements
 from risk_sac.records import wire
 from risk_sac.terminal import console
 
-COUNTS = ("epi-\nsodes", "con-\ntacts", "fail-\nures", "dis-\ntinct", "preven-\ntable")
+COUNTS = ("head-\nline", "epi-\nsodes", "fail-\nures", "dis-\ntinct", "preven-\ntable")
 RATES = ("ECR\n95 %", "PCR\n95 %")
 
 Answer = BaseModel | Sequence[BaseModel] | Mapping[str, Any]
@@ -67,7 +68,8 @@ def figures(campaign: CampaignSummary) -> str:
     eta = "?" if progress.eta_s is None else f"{progress.eta_s:.0f} s"
     reason = f"; {campaign.state}, {on_one_line(campaign.reason)}" if campaign.reason else ""
     failures = f"{counted(progress.failures, 'failure')}{_by_requirement(campaign)}"
-    found = f"{failures}, {progress.distinct_preventable} distinct and preventable"
+    first = f"headline failures: {headline(progress.headline, progress.headline_candidates)}"
+    found = f"{first}; {failures}, {progress.distinct_preventable} distinct and preventable"
     rates = f"ECR {or_dash(progress.window_ecr, '.2f')}, PCR {or_dash(progress.window_pcr, '.2f')}"
     return f"{found}, {rates}, ETA {eta}{reason}"
 
@@ -84,14 +86,16 @@ def _by_requirement(campaign: CampaignSummary) -> str:
 def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
     """One row per campaign."""
     table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for name in ("id", "state", "episodes", "failures", "posted"):
-        table.add_column(name, no_wrap=True, justify="right" if name in ("episodes", "failures") else "left")
+    for name in ("id", "state", "headline", "episodes", "failures", "posted"):
+        words = name in ("id", "state", "posted")
+        table.add_column(name, no_wrap=True, justify="left" if words else "right")
     table.add_column("label")
     for campaign in campaigns:
         progress = campaign.progress
         table.add_row(
             campaign.id,
             campaign.state,
+            or_dash(progress.headline, "d"),
             f"{progress.episodes_done}/{progress.episodes_total}",
             str(progress.failures),
             f"{campaign.created_at.astimezone():%Y-%m-%d %H:%M}",
@@ -116,10 +120,13 @@ def results_tables(results: Results, bounds: Bounds) -> Group:
 def results_table(results: Results, bounds: Bounds) -> Table:
     """Per family and method the funnel, and ECR and PCR over their intervals; 80 columns hold it.
 
-    Contacts are all of the ego's; failures, distinct and preventable ones are of every requirement that counts.
+    The title has the headline failures of the campaign: what several methods found alike counts once there.
+    Failures, distinct and preventable ones are of every requirement that counts.
     """
     partial = "" if results.complete else ", so far"
-    table = Table(title=f"{results.campaign_id} {results.state}{partial}", box=SIMPLE_HEAD, padding=0)
+    found = headline(results.headline, sum(total.headline_candidates for total in results.totals))
+    title = f"headline failures: {found}\n{results.campaign_id} {results.state}{partial}"
+    table = Table(title=title, box=SIMPLE_HEAD, padding=0)
     table.add_column("family", overflow="fold")  # of a place on a map it is long
     table.add_column("method", no_wrap=True)
     for name in (*COUNTS, *RATES):
@@ -129,7 +136,8 @@ def results_table(results: Results, bounds: Bounds) -> Table:
         table.add_row(
             total.family,
             f"{total.method}\n{counted(total.runs, 'run')}",
-            *map(str, (total.episodes, total.raw_collisions, total.failures)),
+            or_dash(total.headline, "d"),
+            *map(str, (total.episodes, total.failures)),
             *map(str, (total.distinct_failures, total.distinct_preventable)),
             _rate(total.ecr, total.ecr_low, total.ecr_high, broken.get("ECR")),
             _rate(total.pcr, total.pcr_low, total.pcr_high, broken.get("PCR")),

@@ -92,7 +92,7 @@ class Kinds(Record):
     """What a family's valid contacts are, in the taxonomy's terms."""
 
     cells: int
-    """Of the taxonomy; most of them hold what no ego and no road allows."""
+    """Of the taxonomy; most can hold nothing."""
     hit: Mapping[str, int]
     """Cell, in words, → contacts, the most frequent first."""
     values: Mapping[str, Mapping[str, int]]

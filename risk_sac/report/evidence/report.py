@@ -11,7 +11,7 @@ from risk_sac.report.evidence.looked import bounds, coverage, odd
 from risk_sac.report.evidence.origin import Origin, again
 from risk_sac.report.evidence.searched import budget, clusters, funnel, regression
 from risk_sac.report.evidence.words import ego_in_words
-from risk_sac.report.page import DASH, platform_in_words, versions_in_words
+from risk_sac.report.page import DASH, number, platform_in_words, versions_in_words
 
 BANNER = (
     "Search results are no crash rate. The search looks for what goes wrong, so its counts say that something can "
@@ -51,6 +51,7 @@ def report(comparison: Comparison, evidence: Evidence, origin: Origin) -> Docume
 
 def _facts(comparison: Comparison) -> Iterator[tuple[str, str]]:
     spec = comparison.spec
+    yield "headline failures", number(comparison.headline, "d")
     yield "ego", ego_in_words(spec.ego)
     yield "its version", _versions(comparison)
     yield "families", ", ".join(spec.families)

@@ -12,15 +12,15 @@ from risk_sac.report.evidence.document import Block, Card, Cards, Commands, Sect
 from risk_sac.report.evidence.origin import Origin, draw
 from risk_sac.report.evidence.words import ego_in_words
 from risk_sac.report.markdown import verified
-from risk_sac.report.page import DASH
+from risk_sac.report.page import DASH, number
 from risk_sac.report.runs import FinishedRun
 from risk_sac.report.verdicts import class_rows, driver_rows
 from risk_sac.verdicts.words import began, known, prevented_by
 
 MOST_CARDS = 12  # of a family
 FUNNEL = [
-    *("family", "method", "runs", "episodes", "refused", "contacts", "valid contacts"),
-    *("failures", "distinct", "preventable", "verified"),
+    *("family", "method", "runs", "headline", "episodes", "refused", "contacts", "valid contacts"),
+    *("failures", "distinct", "preventable", "not minor", "verified"),
 ]
 
 
@@ -58,8 +58,10 @@ def funnel(comparison: Comparison) -> Section:
             cell.family,
             cell.method,
             str(len(cell.seeds)),
+            number(cell.headline, "d"),
             *(f"{count:,}" for count in (cell.episodes, cell.rejected, cell.raw_collisions, cell.collisions)),
             *(f"{count:,}" for count in (cell.failures, cell.distinct_failures, cell.distinct_preventable)),
+            f"{cell.headline_candidates:,}",
             verified(comparison.of_cell(cell.family, cell.method), "search"),
         ]
         for cell in comparison.cells
@@ -67,10 +69,17 @@ def funnel(comparison: Comparison) -> Section:
     ]
     blocks: list[Block] = [
         (
+            f"{_counted(found, 'headline failure')} by all methods together: distinct, preventable, not minor, and the "
+            "same when replayed. What several runs found alike counts once."
+            if (found := comparison.headline) is not None
+            else "No run was replayed, so there is no count of headline failures yet (risk-sac verify replays them)."
+        ),
+        (
             "Refused: the scene was infeasible, and nothing was played. Valid: no artefact of the simulator, and the "
             "ego had a part in it. Failures: episodes with a valid violation of a requirement that counts, contacts "
             "among them. Distinct: violations that resemble no earlier one of the same run; an episode may have "
             "several. Preventable: the distinct ones that a reference driver in the ego's place would have prevented. "
+            "Not minor: of these, violations without contact, and contacts whose severity is moderate or severe. "
             "Verified: of the first failures of each kind, those that were the same to the bit each time they were "
             "replayed; a dash where none was. The search chose these scenes: no share of these numbers is a rate of "
             "crashes."

@@ -12,7 +12,9 @@ from tests.unit.cli.test_gate import TOTAL, requirements
 
 METRICS = run_metrics(
     40, failures=10, ecr=0.25, ecr_low=0.1, ecr_high=0.4, distinct_failures=4, raw_collisions=12, preventable=6
-).model_copy(update={"distinct_preventable": 2, "pcr": 0.15, "pcr_low": 0.05, "pcr_high": 0.3})
+).model_copy(
+    update={"distinct_preventable": 2, "headline_candidates": 1, "pcr": 0.15, "pcr_low": 0.05, "pcr_high": 0.3}
+)
 RUN = {
     "id": "low-sac-0",
     "family": "low",
@@ -68,6 +70,7 @@ def report(
             "campaign_id": "c1",
             "state": state,
             "complete": state == "succeeded",
+            "headline": 2,
             "totals": [TOTAL | total for total in totals],
             "runs": [RUN | run for run in runs],
         }
@@ -179,8 +182,16 @@ def test_a_run_that_failed_or_was_cancelled_is_an_error_and_one_that_goes_on_is_
 
 def test_digests_versions_and_where_to_look_are_properties() -> None:
     root = report({}, {"seed": 1, "versions": {"libsumo": "1.29.0"}})
-    assert properties(root[0]) == {"campaign": "c1", "url": URL, "version.libsumo": "1.28.0, 1.29.0"}
-    funnel = "12 contacts, 10 valid; 10 failures; 4 distinct violations, 2 preventable"
+    assert properties(root[0]) == {
+        "headline failures": "2",
+        "campaign": "c1",
+        "url": URL,
+        "version.libsumo": "1.28.0, 1.29.0",
+    }
+    funnel = (
+        "headline failures: at most 1; 12 contacts, 10 valid; 10 failures; 4 distinct violations, 2 preventable, "
+        "1 of them not minor"
+    )
     assert properties(root[0][1]) == {"run": "low-sac-0", "spec_digest": "aa", "digest": "bb", "funnel": funnel}
 
 

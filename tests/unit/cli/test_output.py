@@ -24,6 +24,7 @@ TOTAL = ORDINARY | {
     "distinct_failures": 9_999,
     "preventable": 9_999,
     "distinct_preventable": 9_999,
+    "headline": 9_999,
     "pcr": 0.999,
     "pcr_low": 0.99,
     "pcr_high": 1.0,
@@ -33,11 +34,19 @@ TOTAL = ORDINARY | {
 def test_results_of_every_method_fit_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
     place = "car_following_" + "a_street_of_a_town_" * 2 + "0a1b2c3d4e5f"
     totals = [TOTAL | {"method": method} for method in METHODS] + [TOTAL | {"family": place, "method": "sac"}]
-    results = {"campaign_id": "c1", "state": "succeeded", "complete": True, "runs": [], "totals": totals}
+    results = {
+        "campaign_id": "c1",
+        "state": "succeeded",
+        "complete": True,
+        "headline": 12,
+        "runs": [],
+        "totals": totals,
+    }
     Console(width=80).print(results_table(Results.model_validate(results), Bounds(ecr=0.1)))
     printed = capsys.readouterr().out
     assert "…" not in printed
     assert all(f"{method} " in printed for method in METHODS)
+    assert printed.splitlines()[0].strip() == "headline failures: 12"
     assert printed.count("above") == printed.count("100 runs") == len(totals)
     assert place in "".join(line.split()[0] for line in printed.splitlines() if line.strip())
 
@@ -89,5 +98,6 @@ def test_a_failure_without_contact_is_listed_by_what_it_violates(capsys: pytest.
 @pytest.mark.parametrize(("count", "said"), [(0, "0 failures"), (1, "1 failure"), (2, "2 failures")])
 def test_one_failure_is_no_failures(count: int, said: str) -> None:
     progress = PROGRESS | {"episodes_done": 1, "episodes_total": 1, "failures": count, "distinct_preventable": 1}
+    progress |= {"headline_candidates": 3}
     found = CampaignSummary.model_validate(campaign(progress=progress))
-    assert line(found).startswith(f"c1 running: 1/1 episode, {said}, 1 distinct")
+    assert line(found).startswith(f"c1 running: 1/1 episode, headline failures: at most 3; {said}, 1 distinct")

@@ -6,8 +6,10 @@ import pytest
 from risk_sac.config import Budget, LearnerConfig, RunSpec
 from risk_sac.errors import CheckpointError, ConfigError
 from risk_sac.execution.runs import run
+from risk_sac.records import Repetition
 from risk_sac.run import CHECKPOINT
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
+from risk_sac.run_folder.verified import Verified, distinct_failures, write_verified
 
 SPEC = RunSpec(
     family="low",
@@ -71,6 +73,16 @@ def test_a_folder_with_damaged_results_and_the_checkpoint_of_another_run_is_left
         execute(folder, SPEC.model_copy(update={"seed": 4}))
     assert (folder / RESULTS).read_bytes() == b""
     assert (folder / CHECKPOINT).exists()
+
+
+def test_the_same_command_again_keeps_the_headline_of_the_replay(folder, finished):
+    assert execute(folder).metrics.headline is None
+    results = finished[1]
+    episodes = {episode.index: Repetition(times=2, same=2) for episode in distinct_failures(results)}
+    write_verified(folder, Verified(digest=results.digest, code="", versions={}, episodes=episodes))
+    execute(folder)
+    found = read_results(folder).metrics
+    assert found.headline == len(found.headline_kinds) == found.headline_candidates
 
 
 def test_a_contact_whose_series_is_lost_stays_a_contact(folder, finished):

@@ -32,7 +32,8 @@ def test_records_from_before_contacts_were_judged_keep_their_digest():
 
 
 def test_records_that_are_judged_without_the_moment_of_notice_keep_their_digest():
-    judged = RUN[0].model_copy(update={"collision": RUN[0].collision.model_copy(update={"judgement": judgement()})})
+    older = {"judgement": judgement(severity=None, injury_risk=None)}
+    judged = RUN[0].model_copy(update={"collision": RUN[0].collision.model_copy(update=older)})
     old = json.loads(json.dumps(judged.model_dump(mode="json", by_alias=False)))
     for name in NEWER:
         del old[name]

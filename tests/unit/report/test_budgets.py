@@ -57,7 +57,7 @@ def test_the_page_says_it_by_method(spec: CampaignSpec, runs: list[FinishedRun])
     timed = [replace(run, episode_cpu_s=(3.0, 6.0, 9.0, 12.0, 13.0)) for run in runs]
     page = table_markdown(compare(spec, timed, "a command"))
     assert "### What a budget finds: low" in page
-    assert "| risk-sac | 10 CPU s | 2 | 1 (1–1) | 1.5 (1–2) | " in page
+    assert "| risk-sac | 10 CPU s | 2 | 1 (1–1) | 1 (1–1) | 1.5 (1–2) | " in page
     assert "What a budget finds: low" not in table_markdown(compare(spec, runs, "a command"))  # nothing was measured
 
 
@@ -69,7 +69,7 @@ def test_our_own_search_is_tested_against_the_others_on_what_a_user_pays_for(
     wanted = spec.model_copy(update=budget | methods)
     letters = {"risk-sac": "....", "risk-sac-diverse": "f...", "random": "f..."}
     runs = [replace(finished(run, letters[run.method]), episode_cpu_s=(5.0, 10.0, 20.0, 31.0)) for run in wanted.runs()]
-    against = {test.method: test for test in compare(wanted, runs, "a command").headline}
+    against = {test.method: test for test in compare(wanted, runs, "a command").paid_tests}
     assert {test.reference for test in against.values()} == {"risk-sac-diverse"}
     assert (against["risk-sac"].difference, against["random"].difference) == (1.0, 0.0)
     assert against["risk-sac"].p == pytest.approx(2 / 2**6)

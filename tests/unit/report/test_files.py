@@ -66,12 +66,12 @@ def section(page, title):
 
 def test_page_has_the_funnel_of_every_method(comparison):
     assert section(table_markdown(comparison), "### The funnel: low, search\n") == [
-        "| method | episodes | contacts | valid contacts | failures | distinct | preventable | verified "
-        "| unresponsive |",
-        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
-        "| risk-sac | 8 | 4 | 4 | 4 | 3 | 2 | – | 25.0 % |",
-        "| sac | 8 | 3 | 1 | 1 | 1 | 1 | – | 0.0 % |",
-        "| no-adversary | 8 | 1 | 0 | 0 | 0 | 0 | – | – |",
+        "| method | headline | episodes | contacts | valid contacts | failures | distinct | preventable | not minor "
+        "| verified | unresponsive |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+        "| risk-sac | – | 8 | 4 | 4 | 4 | 3 | 2 | 2 | – | 25.0 % |",
+        "| sac | – | 8 | 3 | 1 | 1 | 1 | 1 | 1 | – | 0.0 % |",
+        "| no-adversary | – | 8 | 1 | 0 | 0 | 0 | 0 | 0 | – | – |",
     ]
     assert "### Requirements" not in table_markdown(comparison)  # runs from before they were counted
 
@@ -89,11 +89,11 @@ def test_page_json_and_csv_say_which_driver_prevents_how_bad_it_is_and_whose_fau
         f"| sac | {share} | 0.500 [0.150, 0.850] |",
     ]
     assert section(page, "### Severity and fault: low, search")[2] == (
-        "| sac | 1 (100 %) | 0 (0 %) | 0 (0 %) | 0 (0 %) | 1 (100 %) | 0 (0 %) |"
+        "| sac | 1 (50 %) | 1 (50 %) | 0 (0 %) | 0 (0 %) | 1 (100 %) | 0 (0 %) |"
     )
     cell, _ = json.loads(table_json(compared))["cells"]
     assert cell["pcr_by_driver"]["r157"] == {"prevented": 1, "pcr": 0.25, "pcr_low": low, "pcr_high": high}
-    assert (cell["by_severity"], cell["by_fault"]) == ({"severe": 1}, {"shared": 1})
+    assert (cell["by_severity"], cell["by_fault"]) == ({"moderate": 1, "severe": 1}, {"shared": 1})
     row, _ = csv.DictReader(io.StringIO(table_csv(compared)))
     assert (row["r157.prevented"], row["severity.severe"], row["fault.ego"]) == ("1", "1", "0")
 
@@ -109,7 +109,7 @@ def test_page_json_and_csv_have_the_funnel_of_every_requirement(spec, finished):
         "| sac | safe_ttc | report | 2 | – | – | – | 0.500 [0.150, 0.850] |",
         "| sac | never_fast | failure | 2 | 2 | 1 | 1 | 0.500 [0.150, 0.850] |",
     ]
-    assert section(page, "### The funnel: low, search\n")[-1] == "| sac | 4 | 0 | 0 | 2 | 1 | 1 | – | – |"
+    assert section(page, "### The funnel: low, search\n")[-1] == "| sac | – | 4 | 0 | 0 | 2 | 1 | 1 | 1 | – | – |"
     cell = json.loads(table_json(newer))["cells"][0]
     assert (cell["failures"], cell["collisions"], cell["requirements"]["never_fast"]["valid"]) == (2, 0, 2)
     search, evaluation = csv.DictReader(io.StringIO(table_csv(newer)))

@@ -7,7 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.config import METHODS, LearnerConfig, Requirement, RewardConfig
+from risk_sac.records import Grade, Severity
 from risk_sac.risk import reward
+from tests.builders import collision, judgement
 
 CONFIG = RewardConfig(
     valid_collision=10, violation=4, degenerate_collision=2, ttc_weight=0.1, ttc_scale_s=2.0, rss_weight=0.05
@@ -87,3 +89,17 @@ def test_the_training_reward_takes_equation_8_to_the_letter_if_told() -> None:
     told = {"agent": {"discount": 0.5}, "reward": {"zero_terminal_potential": False}}
     to_the_letter = reward.TrainingReward(METHODS["risk-sac"], LearnerConfig.model_validate(told))
     assert to_the_letter(1.0, 0.4, 2.0, -3.0, 1.0, 2.5) == 3.5
+
+
+@pytest.mark.parametrize(
+    ("grade", "severity", "share"),
+    [
+        (Grade.PREVENTABLE, Severity.SEVERE, 1.0),
+        (Grade.PREVENTABLE, None, 1.0),
+        (Grade.PREVENTABLE, Severity.MINOR, 0.5),
+        (Grade.FULL_BRAKING, Severity.MODERATE, 0.5),
+        (Grade.UNAVOIDABLE, Severity.MINOR, 0.125),
+    ],
+)
+def test_a_contact_is_worth_less_the_less_it_says_of_the_ego_and_less_again_if_it_is_minor(grade, severity, share):
+    assert reward.worth(collision(judgement=judgement(grade, severity=severity)), RewardConfig()) == share

@@ -1,10 +1,13 @@
 """Which failures are refused because one of them does not repeat."""
 
+from dataclasses import replace
+
 from risk_sac.config import RunSpec
-from risk_sac.records import REPEATS, EpisodeRecord, Grade, Outcome, Repetition
+from risk_sac.metrics import pooled_headline
+from risk_sac.records import REPEATS, EpisodeRecord, Grade, Outcome, Repetition, Severity
 from risk_sac.run_folder.results import RecordedFailure, Results
-from risk_sac.run_folder.verified import Verified, distinct_failures
-from tests.builders import collision, episode_record, judgement, violation
+from risk_sac.run_folder.verified import Verified, distinct_failures, with_headline
+from tests.builders import collision, episode_record, judgement, run_metrics, violation
 
 
 def failure(index: int, phase: str = "train", **changes: object) -> EpisodeRecord:
@@ -78,3 +81,50 @@ def test_an_episode_is_distinct_by_any_of_its_violations() -> None:
     failures = tuple(RecordedFailure.of(spec.id, each) for each in episodes)
     results = Results(spec=spec, spec_digest="", finished=True, failures=failures)
     assert [episode.index for episode in distinct_failures(results)] == [0, 2]
+
+
+def results_of(*episodes: EpisodeRecord) -> Results:
+    spec = RunSpec(family="low", method="random", seed=0)
+    failures = tuple(RecordedFailure.of(spec.id, each) for each in episodes)
+    return Results(spec=spec, spec_digest="", finished=True, metrics=run_metrics(), failures=failures)
+
+
+MINOR = judgement(severity=Severity.MINOR)
+HEADLINE = ("no_contact: cut-in, straight [1-0-0]", "never_fast: never_fast violated; straight [1]")
+
+
+def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repeats() -> None:
+    results = results_of(
+        failure(0, judgement=MINOR, other_speed_mps=20.0),
+        failure(1),
+        failure(2),  # like it
+        failure(3, judgement=judgement(Grade.FULL_BRAKING, signature="leader")),
+        failure(4, judgement=judgement(signature="merge")),  # does not repeat
+        failure(5, judgement=judgement(signature="crossing", severity=None)),  # of an older version
+        episode_record(6, Outcome.FAILURE, violations=(violation(grade=Grade.PREVENTABLE),)),
+        failure(7, phase="evaluate"),
+    )
+    found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e5=2, e6=2, e7=2)).metrics
+    assert found is not None
+    assert (found.headline, found.headline_kinds) == (2, HEADLINE)
+    assert results.metrics is not None
+    assert results.metrics.headline is None, "before a replay"
+
+
+def test_the_evaluation_has_a_headline_of_its_own() -> None:
+    results = replace(results_of(failure(0, judgement=MINOR), failure(1, phase="evaluate")), evaluation=run_metrics())
+    found = with_headline(results, verified(e0=2, e1=2))
+    assert [phase and phase.headline for phase in (found.metrics, found.evaluation)] == [0, 1]
+
+
+def test_the_first_that_is_not_minor_is_replayed_though_another_of_its_kind_is_preventable() -> None:
+    results = results_of(failure(0, judgement=MINOR), failure(1, judgement=MINOR), failure(2), failure(3))
+    assert [episode.index for episode in distinct_failures(results)] == [0, 2]
+
+
+def test_runs_have_the_union_of_their_headlines() -> None:
+    one = run_metrics(headline=2, headline_kinds=HEADLINE)
+    other = run_metrics(headline=2, headline_kinds=("no_contact: merge [0-0-0]", HEADLINE[0]))
+    assert pooled_headline([one, other, run_metrics()]) == 3
+    assert pooled_headline([one, one]) == 2
+    assert pooled_headline([run_metrics()]) is None

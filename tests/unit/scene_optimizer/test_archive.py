@@ -1,22 +1,26 @@
 """What the archive search adds to the promises in test_scene_optimizer.py."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.records import Collision, Grade, ReferenceOutcome
+from risk_sac.records import Collision, Grade, ReferenceOutcome, Severity
 from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
-from risk_sac.scene_optimizer.archive import INITIAL, NEW, NEW_PREVENTABLE, Elites, mutated
+from risk_sac.scene_optimizer.archive import INITIAL, NEW, NEW_CANDIDATE, Elites, mutated
 from tests.builders import collision, judgement, violation
 
 HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)
 
 
-def failure(grade: Grade, kind: str = "cut-in", impact_mps: float = 5.0, striker: str = "left") -> Collision:
+def failure(
+    grade: Grade, kind: str = "cut-in", impact_mps: float = 5.0, striker: str = "left", **judged: Any
+) -> Collision:
     careful = ReferenceOutcome(avoids=grade is Grade.PREVENTABLE, impact_speed_mps=impact_mps)
-    return collision(other_id=striker, judgement=judgement(grade, signature=kind, drivers={"r157": careful}))
+    return collision(other_id=striker, judgement=judgement(grade, signature=kind, drivers={"r157": careful}, **judged))
 
 
 def test_a_niche_keeps_what_the_careful_driver_came_nearest_to_preventing():
@@ -42,11 +46,24 @@ def test_a_parent_is_credited_with_what_was_new_and_most_with_what_was_preventab
     elites.add_failure(THERE, failure(Grade.FULL_BRAKING), parent)
     assert parent.credit == 0.0
     elites.add_failure(THERE, failure(Grade.PREVENTABLE), parent)
-    assert parent.credit == NEW_PREVENTABLE
+    assert parent.credit == NEW_CANDIDATE
     elites.add_failure(THERE, failure(Grade.FULL_BRAKING, "leader"), parent)
-    assert parent.credit == NEW_PREVENTABLE + NEW
+    assert parent.credit == NEW_CANDIDATE + NEW
     elites.add_failure(THERE, failure(Grade.PREVENTABLE), parent)
-    assert parent.credit == NEW_PREVENTABLE + NEW
+    assert parent.credit == NEW_CANDIDATE + NEW
+
+
+def test_a_minor_contact_ranks_below_what_the_headline_counts():
+    elites = Elites()
+    elites.add_failure(HERE, failure(Grade.PREVENTABLE, severity=Severity.MINOR), None)
+    (minor,) = elites.pool()
+    elites.add_failure(THERE, failure(Grade.PREVENTABLE), minor)
+    (severe,) = elites.pool()
+    assert severe.worth > minor.worth
+    assert minor.credit == NEW_CANDIDATE
+    elites.add_failure(HERE, failure(Grade.PREVENTABLE, severity=Severity.MINOR), severe)
+    np.testing.assert_array_equal(elites.pool()[0].point, THERE)
+    assert severe.credit == 0.0
 
 
 def test_near_misses_stand_in_for_who_has_struck_nobody():

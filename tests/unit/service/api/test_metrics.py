@@ -4,6 +4,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.local import LocalExecutor
+from risk_sac.execution.messages import Finished
 from risk_sac.metrics.requirements import STEPS
 from risk_sac.records import Outcome, RequirementCounts, State
 from service.api.metrics import MOST_OWN, OTHERS, registry, request_latencies
@@ -57,6 +58,20 @@ def test_what_is_stored_is_counted(store, ledger, episode, scrape):
     assert (seen["risk_sac_campaigns", "running"], seen["risk_sac_campaigns", "failed"]) == (1, 0)
     assert seen[("risk_sac_storage_available",)] == 1
     assert seen[("process_resident_memory_bytes",)] > 0
+
+
+def test_headline_failures_count_once_a_run_was_replayed(store, ledger, metrics, scrape):
+    run = ledger.create(SPEC).runs[0]
+    ledger.start_run(run.number)
+    assert scrape()["risk_sac_headline_failures_total", "low", "random"] == 0
+    told = {"headline": 2, "headline_kinds": ("a", "b"), "headline_candidates": 3}
+    evaluation = metrics.model_copy(update={"headline": 1, "headline_kinds": ("b",)})
+    searched = metrics.model_copy(update=told)
+    result = Finished(finished=True, metrics=searched, evaluation=evaluation, digest="", versions={}, wall_s=1.0)
+    ledger.end_run(run.number, State.SUCCEEDED, result=result)
+    seen = scrape()
+    assert seen["risk_sac_headline_failures_total", "low", "random"] == 2
+    assert seen["risk_sac_headline_candidates_total", "low", "random"] == 3
 
 
 def test_a_run_from_before_contacts_were_judged_has_an_ecr_alone(store, ledger, episode, scrape):

@@ -69,6 +69,8 @@ def test_one_step_back_leaves_all_rows_to_the_version_before(settings, episode, 
     assert newest.keys() == before.keys()
     gone = set(newest["episodes"][0]) - set(before["episodes"][0])
     assert {name for name, *_ in gone} == {"severity", "fault"}
+    gone = set(newest["runs"][0]) - set(before["runs"][0])
+    assert {name for name, *_ in gone} == {"headline", "headline_candidates"}
     assert main(["back"]) == 1, "no further"
     assert f"database is at step {BEFORE}; wanted {newest_step()}" in capsys.readouterr().err
     store = Store(settings.url)  # which steps forward again

@@ -53,6 +53,7 @@ def test_a_column_has_what_the_record_has(ledger):
         "injury_risk": 0.0123,
         "fault": None,
         "prevented_by": [],
+        "headline": False,
         "distinct": False,
         "kind": 0,
         "striker": "lead",
@@ -184,3 +185,23 @@ def test_scenes_of_a_family_have_all_parameters_that_one_of_them_has(ledger):
         "low": {"names": ["gap", "friction"], "rows": [[1.0, None], [2.0, 0.5]], "of": [0, 2]},
         "dense": {"names": [], "rows": [[]], "of": [1]},
     }
+
+
+def test_the_headline_has_the_first_of_a_kind_over_all_runs_that_is_not_minor_and_repeats(ledger):
+    campaign = ledger.create(SPEC)
+    first, second = (
+        run.model_copy(update={"repetitions": {index: Repetition(times=2, same=2) for index in (0, 1, 3)}})
+        for run in campaign.runs
+    )
+    searched = campaign.model_copy(update={"runs": (first, second)})
+    minor, grave = (collision(judgement=judgement(severity=each)) for each in (Severity.MINOR, Severity.SEVERE))
+    other = collision(judgement=judgement(signature="leader"))
+    hits = [(first, 0, minor), (first, 1, grave), (first, 2, other), (second, 0, grave), (second, 3, other)]
+    found = told(failure_table(searched, [plain(*each) for each in hits], {}))
+    assert list(zip(found["severity"], found["headline"], strict=True)) == [
+        ("minor", False),
+        ("severe", True),
+        ("moderate", False),  # not replayed
+        ("severe", False),  # as in the other run
+        ("moderate", True),
+    ]

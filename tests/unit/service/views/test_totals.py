@@ -2,6 +2,7 @@ import pytest
 
 from risk_sac.config import CampaignSpec
 from risk_sac.records import RequirementCounts, State
+from service.views.progress import progress
 from service.views.totals import results
 
 
@@ -53,6 +54,25 @@ def test_totals_have_the_funnel_and_its_histograms(ledger, metrics):
     assert (pooled.violated, pooled.valid, pooled.rate) == (4, 2, 2 / 8)
     assert total.signatures == {"cut-in, straight": 2, "pedestrian": 2}
     assert (total.conflicts_by_second, total.contacts_by_second) == ([1, 1, 2, 0], [0, 0, 1, 3])
+
+
+def test_what_two_methods_found_alike_counts_once_in_the_campaign_and_once_for_each(ledger, metrics):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random"), seeds=(0, 1)))
+    found = {("sac", 0): ("a", "b"), ("sac", 1): ("b",), ("random", 0): ("b", "c"), ("random", 1): None}
+    runs = []
+    for run in campaign.runs:
+        kinds = found[run.method, run.seed]
+        told = {} if kinds is None else {"headline": len(kinds), "headline_kinds": kinds}
+        runs.append(changed(run, metrics=metrics.model_copy(update=told)))
+    searched = changed(campaign, runs=tuple(runs))
+    assert {total.method: total.headline for total in results(searched).totals} == {"sac": 2, "random": 2}
+    assert results(searched).headline == progress(searched, 1).headline == 3
+
+
+def test_a_campaign_without_a_replay_has_no_headline_yet(ledger, metrics):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0,)))
+    searched = changed(campaign, runs=(changed(campaign.runs[0], metrics=metrics),))
+    assert results(searched).headline is results(searched).totals[0].headline is progress(searched, 1).headline is None
 
 
 def test_one_run_keeps_its_wilson_interval(ledger, metrics):

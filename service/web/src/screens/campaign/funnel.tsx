@@ -1,4 +1,4 @@
-/** The funnel failures -> distinct -> preventable over all requirements that count, as bars to one scale. */
+/** The funnel failures -> distinct -> preventable -> not minor -> headline over all requirements that count, as bars to one scale. */
 
 import { count } from "../../ui/text";
 
@@ -6,12 +6,16 @@ export interface Counts {
   failures: number;
   distinct_failures: number;
   distinct_preventable: number;
+  headline_candidates: number;
+  headline: number | null;
 }
 
 const STEPS = [
   ["failures", "failures", "Episodes with a valid violation of a requirement that counts; a contact violates one, too."],
   ["distinct_failures", "distinct", "Violations of each kind once, per run."],
   ["distinct_preventable", "preventable", "Distinct ones that a reference driver would have prevented."],
+  ["headline_candidates", "not minor", "Preventable ones that are no minor contacts."],
+  ["headline", "headline", "Those that went the same way when replayed; what several runs found alike counts once."],
 ] as const;
 
 /** @param most what the longest bar stands for, where several funnels are to be compared. */
@@ -20,14 +24,15 @@ export function Funnel({ counts, most = Math.max(counts.failures, counts.distinc
     <ol class="stages" aria-label="Funnel">
       {STEPS.map(([name, word, meaning], step) => {
         const before = step ? counts[STEPS[step - 1]![0]] : 0;
+        const now = counts[name];
         return (
           <li key={name} title={meaning}>
             <span class="stage-word">{word}</span>
             <span class="stage-room">
-              {counts[name] > 0 && <span class={`stage-bar stage-${step + 1}`} style={{ width: `${(100 * counts[name]) / most}%` }} />}
+              {now !== null && now > 0 && <span class={`stage-bar stage-${step + 1}`} style={{ width: `${(100 * now) / most}%` }} />}
             </span>
-            <b data-count={name}>{count(counts[name])}</b>
-            <span class="stage-share">{before ? share(counts[name], before) : ""}</span>
+            <b data-count={name}>{now === null ? "–" : count(now)}</b>
+            <span class="stage-share">{before && now !== null ? share(now, before) : ""}</span>
           </li>
         );
       })}

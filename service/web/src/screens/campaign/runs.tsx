@@ -53,6 +53,7 @@ function Card({ run, campaign, away, hide }: { run: Run; campaign: Body<"Campaig
         <span>{time(run)}</span>
       </p>
       <dl class="run-figures">
+        <Figure name="headline" value={known(run.metrics?.headline)} />
         <Figure name="failures" value={count(run.failures)} />
         <Figure name="distinct" value={count(run.distinct_failures)} />
         <Figure name="preventable" value={count(run.distinct_preventable)} />
@@ -67,6 +68,10 @@ function Card({ run, campaign, away, hide }: { run: Run; campaign: Body<"Campaig
       <Log campaign={campaign.id} run={run} name={name} />
     </article>
   );
+}
+
+function known(value: number | null | undefined): string {
+  return value === null || value === undefined ? "–" : count(value);
 }
 
 function Figure({ name, value }: { name: string; value: string }) {

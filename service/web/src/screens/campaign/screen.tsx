@@ -45,6 +45,7 @@ export function CampaignScreen({ id }: { id: string }) {
           <Funnel counts={progress} />
         </section>
         <section class="card tiles" aria-label="Where the search stands">
+          <Tile name="headline failures" value={known(progress.headline)} title={HEADLINE} />
           <Tile name="sliding ECR" value={percent(progress.window_ecr)} title={OVER} />
           <Tile name="sliding PCR" value={percent(progress.window_pcr)} title={OVER} />
           <Tile name="dual variable λ" value={number(progress.dual_variable)} title={OVER} />
@@ -75,6 +76,9 @@ export function CampaignScreen({ id }: { id: string }) {
 
 const OVER = "Mean over the runs at work, or over all once none is; without controls such as random, unless there is nothing else.";
 
+const HEADLINE =
+  "Distinct, preventable, no minor contact, and the same when replayed. What several runs found alike counts once. A run is replayed at its end.";
+
 function Tile({ name, value, title }: { name: string; value: string; title?: string }) {
   return (
     <div class="tile" title={title}>
@@ -82,6 +86,10 @@ function Tile({ name, value, title }: { name: string; value: string; title?: str
       <span>{name}</span>
     </div>
   );
+}
+
+function known(value: number | null): string {
+  return value === null ? "–" : count(value);
 }
 
 function percent(value: number | null): string {

@@ -13,6 +13,7 @@ export const KEYS = {
   ego: (campaign: Listed) => `${campaign.ego.profile} ${campaign.ego.car_following}`,
   progress: ({ progress }: Listed) => progress.episodes_done / Math.max(1, progress.episodes_total),
   ecr: ({ progress }: Listed) => progress.window_ecr,
+  headline: ({ progress }: Listed) => progress.headline,
   distinct: ({ progress }: Listed) => progress.distinct_failures,
   preventable: ({ progress }: Listed) => progress.distinct_preventable,
   eta: ({ progress }: Listed) => progress.eta_s,

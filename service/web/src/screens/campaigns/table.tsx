@@ -16,6 +16,12 @@ const HEADS: { column: Column; title: string; number?: boolean; hint?: string }[
   { column: "ego", title: "Ego" },
   { column: "progress", title: "Episodes" },
   { column: "ecr", title: "ECR", hint: "valid collisions per episode, over each run's newest 100 episodes" },
+  {
+    column: "headline",
+    title: "Head\u00adline",
+    number: true,
+    hint: "distinct, preventable and not minor failures that went the same way when replayed; what several runs found alike counts once",
+  },
   { column: "distinct", title: "Distinct", number: true, hint: "distinct valid failures, summed over the runs" },
   {
     column: "preventable",
@@ -151,6 +157,7 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
         <Sparkline campaign={campaign} learners={learners} />
         <span class="small faint">{percent(progress.window_ecr)}</span>
       </td>
+      <td class="number">{progress.headline === null ? "–" : count(progress.headline)}</td>
       <td class="number">{count(progress.distinct_failures)}</td>
       <td class="number">{count(progress.distinct_preventable)}</td>
       <td class="number">{remaining(campaign)}</td>

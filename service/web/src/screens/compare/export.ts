@@ -15,6 +15,7 @@ const COLUMNS: [string, (line: Line) => string | number | null][] = [
   ["label", (line) => line.label],
   ["method", (line) => line.row.key.split(" ").at(-1)!],
   ["runs", ({ row }) => row.runs],
+  ["headline", ({ row }) => row.headline],
   ["episodes", ({ row }) => row.episodes],
   ["contacts", ({ row }) => row.raw_collisions],
   ["failures", ({ row }) => row.failures],

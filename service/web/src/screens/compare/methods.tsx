@@ -23,6 +23,9 @@ export function Methods({ what, family, rows }: Compared) {
         <thead>
           <tr>
             <th scope="col">{what}</th>
+            <th scope="col" title="distinct, preventable, not minor, and the same when replayed; each kind once over the runs">
+              Headline
+            </th>
             <th scope="col">Distinct</th>
             <th scope="col">Preventable</th>
             <Axis name="ECR" end={ends.ecr} />
@@ -37,6 +40,7 @@ export function Methods({ what, family, rows }: Compared) {
               <th scope="row">
                 <Sample mark={row.mark} /> {row.name}
               </th>
+              <Bar value={row.headline} most={most} />
               <Bar value={row.distinct_failures} most={most} />
               <Bar value={row.distinct_preventable} most={most} />
               <Rate name="ECR" row={row} estimate={row.ecr} end={ends.ecr} />
@@ -75,12 +79,12 @@ function Rate({ name, row, estimate, end }: { name: string; row: Row; estimate: 
   );
 }
 
-function Bar({ value, most }: { value: number; most: number }) {
+function Bar({ value, most }: { value: number | null; most: number }) {
   return (
     <td class="bar-cell">
-      <b>{count(value)}</b>
+      <b>{value === null ? "–" : count(value)}</b>
       <span class="bar-room">
-        <span style={{ width: `${(100 * value) / most}%` }} />
+        <span style={{ width: `${(100 * (value ?? 0)) / most}%` }} />
       </span>
     </td>
   );

@@ -115,7 +115,7 @@ function Family({ id, table, family, phase }: { id: string; table: Table; family
   const cells = table.cells.filter((cell) => cell.family === family && cell.phase === phase);
   const rows = cells.map((cell) => rowOfCell(cell, markOf(table.spec, { family: table.spec.families[0]!, method: cell.method })));
   const tests = table.tests.filter((test) => test.family === family && test.phase === phase);
-  const headline = table.headline.filter((test) => test.family === family && test.phase === phase);
+  const paid = table.paid_tests.filter((test) => test.family === family && test.phase === phase);
   const overview = table.failures[family];
   return (
     <section class="card family" aria-labelledby={`family-${family}`}>
@@ -128,7 +128,7 @@ function Family({ id, table, family, phase }: { id: string; table: Table; family
       <Verdicts what="Method" family={family} rows={rows} />
       <ByRequirement what="Method" family={family} rows={rows} />
       <Measures what="Method" family={family} rows={rows} />
-      <Tests tests={headline} family={family} reference={headline[0]?.reference ?? table.reference} caption={`Declared beforehand: ${headline[0]?.metric}`} />
+      <Tests tests={paid} family={family} reference={paid[0]?.reference ?? table.reference} caption={`Declared beforehand: ${paid[0]?.metric}`} />
       <Tests tests={tests} family={family} reference={table.reference} caption={`${table.reference} against the others`} />
       {phase === "search" && (
         <section class="block">

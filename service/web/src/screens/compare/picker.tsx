@@ -47,7 +47,8 @@ export function Picker({ chosen: first }: { chosen: string[] }) {
                     <b class="breaking">{campaign.label || campaign.id}</b>
                     <span class={`tag ${campaign.state}`}>{campaign.state}</span>
                     <span class="faint small">
-                      {moment(campaign.created_at)} · {count(campaign.progress.episodes_done)} episodes · {count(campaign.progress.distinct_failures)} distinct,{" "}
+                      {moment(campaign.created_at)} · {count(campaign.progress.episodes_done)} episodes · {campaign.progress.headline === null ? "no" : count(campaign.progress.headline)} headline failures,{" "}
+                      {count(campaign.progress.distinct_failures)} distinct,{" "}
                       {count(campaign.progress.distinct_preventable)} preventable
                     </span>
                   </label>

@@ -21,6 +21,9 @@ export interface Row {
   failures: number;
   distinct_failures: number;
   distinct_preventable: number;
+  headline_candidates: number;
+  /** Each kind once over the row's runs; null before a replay. */
+  headline: number | null;
   /** Requirement -> its funnel; none in what was stored before requirements were counted. */
   requirements: Requirements;
   /** Reference driver -> its own PCR. */
@@ -45,7 +48,7 @@ export interface More {
   environment_steps: number;
 }
 
-const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "requirements", "pcr_by_driver", "by_severity", "by_fault"] as const;
+const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "headline_candidates", "headline", "requirements", "pcr_by_driver", "by_severity", "by_fault"] as const;
 const FURTHER = ["artefacts", "unresponsive_share", "preventable", "environment_steps", "steps_per_distinct_failure"] as const;
 const NOTHING: Estimate = { mean: null, low: null, high: null };
 

@@ -20,6 +20,7 @@ export function sample(size: number, changed: Partial<FailureTable> = {}): Failu
     injury_risk: column(() => 0.1),
     fault: column((i) => (i % 4 === 3 ? null : (["ego", "shared", "other"] as const)[i % 3]!)),
     prevented_by: column((i) => (i % 3 === 0 ? ["r157", "full_braking"] : i % 3 === 1 ? ["full_braking"] : [])),
+    headline: column(() => false),
     distinct: column((i) => i % 4 === 0),
     kind: column((i) => i % 2),
     striker: column((i) => (i % 2 ? "pedestrian" : "left")),

@@ -74,12 +74,15 @@ function Head({ campaign, about, query, table }: HeadProps) {
 }
 
 /** Each step of the funnel: its name, how many, and what it takes. */
-function funnelOf({ valid, distinct, grade }: FailureTable): [string, number, string][] {
+function funnelOf({ valid, distinct, grade, headline, repeats }: FailureTable): [string, number, string][] {
   const among = (test: (i: number) => boolean) => valid.reduce((sum, _, i) => sum + (test(i) ? 1 : 0), 0);
+  const replayed = repeats.some((each) => each !== null);
+  const found: [string, number, string][] = [["headline", among((i) => headline[i]!), "Preventable, not minor, and the same when replayed; each kind once over all runs"]];
   return [
     ["failures", among((i) => valid[i]!), "A requirement that counts was violated, and no rule refused it"],
     ["distinct", among((i) => distinct[i]!), "The first of their kind in their run"],
     ["preventable", among((i) => distinct[i]! && grade[i] === "preventable"), "Distinct, and a reference driver would have prevented them"],
+    ...(replayed ? found : []),
   ];
 }
 
