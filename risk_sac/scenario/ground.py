@@ -62,12 +62,12 @@ def sides_of(areas: Sequence[Area]) -> Sides:
 
 
 @compiled
-def within(areas: Sides, x_m: float, y_m: float) -> bool:
-    """Whether a point lies in any of the areas."""
+def within(areas: Sides, x_m: float, y_m: float, margin_m: float = 0.0) -> bool:
+    """Whether a point lies in any of the areas, or no further than `margin_m` outside one."""
     for area in range(len(areas.first) - 1):
         here = True
         for k in range(areas.first[area], areas.first[area + 1]):
-            if areas.sides[k, 0] * x_m + areas.sides[k, 1] * y_m > areas.sides[k, 2]:
+            if areas.sides[k, 0] * x_m + areas.sides[k, 1] * y_m > areas.sides[k, 2] + margin_m:
                 here = False
                 break
         if here:

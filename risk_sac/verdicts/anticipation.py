@@ -1,9 +1,13 @@
 """The defensive driver in the ego's place: from when it would have driven slower until 4 s after the contact.
 
 It is followed along the ego's path while all others move as recorded. On the record it is asked in every frame since
-the release how much it would allow itself; where that is less than what the ego did, the two part. It takes over at the
-beginning of the last stretch of restraint, which must last until the contact: one that has been unrestrained for more
-than 1 s has let the ego drive as it did.
+the release how much it would allow itself for the striker; where that is less than what the ego did, the two part. It
+takes over at the beginning of the last stretch of restraint, which must last until the contact: one that has been
+unrestrained for more than 1 s has let the ego drive as it did. From then on it minds all others too. So it prevents no
+contact because something else had slowed it down before. For a pedestrian, places count that the ego did not see.
+
+The conflict with the striker is the one that all reference drivers judge: from its beginning until the contact the
+driver knows of it, and where it would end. The record tells that the striker did not stop or yield.
 
 Choices: until the conflict begins it drives no faster than the ego did at the same time; having been slower, it speeds
 up by 2 m/s² at most. From then on it may keep the ego's speed at that moment, or what the ego speeds up to: the ego's
@@ -49,12 +53,13 @@ class Record(NamedTuple):
     step_s: float
 
 
-def driven(evidence: Evidence, path: Path, conflict_frame: int, latest: int) -> tuple[Floats, int]:
+def driven(evidence: Evidence, path: Path, striker: int | None, conflict_frame: int, latest: int) -> tuple[Floats, int]:
     """Drives the defensive driver along a path.
 
     Args:
       evidence: of the episode.
       path: with a point per frame.
+      striker: its column; None: whatever restrains the driver counts.
       conflict_frame: in which the conflict begins.
       latest: the frame from which it drives in any case; on another path than the ego's, where they part.
 
@@ -69,11 +74,14 @@ def driven(evidence: Evidence, path: Path, conflict_frame: int, latest: int) -> 
     crossings = crossings_on(path, float(path.s[0]), float(path.s[-1]) + LOOKS_M, street.boxes, size.half_width)
     memory = nothing_remembered(len(e.ids))
     speed = np.ascontiguousarray(e.speed_mps[:, 0])
-    acts = _acts(path, size, record, street, crossings, speed, released, latest, memory)
+    minds = np.arange(len(e.ids)) == striker if striker is not None else np.ones(len(e.ids), dtype=np.bool_)
+    places = striker is None or not record.vehicle[striker]
+    column, began = (0, len(path.s)) if striker is None else (striker, conflict_frame)
+    acts = _acts(path, size, record, minds, places, column, began, street, crossings, speed, released, latest, memory)
     if acts == len(path.s) - 1:
         return path.s.copy(), acts
     after = round(AFTER_S / e.step_s)
-    return _drive(path, size, record, street, crossings, speed, acts, conflict_frame, memory, after), acts
+    return _drive(path, size, record, column, began, street, crossings, speed, acts, memory, after), acts
 
 
 def _record(e: Evidence) -> Record:
@@ -91,6 +99,10 @@ def _acts(
     path: Path,
     size: Size,
     record: Record,
+    minds: Bools,
+    places: bool,
+    striker: int,
+    began: int,
     street: Street,
     crossings: Crossings,
     speed: Floats,
@@ -105,7 +117,18 @@ def _acts(
     for t in range(released, last):
         remembered[t] = memory
         ego = OnPath(path, t, path.s[t], speed[t], size)
-        scene = Scene(record.states[t], record.vehicle, record.link[t], record.known[t], record.priority[t])
+        strikes_s = _strikes_s(path, path.s[t], speed[t], t, began)
+        scene = Scene(
+            record.states[t],
+            record.vehicle,
+            record.link[t],
+            record.known[t],
+            record.priority[t],
+            minds,
+            places,
+            striker,
+            strikes_s,
+        )
         accel = allowed_accel(ego, scene, street, crossings, memory, step_s)
         free[t] = accel > RESTRAINED_MPS2
         possible = max(speed[t] + accel * step_s, 0.0) if accel < math.inf else math.inf
@@ -124,15 +147,25 @@ def _acts(
 
 
 @compiled
+def _strikes_s(path: Path, s: float, speed: float, frame: int, began: int) -> float:
+    """When the driver would come to the place of the contact, while the conflict of the record lasts; inf else."""
+    last = len(path.s) - 1
+    if began <= frame < last and speed > 0.0:
+        return max(path.s[last] - s, 0.0) / speed
+    return math.inf
+
+
+@compiled
 def _drive(
     path: Path,
     size: Size,
     record: Record,
+    striker: int,
+    began: int,
     street: Street,
     crossings: Crossings,
     recorded_mps: Floats,
     first: int,
-    conflict_frame: int,
     memory: Floats,
     after: int,
 ) -> Floats:
@@ -142,8 +175,8 @@ def _drive(
     found[: first + 1] = path.s[: first + 1]
     s, speed, point = path.s[first], recorded_mps[first], first
     before = (speed - recorded_mps[max(first - 1, 0)]) / step_s
-    kept_mps = recorded_mps[min(max(conflict_frame, first), last)]
-    known = np.zeros(len(record.vehicle), dtype=np.bool_)
+    kept_mps = recorded_mps[min(max(began, first), last)]
+    known, everything = np.zeros(len(record.vehicle), dtype=np.bool_), np.ones(len(record.vehicle), dtype=np.bool_)
     for t in range(first):
         known |= record.known[t]
     for t in range(first, last + after):
@@ -161,10 +194,11 @@ def _drive(
         while point < last and path.s[point + 1] <= s:
             point += 1
         ego = OnPath(path, point, s, speed, size)
-        scene = Scene(state, record.vehicle, record.link[frame], seen, record.priority[frame])
+        link, priority, strikes_s = record.link[frame], record.priority[frame], _strikes_s(path, s, speed, t, began)
+        scene = Scene(state, record.vehicle, link, seen, priority, everything, True, striker, strikes_s)
         accel = allowed_accel(ego, scene, street, crossings, memory, step_s)
         wanted = recorded_mps[min(t + 1, last)]
-        if t + 1 > conflict_frame:
+        if t + 1 > began:
             wanted = max(wanted, kept_mps)
         accel = min(accel, (wanted - speed) / step_s, SPEEDS_UP_MPS2)
         accel = max(accel, min(before, 0.0) - JERK_MPS3 * step_s)

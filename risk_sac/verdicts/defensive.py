@@ -5,14 +5,16 @@
    kerb behind a vehicle that stands beside its path.
 2. Where a vehicle stops at the crossing in another lane of its direction, all of the crossing has to be in sight.
 3. It does not start or speed up while a pedestrian is within 1.5 m of its corridor, or a pedestrian or a crossing
-   vehicle would reach the corridor within 3 s. Before a pedestrian on the carriageway or at a crossing it can stop.
+   vehicle would reach the corridor within 3 s. From 0.75 s after it saw a pedestrian on the carriageway or at a
+   crossing it can stop before it.
 4. It brakes for a conflict: with 3.4 m/s² after 0.75 s if that is enough, or else as R157's driver, until the conflict
    has been over for 1 s.
 
-Choices: it creeps past what it cannot see, so that it never stands for ever. A pedestrian that stands off the
-carriageway on red, or has stood there for 4 s, waits; on the carriageway the driver creeps past one that has stood for
-4 s. A crossing is taken as empty while the ego's signal gives it priority. Vehicles ahead on its own lane that move
-hide nothing: they go through first.
+Choices: it creeps past what it cannot see, so that it never stands for ever. A pedestrian that stands with its whole
+body beside the carriageway on red, or has stood there for 4 s, waits; on the carriageway the driver creeps past one
+that has stood for 4 s. While the ego's signal gives it priority, a crossing is taken as empty, and traffic from across
+is expected to stop if it still can, unless it has passed its own signal. Vehicles ahead on its own lane that move hide
+nothing: they go through first.
 
 Sources: 3.4 m/s² and the 2.5 s of a driver that is not prepared: AASHTO, "A Policy on Geometric Design of Highways and
 Streets" (Green Book), stopping sight distance. 0.75 s and full braking: UN R157, Annex 3; the driver is prepared.
@@ -54,11 +56,12 @@ OWN_LANE_M = 1.2
 STOPS_BEFORE_M, STOPS_BEYOND_M = 12.0, 1.0  # a vehicle that stops for a crossing stands this near to its edge
 AT_CROSSING_M = 2.5  # from a spot of a crossing
 TOUCHES_S = 0.25
+NEARS_MPS = 0.5  # an oncoming vehicle that comes nearer no faster stays on its lane
 PRIORITY, PRIORITY_S = ord("G"), 4.0  # its signal, and how long it counts after the stop line
 SAME_WAY_COS, ONCOMING_COS = 0.5, -0.9
 
 # Rows of what the driver remembers of each actor.
-STOOD_S, SINCE_S, GONE_S = range(3)
+SEEN_S, STOOD_S, SINCE_S, GONE_S, HAD_SIGNAL = range(5)
 
 
 class Scene(NamedTuple):
@@ -69,11 +72,15 @@ class Scene(NamedTuple):
     link: NDArray[np.uint8]
     seen: Bools
     priority: bool  # whether the ego's signal lets it go before all others
+    minds: Bools  # the actors that rules 3 and 4 are asked of
+    places: bool  # whether rules 1 and 2 are asked
+    striker: int  # an actor in a conflict with the ego, whatever it looks like; 0: none
+    strikes_s: float  # when the ego would reach it
 
 
 def nothing_remembered(n: int) -> Floats:
     """The driver's memory at its beginning, for `n` actors."""
-    memory = np.zeros((3, n))
+    memory = np.zeros((5, n))
     memory[SINCE_S] = -1.0
     return memory
 
@@ -89,7 +96,7 @@ def allowed_accel(
       scene: what it sees.
       street: where it is.
       crossings: on its path.
-      memory: of the frames before, `3 x n`; it is brought up to date.
+      memory: of the frames before, `5 x n`; it is brought up to date.
       step_s: until it decides again.
     """
     n = len(scene.vehicle)
@@ -105,25 +112,33 @@ def allowed_accel(
     x, y, heading = pose_at(ego.path, ego.s)
     eye_x, eye_y = x + ego.size.half_length * math.cos(heading), y + ego.size.half_length * math.sin(heading)
     accel = math.inf
-    if not scene.priority:
+    if scene.places and not scene.priority:
         accel = _at_crossings(ego, front, scene, crossings, placed, walls, eye_x, eye_y, step_s)
     for i in range(1, n):
         if math.isnan(state[X, i]) or not scene.seen[i]:
-            memory[STOOD_S, i] = memory[GONE_S, i] = 0.0
+            memory[SEEN_S, i] = memory[STOOD_S, i] = memory[GONE_S, i] = 0.0
             memory[SINCE_S, i] = -1.0
             continue
+        memory[SEEN_S, i] += step_s
         memory[STOOD_S, i] = memory[STOOD_S, i] + step_s if state[SPEED, i] < STANDING_MPS else 0.0
-        where = (placed[0, i], placed[1, i], placed[2, i])
+        where, link = (placed[0, i], placed[1, i], placed[2, i]), int(scene.link[i])
+        memory[HAD_SIGNAL, i] = 1.0 if link != 0 else memory[HAD_SIGNAL, i]
+        approaches = memory[HAD_SIGNAL, i] == 0.0 and not within(street.junctions, state[X, i], state[Y, i])
+        if scene.vehicle[i] and scene.priority and approaches:  # the ego's signal says that it has to stop
+            link = RED
+        touch_s = conflict_in(ego, state, i, scene.vehicle[i], link, street, False)
+        if i == scene.striker:
+            touch_s = min(touch_s, scene.strikes_s)
+        braking = _in_conflict(ego.speed_mps, touch_s, street.grip_mps2, memory[:, i], step_s)
+        if scene.places and scene.vehicle[i] and state[SPEED, i] < STANDING_MPS:
+            accel = min(accel, _past_standing(ego, front, state, i, where, street, walls, eye_x, eye_y, step_s))
+        if not scene.minds[i]:
+            continue
+        accel = min(accel, braking)
         if not scene.vehicle[i]:
-            on_red = int(scene.link[i]) == RED
-            accel = min(accel, _beside(ego, front, state, i, on_red, where, street, crossings, memory, step_s))
-        else:
-            if state[SPEED, i] < STANDING_MPS:
-                accel = min(accel, _past_standing(ego, front, state, i, where, street, walls, eye_x, eye_y, step_s))
-            elif accel > 0.0 and _comes_across(ego, state, i, int(scene.link[i]), where):
-                accel = 0.0
-        touch_s = conflict_in(ego, state, i, scene.vehicle[i], int(scene.link[i]), street, False)
-        accel = min(accel, _in_conflict(ego.speed_mps, touch_s, street.grip_mps2, memory[:, i], step_s))
+            accel = min(accel, _beside(ego, front, state, i, link == RED, where, street, crossings, memory, step_s))
+        elif accel > 0.0 and state[SPEED, i] >= STANDING_MPS and _comes_across(ego, state, i, link, where):
+            accel = 0.0
     return accel
 
 
@@ -262,19 +277,27 @@ def _beside(
     ahead, aside = along - body - front, abs(across) - body - ego.size.half_width - CORRIDOR_M
     if ahead + 2.0 * body < 0.0 or ahead > stopping_m(ego.speed_mps) + AHEAD_M:
         return math.inf
-    comes_mps = -math.copysign(1.0, across) * (state[VY, i] * math.cos(heading) - state[VX, i] * math.sin(heading))
+    comes_mps = _nearing_mps(state, i, across, heading)
     if aside > BESIDE_M and aside > comes_mps * REACHES_S:
         return math.inf
-    on_road = len(street.roadway.sides) == 0 or within(street.roadway, state[X, i], state[Y, i])
+    on_road = len(street.roadway.sides) == 0 or within(street.roadway, state[X, i], state[Y, i], body)
     stood = memory[STOOD_S, i] >= WAITS_S - 1e-6
     if not on_road and (stood or (on_red and memory[STOOD_S, i] > 0.0)):
         return math.inf
     leaves = comes_mps < -STANDING_MPS
     if leaves or not (on_road or _is_at(crossings, state[X, i], state[Y, i])):
         return 0.0
+    if memory[SEEN_S, i] < DELAY_S - 1e-6:
+        return 0.0
     passes = ahead + 2.0 * (body + ego.size.half_length)
     least = CREEP_MPS if stood and aside > 0.0 else 0.0
     return min(_held_to(ego, ahead, passes, aside, max(comes_mps, WALKS_MPS), least, step_s), 0.0)
+
+
+@compiled
+def _nearing_mps(state: Floats, i: int, across: float, heading: float) -> float:
+    """How fast an actor comes nearer to the path sideways."""
+    return -math.copysign(1.0, across) * (state[VY, i] * math.cos(heading) - state[VX, i] * math.sin(heading))
 
 
 @compiled
@@ -292,8 +315,11 @@ def _comes_across(ego: OnPath, state: Floats, i: int, link: int, where: tuple[fl
 
     One that has to yield and still can is expected to, and so is one that brakes already.
     """
-    turn = math.cos(state[HEADING, i] - where[2])
-    if turn > SAME_WAY_COS or (turn < ONCOMING_COS and abs(where[1]) > OWN_LANE_M + state[WIDTH, i]):
+    _, across, heading = where
+    turn = math.cos(state[HEADING, i] - heading)
+    if turn > SAME_WAY_COS:
+        return False
+    if turn < ONCOMING_COS and abs(across) > OWN_LANE_M and _nearing_mps(state, i, across, heading) < NEARS_MPS:
         return False
     speed = state[SPEED, i]
     reach = max(ego.speed_mps * REACHES_S, AHEAD_M)
@@ -325,6 +351,7 @@ def _in_conflict(speed_mps: float, touch_s: float, grip_mps2: float, remembered:
     if since < 0.0:
         return math.inf
     braking = min(max(JERK_MPS3 * (since - DELAY_S), 0.0), COMFORT_MPS2, grip_mps2)
-    if since >= R157_PERCEIVES_S and speed_mps / (2.0 * max(touch_s, 0.01)) > COMFORT_MPS2:
+    room = max(speed_mps * touch_s - BEFORE_M, 0.01)
+    if since >= R157_PERCEIVES_S and speed_mps**2 / (2.0 * room) > COMFORT_MPS2:
         braking = max(braking, r157(since - R157_PERCEIVES_S, grip_mps2))
     return -braking if braking > 0.0 else math.inf

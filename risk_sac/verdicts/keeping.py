@@ -84,7 +84,7 @@ def _keeps(name: str, gauge: Gauge, history: History, index: int, met: MetActor 
     stays = left is None and keeps_lane(e, in_lane)
     path = ego_path(e) if stays else lane_path(e, in_lane)
     if name == "defensive":
-        s, acts = _anticipating(e, path, index if met is None else met.conflict.frame, index)
+        s, acts = _anticipating(e, path, met, index)
     else:
         touched = history.measures[-1].assessment.touched
         s, acts = _braking(name, e, path, met, after_steps=AFTER_CONTACT_STEPS * touched)
@@ -98,9 +98,10 @@ def _keeps(name: str, gauge: Gauge, history: History, index: int, met: MetActor 
     return _holds(gauge, history, path, s, acts)
 
 
-def _anticipating(e: Evidence, path: Path, began: int, index: int) -> tuple[Floats, int]:
+def _anticipating(e: Evidence, path: Path, met: MetActor | None, index: int) -> tuple[Floats, int]:
     """Drives the defensive driver along the path: metres per frame until 4 s after the violation, and when it acts."""
-    s, acts = driven(e.until(index), Path(*(each[: index + 1] for each in path)), began, index)
+    striker, began = (None, index) if met is None else (met.column, met.conflict.frame)
+    s, acts = driven(e.until(index), Path(*(each[: index + 1] for each in path)), striker, began, index)
     return (path.s.copy() if acts == index else s), acts
 
 

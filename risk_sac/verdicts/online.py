@@ -109,7 +109,10 @@ class DefensiveReflex:
         size = size_of(frame.state, 0)
         ego = OnPath(path, 0, float(path.s[0]), frame.ego_speed_mps, size)
         crossings = crossings_on(path, ego.s, float(path.s[-1]), self._street.boxes, size.half_width)
-        scene = Scene(frame.state, frame.kind == Kind.VEHICLE, frame.link, seen, priority)
+        everything = np.ones(len(frame.ids), dtype=np.bool_)
+        scene = Scene(
+            frame.state, frame.kind == Kind.VEHICLE, frame.link, seen, priority, everything, True, 0, math.inf
+        )
         accel = allowed_accel(ego, scene, self._street, crossings, self._memory, STEP_S)
         # SUMO's driver speeds up by itself: the least braking keeps it from that.
         return max(-accel, LEAST_MPS2) if accel < LEAST_ACCEL_MPS2 else 0.0

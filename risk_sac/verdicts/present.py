@@ -42,6 +42,7 @@ class Street(NamedTuple):
 
     roadway: Sides  # none: pedestrians are judged as if always on it
     walked: Sides  # roadway and crossings
+    junctions: Sides
     boxes: Floats  # of the crossings, see `boxes_of`
     lane_width_m: float
     grip_mps2: float
@@ -51,7 +52,8 @@ class Street(NamedTuple):
 def street_of(ground: Ground, grip_mps2: float) -> Street:
     """What compiled code goes by of a ground."""
     roadway, walked = sides_of(ground.roadway), sides_of(ground.roadway + ground.crossings)
-    return Street(roadway, walked, boxes_of(ground.crossings), ground.lane_width_m, grip_mps2)
+    junctions, boxes = sides_of(ground.junctions), boxes_of(ground.crossings)
+    return Street(roadway, walked, junctions, boxes, ground.lane_width_m, grip_mps2)
 
 
 @compiled

@@ -3,7 +3,7 @@
 Source: UN Regulation 157, 5.2.5 and Annex 3; the drivers in `risk_sac.verdicts.drivers`.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -93,10 +93,10 @@ def _braking(evidence: Evidence, path: Path, other: int, driver: int, began: int
 
 
 def _anticipating(
-    evidence: Evidence, path: Path, others: Iterable[int], began: int, latest: int
+    evidence: Evidence, path: Path, others: Sequence[int], began: int, latest: int
 ) -> Iterator[Ending | None]:
     """Drives the defensive driver; None where it does as the ego did."""
-    s, acts = driven(evidence, path, began, latest)
+    s, acts = driven(evidence, path, others[0], began, latest)
     for other in others:
         if acts == len(evidence.time_s) - 1:
             yield None
