@@ -1,10 +1,11 @@
-"""The defensive driver in the ego's place: from when it would have driven slower until 4 s after the contact.
+"""The defensive driver in the ego's place: from when it would have driven slower until 3 s after the contact.
 
 It is followed along the ego's path while all others move as recorded. On the record it is asked in every frame since
-the release how much it would allow itself for the striker; where that is less than what the ego did, the two part. It
-takes over at the beginning of the last stretch of restraint, which must last until the contact: one that has been
-unrestrained for more than 1 s has let the ego drive as it did. From then on it minds all others too. So it prevents no
-contact because something else had slowed it down before. For a pedestrian, places count that the ego did not see.
+the release how much it would allow itself; where that is less than what the ego did, the two part. It takes over at the
+beginning of the last stretch of restraint, which must last until the contact: one that has been unrestrained for more
+than 1 s has let the ego drive as it did. What counts is restraint by the striker, and by places that hide a pedestrian
+where the striker is one: the driver prevents nothing because something else slows it down. Only on a path that the ego
+did not take does it mind all others.
 
 The conflict with the striker is the one that all reference drivers judge: from its beginning until the contact the
 driver knows of it, and where it would end. The record tells that the striker did not stop or yield.
@@ -20,36 +21,46 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.geometry import Size, frame_view, line_of_sight, touches
+from risk_sac.geometry import Size, touches
 from risk_sac.jit import compiled
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.types import HEADING, VX, VY, Bools, Floats, Kind, X, Y
+from risk_sac.types import VX, VY, Bools, Floats, Kind, X, Y
 from risk_sac.verdicts.course import Body
-from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, Scene, allowed_accel, nothing_remembered
+from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, allowed_accel, nothing_remembered
 from risk_sac.verdicts.drivers import JERK_MPS3
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
+from risk_sac.verdicts.moment import Scene
 from risk_sac.verdicts.path import Path, pose_at
-from risk_sac.verdicts.present import OnPath, Street, street_of
+from risk_sac.verdicts.present import OnPath, Street, body_of, street_of
 from risk_sac.verdicts.recorded import recorded_size
 from risk_sac.verdicts.rollout import FINE_S, Ending
-from risk_sac.verdicts.unseen import Crossings, crossings_on
+from risk_sac.verdicts.unseen import Crossings, crossings_on, is_in_view, walls_of
 
 LOOKS_M = 60.0  # beyond the path's end, for crossings
-AFTER_S = 4.0
+AFTER_S = 3.0
 BRIDGE_S = 1.0
 SLOWER_MPS2 = 0.3  # Choice: less is no difference between two drivers
 SPEEDS_UP_MPS2 = 2.0
 RESTRAINED_MPS2 = 2.0  # one that may speed up by more is not
 
 
-class Record(NamedTuple):
-    """An episode as compiled code needs it: `T` frames, `n` actors."""
+class Task(NamedTuple):
+    """An episode as compiled code needs it, of `T` frames and `n` actors, and what the driver goes by in it."""
 
+    path: Path
+    size: Size
+    speed_mps: Floats  # T, of the recorded ego
     states: Floats  # T x rows x n
     vehicle: Bools
     link: NDArray[np.uint8]  # T x n
     known: Bools  # T x n
     priority: Bools  # T
+    street: Street
+    crossings: Crossings
+    minds: Bools  # n, see `Scene`
+    places: bool
+    striker: int
+    began: int  # the frame in which the conflict with it begins
     step_s: float
 
 
@@ -64,72 +75,56 @@ def driven(evidence: Evidence, path: Path, striker: int | None, conflict_frame: 
       latest: the frame from which it drives in any case; on another path than the ego's, where they part.
 
     Returns:
-      Metres along the path per frame, until 4 s after the last, and the frame from which it drives; the last one if it
+      Metres along the path per frame, until 3 s after the last, and the frame from which it drives; the last one if it
       does as the ego did, and then nothing is driven after it.
     """
-    e = evidence
+    e, last = evidence, len(path.s) - 1
+    task, memory = _task(e, path, striker, conflict_frame), nothing_remembered(len(e.ids))
     released = int(np.searchsorted(e.time_s, -e.step_s / 2))
-    record, size = _record(e), recorded_size(e, 0)
-    street = street_of(e.ground, e.ground.friction * GRAVITY_MPS2)
-    crossings = crossings_on(path, float(path.s[0]), float(path.s[-1]) + LOOKS_M, street.boxes, size.half_width)
-    memory = nothing_remembered(len(e.ids))
-    speed = np.ascontiguousarray(e.speed_mps[:, 0])
-    minds = np.arange(len(e.ids)) == striker if striker is not None else np.ones(len(e.ids), dtype=np.bool_)
-    places = striker is None or not record.vehicle[striker]
-    column, began = (0, len(path.s)) if striker is None else (striker, conflict_frame)
-    acts = _acts(path, size, record, minds, places, column, began, street, crossings, speed, released, latest, memory)
-    if acts == len(path.s) - 1:
+    acts = _acts(task, released, latest, memory)
+    if acts == last:
         return path.s.copy(), acts
-    after = round(AFTER_S / e.step_s)
-    return _drive(path, size, record, column, began, street, crossings, speed, acts, memory, after), acts
+    if latest < last:
+        task = task._replace(minds=np.ones(len(e.ids), dtype=np.bool_), places=True)
+    return _drive(task, acts, round(AFTER_S / e.step_s), memory), acts
 
 
-def _record(e: Evidence) -> Record:
+def _task(e: Evidence, path: Path, striker: int | None, conflict_frame: int) -> Task:
     sizes = (np.broadcast_to(each, e.x_m.shape) for each in (e.length_m, e.width_m))
-    states = np.stack([*(getattr(e, name) for name in PER_ACTOR), *sizes], axis=1)
     link = np.nan_to_num(e.link).astype(np.uint8)
-    ahead = link[:, 0]
+    ahead, vehicle, size = link[:, 0], e.kind == int(Kind.VEHICLE), recorded_size(e, 0)
     latest = np.maximum.accumulate(np.where(ahead == PRIORITY, e.time_s, -np.inf))
-    priority = ((ahead == 0) | (ahead == PRIORITY)) & (e.time_s - latest <= PRIORITY_S)
-    return Record(states, e.kind == int(Kind.VEHICLE), link, np.ascontiguousarray(e.known), priority, e.step_s)
+    street = street_of(e.ground, e.ground.friction * GRAVITY_MPS2)
+    everything = np.ones(len(e.ids), dtype=np.bool_)
+    return Task(
+        path=path,
+        size=size,
+        speed_mps=np.ascontiguousarray(e.speed_mps[:, 0]),
+        states=np.stack([*(getattr(e, name) for name in PER_ACTOR), *sizes], axis=1),
+        vehicle=vehicle,
+        link=link,
+        known=np.ascontiguousarray(e.known),
+        priority=((ahead == 0) | (ahead == PRIORITY)) & (e.time_s - latest <= PRIORITY_S),
+        street=street,
+        crossings=crossings_on(path, float(path.s[0]), float(path.s[-1]) + LOOKS_M, street.boxes, size.half_width),
+        minds=everything if striker is None else np.arange(len(e.ids)) == striker,
+        places=striker is None or not vehicle[striker],
+        striker=striker or 0,
+        began=len(path.s) if striker is None else conflict_frame,
+        step_s=e.step_s,
+    )
 
 
 @compiled
-def _acts(
-    path: Path,
-    size: Size,
-    record: Record,
-    minds: Bools,
-    places: bool,
-    striker: int,
-    began: int,
-    street: Street,
-    crossings: Crossings,
-    speed: Floats,
-    released: int,
-    latest: int,
-    memory: Floats,
-) -> int:
+def _acts(task: Task, released: int, latest: int, memory: Floats) -> int:
     """The frame from which the driver drives; `memory` is then what it remembers there."""
-    last, step_s = len(path.s) - 1, record.step_s
+    path, speed, last, step_s = task.path, task.speed_mps, len(task.path.s) - 1, task.step_s
     slower, free = np.zeros(last, dtype=np.bool_), np.ones(last, dtype=np.bool_)
     remembered = np.empty((last, memory.shape[0], memory.shape[1]))
     for t in range(released, last):
         remembered[t] = memory
-        ego = OnPath(path, t, path.s[t], speed[t], size)
-        strikes_s = _strikes_s(path, path.s[t], speed[t], t, began)
-        scene = Scene(
-            record.states[t],
-            record.vehicle,
-            record.link[t],
-            record.known[t],
-            record.priority[t],
-            minds,
-            places,
-            striker,
-            strikes_s,
-        )
-        accel = allowed_accel(ego, scene, street, crossings, memory, step_s)
+        ego = OnPath(path, t, path.s[t], speed[t], task.size)
+        accel = _asked(task, t, ego, task.states[t], task.known[t], memory)
         free[t] = accel > RESTRAINED_MPS2
         possible = max(speed[t] + accel * step_s, 0.0) if accel < math.inf else math.inf
         slower[t] = possible < speed[t + 1] - SLOWER_MPS2 * step_s
@@ -147,6 +142,25 @@ def _acts(
 
 
 @compiled
+def _asked(task: Task, t: int, ego: OnPath, state: Floats, seen: Bools, memory: Floats) -> float:
+    """The acceleration that the driver allows itself in frame `t`, or after the last one."""
+    frame = min(t, len(task.path.s) - 1)
+    strikes_s = _strikes_s(task.path, ego.s, ego.speed_mps, t, task.began)
+    scene = Scene(
+        state,
+        task.vehicle,
+        task.link[frame],
+        seen,
+        task.priority[frame],
+        task.minds,
+        task.places,
+        task.striker,
+        strikes_s,
+    )
+    return allowed_accel(ego, scene, task.street, task.crossings, memory, task.step_s)
+
+
+@compiled
 def _strikes_s(path: Path, s: float, speed: float, frame: int, began: int) -> float:
     """When the driver would come to the place of the contact, while the conflict of the record lasts; inf else."""
     last = len(path.s) - 1
@@ -156,49 +170,38 @@ def _strikes_s(path: Path, s: float, speed: float, frame: int, began: int) -> fl
 
 
 @compiled
-def _drive(
-    path: Path,
-    size: Size,
-    record: Record,
-    striker: int,
-    began: int,
-    street: Street,
-    crossings: Crossings,
-    recorded_mps: Floats,
-    first: int,
-    memory: Floats,
-    after: int,
-) -> Floats:
-    """Metres along the path per frame, `after` frames beyond the last."""
-    last, step_s = len(path.s) - 1, record.step_s
+def _drive(task: Task, first: int, after: int, memory: Floats) -> Floats:
+    """Metres along the path per frame, `after` frames beyond the last; the ego's own up to the `first`."""
+    path, recorded_mps, last, step_s = task.path, task.speed_mps, len(task.path.s) - 1, task.step_s
     found = np.empty(last + 1 + after)
     found[: first + 1] = path.s[: first + 1]
     s, speed, point = path.s[first], recorded_mps[first], first
     before = (speed - recorded_mps[max(first - 1, 0)]) / step_s
-    kept_mps = recorded_mps[min(max(began, first), last)]
-    known, everything = np.zeros(len(record.vehicle), dtype=np.bool_), np.ones(len(record.vehicle), dtype=np.bool_)
+    kept_mps = recorded_mps[min(max(task.began, first), last)]
+    known = np.zeros(len(task.vehicle), dtype=np.bool_)
     for t in range(first):
-        known |= record.known[t]
+        known |= task.known[t]
+    bodies = task.vehicle.copy()
+    bodies[0] = False
     for t in range(first, last + after):
         frame = min(t, last)
-        state = record.states[frame].copy()
-        known |= record.known[frame]
+        state = task.states[frame].copy()
+        known |= task.known[frame]
         beyond_s = (t - frame) * step_s
         for i in range(1, state.shape[1]):
             state[X, i] += beyond_s * state[VX, i]
             state[Y, i] += beyond_s * state[VY, i]
-        x, y, heading = pose_at(path, s)
-        state[X, 0], state[Y, 0], state[HEADING, 0] = x, y, heading
-        seen = known.copy()
-        seen[1:] &= line_of_sight(frame_view(state), record.vehicle[1:])
+        x, y, _ = pose_at(path, s)
+        state[X, 0], state[Y, 0] = x, y
+        seen, walls = known.copy(), walls_of(state, bodies)
+        for i in range(1, len(seen)):
+            if seen[i] and task.minds[i]:
+                seen[i] = is_in_view(walls, x, y, body_of(state, i))
         while point < last and path.s[point + 1] <= s:
             point += 1
-        ego = OnPath(path, point, s, speed, size)
-        link, priority, strikes_s = record.link[frame], record.priority[frame], _strikes_s(path, s, speed, t, began)
-        scene = Scene(state, record.vehicle, link, seen, priority, everything, True, striker, strikes_s)
-        accel = allowed_accel(ego, scene, street, crossings, memory, step_s)
+        accel = _asked(task, t, OnPath(path, point, s, speed, task.size), state, seen, memory)
         wanted = recorded_mps[min(t + 1, last)]
-        if t + 1 > began:
+        if t + 1 > task.began:
             wanted = max(wanted, kept_mps)
         accel = min(accel, (wanted - speed) / step_s, SPEEDS_UP_MPS2)
         accel = max(accel, min(before, 0.0) - JERK_MPS3 * step_s)
@@ -206,6 +209,9 @@ def _drive(
         s += (speed + slower) / 2 * step_s
         speed, before = slower, accel
         found[t + 1] = s
+        if speed == 0.0 and t >= last:
+            found[t + 2 :] = s
+            break
     return found
 
 

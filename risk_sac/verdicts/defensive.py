@@ -22,25 +22,31 @@ Walking speed 1.2 m/s (4 ft/s): Highway Capacity Manual and MUTCD.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from risk_sac.jit import compiled
-from risk_sac.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
+from risk_sac.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Floats, X, Y
 from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, YIELDING_MPS2
 from risk_sac.verdicts.course import CORRIDOR_M, entry_distance, with_margin
 from risk_sac.verdicts.drivers import JERK_MPS3, R157_PERCEIVES_S, r157
-from risk_sac.verdicts.path import pose_at, project
+from risk_sac.verdicts.moment import (
+    BEFORE_M,
+    COMFORT_MPS2,
+    CREEP_MPS,
+    DELAY_S,
+    OWN_LANE_M,
+    Scene,
+    View,
+    held_to,
+    stopping_m,
+    view_of,
+)
+from risk_sac.verdicts.path import pose_at
 from risk_sac.verdicts.present import RED, OnPath, Street, body_of, conflict_in, must_yield, within
-from risk_sac.verdicts.unseen import Crossings, is_hidden, walls_of
+from risk_sac.verdicts.unseen import Crossings, is_hidden
 
-COMFORT_MPS2 = 3.4
-DELAY_S = 0.75
 WALKS_MPS = 1.2
-BEFORE_M = 1.0  # that it stops before a place
-CREEP_MPS = 2.0
 KERB_MPS = 8.33  # Choice: 30 km/h past standing vehicles, away from crossings
 BESIDE_M = 1.5  # of its corridor
 REACHES_S = 3.0
@@ -52,7 +58,6 @@ PASSABLE_M = 3.0  # a standing vehicle farther from the corridor hides nothing t
 BEHIND_M = 1.0  # from a standing vehicle's end to the place where a pedestrian may stand unseen
 KERB_M = 2.0  # from its flank to where the kerb would be
 LANES_M = 6.0  # a vehicle farther beside is in no other lane of the ego's direction
-OWN_LANE_M = 1.2
 STOPS_BEFORE_M, STOPS_BEYOND_M = 12.0, 1.0  # a vehicle that stops for a crossing stands this near to its edge
 AT_CROSSING_M = 2.5  # from a spot of a crossing
 TOUCHES_S = 0.25
@@ -62,20 +67,6 @@ SAME_WAY_COS, ONCOMING_COS = 0.5, -0.9
 
 # Rows of what the driver remembers of each actor.
 SEEN_S, STOOD_S, SINCE_S, GONE_S, HAD_SIGNAL = range(5)
-
-
-class Scene(NamedTuple):
-    """What the driver has before it."""
-
-    state: Floats  # rows x n, of a frame; the ego's column is not used
-    vehicle: Bools
-    link: NDArray[np.uint8]
-    seen: Bools
-    priority: bool  # whether the ego's signal lets it go before all others
-    minds: Bools  # the actors that rules 3 and 4 are asked of
-    places: bool  # whether rules 1 and 2 are asked
-    striker: int  # an actor in a conflict with the ego, whatever it looks like; 0: none
-    strikes_s: float  # when the ego would reach it
 
 
 def nothing_remembered(n: int) -> Floats:
@@ -99,108 +90,54 @@ def allowed_accel(
       memory: of the frames before, `5 x n`; it is brought up to date.
       step_s: until it decides again.
     """
-    n = len(scene.vehicle)
-    state, front = scene.state, ego.s + ego.size.half_length
-    placed, hides = np.empty((3, n)), np.zeros(n, dtype=np.bool_)
-    for i in range(1, n):
-        if math.isnan(state[X, i]):
-            continue
-        placed[0, i], placed[1, i], placed[2, i] = project(ego.path, ego.first, state[X, i], state[Y, i])
-        leads = abs(placed[1, i]) < OWN_LANE_M and placed[0, i] > ego.s and state[SPEED, i] > CREEP_MPS
-        hides[i] = scene.vehicle[i] and not leads
-    walls = walls_of(state, hides)
-    x, y, heading = pose_at(ego.path, ego.s)
-    eye_x, eye_y = x + ego.size.half_length * math.cos(heading), y + ego.size.half_length * math.sin(heading)
-    accel = math.inf
-    if scene.places and not scene.priority:
-        accel = _at_crossings(ego, front, scene, crossings, placed, walls, eye_x, eye_y, step_s)
-    for i in range(1, n):
+    state = scene.state
+    view = view_of(ego, scene, street, crossings, step_s)
+    accel = _at_crossings(view) if scene.places and not scene.priority else math.inf
+    for i in range(1, len(scene.vehicle)):
         if math.isnan(state[X, i]) or not scene.seen[i]:
             memory[SEEN_S, i] = memory[STOOD_S, i] = memory[GONE_S, i] = 0.0
             memory[SINCE_S, i] = -1.0
             continue
+        if not scene.minds[i] and not scene.places:
+            continue
+        vehicle, stands, link = scene.vehicle[i], state[SPEED, i] < STANDING_MPS, int(scene.link[i])
         memory[SEEN_S, i] += step_s
-        memory[STOOD_S, i] = memory[STOOD_S, i] + step_s if state[SPEED, i] < STANDING_MPS else 0.0
-        where, link = (placed[0, i], placed[1, i], placed[2, i]), int(scene.link[i])
+        memory[STOOD_S, i] = memory[STOOD_S, i] + step_s if stands else 0.0
         memory[HAD_SIGNAL, i] = 1.0 if link != 0 else memory[HAD_SIGNAL, i]
-        approaches = memory[HAD_SIGNAL, i] == 0.0 and not within(street.junctions, state[X, i], state[Y, i])
-        if scene.vehicle[i] and scene.priority and approaches:  # the ego's signal says that it has to stop
-            link = RED
-        touch_s = conflict_in(ego, state, i, scene.vehicle[i], link, street, False)
-        if i == scene.striker:
-            touch_s = min(touch_s, scene.strikes_s)
-        braking = _in_conflict(ego.speed_mps, touch_s, street.grip_mps2, memory[:, i], step_s)
-        if scene.places and scene.vehicle[i] and state[SPEED, i] < STANDING_MPS:
-            accel = min(accel, _past_standing(ego, front, state, i, where, street, walls, eye_x, eye_y, step_s))
+        if scene.places and vehicle and stands:
+            accel = min(accel, _past_standing(view, i))
         if not scene.minds[i]:
             continue
-        accel = min(accel, braking)
-        if not scene.vehicle[i]:
-            accel = min(accel, _beside(ego, front, state, i, link == RED, where, street, crossings, memory, step_s))
-        elif accel > 0.0 and state[SPEED, i] >= STANDING_MPS and _comes_across(ego, state, i, link, where):
+        approaches = memory[HAD_SIGNAL, i] == 0.0 and not within(street.junctions, state[X, i], state[Y, i])
+        if vehicle and scene.priority and approaches:  # the ego's signal says that it has to stop
+            link = RED
+        touch_s = conflict_in(ego, state, i, vehicle, link, street, False)
+        if i == scene.striker:
+            touch_s = min(touch_s, scene.strikes_s)
+        accel = min(accel, _in_conflict(ego.speed_mps, touch_s, street.grip_mps2, memory[:, i], step_s))
+        if not vehicle:
+            accel = min(accel, _beside(view, i, memory[:, i]))
+        elif accel > 0.0 and not stands and _comes_across(view, i, link):
             accel = 0.0
     return accel
 
 
 @compiled
-def stopping_m(speed_mps: float) -> float:
-    """The way in which the driver stops at leisure."""
-    return speed_mps * DELAY_S + speed_mps**2 / (2.0 * COMFORT_MPS2)
-
-
-@compiled
-def fitting_mps(ahead_m: float) -> float:
-    """The speed from which it stops `BEFORE_M` before a place; `stopping_m` the other way round."""
-    reaction = COMFORT_MPS2 * DELAY_S
-    return math.sqrt(reaction**2 + 2.0 * COMFORT_MPS2 * max(ahead_m - BEFORE_M, 0.0)) - reaction
-
-
-@compiled
-def _held_to(
-    ego: OnPath, ahead_m: float, passes_m: float, aside_m: float, walks_mps: float, least_mps: float, step_s: float
-) -> float:
-    """The acceleration that keeps a fitting speed before a place from which a pedestrian may come.
-
-    Args:
-      ego: on its path.
-      ahead_m: from its front to the place.
-      passes_m: what it has to drive until it has passed it with its whole body.
-      aside_m: from the pedestrian to the corridor.
-      walks_mps: how fast it may come.
-      least_mps: the speed that it keeps anyway.
-      step_s: until it decides again.
-    """
-    speed = ego.speed_mps
-    if aside_m * speed >= walks_mps * passes_m and aside_m > 0.0:  # it has passed before anything could come
-        return math.inf
-    wanted = max(fitting_mps(ahead_m - speed * step_s), least_mps)
-    return max((wanted - speed) / step_s, -COMFORT_MPS2)
-
-
-@compiled
-def _at_crossings(
-    ego: OnPath,
-    front: float,
-    scene: Scene,
-    crossings: Crossings,
-    placed: Floats,
-    walls: Floats,
-    eye_x: float,
-    eye_y: float,
-    step_s: float,
-) -> float:
+def _at_crossings(view: View) -> float:
     """Rules 1 and 2: what the driver cannot see of a crossing ahead."""
-    accel, looks_m = math.inf, stopping_m(ego.speed_mps) + AHEAD_M
+    ego, crossings = view.ego, view.crossings
+    accel, looks_m, asked, stopped_for = math.inf, stopping_m(ego.speed_mps) + AHEAD_M, -1.0, False
     for k in range(len(crossings.spots)):
         spot_x, spot_y, crossing, aside = crossings.spots[k]
         enters, leaves = crossings.entries[int(crossing)]
-        ahead = enters - front
-        if ahead < 0.0 or ahead > looks_m or not is_hidden(walls, eye_x, eye_y, spot_x, spot_y):
+        ahead = enters - view.front
+        if not 0.0 <= ahead <= looks_m or not is_hidden(view.walls, view.eye_x, view.eye_y, spot_x, spot_y):
             continue
-        if _is_stopped_for(scene, placed, enters):
-            aside = 0.0
-        passes = leaves - front + 2.0 * ego.size.half_length
-        accel = min(accel, _held_to(ego, ahead, passes, aside, WALKS_MPS, CREEP_MPS, step_s))
+        if crossing != asked:
+            asked, stopped_for = crossing, _is_stopped_for(view.scene, view.placed, enters)
+        aside = 0.0 if stopped_for else aside
+        passes = leaves - view.front + 2.0 * ego.size.half_length
+        accel = min(accel, held_to(view, ahead, passes, aside, WALKS_MPS, CREEP_MPS))
     return accel
 
 
@@ -225,26 +162,16 @@ def _is_stopped_for(scene: Scene, placed: Floats, enters_m: float) -> bool:
 
 
 @compiled
-def _past_standing(
-    ego: OnPath,
-    front: float,
-    state: Floats,
-    i: int,
-    where: tuple[float, float, float],
-    street: Street,
-    walls: Floats,
-    eye_x: float,
-    eye_y: float,
-    step_s: float,
-) -> float:
+def _past_standing(view: View, i: int) -> float:
     """Rule 1: the kerb behind a vehicle that stands beside the path."""
-    along, across, heading = where
+    ego, state, street = view.ego, view.scene.state, view.street
+    along, across, heading = view.placed[0, i], view.placed[1, i], view.placed[2, i]
     cos, sin = abs(math.cos(state[HEADING, i] - heading)), abs(math.sin(state[HEADING, i] - heading))
     half_length = state[LENGTH, i] / 2 * cos + state[WIDTH, i] / 2 * sin
     half_width = state[LENGTH, i] / 2 * sin + state[WIDTH, i] / 2 * cos
     aside = abs(across) - half_width - ego.size.half_width - CORRIDOR_M
     end = along + half_length
-    if not 0.0 < aside < PASSABLE_M or not 0.0 < end - front < stopping_m(ego.speed_mps) + AHEAD_M:
+    if not 0.0 < aside < PASSABLE_M or not 0.0 < end - view.front < stopping_m(ego.speed_mps) + AHEAD_M:
         return math.inf
     x, y, way = pose_at(ego.path, end + BEHIND_M)
     side = math.copysign(1.0, across)
@@ -252,46 +179,34 @@ def _past_standing(
     kerb_x, kerb_y = x - kerb * math.sin(way), y + kerb * math.cos(way)
     if len(street.roadway.sides) == 0 or within(street.roadway, kerb_x, kerb_y):
         return math.inf
-    if not is_hidden(walls, eye_x, eye_y, x - across * math.sin(way), y + across * math.cos(way)):
+    if not is_hidden(view.walls, view.eye_x, view.eye_y, x - across * math.sin(way), y + across * math.cos(way)):
         return math.inf
-    passes = end + BEHIND_M - front + 2.0 * ego.size.half_length
-    return _held_to(ego, end - front, passes, aside, WALKS_MPS, KERB_MPS, step_s)
+    passes = end + BEHIND_M - view.front + 2.0 * ego.size.half_length
+    return held_to(view, end - view.front, passes, aside, WALKS_MPS, KERB_MPS)
 
 
 @compiled
-def _beside(
-    ego: OnPath,
-    front: float,
-    state: Floats,
-    i: int,
-    on_red: bool,
-    where: tuple[float, float, float],
-    street: Street,
-    crossings: Crossings,
-    memory: Floats,
-    step_s: float,
-) -> float:
+def _beside(view: View, i: int, remembered: Floats) -> float:
     """Rule 3 for a pedestrian."""
-    along, across, heading = where
-    body = state[WIDTH, i] / 2
-    ahead, aside = along - body - front, abs(across) - body - ego.size.half_width - CORRIDOR_M
+    ego, state, roadway = view.ego, view.scene.state, view.street.roadway
+    along, across, heading = view.placed[0, i], view.placed[1, i], view.placed[2, i]
+    x, y, body = state[X, i], state[Y, i], state[WIDTH, i] / 2
+    ahead, aside = along - body - view.front, abs(across) - body - ego.size.half_width - CORRIDOR_M
     if ahead + 2.0 * body < 0.0 or ahead > stopping_m(ego.speed_mps) + AHEAD_M:
         return math.inf
     comes_mps = _nearing_mps(state, i, across, heading)
     if aside > BESIDE_M and aside > comes_mps * REACHES_S:
         return math.inf
-    on_road = len(street.roadway.sides) == 0 or within(street.roadway, state[X, i], state[Y, i], body)
-    stood = memory[STOOD_S, i] >= WAITS_S - 1e-6
-    if not on_road and (stood or (on_red and memory[STOOD_S, i] > 0.0)):
+    on_road = len(roadway.sides) == 0 or within(roadway, x, y, body)
+    stood, on_red = remembered[STOOD_S] >= WAITS_S - 1e-6, int(view.scene.link[i]) == RED
+    if not on_road and (stood or (on_red and remembered[STOOD_S] > 0.0)):
         return math.inf
     leaves = comes_mps < -STANDING_MPS
-    if leaves or not (on_road or _is_at(crossings, state[X, i], state[Y, i])):
-        return 0.0
-    if memory[SEEN_S, i] < DELAY_S - 1e-6:
+    if leaves or remembered[SEEN_S] < DELAY_S - 1e-6 or not (on_road or _is_at(view.crossings, x, y)):
         return 0.0
     passes = ahead + 2.0 * (body + ego.size.half_length)
     least = CREEP_MPS if stood and aside > 0.0 else 0.0
-    return min(_held_to(ego, ahead, passes, aside, max(comes_mps, WALKS_MPS), least, step_s), 0.0)
+    return min(held_to(view, ahead, passes, aside, max(comes_mps, WALKS_MPS), least), 0.0)
 
 
 @compiled
@@ -310,12 +225,13 @@ def _is_at(crossings: Crossings, x: float, y: float) -> bool:
 
 
 @compiled
-def _comes_across(ego: OnPath, state: Floats, i: int, link: int, where: tuple[float, float, float]) -> bool:
+def _comes_across(view: View, i: int, link: int) -> bool:
     """Rule 3 for a vehicle from across: whether it would be in the corridor within 3 s.
 
     One that has to yield and still can is expected to, and so is one that brakes already.
     """
-    _, across, heading = where
+    ego, state = view.ego, view.scene.state
+    across, heading = view.placed[1, i], view.placed[2, i]
     turn = math.cos(state[HEADING, i] - heading)
     if turn > SAME_WAY_COS:
         return False

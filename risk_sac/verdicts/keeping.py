@@ -99,7 +99,7 @@ def _keeps(name: str, gauge: Gauge, history: History, index: int, met: MetActor 
 
 
 def _anticipating(e: Evidence, path: Path, met: MetActor | None, index: int) -> tuple[Floats, int]:
-    """Drives the defensive driver along the path: metres per frame until 4 s after the violation, and when it acts."""
+    """Drives the defensive driver along the path: metres per frame until 3 s after the violation, and when it acts."""
     striker, began = (None, index) if met is None else (met.column, met.conflict.frame)
     s, acts = driven(e.until(index), Path(*(each[: index + 1] for each in path)), striker, began, index)
     return (path.s.copy() if acts == index else s), acts

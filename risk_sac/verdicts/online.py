@@ -12,9 +12,10 @@ from risk_sac.geometry import size_of
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.types import STEP_S, Bools, Frame, Kind
 from risk_sac.verdicts.course import HORIZON_S
-from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, Scene, allowed_accel, nothing_remembered
+from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, allowed_accel, nothing_remembered
 from risk_sac.verdicts.drivers import R157_PERCEIVES_S, r157
 from risk_sac.verdicts.evidence import Ground
+from risk_sac.verdicts.moment import Scene
 from risk_sac.verdicts.path import Path
 from risk_sac.verdicts.present import OnPath, conflict_in, street_of
 from risk_sac.verdicts.unseen import crossings_on

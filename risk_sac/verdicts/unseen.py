@@ -9,12 +9,13 @@ import numpy as np
 from risk_sac.jit import compiled
 from risk_sac.scenario.ground import Area
 from risk_sac.types import HEADING, LENGTH, WIDTH, Bools, Floats, X, Y
-from risk_sac.verdicts.course import CORRIDOR_M
+from risk_sac.verdicts.course import CORRIDOR_M, Body
 from risk_sac.verdicts.path import Path, pose_at
 
 WAITING_M = 2.0  # of sidewalk at either end of a crossing, on which pedestrians wait
 SPOT_M = 1.0  # between two places on a crossing that are looked at
 LOOK_M = 0.5  # between two places on the path that may be on a crossing
+CORNER = 0.99  # just inside the corner: a body does not hide itself
 ALONG_COS = math.cos(math.radians(45.0))
 
 
@@ -93,13 +94,24 @@ def walls_of(state: Floats, hides: Bools) -> Floats:
     """Bodies that hide what is behind them, `w x 6`: centre, cosine and sine of the heading, half the size."""
     found, count = np.empty((len(hides), 6)), 0
     for i in range(len(hides)):
-        if hides[i]:
+        if hides[i] and not math.isnan(state[X, i]):  # it has left
             heading = state[HEADING, i]
             found[count, 0], found[count, 1] = state[X, i], state[Y, i]
             found[count, 2], found[count, 3] = math.cos(heading), math.sin(heading)
             found[count, 4], found[count, 5] = state[LENGTH, i] / 2, state[WIDTH, i] / 2
             count += 1
     return found[:count]
+
+
+@compiled
+def is_in_view(walls: Floats, eye_x: float, eye_y: float, body: Body[float]) -> bool:
+    """Whether a corner or the centre of a body can be seen, as `risk_sac.geometry.line_of_sight` asks it."""
+    cos, sin = math.cos(body.heading), math.sin(body.heading)
+    for along, across in ((0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
+        a, b = along * CORNER * body.size.half_length, across * CORNER * body.size.half_width
+        if not is_hidden(walls, eye_x, eye_y, body.x + a * cos - b * sin, body.y + a * sin + b * cos):
+            return True
+    return False
 
 
 @compiled
