@@ -165,7 +165,8 @@ def _strikes_s(path: Path, s: float, speed: float, frame: int, began: int) -> fl
     """When the driver would come to the place of the contact, while the conflict of the record lasts; inf else."""
     last = len(path.s) - 1
     if began <= frame < last and speed > 0.0:
-        return max(path.s[last] - s, 0.0) / speed
+        to_go_m: float = path.s[last] - s
+        return max(to_go_m, 0.0) / speed
     return math.inf
 
 

@@ -212,7 +212,8 @@ def _beside(view: View, i: int, remembered: Floats) -> float:
 @compiled
 def _nearing_mps(state: Floats, i: int, across: float, heading: float) -> float:
     """How fast an actor comes nearer to the path sideways."""
-    return -math.copysign(1.0, across) * (state[VY, i] * math.cos(heading) - state[VX, i] * math.sin(heading))
+    left_mps: float = state[VY, i] * math.cos(heading) - state[VX, i] * math.sin(heading)
+    return -math.copysign(1.0, across) * left_mps
 
 
 @compiled
