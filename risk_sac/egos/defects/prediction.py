@@ -79,11 +79,3 @@ class NeighboursKeepLane(Defective):
         cos, sin = math.cos(p.state[HEADING, 0]), math.sin(p.state[HEADING, 0])
         along = p.state[VX] * cos + p.state[VY] * sin
         return moving(p, beside, along * cos, along * sin)
-
-
-class SlowIsParked(Defective):
-    """Takes a vehicle slower than some speed for parked."""
-
-    def sees(self, p: Perceived) -> Perceived:
-        """Stops slow vehicles."""
-        return moving(p, (p.kind == VEHICLE) & (np.hypot(p.state[VX], p.state[VY]) < self.value), 0.0, 0.0)

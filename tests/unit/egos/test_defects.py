@@ -199,8 +199,6 @@ def test_others_are_expected_to_stop_or_to_stay() -> None:
         assert velocity("kerb-waits", walker(20, 1.4 * side)) == [(0.0, 1.4)]
         assert velocity("neighbours-keep-lane", car(10, 1.1 * side, 9.0, -1.0 * side)) == [(9.0, 0.0)]
         assert velocity("neighbours-keep-lane", car(10, 0.9 * side, 9.0, -1.0 * side)) == [(9.0, -1.0 * side)]
-    assert velocity("slow-is-parked", car(20, -5, 0.0, 6.9), walker(9, 9)) == [(0.0, 0.0), (0.0, 1.4)]
-    assert velocity("slow-is-parked", car(20, -5, 0.0, 7.1)) == [(0.0, 7.1)]
 
 
 def test_who_brakes_is_expected_to_yield() -> None:
