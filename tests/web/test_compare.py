@@ -67,6 +67,19 @@ def test_the_numbers_of_a_report_are_the_services(
         expect(page.get_by_role("link", name=name["name"], exact=True)).to_have_attribute(
             "href", f"#/campaigns/{methods}/failures/{name['representative']}"
         )
+    for cell in table["cells"]:
+        in_row = f"[data-row='{cell['method']}'] td"
+        drivers = page.get_by_role("region", name="PCR by reference driver: low").locator(in_row)
+        told = cell["pcr_by_driver"].values()
+        shown = drivers.filter(has_not_text="–").all_inner_texts()
+        assert [numbers(text) for text in shown] == [
+            per_cent(each["pcr"], each["pcr_low"], each["pcr_high"]) for each in told
+        ]
+        classes = page.get_by_role("region", name="Severity and fault: low").locator(in_row)
+        counts = [cell["by_severity"].get(name, 0) for name in ("severe", "moderate", "minor")]
+        counts += [cell["by_fault"].get(name, 0) for name in ("ego", "shared", "other")]
+        shown = [int(text.split()[0].replace("–", "0")) for text in classes.all_inner_texts()]
+        assert shown == counts
     page.get_by_text("More measures").click()
     check_axe(page)
 

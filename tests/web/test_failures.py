@@ -69,6 +69,7 @@ def test_cards_match_the_api(screen: Callable[..., Page], table: dict[str, Any],
     expect(card.locator("dd").nth(2)).to_have_text(str(often[table["kind"][newest]]))
     words = {"preventable": "preventable", "full_braking": "by full braking", "unavoidable": "unavoidable"}
     expect(card).to_contain_text(words[table["grade"][newest]])
+    expect(card).to_contain_text(f"fault: {table['fault'][newest]}")
 
     page.get_by_label("every failure").check()
     wait_for(page, len(valid_of(table)))
@@ -113,6 +114,18 @@ def test_filters_survive_a_reload(screen: Callable[..., Page], table: dict[str, 
 
     page.get_by_role("button", name="Reset", exact=True).click()
     wait_for(page, len(valid_of(table)))
+
+
+def test_failures_are_filtered_by_severity_fault_and_driver(screen: Callable[..., Page], table: dict[str, Any]) -> None:
+    page = screen("?every=1")
+    valid = valid_of(table)
+    for facet, column in (("Severity", "severity"), ("Fault", "fault")):
+        value = next(table[column][i] for i in valid if table[column][i])
+        page.get_by_role("combobox", name=facet).select_option(value)
+        wait_for(page, sum(table[column][i] == value for i in valid))
+        page.get_by_role("button", name="Reset", exact=True).click()
+    page.get_by_role("combobox", name="Prevented by").select_option("full_braking")
+    wait_for(page, sum("full_braking" in table["prevented_by"][i] for i in valid))
 
 
 def test_filters_that_leave_nothing_can_be_reset(screen: Callable[..., Page], table: dict[str, Any]) -> None:

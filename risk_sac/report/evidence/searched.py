@@ -15,7 +15,7 @@ from risk_sac.report.markdown import verified
 from risk_sac.report.page import DASH, number
 from risk_sac.report.runs import FinishedRun
 from risk_sac.report.verdicts import class_rows, driver_rows
-from risk_sac.verdicts.words import began, known, prevented_by
+from risk_sac.verdicts.words import began, ego_did, known, prevented_by
 
 MOST_CARDS = 12  # of a family
 FUNNEL = [
@@ -154,11 +154,14 @@ def _of_family(comparison: Comparison, family: FamilyName, origin: Origin) -> Se
 
 
 def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Origin) -> Card:
+    pictured = next((each for each in record.valid_violations if each.signature == cluster.name), None)
+    prevented = pictured and prevented_by(pictured)
     return Card(
         title=cluster.name,
         lines=[
             f"{_counted(cluster.failures, 'failure')}, {cluster.distinct} distinct, {cluster.preventable} preventable",
-            f"grade: {_grade(cluster, record)}",
+            f"grade: {f'{cluster.grade}: {prevented}' if prevented else 'not judged'}",
+            *(_fault(pictured) if pictured else ()),
             *_told(run, record),
         ],
         command=origin.show(run, cluster.representative),
@@ -166,11 +169,12 @@ def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Ori
     )
 
 
-def _grade(cluster: Cluster, record: EpisodeRecord) -> str:
-    """Returns the grade of the pictured failure and who would have prevented it."""
-    pictured = next((each for each in record.valid_violations if each.signature == cluster.name), None)
-    prevented = pictured and prevented_by(pictured)
-    return f"{cluster.grade}: {prevented}" if prevented else "not judged"
+def _fault(violation: Collision | Violation) -> Iterator[str]:
+    """Which party caused it, and what the ego did about the striker."""
+    if violation.blamed is not None:
+        judged = violation.judgement if isinstance(violation, Collision) else None
+        did = f"; the ego {ego_did(judged.ego_part)}" if judged and judged.ego_part else ""
+        yield f"fault: {violation.blamed}{did}"
 
 
 def _told(run: FinishedRun, record: EpisodeRecord) -> Iterator[str]:
