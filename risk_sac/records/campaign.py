@@ -140,7 +140,7 @@ class Total(Counts):
     unresponsive_share: Real
     """Of the valid contacts; null without one."""
     pcr_by_driver: Mapping[str, DriverPcr] = {}
-    """Reference driver → its own PCR, over all runs."""
+    """Reference driver → its own PCR."""
     by_severity: Mapping[str, int] = {}
     """Severity → valid contacts."""
     by_fault: Mapping[str, int] = {}

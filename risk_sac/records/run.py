@@ -135,7 +135,7 @@ class RunMetrics(Counts):
     by_fault: Mapping[str, int] = {}
     """Fault → failures, each by its worst violation."""
     requirements: Mapping[str, RequirementCounts] = {}
-    """Requirement → its funnel; empty in what was stored before requirements were counted."""
+    """Requirement → its funnel; empty in older runs."""
     conflicts_by_second: tuple[int, ...] = ()
     """Valid contacts by the second in which the conflict began."""
     contacts_by_second: tuple[int, ...] = ()

@@ -53,7 +53,7 @@ class Cell(Counts):
     unresponsive_share: float | None
     """`unresponsive` / valid contacts."""
     pcr_by_driver: Mapping[str, DriverPcr]
-    """Reference driver → its own PCR, over all seeds."""
+    """Reference driver → its own PCR."""
     by_severity: Mapping[str, int]
     """Severity → valid contacts."""
     by_fault: Mapping[str, int]

@@ -111,11 +111,11 @@ class FailureTable(Record):
     kind: list[int]
     """Position in `kinds`."""
     striker: list[str | None]
-    """The road user that touched the ego; without contact the one that the ego would have met soonest, if any."""
+    """What touched the ego; without contact what the ego would have met soonest, if any."""
     striker_kind: list[str | None]
     """vehicle | pedestrian"""
     conflict_type: list[ConflictType | None]
-    """Null without contact, as all that is said of contacts alone; and in what was stored before they were judged."""
+    """Null without contact, and where that was never judged."""
     conflict_s: list[Real]
     """When the conflict began; negative before the release."""
     time_s: list[Real]
@@ -132,10 +132,10 @@ class FailureTable(Record):
     """Until 1 s before the contact; null where there was none."""
     min_rss_margin_m: list[Real]
     min_robustness: list[Real]
-    """Soft minimum of the requirements, until 1 s before the contact; without contact, of the one that was violated."""
+    """Until 1 s before the contact; without contact, of the requirement that was violated."""
     ego_peak_braking_mps2: list[Real]
     hidden: list[bool | None]
-    """Whether the ego knew nothing of the striker when the conflict began, or at the violation."""
+    """As in Judgement, or at the violation."""
     ego_response: list[str | None]
     """none | late_braking | braking | standing | starting | accelerating"""
     ground: list[str | None]
@@ -147,7 +147,7 @@ class FailureTable(Record):
     refused_by: list[list[str]]
     """Rules that the violation failed; none where it is valid."""
     repeats: list[Repeats | None]
-    """Whether it was the same each time that it was played again; null where it was not."""
+    """Whether it was the same each time it was replayed; null where it was not."""
     triage: list[TriageState]
     """What people made of it; `new` at first."""
     kinds: list[FailureKind]
