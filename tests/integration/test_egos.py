@@ -234,6 +234,15 @@ def test_a_request_names_only_what_is_registered(client):
     assert not any("address" in item for item in items.values())
 
 
+def test_a_planner_in_another_process_is_told_the_same_road(tmp_path, monkeypatch):
+    pytest.importorskip("grpc")
+    here = frames("dense", "fiss-plus", 3)
+    with served("fiss-plus", tmp_path, deadline_s=60) as table:
+        register(monkeypatch, tmp_path, far=table)
+        there = frames("dense", "far", 3)
+    np.testing.assert_array_equal([frame.state[:, 0] for frame in there], [frame.state[:, 0] for frame in here])
+
+
 def test_a_request_names_only_defects_that_exist_and_fit(client):
     body = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 1}}
     for ego in ({"driver": "idm-aeb", "defects": ["blind"]}, {"defects": ["latency"]}):
