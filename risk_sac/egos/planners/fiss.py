@@ -74,7 +74,11 @@ class FrenetPlanner:
             raise ValueError(f"the ego begins on no lane of its road: at {ego.x:.1f}, {ego.y:.1f}")
         way = lanes_ahead(self._road, self._road.lanes[start].id)
         self._planner.set_map(self._map, [self._numbers[id_] for id_ in way])
-        self._controller = fp.make_controller("mpc", vehicle_params(self._car, self._car.brake_mps2))
+        tracking = fp.MpcConfig()
+        # The rate of steering is bounded for each of its steps, which have to be as long as the ego's.
+        tracking.horizon = round(tracking.horizon * tracking.dt / self._step_s)
+        tracking.dt = self._step_s
+        self._controller = fp.MpcController(vehicle_params(self._car, self._car.brake_mps2), tracking)
 
     def _ego(self, perceived: Perceived) -> Any:
         x_m, y_m, heading, speed, accel = perceived.state[[X, Y, HEADING, SPEED, ACCEL], 0].tolist()
