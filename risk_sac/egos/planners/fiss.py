@@ -12,9 +12,11 @@ from typing import Any, ClassVar
 import fiss_planner as fp
 import numpy as np
 
+from risk_sac.egos.bicycle import track
 from risk_sac.egos.planners.route import in_pieces, lanes_ahead, stops
 from risk_sac.egos.road import lane_edges
-from risk_sac.egos.seam import Control, Episode, Perceived, Vehicle
+from risk_sac.egos.seam import Control, Episode, Perceived, Trajectory, Vehicle
+from risk_sac.sim.pilot import Motion
 from risk_sac.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Road, X, Y
 
 SPACING_M = 2.0  # of points along lanes
@@ -26,7 +28,10 @@ BEYOND_S = 0.5  # by which predictions reach beyond the longest plan
 
 
 class FrenetPlanner:
-    """The package's local planner on the road that the seam tells, and its tracking controller."""
+    """The package's local planner on the road that the seam tells; the seam's tracker follows its plans.
+
+    Its own MPC does not know the wheels' angle, and strayed from plans by 0.7 m where that tracker strays by 0.1 m.
+    """
 
     kind: ClassVar[str]
     _told: Road | None = None
@@ -54,8 +59,10 @@ class FrenetPlanner:
         plan = self._planner.step(perceived.time_s, ego, self._obstacles(perceived))
         if len(plan.trajectory) < 2:
             return Control(-self._car.brake_mps2)
-        command = self._controller.compute(ego, plan.trajectory, 0.0)
-        return Control(-self._car.brake_mps2 if plan.emergency else command.accel, command.steer)
+        t = plan.trajectory
+        planned = Trajectory(*(np.asarray(row) for row in (t.t, t.x, t.y, t.v)))
+        command = track(planned, Motion(ego.x, ego.y, ego.yaw, ego.v, ego.a), self._car)
+        return command._replace(accel_mps2=-self._car.brake_mps2) if plan.emergency else command
 
     def close(self) -> None:
         """Releases nothing."""
@@ -68,17 +75,12 @@ class FrenetPlanner:
         config.emergency_decel = self._car.brake_mps2
         config.planner.collision.ignore_rear_in_lane = True  # as it drives in CARLA: those behind react
         self._reach_s = config.planner.sampling.max_t + BEYOND_S
-        self._planner = fp.LocalPlanner(config, vehicle_params(self._car, min(self._car.brake_mps2, MOST_BRAKING_MPS2)))
+        self._planner = fp.LocalPlanner(config, vehicle_params(self._car))
         start = self._map.locate(ego.x, ego.y, ego.yaw)
         if start < 0:
             raise ValueError(f"the ego begins on no lane of its road: at {ego.x:.1f}, {ego.y:.1f}")
         way = lanes_ahead(self._road, self._road.lanes[start].id)
         self._planner.set_map(self._map, [self._numbers[id_] for id_ in way])
-        tracking = fp.MpcConfig()
-        # The rate of steering is bounded for each of its steps, which have to be as long as the ego's.
-        tracking.horizon = round(tracking.horizon * tracking.dt / self._step_s)
-        tracking.dt = self._step_s
-        self._controller = fp.MpcController(vehicle_params(self._car, self._car.brake_mps2), tracking)
 
     def _ego(self, perceived: Perceived) -> Any:
         x_m, y_m, heading, speed, accel = perceived.state[[X, Y, HEADING, SPEED, ACCEL], 0].tolist()
@@ -125,12 +127,12 @@ def road_map(road: Road, numbers: Mapping[str, int]) -> Any:
     return found
 
 
-def vehicle_params(car: Vehicle, most_braking_mps2: float) -> Any:
+def vehicle_params(car: Vehicle) -> Any:
     """Returns the package's parameters of the car; the limits that are not given here are the package's."""
     found = fp.VehicleParams()
     found.length, found.width, found.wheelbase = car.length_m, car.width_m, car.wheelbase_m
     found.rear_axle_to_center = car.wheelbase_m / 2
-    found.max_accel, found.max_decel = car.accel_mps2, most_braking_mps2
+    found.max_accel, found.max_decel = car.accel_mps2, min(car.brake_mps2, MOST_BRAKING_MPS2)
     found.max_steer, found.max_steer_rate = car.steering_rad, car.steering_rate_rad_s
     return found
 

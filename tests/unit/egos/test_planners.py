@@ -137,6 +137,13 @@ def test_it_brakes_as_hard_as_the_car_can_where_it_finds_no_plan(name: str) -> N
     assert min(motion.accel_mps2 for motion in motions) == pytest.approx(-VEHICLE.brake_mps2)
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_it_follows_its_plan_back_to_the_middle_of_its_lane(side: float) -> None:
+    road = two_lanes(right=side > 0.0, change=False)
+    motions = drive("fiss-plus", road, steps=40, start=Motion(20.0, 0.8 * side, 0.15 * side, 8.0))
+    assert max(side * motion.y_m for motion in motions) < 1.9  # as its plans, which reach 1.7 m
+
+
 def test_it_drives_the_same_again() -> None:
     road, start = two_lanes(), Motion(20.0, 0.0, 0.0, 12.0)
     assert drive("fiss-plus", road, (slow,), steps=60, start=start) == drive(
