@@ -16,7 +16,7 @@ class Progress(Record):
     """Of the i.i.d. phase too, if there is one; what follows the totals is of the searches alone."""
     episodes_total: int
     headline: int | None = None
-    """Distinct, preventable, not minor, and the same when replayed; each kind once over all runs. Null before that."""
+    """Distinct, preventable, not minor, the same when replayed; each kind once. Null before a replay."""
     failures: int
     """Episodes with a valid violation of a requirement that counts."""
     raw_collisions: int
@@ -29,7 +29,7 @@ class Progress(Record):
     distinct_preventable: int
     """The distinct ones among them; sum over the runs."""
     headline_candidates: int = 0
-    """Those without minor contacts; sum over the runs."""
+    """Those without minor contacts."""
     window_ecr: Real
     """ECR over each run's newest 100 episodes: mean over the runs at work, or all once none is; without
     controls, unless there is nothing else."""

@@ -98,7 +98,7 @@ class RunMetrics(Counts):
     # Fields with a default can be read from what was stored before they were counted.
 
     headline: int | None = None
-    """Candidates that were the same when replayed; null before that."""
+    """Null before a replay."""
     headline_kinds: tuple[str, ...] = ()  # requirement, signature and cell of each
     ecr: Real
     """Effective collision rate: valid contacts / episodes."""

@@ -85,8 +85,8 @@ def _by_requirement(campaign: CampaignSummary) -> str:
 
 def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
     """One row per campaign."""
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for name in ("id", "state", "headline", "episodes", "failures", "posted"):
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    for name in ("id", "state", "head-\nline", "epi-\nsodes", "fail-\nures", "posted"):
         words = name in ("id", "state", "posted")
         table.add_column(name, no_wrap=True, justify="left" if words else "right")
     table.add_column("label")
