@@ -23,7 +23,7 @@ from risk_sac.run_folder.results import read_results
 EGOS = ("default", "red-runner", "off-roader")
 METHODS = ("random", "archive", "risk-sac")
 FAMILIES = ("low", "mixed", "dense")
-COLUMNS = ("family", "ego", "method", "seed", "requirement", "episodes", "violated", "valid", "distinct", "preventable")
+COLUMNS = ("family", "ego", "method", "seed", "requirement", "episodes", "violated", "valid", "distinct")
 FIRST_SEED = 301
 
 
@@ -53,7 +53,7 @@ def rows(out: Path) -> Iterator[dict[str, object]]:
             for name, counts in metrics.requirements.items():
                 if counts.counts == "failure":
                     head = (spec.family, ego, spec.method, spec.seed, name, metrics.driven)
-                    steps = (counts.violated, counts.valid, counts.distinct, counts.preventable)
+                    steps = (counts.violated, counts.valid, counts.distinct)
                     yield dict(zip(COLUMNS, (*head, *steps), strict=True))
 
 
