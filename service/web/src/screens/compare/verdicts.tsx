@@ -67,7 +67,7 @@ function Grid({ what, rows, label, columns, children }: GridProps) {
         </thead>
         <tbody>
           {rows.map((row) => (
-            <tr key={row.key} data-row={row.key}>
+            <tr key={row.key} data-of={row.key}>
               <th scope="row">{row.name}</th>
               {children(row)}
             </tr>
