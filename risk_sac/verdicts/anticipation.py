@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from risk_sac.geometry import Size, touches
 from risk_sac.jit import compiled
-from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.types import VX, VY, Bools, Floats, Kind, X, Y
 from risk_sac.verdicts.course import Body
 from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, allowed_accel, nothing_remembered
@@ -94,7 +93,7 @@ def _task(e: Evidence, path: Path, striker: int | None, conflict_frame: int) -> 
     link = np.nan_to_num(e.link).astype(np.uint8)
     ahead, vehicle, size = link[:, 0], e.kind == int(Kind.VEHICLE), recorded_size(e, 0)
     latest = np.maximum.accumulate(np.where(ahead == PRIORITY, e.time_s, -np.inf))
-    street = street_of(e.ground, e.ground.friction * GRAVITY_MPS2)
+    street = street_of(e.ground)
     everything = np.ones(len(e.ids), dtype=np.bool_)
     return Task(
         path=path,

@@ -41,7 +41,7 @@ def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, war
     apart_m = np.hypot(frame.x_m - frame.x_m[0], frame.y_m - frame.y_m[0]) - (frame.length_m + frame.length_m[0])
     within_reach = apart_m <= HORIZON_S * (frame.speed_mps + frame.ego_speed_mps)
     within_reach[0] = False
-    street = street_of(ground, ground.friction * GRAVITY_MPS2)
+    street = street_of(ground)
     ego = OnPath(path, 0, float(path.s[0]), frame.ego_speed_mps, size_of(frame.state, 0))
     for i in np.flatnonzero(known & within_reach):
         vehicle, link = bool(frame.kind[i] == Kind.VEHICLE), int(frame.link[i])
@@ -91,7 +91,7 @@ class DefensiveReflex:
     """
 
     def __init__(self, ground: Ground) -> None:
-        self._street = street_of(ground, ground.friction * GRAVITY_MPS2)
+        self._street = street_of(ground)
         self._ids: tuple[str, ...] = ()
         self._memory = nothing_remembered(0)
         self._priority_s = -math.inf  # when its signal last gave it priority

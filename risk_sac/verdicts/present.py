@@ -12,7 +12,8 @@ import numpy as np
 
 from risk_sac.geometry import Size
 from risk_sac.jit import compiled
-from risk_sac.scenario.ground import Sides, sides_of, within
+from risk_sac.scenario.ground import Area, Sides, sides_of, within
+from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.types import ACCEL, HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Floats, X, Y
 from risk_sac.verdicts.along import along, lane_conflict
 from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, KERB_S, SAME_WAY_COS, YIELDING_MPS2
@@ -48,12 +49,17 @@ class Street(NamedTuple):
     grip_mps2: float
 
 
-@lru_cache(maxsize=8)
-def street_of(ground: Ground, grip_mps2: float) -> Street:
+def street_of(ground: Ground) -> Street:
     """What compiled code goes by of a ground."""
-    roadway, walked = sides_of(ground.roadway), sides_of(ground.roadway + ground.crossings)
-    junctions, boxes = sides_of(ground.junctions), boxes_of(ground.crossings)
-    return Street(roadway, walked, junctions, boxes, ground.lane_width_m, grip_mps2)
+    areas = _areas_of(ground.roadway, ground.crossings, ground.junctions)
+    return Street(*areas, ground.lane_width_m, ground.friction * GRAVITY_MPS2)
+
+
+@lru_cache(maxsize=8)  # an episode's friction is its own, but many are at one place
+def _areas_of(
+    roadway: tuple[Area, ...], crossings: tuple[Area, ...], junctions: tuple[Area, ...]
+) -> tuple[Sides, Sides, Sides, Floats]:
+    return sides_of(roadway), sides_of(roadway + crossings), sides_of(junctions), boxes_of(crossings)
 
 
 @compiled

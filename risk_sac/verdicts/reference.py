@@ -3,7 +3,7 @@
 Source: UN Regulation 157, 5.2.5 and Annex 3; the drivers in `risk_sac.verdicts.drivers`.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -53,13 +53,16 @@ def reference_outcomes(evidence: Evidence, striker: int, conflict: Conflict) -> 
     outcomes = {}
     path = recorded if kept is None else kept
     others = (striker,) if kept is None else (striker, *_met(evidence, kept, striker))
+    tracks = {other: _track(evidence, other) for other in others}
     for name, (driver, perceives_s) in DRIVERS.items():
         if driver == DEFENSIVE:
             latest = len(evidence.time_s) - 1 if kept is None else conflict.in_lane
-            endings = _anticipating(evidence, path, others, conflict.frame, latest)
+            endings = _anticipating(evidence, path, tracks, conflict.frame, latest)
         else:
-            endings = (_braking(evidence, path, each, driver, conflict.frame, perceives_s) for each in others)
-        each = (_outcome(evidence, *ending, kept=kept is not None) for ending in zip(others, endings, strict=True))
+            endings = (
+                _braking(evidence, path, track, driver, conflict.frame, perceives_s) for track in tracks.values()
+            )
+        each = (_outcome(evidence, *ending, kept=kept is not None) for ending in zip(tracks, endings, strict=True))
         outcomes[name] = next((outcome for outcome in each if not outcome.avoids), AVOIDED)
     if conflict.type is ConflictType.CUT_IN:
         outcomes["r157_ttc"] = _by_ttc(evidence, recorded, striker)
@@ -82,9 +85,11 @@ def grade(keeps: Mapping[str, bool]) -> Grade:
     return Grade.FULL_BRAKING if keeps["full_braking"] else Grade.UNAVOIDABLE
 
 
-def _braking(evidence: Evidence, path: Path, other: int, driver: int, began: int, perceives_s: float) -> Ending | None:
+def _braking(
+    evidence: Evidence, path: Path, track: Body[Floats], driver: int, began: int, perceives_s: float
+) -> Ending | None:
     """Drives against one actor with a driver that brakes; None if the ego is struck before it perceives."""
-    e, track = evidence, _track(evidence, other)
+    e = evidence
     first = began + round(perceives_s / e.step_s)
     if first >= len(e.time_s) - 1:
         return None
@@ -93,15 +98,15 @@ def _braking(evidence: Evidence, path: Path, other: int, driver: int, began: int
 
 
 def _anticipating(
-    evidence: Evidence, path: Path, others: Sequence[int], began: int, latest: int
+    evidence: Evidence, path: Path, tracks: Mapping[int, Body[Floats]], began: int, latest: int
 ) -> Iterator[Ending | None]:
     """Drives the defensive driver; None where it does as the ego did."""
-    s, acts = driven(evidence, path, others[0], began, latest)
-    for other in others:
+    s, acts = driven(evidence, path, next(iter(tracks)), began, latest)
+    for track in tracks.values():
         if acts == len(evidence.time_s) - 1:
             yield None
         else:
-            yield meets(path, recorded_size(evidence, 0), _track(evidence, other), s, acts, evidence.step_s)
+            yield meets(path, recorded_size(evidence, 0), track, s, acts, evidence.step_s)
 
 
 def _track(evidence: Evidence, other: int) -> Body[Floats]:
