@@ -12,10 +12,11 @@ import numpy as np
 
 from risk_sac.geometry import Size
 from risk_sac.jit import compiled
-from risk_sac.scenario.ground import Area, Sides, sides_of, within
+from risk_sac.scenario.ground import Area
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.types import ACCEL, HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Floats, X, Y
 from risk_sac.verdicts.along import along, lane_conflict
+from risk_sac.verdicts.areas import Sides, sides_of, within
 from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, KERB_S, SAME_WAY_COS, YIELDING_MPS2
 from risk_sac.verdicts.course import HORIZON_S, Body, entry_distance, time_to_touch, with_margin
 from risk_sac.verdicts.evidence import KERB_STEPS, Ground

@@ -30,7 +30,8 @@ BEYOND_S = 0.5  # by which predictions reach beyond the longest plan
 class FrenetPlanner:
     """The package's local planner on the road that the seam tells; the seam's tracker follows its plans.
 
-    Its own MPC does not know the wheels' angle, and strayed from plans by 0.7 m where that tracker strays by 0.1 m.
+    Its own MPC does not know the wheels' angle. In three staged starts it went up to 1.4 m beyond a plan, that
+    tracker up to 0.4 m.
     """
 
     kind: ClassVar[str]
@@ -142,7 +143,7 @@ class Fop(FrenetPlanner):
 
     version = "1.0.0"
     response_time_s = 0.5
-    kind = "fop_plus"  # chooses as `fop` does, but validates in order of cost: a fifth of the time
+    kind = "fop_plus"  # chooses as `fop` does, but validates in order of cost, which is faster
 
 
 class Fiss(FrenetPlanner):
