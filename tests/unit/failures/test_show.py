@@ -104,6 +104,7 @@ def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke()
         "the ego's front, at 10.0 m/s, touched the left of adversary 'pedestrian', at 1.0 m/s, "
         "of which it had known for 1.0 s",
         JUDGED.signature,
+        "moderate: closing speed 10.1 m/s, risk of death 0.5 %",
         "the conflict began 1.2 s before the contact · grade preventable: R157's driver and full braking at once "
         "would have",
         "prevented it",
