@@ -156,3 +156,8 @@ def check_axe() -> Callable[["Page"], None]:
         )
 
     return check
+
+
+def count(value: int | None) -> str:
+    """As the page shows it; the headline is not known where nothing was replayed."""
+    return "–" if value is None else str(value)

@@ -10,7 +10,7 @@ from playwright.sync_api import Locator, Page, expect
 from pyarrow import parquet
 
 from tests.server import Service, servers
-from tests.web.conftest import LONG_MS
+from tests.web.conftest import LONG_MS, count
 
 STEPS = ("failures", "distinct_failures", "distinct_preventable", "headline_candidates", "headline")
 
@@ -34,7 +34,7 @@ def test_the_numbers_on_the_screen_are_the_services(
     expect(page.get_by_role("heading", name="night <b>7</b>")).to_be_visible()
     plot(page, "Sliding ECR").wait_for()
     seen = service.get(campaign)
-    assert funnel(page) == [str(seen["progress"][name]) for name in STEPS]
+    assert funnel(page) == [count(seen["progress"][name]) for name in STEPS]
     expect(page.locator("[data-field='done']")).to_have_text(str(seen["progress"]["episodes_done"]))
     for run in seen["runs"]:
         shown = dict(
@@ -43,7 +43,7 @@ def test_the_numbers_on_the_screen_are_the_services(
         assert [shown[name] for name in ("failures", "distinct", "preventable")] == [
             str(run[name]) for name in STEPS[:3]
         ]
-        assert shown["headline"] == str(run["metrics"]["headline"])
+        assert shown["headline"] == count(run["metrics"]["headline"])
         for name in ("ecr", "pcr"):
             assert _number(shown[name.upper()]) == pytest.approx(100 * run["metrics"][name], abs=0.0501)
         expect(card(page, run["id"])).to_contain_text(f"{run['raw_collisions']} contacts")
@@ -113,7 +113,7 @@ def test_a_running_campaign_is_followed_to_its_end_without_a_reload(
     expect(page.get_by_text("succeeded", exact=True).first).to_be_visible(timeout=LONG_MS)
     ended = service.wait(running)
     expect(page.locator("[data-field='done']")).to_have_text("40")
-    assert funnel(page) == [str(ended["progress"][name]) for name in STEPS]
+    assert funnel(page) == [count(ended["progress"][name]) for name in STEPS]
     area = plot(page, "Realism cost")
     area.focus()
     area.press("ArrowRight")

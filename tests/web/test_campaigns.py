@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 
 from tests.server import Service
-from tests.web.conftest import CAMPAIGN
+from tests.web.conftest import CAMPAIGN, count
 
 HOSTILE = "<img src=x onerror=alert(1)> ‮& \"'"
 
@@ -57,7 +57,7 @@ def test_a_row_says_what_the_api_says(
     expect(cells.nth(6)).to_have_text(str(said["progress"]["episodes_total"]))
     expect(cells.nth(7)).to_contain_text(f"{100 * said['progress']['window_ecr']:.1f} %")
     for place, name in enumerate(("headline", "distinct_failures", "distinct_preventable"), start=8):
-        expect(cells.nth(place)).to_have_text(str(said["progress"][name]))
+        expect(cells.nth(place)).to_have_text(count(said["progress"][name]))
     expect(cells.nth(11)).to_contain_text("took")
 
 

@@ -11,6 +11,7 @@ import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 
 from tests.server import Service
+from tests.web.conftest import count
 
 
 @pytest.fixture(scope="session")
@@ -34,11 +35,6 @@ def numbers(text: str) -> list[float]:
 def per_cent(*values: float) -> Any:
     """As they are shown, rounded to a tenth of a per cent."""
     return pytest.approx([100 * value for value in values], abs=0.0501)
-
-
-def count(value: int | None) -> str:
-    """As it is shown; the headline is not known where nothing was replayed."""
-    return "–" if value is None else str(value)
 
 
 def row_of(page: Page, key: str, family: str = "low") -> Locator:
@@ -187,7 +183,7 @@ def _check_total(row: Locator, letter: str, total: dict[str, Any]) -> None:
         assert numbers(text) == per_cent(total[name], total[f"{name}_low"], total[f"{name}_high"])
     shown = [text.strip() for text in row.locator("td").all_inner_texts()]
     named = ("headline", "distinct_failures", "distinct_preventable", "runs", "episodes")
-    assert [*shown[:3], *shown[5:]] == [str(total[name]) for name in named]
+    assert [*shown[:3], *shown[5:]] == [count(total[name]) for name in named]
 
 
 def _saved(page: Page, button: Locator, folder: Path) -> Path:
