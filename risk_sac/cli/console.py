@@ -16,7 +16,7 @@ from rich.progress import (
     TextColumn,
     TimeRemainingColumn,
 )
-from rich.table import Table
+from rich.table import Column, Table
 
 from risk_sac.metrics import requirement_cells
 from risk_sac.records import Adjustment, Collision, EpisodeRecord, RequirementCounts, Violation
@@ -61,8 +61,9 @@ def write_out(file: Path, content: bytes, what: str = "", said_on: Output = cons
 
 
 def columns(bar: BarColumn) -> tuple[ProgressColumn, ...]:
-    """Around a bar, with a field `found` for what the search has found."""
-    return TextColumn("{task.description}"), bar, MofNCompleteColumn(), TextColumn("{task.fields[found]}")
+    """Around a bar, with a field `found` for what the search has found, which wraps where the terminal is narrow."""
+    found = TextColumn("{task.fields[found]}", table_column=Column(no_wrap=False))
+    return TextColumn("{task.description}"), bar, MofNCompleteColumn(), found
 
 
 def progress_bar() -> Progress:
