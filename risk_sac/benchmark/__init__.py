@@ -1,1 +1,1 @@
-"""How soon search methods detect egos with known faults."""
+"""Measures how soon search methods detect egos with known faults."""

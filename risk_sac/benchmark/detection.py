@@ -1,4 +1,4 @@
-"""Runs a search until it detects the planted defect of its ego, or has spent its budget of environment steps."""
+"""Runs a search until it detects a planted defect or ends its budget."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -17,7 +17,10 @@ MOST_EPISODES = 20_000  # scenes that are refused cost no steps
 
 
 class Detection(Record):
-    """Outcome of a run against an ego with defects. Times are environment steps up to the end of an episode."""
+    """Outcome of a run against an ego with defects.
+
+    Times are environment steps up to the end of an episode.
+    """
 
     defects: tuple[str, ...]
     family: str
@@ -44,7 +47,7 @@ class Detection(Record):
 
 @dataclass(slots=True)
 class _Candidates:
-    """Observer that stops a run at each failure that may detect a defect, and once the budget is spent."""
+    """Observer that stops a run at each candidate, and at the budget's end."""
 
     spec: RunSpec
     budget_steps: int

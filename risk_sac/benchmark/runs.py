@@ -12,7 +12,7 @@ from pathlib import Path
 from risk_sac.benchmark.detection import ANSWER, Detection, first_detection
 from risk_sac.config import EgoConfig, MethodName, RunSpec
 from risk_sac.config.spec_file import read_ego
-from risk_sac.egos.defects.catalogue import DEFECTS, Defect
+from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.egos.registry import pinned
 from risk_sac.errors import ConfigError
 from risk_sac.problem import check_installed
@@ -20,7 +20,7 @@ from risk_sac.problem import check_installed
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Benchmark:
-    """What is compared on which defects."""
+    """Methods and the defects on which they are compared."""
 
     methods: tuple[MethodName, ...]
     defects: tuple[str, ...]
@@ -36,22 +36,22 @@ class Benchmark:
         for method in self.methods:
             check_installed(method)
         for name in self.defects:
-            pinned(ego_with(DEFECTS.get(name) or name))
+            pinned(ego_with(name))
 
     def specs(self) -> Iterator[RunSpec]:
         """Seeds outermost and methods innermost, so that early results compare methods."""
         for seed in self.seeds:
             for name in self.defects:
-                defect = DEFECTS[name]
                 for method in self.methods:
-                    yield RunSpec(family=defect.families[0], method=method, seed=seed, ego=pinned(ego_with(defect)))
+                    yield RunSpec(
+                        family=DEFECTS[name].families[0], method=method, seed=seed, ego=pinned(ego_with(name))
+                    )
 
 
-def ego_with(defect: Defect | str) -> EgoConfig:
-    """Returns a defect's base ego with the defect."""
-    if isinstance(defect, str):
-        return read_ego(f"idm-aeb+{defect}")
-    return read_ego(f"{defect.base}+{defect.name}")
+def ego_with(defect: str) -> EgoConfig:
+    """Returns a defect's base ego with the defect; a name that no defect has is refused when the ego is pinned."""
+    base = DEFECTS[defect].base if defect in DEFECTS else "idm-aeb"
+    return read_ego(f"{base}+{defect}")
 
 
 def folder_of(spec: RunSpec, out: Path, budget_steps: int) -> Path:

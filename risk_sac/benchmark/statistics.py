@@ -60,7 +60,7 @@ def survival(detections: Sequence[Detection]) -> tuple[Floats, Floats]:
 
 
 def log_rank(first: Sequence[Detection], second: Sequence[Detection]) -> float:
-    """P of the log-rank test that both have the same time to detection; 1 where neither has a detection."""
+    """P value of the log-rank test of two times to detection; 1 without any."""
     from scipy.stats import logrank
 
     if all(each.detected is None for each in (*first, *second)):

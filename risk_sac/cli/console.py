@@ -61,7 +61,7 @@ def write_out(file: Path, content: bytes, what: str = "", said_on: Output = cons
 
 
 def columns(bar: BarColumn) -> tuple[ProgressColumn, ...]:
-    """Around a bar, with a field `found` for what the search has found, which wraps where the terminal is narrow."""
+    """Columns around a bar; the field `found`, the search's findings, wraps on narrow terminals."""
     found = TextColumn("{task.fields[found]}", table_column=Column(no_wrap=False))
     return TextColumn("{task.description}"), bar, MofNCompleteColumn(), found
 
@@ -152,7 +152,7 @@ def counted(count: int, noun: str) -> str:
 
 
 def headline(found: int | None, candidates: int) -> str:
-    """How many headline failures there are; before they were replayed, how many there may be."""
+    """Number of headline failures; before their replay "at most" the candidates."""
     return f"at most {candidates}" if found is None and candidates else f"{found or 0}"
 
 

@@ -136,7 +136,7 @@ def compared(found: Sequence[Collision | Violation], wanted: Sequence[Collision 
     if valid := [each for each in found if each.valid]:
         return _Ending(Verdict.NEW_KIND, f"{_events(valid)}: {valid[0].signature}", valid[0].signature)
     if not found:
-        kept = (f"{old.requirement} is kept" if isinstance(old, Violation) else "nobody is touched" for old in wanted)
+        kept = (f"{old.requirement} is kept" if isinstance(old, Violation) else "nothing is touched" for old in wanted)
         return _Ending(Verdict.FIXED, " and ".join(kept))
     events, broken = _events(found), {rule for each in found for rule in each.broken}
     said = f"{events}, which is not its failure: {', '.join(sorted(broken))}"

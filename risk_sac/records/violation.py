@@ -1,5 +1,6 @@
 """Violations of requirements, with and without contact."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -32,8 +33,8 @@ def _early(name: str) -> Any:
     return Field(validation_alias=AliasChoices(f"early_{name}", name), serialization_alias=f"early_{name}")
 
 
-class Violated(Record):
-    """What all violations have in common: the rules they are valid by."""
+class Violated(Record, ABC):
+    """Base of violations, with and without contact: the rules they are valid by, and their verdict."""
 
     verdicts: Mapping[str, bool] = {}
     """Validity rule → passed."""
@@ -54,19 +55,19 @@ class Violated(Record):
         return not ARTEFACT_RULES.isdisjoint(self.broken)
 
     @property
+    @abstractmethod
     def graded(self) -> Grade | None:
-        """Which reference driver would have prevented it; None where it is not valid, or was never judged."""
-        raise NotImplementedError
+        """Its grade; None where it is not valid, or was never judged."""
 
     @property
+    @abstractmethod
     def blamed(self) -> Fault | None:
         """Which party caused it; None where it is not valid, or was never judged."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def prevention(self) -> Mapping[str, bool]:
         """Reference driver → whether it would have prevented it; empty where none was asked."""
-        raise NotImplementedError
 
     @property
     def preventable(self) -> bool:

@@ -1,4 +1,6 @@
-"""The defensive driver in the ego's place: from when it would have driven slower until 3 s after the contact.
+"""Puts the defensive driver in the ego's place.
+
+It drives from when it would have been slower than the ego until 3 s after the contact.
 
 It is followed along the ego's path while all others move as recorded. On the record it is asked in every frame since
 the release how much it would allow itself; where that is less than what the ego did, the two part. It takes over at the
@@ -44,7 +46,7 @@ RESTRAINED_MPS2 = 2.0  # one that may speed up by more is not
 
 
 class Task(NamedTuple):
-    """An episode as compiled code needs it, of `T` frames and `n` actors, and what the driver goes by in it."""
+    """Episode of `T` frames and `n` actors, as compiled code needs it."""
 
     path: Path
     size: Size
@@ -161,7 +163,7 @@ def _asked(task: Task, t: int, ego: OnPath, state: Floats, seen: Bools, memory: 
 
 @compiled
 def _strikes_s(path: Path, s: float, speed: float, frame: int, began: int) -> float:
-    """When the driver would come to the place of the contact, while the conflict of the record lasts; inf else."""
+    """Time until the driver reaches the place of the contact, during the recorded conflict; else inf."""
     last = len(path.s) - 1
     if began <= frame < last and speed > 0.0:
         to_go_m: float = path.s[last] - s

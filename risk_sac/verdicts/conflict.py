@@ -84,12 +84,12 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
         to_go_m = _way_to_corridor(path, evidence, striker)
         begins = lasts = course | _cannot_stop(to_go_m, evidence, striker, wary=False)
         begins_if_wary = lasts_if_wary = course | _cannot_stop(to_go_m, evidence, striker, wary=True)
-    frame, unseen = _since(begins & known, lasts & known), _since(begins, lasts)
-    noticed = _since(begins_if_wary & known, lasts_if_wary & known)
-    unseen_if_wary = _since(begins_if_wary, lasts_if_wary)
-    course_from = _since(course & known, course & known)
+    frame, unseen = lasting_since(begins & known, lasts & known), lasting_since(begins, lasts)
+    noticed = lasting_since(begins_if_wary & known, lasts_if_wary & known)
+    unseen_if_wary = lasting_since(begins_if_wary, lasts_if_wary)
+    course_from = lasting_since(course & known, course & known)
     if same_way and unseen_if_wary == len(course) - 1:  # neither led nor cut in
-        frame, unseen = course_from, _since(course, course)
+        frame, unseen = course_from, lasting_since(course, course)
     left = None if same_way and came_further(evidence, striker, seen) else left_its_lane(evidence, striker)
     if left is not None:
         frame, noticed, unseen = (max(left, each) for each in (frame, noticed, unseen))
@@ -158,7 +158,7 @@ def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
 
 
 @compiled
-def _since(begins: Bools, lasts: Bools) -> int:
+def lasting_since(begins: Bools, lasts: Bools) -> int:
     """The first frame in which a condition begins that then lasts until the last frame, in which it holds anyway."""
     first, missing = len(begins) - 1, 0
     for t in range(len(begins) - 2, -1, -1):

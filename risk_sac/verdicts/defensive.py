@@ -1,4 +1,4 @@
-"""The defensive driver: how much it speeds up, or how hard it brakes, for what it sees and for what it does not.
+"""Computes how much the defensive driver speeds up or brakes.
 
 1. It keeps a speed at which it can stop, at 3.4 m/s² after 0.75 s, before a place that it does not see and from which a
    pedestrian could come into its way before it has passed: a crossing with 2 m of waiting area at either end, or the
@@ -143,7 +143,7 @@ def _at_crossings(view: View) -> float:
 
 @compiled
 def _is_stopped_for(scene: Scene, placed: Floats, enters_m: float) -> bool:
-    """Whether a vehicle in another lane of the ego's direction stands before a crossing, or brakes to stop there."""
+    """Whether a vehicle of the ego's direction stops for a crossing in another lane."""
     state = scene.state
     for i in range(1, len(scene.vehicle)):
         if not scene.vehicle[i] or not scene.seen[i] or math.isnan(state[X, i]):
@@ -211,7 +211,7 @@ def _beside(view: View, i: int, remembered: Floats) -> float:
 
 @compiled
 def _nearing_mps(state: Floats, i: int, across: float, heading: float) -> float:
-    """How fast an actor comes nearer to the path sideways."""
+    """Speed of an actor towards the path, sideways."""
     left_mps: float = state[VY, i] * math.cos(heading) - state[VX, i] * math.sin(heading)
     return -math.copysign(1.0, across) * left_mps
 
@@ -255,7 +255,7 @@ def _comes_across(view: View, i: int, link: int) -> bool:
 
 @compiled
 def _in_conflict(speed_mps: float, touch_s: float, grip_mps2: float, remembered: Floats, step_s: float) -> float:
-    """Rule 4, given when the ego would reach the actor; brings up to date what it remembers of that actor."""
+    """Applies rule 4, given the time to the actor; updates the memory of it."""
     if touch_s < math.inf:
         remembered[SINCE_S] = 0.0 if remembered[SINCE_S] < 0.0 else remembered[SINCE_S] + step_s
         remembered[GONE_S] = 0.0

@@ -1,4 +1,4 @@
-"""What the ego did about the striker: facts, from the frames up to the contact.
+"""States facts about the ego's part in a contact.
 
 They are stated next to the verdict, and `risk_sac.verdicts.fault` judges by them.
 """

@@ -1,4 +1,4 @@
-"""Which party caused a contact or a violation, by the rule of risk_sac/verdicts/README.md."""
+"""Decides which party caused a contact or a violation; README.md has the rule."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -16,7 +16,7 @@ CROSSINGS = ("crossing", "beside_crossing")
 
 
 class Parts(NamedTuple):
-    """What either party did, as far as the fault depends on it."""
+    """Behaviour of both parties that the fault depends on."""
 
     drove_into: bool = False  # the ego drove on into a road user that it saw in its way
     ego_erred: bool = False

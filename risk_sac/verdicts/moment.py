@@ -1,4 +1,4 @@
-"""One moment as the defensive driver sees it, and the speed from which it can stop before a place."""
+"""Builds the defensive driver's view of one moment."""
 
 import math
 from typing import NamedTuple
@@ -20,7 +20,7 @@ OWN_LANE_M = 1.2
 
 
 class Scene(NamedTuple):
-    """What the driver has before it."""
+    """Scene before the driver."""
 
     state: Floats  # rows x n, of a frame; the ego's column is not used
     vehicle: Bools

@@ -40,7 +40,7 @@ class OnPath(NamedTuple):
 
 
 class Street(NamedTuple):
-    """What does not change in an episode."""
+    """Ground of an episode, as compiled code needs it."""
 
     roadway: Sides  # none: pedestrians are judged as if always on it
     walked: Sides  # roadway and crossings
@@ -51,7 +51,7 @@ class Street(NamedTuple):
 
 
 def street_of(ground: Ground) -> Street:
-    """What compiled code goes by of a ground."""
+    """Converts a ground."""
     areas = _areas_of(ground.roadway, ground.crossings, ground.junctions)
     return Street(*areas, ground.lane_width_m, ground.friction * GRAVITY_MPS2)
 
@@ -72,9 +72,9 @@ def body_of(state: Floats, i: int) -> Body[float]:
 
 @compiled
 def conflict_in(ego: OnPath, state: Floats, i: int, vehicle: bool, link: int, street: Street, wary: bool) -> float:
-    """Time until the ego reaches an actor that it is in a conflict with, s; inf if it is in none.
+    """Computes the time until the ego reaches a conflicting actor, s.
 
-    It is 0 where the two drive alongside.
+    It is inf without a conflict, and 0 where the two drive alongside.
 
     Args:
       ego: on its path.
@@ -133,7 +133,7 @@ def soon_walked(street: Street, other: Body[float]) -> bool:
 def _entry(
     ego: OnPath, corridor: Size, other: Body[float], other_mps: float, braking_mps2: float
 ) -> tuple[float, float]:
-    """`entry_distance` of one that goes on straight, as far as it needs to stop; infinite if it can stop before."""
+    """`entry_distance` of a straight course as long as stopping takes; inf if it can stop before."""
     stopping_m = other_mps**2 / (2 * braking_mps2)
     ahead = np.linspace(0.0, stopping_m, math.ceil(stopping_m / AHEAD_M) + 1)
     cos, sin = (other.vx / other_mps, other.vy / other_mps) if other_mps > STANDING_MPS else (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Which of two road users first left RSS's proper response before a contact.
+"""Finds which of two road users first left RSS's proper response.
 
 A situation is dangerous while both RSS distances are too short. From when it became so until the contact, each party
 may go on for the response time and has to brake from then on:
@@ -26,7 +26,7 @@ from risk_sac.risk.rss import margins
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.types import HEADING, LENGTH, VX, VY, WIDTH, Bools, Floats, Kind, X, Y
 from risk_sac.verdicts.along import Along
-from risk_sac.verdicts.conflict import BRIDGE
+from risk_sac.verdicts.conflict import lasting_since
 from risk_sac.verdicts.course import Body
 from risk_sac.verdicts.drivers import JERK_MPS3
 from risk_sac.verdicts.evidence import Evidence
@@ -41,7 +41,9 @@ HARDER = 1.1  # than the hardest braking to be expected, beyond what a step of 0
 def left_first(
     evidence: Evidence, striker: int, conflict_type: ConflictType, seen: Along[Floats], yields: str | None
 ) -> str | None:
-    """Names which party first left the proper response: ego or striker; None if neither did, or both at once.
+    """Names the party that first left the proper response: ego or striker.
+
+    None if neither did, or both at once.
 
     Args:
       evidence: up to the contact.
@@ -68,8 +70,7 @@ def _danger(evidence: Evidence, striker: int) -> tuple[int, bool]:
     walks = np.array([evidence.kind[striker] == Kind.PEDESTRIAN])
     along, across = _margins(recorded_motion(evidence, 0), recorded_motion(evidence, striker), walks, RSS)
     dangerous = (along < 0.0) & (across < 0.0)
-    dangerous[-1] = True  # of the contact
-    began = first_of_last_run(dangerous)
+    began = lasting_since(dangerous, dangerous)
     return began, bool(across[began - 1] >= 0.0 > along[began - 1]) if began else False
 
 
@@ -119,13 +120,6 @@ def _leaves(
     allowed = np.maximum(speed[responds] - brake_mps2 * since_s, 0.0) + tolerance_mps
     faster = np.flatnonzero(speed[responds:] > allowed)
     return float(responds + faster[0]) if len(faster) else math.inf
-
-
-def first_of_last_run(holds: Bools) -> int:
-    """Finds the first frame of the run that lasts until the last frame; it may be interrupted for 0.2 s."""
-    frames = np.flatnonzero(holds)
-    breaks = np.flatnonzero(np.diff(frames) > BRIDGE + 1)
-    return int(frames[breaks[-1] + 1] if len(breaks) else frames[0])
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""Places from which a pedestrian may come that the ego does not see: crossings on its path, and what hides them."""
+"""Finds places that hide pedestrians: crossings on the path, behind other bodies."""
 
 import math
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ def boxes_of(crossings: Sequence[Area]) -> Floats:
 
 
 def _corners(area: Area) -> list[tuple[float, float]]:
-    """Where consecutive sides meet."""
+    """Computes the corners of an area."""
     found = []
     for (ax, ay, a), (bx, by, b) in zip(area.sides, (*area.sides[1:], area.sides[0]), strict=True):
         cross = ax * by - ay * bx

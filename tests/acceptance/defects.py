@@ -26,7 +26,7 @@ UNDISTURBED, METHODS, FIRST_SEED = "iid-undisturbed", ("archive", "random"), 501
 
 def played(name: str, family: str, options: argparse.Namespace) -> Iterator[Detection]:
     """Yields the undisturbed run of a defect in a family, and then searches up to a detection."""
-    ego = pinned(ego_with(DEFECTS[name]))
+    ego = pinned(ego_with(name))
     searches = [(method, FIRST_SEED + k) for k in range(options.seeds) for method in METHODS]
     for method, seed in [(UNDISTURBED, FIRST_SEED), *searches]:
         spec = RunSpec(family=family, method=method, seed=seed, ego=ego, budget=Budget(episodes=options.scenes))

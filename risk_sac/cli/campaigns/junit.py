@@ -28,12 +28,11 @@ def junit(
     """
     names = Names(results, service_url, url, failures)
     report = JUnitXml("risk-sac")
+    found = headline(results.headline, sum(total.headline_candidates for total in results.totals))
     for family in dict.fromkeys(run.family for run in results.runs):
         suite = TestSuite(family)
         runs = [run for run in results.runs if run.family == family]
-        candidates = sum(total.headline_candidates for total in results.totals)
-        properties = {"headline failures": headline(results.headline, candidates)}
-        properties |= {"campaign": results.campaign_id, "url": url, **_versions(runs)}
+        properties = {"headline failures": found, "campaign": results.campaign_id, "url": url, **_versions(runs)}
         for name, value in properties.items():
             suite.add_property(printable(name), printable(value))
         suite.add_testcases([_case(run, names.of_run(run)) for run in runs])

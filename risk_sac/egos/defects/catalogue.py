@@ -57,7 +57,7 @@ class Defect(Settings):
 
     @property
     def fingerprint(self) -> bytes:
-        """What determines its effect: its row, and the code of its kind."""
+        """Bytes that determine its effect: its row, and the code of its kind."""
         sources = [] if self.kind == "sumo" else [HERE / "defective.py", HERE / f"{self.kind}.py"]
         row = self.model_dump_json(exclude={"sentence", "families", "requirement", "test_set"}).encode()
         return b"\0".join([row, *(source.read_bytes() for source in sources)])

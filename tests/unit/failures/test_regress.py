@@ -94,4 +94,4 @@ def test_every_requirement_that_a_failure_violated_has_to_be_kept() -> None:
     assert compared([violation()], [HIT, violation()]).verdict is Verdict.STILL_FAILING
     assert compared([HIT], [HIT, violation()]).found == "cut-in"
     assert compared([other], [HIT, violation()]).verdict is Verdict.NEW_KIND
-    assert compared([], [HIT, violation()]).reason == "nobody is touched and never_fast is kept"
+    assert compared([], [HIT, violation()]).reason == "nothing is touched and never_fast is kept"
