@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from risk_sac.agents.controls import RandomAgent, ScriptedAgent
+from risk_sac.agents.controls import IdleAgent, RandomAgent, ScriptedAgent
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.config import RunSpec, method_of
 from risk_sac.problem import Problem
-from risk_sac.records import Collision, EpisodeRecord, Outcome, Violation
+from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Outcome, Violation
 from risk_sac.scene_optimizer import (
     NOBODY,
     ArchiveOptimizer,
@@ -27,15 +27,15 @@ from risk_sac.scene_optimizer import (
 from risk_sac.types import Floats, Scene
 from risk_sac.verdicts.distinct import DistinctFailures
 
-CONTROLS: Mapping[str, type[RandomAgent | ScriptedAgent]] = {
+CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
     "scripted": ScriptedAgent,
     "random": RandomAgent,
-    "none": RandomAgent,
+    "none": IdleAgent,
 }
 OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
     each.kind: each for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler)
 }
-Actor = Learner | RandomAgent | ScriptedAgent | ScriptFollower
+Actor = Learner | IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
 """A joint policy that drives all adversaries."""
 GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
 STEP_COSTS = 1.0, 8.0  # processor time of an environment step: of the guide, and of a policy with its share of updates
@@ -100,6 +100,14 @@ class Searchers:
         warm_start = self._spec.learner.warm_start
         spent = self._episodes >= warm_start.episodes and not (self._turns and warm_start.episodes)
         return spent or self._failures >= warm_start.failures
+
+    def driven_by(self, *, learning: bool) -> DrivenBy | None:
+        """Returns what drives the adversaries of the point that was proposed last; None: nothing does."""
+        sampler, actor = self._next
+        if actor.genes:
+            return sampler.driven_by
+        frozen = isinstance(actor, Learner) and not learning
+        return DrivenBy.POLICY if frozen else actor.driven_by
 
     def split(self, point: Floats) -> tuple[Scene, Floats]:
         """Splits a proposed point into its scene and the actor's genes."""

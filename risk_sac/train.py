@@ -17,7 +17,7 @@ import torch
 from risk_sac.agents.replay import Transition
 from risk_sac.config import RunSpec
 from risk_sac.guarded_env import GuardedEnv, Unplayable
-from risk_sac.records import RECORDED, Ending, EpisodeRecord, RequirementResult, RunMetrics, SeriesFile
+from risk_sac.records import RECORDED, DrivenBy, Ending, EpisodeRecord, RequirementResult, RunMetrics, SeriesFile
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.run import RunState, RunSummary
@@ -82,6 +82,7 @@ def episode(run: RunState, env: GuardedEnv) -> EpisodeRecord:
     env.begin(len(run.records))
     sampler, actor = run.searchers.next(learning=learning)
     point = sampler.ask()  # Alg. 1, l. 4
+    driven_by = run.searchers.driven_by(learning=learning)
     scene, genes = run.searchers.split(point)
     run.searchers.begin(genes)
     try:
@@ -114,7 +115,7 @@ def episode(run: RunState, env: GuardedEnv) -> EpisodeRecord:
                 break
     except Unplayable as unplayable:
         run.searchers.tell(point, None)
-        return _record(run, seed, scene, tally, unplayable=unplayable)
+        return _record(run, seed, scene, tally, driven_by, unplayable=unplayable)
     kept = run.env.requirement_results()
     encounter = Encounter(
         collision=info.get("collision"),
@@ -123,7 +124,7 @@ def episode(run: RunState, env: GuardedEnv) -> EpisodeRecord:
         encounters_s=run.env.trace.encounters_s(run.problem.family.adversaries),
     )
     objective = run.searchers.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
-    return _record(run, seed, scene, tally, genes=genes, objective=objective, kept=kept, encounter=encounter)
+    return _record(run, seed, scene, tally, driven_by, genes=genes, objective=objective, kept=kept, encounter=encounter)
 
 
 @dataclass(slots=True)
@@ -148,6 +149,7 @@ def _record(
     seed: int,
     scene: Scene,
     tally: Tally,
+    driven_by: DrivenBy | None,
     *,
     unplayable: Unplayable | None = None,
     genes: Floats | None = None,
@@ -175,6 +177,7 @@ def _record(
         temperature=run.searchers.agent.temperature,
         environment_steps=run.environment_steps + tally.steps,
         objective=objective,
+        driven_by=driven_by,
         script=None if genes is None else tuple(genes.tolist()) or None,
         requirements=kept or {},
         violations=encounter.violations,

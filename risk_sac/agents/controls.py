@@ -6,6 +6,7 @@ import numpy as np
 
 from risk_sac.agents.replay import Transition
 from risk_sac.observation_layout import PER_ADVERSARY, X_M, Y_M
+from risk_sac.records import DrivenBy
 from risk_sac.types import Floats, Vector
 
 REDRAWN = 0.1  # share of steps in which an adversary's action is drawn again: it holds for a second on average
@@ -15,8 +16,13 @@ ALONG_COS = 0.9  # headings less than about 25 degrees apart
 
 
 class Control:
-    """The learner's verbs for an agent that learns nothing and keeps no state; λ and α are 0."""
+    """The learner's verbs for an agent that learns nothing and keeps no state; λ and α are 0.
 
+    Attributes:
+      driven_by: what chooses the actions; None: nothing does, or, where there are genes, the sampler knows.
+    """
+
+    driven_by: DrivenBy | None = None
     device = "cpu"
     dual_variable = 0.0
     temperature = 0.0
@@ -40,12 +46,25 @@ class Control:
         """Continues from `state()`."""
 
 
+class IdleAgent(Control):
+    """No actions: SUMO drives the adversary vehicles, and pedestrians stand."""
+
+    def __init__(self, action_size: int, seed: int) -> None:
+        self._action = np.zeros(action_size, dtype=np.float32)
+
+    def act(self, observation: Vector, explore: bool = True) -> Vector:
+        """Returns zeros, which the environment ignores."""
+        return self._action
+
+
 class RandomAgent(Control):
     """Uniform actions in [-1, 1], each adversary's held for a while.
 
     Choice: drawn again in every step they would average out to nothing, since jerk is bounded, and the control would be
     too weak.
     """
+
+    driven_by = DrivenBy.RANDOM
 
     def __init__(self, action_size: int, seed: int) -> None:
         self._generator = np.random.default_rng(seed)
@@ -72,6 +91,8 @@ class RandomAgent(Control):
 
 class ScriptedAgent(Control):
     """A vehicle ahead of the ego in its direction moves into its path and brakes; all others keep on."""
+
+    driven_by = DrivenBy.SCRIPT
 
     def __init__(self, action_size: int, seed: int) -> None:
         self._adversaries = action_size // 2

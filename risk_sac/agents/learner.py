@@ -25,6 +25,7 @@ from risk_sac.config.methods import Method
 from risk_sac.errors import ConfigError
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.problem import check_installed
+from risk_sac.records import DrivenBy
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.types import Floats, Vector
 
@@ -74,6 +75,11 @@ class Learner:
     def temperature(self) -> float:
         """α."""
         return self._agent.temperature
+
+    @property
+    def driven_by(self) -> DrivenBy:
+        """What chooses the next action while exploring; the frozen policy always acts itself."""
+        return DrivenBy.RANDOM if self._steps < self._config.agent.warmup_steps else DrivenBy.POLICY
 
     def begin(self, genes: Floats) -> None:
         """An episode begins, whoever acts in it; there are no genes."""
@@ -147,7 +153,7 @@ class Learner:
         self._acted, self._steps, self._updates = state["acted"], state["steps"], state["updates"]
 
     def _decide(self, observation: Vector, explore: bool) -> Vector:
-        if explore and self._steps < self._config.agent.warmup_steps:
+        if explore and self.driven_by is DrivenBy.RANDOM:
             return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
         return self._agent.act(observation, explore)  # Alg. 1, l. 7
 

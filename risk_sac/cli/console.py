@@ -166,14 +166,15 @@ def offences(violation: Collision | Violation) -> Iterator[str]:
     yield from (f"{actor}: {in_words(broke)}" for actor, broke in broken.items() if broke)
 
 
-OUTCOME = "outcome\ngrade\nseverity\nfault"
+OUTCOME = "outcome\ngrade\nseverity\nfault\ndriven by"
 
 
 def outcome(episode: EpisodeRecord, violation: Collision | Violation) -> str:
     """The cell below `OUTCOME`, with as many lines as there are."""
     severity = violation.severity if isinstance(violation, Collision) else None
     fault = f"fault: {violation.blamed}" if violation.blamed else None
-    return "\n".join(str(line) for line in (episode.outcome, violation.graded, severity, fault) if line)
+    lines = (episode.outcome, violation.graded, severity, fault, episode.driven_by)
+    return "\n".join(str(line) for line in lines if line)
 
 
 def in_words(names: Iterable[str]) -> str:

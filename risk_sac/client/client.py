@@ -22,6 +22,7 @@ from risk_sac.records import (
     Campaign,
     CampaignPage,
     CampaignSummary,
+    DrivenBy,
     Episode,
     EpisodePage,
     Failure,
@@ -171,13 +172,14 @@ class Client:
         grade: Grade | None = None,
         severity: Severity | None = None,
         fault: Fault | None = None,
+        driven_by: DrivenBy | None = None,
         broke: str | None = None,
         signature: str | None = None,
         page: int = PAGE,
     ) -> Iterator[Episode]:
         """Failures in the order of their arrival; read page by page as far as they are asked for."""
         query: Query = {"run": run, "tier": tier, "requirement": requirement, "grade": grade, "broke": broke}
-        query |= {"severity": severity, "fault": fault, "signature": signature, "limit": page}
+        query |= {"severity": severity, "fault": fault, "driven_by": driven_by, "signature": signature, "limit": page}
         return self._items(EpisodePage, f"{_path(campaign_id)}/failures", query)
 
     def failure(self, campaign_id: str, failure_id: str) -> Failure:

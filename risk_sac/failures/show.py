@@ -35,9 +35,10 @@ def caption(family: FamilyName, recording: Recording) -> str:
     """Returns which failure it is, what happened, and how it was judged."""
     episode, violation = recording.failure.episode, recording.violation
     refused = f" · failed rules: {_words(episode.reason)}" if episode.reason else ""
+    drove = f" · driven by {episode.driven_by}" if episode.driven_by else ""
     also = [name for name in episode.failed if name != violation.requirement]
     lines = [
-        f"{family} · episode {recording.failure.id} · {episode.outcome}{refused}",
+        f"{family} · episode {recording.failure.id} · {episode.outcome}{refused}{drove}",
         *(_contact(violation) if isinstance(violation, Collision) else _violation(violation)),
         *([f"also violated: {', '.join(also)}"] if also else []),
     ]

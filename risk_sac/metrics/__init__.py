@@ -13,6 +13,7 @@ from risk_sac.metrics.metric import (
     Metric,
     Ratio,
     estimate,
+    headline_driven_by,
     mean_over_runs,
     pcr_by_driver,
     pooled_bins,

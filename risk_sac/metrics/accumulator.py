@@ -9,7 +9,15 @@ from risk_sac.metrics.rows import METRICS, steps_per_distinct_failure
 from risk_sac.metrics.tally import Tally
 from risk_sac.records import Counts, EpisodeRecord, Record, RunMetrics
 
-HISTOGRAMS = ("prevented_by", "by_severity", "by_fault", "signatures", "conflicts_by_second", "contacts_by_second")
+HISTOGRAMS = (
+    "episodes_driven_by",
+    "prevented_by",
+    "by_severity",
+    "by_fault",
+    "signatures",
+    "conflicts_by_second",
+    "contacts_by_second",
+)
 
 # Fields that records have had since they were first digested. Those from before, which lack them, keep their digests.
 FIELDS_ADDED_LATER = frozenset(
@@ -23,6 +31,7 @@ FIELDS_ADDED_LATER = frozenset(
         "ego_part",
         "defect_reached_s",
         "script",
+        "driven_by",
         "requirements",
         "violations",
         "failed",

@@ -7,7 +7,7 @@ from itertools import zip_longest
 from typing import Any
 
 from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, wilson_interval
-from risk_sac.records import Counts, DriverPcr, RunMetrics
+from risk_sac.records import Counts, DrivenBy, DriverPcr, RunMetrics
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,6 +94,15 @@ def pooled_headline(metrics: Iterable[RunMetrics]) -> int | None:
     """Headline failures of several runs: what they found alike counts once; None if none was replayed."""
     replayed = [each for each in metrics if each.headline is not None]
     return len({kind for each in replayed for kind in each.headline_kinds}) if replayed else None
+
+
+def headline_driven_by(metrics: Iterable[RunMetrics]) -> dict[str, int]:
+    """Headline failures of several runs by what drove the first of each kind; none where that is not known."""
+    first: dict[str, DrivenBy | None] = {}
+    for each in metrics:
+        for kind, driven_by in zip(each.headline_kinds, each.headline_kinds_driven_by, strict=False):
+            first.setdefault(kind, driven_by)
+    return dict(Counter(driven_by.value for driven_by in first.values() if driven_by is not None))
 
 
 def pooled_names(counts: Sequence[Mapping[str, int]]) -> dict[str, int]:

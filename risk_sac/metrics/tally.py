@@ -44,6 +44,8 @@ class Tally(Counts):
     """Valid contacts among them."""
     newest_preventable: int = 0
     """Those that a reference driver would have prevented."""
+    episodes_driven_by: Counter[str] = Field(default_factory=Counter)
+    """What drove the adversaries → episodes."""
     prevented_by: Counter[str] = Field(default_factory=Counter)
     """Reference driver → valid contacts that it would have prevented."""
     by_severity: Counter[str] = Field(default_factory=Counter)
@@ -95,6 +97,8 @@ class Tally(Counts):
         for name, result in record.requirements.items():
             self._requirements[name].violated += result.violated_s is not None
         self.episodes += 1
+        if record.driven_by is not None:
+            self.episodes_driven_by[record.driven_by] += 1
         self.rejected += record.outcome is Outcome.REJECTED
         self.raw_collisions += collision is not None
         self.artefacts += collision is not None and collision.artefact

@@ -42,6 +42,7 @@ from risk_sac.records.judgement import (
 from risk_sac.records.run import (
     FINAL,
     Counts,
+    DrivenBy,
     DriverPcr,
     Funnel,
     RequirementCounts,

@@ -141,6 +141,10 @@ class Total(Counts):
     """Of the valid contacts; null without one."""
     pcr_by_driver: Mapping[str, DriverPcr] = {}
     """Reference driver → its own PCR."""
+    episodes_driven_by: Mapping[str, int] = {}
+    """What drove the adversaries → episodes."""
+    headline_driven_by: Mapping[str, int] = {}
+    """What drove the first episode of a kind → headline failures."""
     by_severity: Mapping[str, int] = {}
     """Severity → valid contacts."""
     by_fault: Mapping[str, int] = {}

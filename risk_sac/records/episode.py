@@ -7,7 +7,7 @@ from enum import StrEnum
 from typing import Any, Literal, NamedTuple
 
 from risk_sac.records.base import Least, Page, Real, Record
-from risk_sac.records.run import Funnel
+from risk_sac.records.run import DrivenBy, Funnel
 from risk_sac.records.violation import Collision, RequirementResult, Violation
 from risk_sac.series import Series
 
@@ -61,6 +61,8 @@ class EpisodeRecord(Record):
     """α after the episode."""
     environment_steps: int
     """Of the run, up to and including this episode."""
+    driven_by: DrivenBy | None = None
+    """What drove the adversaries, or would have in a rejected scene; null: nothing did, or an older record."""
     script: tuple[float, ...] | None = None
     """Genes of the adversaries' scripts; null where a policy drove."""
     requirements: Mapping[str, RequirementResult] = {}

@@ -11,6 +11,15 @@ from risk_sac.config import FamilyName, MethodName, RunMethod
 from risk_sac.records.base import Real, Record
 
 
+class DrivenBy(StrEnum):
+    """What drives the adversaries of an episode."""
+
+    POLICY = "policy"  # the learner's own
+    MODEL = "model"  # a script that the script model proposed
+    SCRIPT = "script"  # one that was bred, is from the library, or is a fixed rule
+    RANDOM = "random"  # random actions, or a script drawn at random
+
+
 class Counts(Record):
     """Counts of the episodes of one run; several runs have their sums."""
 
@@ -100,6 +109,9 @@ class RunMetrics(Counts):
     headline: int | None = None
     """Null before a replay."""
     headline_kinds: tuple[str, ...] = ()  # requirement, signature and cell of each
+    headline_kinds_driven_by: tuple[DrivenBy | None, ...] = ()  # what drove the first episode of each
+    episodes_driven_by: Mapping[str, int] = {}
+    """What drove the adversaries → episodes, rejected scenes included."""
     ecr: Real
     """Effective collision rate: valid contacts / episodes."""
     ecr_low: Real

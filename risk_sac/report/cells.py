@@ -11,6 +11,7 @@ from risk_sac.metrics import (
     Metric,
     MetricName,
     estimate,
+    headline_driven_by,
     pcr_by_driver,
     pooled_bins,
     pooled_counts,
@@ -54,6 +55,10 @@ class Cell(Counts):
     """`unresponsive` / valid contacts."""
     pcr_by_driver: Mapping[str, DriverPcr]
     """Reference driver → its own PCR."""
+    episodes_driven_by: Mapping[str, int]
+    """What drove the adversaries → episodes."""
+    headline_driven_by: Mapping[str, int]
+    """What drove the first episode of a kind → headline failures."""
     by_severity: Mapping[str, int]
     """Severity → valid contacts."""
     by_fault: Mapping[str, int]
@@ -86,6 +91,8 @@ def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
         estimates={metric.name: estimate(metric, metrics) for metric in metrics_of(phase)},
         cpu_s_per_distinct_failure=cpu_s / distinct if distinct and phase == "search" else None,
         pcr_by_driver=pcr_by_driver(metrics),
+        episodes_driven_by=pooled_names([each.episodes_driven_by for each in metrics]),
+        headline_driven_by=headline_driven_by(metrics),
         by_severity=pooled_names([each.by_severity for each in metrics]),
         by_fault=pooled_names([each.by_fault for each in metrics]),
         requirements=pooled_requirements(metrics),

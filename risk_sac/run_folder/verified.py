@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic.dataclasses import dataclass
 
 from risk_sac.errors import DamagedError
-from risk_sac.records import REPEATS, EpisodeRecord, Repetition, RunMetrics
+from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Repetition, RunMetrics
 from risk_sac.run_folder.durable import read_sealed, write_sealed
 from risk_sac.run_folder.results import Results
 from risk_sac.verdicts.distinct import DistinctFailures, Niche, kind_name, niche_of
@@ -50,9 +50,13 @@ class Verified:
     def headlined(self, metrics: RunMetrics, judged: Sequence[EpisodeRecord]) -> RunMetrics:
         """Adds the headline to the metrics of a phase, whose episodes are `judged`."""
         repeating = self.episodes.keys() - self.flaky
-        candidates = (each for episode in judged if episode.index in repeating for each in episode.valid_violations)
-        kinds = tuple(dict.fromkeys(kind_name(each) for each in candidates if each.headline_candidate))
-        return metrics.model_copy(update={"headline": len(kinds), "headline_kinds": kinds})
+        first: dict[str, DrivenBy | None] = {}  # of a kind: what drove the episode
+        for episode in judged:
+            for each in episode.valid_violations if episode.index in repeating else ():
+                if each.headline_candidate:
+                    first.setdefault(kind_name(each), episode.driven_by)
+        kinds = {"headline_kinds": tuple(first), "headline_kinds_driven_by": tuple(first.values())}
+        return metrics.model_copy(update={"headline": len(first), **kinds})
 
 
 def with_headline(results: Results, verified: Verified) -> Results:

@@ -14,7 +14,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.records import NO_CONTACT, Collision, Severity, Violation
+from risk_sac.records import NO_CONTACT, Collision, DrivenBy, Severity, Violation
 from risk_sac.scene_optimizer.base import Encounter, SceneOptimizer, State
 from risk_sac.types import Floats
 from risk_sac.verdicts.distinct import niche_of
@@ -166,9 +166,9 @@ class ArchiveOptimizer(SceneOptimizer):
         pool = self._elites.pool()
         random_share = max(RANDOM_SHARE, 1.0 / (2 + self._elites.failures))
         if self._asked <= INITIAL or not pool or self._random.random() < random_share:
-            self._parent = None
+            self._parent, self.driven_by = None, DrivenBy.RANDOM
             return self._random.random(self._dimension)
-        self._parent = self._elites.draw(pool, self._random)
+        self._parent, self.driven_by = self._elites.draw(pool, self._random), DrivenBy.SCRIPT
         return mutated(self._parent.point, pool[self._random.integers(len(pool))].point, self._random)
 
     def _learn(self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter) -> None:

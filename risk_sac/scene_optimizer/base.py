@@ -13,7 +13,7 @@ import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
-from risk_sac.records import Collision, Violation
+from risk_sac.records import Collision, DrivenBy, Violation
 from risk_sac.types import Floats
 
 State = dict[str, Any]
@@ -102,9 +102,13 @@ class SceneOptimizer(ABC):
     """Proposes points of the unit cube, and learns from their scores.
 
     A point is a scene and, where the adversaries follow scripts, their genes behind it.
+
+    Attributes:
+      driven_by: where the genes of the point that was proposed last come from; None before the first one.
     """
 
     kind: ClassVar[str]
+    driven_by: DrivenBy | None = None
 
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:
         self._dimension, self._config, self._seed = dimension, config, seed

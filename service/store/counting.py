@@ -61,6 +61,7 @@ def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
     row.phase = record.phase
     row.index = record.index
     row.outcome = record.outcome
+    row.driven_by = record.driven_by
     row.record = stored(record)
     contact, worst = record.collision, record.worst_violation
     violated = [name for name, result in record.requirements.items() if result.violated_s is not None]

@@ -9,7 +9,7 @@ from operator import attrgetter
 from sqlalchemy import ColumnElement, Select, select
 from sqlalchemy.orm import Session
 
-from risk_sac.records import RECORDED, Episode, Fault, Grade, Outcome, Severity
+from risk_sac.records import RECORDED, DrivenBy, Episode, Fault, Grade, Outcome, Severity
 from service.errors import NotFoundError
 from service.store.stored import StoredPage, read_episode
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow
@@ -17,7 +17,7 @@ from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """Which episodes are asked for, by what was judged of them; None: any."""
+    """Which episodes are asked for, by what drove them and what was judged of them; None: any."""
 
     requirement: str | None = None
     valid: bool = False
@@ -25,6 +25,7 @@ class Judged:
     grade: Grade | None = None
     severity: Severity | None = None
     fault: Fault | None = None
+    driven_by: DrivenBy | None = None
     broke: str | None = None
     signature: str | None = None
     iid: bool = True
@@ -35,7 +36,7 @@ class Judged:
         if self.requirement is not None:
             column = EpisodeRow.failed if self.valid else EpisodeRow.violated
             yield column.contains(f",{self.requirement},", autoescape=True)
-        for name in ("grade", "severity", "fault", "signature"):
+        for name in ("grade", "severity", "fault", "driven_by", "signature"):
             if (wanted := getattr(self, name)) is not None:
                 yield getattr(EpisodeRow, name) == wanted
         if self.broke is not None:

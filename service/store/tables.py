@@ -142,6 +142,7 @@ class EpisodeRow(Base):
     phase: Mapped[str]
     index: Mapped[int]
     outcome: Mapped[str]
+    driven_by: Mapped[str | None]  # null where nothing drove, and of older records
     record: Mapped[str] = mapped_column(Text)
     series: Mapped[str | None]
     series_sha256: Mapped[str | None]

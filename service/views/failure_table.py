@@ -10,7 +10,18 @@ from typing import Any, Literal
 import numpy as np
 
 from risk_sac.config import FamilyName, MethodName
-from risk_sac.records import NO_CONTACT, ConflictType, Fault, Grade, Outcome, Real, Record, Severity, TriageState
+from risk_sac.records import (
+    NO_CONTACT,
+    ConflictType,
+    DrivenBy,
+    Fault,
+    Grade,
+    Outcome,
+    Real,
+    Record,
+    Severity,
+    TriageState,
+)
 from risk_sac.verdicts.distinct import Niche, cell
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
 
@@ -88,6 +99,8 @@ class FailureTable(Record):
     """0-based within the run."""
     phases: list[str]
     """train | evaluate"""
+    driven_by: list[DrivenBy | None]
+    """What drove the adversaries; null in older records."""
     valid: list[bool]
     """Whether it has a violation that no rule refused; always, unless `tier=raw` was asked for."""
     requirement: list[str]
@@ -274,6 +287,7 @@ def _row(run: StoredRun, failure: PlainEpisode, violation: Plain) -> dict[str, A
         "seeds": run.seed,
         "indices": failure.index,
         "phases": failure.phase,
+        "driven_by": failure.record.get("driven_by"),
         "valid": failure.outcome == Outcome.FAILURE,
         "requirement": _requirement(violation),
         "striker": violation["other_id"],

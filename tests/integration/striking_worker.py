@@ -1,12 +1,12 @@
 """The scripted worker, but in every second episode the ego fails, and every third failure repeats the one before.
 
-Those in episodes 1, 7, 13, … are preventable.
+Those in episodes 1, 7, 13, … are preventable, and driven by a script; the others are driven at random.
 """
 
 import scripted_worker
 
 from risk_sac.metrics import wilson_interval
-from risk_sac.records import NO_CONTACT, EpisodeRecord, Grade, Outcome, RequirementCounts, RunMetrics
+from risk_sac.records import NO_CONTACT, DrivenBy, EpisodeRecord, Grade, Outcome, RequirementCounts, RunMetrics
 from tests.builders import LOW_SCENE, collision, episode_record, judgement, run_metrics
 
 _record = scripted_worker.record
@@ -20,7 +20,10 @@ def record(index: int) -> EpisodeRecord:
         Grade.PREVENTABLE if preventable else Grade.FULL_BRAKING, broke=("red_light",) if preventable else ()
     )
     hit = collision(time_s=3.9, min_ttc_s=0.4, verdicts={"inside_grip": True}, judgement=judged)
-    return episode_record(index, Outcome.FAILURE, scene=LOW_SCENE, min_ttc_s=float("inf"), collision=hit)
+    drove = DrivenBy.SCRIPT if preventable else DrivenBy.RANDOM
+    return episode_record(
+        index, Outcome.FAILURE, scene=LOW_SCENE, min_ttc_s=float("inf"), collision=hit, driven_by=drove
+    )
 
 
 def metrics(episodes: int) -> RunMetrics:
@@ -49,6 +52,7 @@ def metrics(episodes: int) -> RunMetrics:
         pcr=preventable / episodes,
         pcr_low=low,
         pcr_high=high,
+        episodes_driven_by={"script": preventable, "random": failures - preventable},
         signatures={"cut-in, straight": failures},
         requirements={NO_CONTACT: contacts},
     )

@@ -172,6 +172,7 @@ def test_a_body_of_another_type_is_refused(client):
         ("/v1/campaigns?cursor=OTk5OTk5OTk5OTk5OTk5OTk5OTk5OTk=", 422, "cursor"),
         ("/v1/campaigns/none/failures?tier=all", 422, "tier"),
         ("/v1/campaigns/none/failures?grade=good", 422, "grade"),
+        ("/v1/campaigns/none/failures?driven_by=luck", 422, "driven_by"),
         ("/v1/campaigns/none/failures?broke=red%25light", 422, "broke"),
         ("/v1/campaigns/none/failures?broke=", 422, "broke"),
         ("/v1/campaigns/none/failures?signature=%00", 422, "signature"),

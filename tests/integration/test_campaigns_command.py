@@ -119,6 +119,18 @@ def test_failures_are_listed_by_the_requirement_that_they_violate(
     assert "no_contact" in capsys.readouterr().err
 
 
+def test_failures_are_listed_by_what_drove_them(finished: str, answer: Callable[..., Any], service: Service) -> None:
+    listed = answer("failures", "list", finished, "--driven-by", "script")
+    assert [(each["index"], each["driven_by"]) for each in listed] == [(1, "script"), (1, "script")]
+    assert answer("failures", "list", finished, "--driven-by", "model") == []
+    for part in ("/failures", "/episodes"):
+        found = [each["index"] for each in service.get(finished, part, driven_by="random")["items"]]
+        assert sorted(found) == [3, 3, 5, 5]
+    (total,) = service.get(finished, "/results")["totals"]
+    assert total["episodes_driven_by"] == {"script": 2, "random": 4}
+    assert set(service.get(finished, "/failure-table")["driven_by"]) == {"script", "random"}
+
+
 def test_results_and_metrics_tell_the_funnel(finished: str, service: Service) -> None:
     (total,) = service.get(finished, "/results")["totals"]
     names = ("raw_collisions", "failures", "distinct_failures", "distinct_preventable", "preventable")

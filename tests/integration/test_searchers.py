@@ -6,9 +6,10 @@ import pytest
 
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
-from risk_sac.config import AgentConfig, Budget, LearnerConfig, MethodName, RunSpec, WarmStartConfig
+from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunMethod, RunSpec, WarmStartConfig
 from risk_sac.problem import Problem
-from risk_sac.records import EpisodeRecord, Grade, Outcome
+from risk_sac.records import DrivenBy, EpisodeRecord, Grade, Outcome
+from risk_sac.scene_optimizer import Encounter
 from risk_sac.searchers import GUIDE, OWN, Searchers, Turns
 from risk_sac.train import train
 from tests.builders import collision, episode_record, judgement
@@ -17,7 +18,7 @@ from tests.listener import Listener
 WARM = 3
 
 
-def spec(method: MethodName, budget: Budget, warm_start: WarmStartConfig | None = None) -> RunSpec:
+def spec(method: RunMethod, budget: Budget, warm_start: WarmStartConfig | None = None) -> RunSpec:
     agent = AgentConfig(hidden_sizes=(8,), batch_size=8, warmup_steps=50)
     learner = LearnerConfig(agent=agent, warm_start=warm_start or WarmStartConfig(episodes=WARM))
     return RunSpec(family="low", method=method, seed=5, budget=budget, learner=learner)
@@ -30,7 +31,7 @@ def played(folder: Path, wanted: RunSpec) -> list[EpisodeRecord]:
 
 
 @pytest.mark.parametrize("method", ["risk-sac", "ddpg"])
-def test_a_learner_is_warmed_by_what_an_archive_search_would_have_tried(tmp_path: Path, method: MethodName) -> None:
+def test_a_learner_is_warmed_by_what_an_archive_search_would_have_tried(tmp_path: Path, method: RunMethod) -> None:
     bred = played(tmp_path / "bred", spec("archive", Budget(episodes=WARM + 1)))
     warmed = played(tmp_path / "warmed", spec(method, Budget(episodes=WARM + 1)))
     same = [
@@ -38,10 +39,11 @@ def test_a_learner_is_warmed_by_what_an_archive_search_would_have_tried(tmp_path
         for one, two in zip(bred, warmed, strict=True)
     ]
     assert same == [True] * WARM + [False]
+    assert [record.driven_by for record in warmed] == [*[DrivenBy.RANDOM] * WARM, DrivenBy.POLICY]
     assert {record.temperature for record in warmed[:WARM]} == {warmed[0].temperature}  # nothing is learned meanwhile
 
 
-def searchers(method: MethodName, warm_start: WarmStartConfig) -> Searchers:
+def searchers(method: RunMethod, warm_start: WarmStartConfig) -> Searchers:
     wanted = spec(method, Budget(episodes=100), warm_start)
     return Searchers(wanted, Problem.from_spec(wanted), observation_size=20, action_size=4)
 
@@ -87,6 +89,45 @@ def test_turns_go_to_the_searcher_that_finds_what_is_new() -> None:
     )
     unpreventable = shares((GUIDE, "one", Grade.PREVENTABLE), (OWN, "another", Grade.FULL_BRAKING))[-1]
     assert max(first, repeated) < unpreventable < preventable
+
+
+@pytest.mark.parametrize(
+    ("method", "searching", "frozen"),
+    [
+        ("risk-sac", DrivenBy.RANDOM, DrivenBy.POLICY),  # without a guide its first actions are random
+        ("ddpg", DrivenBy.RANDOM, DrivenBy.POLICY),
+        ("archive", DrivenBy.RANDOM, DrivenBy.RANDOM),  # nothing to breed from yet
+        ("bo-only", DrivenBy.SCRIPT, DrivenBy.SCRIPT),
+        ("random", DrivenBy.RANDOM, DrivenBy.RANDOM),
+        ("no-adversary", None, None),
+        ("iid-random", DrivenBy.RANDOM, DrivenBy.RANDOM),
+        ("iid-undisturbed", None, None),
+    ],
+)
+def test_each_method_says_what_drives_the_adversaries(
+    method: RunMethod, searching: DrivenBy | None, frozen: DrivenBy | None
+) -> None:
+    subject = searchers(method, WarmStartConfig(episodes=0))
+    for learning, expected in ((True, searching), (False, frozen)):
+        subject.next(learning=learning).sampler.ask()
+        assert subject.driven_by(learning=learning) is expected
+
+
+def test_the_policy_drives_in_the_scenes_of_its_own_archive_and_scripts_in_the_guides() -> None:
+    wanted = spec("risk-sac-diverse", Budget(episodes=100), WarmStartConfig(episodes=3, failures=2))
+    wanted = wanted.model_copy(
+        update={"learner": wanted.learner.model_copy(update={"agent": AgentConfig(warmup_steps=0)})}
+    )
+    subject = Searchers(wanted, Problem.from_spec(wanted), observation_size=20, action_size=4)
+    drove: dict[type, set[DrivenBy | None]] = {}
+    struck = collision(judgement=judgement())
+    for index in range(60):
+        searcher = subject.next(learning=True)
+        point = searcher.sampler.ask()
+        drove.setdefault(type(searcher.actor), set()).add(subject.driven_by(learning=True))
+        subject.tell(point, 0.0, Encounter(collision=struck))
+        subject.add(episode_record(index, Outcome.FAILURE, collision=struck))
+    assert drove == {ScriptFollower: {DrivenBy.RANDOM, DrivenBy.SCRIPT}, Learner: {DrivenBy.POLICY}}
 
 
 def test_the_frozen_policy_is_on_its_own() -> None:

@@ -15,7 +15,7 @@ from risk_sac.cli.console import OK, OUTCOME, Commands, in_words, offences, or_d
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
-from risk_sac.records import Collision, Fault, Grade, Severity, Violation
+from risk_sac.records import Collision, DrivenBy, Fault, Grade, Severity, Violation
 from risk_sac.terminal import notes, printable
 
 CLASSES = {"grade": Grade, "severity": Severity, "fault": Fault}
@@ -32,6 +32,8 @@ def add(commands: Commands) -> None:
     parser = add_campaign_command(commands, "list", _list, "a campaign's failures, in the order they were found")
     for name, classes in CLASSES.items():
         parser.add_argument(f"--{name}", choices=[each.value for each in classes], help=f"only of this {name}")
+    drove = [each.value for each in DrivenBy]
+    parser.add_argument("--driven-by", choices=drove, help="only those whose adversaries this drove")
     for name, which in FILTERS.items():
         parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only those {which}")
     parser.add_argument("--raw", action="store_true", help="contacts and violations too that a rule refused")
@@ -61,7 +63,7 @@ def look_command(service_url: str, campaign_id: str, failure_id: str) -> str:
 
 
 def _list(options: argparse.Namespace) -> int:
-    filters = {name: getattr(options, name) for name in (*FILTERS, *CLASSES)}
+    filters = {name: getattr(options, name) for name in (*FILTERS, *CLASSES, "driven_by")}
     with Client.from_environment(options.url) as client:
         found = client.failures(options.id, tier="raw" if options.raw else "valid", **filters)
         failures = list(itertools.islice(found, options.limit + 1))
@@ -115,6 +117,8 @@ def failures_table(failures: Sequence[Episode]) -> Table:
 def _lines(failure: Episode) -> Iterator[str]:
     """A failure in words."""
     yield f"{failure.id}: {failure.outcome}{f' ({in_words([failure.reason])})' if failure.reason else ''}"
+    if failure.driven_by is not None:
+        yield f"  driven by  {failure.driven_by}"
     if failure.collision is not None:
         yield from _contact(failure.collision)
     for violation in failure.violations:

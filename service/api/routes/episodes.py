@@ -6,7 +6,18 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import Field
 
 from risk_sac.config.base import Settings
-from risk_sac.records import Episode, EpisodePage, Failure, Fault, Grade, Outcome, Severity, Triage, TriageState
+from risk_sac.records import (
+    DrivenBy,
+    Episode,
+    EpisodePage,
+    Failure,
+    Fault,
+    Grade,
+    Outcome,
+    Severity,
+    Triage,
+    TriageState,
+)
 from service.api.answers.pages import TIERS, Cursor, Limit, Tier
 from service.api.answers.representations import as_json
 from service.api.answers.responses import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN
@@ -19,6 +30,8 @@ from service.views.series import failure_body
 
 # Text of any language, with tabs and new lines; other control characters could hide or reorder what is shown.
 TEXT = r"^[^\x00-\x08\x0b\x0c\x0e-\x1f\x7f]*$"
+
+AskedDrivenBy = Annotated[DrivenBy | None, Query(description="Only those whose adversaries this drove.")]
 
 
 class PostedTriage(Settings):
@@ -44,6 +57,7 @@ def list_episodes(
     caller: CurrentCaller,
     run: Annotated[str | None, Query(description="Only episodes of this run.")] = None,
     outcome: Annotated[Outcome | None, Query(description="Only episodes that ended so.")] = None,
+    driven_by: AskedDrivenBy = None,
     requirement: AskedRequirement = None,
     limit: Limit = 50,
     cursor: Cursor = None,
@@ -55,7 +69,7 @@ def list_episodes(
         after=service.cursors.decode(cursor, campaign_id, caller.sees),
         run_id=run,
         outcomes=() if outcome is None else (outcome,),
-        judged=Judged(requirement=requirement),
+        judged=Judged(requirement=requirement, driven_by=driven_by),
         project=caller.sees,
     )
     return _page(page, service.cursors.encode(page.last, campaign_id, caller.sees))
@@ -74,6 +88,7 @@ def list_failures(
     grade: Annotated[Grade | None, Query(description="Only failures of this grade.")] = None,
     severity: Annotated[Severity | None, Query(description="Only contacts as bad as this.")] = None,
     fault: Annotated[Fault | None, Query(description="Only those that this party caused.")] = None,
+    driven_by: AskedDrivenBy = None,
     broke: Annotated[
         str | None, Query(max_length=40, pattern="^[a-z_]+$", description="Only those whose striker broke this.")
     ] = None,
@@ -96,6 +111,7 @@ def list_failures(
             grade=grade,
             severity=severity,
             fault=fault,
+            driven_by=driven_by,
             broke=broke,
             signature=signature,
             iid=run is not None,

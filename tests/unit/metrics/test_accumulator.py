@@ -13,7 +13,7 @@ from risk_sac.metrics.rows import (
     outcome_dispersion,
     preventable_collision_rate,
 )
-from risk_sac.records import Fault, Funnel, Grade, Outcome, RequirementResult, RunMetrics, Severity
+from risk_sac.records import DrivenBy, Fault, Funnel, Grade, Outcome, RequirementResult, RunMetrics, Severity
 from risk_sac.verdicts.distinct import distinct_failures, kind_of
 from tests.builders import AVOIDS, TOUCHES, judgement, violation
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
@@ -65,6 +65,12 @@ def test_contacts_are_counted_by_reference_driver_and_severity_and_failures_by_f
     assert metrics.by_fault == {"ego": 3, "shared": 1}
     old = metrics.model_dump(exclude={"prevented_by", "by_severity", "by_fault"})
     assert RunMetrics.model_validate(old).prevented_by == {}
+
+
+def test_episodes_are_counted_by_what_drove_them_rejected_ones_too():
+    drove = [(Outcome.SAFE, DrivenBy.SCRIPT), (Outcome.REJECTED, DrivenBy.SCRIPT), (Outcome.SAFE, DrivenBy.POLICY)]
+    metrics = feed([*(episode(outcome, driven_by=by) for outcome, by in drove), episode()])
+    assert metrics.episodes_driven_by == {"script": 2, "policy": 1}
 
 
 def test_each_requirement_has_a_funnel_and_records_from_before_have_none():

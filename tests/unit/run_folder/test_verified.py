@@ -3,17 +3,16 @@
 from dataclasses import replace
 
 from risk_sac.config import RunSpec
-from risk_sac.metrics import pooled_headline
-from risk_sac.records import REPEATS, EpisodeRecord, Grade, Outcome, Repetition, Severity
+from risk_sac.metrics import headline_driven_by, pooled_headline
+from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, Repetition, RunMetrics, Severity
 from risk_sac.run_folder.results import RecordedFailure, Results
 from risk_sac.run_folder.verified import Verified, distinct_failures, with_headline
 from tests.builders import collision, episode_record, judgement, run_metrics, violation
 
 
-def failure(index: int, phase: str = "train", **changes: object) -> EpisodeRecord:
-    return episode_record(
-        index, Outcome.FAILURE, phase=phase, collision=collision(**({"judgement": judgement()} | changes))
-    )
+def failure(index: int, phase: str = "train", driven_by: DrivenBy | None = None, **changes: object) -> EpisodeRecord:
+    struck = collision(**({"judgement": judgement()} | changes))
+    return episode_record(index, Outcome.FAILURE, phase=phase, driven_by=driven_by, collision=struck)
 
 
 def verified(**same: int) -> Verified:
@@ -120,6 +119,24 @@ def test_the_evaluation_has_a_headline_of_its_own() -> None:
 def test_the_first_that_is_not_minor_is_replayed_though_another_of_its_kind_is_preventable() -> None:
     results = results_of(failure(0, judgement=MINOR), failure(1, judgement=MINOR), failure(2), failure(3))
     assert [episode.index for episode in distinct_failures(results)] == [0, 2]
+
+
+def test_a_headline_failure_counts_for_what_drove_the_first_of_its_kind() -> None:
+    results = results_of(
+        failure(0, judgement=MINOR, driven_by=DrivenBy.RANDOM),
+        failure(1, driven_by=DrivenBy.SCRIPT),
+        failure(2, driven_by=DrivenBy.POLICY),  # like it
+        failure(3, judgement=judgement(signature="merge"), driven_by=DrivenBy.POLICY),
+        failure(4, judgement=judgement(signature="crossing")),  # of an older version
+    )
+    found = with_headline(results, verified(e0=2, e1=2, e2=2, e3=2, e4=2)).metrics
+    assert found is not None
+    assert found.headline_kinds_driven_by == (DrivenBy.SCRIPT, DrivenBy.POLICY, None)
+    assert headline_driven_by([found]) == {"script": 1, "policy": 1}
+    later = found.model_copy(update={"headline_kinds_driven_by": (DrivenBy.MODEL,) * 3})
+    assert headline_driven_by([found, later]) == {"script": 1, "policy": 1}, "what an earlier run found counts for it"
+    older = found.model_dump(exclude={"headline_kinds_driven_by", "episodes_driven_by"})
+    assert headline_driven_by([RunMetrics.model_validate(older)]) == {}
 
 
 def test_runs_have_the_union_of_their_headlines() -> None:

@@ -4,7 +4,7 @@ import pytest
 from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec, EgoConfig
-from risk_sac.records import Fault, Grade, Outcome, RequirementResult, Severity, State, stored
+from risk_sac.records import DrivenBy, Fault, Grade, Outcome, RequirementResult, Severity, State, stored
 from service.errors import NotFoundError
 from service.store.finding import Judged
 from tests.begun import start
@@ -143,6 +143,21 @@ def test_contacts_are_found_by_grade_severity_fault_what_was_broken_and_signatur
     first = store.episodes(campaign.id, limit=1, judged=Judged(grade=Grade.PREVENTABLE))
     rest = store.episodes(campaign.id, limit=9, after=first.last, judged=Judged(grade=Grade.PREVENTABLE))
     assert [item.index for item in (*first.items, *rest.items)] == [0, 3] * 2
+
+
+def test_episodes_are_found_by_what_drove_them(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    for index, drove in enumerate([DrivenBy.RANDOM, DrivenBy.SCRIPT, DrivenBy.SCRIPT, None]):
+        event = episode(index)
+        record = event.record.model_copy(update={"driven_by": drove})
+        ledger.add_episodes([(number, event.model_copy(update={"record": record}))])
+
+    def found(drove):
+        return [each.index for each in store.episodes(campaign.id, limit=9, judged=Judged(driven_by=drove)).items]
+
+    assert (found(DrivenBy.RANDOM), found(DrivenBy.SCRIPT), found(DrivenBy.POLICY)) == ([0], [1, 2], [])
+    assert found(None) == [0, 1, 2, 3]
 
 
 def test_failures_are_found_by_the_requirement_that_was_violated(store, ledger, episode):
