@@ -145,12 +145,13 @@ def page_at(new_page: Callable[..., "Page"], service: Service) -> Callable[..., 
 
 
 @pytest.fixture
-def check_axe() -> Callable[["Page"], None]:
-    """Holds a page against the accessibility rules of axe."""
+def check_axe() -> Callable[..., None]:
+    """Checks a page by the accessibility rules of axe; by all of them unless some are named."""
 
-    def check(page: "Page") -> None:
+    def check(page: "Page", rules: list[str] | None = None) -> None:
         page.evaluate(Path(AXE).read_text(encoding="utf-8"))  # by the debugger, which no policy forbids
-        violations = page.evaluate("async () => (await axe.run()).violations")
+        only = {"runOnly": rules} if rules else {}
+        violations = page.evaluate("async (only) => (await axe.run(only)).violations", only)
         assert not violations, "\n".join(
             f"{each['id']}: {each['help']}: {[node['html'][:200] for node in each['nodes'][:3]]}" for each in violations
         )

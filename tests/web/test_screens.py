@@ -1,12 +1,18 @@
-"""Every screen keeps the rules of accessibility, in both themes, and needs no sideways scrolling on a phone."""
+"""Every screen keeps the rules of accessibility in both themes and fits every width."""
 
 from collections.abc import Callable
+from typing import Literal, get_args
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from tests.server import Service
 from tests.web.conftest import PHONE
+
+Scheme = Literal["dark", "light"]
+WIDTHS = (1440, 1024, PHONE["width"])
+STATES = ("hover", "focus", "focus-visible", "active")
+OUTLINE = 3.0  # contrast that WCAG 1.4.11 wants of what marks the focus
 
 
 def heading(page: Page) -> None:
@@ -48,6 +54,37 @@ def places(page: Page) -> None:
     page.get_by_text("Why elsewhere not").click()
 
 
+# What reaches beyond its parent to the right; not what scrolls, floats above the page, or hangs out by its margin.
+WIDER_THAN_PARENT = """() => [...document.querySelectorAll("#page *")].flatMap((each) => {
+    const parent = each.parentElement;
+    const style = getComputedStyle(each);
+    if (parent.closest("svg, select") || ["absolute", "fixed"].includes(style.position)) return [];
+    if (getComputedStyle(parent).overflowX !== "visible" || style.display === "contents") return [];
+    const hangs = Math.min(0, parseFloat(style.marginRight));
+    const beyond = each.getBoundingClientRect().right + hangs - parent.getBoundingClientRect().right;
+    return beyond > 1 ? [`${each.outerHTML.slice(0, 120)} by ${beyond.toFixed(0)} px`] : [];
+})"""
+# The colour of the ring around what has the focus, and of the grounds that it lies on.
+RING = """() => {
+    const style = getComputedStyle(document.documentElement);
+    return ["--accent", "--ground", "--surface", "--raised"].map((name) => style.getPropertyValue(name).trim());
+}"""
+
+
+def contrast(one: str, other: str) -> float:
+    """The contrast of two colours such as #0b5a94 or #fff, by WCAG 2."""
+
+    def luminance(colour: str) -> float:
+        if len(colour) == 4:
+            colour = "#" + "".join(2 * digit for digit in colour[1:])
+        parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+        red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts)
+        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
 SCREENS: dict[str, tuple[str, Callable[[Page], None]]] = {
     "campaigns": ("campaigns", heading),
     "question": ("campaigns", question),
@@ -66,13 +103,13 @@ SCREENS: dict[str, tuple[str, Callable[[Page], None]]] = {
 
 
 @pytest.mark.parametrize("screen", SCREENS)
-def test_a_screen_is_accessible_and_fits_a_phone(
+def test_a_screen_is_accessible_and_fits_every_width(
     screen: str,
     page_at: Callable[..., Page],
     service: Service,
     campaign: str,
     network: str,
-    check_axe: Callable[[Page], None],
+    check_axe: Callable[..., None],
 ) -> None:
     place, prepare = SCREENS[screen]
     failure = service.get(campaign, "/failures", limit=1)["items"][0]["id"]
@@ -80,8 +117,34 @@ def test_a_screen_is_accessible_and_fits_a_phone(
     page = page_at(address, allowed=("422",))
     prepare(page)
     page.wait_for_load_state("networkidle")
-    for scheme in ("dark", "light"):
-        page.emulate_media(color_scheme=scheme)
+    for scheme in get_args(Scheme):
+        show_in(page, scheme)
         check_axe(page)
-    page.set_viewport_size(PHONE)
-    page.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=PHONE["width"])
+    check_buttons(page, check_axe)
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=width)
+        assert page.evaluate(WIDER_THAN_PARENT) == [], f"at {width} px"
+
+
+def show_in(page: Page, scheme: Scheme) -> None:
+    """Changes the system's theme, and waits until the page follows."""
+    page.emulate_media(color_scheme=scheme)
+    expect(page.locator("html")).to_have_attribute("data-theme", scheme)
+
+
+def check_buttons(page: Page, check_axe: Callable[..., None]) -> None:
+    """Checks the contrast of every button's text and focus ring, under the pointer and in focus, in both themes."""
+    session = page.context.new_cdp_session(page)
+    for domain in ("DOM", "CSS"):
+        session.send(f"{domain}.enable")
+    root = session.send("DOM.getDocument")["root"]["nodeId"]
+    buttons = session.send("DOM.querySelectorAll", {"nodeId": root, "selector": "button, .button, nav a"})["nodeIds"]
+    for button in buttons:
+        session.send("CSS.forcePseudoState", {"nodeId": button, "forcedPseudoClasses": STATES})
+    for scheme in get_args(Scheme):
+        show_in(page, scheme)
+        check_axe(page, rules=["color-contrast"])
+        ring, *grounds = page.evaluate(RING)
+        assert min(contrast(ring, ground) for ground in grounds) >= OUTLINE
+    session.detach()
