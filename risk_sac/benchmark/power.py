@@ -1,14 +1,24 @@
 """Power of a budget: how many known defects a method has detected within so many environment steps."""
 
 import csv
-from collections import defaultdict
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import cache
 from importlib.resources import files
-from typing import NamedTuple
+from math import comb
+from typing import TYPE_CHECKING, NamedTuple
 
-from risk_sac.errors import ConfigError
+from risk_sac.config import CampaignSpec
+from risk_sac.records import DefectPower, MethodPower, Power, RunBudget
+
+if TYPE_CHECKING:
+    from risk_sac.report import FinishedRun
 
 MEASURED = files("risk_sac.benchmark") / "measured.csv"  # a detections.csv of `risk-sac benchmark`
+NOTE = (
+    "Known defects were planted into egos of ours, and searched for with default settings in the whole of each family. "
+    "That measures a method and its budget. It is the same whichever ego this campaign has, remote ones included, and "
+    "tells nothing about that ego."
+)
 
 
 class Run(NamedTuple):
@@ -18,54 +28,141 @@ class Run(NamedTuple):
     family: str
     method: str
     budget_steps: int
+    steps: int
+    episodes: int
     detected: int | None
 
 
-class DefectPower(NamedTuple):
-    """How often a method has detected a defect within the budget."""
+class Played(NamedTuple):
+    """What a run of a campaign's search has played so far."""
 
-    defect: str
     family: str
-    detected: int
-    runs: int
+    method: str
+    episodes: int
+    steps: int
+    ended: bool
 
 
 def runs_of(text: str) -> list[Run]:
     """Returns the runs of a `detections.csv`."""
+    numbers = ("budget_steps", "steps", "episodes")
     return [
-        Run(row["defects"], row["family"], row["method"], int(row["budget_steps"]), _steps(row["detected"]))
+        Run(
+            defect=row["defects"],
+            family=row["family"],
+            method=row["method"],
+            detected=int(row["detected"]) if row["detected"] else None,
+            **{name: int(row[name]) for name in numbers},
+        )
         for row in csv.DictReader(text.splitlines())
     ]
 
 
-def power(runs: Sequence[Run], families: Collection[str], method: str, steps: int) -> list[DefectPower]:
-    """Returns how often a method has detected each defect in these families within so many steps.
+@cache
+def measured() -> Sequence[Run]:
+    """Returns the runs that are shipped."""
+    return runs_of(MEASURED.read_text(encoding="utf-8"))
 
-    Raises:
-      ConfigError: no run of this method in these families had such a budget.
+
+def played_by(finished: "Sequence[FinishedRun]") -> list[Played]:
+    """Returns what the searches of finished runs have played."""
+    found = [(run.cell, run.metrics["search"]) for run in finished]
+    return [Played(*cell, search.episodes, search.environment_steps, ended=True) for cell, search in found]
+
+
+def power_of(spec: CampaignSpec, played: Collection[Played], runs: Sequence[Run] | None = None) -> Power:
+    """Returns what the budget of a campaign is worth.
+
+    Args:
+      spec: of the campaign.
+      played: by its searches so far. Only these count, but where a method has none yet in a family.
+      runs: of the benchmark; those that are shipped if None.
     """
-    played = [each for each in runs if each.method == method and each.family in families]
-    long_enough = [each for each in played if each.budget_steps >= steps]
-    if not long_enough:
-        longest = max((each.budget_steps for each in played), default=0)
-        got = f"{steps} steps of {method!r} in {', '.join(families)}"
-        wanted = (
-            f"at most {longest}" if longest else f"one of the methods {', '.join(sorted({r.method for r in runs}))}"
-        )
-        raise ConfigError("steps" if longest else "method", got, f"{wanted}, which has been measured")
-    found: dict[tuple[str, str], list[bool]] = defaultdict(list)
-    for each in long_enough:
-        found[each.defect, each.family].append(each.detected is not None and each.detected <= steps)
-    return [DefectPower(defect, family, sum(each), len(each)) for (defect, family), each in found.items()]
+    methods, runs = [], measured() if runs is None else runs
+    for method in spec.methods:
+        known = {run.family for run in runs if run.method == method}
+        budgets = tuple(_budget(spec, family, method, played, runs) for family in spec.families if family in known)
+        found = method_power(method, {each.family: (each.steps, each.runs) for each in budgets}, runs)
+        sentences = [*(found.sentences if budgets else ()), *map(_in_words, budgets)]
+        if lacking := [family for family in spec.families if family not in known]:
+            sentences.append(f"Nothing was measured of {method} in {', '.join(lacking)}.")
+        methods.append(found.model_copy(update={"budgets": budgets, "sentences": tuple(sentences)}))
+    return Power(note=NOTE, methods=tuple(methods))
 
 
-def in_words(found: Sequence[DefectPower]) -> str:
-    """Returns such as "Of 3 known defects this budget detects 1.5 on average; never: speeds."."""
-    expected = sum(each.detected / each.runs for each in found)
-    never = [each.defect for each in found if not each.detected]
-    rest = f"never: {', '.join(never)}" if never else "each at least once"
-    return f"Of {len(found)} known defects this budget detects {expected:.3g} on average; {rest}."
+def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequence[Run]) -> MethodPower:
+    """Returns how many known defects a method detects.
+
+    Args:
+      method: its name.
+      budgets: family → environment steps of a run, and how many runs there are, each with a seed of its own.
+      runs: of the benchmark.
+    """
+    found, at_least = [], False
+    of_method = [run for run in runs if run.method == method and run.family in budgets]
+    for defect, family in dict.fromkeys((run.defect, run.family) for run in of_method):
+        of_defect = [run for run in of_method if (run.defect, run.family) == (defect, family)]
+        limit = min(budgets[family][0], max(run.budget_steps for run in of_defect))
+        at_least |= limit < budgets[family][0]
+        long_enough = [run for run in of_defect if run.budget_steps >= limit]
+        detected = sum(run.detected is not None and run.detected <= limit for run in long_enough)
+        found.append(DefectPower(defect=defect, family=family, detected=detected, runs=len(long_enough)))
+    expected = sum(_chance(each, budgets[each.family][1]) for each in found)
+    once = tuple(each.defect for each in found if each.detected)
+    most = tuple(each.defect for each in found if 2 * each.detected > each.runs)
+    never = tuple(each.defect for each in found if not each.detected)
+    about = f"{'at least ' if at_least else ''}{expected:.3g} on average"
+    sentence = (
+        f"Of {len(found)} known defects this budget detects {about}: {len(most)} in most seeds, "
+        f"{len(once)} at least once; never found: {', '.join(never) or 'none'}."
+    )
+    return MethodPower(
+        method=method,
+        budgets=(),
+        defects=tuple(found),
+        expected=expected,
+        at_least=at_least,
+        in_most_seeds=most,
+        at_least_once=once,
+        never=never,
+        sentences=(sentence, *_basis(found)),
+    )
 
 
-def _steps(text: str) -> int | None:
-    return int(text) if text else None
+def _chance(each: DefectPower, seeds: int) -> float:
+    """Share of the choices of so many of the measured runs, or all of them, in which one detects the defect."""
+    chosen = min(seeds, each.runs)
+    return 1 - comb(each.runs - each.detected, chosen) / comb(each.runs, chosen)
+
+
+def _basis(found: Sequence[DefectPower]) -> Iterator[str]:
+    if found:
+        least, most = min(each.runs for each in found), max(each.runs for each in found)
+        yield f"Seeds that were measured: {least if least == most else f'{least} to {most}'} of each defect."
+
+
+def _budget(spec: CampaignSpec, family: str, method: str, played: Collection[Played], runs: Sequence[Run]) -> RunBudget:
+    """Returns the budget of a run, by the method's episodes of the campaign, or else of the benchmark."""
+    cell = (family, method)
+    own = [each for each in played if (each.family, each.method) == cell]
+    begun = any(each.steps for each in own)
+    known: Sequence[Played | Run] = own if begun else [run for run in runs if (run.family, run.method) == cell]
+    mean = sum(each.steps for each in known) / sum(each.episodes for each in known)
+    episodes = [each.episodes if each.ended else spec.budget.episodes for each in own] or [spec.budget.episodes]
+    return RunBudget(
+        family=family,
+        runs=len(own) or len(spec.seeds),
+        episodes=round(sum(episodes) / len(episodes)),
+        steps_per_episode=mean,
+        estimated_from="campaign" if begun else "benchmark",
+        steps=round(mean * sum(episodes) / len(episodes)),
+    )
+
+
+def _in_words(budget: RunBudget) -> str:
+    whose = "its own episodes" if budget.estimated_from == "campaign" else "episodes of the benchmark"
+    runs = "1 run" if budget.runs == 1 else f"{budget.runs} runs"
+    return (
+        f"In {budget.family}: {runs} of {budget.episodes} episodes, which are {budget.steps:,} environment steps "
+        f"at the mean of {whose}, {budget.steps_per_episode:.0f}."
+    )

@@ -9,12 +9,14 @@ from rich.box import SIMPLE_HEAD
 from rich.progress import Progress
 from rich.table import Table
 
-from risk_sac.benchmark.power import MEASURED, in_words, power, runs_of
+from risk_sac.benchmark.power import Played, Run, measured, method_power, power_of, runs_of
 from risk_sac.cli.console import OK, Commands, add_command, number
 from risk_sac.config import SHIPPED, MethodName
 from risk_sac.config.text import read_text
 from risk_sac.egos.defects.catalogue import DEFECTS
+from risk_sac.errors import ConfigError
 from risk_sac.machine import cores
+from risk_sac.records import Counts
 from risk_sac.terminal import console
 
 METHODS: Sequence[MethodName] = ("random", "archive", "risk-sac-diverse")
@@ -39,9 +41,11 @@ def add(commands: Commands) -> None:
     out = "a folder for each run, and detections.csv, benchmark.md and curves.svg of those that have ended"
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help=out)
     worth = add_command(commands, "power", _power, "how many known faults a method finds with a budget, as measured")
-    worth.add_argument("--families", nargs="+", choices=SHIPPED, default=SHIPPED, metavar="low|mixed|dense")
-    worth.add_argument("--method", choices=known, default="archive", metavar="NAME", help="(default: %(default)s)")
-    worth.add_argument("--steps", type=number(int, 1), default=STEPS, metavar="N", help="(default: %(default)s)")
+    folders = "folder of `risk-sac evaluate`, or folders of runs, whose budget it is; instead of the flags"
+    worth.add_argument("runs", type=Path, nargs="*", metavar="RUNS", help=folders)
+    worth.add_argument("--families", nargs="+", choices=SHIPPED, metavar="low|mixed|dense", help="(default: all)")
+    worth.add_argument("--method", choices=known, metavar="NAME", help="(default: archive)")
+    worth.add_argument("--steps", type=number(int, 1), metavar="N", help=f"(default: {STEPS})")
     measured = "detections.csv of a benchmark (default: the one that is shipped)"
     worth.add_argument("--measured", type=Path, metavar="FILE", help=measured)
 
@@ -70,11 +74,34 @@ def _benchmark(options: argparse.Namespace) -> int:
 
 
 def _power(options: argparse.Namespace) -> int:
-    text = MEASURED.read_text(encoding="utf-8") if options.measured is None else read_text(options.measured, "measured")
-    found = power(runs_of(text), options.families, options.method, options.steps)
+    runs = measured() if options.measured is None else runs_of(read_text(options.measured, "measured"))
+    if options.runs:
+        return _power_of_folders(options, runs)
+    method, families = options.method or "archive", options.families or SHIPPED
+    found = method_power(method, dict.fromkeys(families, (options.steps or STEPS, 1)), runs)
+    if not found.defects:
+        known = ", ".join(sorted({run.method for run in runs if run.family in families}))
+        raise ConfigError("--method", f"{method!r}, of which nothing was measured in {', '.join(families)}", known)
     table = Table("defect", "family", "detected", "runs", box=SIMPLE_HEAD)
-    for each in found:
+    for each in found.defects:
         table.add_row(each.defect, each.family, str(each.detected), str(each.runs))
     console.print(table)
-    console.print(in_words(found), markup=False, soft_wrap=True)
+    console.print(" ".join(found.sentences), markup=False, soft_wrap=True)
+    return OK
+
+
+def _power_of_folders(options: argparse.Namespace, runs: Sequence[Run]) -> int:
+    from risk_sac.report.evidence.folders import campaign_in  # here, because loading numpy takes a while
+
+    if given := [name for name in ("families", "method", "steps") if getattr(options, name) is not None]:
+        raise ConfigError(f"--{given[0]}", "RUNS are given beside it", remedy="leave one of the two out")
+    campaign, results = campaign_in(options.runs)
+    searches = [(each, each.metrics or Counts()) for each in results.values() if not each.spec.iid]
+    played = [
+        Played(each.spec.family, each.spec.method, did.episodes, did.environment_steps, each.finished)
+        for each, did in searches
+    ]
+    found = power_of(campaign, played, runs)
+    for line in (*found.lines, found.note):
+        console.print(line, markup=False, soft_wrap=True)
     return OK

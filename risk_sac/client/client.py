@@ -29,6 +29,7 @@ from risk_sac.records import (
     Fault,
     Grade,
     Page,
+    Power,
     Record,
     Results,
     Severity,
@@ -161,6 +162,10 @@ class Client:
     def results(self, campaign_id: str) -> Results:
         """What a campaign has found so far."""
         return self._get(Results, f"{_path(campaign_id)}/results")
+
+    def power(self, campaign_id: str) -> Power:
+        """How many known defects the budget of a campaign detects, by stored benchmark runs."""
+        return self._get(Power, f"{_path(campaign_id)}/power")
 
     def failures(
         self,

@@ -39,6 +39,7 @@ from risk_sac.records.judgement import (
     ReferenceOutcome,
     Severity,
 )
+from risk_sac.records.power import DefectPower, MethodPower, Power, RunBudget
 from risk_sac.records.run import (
     FINAL,
     Counts,

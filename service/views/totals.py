@@ -7,6 +7,7 @@ intervals are those of the report.
 from collections.abc import Sequence
 
 from risk_sac.adjustments import adjustments
+from risk_sac.benchmark.power import Played
 from risk_sac.metrics import (
     METRICS,
     RATIOS,
@@ -20,7 +21,7 @@ from risk_sac.metrics import (
     pooled_names,
     pooled_requirements,
 )
-from risk_sac.records import Adjustment, Results, RunMetrics, Total
+from risk_sac.records import Adjustment, Counts, Results, RunMetrics, Total
 from service.errors import OutdatedError
 from service.store.stored import StoredCampaign, StoredRun
 
@@ -36,6 +37,12 @@ def results(campaign: StoredCampaign) -> Results:
         runs=campaign.runs,
         totals=totals(campaign.searches),
     )
+
+
+def played(campaign: StoredCampaign) -> list[Played]:
+    """What each search has played so far."""
+    found = [(run, run.metrics or Counts()) for run in campaign.searches]
+    return [Played(run.family, run.method, did.episodes, did.environment_steps, run.state.final) for run, did in found]
 
 
 def _adjustments(campaign: StoredCampaign) -> tuple[Adjustment, ...]:

@@ -72,6 +72,7 @@ ROUTES = {
     ("PUT", TRIAGE): ("run", 200),
     ("GET", f"{CAMPAIGN}/failure-table"): ("read", 200),
     ("GET", f"{CAMPAIGN}/curves"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/power"): ("read", 200),
     ("GET", f"{CAMPAIGN}/clusters"): ("read", 200),
     ("GET", f"{CAMPAIGN}/report"): ("read", 200),
     ("GET", f"{CAMPAIGN}/export"): ("read", 422),  # without a format

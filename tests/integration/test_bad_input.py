@@ -162,6 +162,7 @@ def test_a_body_of_another_type_is_refused(client):
     [
         ("/v1/campaigns/none", 404, "campaign_id"),
         ("/v1/campaigns/none/results", 404, "campaign_id"),
+        ("/v1/campaigns/none/power", 404, "campaign_id"),
         ("/v1/campaigns/none/episodes", 404, "campaign_id"),
         ("/v1/campaigns/none/failures", 404, "campaign_id"),
         ("/v1/campaigns/none/failures/x", 404, "campaign_id"),

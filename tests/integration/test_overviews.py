@@ -4,6 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from risk_sac.client import Client
+
 EPISODES = 24
 
 
@@ -28,6 +30,20 @@ def test_curves_follow_the_search_of_each_run(service, campaign):
     few = service.get(campaign, "/curves", points=5)["runs"][0]
     assert few["episodes"] == [5, 10, 15, 20, 24]
     assert few["window_ecr"] == [runs[0]["window_ecr"][count - 1] for count in few["episodes"]]
+
+
+def test_the_power_of_a_campaign_goes_by_its_own_episodes(service):
+    campaign_id = service.post(methods=["archive"], seeds=[0, 1], budget={"episodes": 5})
+    assert service.wait(campaign_id)["state"] == "succeeded"
+    with Client(str(service.client.base_url)) as client:
+        power = client.power(campaign_id)
+    (archive,) = power.methods
+    spent = sum(run["metrics"]["environment_steps"] for run in service.get(campaign_id)["runs"])
+    (budget,) = archive.budgets
+    assert (budget.family, budget.runs, budget.episodes, budget.steps) == ("low", 2, 5, round(spent / 2))
+    assert archive.sentences[0].startswith(f"Of {len(archive.defects)} known defects this budget detects ")
+    assert "whichever ego this campaign has, remote ones included" in power.note
+    assert service.get(campaign_id, "/power") == power.model_dump(mode="json")
 
 
 @pytest.fixture

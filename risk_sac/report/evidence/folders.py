@@ -10,7 +10,7 @@ from risk_sac.config.spec_file import read_campaign
 from risk_sac.errors import ConfigError
 from risk_sac.report.comparison import Comparison, compare
 from risk_sac.report.runs import FinishedRun, read_run
-from risk_sac.run_folder.results import read_results
+from risk_sac.run_folder.results import Results, read_results
 from risk_sac.scenario.families import family_named
 
 SPEC, RUNS = "spec.yaml", "runs"
@@ -35,13 +35,8 @@ def read_folders(paths: Sequence[Path]) -> Found:
     Raises:
       ConfigError: there is no run, or they are of different campaigns.
     """
-    whole = paths[0] if len(paths) == 1 and (paths[0] / SPEC).is_file() else None
-    if whole is None:
-        specs = {path: read_results(path).spec for path in paths}
-    else:  # which of its runs a damaged results.json was of, nobody can tell; it is missing
-        specs = dict(_readable(sorted((whole / RUNS).glob("*/"))))
-    if not specs:
-        raise ConfigError("RUNS", f"there is no run in {paths[0]}")
+    campaign, results = campaign_in(paths)
+    specs = {path: each.spec for path, each in results.items()}
     runs: list[FinishedRun] = []
     reasons: dict[str, str] = {}
     for path, spec in specs.items():
@@ -50,17 +45,34 @@ def read_folders(paths: Sequence[Path]) -> Found:
             runs.append(read_run(path))
         except (ConfigError, OSError) as error:
             reasons[spec.digest] = str(error)
-    campaign = read_campaign(whole / SPEC, {}, {}) if whole else _campaign(list(specs.values()))
     return Found(
         comparison=compare(campaign, runs, AGAIN, reasons=reasons),
         folders={spec.digest: path for path, spec in specs.items()},
     )
 
 
-def _readable(paths: Iterable[Path]) -> Iterator[tuple[Path, RunSpec]]:
+def campaign_in(paths: Sequence[Path]) -> tuple[CampaignSpec, Mapping[Path, Results]]:
+    """Reads the campaign of some folders, and the results of its runs by their folder; arguments as above.
+
+    Raises:
+      ConfigError: there is no run, or they are of different campaigns.
+    """
+    whole = paths[0] if len(paths) == 1 and (paths[0] / SPEC).is_file() else None
+    if whole is None:
+        results = {path: read_results(path) for path in paths}
+    else:  # which of its runs a damaged results.json was of, nobody can tell; it is missing
+        results = dict(_readable(sorted((whole / RUNS).glob("*/"))))
+    if not results:
+        raise ConfigError("RUNS", f"there is no run in {paths[0]}")
+    if whole is not None:
+        return read_campaign(whole / SPEC, {}, {}), results
+    return _campaign([each.spec for each in results.values()]), results
+
+
+def _readable(paths: Iterable[Path]) -> Iterator[tuple[Path, Results]]:
     for path in paths:
         with contextlib.suppress(ConfigError):
-            yield path, read_results(path).spec
+            yield path, read_results(path)
 
 
 def _campaign(runs: Sequence[RunSpec]) -> CampaignSpec:

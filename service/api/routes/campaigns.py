@@ -9,8 +9,9 @@ from fastapi.responses import PlainTextResponse
 
 from risk_sac import __version__, problem
 from risk_sac.adjustments import adjustments
+from risk_sac.benchmark.power import power_of
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
-from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Record, Results, State, wire
+from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Power, Record, Results, State, wire
 from service.api.answer_cache import kept
 from service.api.answers.pages import TIERS, Cursor, Limit, Tier
 from service.api.answers.representations import cacheable, entity_tag, link
@@ -35,7 +36,7 @@ from service.views.curves import Curves, curves
 from service.views.failure_table import FailureTable, failure_table
 from service.views.logs import log_tail
 from service.views.progress import campaign_body, retry_after_s, summary_body
-from service.views.totals import results
+from service.views.totals import played, results
 
 LISTED = "campaigns"
 EITHER_KIND = documented(CampaignSpec.__name__, ON_MAP)
@@ -131,6 +132,12 @@ def get_campaign(campaign_id: str, request: Request, service: Service, caller: C
 def get_results(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """What a campaign has found; partial until it has ended."""
     return _live(campaign_id, request, service, caller, results)
+
+
+@router.get("/{campaign_id}/power", response_model=Power, responses=UNKNOWN | LIVE)
+def get_power(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
+    """What finding nothing is worth: how many known defects this budget detects, by stored runs of a benchmark."""
+    return _live(campaign_id, request, service, caller, lambda found: power_of(found.spec, played(found)))
 
 
 @router.get("/{campaign_id}/failure-table", response_model=FailureTable, responses=UNKNOWN | LIVE)
