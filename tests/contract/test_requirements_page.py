@@ -8,7 +8,7 @@ from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
 from service.api.routes.catalogue import list_families
 
-PAGE = (Path(__file__).parents[2] / "risk_sac" / "README.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "risk_sac" / "risk" / "README.md").read_text(encoding="utf-8")
 
 
 def defaults(family: str) -> tuple[Requirement, ...]:

@@ -1,6 +1,6 @@
 """`python -m tests.exports.make_examples`: writes the examples, one for each format, and the bundles of the tests.
 
-The bundles say what is played; the episodes are those of a short search.
+The bundles say what is played; the episodes are those of a short search. README.md shows the pictures of the families.
 """
 
 import subprocess
@@ -15,7 +15,11 @@ from risk_sac.failures.bundle import Bundle, make_bundle, read_bundle, write_bun
 from risk_sac.failures.export.formats import FORMATS, FormatName, export, names
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.export.written import write
+from risk_sac.failures.net import roads_of
 from risk_sac.failures.play import replay
+from risk_sac.failures.recording import Recording
+from risk_sac.failures.thumbnail import thumbnail
+from risk_sac.run_folder.results import RecordedFailure
 
 FOLDER = Path(__file__).with_name("examples")
 FAMILIES = ("low", "mixed", "dense")
@@ -34,6 +38,13 @@ def played_here(bundle: Bundle) -> Bundle:
     return make_bundle(manifest.spec, episode, played.series, played.signal_heads, bundle.policy)
 
 
+def picture(bundle: Bundle) -> str:
+    """Returns the failure of a bundle as an SVG."""
+    manifest = bundle.manifest
+    recording = Recording(RecordedFailure.of(manifest.spec.id, manifest.episode), bundle.series)
+    return thumbnail(recording, roads_of(manifest.spec.family, manifest.episode.scene))
+
+
 def example(name: FormatName) -> Path:
     """Returns the file of a format's example."""
     suffix = FORMATS[name].suffix
@@ -46,6 +57,7 @@ def main() -> None:
     for family in FAMILIES:
         bundle = FOLDER / f"{family}.npz"
         write_bundle(bundle, played_here(read_bundle(bundle)))
+        (FOLDER / f"{family}.svg").write_text(picture(read_bundle(bundle)))
     failure = Recorded.of(read_bundle(FOLDER / f"{SHOWN}.npz"))
     for name in names("failure"):
         write(FORMATS[name], export(name, failure), example(name))

@@ -33,7 +33,7 @@ from risk_sac.types import Frame, Kind, Scene
 
 NAMES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
 LEAD_IN_STEPS = 15
-README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+README = (Path(__file__).parents[2] / "risk_sac" / "README.md").read_text(encoding="utf-8")
 each_family = pytest.mark.parametrize("family", NAMES)
 Outcome = tuple[np.ndarray, float, bool, bool, dict[str, object]]
 

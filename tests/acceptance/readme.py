@@ -1,0 +1,108 @@
+"""`python -m tests.acceptance.readme`: runs the commands of README.md in a fresh clone and compares what they print.
+
+Numbers and runs of blanks may differ, since another kind of processor plays other episodes. A line `…` stands for any
+lines. The commands run in one shell, so `source .venv/bin/activate` lasts.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.server import ROOT
+
+FENCED = re.compile(r"^```(console)?\n(.*?)^```$", re.M | re.S)
+MAKE = re.compile(r"^make \w+", re.M)
+ENDED = "README ended:"
+IGNORED = {".git", ".venv"}
+
+
+@dataclass(frozen=True)
+class Step:
+    """A command, and the lines that README.md shows below it."""
+
+    command: str
+    shown: tuple[str, ...] = ()
+
+
+def steps(text: str) -> Iterator[Step]:
+    """Yields the commands in their order: the two of `make`, then those of the consoles."""
+    for language, block in FENCED.findall(text):
+        if not language:
+            yield from map(Step, MAKE.findall(block))
+            continue
+        for part in re.split(r"^\$ ", block, flags=re.M)[1:]:
+            command, *shown = part.splitlines()
+            yield Step(command, tuple(shown))
+
+
+def pattern(line: str) -> str:
+    """Returns an expression for a line with any numbers and blanks."""
+    words = (re.sub(r"\d+(\\\.\d+)?", r"[\\d.]+", re.escape(word)) for word in line.split())
+    return r"\s+".join(words)
+
+
+def agrees(printed: str, shown: tuple[str, ...]) -> bool:
+    """Returns whether the lines were printed in this order; next to each other where no `…` is between."""
+    parts = "\n".join(shown).split("…")
+    expressions = [r"\s+".join(pattern(line) for line in part.splitlines() if line.strip()) for part in parts]
+    return re.search(".*".join(expressions), printed, re.S) is not None
+
+
+def run(clone: Path, wanted: list[Step]) -> list[str]:
+    """Runs the commands in one shell in a clone; returns what each printed.
+
+    Raises:
+      AssertionError: one ended with a status other than 0.
+    """
+    script = "\n".join(f"{step.command}\necho '{ENDED}'" for step in wanted)
+    environment = {name: value for name, value in os.environ.items() if name != "VIRTUAL_ENV"} | {"COLUMNS": "80"}
+    shell = subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", script],
+        cwd=clone,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    printed = shell.stdout.split(f"{ENDED}\n")
+    assert shell.returncode == 0, f"{wanted[len(printed) - 1].command}\n{printed[-1][-4000:]}"
+    return printed[:-1]
+
+
+def check(clone: Path, wanted: list[Step]) -> None:
+    """Runs the commands and compares.
+
+    Raises:
+      AssertionError: a command failed, printed something else, or left a file in the clone's root.
+    """
+    before = set(os.listdir(clone))
+    for step, printed in zip(wanted, run(clone, wanted), strict=True):
+        assert agrees(printed, step.shown), f"$ {step.command}\n{printed}\nREADME shows\n" + "\n".join(step.shown)
+    untracked = subprocess.run(["git", "status", "--porcelain"], cwd=clone, capture_output=True, text=True, check=True)
+    assert not untracked.stdout, untracked.stdout
+    left = set(os.listdir(clone)) - before - IGNORED
+    assert left <= {"results"} | {name for name in left if name.startswith(".") or name.endswith(".egg-info")}, left
+
+
+def cloned(folder: Path) -> Path:
+    """Clones the last commit."""
+    clone = folder / "risk-sac"
+    subprocess.run(["git", "clone", "--quiet", "--no-hardlinks", str(ROOT), str(clone)], check=True)
+    return clone
+
+
+def main() -> None:
+    """Runs all commands, the installation and the suite among them."""
+    with tempfile.TemporaryDirectory() as folder:
+        clone = cloned(Path(folder))
+        check(clone, list(steps((clone / "README.md").read_text(encoding="utf-8"))))
+    print("README.md: all commands print what it shows")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,47 @@
+"""README.md's commands, in a fresh clone, print what it shows."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.acceptance.readme import Step, agrees, check, cloned, steps
+from tests.server import ROOT
+
+README = ROOT / "README.md"
+
+
+def test_commands_are_read_in_their_order() -> None:
+    text = "```\nmake demo     # all\n```\n\n```console\n$ risk-sac one\n…\nDone: 3\n$ risk-sac two\n```\n"
+    assert list(steps(text)) == [
+        Step("make demo"),
+        Step("risk-sac one", ("…", "Done: 3")),
+        Step("risk-sac two"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("printed", "agreed"),
+    [
+        ("found 12 failures\n", True),
+        ("bar\nfound  7 failures\nDone\n", True),
+        ("found many failures\n", False),
+        ("Done\n", False),
+    ],
+)
+def test_a_line_agrees_whatever_its_numbers(printed: str, agreed: bool) -> None:
+    assert agrees(printed, ("…", "found 3 failures")) is agreed
+
+
+def test_readme_has_the_two_commands_and_those_of_a_run() -> None:
+    commands = [step.command for step in steps(README.read_text(encoding="utf-8"))]
+    assert commands[:3] == ["make demo", "make test", "source .venv/bin/activate"]
+
+
+@pytest.mark.skipif(not (Path(sys.prefix) / "bin" / "activate").exists(), reason="needs the .venv of `make install`")
+def test_commands_of_a_run_print_what_readme_shows(tmp_path: Path) -> None:
+    """Those of `make` are left out: `python -m tests.acceptance.readme` runs them too, in half an hour."""
+    clone = cloned(tmp_path)
+    (clone / ".venv").symlink_to(sys.prefix)
+    wanted = [step for step in steps(README.read_text(encoding="utf-8")) if not step.command.startswith("make")]
+    check(clone, wanted)
