@@ -77,7 +77,7 @@ lint: $(STAMP) ## style, types and import rules
 openapi: $(STAMP) ## write openapi.yaml
 	$(PYTHON) -m service.openapi
 
-settings: $(STAMP) ## write the table of settings into service/README.md
+settings: $(STAMP) ## write the table of settings into service/settings.md
 	$(PYTHON) -m service.host.environment
 
 protos: $(STAMP) ## generate risk_sac/egos/remote/*_pb2.py

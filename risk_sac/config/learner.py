@@ -1,6 +1,6 @@
 """Settings of the method: agent, replay, constraint, reward, scene optimiser.
 
-Defaults hold for all families and methods alike; risk_sac/README.md says how they were chosen.
+Defaults hold for all families and methods alike; risk_sac/deviations.md says how they were chosen.
 """
 
 from typing import Annotated, Literal

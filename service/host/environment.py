@@ -1,4 +1,4 @@
-"""Settings from the environment, and their table in service/README.md.
+"""Settings from the environment, and their table in service/settings.md.
 
 `python -m service.host.environment [FILE]` writes the table.
 """
@@ -101,5 +101,5 @@ def _default(field: dict[str, Any]) -> str:
 
 
 if __name__ == "__main__":
-    readme = Path(sys.argv[1] if len(sys.argv) > 1 else "service/README.md")
-    readme.write_text(with_table(readme.read_text(encoding="utf-8")), encoding="utf-8")
+    page = Path(sys.argv[1] if len(sys.argv) > 1 else "service/settings.md")
+    page.write_text(with_table(page.read_text(encoding="utf-8")), encoding="utf-8")

@@ -12,7 +12,7 @@ from service.host.environment import BEGIN, END, with_table
 from service.settings import ServiceSettings
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "service" / "README.md").read_text(encoding="utf-8")
+SETTINGS = (ROOT / "service" / "settings.md").read_text(encoding="utf-8")
 DOCKERFILE = (ROOT / "docker" / "Dockerfile").read_text(encoding="utf-8")
 COMPOSE = (ROOT / "docker" / "compose.yaml").read_text(encoding="utf-8")
 KUBERAY = (ROOT / "docker" / "kuberay.yaml").read_text(encoding="utf-8")
@@ -32,8 +32,8 @@ def compose():
     return yaml.safe_load(COMPOSE)["services"]
 
 
-def test_table_of_settings_in_the_readme_is_what_the_settings_generate():
-    assert with_table(README) == README, "run `make settings`"
+def test_table_of_settings_is_what_the_settings_generate():
+    assert with_table(SETTINGS) == SETTINGS, "run `make settings`"
 
 
 def test_table_has_a_row_for_each_setting():

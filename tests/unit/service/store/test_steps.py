@@ -1,4 +1,4 @@
-"""Going back to the version before, as service/README.md says it."""
+"""Going back to the version before, as service/recovery.md describes it."""
 
 import sqlite3
 from collections.abc import Callable
