@@ -11,7 +11,9 @@ from risk_sac.cli.campaigns.output import COUNTS, RATES
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("risk_sac", "service", "docker", "sumo_nets", "tests")
 README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
-OTHERS = sorted(page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md") if "node_modules" not in page.parts)
+OTHERS = sorted(
+    page for folder in FOLDERS for page in (ROOT / folder).rglob("*.md") if "node_modules" not in page.parts
+)
 PAGES = [README, CHANGELOG, *OTHERS]
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]*))?\)")
 
