@@ -103,6 +103,13 @@ class NetworkStore:
         logger.info("network %s of project %s: %d edges", network.id, project, network.edges)
         return network
 
+    def uploaded_before(self, incoming: Incoming, project: str) -> Network | None:
+        """Finds the project's network that was made of the same bytes as an upload that has arrived."""
+        sha256 = incoming.complete()
+        with _refusals("the networks cannot be read"):
+            every = (network for path in self._paths(project) if (network := _readable(path)) is not None)
+            return next((network for network in every if network.sha256 == sha256), None)
+
     def list(self, limit: int, before: int | None, project: str | None) -> StoredPage[Network]:
         """Lists networks, newest first, `before` the `last` of an earlier page; logs and leaves out damaged ones."""
         with _refusals("the networks cannot be read"):

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 
 from pydantic_core import from_json
-from sqlalchemy import func, select
+from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session, selectinload
 
 from risk_sac.records import FINAL, Episode, Outcome, State, StateChange, Triage, TriageState
@@ -58,14 +58,21 @@ class Store:
         family: str | None = None,
         method: str | None = None,
         label: str | None = None,
+        search: str | None = None,
     ) -> StoredPage[StoredCampaign]:
-        """Newest first, from the campaign just older than number `before`; family and method are those of one run."""
+        """Newest first, from the campaign just older than number `before`.
+
+        Family and method are those of one run; each word of `search` occurs in the label or the id.
+        """
         query = select(CampaignRow).options(selectinload(CampaignRow.runs)).order_by(CampaignRow.number.desc())
         wanted = {"project": project, "state": state, "label": label}
         query = query.filter_by(**{name: value for name, value in wanted.items() if value is not None})
         run = {name: value for name, value in (("family", family), ("method", method)) if value is not None}
         if run:
             query = query.where(CampaignRow.number.in_(select(RunRow.campaign_number).filter_by(**run)))
+        for word in (search or "").split():
+            found = (column.icontains(word, autoescape=True) for column in (CampaignRow.label, CampaignRow.id))
+            query = query.where(or_(*found))
         if before is not None:
             query = query.where(CampaignRow.number < before)
         with self._reading() as session:

@@ -9,6 +9,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+import uuid
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -128,7 +129,8 @@ def world(serve_shared, scripted, tmp_path_factory):
 
 
 def upload(service):
-    content, headers = ROADS.read_bytes(), {"content-type": "application/xml"}
+    content = ROADS.read_bytes() + f"<!-- {uuid.uuid4()} -->".encode()  # a network of its own
+    headers = {"content-type": "application/xml"}
     return service.client.post("/v1/networks", content=content, headers=headers).raise_for_status().json()["id"]
 
 

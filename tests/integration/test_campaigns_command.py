@@ -234,7 +234,7 @@ def test_a_campaign_on_an_uploaded_map_is_submitted_by_its_names(
         (family,) = answer("submit", *arguments)["spec"]["families"]
         assert family.startswith("car_following_road_")
     assert call("submit", "--spec", file, "--place", "nowhere") == 2
-    service.client.post("/v1/networks", **post).raise_for_status()
+    service.client.post("/v1/networks", **post | {"content": net + b"<!-- another -->"}).raise_for_status()
     assert call("submit", "--spec", file) == 2  # two maps have this label
 
 

@@ -94,10 +94,41 @@ def test_filters_are_the_apis_and_stay_in_the_address(
     expect(page.get_by_text("No campaign is like that.")).to_be_visible()
     page.get_by_role("button", name="All campaigns").click()
     expect(rows(page)).to_have_count(3)
-    page.get_by_label("Label").fill(HOSTILE)
-    page.get_by_label("Label").press("Enter")
+    page.get_by_label("Search").fill(HOSTILE)
     expect(rows(page)).to_have_count(1)
     assert shown_ids(page) == [small[HOSTILE]]
+
+
+def test_words_of_a_label_or_an_id_find_a_campaign_while_they_are_typed(
+    page_at: Callable[..., Page], campaign: str, small: dict[str, str]
+) -> None:
+    page = page_at("campaigns")
+    expect(rows(page)).to_have_count(3)
+    for text, found in (("MORE one", small["one more"]), ("b>7", campaign), (campaign[3:12], campaign)):
+        page.get_by_label("Search").fill(text)
+        expect(page.locator("td.campaign-name a")).to_have_count(1)
+        expect(page.locator("td.campaign-name a")).to_have_attribute("href", f"#/campaigns/{found}")
+    page.get_by_label("Search").fill("100% more")  # no wildcard
+    expect(page.get_by_text("No campaign is like that.")).to_be_visible()
+    page.reload()
+    expect(page.get_by_label("Search")).to_have_value("100% more")
+
+
+def test_a_long_label_pushes_nothing_off(page_at: Callable[..., Page], service: Service) -> None:
+    label = "regression of the evening " * 5 + "x" * 70
+    posted = service.post(label=label, families=["low"], methods=["random"], budget={"episodes": 1})
+    page = page_at("campaigns")
+    name = row(page, posted).locator("td.campaign-name")
+    expect(name).to_contain_text("regression of the evening")
+    assert name.bounding_box()["width"] < 220
+    assert row(page, posted).bounding_box()["height"] < 90
+    row(page, posted).get_by_role("link").first.click()
+    page.get_by_role("heading", level=1).wait_for()
+    assert page.get_by_role("heading", level=1).bounding_box()["height"] < 70
+    assert page.get_by_role("link", name="Failures").bounding_box()["y"] < 220
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    service.wait(posted)
+    service.client.delete(f"/v1/campaigns/{posted}")
 
 
 def test_a_click_on_a_head_sorts_and_a_second_one_turns_it_around(

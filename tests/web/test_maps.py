@@ -6,6 +6,7 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.server import Service
@@ -18,9 +19,19 @@ def upload(page: Page, file: Path, label: str = "") -> None:
     page.get_by_role("button", name="Upload").click()
 
 
-def test_from_a_file_to_a_campaign_at_one_of_its_places(page_at: Callable[..., Page], service: Service) -> None:
+@pytest.fixture
+def town(tmp_path: Path) -> Path:
+    """A map that no other test has uploaded."""
+    file = tmp_path / "town.net.xml"
+    file.write_bytes(NET.read_bytes() + f"<!-- {tmp_path} -->".encode())
+    return file
+
+
+def test_from_a_file_to_a_campaign_at_one_of_its_places(
+    page_at: Callable[..., Page], service: Service, town: Path
+) -> None:
     page = page_at("maps")
-    upload(page, NET, "my town")
+    upload(page, town, "my town")
     expect(page.get_by_role("heading", level=1)).to_have_text("my town")
     network = page.url.rsplit("/", 1)[1]
     found = service.client.get(f"/v1/networks/{network}/places").raise_for_status().json()["items"]
@@ -81,9 +92,18 @@ def test_a_place_that_is_gone_is_told_beside_its_field(page_at: Callable[..., Pa
     expect(page.locator("#field-network").get_by_role("alert")).to_contain_text("no edge 'nowhere'")
 
 
-def test_a_map_is_deleted_after_a_question(page_at: Callable[..., Page], service: Service) -> None:
+def test_the_same_map_twice_is_recognised(page_at: Callable[..., Page], service: Service, network: str) -> None:
     page = page_at("maps")
-    upload(page, NET, "to be deleted")
+    before = len(service.client.get("/v1/networks").json()["items"])
+    upload(page, NET, "the same again")
+    expect(page.get_by_role("status").first).to_contain_text("This map was uploaded before")
+    expect(page).to_have_url(re.compile(f"#/maps/{network}"))
+    assert len(service.client.get("/v1/networks").json()["items"]) == before
+
+
+def test_a_map_is_deleted_after_a_question(page_at: Callable[..., Page], service: Service, town: Path) -> None:
+    page = page_at("maps")
+    upload(page, town, "to be deleted")
     expect(page.get_by_role("heading", level=1)).to_have_text("to be deleted")
     page.get_by_role("link", name="Maps").first.click()
     page.get_by_role("button", name="Delete to be deleted").click()

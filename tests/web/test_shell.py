@@ -1,12 +1,14 @@
 """What stands around every screen: where the page is, keys, a lost server, themes."""
 
 import gzip
+import re
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import httpx
+import pytest
 from playwright.sync_api import Page, expect
 
 from tests.server import Service, servers
@@ -77,6 +79,49 @@ def _make_key(service: Service) -> str:
     key = made.stdout.split()[-1]
     service.wait_until(lambda: service.client.get("/v1/campaigns").status_code == 401)
     return key
+
+
+def test_the_tab_names_what_is_shown(page_at: Callable[..., Page], service: Service, campaign: str) -> None:
+    label = service.get(campaign)["label"]
+    failure = service.get(campaign, "/failures", limit=1)["items"][0]["id"]
+    titles = {
+        "campaigns": "Campaigns",
+        "new": "New campaign",
+        "maps": "Maps",
+        "compare": "Compare",
+        f"campaigns/{campaign}": label,
+        f"campaigns/{campaign}/failures": f"Failures · {label}",
+        f"campaigns/{campaign}/failures/{failure}": re.compile(f"{failure} · RISK-SAC$"),
+        f"campaigns/{campaign}/compare": f"Methods · {label}",
+        "nowhere": "Nothing is here",
+    }
+    page = page_at()
+    for place, title in titles.items():
+        page.goto(f"{service.client.base_url}/page/#/{place}")
+        expect(page).to_have_title(f"{title} · RISK-SAC" if isinstance(title, str) else title)
+
+
+@pytest.mark.parametrize("place", ["campaigns", "new", "maps", "compare", "nowhere", "campaigns/c/failures"])
+def test_a_server_that_does_not_answer_is_told_on_every_screen(
+    new_page: Callable[..., Page], service: Service, place: str
+) -> None:
+    page = new_page(allowed=("ERR_", "Failed to load", "404"))
+    page.goto(f"{service.client.base_url}/page/#/{place}")
+    page.get_by_role("heading", level=1).first.wait_for()
+    page.wait_for_load_state("networkidle")
+    banner = page.get_by_role("alert").filter(has_text="The service does not answer. The page shows")
+    expect(banner).to_have_count(0)
+    page.route("**/healthz", lambda route: route.abort("connectionrefused"))
+    expect(banner).to_be_visible()
+    page.unroute("**/healthz")
+    expect(banner).to_have_count(0)
+
+
+def test_a_server_that_hangs_is_told_too(new_page: Callable[..., Page], service: Service) -> None:
+    page = new_page()
+    page.goto(f"{service.client.base_url}/page/#/nowhere")
+    page.route("**/healthz", lambda route: None)
+    expect(page.get_by_role("alert")).to_contain_text("The service does not answer")
 
 
 def test_nothing_is_served_outside_the_page(service: Service) -> None:

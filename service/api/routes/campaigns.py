@@ -88,6 +88,14 @@ def list_campaigns(
     label: Annotated[
         str | None, Query(max_length=200, pattern=r"^[^\x00]*$", description="Only campaigns with exactly this label.")
     ] = None,
+    search: Annotated[
+        str | None,
+        Query(
+            max_length=200,
+            pattern=r"^[^\x00]*$",
+            description="Only campaigns whose label or id contains each of these words, in any case.",
+        ),
+    ] = None,
     limit: Limit = 50,
     cursor: Cursor = None,
 ) -> Response:
@@ -101,6 +109,7 @@ def list_campaigns(
         family=family,
         method=method,
         label=label,
+        search=search,
     )
     items = [summary_body(campaign, service.manager.workers) for campaign in page.items]
     cursor = service.cursors.encode(page.last, LISTED, caller.sees)

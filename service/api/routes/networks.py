@@ -22,7 +22,11 @@ from service.networks.surveys import RETRY_AFTER_S
 
 LISTED = "networks"
 RECEIVE_S = 60  # a sender that is slower would keep others out
-CREATED: Responses = {201: {"headers": {"Location": header("Where it is.")}}}
+LOCATED = {"Location": header("Where it is.")}
+CREATED: Responses = {
+    200: {"model": Network, "description": "The same bytes were uploaded before", "headers": LOCATED},
+    201: {"headers": LOCATED},
+}
 REFUSALS: Responses = (
     problem(408, f"The body comes too slowly, or took longer than {RECEIVE_S} s")
     | problem(409, "The project has as many networks as it may")
@@ -43,7 +47,8 @@ The body is a net (`.net.xml`), an OpenStreetMap extract or OpenDRIVE, the same 
 and up to {MAX_FILES - 1} route and additional files. Its content tells what it is. What is no present net is \
 converted by SUMO's netconvert; `warnings` has its remarks, the side of traffic, and what is missing. At most \
 {MAX_BYTES >> 20} MiB once unpacked and {MAX_ROADS} edges outside junctions. What names a file or writes output is \
-refused. The rest is written again and loaded once, in at most {WALL_S} s; only that is kept."""
+refused. The rest is written again and loaded once, in at most {WALL_S} s; only that is kept. Uploading the same \
+bytes again gives the network that there is, under its old label."""
 DOCUMENTED_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -79,7 +84,11 @@ async def post_network(
             async with asyncio.timeout(RECEIVE_S):
                 async for chunk in request.stream():
                     incoming.write(chunk)
-            network = await run_in_threadpool(service.networks.add, incoming, caller.project, label)
+            network = await run_in_threadpool(service.networks.uploaded_before, incoming, caller.project)
+            if network is None:
+                network = await run_in_threadpool(service.networks.add, incoming, caller.project, label)
+            else:
+                response.status_code = HTTPStatus.OK
     except TimeoutError as error:
         detail = f"the body took longer than {RECEIVE_S} s; wanted it faster"
         raise ProblemError(HTTPStatus.REQUEST_TIMEOUT, Reason.UPLOAD_TOO_SLOW, detail) from error

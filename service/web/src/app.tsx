@@ -2,6 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useEffect, useState } from "preact/hooks";
+import { useAlive } from "./api/alive";
 import { absolute, connected, hasKey, setKey, wantsKey } from "./api/client";
 import { placeOf, usePlace, type Place } from "./router";
 import { CampaignScreen } from "./screens/campaign/screen";
@@ -17,12 +18,14 @@ import { useSignal } from "./signal";
 import { Login } from "./ui/login";
 import { Empty } from "./ui/states";
 import { ThemeButton } from "./ui/theme";
+import { useTitle } from "./ui/title";
 
 export function App() {
   const place = usePlace();
   const keyWanted = useSignal(wantsKey);
   const lost = !useSignal(connected);
   useFocusOnArrival(place);
+  useAlive();
   return (
     <>
       <header class="bar">
@@ -46,7 +49,7 @@ export function App() {
       </header>
       {lost && (
         <p class="banner" role="alert">
-          The service does not answer. What you see is what it said last; it is asked again every two seconds.
+          The service does not answer. The page shows its last answers and asks again every two seconds.
         </p>
       )}
       <main id="content" tabIndex={-1}>
@@ -60,7 +63,7 @@ function screen({ parts, query }: Place): ComponentChildren {
   const [room = "campaigns", id, part, failure, twin, kind] = parts;
   if (room === "campaigns" && id === undefined) return <CampaignsScreen query={query} />;
   if (room === "new") return <NewScreen query={query} />;
-  if (room === "maps" && part === undefined) return id === undefined ? <MapsScreen /> : <MapScreen id={id} key={id} />;
+  if (room === "maps" && part === undefined) return id === undefined ? <MapsScreen /> : <MapScreen id={id} query={query} key={id} />;
   if (room === "compare") return <CompareScreen query={query} />;
   if (room === "campaigns" && id !== undefined) {
     if (part === undefined) return <CampaignScreen id={id} key={id} />;
@@ -71,6 +74,11 @@ function screen({ parts, query }: Place): ComponentChildren {
       return <ReplayScreen campaign={id} failure={failure} query={query} key={failure} />;
     }
   }
+  return <Nowhere />;
+}
+
+function Nowhere() {
+  useTitle("Nothing is here");
   return (
     <Empty>
       <h1>Nothing is here</h1>

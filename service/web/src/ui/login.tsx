@@ -2,8 +2,10 @@
 
 import { useRef, useState } from "preact/hooks";
 import { call, setKey } from "../api/client";
+import { useTitle } from "./title";
 
 export function Login() {
+  useTitle("API key");
   const input = useRef<HTMLInputElement>(null);
   const [refused, setRefused] = useState("");
   const enter = async (event: Event) => {

@@ -48,6 +48,14 @@ def test_lists_are_newest_first_and_stable_while_others_come(shelf: NetworkStore
     assert ([network.id for network in second.items], second.last) == ([ids[0]], None)
 
 
+def test_the_same_upload_is_recognised_in_its_project_alone(shelf: NetworkStore) -> None:
+    network = add(shelf)
+    for content, project, found in ((NET, "default", network), (NET + " ", "default", None), (NET, "another", None)):
+        with shelf.receive() as incoming:
+            incoming.write(content.encode())
+            assert shelf.uploaded_before(incoming, project) == found
+
+
 def test_no_project_sees_another_ones(shelf: NetworkStore) -> None:
     mine, theirs = add(shelf, "mine"), add(shelf, "theirs")
     assert [network.id for network in shelf.list(9, None, "mine").items] == [mine.id]

@@ -51,6 +51,22 @@ def test_campaigns_are_listed_newest_first(store, ledger):
     assert [item.id for item in first.items + second.items] == ids[::-1]
 
 
+@pytest.mark.parametrize(
+    ("search", "found"),
+    [("night", ["Nightly 100%", "late night"]), ("LATE night", ["late night"]), ("0%", ["Nightly 100%"]), ("_", [])],
+)
+def test_a_search_finds_words_of_a_label_in_any_case(store, ledger, search, found):
+    for label in ("late night", "Nightly 100%", "other"):
+        ledger.create(SPEC.model_copy(update={"label": label}))
+    assert [item.label for item in store.campaigns(limit=9, search=search).items] == found
+
+
+def test_a_search_finds_a_part_of_an_id(store, ledger):
+    ledger.create(SPEC)
+    wanted = ledger.create(SPEC).id
+    assert [item.id for item in store.campaigns(limit=9, search=wanted[2:14]).items] == [wanted]
+
+
 def test_a_list_tells_what_a_campaign_searches_and_whom(store, ledger):
     ego = EgoConfig(profile="careful", car_following="IDM")
     ledger.create(CampaignSpec(families=("mixed", "low"), methods=("random", "archive"), seeds=(4, 3), ego=ego))

@@ -19,7 +19,7 @@ export function Header({ campaign, again }: { campaign: Campaign; again: () => v
         <p class="crumbs">
           <a href="#/campaigns">Campaigns</a> / {title}
         </p>
-        <h1 class="breaking">{title}</h1>
+        <h1 title={title}>{title}</h1>
         <span class={`tag ${state}`}>{state}</span>
         <Actions campaign={campaign} again={again} />
       </div>

@@ -6,6 +6,7 @@ import { ended } from "../../api/ended";
 import { Empty, Failed, Loading } from "../../ui/states";
 import { RequirementTable } from "../../ui/requirements";
 import { count, number } from "../../ui/text";
+import { useTitle } from "../../ui/title";
 import { Charts } from "./charts";
 import { Funnel } from "./funnel";
 import { Header } from "./header";
@@ -16,6 +17,7 @@ import "./campaign.css";
 
 export function CampaignScreen({ id }: { id: string }) {
   const { campaign, curves, found, error, again } = useLive(id);
+  useTitle(campaign?.label || id);
   const [hidden, setHidden] = useState<ReadonlySet<string>>(new Set());
   const hide = useCallback((runs: string[], away: boolean) => {
     setHidden((before) => {

@@ -1,10 +1,11 @@
 /** What of the list is shown, by the API's own query parameters. */
 
 import type { ComponentChildren } from "preact";
+import { useEffect, useState } from "preact/hooks";
 import type { Body } from "../../api/types";
 
 const STATES: readonly Body<"State">[] = ["queued", "running", "paused", "cancelling", "cancelled", "succeeded", "failed"];
-export const FILTERS = ["state", "family", "method", "label"] as const;
+export const FILTERS = ["state", "family", "method", "search"] as const;
 export type Filters = Partial<Record<(typeof FILTERS)[number], string>>;
 
 export function filtersOf(query: URLSearchParams): Filters {
@@ -27,17 +28,33 @@ export function FilterBar({ filters, families, methods, change }: Choices) {
       {choice("state", "State", STATES)}
       {choice("family", "Family", families)}
       {choice("method", "Method", methods)}
-      <Field title="Label">
-        <input
-          type="search"
-          maxLength={200}
-          placeholder="exactly so, then Enter"
-          value={filters.label ?? ""}
-          onChange={(event) => change({ ...filters, label: event.currentTarget.value })}
-        />
-      </Field>
+      <Search text={filters.search ?? ""} search={(text) => change({ ...filters, search: text })} />
       {Object.keys(filters).length > 0 && <button onClick={() => change({})}>All campaigns</button>}
     </search>
+  );
+}
+
+const TYPED_MS = 250; // without another letter, until it is searched
+
+/** Searches while it is typed; the address may change it, too. */
+function Search({ text, search }: { text: string; search: (text: string) => void }) {
+  const [typed, setTyped] = useState(text);
+  useEffect(() => setTyped(text), [text]);
+  useEffect(() => {
+    if (typed.trim() === text) return;
+    const timer = setTimeout(() => search(typed.trim()), TYPED_MS);
+    return () => clearTimeout(timer);
+  }, [typed]);
+  return (
+    <Field title="Search">
+      <input
+        type="search"
+        maxLength={200}
+        placeholder="words of a label, or an id"
+        value={typed}
+        onInput={(event) => setTyped(event.currentTarget.value)}
+      />
+    </Field>
   );
 }
 

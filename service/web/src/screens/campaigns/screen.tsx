@@ -9,6 +9,7 @@ import { address, replace } from "../../router";
 import { Confirm } from "../../ui/confirm";
 import { Empty, Shown } from "../../ui/states";
 import { count } from "../../ui/text";
+import { useTitle } from "../../ui/title";
 import { FilterBar, filtersOf, type Filters } from "./filters";
 import { useListed, type Listed } from "./listed";
 import { orderOf, sorted, textOf, type Order } from "./order";
@@ -23,6 +24,7 @@ interface Doubt {
 const LEARNING = ["sac", "sb3", "ddpg"];
 
 export function CampaignsScreen({ query }: { query: URLSearchParams }) {
+  useTitle("Campaigns");
   const filters = filtersOf(query);
   const order = orderOf(query.get("sort"));
   const [pages, setPages] = useState(1);

@@ -6,6 +6,7 @@ import { download } from "../../api/client";
 import type { Body } from "../../api/types";
 import { address } from "../../router";
 import { Empty, Shown } from "../../ui/states";
+import { useTitle } from "../../ui/title";
 import { markOf } from "../campaign/look";
 import { Figures } from "./figures";
 import { Kinds } from "./kinds";
@@ -26,6 +27,7 @@ export function One({ id }: { id: string }) {
   const [phase, setPhase] = useState<Phase>("search");
   const [refused, setRefused] = useState("");
   const title = asked.value?.spec.label || id;
+  useTitle("Methods", title);
   const save = (format: string) => download(`${path}/table?format=${format}`, `${id}.${format}`).then(() => setRefused(""), (error: Error) => setRefused(error.message));
   return (
     <div class="compare">

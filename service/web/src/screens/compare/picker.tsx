@@ -6,10 +6,12 @@ import type { Body } from "../../api/types";
 import { address, go } from "../../router";
 import { Empty, Shown } from "../../ui/states";
 import { count, moment } from "../../ui/text";
+import { useTitle } from "../../ui/title";
 
 const MOST = 8; // that can still be told apart
 
 export function Picker({ chosen: first }: { chosen: string[] }) {
+  useTitle("Compare");
   const asked = useAsked<Body<"CampaignPage">>("v1/campaigns?limit=100");
   const [chosen, setChosen] = useState<ReadonlySet<string>>(new Set(first));
   const choose = (id: string, yes: boolean) => {

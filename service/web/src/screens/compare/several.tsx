@@ -7,6 +7,7 @@ import { usePolled } from "../../api/polled";
 import type { Body } from "../../api/types";
 import { address } from "../../router";
 import { Empty, Failed, Loading } from "../../ui/states";
+import { useTitle } from "../../ui/title";
 import { COLOURS, type Mark } from "../campaign/look";
 import { differences } from "./differences";
 import { csv, json, markdown, type Line } from "./export";
@@ -32,6 +33,7 @@ export function Several({ ids }: { ids: string[] }) {
   const found = all?.filter((one): one is Found => one.campaign !== undefined && one.results !== undefined) ?? [];
   const lines = linesOf(found);
   const families = [...new Set(lines.map((line) => line.family))];
+  useTitle(`${ids.length} campaigns compared`);
   return (
     <div class="compare">
       <div class="head">

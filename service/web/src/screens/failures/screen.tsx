@@ -8,6 +8,7 @@ import type { Body } from "../../api/types";
 import { address } from "../../router";
 import { Empty, Shown } from "../../ui/states";
 import { count } from "../../ui/text";
+import { useTitle } from "../../ui/title";
 import { Explorer } from "./explorer";
 import { queryOf, read, reset } from "./filters";
 import type { FailureTable } from "./wire";
@@ -18,6 +19,7 @@ export function FailuresScreen({ campaign, query }: { campaign: string; query: U
   const path = `v1/campaigns/${encodeURIComponent(campaign)}`;
   const about = useAsked<Body<"Campaign">>(path, (campaign) => (ended(campaign) ? null : RUNNING_MS));
   const over = about.value !== undefined && ended(about.value);
+  useTitle("Failures", about.value?.label || campaign);
   const asked = useAsked<FailureTable>(`${path}/failure-table?tier=raw`, () => (over ? null : RUNNING_MS));
   return (
     <div class="failures">

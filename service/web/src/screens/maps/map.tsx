@@ -6,15 +6,17 @@ import { useAsked } from "../../api/asked";
 import type { Body } from "../../api/types";
 import { usePicture } from "../../ui/picture";
 import { Shown } from "../../ui/states";
-import { count } from "../../ui/text";
+import { count, moment } from "../../ui/text";
+import { useTitle } from "../../ui/title";
 import { again, begin, matching, MOST_PLACES, PATTERNS, type Pattern, type Places, type Spot } from "./places";
 import { nameOf } from "./screen";
 import "./maps.css";
 
 const SHOWN = 50; // rows at once
 
-export function MapScreen({ id }: { id: string }) {
+export function MapScreen({ id, query }: { id: string; query: URLSearchParams }) {
   const asked = useAsked<Body<"Network">>(`v1/networks/${encodeURIComponent(id)}`);
+  useTitle(asked.value && nameOf(asked.value), "Maps");
   const places = useAsked<Places>(asked.value ? `v1/networks/${id}/places` : null, again);
   return (
     <Shown asked={asked} what="the map">
@@ -24,11 +26,16 @@ export function MapScreen({ id }: { id: string }) {
             <span class="crumbs">
               <a href="#/maps">Maps</a>
             </span>
-            <h1 class="breaking">{nameOf(map)}</h1>
+            <h1 title={nameOf(map)}>{nameOf(map)}</h1>
             <span class="faint">
               {count(map.edges)} roads, {count(map.junctions)} junctions, {(map.length_m / 1000).toFixed(1)} km
             </span>
           </div>
+          {query.has("known") && (
+            <p class="card" role="status">
+              This map was uploaded before, on {moment(map.created_at)}. It was not added again, and keeps its label.
+            </p>
+          )}
           <Warnings said={map.warnings} />
           <Shown asked={places} what="the places, which may take a minute">
             {(found) =>

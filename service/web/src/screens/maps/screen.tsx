@@ -8,12 +8,14 @@ import { address } from "../../router";
 import { Confirm } from "../../ui/confirm";
 import { Empty, Shown } from "../../ui/states";
 import { count, moment } from "../../ui/text";
+import { useTitle } from "../../ui/title";
 import { Upload } from "./upload";
 import "./maps.css";
 
 type Network = Body<"Network">;
 
 export function MapsScreen() {
+  useTitle("Maps");
   const asked = useAsked<Body<"NetworkPage">>("v1/networks?limit=500"); // a project has 200 at most
   const [doubt, setDoubt] = useState<Network>();
   return (

@@ -21,7 +21,8 @@ export function Upload() {
       const type = packagingOf(new Uint8Array(await chosen.slice(0, 4).arrayBuffer()));
       const named = new URLSearchParams({ label: label || chosen.name });
       const answer = await call(`v1/networks?${named}`, { method: "POST", headers: { "Content-Type": type }, body: chosen });
-      go(address(["maps", ((await answer.json()) as Body<"Network">).id]));
+      const { id } = (await answer.json()) as Body<"Network">;
+      go(address(["maps", id], { known: answer.status === 200 ? "yes" : undefined }));
     } catch (error) {
       setRefused(error instanceof TypeError ? "The service does not answer." : (error as Error).message);
       setBusy(false);

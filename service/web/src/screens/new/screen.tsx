@@ -6,6 +6,7 @@ import { call, Problem } from "../../api/client";
 import type { Body } from "../../api/types";
 import { address, go } from "../../router";
 import { Shown } from "../../ui/states";
+import { useTitle } from "../../ui/title";
 import { bodyOf, isPerfect, NOT_OF_PERFECT, textOf } from "./body";
 import { useChecked } from "./checked";
 import { Choices, Fields, Group, SchemaField } from "./field";
@@ -23,6 +24,7 @@ import "./new.css";
 type Known = [Description, Body<"Families">, Body<"Methods">];
 
 export function NewScreen({ query }: { query: URLSearchParams }) {
+  useTitle("New campaign");
   const from = query.get("from");
   const ground = groundOf(query);
   const description = useAsked<Description>("openapi.json");

@@ -15,6 +15,7 @@ import { askedTime, conflictBounds, marksOf, opening, useLayers, useStopped, use
 import { Stage } from "../../stage/stage";
 import { KeyList, Transport } from "../../stage/transport";
 import { Empty, Shown } from "../../ui/states";
+import { useTitle } from "../../ui/title";
 import { isContact, worstOf, type Collision, type Violation } from "../../ui/violations";
 import { happenedOf, verdictOf } from "../replay/words";
 import { between, commonTimes, pairPanels, sensorOf, TWINS } from "./twins";
@@ -32,6 +33,7 @@ interface Props {
 export function PairScreen({ campaign, failure, twin, query }: Props) {
   const path = `v1/campaigns/${encodeURIComponent(campaign)}/failures/${encodeURIComponent(failure)}`;
   const asked = useAsked<Body<"Failure">>(path);
+  useTitle("Twin", failure);
   if (!(twin in TWINS)) return <Empty>There is no twin of this name. There are {Object.keys(TWINS).join(", ")}.</Empty>;
   const place = ["campaigns", campaign, "failures"];
   const kept = { t: query.get("t") ?? undefined };

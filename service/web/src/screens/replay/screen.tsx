@@ -18,6 +18,7 @@ import { Stage } from "../../stage/stage";
 import { KeyList, Transport } from "../../stage/transport";
 import { Empty, Shown } from "../../ui/states";
 import { capital, words } from "../../ui/text";
+import { useTitle } from "../../ui/title";
 import { GRADE_WORDS } from "../../ui/verdicts";
 import { faultOf, gradeOf, severityOf, signatureOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import { Actors } from "./actors";
@@ -65,6 +66,7 @@ function Head({ campaign, failure, query, known }: Props & { known: Body<"Failur
     );
   const violation = known && worstOf(known);
   const signature = violation && signatureOf(violation);
+  useTitle(signature && capital(signature), failure);
   return (
     <div class="head">
       <nav class="crumbs" aria-label="Breadcrumb">
