@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 from risk_sac.config import Budget, RunMethod, RunSpec
 from risk_sac.failures.detected import candidates, detected
@@ -44,6 +45,19 @@ class Detection(Record):
     episode: EpisodeRecord | None
     """In which that happened; its time series is in the folder."""
 
+    def settles(self, steps: int) -> bool:
+        """Whether it says how a run with a budget of so many steps ends."""
+        return self.detected is not None or self.budget_steps >= steps
+
+    def within(self, steps: int) -> Self:
+        """Returns the outcome of the same run with a budget of so many steps; episodes and refuted stay."""
+        times = {name: getattr(self, name) for name in ("reached", "triggered", "detected")}
+        changed = {name: None if at is None or at > steps else at for name, at in times.items()}
+        changed |= {"budget_steps": steps, "steps": min(self.steps, steps)}
+        if changed["detected"] is None:
+            changed |= {"signature": "", "episode": None}
+        return self.model_copy(update=changed)
+
 
 @dataclass(slots=True)
 class _Candidates:
@@ -51,20 +65,22 @@ class _Candidates:
 
     spec: RunSpec
     budget_steps: int
+    judged: int
+    """Episodes whose candidates an earlier call has refuted."""
     records: list[EpisodeRecord] = field(default_factory=list)
-    candidate: tuple[EpisodeRecord, SeriesFile] | None = None
+    waiting: list[tuple[EpisodeRecord, SeriesFile]] = field(default_factory=list)
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         """Takes an episode; those of a resumed run are repeated."""
         if record.index < len(self.records):
             return
         self.records.append(record)
-        if series is not None and candidates(self.spec, record):
-            self.candidate = record, series
+        if record.index >= self.judged and series is not None and candidates(self.spec, record):
+            self.waiting.append((record, series))
 
     def should_stop(self) -> bool:
         """See `Observer.should_stop`."""
-        return self.candidate is not None or self.spent
+        return bool(self.waiting) or self.spent
 
     @property
     def spent(self) -> bool:
@@ -72,28 +88,35 @@ class _Candidates:
         return bool(self.records) and self.records[-1].environment_steps >= self.budget_steps
 
 
+def answer_of(folder: Path, budget_steps: int) -> Detection | None:
+    """Returns the outcome of a run with this budget; None if it has not been played so far."""
+    played = _stored(folder)
+    return played.within(budget_steps) if played is not None and played.settles(budget_steps) else None
+
+
 def first_detection(spec: RunSpec, folder: Path, budget_steps: int) -> Detection:
     """Returns how soon a run detects its ego's defects; from the folder if it says so already.
 
     Args:
       spec: of the run; its budget of episodes counts for undisturbed scenes alone.
-      folder: of the run, kept up to the detection. An interrupted run goes on from it.
+      folder: of the run, kept up to the detection. A run that was interrupted or had a smaller budget goes on.
       budget_steps: environment steps after which it ends.
     """
-    answer = folder / ANSWER
-    if answer.exists():
-        return Detection.model_validate_json(answer.read_bytes())
+    if known := answer_of(folder, budget_steps):
+        return known
     if not spec.iid:
         spec = spec.model_copy(update={"budget": Budget(episodes=MOST_EPISODES)})
-    seen, found, refuted, failure = _Candidates(spec, budget_steps), None, 0, None
+    before = _stored(folder)
+    seen = _Candidates(spec, budget_steps, judged=before.episodes if before else 0)
+    found, refuted, failure = None, before.refuted if before else 0, None
     while found is None:
-        seen.candidate = None
         train(spec, folder, seen)  # goes on where it stopped; libsumo is free in between
-        if seen.candidate is None:
+        if not seen.waiting:
             break
-        record, series = seen.candidate
-        failure = detected(spec, record, read_series(folder / FAILURES / series.name))
-        found, refuted = (record, refuted) if failure else (None, refuted + 1)
+        while seen.waiting and found is None:
+            record, series = seen.waiting.pop(0)
+            failure = detected(spec, record, read_series(folder / FAILURES / series.name))
+            found, refuted = (record, refuted) if failure else (None, refuted + 1)
         if seen.spent:
             break
     detection = Detection(
@@ -111,8 +134,13 @@ def first_detection(spec: RunSpec, folder: Path, budget_steps: int) -> Detection
         signature="" if failure is None else failure.signature,
         episode=found,
     )
-    replace_file(answer, detection.model_dump_json(indent=2).encode())
-    return detection
+    replace_file(folder / ANSWER, detection.model_dump_json(indent=2).encode())
+    return detection.within(budget_steps)
+
+
+def _stored(folder: Path) -> Detection | None:
+    answer = folder / ANSWER
+    return Detection.model_validate_json(answer.read_bytes()) if answer.exists() else None
 
 
 def _first(records: Iterable[EpisodeRecord]) -> int | None:

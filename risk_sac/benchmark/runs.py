@@ -1,21 +1,24 @@
 """Plays methods × defects × seeds, each up to its first detection or the end of its budget.
 
-OUT/<defects>-<version>-<run>-<steps>/   a run's folder, with its `detection.json` once it has ended
+OUT/<defects>-<version>-<run>/   a run's folder, with its `detection.json` once it has ended
 """
 
+import logging
 import multiprocessing
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
-from risk_sac.benchmark.detection import ANSWER, Detection, first_detection
+from risk_sac.benchmark.detection import Detection, answer_of, first_detection
 from risk_sac.config import EgoConfig, MethodName, RunSpec
 from risk_sac.config.spec_file import read_ego
-from risk_sac.egos.defects.catalogue import DEFECTS
+from risk_sac.egos.defects.catalogue import DEFECTS, version_of
 from risk_sac.egos.registry import pinned
-from risk_sac.errors import ConfigError
+from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.problem import check_installed
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,14 +57,21 @@ def ego_with(defect: str) -> EgoConfig:
     return read_ego(f"{base}+{defect}")
 
 
-def folder_of(spec: RunSpec, out: Path, budget_steps: int) -> Path:
-    """Returns the folder of a run, which is another one for each version of its ego."""
-    version = (spec.ego.version or "").replace("+", "-")
-    return out / "-".join((*spec.ego.defects, version, spec.id, str(budget_steps)))
+def folder_of(spec: RunSpec, out: Path) -> Path:
+    """Returns the folder of a run, which is another one for each version of its defects."""
+    return out / "-".join((*spec.ego.defects, version_of(spec.ego), spec.id))
+
+
+def ended(benchmark: Benchmark, out: Path) -> list[Detection]:
+    """Returns the outcomes of the runs that have ended so far."""
+    answers = (answer_of(folder_of(spec, out), benchmark.budget_steps) for spec in benchmark.specs())
+    return [answer for answer in answers if answer is not None]
 
 
 def play(benchmark: Benchmark, out: Path, jobs: int) -> Iterator[Detection]:
-    """Yields the outcomes of all runs as they end, those that have ended before at first.
+    """Plays the runs that have not ended so far, and yields their outcomes as they end.
+
+    A run that fails is logged, and played again by the next call.
 
     Args:
       benchmark: what to play.
@@ -70,17 +80,15 @@ def play(benchmark: Benchmark, out: Path, jobs: int) -> Iterator[Detection]:
     """
     if jobs < 1:
         raise ConfigError("jobs", f"{jobs}", "at least one process")
-    waiting = []
-    for spec in benchmark.specs():
-        folder = folder_of(spec, out, benchmark.budget_steps)
-        if (folder / ANSWER).exists():
-            yield first_detection(spec, folder, benchmark.budget_steps)
-        else:
-            waiting.append((spec, folder))
+    runs = [(spec, folder_of(spec, out)) for spec in benchmark.specs()]
+    waiting = [run for run in runs if answer_of(run[1], benchmark.budget_steps) is None]
     with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
         try:
-            pending = [pool.submit(first_detection, *each, benchmark.budget_steps) for each in waiting]
-            for ended in as_completed(pending):
-                yield ended.result()
+            pending = {pool.submit(first_detection, *run, benchmark.budget_steps): run[1] for run in waiting}
+            for future in as_completed(pending):
+                try:
+                    yield future.result()
+                except (RiskSacError, OSError) as error:
+                    logger.warning("%s: %s", pending[future].name, error)
         finally:  # of the rest nothing begins
             pool.shutdown(wait=False, cancel_futures=True)

@@ -1,13 +1,16 @@
 """Statistics of times to detection, which the budget cuts off (right-censored). Pure.
 
 Sources: Hazimeh et al. 2020, "Magma: a ground-truth fuzzing benchmark" (survival analysis); ARCH-COMP, category
-falsification (falsification rate); Klees et al. 2018, "Evaluating fuzz testing" (A12, tests over trials).
+falsification (falsification rate); Klees et al. 2018, "Evaluating fuzz testing" (A12, tests over trials);
+Demšar 2006, "Statistical comparisons of classifiers over multiple data sets" (Friedman test, critical differences).
 """
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import mean, median
+
+import numpy as np
 
 from risk_sac.benchmark.detection import Detection
 from risk_sac.config import RunMethod
@@ -16,6 +19,9 @@ from risk_sac.report.paired import vargha_delaney
 from risk_sac.types import Floats
 
 REFERENCE: RunMethod = "random"
+LEAST_METHODS, LEAST_DEFECTS = 3, 2  # of a Friedman test
+By = Mapping[tuple[str, ...], Sequence[Detection]]
+"""Runs of a method by defect."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,16 +36,20 @@ class Summary:
     restricted_mean: float  # of the time to detection, up to the budget
     low: float  # bootstrap 95 % interval over runs
     high: float
-    a12: float | None  # chance that random search takes longer; None of random search, and without it
+    a12: float | None  # chance that random search takes longer, mean over defects; None of random search
     p: float | None  # log-rank test against random search
     always: int  # defects that every run detected
     once: int  # defects that a run detected
     never: int
 
-    @property
-    def rate(self) -> float:
-        """The falsification rate."""
-        return self.detected / self.runs
+
+def balanced(detections: Sequence[Detection]) -> list[Detection]:
+    """Returns the runs of those defects and seeds that every method has played, so that all have the same tasks."""
+    methods = {each.method for each in detections}
+    played: dict[tuple[object, ...], set[RunMethod]] = defaultdict(set)
+    for each in detections:
+        played[each.defects, each.family, each.seed].add(each.method)
+    return [each for each in detections if played[each.defects, each.family, each.seed] == methods]
 
 
 def times(detections: Sequence[Detection]) -> list[float]:
@@ -70,22 +80,52 @@ def log_rank(first: Sequence[Detection], second: Sequence[Detection]) -> float:
 
 def summaries(detections: Sequence[Detection]) -> list[Summary]:
     """Returns a summary for each method, the quickest first."""
-    by_method: dict[RunMethod, list[Detection]] = defaultdict(list)
-    for each in detections:
-        by_method[each.method].append(each)
-    found = [_summary(method, by_method) for method in by_method]
+    by_method = _by_method(detections)
+    found = [_summary(method, runs, by_method.get(REFERENCE)) for method, runs in by_method.items()]
     return sorted(found, key=lambda each: each.restricted_mean)
 
 
-def _summary(method: RunMethod, by_method: Mapping[RunMethod, Sequence[Detection]]) -> Summary:
-    runs, reference = by_method[method], by_method.get(REFERENCE)
-    compared = reference if method != REFERENCE else None
+def restricted_means(detections: Sequence[Detection]) -> tuple[list[RunMethod], Floats]:
+    """Returns the methods, and the restricted mean time to detection, `defects x methods`, of balanced runs."""
+    by_method = _by_method(detections)
+    columns = [[mean(times(runs)) for runs in defects.values()] for defects in by_method.values()]
+    return list(by_method), np.array(columns, dtype=np.float64).T.reshape(-1, len(columns))
+
+
+def friedman(means: Floats) -> float | None:
+    """P value of the Friedman test that methods rank alike over defects; None if there are too few of either.
+
+    Args:
+      means: `defects x methods`.
+    """
+    from scipy.stats import friedmanchisquare
+
+    if len(means) < LEAST_DEFECTS or means.shape[1] < LEAST_METHODS:
+        return None
+    if (means == means[:, :1]).all():  # the statistic would be 0 / 0
+        return 1.0
+    return float(friedmanchisquare(*means.T).pvalue)
+
+
+def _by_method(detections: Sequence[Detection]) -> dict[RunMethod, By]:
+    found: dict[RunMethod, dict[tuple[str, ...], list[Detection]]] = defaultdict(lambda: defaultdict(list))
+    for each in sorted(detections, key=lambda each: (each.defects, each.seed)):
+        found[each.method][each.defects].append(each)
+    return {method: found[method] for method in dict.fromkeys(each.method for each in detections)}
+
+
+def _summary(method: RunMethod, by_defect: By, reference: By | None) -> Summary:
+    runs = [each for defect in by_defect.values() for each in defect]
     detected = [float(each.detected) for each in runs if each.detected is not None]
     restricted = times(runs)
     low, high = bootstrap_interval(restricted, RESAMPLING_SEED)
-    outcomes: dict[tuple[str, ...], list[bool]] = defaultdict(list)
-    for each in runs:
-        outcomes[each.defects].append(each.detected is not None)
+    outcomes = [[each.detected is not None for each in defect] for defect in by_defect.values()]
+    compared = reference if method != REFERENCE else None
+    a12 = p = None
+    if compared:
+        common = by_defect.keys() & compared.keys()
+        a12 = mean(vargha_delaney(times(compared[each]), times(by_defect[each])) for each in sorted(common))
+        p = log_rank(runs, [each for defect in compared.values() for each in defect])
     return Summary(
         method=method,
         runs=len(runs),
@@ -95,11 +135,11 @@ def _summary(method: RunMethod, by_method: Mapping[RunMethod, Sequence[Detection
         restricted_mean=mean(restricted),
         low=low,
         high=high,
-        a12=vargha_delaney(times(compared), restricted) if compared else None,
-        p=log_rank(runs, compared) if compared else None,
-        always=sum(map(all, outcomes.values())),
-        once=sum(map(any, outcomes.values())),
-        never=sum(not any(each) for each in outcomes.values()),
+        a12=a12,
+        p=p,
+        always=sum(map(all, outcomes)),
+        once=sum(map(any, outcomes)),
+        never=sum(not any(each) for each in outcomes),
     )
 
 

@@ -1,20 +1,29 @@
-"""Tables and the figure of a benchmark; they can be made of the runs that have ended so far."""
+"""Tables and figures of a benchmark; they can be made of the runs that have ended so far.
+
+OUT/detections.csv       a row for each run
+OUT/benchmark.md         tables of methods and defects, for the test set and for all defects
+OUT/curves-*.svg         Kaplan-Meier curves of the methods
+OUT/difference-*.svg     critical-difference diagram, if `scikit-posthocs` is installed
+"""
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from risk_sac.benchmark.detection import Detection
-from risk_sac.benchmark.statistics import Summary, summaries, survival
+from risk_sac.benchmark.difference import PACKAGE, REMEDY, diagram
+from risk_sac.benchmark.statistics import Summary, balanced, friedman, restricted_means, summaries, survival
 from risk_sac.canvas import canvas, picture
+from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.metrics.intervals import wilson_interval
 from risk_sac.report.drawing import CURVE_IN, DPI, LOOKS, STYLE
-from risk_sac.report.page import interval, number, table
+from risk_sac.report.page import interval, number, platform_in_words, table
 from risk_sac.run_folder.durable import replace_file
 
 COLUMNS = (
@@ -22,9 +31,23 @@ COLUMNS = (
     *("reached", "triggered", "detected", "refuted", "signature"),
 )
 METHODS = (
-    *("method", "runs", "detected", "falsification rate (95 %)", "mean steps", "median steps"),
-    *("restricted mean steps (95 %)", "A12", "p (log-rank)", "always", "at least once", "never"),
+    *("method", "runs", "falsification rate (95 %)", "mean steps", "median steps"),
+    *("restricted mean steps (95 %)", "A12", "p (log-rank)", "in all runs", "in some", "never"),
 )
+LEGEND = (
+    "Falsification rate: runs that detected their defect. Mean and median: over these runs. Restricted mean: over all"
+    " runs, with the budget where there was no detection; bootstrap interval. A12: chance that random search takes"
+    " longer on the same defect. p: log-rank test against random search. Last columns: defects that all runs, some run,"
+    " or no run of the method detected.\n"
+)
+
+
+def sections(detections: Sequence[Detection]) -> dict[str, list[Detection]]:
+    """Returns the runs of the test set, and those of all defects, of those tasks that every method has played."""
+    compared = balanced(detections)
+    test_set = [each for each in compared if all(DEFECTS[name].test_set for name in each.defects)]
+    others = len(compared) > len(test_set)
+    return ({"test-set": test_set} if test_set else {}) | ({"all": compared} if others else {})
 
 
 def methods_table(detections: Sequence[Detection]) -> str:
@@ -33,12 +56,12 @@ def methods_table(detections: Sequence[Detection]) -> str:
 
 
 def _row(each: Summary) -> list[str]:
-    rate = f"{each.rate:.2f}{interval(*wilson_interval(each.detected, each.runs), '.2f')}"
+    rate = f"{each.detected} of {each.runs}{interval(*wilson_interval(each.detected, each.runs), '.2f')}"
     restricted = f"{each.restricted_mean:.0f}{interval(each.low, each.high, '.0f')}"
     told = (number(each.mean_steps, ".0f"), number(each.median_steps, ".0f"), restricted)
     tests = (number(each.a12, ".2f"), number(each.p, ".3g"))
     counts = map(str, (each.always, each.once, each.never))
-    return [each.method, str(each.runs), str(each.detected), rate, *told, *tests, *counts]
+    return [each.method, str(each.runs), rate, *told, *tests, *counts]
 
 
 def defects_table(detections: Sequence[Detection]) -> str:
@@ -84,9 +107,32 @@ def curves(detections: Sequence[Detection]) -> Figure:
 
 
 def write(detections: Sequence[Detection], out: Path, command: str) -> None:
-    """Writes what has ended so far: `detections.csv`, `benchmark.md` and `curves.svg`."""
+    """Writes tables and figures of what has ended so far."""
     replace_file(out / "detections.csv", detections_csv(detections))
-    text = "\n".join((f"`{command}`\n", methods_table(detections), defects_table(detections)))
-    replace_file(out / "benchmark.md", text.encode())
-    (drawn,) = picture(partial(curves, detections), ["svg"], DPI, STYLE)
-    replace_file(out / "curves.svg", drawn)
+    text = [f"`{command}`\n", f"{platform_in_words()}. {LEGEND}"]
+    for name, runs in sections(detections).items():
+        defects, seeds = {each.defects for each in runs}, {each.seed for each in runs}
+        text.append(
+            f"## {name.capitalize().replace('-', ' ')}: {len(defects)} defects, {len(seeds)} seeds, "
+            f"{runs[0].budget_steps} steps\n"
+        )
+        text += [methods_table(runs), *_difference(runs, out, name), defects_table(runs)]
+        _figure(partial(curves, runs), out / f"curves-{name}.svg")
+    replace_file(out / "benchmark.md", "\n".join(text).encode())
+
+
+def _difference(runs: Sequence[Detection], out: Path, name: str) -> list[str]:
+    methods, means = restricted_means(runs)
+    p = friedman(means)
+    if p is None:
+        return []
+    told = f"Friedman test that the methods rank alike over defects: p = {p:.3g}"
+    if find_spec(PACKAGE) is None:
+        return [f"{told}; {REMEDY}.\n"]
+    _figure(partial(diagram, methods, means), out / f"difference-{name}.svg")
+    return [f"{told}; `difference-{name}.svg` has the critical differences (Nemenyi test).\n"]
+
+
+def _figure(draw: Callable[[], Figure], file: Path) -> None:
+    (drawn,) = picture(draw, [file.suffix[1:]], DPI, STYLE)
+    replace_file(file, drawn)

@@ -1,6 +1,8 @@
 """`risk-sac benchmark` and `power`: how soon methods detect egos with known faults, and what a budget is worth."""
 
 import argparse
+import math
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
@@ -21,6 +23,7 @@ from risk_sac.terminal import console
 
 METHODS: Sequence[MethodName] = ("random", "archive", "risk-sac-diverse")
 SEEDS, STEPS = 10, 20_000
+WRITTEN_EVERY_S = 60.0
 
 
 def add(commands: Commands) -> None:
@@ -38,6 +41,8 @@ def add(commands: Commands) -> None:
     steps = "environment steps of a run without a detection (default: %(default)s)"
     parser.add_argument("--steps", type=number(int, 1, 10_000_000), default=STEPS, metavar="N", help=steps)
     parser.add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help="runs at a time (default: one per core)")
+    shown = "write the tables of the runs that have ended so far; play nothing"
+    parser.add_argument("--tables-only", action="store_true", help=shown)
     out = "a folder for each run, and detections.csv, benchmark.md and curves.svg of those that have ended"
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help=out)
     worth = add_command(commands, "power", _power, "how many known faults a method finds with a budget, as measured")
@@ -52,7 +57,7 @@ def add(commands: Commands) -> None:
 
 def _benchmark(options: argparse.Namespace) -> int:
     # Here, because loading the simulator takes seconds.
-    from risk_sac.benchmark.runs import Benchmark, play
+    from risk_sac.benchmark.runs import Benchmark, ended, play
     from risk_sac.benchmark.table import methods_table, write
 
     test_set = [name for name, defect in DEFECTS.items() if defect.test_set]
@@ -62,13 +67,17 @@ def _benchmark(options: argparse.Namespace) -> int:
         seeds=tuple(range(options.first_seed, options.first_seed + options.seeds)),
         budget_steps=options.steps,
     )
-    found = []
-    with Progress(console=console) as bar:
-        task = bar.add_task("runs", total=len(list(benchmark.specs())))
-        for detection in play(benchmark, options.out, options.jobs or cores()):
-            found.append(detection)
-            bar.advance(task)
-            write(found, options.out, options.typed)
+    found, written_s = ended(benchmark, options.out), -math.inf
+    if not options.tables_only:
+        with Progress(console=console) as bar:
+            task = bar.add_task("runs", total=len(list(benchmark.specs())), completed=len(found))
+            for detection in play(benchmark, options.out, options.jobs or cores()):
+                found.append(detection)
+                bar.advance(task)
+                if time.monotonic() - written_s > WRITTEN_EVERY_S:
+                    write(found, options.out, options.typed)
+                    written_s = time.monotonic()
+    write(found, options.out, options.typed)
     console.print(methods_table(found), markup=False, soft_wrap=True)
     return OK
 

@@ -2,42 +2,67 @@
 
     python -m tests.acceptance.defects OUT [--defects NAME ...] [--scenes N] [--steps N] [--seeds N]
 
-plays what OUT lacks: for each defect and family, undisturbed scenes, and searches up to the first that detects the
-defect. It rewrites OUT/admission.csv after each run. A row is admitted in a family if a search detects the defect there
-and the undisturbed scenes do not.
+plays what OUT, a folder of `risk-sac benchmark`, lacks: searches up to the first that detects the defect, and
+undisturbed scenes. It rewrites OUT/admission.csv after each defect. A row is admitted in the first of its families if a
+search detects the defect there and the undisturbed scenes do not.
 """
 
 import argparse
+import csv
+import io
 import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from risk_sac.benchmark.detection import ANSWER, Detection, first_detection
-from risk_sac.benchmark.runs import ego_with, folder_of
-from risk_sac.benchmark.table import detections_csv
+from risk_sac.benchmark.runs import Benchmark, ego_with, ended, folder_of
 from risk_sac.config import Budget, RunSpec
-from risk_sac.egos.defects.catalogue import DEFECTS
+from risk_sac.egos.defects.catalogue import DEFECTS, version_of
 from risk_sac.egos.registry import pinned
+from risk_sac.errors import RiskSacError
 from risk_sac.run_folder.durable import replace_file
 
-UNDISTURBED, METHODS, FIRST_SEED = "iid-undisturbed", ("archive", "random"), 501
+UNDISTURBED, METHODS, FIRST_SEED = "iid-undisturbed", ("archive", "random"), 1
+COLUMNS = ("defect", "version", "family", "undisturbed_scenes", "undisturbed_detected", "method", "seed", "detected")
 
 
-def played(name: str, family: str, options: argparse.Namespace) -> Iterator[Detection]:
-    """Yields the undisturbed run of a defect in a family, and then searches up to a detection."""
-    ego = pinned(ego_with(name))
-    searches = [(method, FIRST_SEED + k) for k in range(options.seeds) for method in METHODS]
-    for method, seed in [(UNDISTURBED, FIRST_SEED), *searches]:
-        spec = RunSpec(family=family, method=method, seed=seed, ego=ego, budget=Budget(episodes=options.scenes))
-        folder = folder_of(spec, options.out, options.scenes if spec.iid else options.steps)
-        detection = first_detection(spec, folder, sys.maxsize if spec.iid else options.steps)
-        for path in folder.iterdir():  # what a finished run leaves
-            if path.name != ANSWER:
-                shutil.rmtree(path) if path.is_dir() else path.unlink()
-        yield detection
-        if detection.detected is not None and not spec.iid:
-            return
+def undisturbed(name: str, options: argparse.Namespace) -> Detection:
+    """Plays the undisturbed scenes of a defect up to one that detects it."""
+    budget = Budget(episodes=options.scenes)
+    spec = RunSpec(
+        family=DEFECTS[name].families[0], method=UNDISTURBED, seed=501, ego=pinned(ego_with(name)), budget=budget
+    )
+    folder = folder_of(spec, options.out / f"undisturbed-{options.scenes}")
+    detection = first_detection(spec, folder, sys.maxsize)
+    for path in folder.iterdir():  # what a finished run leaves
+        if path.name != ANSWER:
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    return detection
+
+
+def search(name: str, options: argparse.Namespace) -> Detection | None:
+    """Returns the quickest detection in OUT; without one, plays searches up to the first detection."""
+    seeds = tuple(range(FIRST_SEED, FIRST_SEED + options.seeds))
+    searches = Benchmark(methods=METHODS, defects=(name,), seeds=seeds, budget_steps=options.steps)
+    found = [(each.detected, each) for each in ended(searches, options.out) if each.detected is not None]
+    if found:
+        return min(found, key=lambda each: each[0])[1]
+    played = (first_detection(spec, folder_of(spec, options.out), options.steps) for spec in searches.specs())
+    return next((each for each in played if each.detected is not None), None)
+
+
+def rows(options: argparse.Namespace) -> Iterator[tuple[object, ...]]:
+    """Yields a row of admission.csv for each defect."""
+    for name in options.defects:
+        try:
+            clean, found = undisturbed(name, options), search(name, options)
+        except RiskSacError as error:
+            print(f"{name}: {error}", file=sys.stderr)
+            continue
+        hit = (found.method, found.seed, found.detected) if found else ("", "", "")
+        version = version_of(ego_with(name))
+        yield name, version, clean.family, clean.episodes, int(clean.detected is not None), *hit
 
 
 def main() -> None:
@@ -46,20 +71,15 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--defects", nargs="+", default=list(DEFECTS), choices=DEFECTS, metavar="NAME")
     parser.add_argument("--scenes", type=int, default=500, help="undisturbed ones (default: %(default)s)")
-    parser.add_argument("--steps", type=int, default=20_000, help="of each search (default: %(default)s)")
+    parser.add_argument("--steps", type=int, default=60_000, help="of each search (default: %(default)s)")
     parser.add_argument("--seeds", type=int, default=1, help="of each search (default: %(default)s)")
     options = parser.parse_args()
-    found: list[Detection] = []
-    pairs = [
-        (name, DEFECTS[name].families[k])  # so that each defect is soon played in some family
-        for k in range(3)
-        for name in options.defects
-        if k < len(DEFECTS[name].families)
-    ]
-    for name, family in pairs:
-        for detection in played(name, family, options):
-            found.append(detection)
-            replace_file(options.out / "admission.csv", detections_csv(found))
+    found: list[tuple[object, ...]] = []
+    for row in rows(options):
+        found.append(row)
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows([COLUMNS, *found])
+        replace_file(options.out / "admission.csv", text.getvalue().encode())
 
 
 if __name__ == "__main__":

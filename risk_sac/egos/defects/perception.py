@@ -39,7 +39,7 @@ class PedestrianRange(Defective):
 
 
 class DropsFrames(Defective):
-    """Sees nothing in every so manieth frame."""
+    """Sees nothing in every n-th frame."""
 
     def begin(self) -> None:
         """Counts from the first frame."""

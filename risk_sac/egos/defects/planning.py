@@ -5,7 +5,6 @@ import numpy as np
 from risk_sac.egos.defects.defective import VEHICLE, Defective, in_front, only, turned
 from risk_sac.egos.defects.prediction import SAME_WAY, offsets
 from risk_sac.egos.driving import Driver, idm, stop_at_signal, time_to_collision
-from risk_sac.egos.road import LIMIT
 from risk_sac.egos.seam import Command, Control, Perceived
 from risk_sac.types import SPEED, WIDTH
 
@@ -18,7 +17,7 @@ class Tailgates(Defective):
     """Follows with a short headway; its emergency braking is as before."""
 
     def begin(self) -> None:
-        """Looks out by itself."""
+        """Makes a lookout of its own."""
         self._driver = Driver()
         self._driver.reset(self.episode)
 
@@ -71,7 +70,7 @@ class ShortHorizon(Defective):
 
 
 class SlowReplanning(Defective):
-    """Plans its speed anew only from time to time; steers in time."""
+    """Replans its speed periodically; steers in every step."""
 
     def begin(self) -> None:
         """Has no plan yet."""
@@ -90,7 +89,7 @@ class LateBraking(Defective):
     """Brakes for others only once the time to collision falls below a threshold."""
 
     def begin(self) -> None:
-        """Looks out by itself."""
+        """Makes a lookout of its own."""
         self._driver = Driver()
         self._driver.reset(self.episode)
 
@@ -99,13 +98,3 @@ class LateBraking(Defective):
         control, ahead = self.control(command, p), self._driver.ahead(p)
         late = time_to_collision(float(p.state[SPEED, 0]), ahead) > self.value and not stop_at_signal(p)
         return Control(max(control.accel_mps2, -GENTLE_MPS2), control.steering_rad) if late else control
-
-
-class Speeds(Defective):
-    """Takes every speed limit for so many times as high."""
-
-    def sees(self, p: Perceived) -> Perceived:
-        """Raises the limits."""
-        path = p.path.copy()
-        path[LIMIT] *= self.value
-        return p._replace(path=path)

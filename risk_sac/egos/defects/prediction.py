@@ -27,7 +27,7 @@ class LeaderDrivesOn(Defective):
         self._past: dict[str, deque[float]] = {}
 
     def sees(self, p: Perceived) -> Perceived:
-        """Gives vehicles on the ego's way their highest speed of late."""
+        """Gives vehicles on the ego's way the highest of their recent speeds."""
         for id_, speed in zip(p.ids, np.hypot(p.state[VX], p.state[VY]).tolist(), strict=True):
             self._past.setdefault(id_, deque(maxlen=self.steps(self.value) + 1)).append(speed)
         highest, heading = np.array([max(self._past[id_]) for id_ in p.ids]), p.state[HEADING]
@@ -61,7 +61,7 @@ class BrakingYields(Defective):
         self._braked_s: dict[str, float] = {}
 
     def sees(self, p: Perceived) -> Perceived:
-        """Drops vehicles that have braked of late."""
+        """Drops vehicles that braked recently."""
         speeds = dict(zip(p.ids, np.hypot(p.state[VX], p.state[VY]).tolist(), strict=True))
         lost = {id_: (self._speeds.get(id_, speed) - speed) / self.step_s for id_, speed in speeds.items()}
         self._speeds = speeds

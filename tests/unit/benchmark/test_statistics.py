@@ -1,8 +1,12 @@
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+from risk_sac.benchmark import table
 from risk_sac.benchmark.detection import Detection
-from risk_sac.benchmark.statistics import log_rank, summaries, survival
-from risk_sac.benchmark.table import curves, defects_table, detections_csv, methods_table
+from risk_sac.benchmark.statistics import balanced, friedman, log_rank, restricted_means, summaries, survival
+from risk_sac.benchmark.table import curves, defects_table, detections_csv, methods_table, write
 from risk_sac.config import RunMethod
 
 BUDGET = 1000
@@ -39,14 +43,14 @@ FOUND = [
 
 def test_a_method_is_summed_up_over_defects_and_seeds() -> None:
     archive, random = summaries(FOUND)  # the quickest first
-    assert (archive.method, archive.runs, archive.detected, archive.rate) == ("archive", 6, 4, 4 / 6)
+    assert (archive.method, archive.runs, archive.detected) == ("archive", 6, 4)
     assert (archive.mean_steps, archive.median_steps) == (250.0, 250.0)
     assert archive.restricted_mean == (100 + 200 + 300 + 400 + 1000 + 1000) / 6
     assert archive.low < archive.restricted_mean < archive.high
     assert (archive.always, archive.once, archive.never) == (1, 2, 0)
     assert (random.always, random.once, random.never) == (0, 1, 1)
-    # of 36 pairs archive is quicker in 4 x 6, and as quick in 2 x 4
-    assert archive.a12 == (24 + 8 / 2) / 36
+    # of 9 pairs archive is quicker in 9 and in 3; in the 6 others neither detects
+    assert archive.a12 == pytest.approx((9 / 9 + (3 + 6 / 2) / 9) / 2)
     assert (random.a12, random.p) == (None, None)
 
 
@@ -65,10 +69,59 @@ def test_the_log_rank_test_tells_quick_from_slow() -> None:
 
 
 def test_tables_hold_every_run() -> None:
-    assert methods_table(FOUND).splitlines()[2].startswith("| archive | 6 | 4 | 0.67 [0.30, 0.90] | 250 | 250 | 500 [")
+    assert methods_table(FOUND).splitlines()[2].startswith("| archive | 6 | 4 of 6 [0.30, 0.90] | 250 | 250 | 500 [")
     assert defects_table(FOUND).splitlines()[2:] == [
         "| latency | low | 3 of 3, 200 | 2 of 3, 600 |",
         "| speeds | low | 1 of 3, 400 | 0 of 3 |",
     ]
     assert len(detections_csv(FOUND).decode().splitlines()) == 1 + len(FOUND)
     assert [line.get_label() for line in curves(FOUND).axes[0].get_lines()] == ["archive", "random"]
+
+
+def test_a_run_tells_what_a_smaller_budget_would_have_told() -> None:
+    (late,), (never,) = runs("archive", "latency", 400), runs("archive", "latency", None)
+    early = late.within(300)
+    assert (early.detected, early.signature, early.budget_steps, early.steps) == (None, "", 300, 300)
+    assert (late.within(400).detected, late.within(9000).budget_steps) == (400, 9000)
+    assert late.settles(9000)  # it has ended
+    assert never.settles(BUDGET)
+    assert not never.settles(BUDGET + 1)
+
+
+def test_methods_are_compared_on_what_each_has_played() -> None:
+    more = [*FOUND, *runs("archive", "short-gap", 1, 2)]
+    assert balanced(more) == FOUND
+    methods, means = restricted_means(FOUND)
+    assert methods == ["archive", "random"]
+    assert means.tolist() == [[200.0, (500 + 1000 + 700) / 3], [800.0, 1000.0]]
+
+
+def test_ranks_that_never_differ_are_no_coincidence() -> None:
+    means = np.array([[1.0, 2.0, 3.0]] * 9)
+    p = friedman(means)
+    assert p is not None
+    assert p < 0.001
+    assert friedman(means[:, :2]) is None
+    assert friedman(np.ones((9, 3))) == 1.0
+
+
+def test_the_test_set_and_the_whole_catalogue_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tasks = ("latency", "kerb-waits", "weak-brakes")
+    times = {"archive": (100, 300), "random": (800, None), "sac": (500, 600)}
+    write(
+        [run for method, at in times.items() for task in tasks for run in runs(method, task, *at)], tmp_path, "command"
+    )
+    text = (tmp_path / "benchmark.md").read_text()
+    assert "## Test set: 2 defects, 2 seeds, 1000 steps" in text
+    assert "## All: 3 defects, 2 seeds, 1000 steps" in text
+    assert text.count("| latency |") == 1
+    assert {file.name for file in tmp_path.glob("*.svg")} == {
+        f"{what}-{which}.svg" for what in ("curves", "difference") for which in ("test-set", "all")
+    }
+    monkeypatch.setattr(table, "PACKAGE", "no_such_package")
+    write([run for method, at in times.items() for run in runs(method, "latency", *at)], tmp_path, "command")
+    assert "Friedman" not in (tmp_path / "benchmark.md").read_text()  # one defect
+    write(
+        [run for method, at in times.items() for task in tasks for run in runs(method, task, *at)], tmp_path, "command"
+    )
+    assert "pip install 'risk-sac[benchmark]'" in (tmp_path / "benchmark.md").read_text()

@@ -1,8 +1,10 @@
 """Each defect changes what its sentence says, and nothing else."""
 
+import csv
 import math
 from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
-from risk_sac.egos.defects.catalogue import DEFECTS, planted
+from risk_sac.egos.defects.catalogue import DEFECTS, planted, version_of
 from risk_sac.egos.defects.planted import Planted
 from risk_sac.egos.idm_aeb import IdmAeb
 from risk_sac.egos.registry import pinned
@@ -21,6 +23,7 @@ from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Signal, 
 CAR, TRUCK, WALKER = (Kind.VEHICLE, 4.6, 1.85), (Kind.VEHICLE, 8.0, 2.4), (Kind.PEDESTRIAN, 0.5, 0.5)
 Actor = tuple[str, tuple[Kind, float, float], float, float, float, float]
 """Name, body, m ahead of the ego's centre, m to its left, velocity along and across, m/s."""
+ADMISSION = Path(__file__).parents[3] / "risk_sac/report/measured/admission.csv"  # of tests.acceptance.defects
 PYTHON = [name for name, defect in DEFECTS.items() if defect.kind != "sumo"]
 
 
@@ -123,9 +126,9 @@ def test_sight_ends_at_a_range_and_at_a_sector_on_one_side(turn: float) -> None:
         assert left_over("blind-right", car(ahead, beside), turn=turn) == ("car",)
 
 
-def test_every_sixth_frame_is_empty() -> None:
-    frames = perceived("drops-frames", *(seen(car(20.0)) for _ in range(12)))
-    assert [len(frame.ids) for frame in frames] == [2, 2, 2, 2, 2, 1] * 2
+def test_every_tenth_frame_is_empty() -> None:
+    frames = perceived("drops-frames", *(seen(car(20.0)) for _ in range(20)))
+    assert [len(frame.ids) for frame in frames] == [*[2] * 9, 1] * 2
 
 
 def test_others_are_seen_late_and_the_ego_in_time() -> None:
@@ -179,9 +182,9 @@ def test_pedestrians_vanish_beside_vehicles_and_after_standing() -> None:
     truck = ("truck", TRUCK, 20.0, -3.0, 1.0, 0.0)
     assert left_over("merges-pedestrians", truck, walker(25.0, -3.0)) == ("truck",)
     assert left_over("merges-pedestrians", truck, walker(26.0, -3.0)) == ("truck", "walker")
-    stood = [seen(walker(20, -4, across=0.0 if k < 10 else 2.0)) for k in range(12)]
-    assert [len(frame.ids) for frame in perceived("drops-standing", *stood)] == [2] * 9 + [1] * 3
-    cars = [seen(car(20, along=0.0)) for _ in range(12)]
+    stood = [seen(walker(20, -4, across=0.0 if k < 20 else 2.0)) for k in range(22)]
+    assert [len(frame.ids) for frame in perceived("drops-standing", *stood)] == [2] * 19 + [1] * 3
+    cars = [seen(car(20, along=0.0)) for _ in range(22)]
     assert {len(frame.ids) for frame in perceived("drops-standing", *cars)} == {2}
 
 
@@ -212,14 +215,12 @@ def test_plans_are_short_sighted() -> None:
     far = [car(20, -14, 0.0, 8.0), car(20, 4, -8.0, name="oncoming"), car(40, name="leader")]
     assert left_over("short-gap", *far) == ("leader",)
     assert left_over("short-gap", car(9, -9, 0.0, 8.0)) == ("car",)
-    assert left_over("nearest-only", *far, car(-5, name="behind")) == ("oncoming",)
+    assert left_over("nearest-only", *far, car(-5, name="behind")) == ("car", "oncoming")
     assert left_over("short-horizon", car(17.9), car(18.1, name="far")) == ("car",)
     assert left_over("short-horizon", car(17.9), speed=5.0) == ()
     assert left_over("restarts-early", walker(5, -3), speed=3.0) == ()
     assert left_over("restarts-early", walker(5, -1), speed=3.0) == ("walker",)
     assert left_over("restarts-early", walker(5, -3), speed=9.0) == ("walker",)
-    (frame,) = perceived("speeds", seen())
-    assert frame.path[4].tolist() == pytest.approx([1.4 * 13.9] * 3)
 
 
 def test_braking_is_held_back() -> None:
@@ -233,7 +234,7 @@ def test_braking_is_held_back() -> None:
 
 def test_actuators_do_less_and_later() -> None:
     assert commanded("weak-brakes", 1.0, -3.0, -7.0) == [1.0, -3.0, -4.0]
-    assert commanded("slow-brakes", -7.0, -7.0, 2.0, -7.0) == pytest.approx([-0.4, -0.8, 2.0, -0.4])
+    assert commanded("slow-brakes", -7.0, -7.0, 2.0, -7.0) == pytest.approx([-0.8, -1.6, 2.0, -0.8])
     assert commanded("late-actuators", 1.0, *[-7.0] * 7) == [0.0] * 6 + [1.0, -7.0]
     assert commanded("locks-wheels", -5.0, -6.0) == pytest.approx([-5.0, -9.81 / 2])
     assert commanded("locks-wheels", -3.0, grip=4.0) == [-2.0]
@@ -279,7 +280,7 @@ def test_a_defect_is_reached_when_it_first_changes_a_command() -> None:
             r"ego.defects: got 'blind-rihgt'; wanted defects of the catalogue, such as blind-right",
         ),
         ("default+blind-right", r"ego.defects: 'blind-right', which SUMO's driver cannot have; name a driver"),
-        ("idm-aeb+sumo-assertive", r"ego.defects: 'sumo-assertive', a setting of SUMO's driver"),
+        ("idm-aeb+sumo-distracted", r"ego.defects: 'sumo-distracted', a setting of SUMO's driver"),
         ("idm-aeb+latency+latency", r"defects: got \['latency', 'latency'\]; wanted each defect once"),
     ],
 )
@@ -289,11 +290,23 @@ def test_a_defect_that_does_not_exist_or_fit_is_refused_in_a_line(ego: str, mess
     assert "\n" not in str(raised.value)
 
 
-def test_a_third_of_each_kind_is_the_test_set() -> None:
+def test_about_a_third_is_the_test_set_with_each_kind_in_it() -> None:
     assert len(DEFECTS) >= 28
-    for kind in {defect.kind for defect in DEFECTS.values()}:
-        names = sorted(name for name, defect in DEFECTS.items() if defect.kind == kind)
-        assert [name for name in names if DEFECTS[name].test_set] == names[2::3], kind
+    tested = [defect for defect in DEFECTS.values() if defect.test_set]
+    assert 0.3 <= len(tested) / len(DEFECTS) <= 0.36
+    assert {defect.kind for defect in tested} == {defect.kind for defect in DEFECTS.values()}
+
+
+def test_every_row_is_admitted_in_its_first_family() -> None:
+    rows = {row["defect"]: row for row in csv.DictReader(ADMISSION.read_text(encoding="utf-8").splitlines())}
+    assert rows.keys() == DEFECTS.keys()
+    for name, row in rows.items():
+        assert row["version"] == version_of(read_ego(f"{DEFECTS[name].base}+{name}")), (
+            f"{name} has changed; play it again"
+        )
+        assert row["family"] == DEFECTS[name].families[0]
+        assert (int(row["undisturbed_scenes"]), row["undisturbed_detected"]) == (500, "0"), name
+        assert 0 < int(row["detected"]) <= 200_000, name
 
 
 def test_a_row_says_the_value_that_it_sets() -> None:
@@ -305,10 +318,10 @@ def test_a_row_says_the_value_that_it_sets() -> None:
 def test_an_ego_with_a_defect_is_of_another_version() -> None:
     versions = {pinned(read_ego(ego)).version for ego in ("idm-aeb", "idm-aeb+latency", "idm-aeb+short-sight")}
     versions |= {
-        pinned(read_ego(ego)).version for ego in ("default", "default+sumo-assertive", "idm-aeb+latency+speeds")
+        pinned(read_ego(ego)).version for ego in ("default", "default+sumo-distracted", "idm-aeb+latency+blind-right")
     }
     assert len(versions) == 6
-    ego = pinned(read_ego("default+sumo-assertive"))
+    ego = pinned(read_ego("default+sumo-distracted"))
     assert pinned(ego) == ego
     assert EgoConfig.model_validate_json(ego.model_dump_json()) == ego
     assert "defects" not in EgoConfig().model_dump_json()  # older specs keep their digests
