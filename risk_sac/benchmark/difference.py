@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from risk_sac.canvas import canvas
+from risk_sac.config import RunMethod
 from risk_sac.report.drawing import LOOKS
 from risk_sac.types import Floats
 
@@ -16,7 +17,7 @@ PACKAGE, REMEDY = "scikit_posthocs", "for the diagram, pip install 'risk-sac[ben
 SIZE_IN = (6.4, 2.2)
 
 
-def diagram(methods: Sequence[str], means: Floats) -> Figure:
+def diagram(methods: Sequence[RunMethod], means: Floats) -> Figure:
     """Draws the mean ranks of the methods, 1 being the quickest.
 
     Args:
