@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from risk_sac.cli.campaigns.gate import Bounds
-from risk_sac.cli.campaigns.output import results_table
+from risk_sac.cli.campaigns.output import driven_by_table, results_table
 from risk_sac.cli.campaigns.watch import shown
 from risk_sac.cli.console import headline
 from risk_sac.client import Campaign, Client, ClientError, Episode, Results, Unreachable
@@ -43,6 +43,9 @@ def main(arguments: list[str] | None = None) -> int:
             results = client.results(campaign.id)
             _write(options.out, campaign, results, failures)
             console.print(results_table(results, Bounds()))
+            drove = driven_by_table(results)
+            if drove is not None:
+                console.print(drove)
             console.print(f"results: {options.out}")
             console.print(f"recorded failures: {options.data_dir}/campaigns/{campaign.id}", soft_wrap=True)
             if failures:

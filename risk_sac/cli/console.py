@@ -19,7 +19,7 @@ from rich.progress import (
 from rich.table import Column, Table
 
 from risk_sac.metrics import requirement_cells
-from risk_sac.records import Adjustment, Collision, EpisodeRecord, RequirementCounts, Violation
+from risk_sac.records import Adjustment, Collision, DrivenBy, EpisodeRecord, RequirementCounts, Violation
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.terminal import Output, console, notes, printable
 
@@ -154,6 +154,11 @@ def counted(count: int, noun: str) -> str:
 def headline(found: int | None, candidates: int) -> str:
     """Number of headline failures; before their replay "at most" the candidates."""
     return f"at most {candidates}" if found is None and candidates else f"{found or 0}"
+
+
+def driven_by_in_words(counts: Mapping[str, int]) -> str:
+    """Counts by what drove the adversaries, such as `policy 41, script 137`; a dash where nothing is known."""
+    return ", ".join(f"{each} {counts[each]}" for each in DrivenBy if counts.get(each)) or "-"
 
 
 def offences(violation: Collision | Violation) -> Iterator[str]:

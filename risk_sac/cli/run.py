@@ -28,6 +28,7 @@ from risk_sac.cli.console import (
     Commands,
     add_command,
     counted,
+    driven_by_in_words,
     headline,
     or_dash,
     progress_bar,
@@ -135,6 +136,7 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
     return {
         "headline failures": headline(metrics.headline, metrics.headline_candidates),
         "episodes": f"{metrics.episodes} ({metrics.rejected} rejected)",
+        "driven by": driven_by_in_words(metrics.episodes_driven_by),
         "contacts": f"{metrics.raw_collisions} ({counted(metrics.artefacts, 'artefact')})",
         "valid contacts": f"{metrics.collisions} ({metrics.unresponsive} unresponsive)",
         "failures of any requirement": f"{metrics.failures}",

@@ -2,6 +2,7 @@
 
 import argparse
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 
 from rich.table import Table
@@ -12,6 +13,7 @@ from risk_sac.cli.console import (
     OUTCOME,
     Commands,
     add_command,
+    driven_by_in_words,
     headline,
     in_words,
     narrow_table,
@@ -21,7 +23,8 @@ from risk_sac.cli.console import (
 from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
-from risk_sac.records import Collision, Judgement, Violation
+from risk_sac.metrics import headline_driven_by
+from risk_sac.records import Collision, Judgement, RunMetrics, Violation
 from risk_sac.run_folder.results import Results, read_results
 from risk_sac.run_folder.series import read_series
 from risk_sac.terminal import console
@@ -47,7 +50,8 @@ def _show(options: argparse.Namespace) -> int:
         for phase in (results.metrics, results.evaluation):
             if phase is not None:
                 name = "headline failures" if phase is results.metrics else "headline failures of the evaluation"
-                console.print(f"{name}: {headline(phase.headline, phase.headline_candidates)}")
+                console.print(f"{name}: {headline(phase.headline, phase.headline_candidates)}{_driven_by([phase])}")
+                console.print(f"episodes driven by: {driven_by_in_words(phase.episodes_driven_by)}")
         console.print(_failures(results))
         return OK
     failure = results.failure(options.failure)
@@ -66,6 +70,12 @@ def _show(options: argparse.Namespace) -> int:
     draw(results.spec.family, recording, picture, twin)
     console.print(f"Drawn: {picture}", soft_wrap=True)
     return OK
+
+
+def _driven_by(phases: Sequence[RunMetrics]) -> str:
+    """What drove the headline failures, in brackets; empty without any."""
+    counts = headline_driven_by(phases)
+    return f" (driven by: {driven_by_in_words(counts)})" if counts else ""
 
 
 def _failures(results: Results) -> Table:

@@ -13,7 +13,7 @@ from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.failures.clusters import Overview
 from risk_sac.failures.studied import Studied
 from risk_sac.metrics import METRICS
-from risk_sac.records import Fault, Phase, Record, RunMetrics, Severity
+from risk_sac.records import DrivenBy, Fault, Phase, Record, RunMetrics, Severity
 from risk_sac.report.cells import Cell
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.figures import FORMATS, figure_files, figure_names
@@ -165,8 +165,10 @@ def table_csv(comparison: Comparison) -> str:
 
 
 def _by_name(cell: Cell) -> dict[str, Any]:
-    """A column for each severity and fault, and for each figure of each reference driver and requirement."""
+    """A column for each severity, fault and thing that drove, and for each figure of a reference driver or requirement."""
     columns: dict[str, Any] = {f"severity.{each}": cell.by_severity.get(each, 0) for each in Severity}
+    for name in ("episodes_driven_by", "headline_driven_by"):
+        columns |= {f"{name}.{each}": getattr(cell, name).get(each, 0) for each in DrivenBy}
     columns |= {f"fault.{each}": cell.by_fault.get(each, 0) for each in Fault}
     figures = {**cell.pcr_by_driver, **cell.requirements}.items()
     return columns | {f"{name}.{figure}": value for name, found in figures for figure, value in found}

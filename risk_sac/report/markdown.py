@@ -19,7 +19,7 @@ from risk_sac.report.comparison import DECLARED, REFERENCE, RIVALS, Comparison, 
 from risk_sac.report.page import DASH, interval, number, percent, platform_in_words, table, versions_in_words
 from risk_sac.report.paired import LEVEL, PairedTest, power_of
 from risk_sac.report.runs import LIMITS, TESTED, FinishedRun, found_within
-from risk_sac.report.verdicts import RowsOf, class_rows, driver_rows
+from risk_sac.report.verdicts import RowsOf, class_rows, driven_by_rows, driver_rows
 
 CONTROL = "no-adversary"
 MOST_CLUSTERS = 12  # rows of their table
@@ -63,6 +63,7 @@ def _template() -> Template:
     environment.globals |= {
         "class_rows": class_rows,
         "declared_metrics": DECLARED,
+        "driven_by_rows": driven_by_rows,
         "driver_rows": driver_rows,
         "level": f"{LEVEL:g}",
         "metrics": METRICS,

@@ -1,8 +1,8 @@
-"""Rows of cells: each reference driver's PCR, and contacts by severity and failures by fault."""
+"""Rows of cells: each reference driver's PCR, contacts by severity, failures by fault, episodes by what drove them."""
 
 from collections.abc import Callable, Mapping, Sequence
 
-from risk_sac.records import Fault, Severity
+from risk_sac.records import DrivenBy, Fault, Severity
 from risk_sac.report.cells import Cell
 from risk_sac.report.page import DASH, interval, percent
 
@@ -29,6 +29,17 @@ def class_rows(cells: Sequence[Cell]) -> Table:
     return CLASSES, [
         [*_shares(cell.by_severity, list(reversed(Severity))), *_shares(cell.by_fault, list(Fault))] for cell in cells
     ]
+
+
+def driven_by_rows(cells: Sequence[Cell]) -> Table:
+    """Returns what drove, and per cell the episodes that it drove with their share, and its headline failures."""
+    names = [each for each in DrivenBy if any(cell.episodes_driven_by.get(each) for cell in cells)]
+    columns = [*names, *(f"headline: {name}" for name in names)]
+    return columns, [[*_shares(cell.episodes_driven_by, names), *_headline(cell, names)] for cell in cells if names]
+
+
+def _headline(cell: Cell, names: Sequence[str]) -> list[str]:
+    return [DASH if cell.headline is None else str(cell.headline_driven_by.get(name, 0)) for name in names]
 
 
 def _shares(counts: Mapping[str, int], names: Sequence[str]) -> list[str]:

@@ -3,7 +3,7 @@
 They follow `risk_sac.metrics`, but go by what each episode is taken for now: a failure may have been refused since.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.metrics import WINDOW
-from risk_sac.records import RECORDED, Outcome, Real, Record, State
+from risk_sac.records import RECORDED, DrivenBy, Outcome, Real, Record, State
 from risk_sac.types import Floats
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
 from service.views.failure_table import Kinds, Plain, is_preventable, violations_of
@@ -42,6 +42,8 @@ class RunCurves(Record):
     """The distinct ones among them."""
     dual_variable: list[Real]
     """λ after the last episode."""
+    driven_by: Mapping[DrivenBy, list[int]]
+    """What drove the adversaries → episodes so far; without what never did."""
     mean_cost: list[Real]
     """Realism cost per step of the episodes since the point before; null where none of them was simulated."""
 
@@ -71,6 +73,7 @@ class _Search:
     preventable: list[bool] = field(default_factory=list)
     distinct: list[int] = field(default_factory=list)
     distinct_preventable: list[int] = field(default_factory=list)
+    driven_by: list[str | None] = field(default_factory=list)
     steps: list[int] = field(default_factory=list)
     cost: list[float] = field(default_factory=list)  # summed over the steps
     dual_variable: list[float] = field(default_factory=list)
@@ -88,6 +91,7 @@ class _Search:
         self.preventable.append(bool(preventable))
         self.distinct.append(sum(map(self._kinds.add, valid)))
         self.distinct_preventable.append(sum(map(self._preventable_kinds.add, preventable)))
+        self.driven_by.append(record.get("driven_by"))
         self.steps.append(record["steps"])
         self.cost.append(float(record["mean_cost"]) * record["steps"] if record["steps"] else 0.0)
         self.dual_variable.append(float(record["dual_variable"]))
@@ -106,7 +110,12 @@ def _curves(run: StoredRun, search: _Search, points: int) -> RunCurves:
     }
     named = {name: getattr(run, name) for name in ("family", "method", "seed", "state")}
     values = {name: line.tolist() for name, line in lines.items()}
-    return RunCurves.model_validate(named | values | {"run_id": run.id, "episodes": at.tolist()})
+    drove = {
+        each: _summed([found == each for found in search.driven_by])[at].tolist()
+        for each in DrivenBy
+        if each in search.driven_by
+    }
+    return RunCurves.model_validate(named | values | {"run_id": run.id, "episodes": at.tolist(), "driven_by": drove})
 
 
 def spread(count: int, points: int) -> Counts:

@@ -66,7 +66,7 @@ def test_submit_watch_shows_the_way_on_one_channel_and_the_results_on_the_other(
     printed = capsys.readouterr()
     assert "succeeded: 12/12 episodes, headline failures: 0; 6 failures (no_contact 6), 2 distinct" in printed.err
     assert "\x1b" not in printed.err + printed.out
-    row, _ = (line for line in printed.out.splitlines() if "random" in line)
+    row, *_ = (line for line in printed.out.splitlines() if "random" in line)
     assert row.split() == ["low", "random", "-", "12", "6", "4", "2", "0.50", "0.17"]
     (row,) = (line for line in printed.out.splitlines() if "no_contact" in line)
     assert row.split() == ["no_contact", "failure", "6", "6", "4", "2", "0.500", "[0.254,", "0.746]"]

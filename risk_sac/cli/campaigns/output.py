@@ -25,7 +25,7 @@ from risk_sac.cli.console import (
 from risk_sac.client import Campaign, CampaignSummary, Results
 from risk_sac.config import IID_METHODS
 from risk_sac.metrics import pooled_requirements
-from risk_sac.records import wire
+from risk_sac.records import DrivenBy, Total, wire
 from risk_sac.terminal import console
 
 COUNTS = ("head-\nline", "epi-\nsodes", "fail-\nures", "dis-\ntinct", "preven-\ntable")
@@ -114,7 +114,8 @@ def results_tables(results: Results, bounds: Bounds) -> Group:
         if each.verdict != "within"
     }
     requirements = requirements_table({name: group.requirements for name, group in groups.items()}, said)
-    return Group(results_table(results, bounds), *([requirements] if requirements else []))
+    tables = (results_table(results, bounds), driven_by_table(results), requirements)
+    return Group(*(table for table in tables if table is not None))
 
 
 def results_table(results: Results, bounds: Bounds) -> Table:
@@ -144,6 +145,25 @@ def results_table(results: Results, bounds: Bounds) -> Table:
             style="red" if broken else None,
         )
     return table
+
+
+def driven_by_table(results: Results) -> Table | None:
+    """A line for each family and method: episodes and headline failures by what drove them; None where unknown."""
+    if not any(total.episodes_driven_by for total in results.totals):
+        return None
+    table = Table(title="episodes driven by (of them headline failures)", box=SIMPLE_HEAD, padding=0)
+    table.add_column("family", overflow="fold")
+    table.add_column("method", no_wrap=True)
+    for each in DrivenBy:
+        table.add_column(each, no_wrap=True, justify="right")
+    for total in results.totals:
+        table.add_row(total.family, total.method, *(_driven_by(total, each) for each in DrivenBy))
+    return table
+
+
+def _driven_by(total: Total, what: DrivenBy) -> str:
+    headline = "" if total.headline is None else f" ({total.headline_driven_by.get(what, 0)})"
+    return f"{total.episodes_driven_by.get(what, 0)}{headline}"
 
 
 def _rate(rate: float | None, low: float | None, high: float | None, broken: Comparison | None) -> str:

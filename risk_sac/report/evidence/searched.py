@@ -14,7 +14,7 @@ from risk_sac.report.evidence.words import ego_in_words
 from risk_sac.report.markdown import verified
 from risk_sac.report.page import DASH, number
 from risk_sac.report.runs import FinishedRun
-from risk_sac.report.verdicts import class_rows, driver_rows
+from risk_sac.report.verdicts import class_rows, driven_by_rows, driver_rows
 from risk_sac.verdicts.words import began, ego_did, known, prevented_by
 
 MOST_CARDS = 12  # of a family
@@ -118,6 +118,14 @@ def _verdicts(cells: Sequence[Cell]) -> Iterator[Block]:
         yield "Valid contacts by severity, and failures by fault, with the shares of those that were judged:"
         rows = [[*name, *row] for name, row in zip(named, counts, strict=True)]
         yield Table("severity and fault", ["family", "method", *classes], rows, left=2)
+    sources, drove = driven_by_rows(cells)
+    if sources:
+        yield (
+            "Episodes by what drove the adversaries, with their share, and headline failures by what drove the first "
+            "of their kind: the learner's policy, a script that the script model proposed, another script, or chance."
+        )
+        rows = [[*name, *row] for name, row in zip(named, drove, strict=True)]
+        yield Table("driven by", ["family", "method", *sources], rows, left=2)
 
 
 def clusters(comparison: Comparison, origin: Origin) -> Section:
@@ -179,7 +187,7 @@ def _fault(violation: Collision | Violation) -> Iterator[str]:
 
 def _told(run: FinishedRun, record: EpisodeRecord) -> Iterator[str]:
     """Of the pictured failure."""
-    yield f"pictured: {record.id_in(run.spec.id)}"
+    yield f"pictured: {record.id_in(run.spec.id)}{f', driven by {record.driven_by}' if record.driven_by else ''}"
     if record.collision is not None:
         yield _contact(record.collision)
     yield from map(_violation, record.violations)

@@ -3,7 +3,7 @@ from rich.console import Console
 
 from risk_sac.cli.campaigns.failures import failures_table
 from risk_sac.cli.campaigns.gate import Bounds
-from risk_sac.cli.campaigns.output import line, results_table, results_tables
+from risk_sac.cli.campaigns.output import driven_by_table, line, results_table, results_tables
 from risk_sac.client import CampaignSummary, Episode, Results
 from risk_sac.config import METHODS
 from risk_sac.records import NO_CONTACT, Outcome
@@ -76,6 +76,24 @@ def test_each_requirement_is_a_row_below_its_family_and_method(capsys: pytest.Ca
     assert rows[4] == ["above", "0.1"]
     assert rows[5][0] + rows[6][0] == own
     assert "low random" not in printed
+
+
+def test_each_method_has_a_line_that_says_what_drove_its_episodes(capsys: pytest.CaptureFixture[str]) -> None:
+    drove = {"episodes_driven_by": {"script": 137, "policy": 41, "random": 22}}
+    found = {"headline": 9, "headline_driven_by": {"script": 7, "policy": 2}}
+    totals = [
+        TOTAL | drove | found | {"method": "risk-sac-diverse"},
+        TOTAL | drove | {"method": "archive", "headline": None},
+    ]
+    results = {"campaign_id": "c1", "state": "succeeded", "complete": True, "runs": [], "totals": totals}
+    table = driven_by_table(Results.model_validate(results))
+    assert table is not None
+    Console(width=80).print(table)
+    *_, heads, _, diverse, archive, _ = (line.split() for line in capsys.readouterr().out.splitlines())
+    assert heads == ["family", "method", "policy", "model", "script", "random"]
+    assert diverse == ["dense", "risk-sac-diverse", "41", "(2)", "0", "(0)", "137", "(7)", "22", "(0)"]
+    assert archive == ["dense", "archive", "41", "0", "137", "22"]
+    assert driven_by_table(Results.model_validate(results | {"totals": [TOTAL]})) is None
 
 
 def test_a_failure_without_contact_is_listed_by_what_it_violates(capsys: pytest.CaptureFixture[str]) -> None:

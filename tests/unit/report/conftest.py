@@ -4,7 +4,7 @@ import pytest
 
 from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.metrics import results_digest
-from risk_sac.records import Collision, Fault, Grade, Judgement, Outcome, RequirementResult, Severity
+from risk_sac.records import Collision, DrivenBy, Fault, Grade, Judgement, Outcome, RequirementResult, Severity
 from risk_sac.report import FinishedRun
 from tests.builders import collision, episode_record, judgement, violation
 
@@ -50,7 +50,10 @@ def results(**violated_s: float | None) -> dict[str, RequirementResult]:
 
 # Of a newer run, whose requirements were counted: all are kept, one is violated without contact.
 OUTCOMES |= {"k": (Outcome.SAFE, None), "v": (Outcome.FAILURE, None)}
+OUTCOMES |= {"p": OUTCOMES["."], "s": OUTCOMES["f"]}
 NEWER = {
+    "p": {"driven_by": DrivenBy.POLICY},
+    "s": {"driven_by": DrivenBy.SCRIPT},
     "k": {"requirements": results(no_contact=None, safe_ttc=None, never_fast=None)},
     "v": {
         "requirements": results(no_contact=None, safe_ttc=0.5, never_fast=1.5),

@@ -98,6 +98,20 @@ def test_page_json_and_csv_say_which_driver_prevents_how_bad_it_is_and_whose_fau
     assert (row["r157.prevented"], row["severity.severe"], row["fault.ego"]) == ("1", "1", "0")
 
 
+def test_page_and_csv_say_what_drove_the_episodes(spec, finished):
+    only = spec.model_copy(update={"methods": ("sac",), "seeds": (0,)})
+    compared = compare(only, [finished(only.runs()[0], "sspp.p", "p")], "risk-sac evaluate")
+    assert section(table_markdown(compared), "### Episodes driven by: low, search") == [
+        "| method | policy | script | headline: policy | headline: script |",
+        "| --- | ---: | ---: | ---: | ---: |",
+        "| sac | 3 (60 %) | 2 (40 %) | – | – |",
+    ]
+    row, _ = csv.DictReader(io.StringIO(table_csv(compared)))
+    assert (row["episodes_driven_by.policy"], row["episodes_driven_by.model"]) == ("3", "0")
+    older = compare(only, [finished(only.runs()[0], "ff..", ".")], "risk-sac evaluate")
+    assert "### Episodes driven by" not in table_markdown(older)
+
+
 def test_page_json_and_csv_have_the_funnel_of_every_requirement(spec, finished):
     only = spec.model_copy(update={"methods": ("sac",), "seeds": (0,)})
     newer = compare(only, [finished(run, "kvvk", "k") for run in only.runs()], "")

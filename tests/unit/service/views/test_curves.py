@@ -9,7 +9,7 @@ from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec
 from risk_sac.metrics import MetricsAccumulator
-from risk_sac.records import Grade, Outcome, stored, wire
+from risk_sac.records import DrivenBy, Grade, Outcome, stored, wire
 from service.store.stored import PlainEpisode
 from service.views.curves import curves, spread
 from tests.builders import collision, episode_record, judgement, violation
@@ -56,6 +56,19 @@ def test_curves_are_what_the_metrics_of_the_run_were_at_each_point(ledger):
     assert found.distinct[-1] > found.distinct_preventable[-1] > 3
     assert (found.run_id, found.family, found.method, found.seed) == ("low-random-3", "low", "random", 3)
     assert [value for _, value in empty if isinstance(value, list)] == [[]] * 8
+
+
+def test_what_drove_is_counted_up_to_each_point_and_is_unknown_of_older_records(ledger):
+    campaign = ledger.create(SPEC)
+    drove = [DrivenBy.RANDOM, DrivenBy.SCRIPT, DrivenBy.SCRIPT, None, DrivenBy.POLICY, DrivenBy.SCRIPT]
+    records = [episode_record(index, driven_by=each) for index, each in enumerate(drove)]
+    found, empty = curves(campaign, [plain(campaign.runs[0], each) for each in records], 3).runs
+    assert found.episodes == [2, 4, 6]
+    assert found.driven_by == {"policy": [0, 0, 1], "script": [1, 2, 3], "random": [1, 1, 1]}
+    assert empty.driven_by == {}
+    older = plain(campaign.runs[0], episode_record(0))
+    del older.record["driven_by"]
+    assert curves(campaign, [older], 3).runs[0].driven_by == {}
 
 
 def test_mean_cost_is_that_of_the_steps_since_the_point_before(ledger):
