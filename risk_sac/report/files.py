@@ -165,7 +165,7 @@ def table_csv(comparison: Comparison) -> str:
 
 
 def _by_name(cell: Cell) -> dict[str, Any]:
-    """A column for each severity, fault and thing that drove, and for each figure of a reference driver or requirement."""
+    """A column per severity, fault and what drove, and per figure of each reference driver and requirement."""
     columns: dict[str, Any] = {f"severity.{each}": cell.by_severity.get(each, 0) for each in Severity}
     for name in ("episodes_driven_by", "headline_driven_by"):
         columns |= {f"{name}.{each}": getattr(cell, name).get(each, 0) for each in DrivenBy}

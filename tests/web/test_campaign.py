@@ -71,6 +71,58 @@ def test_the_pointer_reads_the_curves_of_the_service(
         expect(shown).to_contain_text("Episode 59")
 
 
+def test_strips_and_cards_say_what_drove_the_episodes(
+    page_at: Callable[..., Page], service: Service, campaign: str, check_axe: Callable[[Page], None]
+) -> None:
+    page = page_at(f"campaigns/{campaign}")
+    strips = page.get_by_role("region", name="Driven by", exact=True)
+    for run in service.get(campaign)["runs"]:
+        drove = run["metrics"]["episodes_driven_by"]
+        assert set(drove) == {"script", "random"}
+        said = f"{drove['script']} episodes driven by a script, {drove['random']} at random"
+        expect(strips.locator(f"[data-run='{run['id']}']").get_by_role("img", name=said)).to_be_visible()
+        expect(card(page, run["id"])).to_contain_text(said)
+    expect(page.get_by_text("Shaded: the warm-up")).to_have_count(0)  # no policy ever drove
+    check_axe(page)
+
+
+def test_episodes_before_the_policys_first_are_shaded(
+    page_at: Callable[..., Page], service: Service, campaign: str
+) -> None:
+    def shade(page: Page) -> str:
+        canvas = plot(page, "Sliding ECR").locator("canvas")
+        canvas.wait_for()
+        return str(
+            canvas.evaluate(
+                "c => [0.3, 0.8].map(x => c.getContext('2d').getImageData(c.width * x, 16, 1, 1).data[3] > 0).join()"
+            )
+        )
+
+    page = page_at(f"campaigns/{campaign}")
+    assert shade(page) == "false,false"
+    found = service.get(campaign, "/curves", points=200)
+    for run in found["runs"]:
+        half = len(run["episodes"]) // 2
+        run["driven_by"] = {"script": [min(n, half) for n in run["episodes"]]}
+        run["driven_by"]["policy"] = [max(0, n - half) for n in run["episodes"]]
+    page = page_at()
+    page.route("**/curves?*", lambda route: route.fulfill(json=found))
+    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}")
+    expect(page.get_by_text("Shaded: the warm-up")).to_be_visible()
+    assert shade(page) == "true,false"
+
+
+def test_older_curves_have_no_strips(page_at: Callable[..., Page], service: Service, campaign: str) -> None:
+    found = service.get(campaign, "/curves", points=200)
+    for run in found["runs"]:
+        run["driven_by"] = {}
+    page = page_at()
+    page.route("**/curves?*", lambda route: route.fulfill(json=found))
+    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}")
+    plot(page, "Sliding ECR").wait_for()
+    expect(page.get_by_role("region", name="Driven by", exact=True)).to_have_count(0)
+
+
 def test_a_drag_zooms_all_curves_and_a_double_click_shows_all_again(
     page_at: Callable[..., Page], campaign: str
 ) -> None:

@@ -12,6 +12,8 @@ export interface Line {
   mark: Mark;
   x: number[];
   y: (number | null)[];
+  /** Episodes before the policy's first, which are shaded. */
+  warmUp: number;
 }
 
 interface Plot {
@@ -34,6 +36,7 @@ interface Pointer {
 const HEIGHT = 210;
 const SHOWN = 7; // values beside the pointer
 const FAR = 0.22;
+const SHADE = 0.16;
 const PAPER = ["--faint", "--grid", "--surface", ...COLOURS] as const;
 
 export function Chart({ title, meaning, lines, written, atLeast, pointed }: Plot) {
@@ -42,12 +45,16 @@ export function Chart({ title, meaning, lines, written, atLeast, pointed }: Plot
   const [pointer, setPointer] = useState<Pointer | null>(null);
   const [zoomed, setZoomed] = useState(false);
   const [over, setOver] = useState(false);
+  const warmUps = useRef<number[]>([]);
+  warmUps.current = lines.map((line) => line.warmUp).filter(Boolean);
   const colours = useColours(PAPER);
   const data = useMemo(() => aligned(lines), [lines]);
   const drawn = lines.map((line) => line.run).join(" ");
 
   useEffect(() => {
-    const made = new uPlot(options(room.current!, lines, colours, atLeast, written, setPointer, setZoomed), data, room.current!);
+    const settings = options(room.current!, lines, colours, atLeast, written, setPointer, setZoomed);
+    settings.hooks!.drawClear = [(drawn) => shade(drawn, warmUps.current, colours["--faint"])];
+    const made = new uPlot(settings, data, room.current!);
     plot.current = made;
     const resized = new ResizeObserver(() => made.setSize({ width: room.current!.clientWidth, height: HEIGHT }));
     resized.observe(room.current!);
@@ -208,6 +215,19 @@ function options(
       ],
     },
   };
+}
+
+/** Ground behind the warm-up of each run; the more runs share it, the darker. */
+function shade(made: uPlot, warmUps: number[], colour: string): void {
+  const { ctx, bbox } = made;
+  ctx.save();
+  ctx.fillStyle = colour;
+  ctx.globalAlpha = SHADE / Math.max(1, warmUps.length);
+  for (const end of warmUps) {
+    const x = Math.min(bbox.left + bbox.width, made.valToPos(end, "x", true));
+    if (x > bbox.left) ctx.fillRect(bbox.left, bbox.top, x - bbox.left, bbox.height);
+  }
+  ctx.restore();
 }
 
 function isZoomed(made: uPlot): boolean {

@@ -4,8 +4,10 @@ import { useMemo, useState } from "preact/hooks";
 import type { Body } from "../../api/types";
 import { Chart, type Line } from "./chart";
 import { trailing, WINDOW, type Curve } from "./curves";
+import { warmUp } from "./driven";
 import { groupName, markOf, runName } from "./look";
 import { Sample } from "./sample";
+import { Strips } from "./strips";
 
 type Spec = Body<"CampaignSpec">;
 
@@ -31,7 +33,7 @@ export function Charts({ spec, curves, hidden, hide }: Panels) {
   const [pointed, setPointed] = useState<string | null>(null);
   const shown = useMemo(() => curves.filter((curve) => !hidden.has(curve.run_id)), [curves, hidden]);
   const lines = (values: (curve: Curve) => (number | null)[]): Line[] =>
-    shown.map((curve) => ({ run: curve.run_id, name: runName(spec, curve), mark: markOf(spec, curve), x: curve.episodes, y: values(curve) }));
+    shown.map((curve) => ({ run: curve.run_id, name: runName(spec, curve), mark: markOf(spec, curve), x: curve.episodes, y: values(curve), warmUp: warmUp(curve) }));
   const rates = useMemo(() => lines((curve) => curve[RATES[rate]![0]]), [shown, rate]);
   const counts = useMemo(() => lines((curve) => curve[COUNTS[found]![0]]), [shown, found]);
   const multipliers = useMemo(() => lines((curve) => curve.dual_variable), [shown]);
@@ -45,7 +47,9 @@ export function Charts({ spec, curves, hidden, hide }: Panels) {
         <Choice label="Rate" names={RATES.map((each) => each[1])} chosen={rate} choose={setRate} />
         <Choice label="Count" names={COUNTS.map((each) => each[1])} chosen={found} choose={setFound} />
       </div>
+      {rates.some((line) => line.warmUp > 0) && <p class="faint small warm-up">Shaded: the warm-up, which is the episodes before the policy's first.</p>}
       <div class="curves">
+        <Strips curves={shown} nameOf={(curve) => runName(spec, curve)} />
         <Chart title={`Sliding ${RATES[rate]![1]}`} meaning={RATES[rate]![2]} lines={rates} written={percent} atLeast={0.1} pointed={pointed} />
         <Chart title={`${COUNTS[found]![1]} failures`} meaning={COUNTS[found]![2]} lines={counts} written={whole} atLeast={4} pointed={pointed} />
         {constrained ? (

@@ -6,17 +6,17 @@ function curve(episodes: number[] = [], mean_cost: number[] = []): Curve {
   return {
     run_id: "low-random-1", family: "low", method: "random", seed: 1, state: "running",
     episodes, mean_cost, window_ecr: known(0.1), window_pcr: known(0), distinct: [...episodes],
-    distinct_preventable: known(0), dual_variable: known(0.2),
+    distinct_preventable: known(0), dual_variable: known(0.2), driven_by: { script: [...episodes] },
   };
 }
 
 function point(episodes: number, mean_cost: number | null = 0): Point {
-  return { episodes, mean_cost, window_ecr: 0.5, window_pcr: 0.25, distinct: episodes, distinct_preventable: 1, dual_variable: 0.3 };
+  return { episodes, mean_cost, window_ecr: 0.5, window_pcr: 0.25, distinct: episodes, distinct_preventable: 1, dual_variable: 0.3, driven_by: "policy" };
 }
 
 function told(index: number, more: object = {}) {
   const episode = {
-    run_id: "low-random-1", phase: "train", index, outcome: "no_failure", collision: null, mean_cost: 0.5, steps: 80, dual_variable: 0.4,
+    run_id: "low-random-1", phase: "train", index, outcome: "no_failure", collision: null, mean_cost: 0.5, steps: 80, dual_variable: 0.4, driven_by: "policy",
     funnel: { contacts: 9, valid: 8, distinct: 7, preventable: 6 }, ...more,
   };
   return { id: `${index}`, event: "episode", data: JSON.stringify(episode) };
@@ -60,6 +60,7 @@ describe("a growing curve", () => {
     expect(grown.episodes).toEqual([1, 2, 3]);
     expect(grown.mean_cost).toEqual([0, 1, 0.5]);
     expect(grown.window_ecr).toEqual([0.1, 0.1, 0.5]);
+    expect(grown.driven_by).toEqual({ script: [1, 2, 2], policy: [0, 0, 1] });
   });
 
   test("moves its newest point along while the search is long, with the mean cost of all since the one before", () => {
@@ -90,6 +91,7 @@ describe("a growing curve", () => {
       expect(halved.episodes).toEqual(length === 4 ? [2, 4] : [1, 3, 5]);
       expect(halved.mean_cost).toEqual(length === 4 ? [0.5, 2.5] : [0, 1.5, 3.5]);
       expect(halved.distinct).toEqual(halved.episodes);
+      expect(halved.driven_by).toEqual({ script: halved.episodes });
     }
   });
 });
@@ -104,7 +106,7 @@ test("events go on where the snapshot ends; those before it fill the window alon
   const live = new LiveCurves([curve([1, 2], [0, 0])]);
   const failed = { outcome: "failure", collision: { verdicts: {}, judgement: { grade: "preventable" } } };
   live.apply([told(0), told(1, failed), told(2), { id: "s", event: "state", data: "{}" }, told(3, { phase: "evaluate" })]);
-  expect(live.runs[0]).toMatchObject({ episodes: [1, 2, 3], distinct: [1, 2, 7], dual_variable: [0.2, 0.2, 0.4], mean_cost: [0, 0, 0.5] });
+  expect(live.runs[0]).toMatchObject({ episodes: [1, 2, 3], distinct: [1, 2, 7], dual_variable: [0.2, 0.2, 0.4], mean_cost: [0, 0, 0.5], driven_by: { policy: [0, 0, 1] } });
   expect(live.runs[0]!.window_ecr[2]).toBeCloseTo(1 / 3);
   expect(live.runs[0]!.window_pcr[2]).toBeCloseTo(1 / 3);
 });

@@ -3,6 +3,8 @@
 import type { Body } from "../../api/types";
 import type { ServerEvent } from "../../api/events";
 import { isValid } from "../../ui/violations";
+import type { DrivenBy } from "../../ui/driven";
+import { drive, drivenAt, type Driven } from "./driven";
 
 export const WINDOW = 100; // episodes of a sliding rate, as in the API
 export const POINTS = 200; // of a curve, about
@@ -16,13 +18,14 @@ export interface Point {
   distinct_preventable: number | null;
   dual_variable: number | null;
   mean_cost: number | null;
+  driven_by: DrivenBy | null;
 }
 
-type Column = Exclude<keyof Point, "episodes">;
+type Column = Exclude<keyof Point, "episodes" | "driven_by">;
 type Run = Pick<Body<"RunCurves">, "run_id" | "family" | "method" | "seed" | "state">;
 
 /** A run's curve as the API gives it, or longer by what its events said. */
-export type Curve = Run & { episodes: number[] } & Record<Column, (number | null)[]>;
+export type Curve = Run & { episodes: number[]; driven_by: Driven } & Record<Column, (number | null)[]>;
 
 const KEPT: Column[] = ["window_ecr", "window_pcr", "distinct", "distinct_preventable", "dual_variable"];
 
@@ -59,6 +62,7 @@ export function extend(curve: Curve, point: Point): void {
   curve.mean_cost[at] = room ? joined(curve.mean_cost[end]!, newest - before, point.mean_cost, point.episodes - newest) : point.mean_cost;
   curve.episodes[at] = point.episodes;
   for (const name of KEPT) curve[name][at] = point[name];
+  drive(curve.driven_by, at, point.driven_by);
   if (curve.episodes.length > 2 * POINTS) halve(curve);
 }
 
@@ -72,6 +76,7 @@ export function halve(curve: Curve): void {
   });
   for (const name of KEPT) curve[name] = kept.map((at) => curve[name][at]!);
   curve.mean_cost = costs;
+  curve.driven_by = drivenAt(curve.driven_by, kept);
   curve.episodes = kept.map((at) => episodes[at]!);
 }
 
@@ -133,6 +138,7 @@ export class LiveCurves {
       distinct: episode.funnel?.distinct ?? null,
       distinct_preventable: episode.funnel?.preventable ?? null,
       dual_variable: episode.dual_variable,
+      driven_by: episode.driven_by,
       mean_cost: episode.steps ? episode.mean_cost : null,
     });
   }

@@ -164,6 +164,6 @@ function searches(run: Body<"Run">): run is Search {
 
 /** The curve of a run without an episode. */
 function begun({ id, family, method, seed, state }: Search): Curve {
-  const columns = { episodes: [], window_ecr: [], window_pcr: [], distinct: [], distinct_preventable: [], dual_variable: [], mean_cost: [] };
+  const columns = { episodes: [], window_ecr: [], window_pcr: [], distinct: [], distinct_preventable: [], dual_variable: [], mean_cost: [], driven_by: {} };
   return { run_id: id, family, method, seed, state, ...columns };
 }

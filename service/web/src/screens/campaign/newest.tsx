@@ -1,6 +1,7 @@
 /** Failures as they are found. */
 
 import { address } from "../../router";
+import { drivenWords } from "../../ui/driven";
 import { words } from "../../ui/text";
 import { isContact, signatureOf, gradeOf, worstOf } from "../../ui/violations";
 import type { Found } from "./live";
@@ -16,6 +17,7 @@ export function Newest({ campaign, found }: { campaign: string; found: Found[] }
             <a href={address(["campaigns", campaign, "failures", failure.id])}>{described(failure)}</a>
             <span class="faint small">
               {failure.run_id}, episode {failure.index + 1}
+              {failure.driven_by && `, driven ${drivenWords(failure.driven_by)}`}
             </span>
           </li>
         ))}

@@ -4,6 +4,7 @@ import { useEffect, useRef, useState } from "preact/hooks";
 import { call } from "../../api/client";
 import { usePolled } from "../../api/polled";
 import type { Body } from "../../api/types";
+import { drivenSummary } from "../../ui/driven";
 import { count, number, seconds } from "../../ui/text";
 import { markOf, runName } from "./look";
 import { Sample } from "./sample";
@@ -64,6 +65,7 @@ function Card({ run, campaign, away, hide }: { run: Run; campaign: Body<"Campaig
         {count(run.raw_collisions)} contact{run.raw_collisions === 1 ? "" : "s"}, {count(run.rejected)} refused scene{run.rejected === 1 ? "" : "s"}
         {run.attempts > 1 && <span class="warn"> · attempt {run.attempts}</span>}
       </p>
+      {run.metrics && Object.keys(run.metrics.episodes_driven_by).length > 0 && <p class="small faint">{drivenSummary(run.metrics.episodes_driven_by)}</p>}
       {run.reason && <p class="small bad breaking">{run.reason}</p>}
       <Log campaign={campaign.id} run={run} name={name} />
     </article>

@@ -30,6 +30,9 @@ export interface Row {
   pcr_by_driver: Record<string, Body<"DriverPcr">>;
   by_severity: Record<string, number>;
   by_fault: Record<string, number>;
+  /** What drove -> episodes, and headline failures; empty in what was stored before that was recorded. */
+  episodes_driven_by: Record<string, number>;
+  headline_driven_by: Record<string, number>;
   ecr: Estimate;
   pcr: Estimate;
   more: More;
@@ -48,7 +51,7 @@ export interface More {
   environment_steps: number;
 }
 
-const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "headline_candidates", "headline", "requirements", "pcr_by_driver", "by_severity", "by_fault"] as const;
+const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "headline_candidates", "headline", "requirements", "pcr_by_driver", "by_severity", "by_fault", "episodes_driven_by", "headline_driven_by"] as const;
 const FURTHER = ["artefacts", "unresponsive_share", "preventable", "environment_steps", "steps_per_distinct_failure"] as const;
 const NOTHING: Estimate = { mean: null, low: null, high: null };
 

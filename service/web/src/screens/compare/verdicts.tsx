@@ -1,5 +1,6 @@
 /** What each reference driver would have prevented, how bad the contacts are, and which party caused the failures. */
 
+import { DRIVEN_BY } from "../../ui/driven";
 import { capital, count } from "../../ui/text";
 import { driverWords } from "../../ui/verdicts";
 import { bracket, percent, type Row } from "./rows";
@@ -16,6 +17,7 @@ interface Props {
 export function Verdicts({ what, family, rows }: Props) {
   const drivers = [...new Set(rows.flatMap((row) => Object.keys(row.pcr_by_driver)))];
   const judged = rows.some((row) => sum(row.by_severity) + sum(row.by_fault) > 0);
+  const drove = DRIVEN_BY.filter((by) => rows.some((row) => row.episodes_driven_by[by]));
   return (
     <>
       {drivers.length > 0 && (
@@ -39,8 +41,21 @@ export function Verdicts({ what, family, rows }: Props) {
           </Grid>
         </section>
       )}
+      {drove.length > 0 && (
+        <section class="block">
+          <h3>Driven by</h3>
+          <p class="faint small">Episodes by what drove the adversaries, with their shares; headline failures by what drove the first of their kind.</p>
+          <Grid {...{ what, rows }} label={`Driven by: ${family}`} columns={[...drove.map(capital), ...drove.map((by) => `Headline: ${by}`)]}>
+            {(row) => [...drove.map((by) => <Share key={by} of={row.episodes_driven_by} name={by} />), ...drove.map((by) => <Headline key={`headline ${by}`} row={row} by={by} />)]}
+          </Grid>
+        </section>
+      )}
     </>
   );
+}
+
+function Headline({ row, by }: { row: Row; by: string }) {
+  return <td class="number">{row.headline === null ? "–" : count(row.headline_driven_by[by] ?? 0)}</td>;
 }
 
 interface GridProps {

@@ -16,6 +16,7 @@ import { roadPaths } from "../../stage/roads";
 import { askedTime, conflictBounds, marksOf, opening, useLayers, useStopped, useTimeInAddress } from "../../stage/room";
 import { Stage } from "../../stage/stage";
 import { KeyList, Transport } from "../../stage/transport";
+import { DrivenTag } from "../../ui/driven";
 import { Empty, Shown } from "../../ui/states";
 import { capital, words } from "../../ui/text";
 import { useTitle } from "../../ui/title";
@@ -152,6 +153,7 @@ function Tags({ failure }: { failure: Body<"Failure"> }) {
       <span class={`tag ${grade ?? ""}`}>{grade ? GRADE_WORDS[grade].short : words(failure.outcome)}</span>
       {severity && <span class="tag">{severity}</span>}
       {fault && <span class="tag">fault: {fault}</span>}
+      <DrivenTag by={failure.driven_by} />
     </>
   );
 }
