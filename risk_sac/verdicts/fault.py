@@ -1,4 +1,4 @@
-"""Decides which party caused a contact or a violation; README.md has the rule."""
+"""Decides which party caused a contact or a violation; rules.md has the rule."""
 
 import math
 from collections.abc import Collection, Mapping
