@@ -1,4 +1,4 @@
-"""The story that the README of the egos tells: its commands, as they stand there, against the real service."""
+"""The commands of the egos' walkthrough, as they stand there, against the real service."""
 
 import os
 import re
@@ -21,8 +21,8 @@ from risk_sac.scenario.library import VARIABLE
 from tests.maps import osm_town
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "risk_sac" / "egos" / "README.md").read_text(encoding="utf-8")
-STORY = README.partition("## The whole way")[2].partition("\n## ")[0]
+EGOS = ROOT / "risk_sac" / "egos"
+README, STORY = ((EGOS / name).read_text(encoding="utf-8") for name in ("README.md", "walkthrough.md"))
 EPISODES = 40
 
 PATIENCE_S = 900.0  # with a machine that is busy
