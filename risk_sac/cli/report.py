@@ -30,6 +30,7 @@ def add(commands: Commands) -> None:
 
 def _report(options: argparse.Namespace) -> int:
     # Here, because loading numpy takes a while.
+    from risk_sac.benchmark.power import played_by, power_of
     from risk_sac.report.evidence import Origin, gathered, html, markdown, report, show_command
     from risk_sac.report.evidence.folders import read_folders
 
@@ -48,7 +49,8 @@ def _report(options: argparse.Namespace) -> int:
     if format_ == "json":
         content = evidence.model_dump_json(indent=2) + "\n"
     else:
-        document = report(found.comparison, evidence, origin)
+        power = power_of(found.comparison.spec, played_by(found.comparison.runs))
+        document = report(found.comparison, evidence, origin, power)
         content = html(document) if format_ == "html" else markdown(document)
     write_out(options.out, content.encode(), "Report")
     return OK

@@ -1,7 +1,7 @@
 """Evidence with its limits: how often an ego fails where nobody searched, where nobody looked, and a report of it.
 
 evidence = gathered(comparison)                      # bounds and coverage, as data
-document = report(comparison, evidence, origin)
+document = report(comparison, evidence, origin, power)
 html(document); markdown(document)
 """
 

@@ -4,12 +4,13 @@ from collections.abc import Iterator
 
 import yaml
 
+from risk_sac.records import Power
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.document import Block, Commands, Document, Items, Section, Table
 from risk_sac.report.evidence.gathered import Evidence
 from risk_sac.report.evidence.looked import bounds, coverage, odd
 from risk_sac.report.evidence.origin import Origin, again
-from risk_sac.report.evidence.searched import budget, clusters, funnel, regression
+from risk_sac.report.evidence.searched import budget, clusters, funnel, regression, worth
 from risk_sac.report.evidence.words import ego_in_words
 from risk_sac.report.page import DASH, number, platform_in_words, versions_in_words
 
@@ -18,7 +19,7 @@ BANNER = (
     "happen, never how often. Only the section on scenes that nobody searched says how often, and only for such scenes."
 )
 LIMITS = (
-    "A search that finds nothing has shown nothing: another seed, method or budget may find it.",
+    "A search that finds nothing has not shown that there is nothing: another seed, method or budget may find it.",
     "The bounds hold for scenes drawn uniformly over the ODD in this simulator, with the two kinds of traffic that are "
     "named. Roads have other shares. Scenes that were refused as infeasible are in no bound.",
     "Each bound holds by itself with 95 % confidence, not all of them together.",
@@ -31,14 +32,15 @@ LIMITS = (
 )
 
 
-def report(comparison: Comparison, evidence: Evidence, origin: Origin) -> Document:
-    """The whole report of the runs that have finished."""
+def report(comparison: Comparison, evidence: Evidence, origin: Origin, power: Power) -> Document:
+    """The whole report of the runs that have finished; `power`: of their budget."""
     sections = [
         odd(comparison),
         budget(comparison),
         funnel(comparison),
         clusters(comparison, origin),
         regression(origin),
+        worth(power),
         bounds(comparison, evidence),
         coverage(evidence),
         _limits(comparison),

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 from risk_sac.config import FamilyName
 from risk_sac.failures.clusters import Cluster
 from risk_sac.metrics import COLUMNS, requirement_cells
-from risk_sac.records import Collision, EpisodeRecord, Violation
+from risk_sac.records import Collision, EpisodeRecord, Power, Violation
 from risk_sac.report.cells import Cell
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.evidence.document import Block, Card, Cards, Commands, Section, Table
+from risk_sac.report.evidence.document import Block, Card, Cards, Commands, Items, Section, Table
 from risk_sac.report.evidence.origin import Origin, draw
 from risk_sac.report.evidence.words import ego_in_words
 from risk_sac.report.markdown import verified
@@ -231,6 +231,12 @@ def regression(origin: Origin) -> Section:
     rows = [[case.id, case.name, case.grade or DASH, case.verdict_in_words, case.reason] for case in found.cases]
     table = Table("regression", columns, rows, left=5)
     return Section("regression", "Regression", [text, table, Commands([origin.regress])])
+
+
+def worth(power: Power) -> Section:
+    """How many known defects the budget detects."""
+    text = "Had the ego a fault that we know, would this budget have found it? Nothing was run for the answer. "
+    return Section("worth", "What finding nothing is worth", [text + power.note, Items(power.lines)])
 
 
 def _counted(count: int, noun: str) -> str:

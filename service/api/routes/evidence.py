@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
+from risk_sac.benchmark.power import played_by, power_of
 from risk_sac.failures.cases import Regression
 from risk_sac.records import State
 from risk_sac.report import FinishedRun
@@ -87,5 +88,6 @@ def _content(
         folders=made.folders,
         regression=Regression(ego=played.ego, cases=played.cases) if played else None,
     )
-    document = report(comparison, evidence, origin)
+    power = power_of(comparison.spec, played_by(comparison.runs))
+    document = report(comparison, evidence, origin, power)
     return html(document) if name == "html" else markdown(document)

@@ -5,6 +5,7 @@ from html.parser import HTMLParser
 import pytest
 
 from risk_sac import cli
+from risk_sac.benchmark.power import played_by, power_of
 from risk_sac.config import CampaignSpec, EgoConfig, Iid, RunSpec
 from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.errors import ConfigError
@@ -32,8 +33,12 @@ def origin(**more):
     )
 
 
+def power(comparison):
+    return power_of(comparison.spec, played_by(comparison.runs))
+
+
 def both(comparison, **more):
-    document = report(comparison, gathered(comparison), origin(**more))
+    document = report(comparison, gathered(comparison), origin(**more), power(comparison))
     return html(document), markdown(document)
 
 
@@ -85,12 +90,23 @@ def test_it_tells_of_each_requirement_what_was_found_and_how_often(spec, finishe
     some = spec.model_copy(update={"methods": ("sac",), "seeds": (0,), "iid": Iid(episodes=8)})
     fresh = [drawn(finished, run, letters) for run, letters in zip(some.drawn(), ("kkkkkkkk", "kkvkkkkk"), strict=True)]
     told = compare(some, [*(finished(run, "kvvk", "k") for run in some.searches()), *fresh], "")
-    document = report(told, gathered(told), origin())
+    document = report(told, gathered(told), origin(), power(told))
     text = markdown(document)
     assert "| low | sac | never_fast | failure | 2 | 2 | 1 | 1 | 0.500 \\[0.150, 0.850\\] |" in text
     assert "| low | sac | safe_ttc | report | 2 | – | – | – | 0.500 \\[0.150, 0.850\\] |" in text
     assert "| low | random adversaries | never_fast | failure | 1 of 8 | 1 of 8 | 47.07 % | 0.64 % |" in text
     assert "| low | undisturbed | never_fast | failure | 0 of 8 | 0 of 8 | 31.23 % | 0.00 % |" in text
+
+
+def test_it_tells_how_many_known_defects_the_budget_detects(spec):
+    told = compare(spec.model_copy(update={"methods": ("archive", "ddpg-lag")}), [], "")
+    archive, ddpg = power(told).lines
+    assert archive.startswith("archive: Of ")
+    page, text = both(told)
+    for each in (Tags(page).text, text):
+        assert "What finding nothing is worth" in each
+        assert archive in each
+        assert ddpg in each
 
 
 def test_an_i_i_d_phase_is_in_no_other_number(told, spec, runs):
