@@ -15,6 +15,9 @@ RiskSacError
 └── NotFinite              a number at a boundary is NaN or infinite
 """
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+
 
 class RiskSacError(Exception):
     """Root of the tree; catch this to catch everything this project raises on purpose."""
@@ -114,3 +117,9 @@ class DamagedError(RiskSacError):
 
 class NotFinite(RiskSacError):
     """A value that must be finite is not; the message names it."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Returns a question that names the closest known name; empty where none is close."""
+    close = get_close_matches(name, list(known), n=1)
+    return f"did you mean {close[0]}?" if close else ""

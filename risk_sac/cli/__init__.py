@@ -1,4 +1,4 @@
-"""`risk-sac`: one run or a comparison of methods without a server, pictures of failures, the server, its campaigns."""
+"""Entry point `risk-sac` and its commands."""
 
 import argparse
 import os
@@ -23,13 +23,18 @@ from risk_sac.cli import (
     understand,
 )
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
+from risk_sac.cli.parser import Parser, as_typed, example_text
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.scenario import library
 from risk_sac.terminal import complain, run_command
 
-EPILOG = """exit status, but of `campaigns`, which says its own: 0 done; 1 failed; 2 a wrong setting or argument;
-130 interrupted, and the same command goes on."""
+EPILOG = """exit status:
+  0    done
+  1    failed
+  2    a setting or an argument is wrong
+  130  interrupted; the same command continues
+`risk-sac campaigns --help` has the exit status of its commands."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,13 +43,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    options = _parser().parse_args(arguments)
+    options, unknown = _parser().parse_known_args(arguments)
+    if unknown:
+        options.parser.refuse(unknown)
     options.typed = shlex.join(["risk-sac", *(sys.argv[1:] if arguments is None else arguments)])
     try:
         _make_absolute(options)
         status: int = options.command(options)
     except ConfigError as error:
-        complain(str(error))
+        complain(as_typed(error, options))
         return MISUSED
     except KeyboardInterrupt:
         complain("interrupted")
@@ -75,8 +82,10 @@ def _make_absolute(options: argparse.Namespace) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="risk-sac", description="Finds scenes and adversaries that make an ego crash.", epilog=EPILOG
+    parser = Parser(
+        prog="risk-sac",
+        description="Finds scenes and adversaries that make an automated vehicle, the ego, fail.",
+        epilog=example_text("run --family low --method archive --episodes 100 --out runs/low", EPILOG),
     )
     parser.add_argument("--version", action="version", version=f"risk-sac {__version__}")
     parser.set_defaults(on_error=FAILED)

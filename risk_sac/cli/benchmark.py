@@ -1,4 +1,4 @@
-"""`risk-sac benchmark` and `power`: how soon methods detect egos with known faults, and what a budget is worth."""
+"""`risk-sac benchmark` and `power`: measures how soon methods detect egos with known faults."""
 
 import argparse
 import math
@@ -12,7 +12,8 @@ from rich.progress import Progress
 from rich.table import Table
 
 from risk_sac.benchmark.power import Played, Run, measured, method_power, power_of, runs_of
-from risk_sac.cli.console import OK, Commands, add_command, number
+from risk_sac.cli.console import OK, number
+from risk_sac.cli.parser import Commands, add_command
 from risk_sac.config import SHIPPED, MethodName
 from risk_sac.config.text import read_text
 from risk_sac.egos.defects.catalogue import DEFECTS
@@ -27,32 +28,49 @@ WRITTEN_EVERY_S = 60.0
 
 
 def add(commands: Commands) -> None:
-    """Add the commands."""
-    summary = "how soon methods detect egos with known faults; the same command again goes on with it"
-    parser = add_command(commands, "benchmark", _benchmark, summary)
-    known = get_args(MethodName)
+    """Adds the commands."""
+    parser = add_command(
+        commands,
+        "benchmark",
+        _benchmark,
+        "measure how soon methods detect egos with known faults",
+        more="The same command again continues an interrupted benchmark.",
+        example="benchmark --methods archive --defects blind-right --seeds 2 --out runs/benchmark",
+    )
+    search, known = parser.group("search"), get_args(MethodName)
     names = f"of {', '.join(known)} (default: {' '.join(METHODS)})"
-    parser.add_argument("--methods", nargs="+", choices=known, default=METHODS, metavar="NAME", help=names)
-    which = parser.add_mutually_exclusive_group()
+    search.add_argument("--methods", nargs="+", choices=known, default=METHODS, metavar="NAME", help=names)
+    which = search.add_mutually_exclusive_group()
     which.add_argument("--defects", nargs="+", metavar="NAME", help="(default: the whole catalogue)")
     which.add_argument("--test-set", action="store_true", help="the defects that nothing was tuned on")
-    parser.add_argument("--seeds", type=number(int, 1, 1000), default=SEEDS, metavar="N", help="(default: %(default)s)")
-    parser.add_argument("--first-seed", type=number(int, 0), default=0, metavar="S", help="(default: %(default)s)")
+    search.add_argument("--seeds", type=number(int, 1, 1000), default=SEEDS, metavar="N", help="(default: %(default)s)")
+    search.add_argument("--first-seed", type=number(int, 0), default=0, metavar="S", help="(default: %(default)s)")
     steps = "environment steps of a run without a detection (default: %(default)s)"
-    parser.add_argument("--steps", type=number(int, 1, 10_000_000), default=STEPS, metavar="N", help=steps)
-    parser.add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help="runs at a time (default: one per core)")
+    parser.group("budget").add_argument(
+        "--steps", type=number(int, 1, 10_000_000), default=STEPS, metavar="N", help=steps
+    )
+    jobs = "runs at a time (default: one per core)"
+    parser.group("execution").add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help=jobs)
     shown = "write the tables of the runs that have ended so far; play nothing"
-    parser.add_argument("--tables-only", action="store_true", help=shown)
+    parser.group("execution").add_argument("--tables-only", action="store_true", help=shown)
     out = "a folder for each run, and detections.csv, benchmark.md and curves.svg of those that have ended"
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help=out)
-    worth = add_command(commands, "power", _power, "how many known faults a method finds with a budget, as measured")
+    parser.group("output").add_argument("--out", type=Path, required=True, metavar="DIR", help=out)
+    worth = add_command(
+        commands,
+        "power",
+        _power,
+        "estimate how many known faults a method finds with a budget",
+        more="The estimate comes from a benchmark that was measured.",
+        example="power --families low --method archive --steps 20000",
+    )
+    budget = worth.group("budget")
     folders = "folder of `risk-sac evaluate`, or folders of runs, whose budget it is; instead of the flags"
     worth.add_argument("runs", type=Path, nargs="*", metavar="RUNS", help=folders)
-    worth.add_argument("--families", nargs="+", choices=SHIPPED, metavar="low|mixed|dense", help="(default: all)")
-    worth.add_argument("--method", choices=known, metavar="NAME", help="(default: archive)")
-    worth.add_argument("--steps", type=number(int, 1), metavar="N", help=f"(default: {STEPS})")
+    budget.add_argument("--families", nargs="+", choices=SHIPPED, metavar="FAMILY", help="(default: all)")
+    budget.add_argument("--method", choices=known, metavar="NAME", help="(default: archive)")
+    budget.add_argument("--steps", type=number(int, 1), metavar="N", help=f"(default: {STEPS})")
     measured = "detections.csv of a benchmark (default: the one that is shipped)"
-    worth.add_argument("--measured", type=Path, metavar="FILE", help=measured)
+    budget.add_argument("--measured", type=Path, metavar="FILE", help=measured)
 
 
 def _benchmark(options: argparse.Namespace) -> int:

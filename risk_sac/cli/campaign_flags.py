@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from risk_sac.cli.console import EGO
+from risk_sac.cli.parser import Parser
 from risk_sac.config import METHODS
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
@@ -22,23 +23,25 @@ BUDGET: Mapping[str, tuple[type, str, str]] = {
 }
 
 
-def add_campaign_flags(parser: argparse.ArgumentParser, *, families: str, methods: str, seeds: int) -> None:
-    """Add the flags of a campaign; the help names the defaults that are given here."""
-    parser.add_argument("--families", nargs="+", metavar="low|mixed|dense", help=f"(default: {families})")
-    parser.add_argument("--methods", nargs="+", metavar="NAME", help=f"of {', '.join(METHODS)} (default: {methods})")
-    parser.add_argument("--seeds", type=int, metavar="N", help=f"how many (default: {seeds})")
-    parser.add_argument("--first-seed", type=int, metavar="S", help="the N seeds begin here (default: 0)")
+def add_campaign_flags(parser: Parser, *, families: str, methods: str, seeds: int) -> None:
+    """Adds the flags of a campaign; the help names the defaults that are given here."""
+    scene, search = parser.group("scene"), parser.group("search")
+    scene.add_argument("--families", nargs="+", metavar="FAMILY", help=f"of low, mixed, dense (default: {families})")
+    search.add_argument("--methods", nargs="+", metavar="NAME", help=f"of {', '.join(METHODS)} (default: {methods})")
+    search.add_argument("--seeds", type=int, metavar="N", help=f"number of seeds (default: {seeds})")
+    search.add_argument("--first-seed", type=int, metavar="S", help="first of the N seeds (default: 0)")
     add_budget_flags(parser)
-    iid = "end with N scenes that no search has chosen, for bounds (default: none)"
-    parser.add_argument("--iid", type=int, metavar="N", help=iid)
-    parser.add_argument("--iid-seed", type=int, metavar="S", help="of those scenes (default: 0)")
-    parser.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a campaign; flags go first")
+    iid = "then play N scenes drawn at random, for bounds (default: none)"
+    parser.group("budget").add_argument("--iid", type=int, metavar="N", help=iid)
+    parser.group("budget").add_argument("--iid-seed", type=int, metavar="S", help="seed of those scenes (default: 0)")
+    search.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a campaign; flags override them")
 
 
-def add_budget_flags(parser: argparse.ArgumentParser) -> None:
+def add_budget_flags(parser: Parser) -> None:
     """Adds the flags of a run's budget, which a campaign gives to each of its runs."""
     for name, (type_, metavar, what) in BUDGET.items():
-        parser.add_argument(f"--{name.replace('_', '-')}", type=type_, metavar=metavar, help=what)
+        flag = f"--{name.replace('_', '-')}"
+        parser.group("budget").add_argument(flag, type=type_, metavar=metavar, help=what)
 
 
 def budget_flags(options: argparse.Namespace) -> dict[str, Any]:
@@ -46,9 +49,9 @@ def budget_flags(options: argparse.Namespace) -> dict[str, Any]:
     return {name: getattr(options, name) for name in BUDGET}
 
 
-def add_ego_flag(parser: argparse.ArgumentParser) -> None:
-    """Adds the flag that says who drives; a ladder has egos of its own."""
-    parser.add_argument("--ego", metavar="EGO", help=f"who drives: {EGO} (default: default)")
+def add_ego_flag(parser: Parser) -> None:
+    """Adds the flag that names the ego."""
+    parser.group("scene").add_argument("--ego", metavar="EGO", help=f"vehicle under test: {EGO} (default: default)")
 
 
 def ego_flag(options: argparse.Namespace) -> dict[str, Any]:
@@ -83,22 +86,23 @@ def _seeds(options: argparse.Namespace, default: int) -> list[int] | None:
 MAP_HELP = "a SUMO net, an OSM extract or OpenDRIVE, also packed"
 
 
-def add_map_flags(parser: argparse.ArgumentParser, *, several: bool) -> None:
-    """Add the flags of a place; `several`: all places of a pattern can be asked for."""
+def add_map_flags(parser: Parser, *, several: bool) -> None:
+    """Adds the flags of a place; `several`: all places of a pattern can be asked for."""
     add_place_flags(parser, f"in place of a family: {MAP_HELP}", several=several)
 
 
-def add_place_flags(parser: argparse.ArgumentParser, what: str, *, several: bool = True) -> None:
-    """Add the flags of a place on the map that `what` describes."""
-    parser.add_argument("--network", metavar="MAP", help=what)
-    parser.add_argument("--pattern", choices=list(FINDERS), help="what is played on the map")
-    parser.add_argument("--place", metavar="ID", help="where; `risk-sac places MAP` lists them")
+def add_place_flags(parser: Parser, what: str, *, several: bool = True) -> None:
+    """Adds the flags of a place on the map that `what` describes."""
+    group = parser.group("map")
+    group.add_argument("--network", metavar="MAP", help=what)
+    group.add_argument("--pattern", choices=list(FINDERS), help="pattern that is played on the map")
+    group.add_argument("--place", metavar="ID", help="one place; `risk-sac places MAP` lists them")
     if several:
-        parser.add_argument("--places", choices=["all"], help="wherever the pattern fits")
+        group.add_argument("--places", choices=["all"], help="every place where the pattern fits")
 
 
 def families_on_map(options: argparse.Namespace) -> list[str] | None:
-    """The names of the places' families, which are in the library from now on; None: no map was named.
+    """Adds the places' families to the library; returns their names, or None if no map was named.
 
     Raises:
       ConfigError: the flags do not go together, or the pattern does not fit there.

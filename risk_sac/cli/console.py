@@ -1,12 +1,15 @@
-"""What the commands share: consoles, exit statuses, and text made safe for a terminal or an XML file."""
+"""Exit statuses, tables, bars and JSON that the commands share."""
 
 import argparse
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from pydantic import BaseModel, TypeAdapter
+from pydantic_core import to_json
 from rich.box import SIMPLE_HEAD
+from rich.console import RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -25,17 +28,18 @@ from risk_sac.terminal import Output, console, notes, printable
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 ABOVE, COULD_NOT_RUN = 1, 2  # of `risk-sac campaigns`, which gates CI jobs
-Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
-"""Where a group of commands adds its parsers."""
+Answer: TypeAlias = BaseModel | Sequence[BaseModel | Mapping[str, Any]] | Mapping[str, Any]
+"""What a command prints with `--json`."""
 
 
-def add_command(
-    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str
-) -> argparse.ArgumentParser:
-    """Add a command that `run` executes; returns its parser."""
-    parser = commands.add_parser(name, help=summary)
-    parser.set_defaults(command=run)
-    return parser
+def print_answer(options: argparse.Namespace, answer: Answer, *texts: RenderableType) -> None:
+    """Prints the answer as one JSON document with `--json`, and the texts otherwise."""
+    if options.json:
+        plain = TypeAdapter(Any).dump_python(answer)  # else models keep their own way to write NaN
+        console.out(to_json(plain, inf_nan_mode="null").decode(), highlight=False)
+        return
+    for text in texts:
+        console.print(text, markup=False, soft_wrap=isinstance(text, str))
 
 
 def number(type_: type[int] | type[float], least: float, most: float = math.inf) -> Callable[[str], float]:
@@ -67,8 +71,8 @@ def columns(bar: BarColumn) -> tuple[ProgressColumn, ...]:
 
 
 def progress_bar() -> Progress:
-    """Bars with the time that remains."""
-    return Progress(*columns(BarColumn()), TimeRemainingColumn(), console=console)
+    """Returns bars with the time that remains; nothing is drawn where standard error is no terminal."""
+    return Progress(*columns(BarColumn()), TimeRemainingColumn(), console=notes, disable=not notes.is_terminal)
 
 
 class Board:
@@ -162,7 +166,7 @@ def driven_by_in_words(counts: Mapping[str, int]) -> str:
 
 
 def offences(violation: Collision | Violation) -> Iterator[str]:
-    """What the ego and the other broke, on a line each."""
+    """Yields a line of what the ego broke, and one of what the other broke."""
     if isinstance(violation, Violation):
         broken = {"ego": violation.broke}
     else:

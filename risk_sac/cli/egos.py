@@ -1,4 +1,4 @@
-"""`risk-sac egos`: which there are, and how they compare under the same search."""
+"""`risk-sac egos`: lists egos and defects, and compares egos under the same search."""
 
 import argparse
 import os
@@ -11,7 +11,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
-from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, Commands, add_command, progress_bar
+from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, progress_bar
+from risk_sac.cli.parser import Commands, add_command, add_group
 from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_campaign, read_ego
@@ -34,18 +35,42 @@ COLUMNS = (
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
-    group = commands.add_parser("egos", help="who can drive, and how they compare")
-    egos = group.add_subparsers(required=True, metavar="COMMAND")
-    add_command(egos, "list", _list, "SUMO's models, the shipped egos, and those the operator has registered")
-    add_command(egos, "defects", _defects, "known faults that can be planted into an ego, such as idm-aeb+blind-right")
-    summary = "the same search on equal budgets against each ego; the same command again goes on with it"
-    ladder = add_command(egos, "ladder", _ladder, summary)
+    """Adds the commands."""
+    egos = add_group(
+        commands, "egos", "list and compare egos, the vehicles under test", example="egos list"
+    ).add_subparsers(required=True, metavar="COMMAND")
+    add_command(
+        egos,
+        "list",
+        _list,
+        "list SUMO's driver models, the shipped egos and the registered ones",
+        example="egos list",
+    )
+    add_command(
+        egos,
+        "defects",
+        _defects,
+        "list known faults that can be planted into an ego",
+        more="A defect follows the name of an ego, such as idm-aeb+blind-right.",
+        example="egos defects",
+    )
+    ladder = add_command(
+        egos,
+        "ladder",
+        _ladder,
+        "run the same search on equal budgets against each ego",
+        more="The same command again continues an interrupted comparison.",
+        example="egos ladder --egos default careful --episodes 50 --out runs/ladder",
+    )
     names = ["default", *SHIPPED]
-    ladder.add_argument("--egos", nargs="+", default=names, metavar="EGO", help=f"(default: {' '.join(names)})")
+    ladder.group("scene").add_argument(
+        "--egos", nargs="+", default=names, metavar="EGO", help=f"(default: {' '.join(names)})"
+    )
     add_campaign_flags(ladder, families="low", methods="archive", seeds=SEEDS)
-    ladder.add_argument("--jobs", type=int, metavar="N", help="runs at a time (default: one per core)")
-    ladder.add_argument("--out", type=Path, required=True, metavar="DIR", help="a folder for each ego, and ladder.md")
+    jobs = "runs at a time (default: one per core)"
+    ladder.group("execution").add_argument("--jobs", type=int, metavar="N", help=jobs)
+    out = "a folder for each ego, and ladder.md"
+    ladder.group("output").add_argument("--out", type=Path, required=True, metavar="DIR", help=out)
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -96,7 +121,7 @@ def _ladder(options: argparse.Namespace) -> int:
 
 
 def _rows(family: str, found: "dict[str, Sequence[FinishedRun]]") -> list[list[str]]:
-    """The egos of a family, the worst first; intervals are Wilson's of all episodes that an ego drove, together."""
+    """Returns a row per ego of a family, the worst first; intervals are Wilson's over the pooled episodes."""
     rows: list[tuple[tuple[float, float], list[str]]] = []
     for name, runs in found.items():
         of_family = [run.metrics["search"] for run in runs if run.spec.family == family]

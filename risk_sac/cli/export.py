@@ -1,10 +1,12 @@
 """`risk-sac export`: a failure, or the episodes of runs, in a format of other tools."""
 
 import argparse
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
-from risk_sac.cli.console import OK, Commands
+from risk_sac.cli.console import OK
+from risk_sac.cli.parser import WIDTH, Commands, add_command
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.formats import FORMATS, Files, FormatName, check_carries, export
 from risk_sac.run_folder.results import RESULTS
@@ -12,24 +14,30 @@ from risk_sac.terminal import console
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
-    formats = "\n".join(f"  {name:13}{format_.what}" for name, format_ in FORMATS.items())
-    parser = commands.add_parser(
-        "export",
-        help="write a failure in a format that other tools read",
-        epilog=f"formats:\n{formats}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    """Adds the command."""
+    formats = "\n".join(
+        textwrap.fill(f"  {name:13}{format_.what}", WIDTH, subsequent_indent=" " * 15)
+        for name, format_ in FORMATS.items()
     )
-    parser.set_defaults(command=_export)
+    parser = add_command(
+        commands,
+        "export",
+        _export,
+        "write a failure in a format that other tools read",
+        example="export failure.npz --format openscenario --out failure.xosc",
+        epilog=f"formats:\n{formats}",
+    )
     source = "the bundle of a failure; of parquet: folders of runs, or folders that hold such"
     parser.add_argument("source", type=Path, nargs="+", metavar="BUNDLE", help=source)
-    parser.add_argument("--format", type=FormatName, required=True, choices=list(FormatName), help="see below")
+    output = parser.group("output")
+    output.add_argument("--format", required=True, choices=[*map(str, FormatName)], metavar="FORMAT", help="see below")
     out = "the file; where a format is several files, a new folder, or a name that ends in .zip"
-    parser.add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
+    output.add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
 
 
 def _export(options: argparse.Namespace) -> int:
-    name, format_ = options.format, FORMATS[options.format]
+    name = FormatName(options.format)
+    format_ = FORMATS[name]
     check_carries(name, format_.of)  # before anything is read
     if format_.of == "episodes":
         files = export(name, list(_runs(options.source)))

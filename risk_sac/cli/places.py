@@ -1,4 +1,4 @@
-"""`risk-sac places`: where the patterns fit on a map, and with --try whether they can be played there."""
+"""`risk-sac places`: lists where patterns fit on a map; with --try, plays there."""
 
 import argparse
 import json
@@ -11,7 +11,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from risk_sac.cli.campaign_flags import MAP_HELP
-from risk_sac.cli.console import FAILED, OK, Commands, add_command, counted
+from risk_sac.cli.console import FAILED, OK, counted
+from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.run_folder.scratch import scratch_folder
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import FINDERS, Map, survey
@@ -26,17 +27,26 @@ SHOWN = 20
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
-    places = add_command(commands, "places", _places, "where the patterns fit on a map of yours")
+    """Adds the command."""
+    places = add_command(
+        commands,
+        "places",
+        _places,
+        "list the places of a map where a pattern fits",
+        more="With --try, also plays there.",
+        example="places town.net.xml --pattern crossing --out town.png",
+    )
     places.add_argument("network", type=Path, metavar="MAP", help=MAP_HELP)
-    places.add_argument("--pattern", choices=list(FINDERS), help="only this one (default: all)")
-    places.add_argument("--why", action="store_true", help="say where they do not fit, and why")
-    places.add_argument("--all", action="store_true", help=f"list all (default: {SHOWN} of each pattern)")
-    places.add_argument("--json", action="store_true", help="one document, with everything")
-    places.add_argument("--try", dest="tries", type=int, metavar="N", help="play at N random places of each pattern")
-    places.add_argument("--episodes", type=int, default=20, metavar="N", help="of each place (default: %(default)s)")
-    places.add_argument("--seed", type=int, default=0, metavar="N", help="of what is tried (default: %(default)s)")
-    places.add_argument("--out", type=Path, metavar="FILE.png", help="draw the map with its places")
+    choice = places.group("choice")
+    choice.add_argument("--pattern", choices=list(FINDERS), help="only this one (default: all)")
+    choice.add_argument("--why", action="store_true", help="list also where they do not fit, and why")
+    choice.add_argument("--all", action="store_true", help=f"list all (default: {SHOWN} of each pattern)")
+    trial = places.group("trial")
+    trial.add_argument("--try", dest="tries", type=int, metavar="N", help="play at N random places of each pattern")
+    trial.add_argument("--episodes", type=int, default=20, metavar="N", help="of each place (default: %(default)s)")
+    trial.add_argument("--seed", type=int, default=0, metavar="N", help="of the choice (default: %(default)s)")
+    places.group("output").add_argument("--out", type=Path, metavar="FILE.png", help="draw the map with its places")
+    add_json_flag(places)
 
 
 def _places(options: argparse.Namespace) -> int:
@@ -88,7 +98,10 @@ def _table(heading: str, rows: Sequence[tuple[str, str]], most: int) -> Table:
 
 
 def _try_places(chosen: Map, found: Survey, options: argparse.Namespace) -> int:
-    """Plays, and prints a row for each pattern; fails if a place does not run, or the ego is touched unattacked."""
+    """Plays at some places and prints a row per pattern.
+
+    Fails if a place does not run, or if the ego is touched without an attack.
+    """
     from risk_sac.tryout import sample, try_out  # here, because loading the simulator takes a second
 
     tried = []
@@ -105,7 +118,7 @@ def _wrong(tried: "Tried") -> list[str]:
     if not tried.played and not tried.invalid:
         whys.append(f"all scenes are refused: {dict(tried.rejected)}")
     if tried.touched_by_nobody:
-        whys.append(f"{tried.touched_by_nobody} contacts although nobody attacks")
+        whys.append(f"{tried.touched_by_nobody} contacts without an attack")
     if tried.unlike is not None:
         whys.append(tried.unlike)
     return whys

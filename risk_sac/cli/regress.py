@@ -1,4 +1,4 @@
-"""`risk-sac regress`: old failures against another ego, with a JUnit report."""
+"""`risk-sac regress`: plays old failures against another ego and writes a JUnit report."""
 
 import argparse
 from collections.abc import Iterator
@@ -11,13 +11,14 @@ from pydantic import ValidationError
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.console import EGO, FAILED, OK, Commands, add_command, counted, narrow_table
+from risk_sac.cli.console import EGO, FAILED, OK, counted, narrow_table
+from risk_sac.cli.parser import Commands, add_command
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.config.text import read_text
 from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Case, Regression, Verdict
-from risk_sac.failures.export.formats import FORMATS, FormatName, check_carries, export, names
+from risk_sac.failures.export.formats import FORMATS, FormatName, export, names
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import RESULTS, read_results
 from risk_sac.run_folder.verified import distinct_failures
@@ -29,29 +30,34 @@ if TYPE_CHECKING:
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
-    summary = "play old failures against another ego; exit status 1 if one is not fixed"
-    regress = add_command(commands, "regress", _regress, summary)
-    failures = "bundles, folders of bundles, or folders of runs; their policy acts on after the recorded actions"
-    regress.add_argument("--failures", type=Path, nargs="+", required=True, metavar="SET", help=failures)
-    regress.add_argument("--ego", required=True, metavar="EGO", help=EGO)
-    regress.add_argument("--baseline", type=Path, metavar="FILE.json", help="known cases, as --out wrote them")
-    regress.add_argument("--out", type=Path, metavar="FILE.json", help="write the cases there")
-    regress.add_argument("--junit", type=Path, metavar="FILE.xml", help="write a JUnit report there")
-    exports = "write what is neither fixed nor known there, as the other ego has it now: bundles, and --format"
-    regress.add_argument("--exports", type=Path, metavar="FOLDER", help=exports)
-    kinds = f"with --exports: {', '.join(names('failure'))}; see `risk-sac export --help`"
-    regress.add_argument(
-        "--format", type=FormatName, nargs="+", default=[], choices=names("failure"), metavar="FORMAT", help=kinds
+    """Adds the command."""
+    regress = add_command(
+        commands,
+        "regress",
+        _regress,
+        "play old failures against another ego",
+        more="The exit status is 1 if one of them is not fixed.",
+        example="regress --failures failures/ --ego careful --junit regress.xml",
     )
+    failures = "bundles, folders of bundles, or folders of runs; their policy acts on after the recorded actions"
+    cases = regress.group("cases")
+    cases.add_argument("--failures", type=Path, nargs="+", required=True, metavar="SET", help=failures)
+    cases.add_argument("--ego", required=True, metavar="EGO", help=EGO)
+    cases.add_argument("--baseline", type=Path, metavar="FILE.json", help="known cases, as --out wrote them")
+    output = regress.group("output")
+    output.add_argument("--out", type=Path, metavar="FILE.json", help="write the cases there")
+    output.add_argument("--junit", type=Path, metavar="FILE.xml", help="write a JUnit report there")
+    exports = "write what is neither fixed nor known there, as it happens now: bundles, and --format"
+    output.add_argument("--exports", type=Path, metavar="FOLDER", help=exports)
+    of_failure = [*map(str, names("failure"))]
+    kinds = f"with --exports: {', '.join(of_failure)}; see `risk-sac export --help`"
+    output.add_argument("--format", nargs="+", default=[], choices=of_failure, metavar="FORMAT", help=kinds)
 
 
 def _regress(options: argparse.Namespace) -> int:
     ego = read_ego(options.ego)
     for file in filter(None, (options.out, options.junit)):
         file.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
-    for name in options.format:
-        check_carries(name, "failure")
     baseline = read_baseline(options.baseline) if options.baseline else None
     regressed = list(_cases(options.failures, ego))
     found = Regression(ego=ego, cases=tuple(each.case for each in regressed))
@@ -64,7 +70,7 @@ def _regress(options: argparse.Namespace) -> int:
         replace_file(options.junit, junit(found))
     if options.exports is not None:
         bundles = [each.bundle for each, case in zip(regressed, found.cases, strict=True) if not case.passed]
-        _export(options.exports, options.format, bundles)
+        _export(options.exports, [*map(FormatName, options.format)], bundles)
     return OK if found.passed else FAILED
 
 
@@ -94,7 +100,7 @@ def _export(folder: Path, formats: list[FormatName], bundles: list["Bundle"]) ->
 
 
 def _cases(paths: list[Path], ego: EgoConfig) -> Iterator["Regressed"]:
-    """Of a whole set, all of which is read before the first is played, so that nothing is half done."""
+    """Plays the failures of files and runs; reads all of them before it plays the first."""
     from risk_sac.failures.bundle import read_bundle  # here, for the simulator takes a second to load
     from risk_sac.failures.regress import regress, regress_run
 

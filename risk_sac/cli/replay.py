@@ -1,10 +1,12 @@
-"""`risk-sac bundle`, `replay` and `verify`: failures in files that stand alone, and played again."""
+"""`risk-sac bundle`, `replay` and `verify`: writes failures into files and plays them again."""
 
 import argparse
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
-from risk_sac.cli.console import FAILED, OK, Commands, add_command, counted
+from risk_sac.cli.console import FAILED, OK, counted, print_answer
+from risk_sac.cli.parser import Commands, add_command, add_failure_arguments, add_json_flag
 from risk_sac.errors import ConfigError, SimulationError
 from risk_sac.machine import cores
 from risk_sac.metrics import pooled_headline
@@ -14,22 +16,39 @@ from risk_sac.terminal import complain, console, printable
 
 
 def add(commands: Commands) -> None:
-    """Add the commands."""
-    bundle = add_command(commands, "bundle", _bundle, "write failures into files that stand alone")
-    bundle.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
-    bundle.add_argument(
-        "failure", nargs="?", metavar="FAILURE", help="id of a failure, or its number; default: every distinct one"
+    """Adds the commands."""
+    bundle = add_command(
+        commands,
+        "bundle",
+        _bundle,
+        "write failures into files that can be replayed without their run",
+        example="bundle runs/low 42 --out failure.npz",
     )
+    add_failure_arguments(bundle, "default: every distinct one")
     out = "the bundle; of every distinct failure: the folder for them"
-    bundle.add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
+    bundle.group("output").add_argument("--out", type=Path, required=True, metavar="PATH", help=out)
 
-    replay = add_command(commands, "replay", _replay, "play the failure in a bundle again")
-    replay.add_argument("bundle", type=Path, metavar="BUNDLE", help="what `risk-sac bundle` wrote")
+    replay = add_command(
+        commands,
+        "replay",
+        _replay,
+        "play the failure in a bundle again and compare it bit by bit",
+        example="replay failure.npz",
+    )
+    replay.add_argument("bundle", type=Path, metavar="BUNDLE", help="file that `risk-sac bundle` wrote")
 
-    verify = add_command(commands, "verify", _verify, "replay the distinct failures of runs in fresh processes")
+    verify = add_command(
+        commands,
+        "verify",
+        _verify,
+        "replay the distinct failures of runs in fresh processes",
+        more="Only failures that repeat count as headline failures.",
+        example="verify runs/low --times 3",
+    )
     verify.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a finished run")
-    times = f"how often each is replayed (default: {TIMES})"
-    verify.add_argument("--times", type=int, default=TIMES, metavar="N", help=times)
+    times = f"replays of each failure (default: {TIMES})"
+    verify.group("replays").add_argument("--times", type=int, default=TIMES, metavar="N", help=times)
+    add_json_flag(verify)
 
 
 def _bundle(options: argparse.Namespace) -> int:
@@ -81,15 +100,17 @@ def _verify(options: argparse.Namespace) -> int:
     found = verify(options.runs, options.times, cores())
     if missing := [folder for folder in options.runs if folder not in found]:
         raise SimulationError(f"{missing[0]} was not verified: its run is unfinished, or cannot be replayed")
+    answer: list[dict[str, Any]] = []
+    lines = []
     for folder, verified in found.items():
-        repeated = len(verified.episodes) - len(verified.flaky)
         results = read_results(folder)
-        headline = pooled_headline(each for each in (results.metrics, results.evaluation) if each is not None)
-        console.print(
-            f"{results.spec.id}: {counted(headline or 0, 'headline failure')}; "
-            f"{repeated} of {counted(len(verified.episodes), 'distinct failure')} repeat"
-        )
+        headline = pooled_headline(each for each in (results.metrics, results.evaluation) if each is not None) or 0
+        answer.append({"id": results.spec.id, "headline": headline, "episodes": verified.episodes})
+        repeated = len(verified.episodes) - len(verified.flaky)
+        repeat = f"{repeated} of {counted(len(verified.episodes), 'distinct failure')} repeat"
+        lines.append(f"{results.spec.id}: {counted(headline, 'headline failure')}; {repeat}")
         for index in sorted(verified.flaky):
             repetition = verified.episodes[index]
-            console.print(f"  flaky: episode {index}, {repetition.same} of {repetition.times} times the same")
+            lines.append(f"  flaky: episode {index}, {repetition.same} of {repetition.times} times the same")
+    print_answer(options, answer, "\n".join(lines))
     return FAILED if any(verified.flaky for verified in found.values()) else OK

@@ -1,11 +1,12 @@
-"""`risk-sac report`: what runs found, how often it happens, and where nobody looked, as one file."""
+"""`risk-sac report`: writes findings, rates and coverage of runs into one file."""
 
 import argparse
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from risk_sac.cli.console import OK, Commands, add_command, write_out
+from risk_sac.cli.console import OK, write_out
+from risk_sac.cli.parser import Commands, add_command
 from risk_sac.cli.regress import read_baseline
 from risk_sac.errors import ConfigError
 
@@ -18,14 +19,21 @@ FORMATS: dict[str, Format] = {".html": "html", ".md": "md", ".json": "json"}
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
-    parser = add_command(commands, "report", _report, "one file on what runs found, with bounds, coverage and limits")
+    """Adds the command."""
+    parser = add_command(
+        commands,
+        "report",
+        _report,
+        "write one file on what runs found, with bounds, coverage and limits",
+        example="report runs/compared --out report.html",
+    )
     parser.add_argument(
         "runs", type=Path, nargs="+", metavar="RUNS", help="folder of `risk-sac evaluate`, or folders of runs"
     )
     regression = "failures against another ego, by `risk-sac regress --out`"
-    parser.add_argument("--regression", type=Path, metavar="FILE.json", help=regression)
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help=OUT)
+    output = parser.group("output")
+    output.add_argument("--regression", type=Path, metavar="FILE.json", help=regression)
+    output.add_argument("--out", type=Path, required=True, metavar="FILE", help=OUT)
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -57,13 +65,13 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def format_of(file: Path) -> Format:
-    """What a report is written as, by the name of its file."""
+    """Returns the format of a report by the name of its file."""
     if file.suffix not in FORMATS:
         raise ConfigError("--out", f"{file.name!r}", f"a name that ends in {', '.join(FORMATS)}")
     return FORMATS[file.suffix]
 
 
 def _regress(found: "Found") -> str:
-    """What to type to play the failures of all searches that have finished."""
+    """Returns the command that plays the failures of all finished searches."""
     runs = [str(found.folders[run.spec.digest]) for run in found.comparison.runs]
     return shlex.join(["risk-sac", "regress", "--failures", *runs, "--ego", "EGO", "--out", "cases.json"])

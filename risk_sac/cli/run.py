@@ -1,4 +1,4 @@
-"""`risk-sac run` and `evaluate`: one run, or methods compared over seeds, without a server."""
+"""`risk-sac run` and `evaluate`: one run, or a comparison of methods over seeds, without a server."""
 
 import argparse
 import os
@@ -25,24 +25,25 @@ from risk_sac.cli.console import (
     INTERRUPTED,
     OK,
     Board,
-    Commands,
-    add_command,
     counted,
     driven_by_in_words,
     headline,
     or_dash,
+    print_answer,
     progress_bar,
     requirements_table,
     say_adjustments,
 )
+from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.config import METHODS, SHIPPED, RunSpec
 from risk_sac.config.spec_file import read_campaign, read_spec
+from risk_sac.errors import ConfigError
 from risk_sac.machine import cores
 from risk_sac.metrics import METRICS, Metric
 from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import Results
 from risk_sac.run_folder.verified import TIMES
-from risk_sac.terminal import complain, console
+from risk_sac.terminal import complain, console, notes
 
 if TYPE_CHECKING:
     from risk_sac.execution.jobs import Job
@@ -51,36 +52,59 @@ SEEDS = 5  # of a comparison that names none
 
 
 def add(commands: Commands) -> None:
-    """Add the commands."""
-    run = add_command(commands, "run", _run, "one run without a server; the same command again goes on with it")
-    run.add_argument("--family", metavar="low|mixed|dense", help="scenario family")
-    add_map_flags(run, several=False)
+    """Adds the commands."""
+    run = add_command(
+        commands,
+        "run",
+        _run,
+        "search for failures with one method and one seed",
+        more="No server is needed. The same command again continues an interrupted run.",
+        example="run --family low --method archive --episodes 100 --out runs/low",
+    )
+    run.group("scene").add_argument("--family", metavar="low|mixed|dense", help="scenario family")
     add_ego_flag(run)
-    run.add_argument("--method", metavar="NAME", help=f"one of {', '.join(METHODS)} (default: risk-sac)")
+    add_map_flags(run, several=False)
+    search = run.group("search")
+    search.add_argument("--method", metavar="NAME", help=f"one of {', '.join(METHODS)} (default: risk-sac)")
+    search.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
+    search.add_argument(
+        "--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags override them"
+    )
     add_budget_flags(run)
-    run.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
-    run.add_argument("--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags go first")
-    run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
+    run.group("output").add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
+    add_json_flag(run)
 
-    summary = "compare methods over seeds, with tables and figures; the same command again goes on with it"
-    evaluate = add_command(commands, "evaluate", _evaluate, summary)
-    add_map_flags(evaluate, several=True)
+    evaluate = add_command(
+        commands,
+        "evaluate",
+        _evaluate,
+        "compare methods over seeds",
+        more="Writes tables and figures. The same command again continues an interrupted comparison.",
+        example="evaluate --families low --methods archive random --seeds 3 --episodes 100 --out runs/compared",
+    )
     add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
     add_ego_flag(evaluate)
-    jobs = "runs at a time (default: one per core, or what a cluster has room for)"
-    evaluate.add_argument("--jobs", type=int, metavar="N", help=jobs)
+    add_map_flags(evaluate, several=True)
+    execution = evaluate.group("execution")
+    jobs = "runs at a time (default: one per core, or as many as a cluster has room for)"
+    execution.add_argument("--jobs", type=int, metavar="N", help=jobs)
     executor = os.environ.get("RISK_SAC_EXECUTOR", "local")
-    where = "where runs execute: `local` or, on a cluster, `ray` (default: RISK_SAC_EXECUTOR or local)"
-    evaluate.add_argument("--executor", default=executor, metavar="NAME", help=where)
-    times = f"how often each distinct failure is replayed (default: {TIMES})"
-    evaluate.add_argument("--verify", type=int, default=TIMES, metavar="N", help=times)
-    evaluate.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of runs, tables and figures")
+    where = "`local` or, on a cluster, `ray` (default: RISK_SAC_EXECUTOR or local)"
+    execution.add_argument("--executor", default=executor, metavar="NAME", help=where)
+    times = f"replays of each distinct failure (default: {TIMES})"
+    execution.add_argument("--verify", type=int, default=TIMES, metavar="N", help=times)
+    out = "folder of runs, tables and figures"
+    evaluate.group("output").add_argument("--out", type=Path, required=True, metavar="DIR", help=out)
+    add_json_flag(evaluate)
 
 
 def _run(options: argparse.Namespace) -> int:
     families = families_on_map(options)
     if families:
         options.family = families[0]
+    if options.spec is None and options.family is None:
+        remedy = "or a map with --network, or a file with --spec"
+        raise ConfigError("family", "nothing", "low, mixed or dense", remedy)
     named = {name: getattr(options, name) for name in ("family", "method", "seed")}
     spec = read_spec(options.spec, named | budget_flags(options) | ego_flag(options))
     say_adjustments(adjustments(spec))
@@ -97,15 +121,16 @@ def _run(options: argparse.Namespace) -> int:
     if not results.finished:
         done = sum(phase.episodes for phase in (results.metrics, results.evaluation) if phase)
         again = "The same command again goes on from there."
-        console.print(f"Stopped after {done} of {counted(total, 'episode')}. {again}")
+        notes.print(f"Stopped after {done} of {counted(total, 'episode')}. {again}", soft_wrap=True)
         return INTERRUPTED
     phases = {"i.i.d." if spec.iid else "search": results.metrics, "evaluation": results.evaluation}
     found = {name: metrics for name, metrics in phases.items() if metrics is not None}
-    console.print(_summary(spec, results, found))
     requirements = requirements_table({name: metrics.requirements for name, metrics in found.items()})
-    if requirements is not None:
-        console.print(requirements)
-    console.print(f"Results: {options.out}/results.json")
+    answer = {"id": spec.id, "folder": str(options.out), "wall_s": results.wall_s, "device": results.device, **found}
+    print_answer(options, answer, _summary(spec, results, found), *([requirements] if requirements else []))
+    if options.json:
+        return OK
+    console.print(f"Results: {options.out}/results.json", soft_wrap=True)
     if any(metrics.headline is None and metrics.headline_candidates for metrics in found.values()):
         console.print(f"Count its headline failures: risk-sac verify {options.out}", soft_wrap=True)
     return OK
@@ -149,7 +174,7 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
 
 
 def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
-    """What a metric is called, and what it is."""
+    """Name and value of a metric, with its interval if it has one."""
     name, value = f"{metric.words} {metric.symbol}".strip(), metric.value(metrics)
     interval = None if value is None else metric.interval(value, metrics)
     text = or_dash(value, ".3f")
@@ -162,7 +187,9 @@ def _evaluate(options: argparse.Namespace) -> int:
     options.families = families_on_map(options) or options.families
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | ego_flag(options), defaults)
     say_adjustments(adjustments(spec))
-    from risk_sac.execution.evaluate import evaluate  # here, because loading what checks the settings takes seconds
+    # Here, because loading what checks the settings takes seconds.
+    from risk_sac.execution.evaluate import evaluate
+    from risk_sac.report.files import table_of
 
     with progress_bar() as bar:
         fill = cores() if options.executor == "local" else len(spec.runs())
@@ -173,15 +200,16 @@ def _evaluate(options: argparse.Namespace) -> int:
         complain(f"{job.name}: {job.reason}")
     comparison = evaluation.comparison
     runs = f"{len(comparison.runs)} of {counted(len(comparison.runs) + len(comparison.missing), 'run')}"
-    console.print(f"Report of {runs}: {options.out}/table.md, table.json, table.csv, figures/", soft_wrap=True)
+    written = f"Report of {runs}: {options.out}/table.md, table.json, table.csv, figures/"
+    print_answer(options, table_of(comparison), written)
     if evaluation.stopped:
-        console.print("Stopped. The same command again goes on from there.")
+        notes.print("Stopped. The same command again goes on from there.")
         return INTERRUPTED
     return FAILED if comparison.missing else OK
 
 
 def drawn(board: Board, jobs: "Sequence[Job]") -> None:
-    """Draws how runs go."""
+    """Draws the progress of runs."""
     done = {job.name: job.episodes for job in jobs}
     finished = sum(job.state == "finished" for job in jobs)
     failed = sum(job.state == "failed" for job in jobs)

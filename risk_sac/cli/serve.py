@@ -5,18 +5,25 @@ import os
 import sys
 from pathlib import Path
 
-from risk_sac.cli.console import Commands, add_command
+from risk_sac.cli.parser import Commands, add_command
 
 ARENAS = {"MALLOC_ARENA_MAX": "2"}  # glibc gives each thread an arena otherwise, and the server's memory grows
 
 
 def add(commands: Commands) -> None:
-    """Add the commands."""
-    serve = add_command(commands, "serve", _serve, "run the service in the foreground")
-    serve.add_argument("--host", metavar="ADDRESS", help="(default: 127.0.0.1)")
-    serve.add_argument("--port", type=int, help="(default: 8000)")
-    serve.add_argument("--data-dir", type=Path, metavar="DIR", help="(default: data)")
-    serve.add_argument("--root-path", metavar="PATH", help="that a proxy in front has the service at, such as /sim")
+    """Adds the commands."""
+    serve = add_command(
+        commands,
+        "serve",
+        _serve,
+        "run the service and its web page in the foreground",
+        example="serve --port 8001",
+    )
+    network = serve.group("network")
+    network.add_argument("--host", metavar="ADDRESS", help="(default: 127.0.0.1)")
+    network.add_argument("--port", type=int, help="(default: 8000)")
+    network.add_argument("--root-path", metavar="PATH", help="path of the service behind a proxy, such as /sim")
+    serve.group("data").add_argument("--data-dir", type=Path, metavar="DIR", help="(default: data)")
 
     keys = commands.add_parser(
         "keys", help="create, list and revoke the service's API keys", add_help=False, prefix_chars="\0"

@@ -1,9 +1,10 @@
-"""`risk-sac show`: the failures of a run, refused ones included, and pictures of them."""
+"""`risk-sac show`: lists and draws the failures of a run."""
 
 import argparse
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.table import Table
 
@@ -11,51 +12,58 @@ from risk_sac.cli.console import (
     EGO,
     OK,
     OUTCOME,
-    Commands,
-    add_command,
     driven_by_in_words,
     headline,
     in_words,
     narrow_table,
     offences,
     outcome,
+    print_answer,
 )
+from risk_sac.cli.failure_filters import add_filter_flags, listed, matching
+from risk_sac.cli.parser import FAILURE_HELP, RESULTS_HELP, Commands, add_command, add_json_flag
 from risk_sac.config.spec_file import read_ego
+from risk_sac.errors import ConfigError
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
 from risk_sac.metrics import headline_driven_by
 from risk_sac.records import Collision, Judgement, RunMetrics, Violation
-from risk_sac.run_folder.results import Results, read_results
+from risk_sac.run_folder.results import RESULTS, RecordedFailure, Results, read_results
 from risk_sac.run_folder.series import read_series
-from risk_sac.terminal import console
+from risk_sac.terminal import notes
 
 NAME_WIDTH = 20  # of a requirement's name in the list
 
 
 def add(commands: Commands) -> None:
-    """Add the command."""
-    show = add_command(commands, "show", _show, "list a run's failures, or draw one")
-    show.add_argument("results", type=Path, metavar="RESULTS", help="folder of a run, or its results.json")
-    show.add_argument(
-        "failure", nargs="?", metavar="FAILURE", help="id of a failure, or its number; default: list them"
+    """Adds the command."""
+    show = add_command(
+        commands,
+        "show",
+        _show,
+        "list a run's failures, or draw one",
+        more="Without RESULTS, takes the newest run below the current folder.",
+        example="show runs/low --preventable --sort severity",
     )
+    show.add_argument("results", type=Path, nargs="?", metavar="RESULTS", help=RESULTS_HELP)
+    show.add_argument("failure", nargs="?", metavar="FAILURE", help=FAILURE_HELP)
+    add_filter_flags(show)
+    picture = show.group("picture of one failure")
     twin = f"draw beside it the same scene without an attack (idle), or with this ego: {EGO}"
-    show.add_argument("--twin", metavar="TWIN", help=twin)
-    show.add_argument("--out", type=Path, metavar="FILE.png", help="(default: failures/FAILURE.png beside RESULTS)")
+    picture.add_argument("--twin", metavar="TWIN", help=twin)
+    out = "(default: failures/FAILURE.png beside RESULTS)"
+    picture.add_argument("--out", type=Path, metavar="FILE.png", help=out)
+    add_json_flag(show)
 
 
 def _show(options: argparse.Namespace) -> int:
-    results = read_results(options.results)
+    path = options.results or newest_run(Path.cwd())
+    results = read_results(path)
     if options.failure is None:
-        for phase in (results.metrics, results.evaluation):
-            if phase is not None:
-                name = "headline failures" if phase is results.metrics else "headline failures of the evaluation"
-                console.print(f"{name}: {headline(phase.headline, phase.headline_candidates)}{_driven_by([phase])}")
-                console.print(f"episodes driven by: {driven_by_in_words(phase.episodes_driven_by)}")
-        console.print(_failures(results))
+        _list(options, results)
         return OK
     failure = results.failure(options.failure)
-    folder = options.results if options.results.is_dir() else options.results.parent
+    folder = path if path.is_dir() else path.parent
     from risk_sac.failures.show import draw  # here, because loading matplotlib takes a second
 
     recording = Recording(failure, read_series(folder / failure.series))
@@ -68,22 +76,56 @@ def _show(options: argparse.Namespace) -> int:
     stem = Path(failure.series).stem + ("" if options.twin is None else f"-{Path(options.twin).stem}")
     picture = options.out or (folder / failure.series).with_name(f"{stem}.png")
     draw(results.spec.family, recording, picture, twin)
-    console.print(f"Drawn: {picture}", soft_wrap=True)
+    print_answer(options, _plain(failure) | {"picture": str(picture)}, f"Drawn: {picture}")
     return OK
 
 
-def _driven_by(phases: Sequence[RunMetrics]) -> str:
-    """What drove the headline failures, in brackets; empty without any."""
-    counts = headline_driven_by(phases)
+def newest_run(folder: Path) -> Path:
+    """Returns the folder of a run below `folder` that was written last, at most three levels down.
+
+    Raises:
+      ConfigError: there is none.
+    """
+    found = [file for depth in range(4) for file in folder.glob("*/" * depth + RESULTS)]
+    if not found:
+        raise ConfigError("RESULTS", "nothing", "the folder of a run", f"there is none below {folder}")
+    newest = max(found, key=lambda file: file.stat().st_mtime).parent
+    notes.print(f"Newest run: {newest}", markup=False, soft_wrap=True)
+    return newest
+
+
+def _list(options: argparse.Namespace, results: Results) -> None:
+    by_index = {failure.episode.index: failure for failure in results.failures}
+    episodes = [failure.episode for failure in results.failures]
+    chosen = [by_index[each.index] for each in listed(options, matching(options, episodes))]
+    lines = [
+        f"headline failures{where}: {headline(phase.headline, phase.headline_candidates)}{_driven_by(phase)}\n"
+        f"episodes driven by: {driven_by_in_words(phase.episodes_driven_by)}"
+        for where, phase in (("", results.metrics), (" of the evaluation", results.evaluation))
+        if phase is not None
+    ]
+    refused = sum(not each.valid_violations for each in episodes)
+    if refused and not options.raw:
+        lines.append(f"refused by a validity rule: {refused} (--raw lists them)")
+    table = _table(results.spec.id, chosen) if chosen else "No failures to list."
+    print_answer(options, list(map(_plain, chosen)), "\n".join(lines), table)
+
+
+def _driven_by(phase: RunMetrics) -> str:
+    """Returns in brackets what drove the headline failures; empty without any."""
+    counts = headline_driven_by([phase])
     return f" (driven by: {driven_by_in_words(counts)})" if counts else ""
 
 
-def _failures(results: Results) -> Table:
-    """Two lines per failure, under the id of the run, with which their own ids begin.
+def _plain(failure: RecordedFailure) -> dict[str, Any]:
+    return {"id": failure.id, "series": failure.series} | failure.episode.model_dump()
+
+
+def _table(run: str, failures: Sequence[RecordedFailure]) -> Table:
+    """Returns a table of failures, under the id of the run, with which their own ids begin.
 
     Fits 80 columns; only the last one wraps.
     """
-    run = results.spec.id
     table = narrow_table(
         "id",
         OUTCOME,
@@ -93,9 +135,8 @@ def _failures(results: Results) -> Table:
         "requirement, or\nconflict; began\nat s, x y m",
         "failed rules,\nor offences",
         title=run,
-        caption=f"in full, as the service says it: {run}-ID",
     )
-    for failure in results.failures:
+    for failure in failures:
         violation = failure.episode.worst_violation
         if violation is None:
             continue
@@ -112,7 +153,7 @@ def _failures(results: Results) -> Table:
 
 
 def _of_contact(collision: Collision) -> tuple[str, ...]:
-    """Speeds, zones, and how the conflict began."""
+    """Returns speeds, zones and the begin of the conflict."""
     return (
         f"{collision.ego_speed_mps:.1f}\n{collision.other_speed_mps:.1f}",
         f"{collision.ego_zone}\n{collision.other_zone}",
@@ -121,12 +162,12 @@ def _of_contact(collision: Collision) -> tuple[str, ...]:
 
 
 def _without_contact(violation: Violation) -> tuple[str, ...]:
-    """The same of a violation without contact, which has no zones."""
+    """Returns the same cells of a violation without contact, which has no zones."""
     name = textwrap.fill(violation.requirement, NAME_WIDTH)
     return f"{violation.ego_speed_mps:.1f}", "", f"{name}\n{violation.time_s:.1f}"
 
 
 def _conflict(judgement: Judgement) -> str:
-    """How it began, and when after the release and where on the map."""
+    """Returns the type of a conflict, and its time after the release and place on the map."""
     began = f"{judgement.conflict_s:.1f}, {judgement.conflict_x_m:.0f} {judgement.conflict_y_m:.0f}"
     return f"{judgement.conflict_type.replace('_', ' ')}\n{began}"

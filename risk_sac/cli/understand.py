@@ -1,4 +1,4 @@
-"""What failures come to: the core of one (`minimise`), what is near it (`region`), and which there are (`clusters`)."""
+"""`risk-sac minimise`, `region` and `clusters`: reduces, perturbs and sorts failures."""
 
 import argparse
 from collections.abc import Iterator
@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rich.text import Text
 
-from risk_sac.cli.console import OK, Commands, add_command, counted, narrow_table
+from risk_sac.cli.console import OK, counted, narrow_table, print_answer
+from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Studied, note, valid_failure
 from risk_sac.records import EpisodeRecord
@@ -21,21 +22,39 @@ if TYPE_CHECKING:
 
 
 def add(commands: Commands) -> None:
-    """Add the commands."""
-    summary = "find the core of a failure: the least that makes the ego fail"
-    minimise = add_command(commands, "minimise", _minimise, summary)
-    minimise.add_argument("--out", type=Path, metavar="FILE", help="write the core there, a bundle too")
-    region = add_command(commands, "region", _region, "how many of the neighbours of a failure fail too")
-    region.add_argument("--out", type=Path, metavar="FILE.json", help="write the shares there too")
-    what = (
-        "what `risk-sac bundle` or `minimise` wrote, or the folder of a finished run, in which the report finds it then"
+    """Adds the commands."""
+    minimise = add_command(
+        commands,
+        "minimise",
+        _minimise,
+        "reduce a failure to the least that still makes the ego fail",
+        example="minimise runs/low 42 --out core.npz",
     )
-    for parser in (minimise, region):
+    region = add_command(
+        commands,
+        "region",
+        _region,
+        "measure how many neighbours of a failure fail too",
+        example="region runs/low 42",
+    )
+    for parser, metavar, out in (
+        (minimise, "FILE.npz", "write the core there, as a bundle"),
+        (region, "FILE.json", "write the shares there"),
+    ):
+        what = "a bundle, or the folder of a finished run, where the report finds the outcome"
         parser.add_argument("path", type=Path, metavar="PATH", help=what)
         parser.add_argument("failure", nargs="?", metavar="FAILURE", help="of a run: id of a failure, or its number")
-    clusters = add_command(commands, "clusters", _clusters, "which different failures runs have found, and one of each")
+        parser.group("output").add_argument("--out", type=Path, metavar=metavar, help=out)
+    clusters = add_command(
+        commands,
+        "clusters",
+        _clusters,
+        "sort the failures of runs into kinds, with one example of each",
+        example="clusters runs/low runs/mixed",
+    )
     clusters.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a run, or its results.json")
-    clusters.add_argument("--out", type=Path, metavar="FILE.json", help="write them there too")
+    clusters.group("output").add_argument("--out", type=Path, metavar="FILE.json", help="write the kinds there")
+    add_json_flag(clusters)
 
 
 class _Asked(NamedTuple):
@@ -135,12 +154,9 @@ def _clusters(options: argparse.Namespace) -> int:
     for cluster in found.clusters:
         first = f"{cluster.name}\n  {cluster.representative} ({cluster.grade})"
         table.add_row(str(cluster.failures), str(cluster.distinct), str(cluster.preventable), printable(first))
-    console.print(table)
-    console.print(
-        f"{counted(len(found.clusters), 'kind')}, as various as {found.vendi:.1f} that have nothing in common (Vendi "
-        f"score); {found.covered} of {found.cells} cells of the taxonomy",
-        soft_wrap=True,
-    )
+    kinds = f"{counted(len(found.clusters), 'kind')}; effective number of kinds (Vendi score): {found.vendi:.1f}"
+    covered = f"cells of the taxonomy with a contact: {found.covered} of {found.cells}"
+    print_answer(options, found, table, f"{kinds}\n{covered}")
     if options.out is not None:
         replace_file(options.out, found.model_dump_json(indent=2).encode())
     return OK

@@ -1,13 +1,14 @@
 """What a validation found, as the errors of fields."""
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
 from pydantic import BaseModel
 
-from risk_sac.errors import ConfigError
+from risk_sac.errors import ConfigError, did_you_mean
 
 LONGEST_VALUE = 200
 _EXPECTED = {
@@ -52,10 +53,13 @@ def field_error(item: Mapping[str, Any], model: type[BaseModel] | None = None) -
         return ConfigError(f"{field}.{cause.field}".strip("."), cause.got, cause.expected, cause.remedy)
     got = "nothing" if item["type"] == "missing" else shown(item.get("input"))
     if item["type"] == "extra_forbidden" and model is not None:
-        return ConfigError(field, got, f"one of {', '.join(_fields_at(location[:-1], model))}")
+        known = _fields_at(location[:-1], model)
+        return ConfigError(field, got, f"one of {', '.join(known)}", did_you_mean(str(location[-1]), known))
     template = _EXPECTED.get(item["type"])
     if template:
-        return ConfigError(field, got, template.format(**item.get("ctx", {})))
+        expected = template.format(**item.get("ctx", {}))
+        choices = re.findall(r"'([^']+)'", expected) if item["type"] in ("literal_error", "enum") else []
+        return ConfigError(field, got, expected, did_you_mean(str(item.get("input")), choices))
     return ConfigError(field, got, str(item["msg"]).removeprefix("Input should be ").partition(",")[0])
 
 

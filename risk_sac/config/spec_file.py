@@ -57,7 +57,7 @@ def read_ego(text: str) -> EgoConfig:
         return _validate(EgoConfig, {"profile": name, "defects": defects})
     if DRIVER.fullmatch(name) and not Path(text).exists():
         return _validate(EgoConfig, {"driver": name, "defects": defects})
-    return _validate(EgoConfig, read_fields(Path(text), "spec"))
+    return _validate(EgoConfig, read_fields(Path(text), "ego"))
 
 
 def campaign_yaml(spec: CampaignSpec) -> str:

@@ -25,7 +25,7 @@ from risk_sac.egos.defects.catalogue import planted, version_of
 from risk_sac.egos.defects.planted import Planted
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.seam import Ego
-from risk_sac.errors import ConfigError, EgoFailed
+from risk_sac.errors import ConfigError, EgoFailed, did_you_mean
 
 GROUP, FILE = "risk_sac.egos", "RISK_SAC_EGOS"
 SHIPPED = {
@@ -113,8 +113,9 @@ def card_of(name: str) -> EgoCard:
     if name in PLANNERS:
         remedy = "pip install 'risk-sac[planners]', for the service and its workers"
         raise ConfigError("ego.driver", f"{name!r}, whose planner is not installed", "an ego that is installed", remedy)
-    registered = ", ".join(sorted((*points, *remotes)))
-    raise ConfigError("ego.driver", f"{name!r}", f"one of {registered}, which are registered")
+    registered = sorted((*points, *remotes))
+    expected = f"one of {', '.join(registered)}, which are registered"
+    raise ConfigError("ego.driver", f"{name!r}", expected, did_you_mean(name, registered))
 
 
 def pinned(ego: EgoConfig) -> EgoConfig:

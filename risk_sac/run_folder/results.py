@@ -64,14 +64,17 @@ class Results:
     failures: Annotated[tuple[RecordedFailure, ...], Field(validation_alias=AliasChoices("failures", "contacts"))] = ()
 
     def failure(self, id_: str) -> RecordedFailure:
-        """The failure with this id, with or without the run's before it, or with this number of an episode."""
+        """Returns the failure with this id, with or without the run's id in front, or with this episode number."""
         for failure in self.failures:
             episode = failure.episode
             known = (failure.id, episode.id_in(self.spec.id), f"{episode.phase}-{episode.index}")
             if id_ in known or (id_.isdecimal() and int(id_) == episode.index):
                 return failure
-        every = ", ".join(failure.id for failure in self.failures) or "none: every requirement that counts was kept"
-        raise ConfigError("FAILURE", f"{id_!r}", f"one of the failures ({every})")
+        if not self.failures:
+            raise ConfigError("FAILURE", f"{id_!r}", remedy="the run has no failures")
+        first, last = (self.failures[place].episode for place in (0, -1))
+        expected = f"one of {len(self.failures)} failures with numbers from {first.index} to {last.index}"
+        raise ConfigError("FAILURE", f"{id_!r}", expected, "`risk-sac show RESULTS --raw` lists them")
 
 
 _RECORDS = TypeAdapter(list[EpisodeRecord])

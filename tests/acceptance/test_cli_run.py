@@ -53,9 +53,9 @@ def test_interrupted_and_resumed_run_equals_an_uninterrupted_one(
         assert process.poll() is None, process.communicate()
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
-    printed, complaint = process.communicate()
+    _, complaint = process.communicate()
     assert process.returncode == 130, complaint
-    assert re.search(r"Stopped after [2-5] of 6 episodes\. The same command again goes on", printed)
+    assert re.search(r"Stopped after [2-5] of 6 episodes\. The same command again goes on", complaint)
     assert results(parts)["finished"] is False
 
     assert cli.main(arguments(parts)) == 0

@@ -1,75 +1,83 @@
-"""`risk-sac campaigns failures`: what a campaign found, one by one, without the server's folder."""
+"""`risk-sac campaigns failures`: lists, draws and fetches failures over REST."""
 
 import argparse
-import itertools
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from risk_sac.cli.campaigns.output import add_campaign_command, add_limit, print_answer
-from risk_sac.cli.console import OK, OUTCOME, Commands, in_words, offences, or_dash, outcome, write_out
+from risk_sac.cli.campaigns.output import add_campaign_command, add_newest_command, chosen_id
+from risk_sac.cli.console import OK, OUTCOME, in_words, offences, or_dash, outcome, print_answer, write_out
+from risk_sac.cli.failure_filters import add_filter_flags, listed, wanted
+from risk_sac.cli.parser import Commands, Parser
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
-from risk_sac.records import Collision, DrivenBy, Fault, Grade, Severity, Violation
+from risk_sac.records import Collision, Violation
 from risk_sac.terminal import notes, printable
-
-CLASSES = {"grade": Grade, "severity": Severity, "fault": Fault}
-FILTERS = {
-    "run": "of this run",
-    "requirement": "that violate this requirement, such as no_contact",
-    "broke": "whose striker broke this, such as red_light",
-    "signature": "of this class, in the words of the list",
-}
 
 
 def add(commands: Commands) -> None:
-    """Add the commands."""
-    parser = add_campaign_command(commands, "list", _list, "a campaign's failures, in the order they were found")
-    for name, classes in CLASSES.items():
-        parser.add_argument(f"--{name}", choices=[each.value for each in classes], help=f"only of this {name}")
-    drove = [each.value for each in DrivenBy]
-    parser.add_argument("--driven-by", choices=drove, help="only those whose adversaries this drove")
-    for name, which in FILTERS.items():
-        parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only those {which}")
-    parser.add_argument("--raw", action="store_true", help="contacts and violations too that a rule refused")
-    add_limit(parser)
+    """Adds the commands."""
+    parser = add_newest_command(
+        commands,
+        "list",
+        _list,
+        "list the failures of a campaign",
+        example="campaigns failures list --preventable --distinct --sort severity",
+    )
+    add_filter_flags(parser)
+    parser.group("choice of failures").add_argument("--run", metavar="RUN", help="only those of this run")
 
-    parser = add_campaign_command(commands, "show", _show, "one failure in words and as a picture")
+    parser = add_campaign_command(
+        commands,
+        "show",
+        _show,
+        "print one failure in words and draw it",
+        example="campaigns failures show ID low-risk-sac-0-train-39 --out failure.png",
+    )
     _add_failure(parser)
-    twin = "draw beside it the same scene without an attack (idle), or with another ego"
-    parser.add_argument("--twin", choices=get_args(Twin), help=twin)
-    parser.add_argument("--out", type=Path, metavar="FILE.png", help="the picture (default: FAILURE.png)")
+    twins = get_args(Twin)
+    twin = f"draw beside it the same scene without an attack (idle), or with another ego: {', '.join(twins)}"
+    picture = parser.group("picture")
+    picture.add_argument("--twin", choices=twins, metavar="TWIN", help=twin)
+    picture.add_argument("--out", type=Path, metavar="FILE.png", help="(default: FAILURE.png)")
 
-    parser = add_campaign_command(commands, "bundle", _bundle, "fetch one failure as a file that stands alone")
+    parser = add_campaign_command(
+        commands,
+        "bundle",
+        _bundle,
+        "fetch one failure as a file that can be replayed alone",
+        example="campaigns failures bundle ID low-risk-sac-0-train-39 --out failure.npz",
+    )
     _add_failure(parser)
-    parser.add_argument(
+    output = parser.group("output")
+    output.add_argument(
         "--core", action="store_true", help="only what makes the ego fail, which takes the service 10 s"
     )
-    parser.add_argument("--out", type=Path, metavar="FILE.npz", help="(default: FAILURE.npz)")
+    output.add_argument("--out", type=Path, metavar="FILE.npz", help="(default: FAILURE.npz)")
 
 
-def _add_failure(parser: argparse.ArgumentParser) -> None:
+def _add_failure(parser: Parser) -> None:
     parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")
 
 
 def look_command(service_url: str, campaign_id: str, failure_id: str) -> str:
-    """What to type to look at a failure."""
+    """Returns the command that shows a failure."""
     return f"risk-sac campaigns failures show {campaign_id} {failure_id} --url {service_url}"
 
 
 def _list(options: argparse.Namespace) -> int:
-    filters = {name: getattr(options, name) for name in (*FILTERS, *CLASSES, "driven_by")}
+    filters: dict[str, Any] = wanted(options)
     with Client.from_environment(options.url) as client:
-        found = client.failures(options.id, tier="raw" if options.raw else "valid", **filters)
-        failures = list(itertools.islice(found, options.limit + 1))
-    print_answer(options, failures[: options.limit], failures_table(failures[: options.limit]))
-    if len(failures) > options.limit:
-        notes.print(f"There are more: --limit is {options.limit}.")
+        found = client.failures(
+            chosen_id(client, options), tier="raw" if options.raw else "valid", run=options.run, **filters
+        )
+        failures = listed(options, found)
+    print_answer(options, failures, failures_table(failures) if failures else "No failures to list.")
     return OK
 
 

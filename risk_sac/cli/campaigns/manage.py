@@ -5,9 +5,17 @@ import itertools
 import time
 from pathlib import Path
 
-from risk_sac.cli.campaigns.output import add_campaign_command, add_limit, campaigns_table, line, print_answer
+from risk_sac.cli.campaigns.output import (
+    add_campaign_command,
+    add_newest_command,
+    campaigns_table,
+    chosen_id,
+    line,
+)
 from risk_sac.cli.campaigns.watch import shown
-from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, Commands, add_command, write_out
+from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, print_answer, write_out
+from risk_sac.cli.failure_filters import add_limit
+from risk_sac.cli.parser import Commands, add_command
 from risk_sac.cli.regress import cases_table, junit
 from risk_sac.cli.report import OUT, format_of
 from risk_sac.client import Client
@@ -21,26 +29,48 @@ FILTERS = ("state", "family", "method", "label")
 
 
 def add(commands: Commands) -> None:
-    """Add the commands."""
-    parser = add_command(commands, "list", _list, "campaigns, newest first")
+    """Adds the commands."""
+    parser = add_command(
+        commands, "list", _list, "list campaigns, newest first", example="campaigns list --state running"
+    )
     for name in FILTERS:
-        parser.add_argument(f"--{name}", metavar=name.upper(), help=f"only with this {name}")
+        parser.group("choice of campaigns").add_argument(f"--{name}", metavar=name.upper(), help=f"only this {name}")
     add_limit(parser)
 
-    parser = add_campaign_command(commands, "cancel", _cancel, "stop a campaign; what it found stays")
-    parser.add_argument("--wait", action="store_true", help="until it has ended")
+    parser = add_campaign_command(
+        commands, "cancel", _cancel, "stop a campaign and keep what it found", example="campaigns cancel ID --wait"
+    )
+    parser.group("waiting").add_argument("--wait", action="store_true", help="return once it has ended")
 
-    parser = add_campaign_command(commands, "delete", _delete, "delete a campaign that has ended, and all it found")
+    add_campaign_command(
+        commands,
+        "delete",
+        _delete,
+        "delete a campaign that has ended, with all it found",
+        example="campaigns delete ID",
+    )
 
-    summary = "one file on what a campaign found, with bounds, coverage and limits"
-    parser = add_campaign_command(commands, "report", _report, summary)
-    parser.add_argument("--regression", metavar="ID", help="of a regression of it, to be told of in the report")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help=OUT)
+    parser = add_newest_command(
+        commands,
+        "report",
+        _report,
+        "write one file on what a campaign found, with bounds, coverage and limits",
+        example="campaigns report --out report.html",
+    )
+    output = parser.group("output")
+    output.add_argument("--regression", metavar="ID", help="add the outcome of this regression")
+    output.add_argument("--out", type=Path, required=True, metavar="FILE", help=OUT)
 
-    parser = add_command(commands, "regress", _regress, "play a campaign's distinct failures against another ego")
-    parser.add_argument("id", metavar="ID", help="of the campaign, which has ended")
-    parser.add_argument("--ego", required=True, metavar="EGO", help=EGO)
-    parser.add_argument("--junit", type=Path, metavar="FILE.xml", help="report for CI: a case per failure, named")
+    parser = add_campaign_command(
+        commands,
+        "regress",
+        _regress,
+        "play the distinct failures of an ended campaign against another ego",
+        example="campaigns regress ID --ego careful --junit regress.xml",
+    )
+    parser.group("cases").add_argument("--ego", required=True, metavar="EGO", help=EGO)
+    junit_help = "report for CI: a case per failure"
+    parser.group("output").add_argument("--junit", type=Path, metavar="FILE.xml", help=junit_help)
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -71,7 +101,7 @@ def _delete(options: argparse.Namespace) -> int:
 def _report(options: argparse.Namespace) -> int:
     format_ = format_of(options.out)
     with Client.from_environment(options.url) as client:
-        content = client.report(options.id, format_, options.regression)
+        content = client.report(chosen_id(client, options), format_, options.regression)
     write_out(options.out, content.encode(), "Report", notes)
     return OK
 

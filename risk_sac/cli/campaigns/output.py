@@ -1,69 +1,68 @@
 """Campaigns and results as one line, a table, or JSON. What others wrote is shown without control characters."""
 
 import argparse
-import json
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
-from pydantic import BaseModel
 from rich.box import SIMPLE_HEAD
-from rich.console import Group, RenderableType
+from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
 from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons, measured
-from risk_sac.cli.console import (
-    Commands,
-    add_command,
-    counted,
-    headline,
-    number,
-    on_one_line,
-    or_dash,
-    requirements_table,
-)
-from risk_sac.client import Campaign, CampaignSummary, Results
+from risk_sac.cli.console import counted, headline, on_one_line, or_dash, requirements_table
+from risk_sac.cli.parser import Commands, Parser, add_command
+from risk_sac.client import Campaign, CampaignSummary, Client, Results
 from risk_sac.config import IID_METHODS
+from risk_sac.errors import ConfigError
 from risk_sac.metrics import pooled_requirements
-from risk_sac.records import DrivenBy, Total, wire
-from risk_sac.terminal import console
+from risk_sac.records import DrivenBy, Total
+from risk_sac.terminal import notes
 
 COUNTS = ("head-\nline", "epi-\nsodes", "fail-\nures", "dis-\ntinct", "preven-\ntable")
 RATES = ("ECR\n95 %", "PCR\n95 %")
 
-Answer = BaseModel | Sequence[BaseModel] | Mapping[str, Any]
-
 
 def add_campaign_command(
-    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str
-) -> argparse.ArgumentParser:
-    """Add a command on one campaign; returns its parser."""
-    parser = add_command(commands, name, run, summary)
-    parser.add_argument("id", metavar="ID", help="of the campaign")
+    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str, *, example: str, **text: str
+) -> Parser:
+    """Adds a command on one campaign; returns its parser."""
+    parser = add_command(commands, name, run, summary, example=example, **text)
+    parser.add_argument("id", metavar="ID", help="id of the campaign")
     return parser
 
 
-def add_limit(parser: argparse.ArgumentParser) -> None:
-    """Add the flag that bounds a list."""
-    parser.add_argument("--limit", type=number(int, 1), default=20, metavar="N", help="at most (default: %(default)s)")
+def add_newest_command(
+    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str, *, example: str, **text: str
+) -> Parser:
+    """Adds a command on one campaign, by default the newest; returns its parser."""
+    parser = add_command(commands, name, run, summary, example=example, **text)
+    parser.add_argument("id", nargs="?", metavar="ID", help="id of the campaign (default: the newest)")
+    return parser
 
 
-def print_answer(options: argparse.Namespace, answer: Answer, text: RenderableType) -> None:
-    """Prints the answer as JSON where that is wanted, and the text otherwise."""
-    if options.json:
-        console.out(json.dumps(_plain(answer), allow_nan=False), highlight=False)
-    else:
-        console.print(text, markup=False, soft_wrap=isinstance(text, str))
+def chosen_id(client: Client, options: argparse.Namespace) -> str:
+    """Returns the id of the campaign that the command line names, or of the newest.
+
+    Raises:
+      ConfigError: the service has no campaign.
+    """
+    if options.id is not None:
+        return str(options.id)
+    newest = next(client.campaigns(page=1), None)
+    if newest is None:
+        raise ConfigError("ID", "nothing", "the id of a campaign", "the service has none yet")
+    notes.print(f"Newest campaign: {newest.id}", markup=False, soft_wrap=True)
+    return newest.id
 
 
 def line(campaign: CampaignSummary) -> str:
-    """Where a campaign stands."""
+    """Returns the state and the findings of a campaign as one line."""
     episodes = f"{campaign.progress.episodes_done}/{counted(campaign.progress.episodes_total, 'episode')}"
     return f"{campaign.id} {campaign.state}: {episodes}, {figures(campaign)}"
 
 
 def figures(campaign: CampaignSummary) -> str:
-    """What a campaign has found lately, by requirement where it is known, and what holds it up."""
+    """Returns the findings of a campaign in words, and the reason of its state."""
     progress = campaign.progress
     eta = "?" if progress.eta_s is None else f"{progress.eta_s:.0f} s"
     reason = f"; {campaign.state}, {on_one_line(campaign.reason)}" if campaign.reason else ""
@@ -105,7 +104,7 @@ def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
 
 
 def results_tables(results: Results, bounds: Bounds) -> Group:
-    """Per family and method the funnel with ECR and PCR, and the requirements; what breaks a bound says so in red."""
+    """Returns the funnel and the requirements of each family and method; broken bounds are red."""
     groups = {f"{group.family} {group.method}": group for group in measured(results)}
     said = {
         (name, each.name): f"above {each.bound:g}" if each.verdict == "above" else f"may be above {each.bound:g}"
@@ -170,9 +169,3 @@ def _rate(rate: float | None, low: float | None, high: float | None, broken: Com
     interval = f"{or_dash(low, '.2f')}-{or_dash(high, '.2f')}"
     said = "" if broken is None else "\nabove" if broken.verdict == "above" else f"\nup to {broken.upper:.2f}"
     return f"{or_dash(rate, '.2f')}\n{interval}{said}"
-
-
-def _plain(answer: Answer) -> Any:
-    if isinstance(answer, BaseModel):
-        return json.loads(wire(answer))
-    return answer if isinstance(answer, Mapping) else [_plain(each) for each in answer]

@@ -1,4 +1,4 @@
-"""`risk-sac campaigns` submit, watch and results: what a campaign found, and whether that is more than it may."""
+"""`risk-sac campaigns` submit, watch and results: follows a campaign and judges its results."""
 
 import argparse
 import itertools
@@ -13,8 +13,9 @@ from risk_sac.adjustments import adjustments
 from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, add_place_flags, campaign_flags, ego_flag
 from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, named_rate, verdict
 from risk_sac.cli.campaigns.junit import junit
-from risk_sac.cli.campaigns.output import add_campaign_command, figures, line, print_answer, results_tables
-from risk_sac.cli.console import OK, Board, Commands, add_command, columns, number, say_adjustments
+from risk_sac.cli.campaigns.output import add_newest_command, chosen_id, figures, line, results_tables
+from risk_sac.cli.console import OK, Board, columns, number, print_answer, say_adjustments
+from risk_sac.cli.parser import Commands, Parser, add_command
 from risk_sac.client import Campaign, Client, Episode, Results
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import read_posted
@@ -29,28 +30,40 @@ NAMED_FAILURES = 5  # of a run, in a JUnit report
 
 
 def add(commands: Commands) -> None:
-    """Add the commands."""
-    parser = add_command(commands, "submit", _submit, "queue a campaign")
+    """Adds the commands."""
+    parser = add_command(
+        commands,
+        "submit",
+        _submit,
+        "queue a campaign",
+        more="With --watch, follows it, shows its results and judges them as `watch` does.",
+        example="campaigns submit --families low --episodes 50 --watch --max-pcr 0.1",
+    )
     add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
     add_ego_flag(parser)
     add_place_flags(parser, MAP_UPLOADED)
-    parser.add_argument("--label", metavar="TEXT", help="to find it by")
-    parser.add_argument(
-        "--idempotency-key", metavar="KEY", help="the same key gives the same campaign, however often it is submitted"
+    service = parser.group("service")
+    service.add_argument("--label", metavar="TEXT", help="text to find the campaign by")
+    key = "the same key gives the same campaign, however often it is submitted"
+    service.add_argument("--idempotency-key", metavar="KEY", help=key)
+    service.add_argument("--watch", action="store_true", help="go on as `watch` does")
+    _add_watch_flags(parser)
+
+    example = "campaigns watch --max-ecr 0.2 --junit junit.xml"
+    parser = add_newest_command(
+        commands, "watch", _watch, "follow a campaign to its end and judge its results", example=example
     )
-    parser.add_argument("--watch", action="store_true", help="go on as `watch` does, with its flags:")
     _add_watch_flags(parser)
 
-    parser = add_campaign_command(commands, "watch", _watch, "follow a campaign to its end, then show its results")
-    _add_watch_flags(parser)
-
-    parser = add_campaign_command(commands, "results", _results, "what a campaign has found so far")
+    example = "campaigns results --max-ecr 0.2"
+    parser = add_newest_command(commands, "results", _results, "show the results of a campaign so far", example=example)
     _add_gate_flags(parser)
 
 
-def _add_watch_flags(parser: argparse.ArgumentParser) -> None:
+def _add_watch_flags(parser: Parser) -> None:
     _add_gate_flags(parser)
-    parser.add_argument("--timeout", type=number(float, 0.001), metavar="S", help="give up after so many seconds")
+    timeout = "give up after so many seconds"
+    parser.group("service").add_argument("--timeout", type=number(float, 0.001), metavar="S", help=timeout)
 
 
 def _prepare(options: argparse.Namespace) -> Bounds:
@@ -83,14 +96,15 @@ def _follow(client: Client, campaign_id: str, options: argparse.Namespace) -> in
 def _watch(options: argparse.Namespace) -> int:
     bounds = _prepare(options)
     with Client.from_environment(options.url) as client:
-        _check_names(bounds, client.campaign(options.id).spec)
-        return _follow(client, options.id, options)
+        campaign_id = chosen_id(client, options)
+        _check_names(bounds, client.campaign(campaign_id).spec)
+        return _follow(client, campaign_id, options)
 
 
 def _results(options: argparse.Namespace) -> int:
     _prepare(options)
     with Client.from_environment(options.url) as client:
-        return _conclude(client, options.id, options)
+        return _conclude(client, chosen_id(client, options), options)
 
 
 def _conclude(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
@@ -129,19 +143,20 @@ def _first_failures(client: Client, campaign_id: str, run_id: str) -> list[Episo
     return list(found.values())[:NAMED_FAILURES]
 
 
-def _add_gate_flags(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--max-ecr", type=RATE, metavar="X", help="exit with 1 unless every ECR is within it")
-    parser.add_argument("--max-pcr", type=RATE, metavar="X", help="exit with 1 unless every PCR is within it")
-    rate = "exit with 1 unless every rate of this requirement is within it, of the i.i.d. phase too; may be repeated"
-    parser.add_argument("--max-rate", type=named_rate, action="append", metavar="NAME=X", help=rate)
-    preventable = "exit with 1 if a family and method has found more distinct preventable failures, of any requirement"
-    parser.add_argument("--max-preventable", type=number(int, 0), metavar="N", help=preventable)
-    known = "exit with 1 if a kind of failure, of any requirement, is not in an earlier campaign's `results --json`"
-    parser.add_argument("--no-new-failures", type=Path, metavar="KNOWN.json", help=known)
-    judged = "what has to lie within: the upper end of the rate's 95 %% interval, or the rate (default: interval)"
-    parser.add_argument("--judge-by", choices=JUDGED_BY, default=JUDGED_BY[0], help=judged)
-    cases = "report for CI: a suite per family, a case per run and per requirement of a method, failures named"
-    parser.add_argument("--junit", type=Path, metavar="FILE.xml", help=cases)
+def _add_gate_flags(parser: Parser) -> None:
+    bounds = parser.group("bounds, for exit status 1")
+    bounds.add_argument("--max-ecr", type=RATE, metavar="X", help="largest ECR of a family and method")
+    bounds.add_argument("--max-pcr", type=RATE, metavar="X", help="largest PCR of a family and method")
+    rate = "largest rate of this requirement, of the i.i.d. phase too; may be repeated"
+    bounds.add_argument("--max-rate", type=named_rate, action="append", metavar="NAME=X", help=rate)
+    preventable = "most distinct preventable failures of a family and method"
+    bounds.add_argument("--max-preventable", type=number(int, 0), metavar="N", help=preventable)
+    known = "no kind of failure that is not in an earlier campaign's `results --json`"
+    bounds.add_argument("--no-new-failures", type=Path, metavar="KNOWN.json", help=known)
+    judged = "compare the upper end of the rate's 95 %% interval, or the rate (default: interval)"
+    bounds.add_argument("--judge-by", choices=JUDGED_BY, default=JUDGED_BY[0], help=judged)
+    cases = "report for CI: a suite per family, a case per run and per requirement of a method"
+    parser.group("output").add_argument("--junit", type=Path, metavar="FILE.xml", help=cases)
 
 
 LINE_S = 10.0  # between two lines, unless the state changes
@@ -150,7 +165,7 @@ AT_WORK = ("running", "cancelling")
 
 @contextmanager
 def shown() -> Iterator[Callable[[Campaign], None]]:
-    """What shows a campaign on standard error whenever it is called with it."""
+    """Yields a function that shows a campaign on standard error."""
     if not notes.is_interactive:
         yield _Lines()
         return
@@ -178,7 +193,7 @@ class _Lines:
 
 
 def _network_id(client: Client, called: object) -> object:
-    """The id of the uploaded network that has a label; anything else is left to the service to refuse."""
+    """Returns the id of the uploaded network with a label; the service refuses unknown ones."""
     found = [network for network in client.networks() if called in (network.id, network.label)]
     if len(found) > 1:
         ids = ", ".join(network.id for network in found)

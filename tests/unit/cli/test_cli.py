@@ -11,7 +11,7 @@ import pytest
 from rich.console import Console
 
 from risk_sac import __version__, cli
-from risk_sac.cli.show import _failures
+from risk_sac.cli.show import _table
 from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.execution.runs import run
@@ -60,7 +60,7 @@ def test_results_hold_spec_metrics_versions_and_failures(folder: Path) -> None:
 
 
 def test_show_lists_the_failures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["show", str(folder)]) == 0
+    assert cli.main(["show", str(folder), "--raw"]) == 0
     printed = capsys.readouterr().out
     results = read_results(folder)
     assert results.spec.id in printed
@@ -82,8 +82,7 @@ def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(
         fault=Fault.SHARED,
     )
     episode = synthetic_contact(judged).episode
-    results = Results(spec=SPEC, spec_digest="", finished=True, failures=(RecordedFailure.of(SPEC.id, episode),))
-    Console(width=80).print(_failures(results))
+    Console(width=80).print(_table(SPEC.id, [RecordedFailure.of(SPEC.id, episode)]))
     printed = capsys.readouterr().out
     assert "…" not in printed
     for word in (grade or "failure", "crossing vehicle", "-11.2, -1301 -1202", "wrong", "moderate", "fault: shared"):
@@ -95,8 +94,7 @@ def test_the_list_names_failed_rules_in_full_within_80_columns(capsys: pytest.Ca
     rules = "conflict_after_release, ego_model_saw, no_spawn_overlap"
     contact = synthetic_contact(judgement(None, conflict_type=ConflictType.CROSSING))
     failed = contact.episode.model_copy(update={"outcome": Outcome.DEGENERATE, "reason": rules})
-    results = Results(spec=SPEC, spec_digest="", finished=True, failures=(RecordedFailure.of(SPEC.id, failed),))
-    Console(width=80).print(_failures(results))
+    Console(width=80).print(_table(SPEC.id, [RecordedFailure.of(SPEC.id, failed)]))
     printed = capsys.readouterr().out
     assert "…" not in printed
     for word in rules.replace(",", "").replace("_", " ").split():
@@ -109,8 +107,7 @@ def test_the_list_says_which_requirement_was_violated_without_contact(capsys: py
         requirement="a" * 20 + "b" * 20, time_s=12.25, broke=("red_light",), grade=Grade.UNAVOIDABLE, **near
     )
     episode = synthetic_contact().episode.model_copy(update={"collision": None, "violations": (long, violation())})
-    results = Results(spec=SPEC, spec_digest="", finished=True, failures=(RecordedFailure.of(SPEC.id, episode),))
-    Console(width=80).print(_failures(results))
+    Console(width=80).print(_table(SPEC.id, [RecordedFailure.of(SPEC.id, episode)]))
     printed = capsys.readouterr().out
     assert "…" not in printed
     assert "ego: red" in printed
@@ -119,8 +116,7 @@ def test_the_list_says_which_requirement_was_violated_without_contact(capsys: py
 
 
 def test_the_list_shows_what_nobody_judged(capsys: pytest.CaptureFixture[str]) -> None:
-    results = Results(spec=SPEC, spec_digest="", finished=True, failures=(synthetic_contact(None),))
-    Console(width=80).print(_failures(results))
+    Console(width=80).print(_table(SPEC.id, [synthetic_contact(None)]))
     printed = capsys.readouterr().out
     assert "failure" in printed
     assert "None" not in printed
@@ -139,11 +135,12 @@ def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder: Path, t
 
 
 @pytest.mark.parametrize("unknown", ["999", "x", "-1", "²"])
-def test_show_names_the_known_contacts(folder: Path, unknown: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_show_names_the_range_of_numbers(folder: Path, unknown: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["show", str(folder), "--", unknown]) == 2
     complaint = capsys.readouterr().err
     assert complaint.startswith("FAILURE: ")
-    assert read_results(folder).failures[0].id in complaint
+    indices = [each.episode.index for each in read_results(folder).failures]
+    assert f"numbers from {indices[0]} to {indices[-1]};" in complaint
 
 
 @pytest.mark.parametrize(
@@ -161,14 +158,14 @@ def test_show_refuses_what_run_did_not_write(
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--family", "high"], "family: "),
-        (["--family", "low", "--method", "magic"], "method: "),
-        (["--family", "low", "--ego", "nobody-s"], "ego.driver: "),
-        (["--family", "low", "--ego", "No/body"], "spec: "),
-        (["--family", "low", "--episodes", "-3"], "budget.episodes: "),
-        (["--family", "low", "--seed", "-1"], "seed: "),
-        ([], "family: "),
-        (["--spec", "nowhere.yaml"], "spec: "),
+        (["--family", "high"], "--family: "),
+        (["--family", "low", "--method", "magic"], "--method: "),
+        (["--family", "low", "--ego", "nobody-s"], "--ego: "),
+        (["--family", "low", "--ego", "No/body"], "--ego: "),
+        (["--family", "low", "--episodes", "-3"], "--episodes: "),
+        (["--family", "low", "--seed", "-1"], "--seed: "),
+        ([], "--family is missing; choose low, mixed or dense"),
+        (["--spec", "nowhere.yaml"], "--spec: "),
     ],
 )
 def test_wrong_settings_name_the_field_and_leave_no_folder(
@@ -198,7 +195,7 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path, capsys: pyt
     (tmp_path / "file").write_text("")
     assert cli.main(["run", "--family", "low", "--method", "random", "--out", str(tmp_path / "file" / "out")]) == 2
     complaint = capsys.readouterr().err
-    assert re.fullmatch(r"out: got .*/file/out, which cannot be written \(Not a directory\); wanted .*\n", complaint)
+    assert re.fullmatch(r"--out: got .*/file/out, which cannot be written \(Not a directory\); wanted .*\n", complaint)
 
 
 def test_interrupt_ends_the_run_after_its_episode_and_it_goes_on(tmp_path: Path) -> None:

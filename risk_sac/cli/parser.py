@@ -1,0 +1,134 @@
+"""Argument parser of all commands: grouped flags, an example in the help, and errors that suggest a name."""
+
+import argparse
+import re
+import textwrap
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NoReturn, TypeAlias
+
+from risk_sac.cli.console import MISUSED
+from risk_sac.errors import ConfigError, did_you_mean
+from risk_sac.terminal import complain
+
+WIDTH = 78
+RESULTS_HELP = "folder of a run, or its results.json"
+FAILURE_HELP = "id of a failure, or the number at its end"
+
+Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
+"""Where a group of commands adds its parsers."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser with titled groups of flags, whose errors name the closest known name."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+        self._titled: dict[str, argparse._ArgumentGroup] = {}
+
+    def group(self, title: str) -> "argparse._ArgumentGroup":
+        """Returns the group of flags with a title; adds it the first time."""
+        if title not in self._titled:
+            self._titled[title] = self.add_argument_group(title)
+        return self._titled[title]
+
+    def flags(self) -> list[str]:
+        """Returns the names of all flags."""
+        return re.findall(r"(?<![\w-])--[a-z][\w-]*", self.format_usage())
+
+    def refuse(self, unknown: Sequence[str]) -> NoReturn:
+        """Ends the program because of words that no flag or argument takes."""
+        name = unknown[0].partition("=")[0]
+        if not name.startswith("--"):
+            self.error(f"{name!r} is one argument too many")
+        self.error(f"there is no flag {name}" + _sentence(did_you_mean(name, self.flags())))
+
+    def error(self, message: str) -> NoReturn:
+        """Ends the program with one line on what is wrong, and where to read on."""
+        complain(f"{self.prog}: {message.removeprefix('argument ')}\n`{self.prog} --help` lists what it takes.")
+        raise SystemExit(MISUSED)
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Overrides argparse's message for a value that is none of the choices."""
+        if action.choices is not None and value not in action.choices:
+            known = [str(each) for each in action.choices]
+            hint = did_you_mean(str(value), known) or f"choose {_listed(known)}"
+            raise argparse.ArgumentError(action, f"there is no {str(value)!r}" + _sentence(hint))
+
+
+def add_command(
+    commands: Commands,
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    summary: str,
+    *,
+    example: str,
+    more: str = "",
+    epilog: str = "",
+) -> Parser:
+    """Adds a command that `run` executes; returns its parser.
+
+    Args:
+      commands: the group it belongs to.
+      name: as typed.
+      run: takes the parsed options; returns the exit status.
+      summary: one line for the list of commands, without a capital and without a full stop.
+      example: a command line that works, without `risk-sac` in front.
+      more: sentences that continue the summary in the command's own help.
+      epilog: printed below the example, with its line breaks.
+    """
+    parser = add_group(commands, name, summary, example=example, more=more, epilog=epilog)
+    parser.set_defaults(command=run, parser=parser)
+    return parser
+
+
+def add_group(commands: Commands, name: str, summary: str, *, example: str, more: str = "", epilog: str = "") -> Parser:
+    """Adds a command that has commands of its own; the arguments are those of `add_command`."""
+    paragraph = textwrap.fill(f"{summary[0].upper()}{summary[1:]}. {more}".strip(), WIDTH)
+    return commands.add_parser(name, help=summary, description=paragraph, epilog=example_text(example, epilog))
+
+
+def example_text(example: str, epilog: str = "") -> str:
+    """Returns the end of a help text: the example, broken where a line is full, and what follows it."""
+    lines = textwrap.wrap(
+        f"risk-sac {example}", WIDTH - 6, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
+    )
+    return "example:\n  " + " \\\n  ".join(lines) + (f"\n\n{epilog}" if epilog else "")
+
+
+def add_failure_arguments(parser: Parser, default: str) -> None:
+    """Adds the arguments that name a run and one of its failures."""
+    parser.add_argument("results", type=Path, metavar="RESULTS", help=RESULTS_HELP)
+    parser.add_argument("failure", nargs="?", metavar="FAILURE", help=f"{FAILURE_HELP}; {default}")
+
+
+def add_json_flag(parser: Parser) -> None:
+    """Adds the flag that `print_answer` reads."""
+    parser.group("output").add_argument("--json", action="store_true", help="print one JSON document instead of tables")
+
+
+def as_typed(error: ConfigError, options: argparse.Namespace) -> str:
+    """Returns the message of a setting that is wrong, named by its flag if it can only come from there.
+
+    A flag that was not given, beside a file of settings, keeps the name of the field.
+    """
+    for part in reversed(re.split(r"[.\[]", error.field)):
+        given = vars(options).get(part.replace("-", "_"), "")
+        if f"--{part}".replace("_", "-") not in options.parser.flags():
+            continue
+        if given is None and vars(options).get("spec") is not None:
+            break
+        error.field = f"--{part}".replace("_", "-")
+        break
+    if error.got != "nothing":
+        return str(error)
+    hints = [f"choose {error.expected}" if error.expected else "", error.remedy]
+    return "; ".join([f"{error.field} is missing", *filter(None, hints)])
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
+
+
+def _sentence(hint: str) -> str:
+    return f"; {hint}" if hint else ""

@@ -1,0 +1,79 @@
+import re
+import shlex
+from argparse import _SubParsersAction
+from collections.abc import Iterator
+
+import pytest
+
+from risk_sac import cli
+from risk_sac.cli.parser import Parser
+
+
+def leaves(parser: Parser) -> Iterator[Parser]:
+    """All commands, those of groups included."""
+    groups = [action for action in parser._actions if isinstance(action, _SubParsersAction)]
+    yield parser
+    for group in groups:
+        for each in group.choices.values():
+            if each.description:  # `keys` hands its words on
+                yield from leaves(each)
+
+
+COMMANDS = {parser.prog: parser for parser in leaves(cli._parser())}
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_has_a_paragraph_an_example_that_parses_and_fits_80_columns(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    text = COMMANDS[name].format_help()
+    assert all(len(line) <= 80 for line in text.splitlines()), text
+    example = re.search(r"^example:\n((?:  .*\n?)+)", text, re.MULTILINE)
+    assert example is not None, text
+    words = shlex.split(example[1].replace("\\\n", ""))
+    assert words[0] == "risk-sac"
+    options, unknown = cli._parser().parse_known_args(words[1:])
+    assert not unknown
+    assert options.parser.prog.startswith(name)
+
+
+@pytest.mark.parametrize("name", ["run", "evaluate", "campaigns submit", "show", "benchmark"])
+def test_flags_are_grouped(name: str) -> None:
+    text = COMMANDS[f"risk-sac {name}"].format_help()
+    options = text.partition("\noptions:\n")[2].partition("\n\n")[0]
+    assert options.split() == ["-h,", "--help", "show", "this", "help", "message", "and", "exit"]
+    assert "\noutput:\n" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("shwo", "there is no 'shwo'; did you mean show?"),
+        ("campaigns lst", "did you mean list?"),
+        ("run --family low --episdes 3 --out x", "there is no flag --episdes; did you mean --episodes?"),
+        ("run --family lwo --out x", '--family: got "lwo"'),
+        ("run --family lwo --out x", "did you mean low?"),
+        ("run --family low --method archve --out x", "did you mean archive?"),
+        ("run --family low --ego r175 --out x", "did you mean r157?"),
+        ("export x.npz --format openscenariox --out y", "did you mean openscenario?"),
+        ("run --method archive --out x", "--family is missing; choose low, mixed or dense"),
+        ("run --family low", "--out"),
+        ("run --family low --out x more", "'more' is one argument too many"),
+        ("evaluate --families low --seeds 0 --out x", "--seeds: got 0"),
+    ],
+)
+def test_a_wrong_word_is_named_as_typed_beside_what_is_close(
+    words: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        status = cli.main(words.split())
+    except SystemExit as ended:
+        status = ended.code  # type: ignore[assignment]
+    assert status == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["run", "show", "evaluate", "verify", "clusters"])
+def test_json_is_a_flag_of_the_commands_with_results(name: str) -> None:
+    assert "--json" in COMMANDS[f"risk-sac {name}"].flags()
