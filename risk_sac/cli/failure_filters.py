@@ -3,7 +3,8 @@
 import argparse
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
-from typing import NamedTuple, TypeAlias, TypeVar
+from operator import itemgetter
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from risk_sac.cli.console import number
 from risk_sac.cli.parser import Parser
@@ -55,8 +56,7 @@ def _gravest(worst: Worst) -> tuple[int, bool, bool]:
     return -rank, not worst.preventable, worst.blamed is not Fault.EGO
 
 
-SORTS: Mapping[str, Callable[[Worst], object]] = {
-    "found": lambda _: 0,
+SORTS: Mapping[str, Callable[[Worst], Any]] = {
     "severity": _gravest,
     "speed": lambda worst: -worst.ego_speed_mps,
 }
@@ -76,7 +76,9 @@ def add_filter_flags(parser: Parser) -> None:
     )
     group.add_argument("--distinct", action="store_true", help="only the first of each kind")
     group.add_argument("--raw", action="store_true", help="also those that a validity rule refused")
-    group.add_argument("--sort", choices=list(SORTS), default="found", help=f"by {SORTED_BY} (default: found)")
+    group.add_argument(
+        "--sort", choices=["found", *SORTS], metavar="ORDER", default="found", help=f"by {SORTED_BY} (default: found)"
+    )
     add_limit(parser)
 
 
@@ -109,9 +111,9 @@ def listed(options: argparse.Namespace, failures: Iterable[E]) -> list[E]:
     if options.distinct:
         failures = _first_of_each_kind(failures)
     if options.sort != "found":
-        judged = [(failure, failure.worst_violation) for failure in failures]
         order = SORTS[options.sort]
-        failures = [each for each, _ in sorted(((f, w) for f, w in judged if w), key=lambda pair: order(pair[1]))]
+        judged = ((order(worst), each) for each in failures if (worst := each.worst_violation))
+        failures = [each for _, each in sorted(judged, key=itemgetter(0))]
     found = list(islice(failures, options.limit + 1))
     if len(found) > options.limit:
         notes.print(f"There are more: --limit is {options.limit}.")

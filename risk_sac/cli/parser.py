@@ -23,7 +23,8 @@ class Parser(argparse.ArgumentParser):
     """Parser with titled groups of flags, whose errors name the closest known name."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+        options["formatter_class"] = argparse.RawDescriptionHelpFormatter
+        super().__init__(*args, **options)
         self._titled: dict[str, argparse._ArgumentGroup] = {}
 
     def group(self, title: str) -> "argparse._ArgumentGroup":
@@ -90,9 +91,10 @@ def add_group(commands: Commands, name: str, summary: str, *, example: str, more
 
 def example_text(example: str, epilog: str = "") -> str:
     """Returns the end of a help text: the example, broken where a line is full, and what follows it."""
-    lines = textwrap.wrap(
-        f"risk-sac {example}", WIDTH - 6, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False
-    )
+    line = f"risk-sac {example}"
+    lines = [line]
+    if len(line) > WIDTH - 2:
+        lines = textwrap.wrap(line, WIDTH - 6, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
     return "example:\n  " + " \\\n  ".join(lines) + (f"\n\n{epilog}" if epilog else "")
 
 

@@ -6,13 +6,13 @@ from risk_sac.cli.parser import Commands, add_group, add_json_flag
 
 EPILOG = """exit status:
   0    fine
-  1    a bound is broken: the upper end of the 95 % interval of a rate lies above
-       --max-ecr, --max-pcr or --max-rate (with --judge-by rate: the rate does),
-       or there are more distinct preventable failures than --max-preventable, or
-       a kind that --no-new-failures does not know; controls such as no-adversary
+  1    a bound is broken: the upper end of the 95 % interval of a rate is above
+       --max-ecr, --max-pcr or --max-rate (with --judge-by rate: the rate is), or
+       there are more distinct preventable failures than --max-preventable, or a
+       kind that --no-new-failures does not know; controls such as no-adversary
        count like any other method
-  2    it could not run: the campaign failed, was cancelled or (with a bound) has
-       not ended; the service refuses or does not answer; the time is up; an
+  2    it could not run: the campaign failed, was cancelled or (with a bound)
+       has not ended; the service refuses or does not answer; the time is up; an
        argument is wrong
   130  interrupted; the campaign goes on
 
