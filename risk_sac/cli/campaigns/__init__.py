@@ -7,7 +7,7 @@ from risk_sac.cli.parser import Commands, add_group, add_json_flag
 EPILOG = """exit status:
   0    fine
   1    a bound is broken: the upper end of the 95 % interval of a rate is above
-       --max-ecr, --max-pcr or --max-rate (with --judge-by rate: the rate is), or
+       --max-ecr, --max-pcr or --max-rate (with --judge-by rate: the rate), or
        there are more distinct preventable failures than --max-preventable, or a
        kind that --no-new-failures does not know; controls such as no-adversary
        count like any other method
