@@ -45,18 +45,13 @@ class Detection(Record):
     episode: EpisodeRecord | None
     """In which that happened; its time series is in the folder."""
 
-    def settles(self, steps: int) -> bool:
-        """Whether it says how a run with a budget of so many steps ends."""
-        return self.detected is not None or self.budget_steps >= steps
-
     def within(self, steps: int) -> Self:
-        """Returns the outcome of the same run with a budget of so many steps; episodes and refuted stay."""
+        """Returns the outcome of the same run with a smaller budget; what it has spent stays."""
         times = {name: getattr(self, name) for name in ("reached", "triggered", "detected")}
         changed = {name: None if at is None or at > steps else at for name, at in times.items()}
-        changed |= {"budget_steps": steps, "steps": min(self.steps, steps)}
         if changed["detected"] is None:
             changed |= {"signature": "", "episode": None}
-        return self.model_copy(update=changed)
+        return self.model_copy(update=changed | {"budget_steps": steps})
 
 
 @dataclass(slots=True)
@@ -89,24 +84,36 @@ class _Candidates:
 
 
 def answer_of(folder: Path, budget_steps: int) -> Detection | None:
-    """Returns the outcome of a run with this budget; None if it has not been played so far."""
-    played = _stored(folder)
-    return played.within(budget_steps) if played is not None and played.settles(budget_steps) else None
+    """Returns the outcome of a run with this budget; None if it has not been called with so much.
+
+    A run that detected early ends alike with any larger budget. It counts for that once it is called with it, as the
+    runs beside it that detected nothing do; else those that detected would be the first to count.
+    """
+    stored = _stored(folder)
+    return stored.within(budget_steps) if stored is not None and stored.budget_steps >= budget_steps else None
 
 
 def first_detection(spec: RunSpec, folder: Path, budget_steps: int) -> Detection:
     """Returns how soon a run detects its ego's defects; from the folder if it says so already.
 
     Args:
-      spec: of the run; its budget of episodes counts for undisturbed scenes alone.
+      spec: of the run; its budget of episodes does not count.
       folder: of the run, kept up to the detection. A run that was interrupted or had a smaller budget goes on.
       budget_steps: environment steps after which it ends.
     """
     if known := answer_of(folder, budget_steps):
         return known
-    if not spec.iid:
-        spec = spec.model_copy(update={"budget": Budget(episodes=MOST_EPISODES)})
     before = _stored(folder)
+    if before is not None and before.detected is not None:
+        detection = before.model_copy(update={"budget_steps": budget_steps})
+    else:
+        detection = _play(spec, folder, budget_steps, before)
+    replace_file(folder / ANSWER, detection.model_dump_json(indent=2).encode())
+    return detection.within(budget_steps)
+
+
+def _play(spec: RunSpec, folder: Path, budget_steps: int, before: Detection | None) -> Detection:
+    spec = spec.model_copy(update={"budget": Budget(episodes=MOST_EPISODES)})
     seen = _Candidates(spec, budget_steps, judged=before.episodes if before else 0)
     found, refuted, failure = None, before.refuted if before else 0, None
     while found is None:
@@ -119,7 +126,7 @@ def first_detection(spec: RunSpec, folder: Path, budget_steps: int) -> Detection
             found, refuted = (record, refuted) if failure else (None, refuted + 1)
         if seen.spent:
             break
-    detection = Detection(
+    return Detection(
         defects=spec.ego.defects,
         family=spec.family,
         method=spec.method,
@@ -134,8 +141,6 @@ def first_detection(spec: RunSpec, folder: Path, budget_steps: int) -> Detection
         signature="" if failure is None else failure.signature,
         episode=found,
     )
-    replace_file(folder / ANSWER, detection.model_dump_json(indent=2).encode())
-    return detection.within(budget_steps)
 
 
 def _stored(folder: Path) -> Detection | None:

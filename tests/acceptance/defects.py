@@ -10,35 +10,27 @@ search detects the defect there and the undisturbed scenes do not.
 import argparse
 import csv
 import io
-import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from risk_sac.benchmark.detection import ANSWER, Detection, first_detection
+from risk_sac.benchmark.detection import Detection, first_detection
 from risk_sac.benchmark.runs import Benchmark, ego_with, ended, folder_of
-from risk_sac.config import Budget, RunSpec
+from risk_sac.config import RunSpec
 from risk_sac.egos.defects.catalogue import DEFECTS, version_of
 from risk_sac.egos.registry import pinned
 from risk_sac.errors import RiskSacError
 from risk_sac.run_folder.durable import replace_file
 
 UNDISTURBED, METHODS, FIRST_SEED = "iid-undisturbed", ("archive", "random"), 1
+SCENE_STEPS = 150  # of a whole scene; shorter ones make it more scenes
 COLUMNS = ("defect", "version", "family", "undisturbed_scenes", "undisturbed_detected", "method", "seed", "detected")
 
 
 def undisturbed(name: str, options: argparse.Namespace) -> Detection:
-    """Plays the undisturbed scenes of a defect up to one that detects it."""
-    budget = Budget(episodes=options.scenes)
-    spec = RunSpec(
-        family=DEFECTS[name].families[0], method=UNDISTURBED, seed=501, ego=pinned(ego_with(name)), budget=budget
-    )
-    folder = folder_of(spec, options.out / f"undisturbed-{options.scenes}")
-    detection = first_detection(spec, folder, sys.maxsize)
-    for path in folder.iterdir():  # what a finished run leaves
-        if path.name != ANSWER:
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
-    return detection
+    """Plays the undisturbed scenes of a defect up to one that detects it; a later call with more goes on."""
+    spec = RunSpec(family=DEFECTS[name].families[0], method=UNDISTURBED, seed=501, ego=pinned(ego_with(name)))
+    return first_detection(spec, folder_of(spec, options.out), options.scenes * SCENE_STEPS)
 
 
 def search(name: str, options: argparse.Namespace) -> Detection | None:

@@ -39,7 +39,7 @@ def test_a_search_ends_at_the_first_detection(found: Detection, folder: Path) ->
     assert found.episode is not None
     assert found.episode.collision is not None
     assert found.signature == found.episode.collision.signature
-    assert first_detection(SPEC, folder, 10 * STEPS) == found.within(10 * STEPS)  # nothing is played again
+    assert first_detection(SPEC, folder, STEPS) == found  # nothing is played again
     (folder / "detection.json").unlink()
     assert first_detection(SPEC, folder, STEPS) == found  # from the checkpoint
 
@@ -72,7 +72,7 @@ def test_a_search_that_detects_nothing_ends_with_its_budget(tmp_path: Path) -> N
     spec = SPEC.model_copy(update={"family": "low", "method": "random", "ego": read_ego("default+sumo-distracted")})
     found = first_detection(spec, tmp_path, 300)
     assert (found.detected, found.reached, found.signature) == (None, None, "")
-    assert found.steps == found.budget_steps == 300
+    assert 300 <= found.steps < 500
 
 
 def test_a_larger_budget_goes_on_with_what_was_played(tmp_path: Path) -> None:
@@ -83,7 +83,8 @@ def test_a_larger_budget_goes_on_with_what_was_played(tmp_path: Path) -> None:
     whole, twice = first_detection(spec, tmp_path / "once", 900), first_detection(spec, tmp_path / "twice", 900)
     assert twice == whole
     assert (tmp_path / "twice" / "checkpoint").stat().st_mtime_ns > began
-    assert first_detection(spec, tmp_path / "twice", 400) == short.model_copy(update={"episodes": whole.episodes})
+    assert first_detection(spec, tmp_path / "twice", 400) == whole.within(400)
+    assert whole.within(400).reached == short.reached
 
 
 def test_the_benchmark_goes_on_where_it_was(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from risk_sac.benchmark import table
-from risk_sac.benchmark.detection import Detection
+from risk_sac.benchmark.detection import ANSWER, Detection, answer_of, first_detection
 from risk_sac.benchmark.statistics import balanced, friedman, log_rank, restricted_means, summaries, survival
 from risk_sac.benchmark.table import curves, defects_table, detections_csv, methods_table, write
-from risk_sac.config import RunMethod
+from risk_sac.config import RunMethod, RunSpec
+from risk_sac.config.spec_file import read_ego
 
 BUDGET = 1000
 
@@ -79,13 +80,21 @@ def test_tables_hold_every_run() -> None:
 
 
 def test_a_run_tells_what_a_smaller_budget_would_have_told() -> None:
-    (late,), (never,) = runs("archive", "latency", 400), runs("archive", "latency", None)
+    (late,) = runs("archive", "latency", 400)
     early = late.within(300)
-    assert (early.detected, early.signature, early.budget_steps, early.steps) == (None, "", 300, 300)
-    assert (late.within(400).detected, late.within(9000).budget_steps) == (400, 9000)
-    assert late.settles(9000)  # it has ended
-    assert never.settles(BUDGET)
-    assert not never.settles(BUDGET + 1)
+    assert (early.detected, early.triggered, early.signature, early.budget_steps) == (None, None, "", 300)
+    assert late.within(400).detected == 400
+
+
+def test_an_early_detection_counts_for_a_larger_budget_once_it_is_called_with_it(tmp_path: Path) -> None:
+    (early,) = runs("archive", "latency", 400)
+    spec = RunSpec(family="low", method="archive", seed=0, ego=read_ego("idm-aeb+latency"))
+    (tmp_path / ANSWER).write_text(early.model_dump_json())
+    assert answer_of(tmp_path, BUDGET) == early
+    assert answer_of(tmp_path, 2 * BUDGET) is None
+    assert first_detection(spec, tmp_path, 2 * BUDGET) == early.within(2 * BUDGET)  # plays nothing
+    assert answer_of(tmp_path, 2 * BUDGET) == early.within(2 * BUDGET)
+    assert answer_of(tmp_path, BUDGET) == early
 
 
 def test_methods_are_compared_on_what_each_has_played() -> None:
