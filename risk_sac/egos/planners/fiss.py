@@ -24,6 +24,7 @@ PIECE_M = 50.0  # of a lane; the planner's step takes as long as the lanes near 
 GROWN_M = 0.2  # by which others are longer and wider
 MOVING_MPS = 0.5  # from which another's heading is that of its velocity
 MOST_BRAKING_MPS2 = 8.0  # that a plan may have; in an emergency the car brakes as it can
+FOLLOW_S = 0.2  # within which the car reaches its plan's speed
 BEYOND_S = 0.5  # by which predictions reach beyond the longest plan
 
 
@@ -62,8 +63,10 @@ class FrenetPlanner:
             return Control(-self._car.brake_mps2)
         t = plan.trajectory
         planned = Trajectory(*(np.asarray(row) for row in (t.t, t.x, t.y, t.v)))
-        command = track(planned, Motion(ego.x, ego.y, ego.yaw, ego.v, ego.a), self._car)
-        return command._replace(accel_mps2=-self._car.brake_mps2) if plan.emergency else command
+        steering = track(planned, Motion(ego.x, ego.y, ego.yaw, ego.v, ego.a), self._car).steering_rad
+        wanted = float(np.interp(FOLLOW_S, planned.time_s, planned.speed_mps))
+        accel = -self._car.brake_mps2 if plan.emergency else (wanted - ego.v) / FOLLOW_S
+        return Control(accel, steering)
 
     def close(self) -> None:
         """Releases nothing."""
