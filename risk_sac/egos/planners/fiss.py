@@ -25,14 +25,16 @@ GROWN_M = 0.2  # by which others are longer and wider
 MOVING_MPS = 0.5  # from which another's heading is that of its velocity
 MOST_BRAKING_MPS2 = 8.0  # that a plan may have; in an emergency the car brakes as it can
 FOLLOW_S = 0.2  # within which the car reaches its plan's speed
+BEYOND_M = 20.0  # by which the lanes it looks at reach beyond the longest plan; more of them only take time
 BEYOND_S = 0.5  # by which predictions reach beyond the longest plan
 
 
 class FrenetPlanner:
-    """The package's local planner on the road that the seam tells; the seam's tracker follows its plans.
+    """The package's local planner on the road that the seam tells; the car follows its plans.
 
-    Its own MPC does not know the wheels' angle. In three staged starts it went up to 1.4 m beyond a plan, that
-    tracker up to 0.4 m.
+    It steers as the seam's tracker does. Its speed is the plan's of `FOLLOW_S` from now: with the tracker's 0.5 s it
+    braked too late into a stop. The package's own MPC does not know the wheels' angle. In three staged starts, which
+    are too few to tell them apart, that went up to 1.4 m beyond a plan's widest point, the tracker up to 0.4 m.
     """
 
     kind: ClassVar[str]
@@ -79,6 +81,8 @@ class FrenetPlanner:
         config.emergency_decel = self._car.brake_mps2
         config.planner.collision.ignore_rear_in_lane = True  # as it drives in CARLA: those behind react
         self._reach_s = config.planner.sampling.max_t + BEYOND_S
+        way_m = config.desired_speed * config.planner.sampling.max_t + BEYOND_M
+        config.route.lookahead = min(config.route.lookahead, way_m)
         self._planner = fp.LocalPlanner(config, vehicle_params(self._car))
         start = self._map.locate(ego.x, ego.y, ego.yaw)
         if start < 0:
