@@ -1,8 +1,9 @@
 """The closed loop as a Gymnasium environment: adversaries act, SUMO and its ego answer.
 
 Importing this module registers RiskSAC/Low-v0, RiskSAC/Mixed-v0 and RiskSAC/Dense-v0, and
-`gymnasium.make("risk_sac.env:RiskSAC/Low-v0")` imports it first. The reward is R_risk alone; the
-realism cost and the robustness come in `info`, because λ and the shaping belong to the learner.
+`gymnasium.make("risk_sac.env:RiskSAC/Low-v0", ego="careful")` imports it first; see `risk_sac.gym_env`.
+The reward is R_risk alone; the realism cost and the robustness come in `info`, because λ and the
+shaping belong to the learner.
 A process plays in one environment at a time: for several, use `gymnasium.vector.AsyncVectorEnv`.
 
 Source: RISK-SAC, Alg. 1, l. 5 and 8.
@@ -95,7 +96,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         return cls(Problem.from_spec(spec), spec.learner.reward, controlled=method_of(spec.method).agent != "none")
 
     # The state of an episode, set by `_start`.
-    layout: Layout  # where everybody started
+    layout: Layout  # of the episode's start
     trace: Trace  # all that is recorded of it
     _adversaries: Adversaries
     _frame: Frame
@@ -182,7 +183,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     @property
     def defect_reached_s(self) -> float | None:
-        """When a planted defect first changed a command, from the release; None if none has."""
+        """Time from the release at which a planted defect first changed a command, s; None if none has."""
         return self._pilot.defect_reached_s if self._pilot and self.problem.ego.defects else None
 
     def signal_heads(self) -> bytes:
@@ -254,7 +255,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
         """C_soft of Eq. 5 over the adversaries."""
-        if before.ids != frame.ids:  # somebody left the net, far from the ego: compare those who stayed
+        if before.ids != frame.ids:  # an actor left the net, far from the ego
             return 0.0
         return soft_cost(
             self._adversaries.rows(frame),
@@ -269,7 +270,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _judge(self, contact: Contact) -> Collision:
         frame = self._frame
         other = frame.ids[contact.other]
-        # SUMO tests bodies at the end of a step only; of a pedestrian, the ego's model was told the oracle's own box.
+        # SUMO tests bodies at the end of a step only; of a pedestrian, the ego's model knows the oracle's own box.
         comparable = frame.kind[contact.other] == Kind.VEHICLE and relative_view(frame).overlap[contact.other - 1]
         facts = EpisodeFacts(
             teleported="no_teleport" in self._artefacts,
@@ -281,7 +282,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         return collision_of(contact, frame, self._released_s, self.evidence(), self.trace.since_release, facts)
 
     def requirement_results(self) -> dict[str, RequirementResult]:
-        """How far each requirement was kept since the release."""
+        """Returns the robustness of each requirement since the release."""
         time_s = [round(frame.time_s - self._released_s, 6) for frame in self.trace.frames[self.trace.released :]]
         return requirement_results(self.problem.requirements, time_s, self.trace.since_release, self._contact_s)
 
@@ -293,7 +294,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         return History(self.trace.frames, self.trace.measures, self.evidence())
 
     def evidence(self) -> Evidence:
-        """What a judge may look at, of the episode so far."""
+        """Returns the evidence of the episode so far, for the judge."""
         return Evidence.from_series(self.trace.series(), self._ground, self._released_s)
 
     def _observe(self) -> Observation:
@@ -303,11 +304,14 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
 
 def make_default(family: FamilyName) -> RiskSacEnv:
-    """The family's default problem, as registered with Gymnasium."""
+    """Returns the environment of a family's default problem."""
     return RiskSacEnv.of(RunSpec(family=family, method="risk-sac", seed=0))
 
 
 for _family in FAMILIES:
     gym.register(
-        f"RiskSAC/{_family.capitalize()}-v0", entry_point="risk_sac.env:make_default", kwargs={"family": _family}
+        f"RiskSAC/{_family.capitalize()}-v0",
+        entry_point="risk_sac.gym_env:NamedEnv",
+        kwargs={"family": _family},
+        max_episode_steps=FAMILIES[_family].horizon_steps,
     )

@@ -90,7 +90,7 @@ def add_group(commands: Commands, name: str, summary: str, *, example: str, more
 
 
 def example_text(example: str, epilog: str = "") -> str:
-    """Returns the end of a help text: the example, broken where a line is full, and what follows it."""
+    """Returns the end of a help text: the example and what follows it."""
     line = f"risk-sac {example}"
     lines = [line]
     if len(line) > WIDTH - 2:
@@ -110,7 +110,7 @@ def add_json_flag(parser: Parser) -> None:
 
 
 def as_typed(error: ConfigError, options: argparse.Namespace) -> str:
-    """Returns the message of a setting that is wrong, named by its flag if it can only come from there.
+    """Returns the message of a wrong setting, named by its flag.
 
     A flag that was not given, beside a file of settings, keeps the name of the field.
     """

@@ -1,4 +1,4 @@
-"""Where the service is and which key opens it, checked before anything is sent."""
+"""Checks the address of the service and the API key before anything is sent."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -63,7 +63,7 @@ class Event:
 
 
 class NetworkName(Record):
-    """How an uploaded network is called."""
+    """Id and label of an uploaded network."""
 
     id: str
     label: str
@@ -122,8 +122,13 @@ class Client:
         self._transport.close()
 
     def url_of(self, campaign_id: str) -> str:
-        """Where a campaign is."""
+        """Returns the REST address of a campaign."""
         return f"{self.url}/{_path(campaign_id)}"
+
+    def page_of(self, campaign_id: str, failure_id: str | None = None) -> str:
+        """Returns the address of a campaign, or of one of its failures, on the service's web page."""
+        failure = "" if failure_id is None else f"/failures/{_part(failure_id)}"
+        return f"{self.url}/page/#/campaigns/{_part(campaign_id)}{failure}"
 
     def submit(self, spec: CampaignSpec | Mapping[str, Any], idempotency_key: str | None = None) -> Campaign:
         """Queues a campaign.
@@ -160,7 +165,7 @@ class Client:
         return self._get(Campaign, _path(campaign_id))
 
     def results(self, campaign_id: str) -> Results:
-        """What a campaign has found so far."""
+        """Returns the results of a campaign so far."""
         return self._get(Results, f"{_path(campaign_id)}/results")
 
     def power(self, campaign_id: str) -> Power:
@@ -192,20 +197,31 @@ class Client:
         return self._get(Failure, f"{_path(campaign_id)}/failures/{_part(failure_id)}")
 
     def picture(self, campaign_id: str, failure_id: str, twin: str | None = None) -> bytes:
-        """One failure as a PNG; `twin` draws beside it the undisturbed scene (idle), or the one with that ego."""
+        """Returns one failure as a PNG.
+
+        Args:
+          campaign_id: of the campaign.
+          failure_id: of the failure.
+          twin: draws beside it the undisturbed scene (idle), or the one with that ego.
+        """
         return self._made(campaign_id, failure_id, "picture.png" if twin is None else f"twins/{_part(twin)}.png", PNG)
+
+    def export(self, campaign_id: str, failure_id: str, format_: str) -> bytes:
+        """Returns one failure in a format of other tools, such as "openscenario"; several files come as a zip."""
+        path = f"{_path(campaign_id)}/failures/{_part(failure_id)}/export"
+        return self._transport.ask("GET", path, query={"format": format_}, patience_s=MAKING_S).content
 
     def bundle(self, campaign_id: str, failure_id: str, *, core: bool = False) -> bytes:
         """One failure in a file that stands alone, or its core, which takes some ten seconds."""
         return self._made(campaign_id, failure_id, "core.npz" if core else "bundle.npz", BUNDLE)
 
     def regress(self, campaign_id: str, ego: EgoConfig) -> CampaignRegression:
-        """Has the distinct failures of a campaign played against another ego; the same again gives the one there is."""
+        """Plays the distinct failures of a campaign against another ego, or returns an earlier equal regression."""
         body = json.dumps({"campaign_id": campaign_id, "ego": ego.model_dump(mode="json", exclude_unset=True)})
         return read(CampaignRegression, self._transport.ask("POST", "v1/regressions", body=body))
 
     def regression(self, regression_id: str) -> CampaignRegression:
-        """What became of the failures, as far as it is known."""
+        """Returns the state and the cases of a regression so far."""
         return self._get(CampaignRegression, f"v1/regressions/{_part(regression_id)}")
 
     def _made(self, campaign_id: str, failure_id: str, what: str, wanted: str) -> bytes:
@@ -222,7 +238,7 @@ class Client:
     def report(
         self, campaign_id: str, format_: Literal["json", "md", "html"] = "md", regression_id: str | None = None
     ) -> str:
-        """The report as a page or Markdown, with a regression if one is named; JSON has bounds and coverage alone."""
+        """Returns the report of a campaign; JSON has bounds and coverage alone, without a regression."""
         query = {"format": format_, "regression": regression_id}
         return self._transport.ask("GET", f"{_path(campaign_id)}/report", query=query).text
 
@@ -246,16 +262,16 @@ class Client:
         """
         path, patience_s = f"{_path(campaign_id)}/events", self._transport.patience_s
         while True:
-            told = False
+            heard = False
             try:
                 for message in self._transport.listen(path, last_event_id, silence_s=SILENCE_S, patience_s=patience_s):
                     event = Event(id=message.id, name=message.event, data=json.loads(message.data))
-                    told, last_event_id = True, event.id or last_event_id
+                    heard, last_event_id = True, event.id or last_event_id
                     yield event
                     if event.last:
                         return
                 # A stream also ends when the service stops; the next one continues it.
-                if not told and self._get(Campaign, _path(campaign_id), away_s).ended:
+                if not heard and self._get(Campaign, _path(campaign_id), away_s).ended:
                     return
             except StreamLost:
                 pass

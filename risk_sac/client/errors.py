@@ -69,7 +69,7 @@ class Overdue(ClientError):
 
 
 def retry_after_s(response: httpx.Response) -> float | None:
-    """Seconds until the service wants to be asked again, from a number or a date; None where it does not say."""
+    """Returns the seconds of a Retry-After header, a number or a date; None without a valid one."""
     value = response.headers.get("retry-after", "")
     try:
         seconds = float(value)

@@ -1,4 +1,4 @@
-"""HTTP with patience: what may pass is asked again, for a bounded time, and only where that can do no harm."""
+"""HTTP with retries: for a bounded time, and only where a repetition does no harm."""
 
 import logging
 import random

@@ -51,6 +51,14 @@ class Lane:
     heads: list[Head] = field(default_factory=list)  # at its end
 
 
+COLOURS = {"r": "red", "u": "red_yellow", "y": "yellow", "g": "green", "o": "off", "s": "green"}
+
+
+def colour(letter: str) -> str:
+    """Returns the colour of one of SUMO's letters of a signal."""
+    return COLOURS.get(letter.lower(), "off")
+
+
 @dataclass(frozen=True, slots=True)
 class Program:
     """A signal that shows fixed letters for fixed times."""
@@ -80,6 +88,15 @@ class Net:
     lanes: Mapping[str, Lane]
     signals: Mapping[str, Program]
     junctions: Sequence[Floats]  # outlines, `k x 2`, m
+
+    def by_signal(self, letters: bytes) -> Mapping[str, bytes]:
+        """Returns the letters of each signal; `letters` has those of all, in the order of their names."""
+        found, begin = {}, 0
+        for name, program in sorted(self.signals.items()):
+            end = begin + len(program.phases[0][1])
+            found[name] = letters[begin:end]
+            begin = end
+        return found
 
     def neighbours(self, lane: Lane) -> tuple[Lane | None, Lane | None]:
         """The lanes of the same edge to its right and to its left."""
@@ -172,12 +189,19 @@ def ribbon(centre: Floats, width_m: float) -> Floats:
 def roads_of(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Surface]:
     """Returns the surfaces of a scene's net; none where the scene lacks parameters that its family has now."""
     found = family_named(family)
-    return _shipped(found.layout(scene).net) if set(found.space.names) <= scene.keys() else ()
+    return shipped_surfaces(found.layout(scene).net) if set(found.space.names) <= scene.keys() else ()
 
 
 @cache  # there are a few nets, and they stay as they are
-def _shipped(name: str) -> Sequence[Surface]:
-    return surfaces(read_net(Path(sumo_nets.__path__[0]) / name))
+def shipped_net(name: str) -> Net:
+    """Returns a net by its file's name."""
+    return read_net(Path(sumo_nets.__path__[0]) / name)
+
+
+@cache
+def shipped_surfaces(name: str) -> Sequence[Surface]:
+    """Returns the surfaces of a net by its file's name."""
+    return surfaces(shipped_net(name))
 
 
 def surfaces(net: Net) -> Sequence[Surface]:

@@ -12,7 +12,7 @@ from risk_sac.records import Counts, DrivenBy, DriverPcr, RunMetrics
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:
-    """A figure of each run; of several runs their mean, with a bootstrap interval over those that have a value."""
+    """A figure of each run; of several runs their mean, with an interval."""
 
     name: str  # in `table.json`, `table.csv`, the API and names of figures
     symbol: str  # in tables
@@ -55,7 +55,7 @@ class Estimate:
     mean: float | None
     """Null where no run has a value."""
     low: float | None
-    """95 % interval: bootstrap over seeds, Wilson for the rate of one run; null where it takes more runs."""
+    """95 % interval: bootstrap over seeds, of a rate no narrower than Wilson over all episodes; null where unknown."""
     high: float | None
     runs: int
     """Over how many the mean was taken."""
@@ -64,15 +64,21 @@ class Estimate:
 
 
 def estimate(metric: Metric, metrics: Sequence[RunMetrics]) -> Estimate:
-    """Mean over the runs that have a value, with its 95 % interval: bootstrap over runs, Wilson for the rate of one."""
+    """Returns the mean over the runs that have a value, with its 95 % interval.
+
+    Choice: the interval of a rate is Wilson's over the pooled trials, widened to the bootstrap interval over the runs.
+    The bootstrap alone ends at the worst run: at 0 where none has failed, however short the runs were.
+    """
     values = _values(metric, metrics)
-    interval: tuple[float, float] | None = None
+    if not values:
+        return Estimate(mean=None, low=None, high=None, runs=0)
+    mean = sum(values) / len(values)
+    intervals = [metric.interval(mean, pooled_counts(metrics))]
     if len(values) > 1:
-        interval = bootstrap_interval(values, RESAMPLING_SEED)
-    elif values:
-        interval = metric.interval(values[0], metrics[0])
-    low, high = interval or (None, None)
-    return Estimate(mean=mean_over_runs(metric, metrics), low=low, high=high, runs=len(values))
+        intervals.append(bootstrap_interval(values, RESAMPLING_SEED))
+    known = [each for each in intervals if each is not None]
+    low, high = (min(low for low, _ in known), max(high for _, high in known)) if known else (None, None)
+    return Estimate(mean=mean, low=low, high=high, runs=len(values))
 
 
 def mean_over_runs(metric: Metric, metrics: Sequence[RunMetrics]) -> float | None:

@@ -125,7 +125,7 @@ class Total(Counts):
     """Each kind once."""
     ecr: Real
     ecr_low: Real
-    """95 % interval: Wilson for one run, bootstrap over the seeds for more."""
+    """95 % interval: Wilson over all episodes, widened to the bootstrap over the seeds."""
     ecr_high: Real
     pcr: Real
     pcr_low: Real

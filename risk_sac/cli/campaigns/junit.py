@@ -1,4 +1,4 @@
-"""What a campaign found as JUnit XML, which CI systems show: a suite per family, a case per run. Pure.
+"""Writes the results of a campaign as JUnit XML: a suite per family, a case per run. Pure.
 
 Each family and method has a case for each requirement that counts or has a bound. Where there are other bounds, it has
 one more. These cases fail as the exit status does.
@@ -92,7 +92,7 @@ def _gate(total: Total, bounds: Bounds, names: "Names") -> TestCase:
 
 
 def _judge(case: TestCase, found: Sequence[Comparison], exceeded: Sequence[str], state: State, named: str) -> None:
-    """Lets a case fail where a rate is not within its bound or something was exceeded; `named` says of which."""
+    """Fails a case whose rate or count is beyond its bound; `named` has its failures."""
     broken = [each for each in found if each.verdict != "within"]
     said = "; ".join([*(f"{each.name} {each.verdict} {each.bound:g}: {each}" for each in broken or found), *exceeded])
     if state != "succeeded":
@@ -107,7 +107,7 @@ def _judge(case: TestCase, found: Sequence[Comparison], exceeded: Sequence[str],
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Failures of a campaign in words, each with how to look at it, and how to have them all again."""
+    """Failures of a campaign in words, each with the command that shows it."""
 
     results: Results
     service_url: str

@@ -13,9 +13,9 @@ from operator import itemgetter
 import numpy as np
 
 from risk_sac.failures.export.formats import Files
-from risk_sac.failures.export.recorded import Actor, Recorded, colour, cycle, goal
+from risk_sac.failures.export.recorded import Actor, Recorded, cycle, goal
 from risk_sac.failures.export.written import BESIDE, add, beside, document
-from risk_sac.failures.net import Head, Lane, boundaries
+from risk_sac.failures.net import Head, Lane, boundaries, colour
 from risk_sac.types import STEP_S, Floats
 
 FREE, AS_RECORDED = "failure.xml", "failure-as-recorded.xml"

@@ -1,33 +1,37 @@
 """Draws a GIF of the last seconds, seen from above.
 
-The ego is blue; its striker, or else the actor that mattered most, is orange. A body that the ego does not know of is
-only outlined.
+The striker is what the ego touched, or else the actor that mattered most.
 """
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
+from risk_sac.failures.canvas import (
+    EDGE,
+    EGO,
+    GROUND,
+    HEIGHT,
+    INK,
+    LIGHTS,
+    OTHER,
+    PAPER,
+    STRIKER,
+    VIEW_M,
+    WIDTH,
+    Canvas,
+)
 from risk_sac.failures.export.formats import Files
-from risk_sac.failures.export.recorded import Actor, Recorded, colour
+from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.net import Surface, surfaces
-from risk_sac.failures.recording import BOX, on_body
 from risk_sac.failures.sentence import story
 from risk_sac.records import Collision
 from risk_sac.types import STEP_S, Floats
 
-WIDTH, HEIGHT, FINE = 560, 340, 2  # px; drawn larger by `FINE`, and then made smooth
-VIEW_M = 56.0  # that the width shows
 LAST_S, AFTER_S, HOLD_MS = 7.0, 2.0, 2000  # before the violation and after it, and how long it stays
 EASE = 0.06  # how fast the view follows the ego, so that it does not tremble
-GROUND = {"junction": "#dcdcdc", "lane": "#dcdcdc", "sidewalk": "#efefef", "crossing": "#c8c8c8"}
-PAPER, EDGE, INK = "#f8f8f6", "#bdbdbd", "#202020"
-EGO, STRIKER, OTHER = "#0072b2", "#d55e00", "#8a8a8a"
-Placed = Callable[[Floats], list[tuple[float, float]]]
-"""Pixels of points on the map."""
-LIGHTS = {"red": "#d00000", "red_yellow": "#e07000", "yellow": "#e0b000", "green": "#109010", "off": "#606060"}
 
 
 def files(failure: Recorded) -> Files:
@@ -83,45 +87,21 @@ def _middles(failure: Recorded, first: int, last: int) -> list[Floats]:
 
 
 def _picture(failure: Recorded, ground: Sequence[Surface], frame: int, middle: Floats) -> Image.Image:
-    picture = Image.new("RGB", (WIDTH * FINE, HEIGHT * FINE), PAPER)
-    pen = ImageDraw.Draw(picture)
-    scale = WIDTH * FINE / VIEW_M
-
-    def placed(points: Floats) -> list[tuple[float, float]]:
-        pixels = (points - middle) * (scale, -scale) + (WIDTH * FINE / 2, HEIGHT * FINE / 2)
-        return [(float(x), float(y)) for x, y in pixels]
-
-    for surface in ground:
-        pen.polygon(placed(surface.outline), fill=GROUND[surface.use], outline=EDGE)
-    for lane in failure.net.lanes.values():
-        for place, head in enumerate(lane.heads if lane.use != "crossing" else []):
-            shown = colour(chr(failure.heads[head.signal][frame, head.index]))
-            ((x, y),) = placed(lane.centre[-1:])
-            r = 0.35 * scale
-            x += 2.4 * r * (place - (len(lane.heads) - 1) / 2)
-            pen.ellipse((x - r, y - r, x + r, y + r), fill=LIGHTS[shown])
+    canvas = Canvas(middle)
+    canvas.ground(ground)
+    canvas.heads(failure.net, {name: rows[frame].tobytes() for name, rows in failure.heads.items()})
     for column, actor in sorted(enumerate(failure.actors), key=lambda each: -each[0]):
         if frame < len(actor.time_s):
-            tone = EGO if column == 0 else STRIKER if column == failure.striker else OTHER
-            known = column == 0 or failure.series["visible"][frame, column] == 1
-            _body(pen, placed, actor, frame, tone, known=known)
-    picture = picture.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
+            canvas.body(
+                (actor.x_m[frame], actor.y_m[frame], actor.heading_rad[frame]),
+                (actor.length_m, actor.width_m),
+                EGO if column == 0 else STRIKER if column == failure.striker else OTHER,
+                walks=actor.pedestrian,
+                known=column == 0 or failure.series["visible"][frame, column] == 1,
+            )
+    picture = canvas.picture()
     _caption(ImageDraw.Draw(picture), failure, frame)
     return picture
-
-
-def _body(pen: ImageDraw.ImageDraw, placed: Placed, actor: Actor, frame: int, tone: str, *, known: bool) -> None:
-    """Draws a body, that of a vehicle with a light patch to the front."""
-    pose, size = (actor.x_m[frame], actor.y_m[frame], actor.heading_rad[frame]), (actor.length_m, actor.width_m)
-    fill = tone if known else None
-    if actor.pedestrian:
-        ring = np.linspace(0.0, 2.0 * np.pi, 17)[:-1]
-        circle = pose[:2] + 0.45 * np.column_stack((np.cos(ring), np.sin(ring)))
-        pen.polygon(placed(circle), fill=fill, outline=tone, width=3)
-        return
-    pen.polygon(placed(on_body(pose, size, BOX)), fill=fill, outline=tone, width=3)
-    head = on_body(pose, size, [(0.25, 0.7), (0.75, 0), (0.25, -0.7)])
-    pen.polygon(placed(head), fill="#ffffff" if known else tone)
 
 
 def _caption(pen: ImageDraw.ImageDraw, failure: Recorded, frame: int) -> None:

@@ -14,9 +14,9 @@ from foxglove import messages as fox
 from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateChannel
 
 from risk_sac.failures.export.formats import Files
-from risk_sac.failures.export.recorded import Actor, Recorded, colour
+from risk_sac.failures.export.recorded import Actor, Recorded
 from risk_sac.failures.export.written import BESIDE, beside
-from risk_sac.failures.net import Lane, boundaries
+from risk_sac.failures.net import Lane, boundaries, colour
 from risk_sac.failures.sentence import story
 from risk_sac.records import Collision
 from risk_sac.types import Floats

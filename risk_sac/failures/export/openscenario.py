@@ -12,8 +12,9 @@ from scenariogeneration import xosc
 
 from risk_sac.failures.export.formats import Files
 from risk_sac.failures.export.opendrive import opendrive
-from risk_sac.failures.export.recorded import Actor, Recorded, colour, cycle, goal
+from risk_sac.failures.export.recorded import Actor, Recorded, cycle, goal
 from risk_sac.failures.export.written import BESIDE, beside, document
+from risk_sac.failures.net import colour
 from risk_sac.types import STEP_S
 
 VERSION = 2  # of OpenSCENARIO 1

@@ -25,8 +25,6 @@ PER_FRAME = ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")
 PER_ACTOR = ("kind", "role", "length_m", "width_m")
 TRUCK_FROM_M = 6.0  # length
 BEYOND_M = 60.0  # into the last road, where a free ego has been through what the failure is about
-COLOURS = {"r": "red", "u": "red_yellow", "y": "yellow", "g": "green", "o": "off", "s": "green"}
-"""SUMO's letter of a signal, in lower case → colour."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,8 +225,3 @@ def cycle(failure: Recorded, signal: str) -> list[tuple[int, str]]:
     turning = [program.letters(failure.offset_s(signal, frame)) for frame in range(max(steps, len(shown)))]
     letters = turning[:steps] if turning[: len(shown)] == shown else shown
     return [(len(list(run)), each) for each, run in groupby(letters)]
-
-
-def colour(letter: str) -> str:
-    """Returns the colour of one of SUMO's letters."""
-    return COLOURS.get(letter.lower(), "off")

@@ -51,6 +51,16 @@ class Server(uvicorn.Server):
         for listening in (each for server in self.servers for each in server.sockets):
             with listening.dup() as same:
                 same.listen(BACKLOG)
+        for address in page_addresses(self):
+            logger.info("the page is at %s", address)
+
+
+def page_addresses(server: uvicorn.Server) -> list[str]:
+    """Returns the addresses of the page; a server on all addresses is shown at that of this machine."""
+    bound = [each.getsockname()[:2] for listening in server.servers for each in listening.sockets]
+    named = [("127.0.0.1" if host in ("0.0.0.0", "::") else host, port) for host, port in bound]
+    path = f"{server.config.root_path}/page/"
+    return list(dict.fromkeys(f"http://{f'[{host}]' if ':' in host else host}:{port}{path}" for host, port in named))
 
 
 class Room:

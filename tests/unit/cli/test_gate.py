@@ -163,16 +163,6 @@ def test_a_rate_is_a_name_and_a_number_from_0_to_1(text: str) -> None:
         named_rate(text)
 
 
-def test_few_short_runs_without_a_failure_prove_nothing() -> None:
-    """A bootstrap over two seeds says 0 to 0, whatever their length."""
-    none = {"runs": 2, "episodes": 10, "failures": 0, "ecr": 0.0, "ecr_low": 0.0, "ecr_high": 0.0}
-    status, reason = verdict(results("succeeded", none), Bounds(ecr=0.1))
-    assert status == 1
-    assert (
-        "low sac 0.000, 95 % interval up to 0.278 (0 valid contacts in 10 episodes)" in reason
-    )  # 1.96² / (10 + 1.96²)
-
-
 @pytest.mark.parametrize(
     ("field", "bounds"),
     [("--max-ecr", {"max_ecr": 0.0}), ("--max-pcr", {"max_pcr": 0.0}), ("--max-rate", {"max_rate": [("a", 0.0)]})],

@@ -131,7 +131,7 @@ function Values({ episode, left, width, lines, data, at, written }: Shown) {
   const side = left > width / 2 ? { right: `${width - left + 12}px` } : { left: `${left + 12}px` };
   return (
     <div class="curve-values" style={side} role="status">
-      <b>Episode {episode.toLocaleString("en")}</b>
+      <b>After {episode.toLocaleString("en")} episodes</b>
       {values.slice(0, SHOWN).map((line) => (
         <span key={line.run}>
           <Sample mark={line.mark} /> {line.name} <b>{written(line.value)}</b>

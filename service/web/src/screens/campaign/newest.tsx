@@ -16,7 +16,7 @@ export function Newest({ campaign, found }: { campaign: string; found: Found[] }
           <li key={failure.id}>
             <a href={address(["campaigns", campaign, "failures", failure.id])}>{described(failure)}</a>
             <span class="faint small">
-              {failure.run_id}, episode {failure.index + 1}
+              {failure.run_id}, episode {failure.index}
               {failure.driven_by && `, driven ${drivenWords(failure.driven_by)}`}
             </span>
           </li>
