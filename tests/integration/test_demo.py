@@ -30,6 +30,8 @@ def test_the_command_it_ends_with_draws_a_failure(tmp_path, capsys, monkeypatch)
     found = json.loads((tmp_path / "demo.json").read_text())
     assert all((data_dir / failure["series"]).is_file() for failure in found["failures"])
     printed = capsys.readouterr().out
+    *_, drove = (line for line in printed.splitlines() if line.split()[:2] == ["low", "bo-only"])
+    assert drove.split()[::2] == ["low", "0", "0", "40", "0"]  # the headline failures of each in brackets
     (line,) = (line for line in printed.splitlines() if line.startswith("draw one: "))
     program, *command = shlex.split(line.removeprefix("draw one: "))
     assert Path(program).is_file()

@@ -81,6 +81,10 @@ def test_the_numbers_of_a_report_are_the_services(
         counts += [cell["by_fault"].get(name, 0) for name in ("ego", "shared", "other")]
         shown = [int(text.split()[0].replace("–", "0")) for text in classes.all_inner_texts()]
         assert shown == counts
+        drove = page.get_by_role("region", name="Driven by: low").locator(in_row).all_inner_texts()
+        episodes = [cell["episodes_driven_by"].get(name, 0) for name in ("script", "random")]
+        assert [int(text.split()[0]) for text in drove[:2]] == episodes
+        assert sum(episodes) == cell["episodes"]
     page.get_by_text("More measures").click()
     check_axe(page)
 

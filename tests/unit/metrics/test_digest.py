@@ -11,7 +11,7 @@ from tests.builders import judgement
 from tests.unit.metrics.episodes import RUN, episode
 
 # Fields of an episode that older records lack.
-NEWER = ("script", "failed", "requirements", "violations", "defect_reached_s")
+NEWER = ("script", "driven_by", "failed", "requirements", "violations", "defect_reached_s")
 
 
 def test_digest_is_the_hash_of_canonical_json():
