@@ -128,10 +128,10 @@ def _rows(family: str, found: "dict[str, Sequence[FinishedRun]]") -> list[list[s
         if not of_family:
             continue
         pooled = pooled_counts(of_family)
-        valid, preventable, driven = pooled.collisions, pooled.preventable_collisions, pooled.driven
+        valid, preventable, rated = pooled.collisions, pooled.preventable_collisions, pooled.rated
         counts = map(str, (len(of_family), pooled.episodes, pooled.invalid, pooled.raw_collisions, valid))
-        rates = _rate(valid, driven), str(preventable), _rate(preventable, driven), str(pooled.failures)
-        rows.append(((preventable / max(driven, 1), valid / max(driven, 1)), [family, name, *counts, *rates]))
+        rates = _rate(valid, rated), str(preventable), _rate(preventable, rated), str(pooled.failures)
+        rows.append(((preventable / max(rated, 1), valid / max(rated, 1)), [family, name, *counts, *rates]))
     return [row for _, row in sorted(rows, key=lambda each: each[0], reverse=True)]
 
 
@@ -142,6 +142,6 @@ def _requirements(family: str, found: "dict[str, Sequence[FinishedRun]]") -> Ite
         yield from ([family, name, *requirement_cells(each, counts)] for each, counts in pooled.items())
 
 
-def _rate(count: int, driven: int) -> str:
-    low, high = wilson_interval(count, driven)
-    return f"{count / max(driven, 1):.3f} ({low:.3f} to {high:.3f})"
+def _rate(count: int, rated: int) -> str:
+    low, high = wilson_interval(count, rated)
+    return f"{count / max(rated, 1):.3f} ({low:.3f} to {high:.3f})"

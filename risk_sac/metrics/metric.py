@@ -122,10 +122,10 @@ def pooled_names(counts: Sequence[Mapping[str, int]]) -> dict[str, int]:
 def pcr_by_driver(metrics: Sequence[RunMetrics]) -> dict[str, DriverPcr]:
     """Each reference driver's own PCR, over the runs whose contacts the drivers were asked for."""
     asked = [each for each in metrics if each.prevented_by or not each.collisions]
-    driven, pooled = sum(each.driven for each in asked), {}
+    rated, pooled = sum(each.rated for each in asked), {}
     for name, prevented in pooled_names([each.prevented_by for each in asked]).items():
-        low, high = wilson_interval(prevented, driven)
-        pooled[name] = DriverPcr(prevented=prevented, pcr=prevented / driven, pcr_low=low, pcr_high=high)
+        low, high = wilson_interval(prevented, rated)
+        pooled[name] = DriverPcr(prevented=prevented, pcr=prevented / rated, pcr_low=low, pcr_high=high)
     return pooled
 
 

@@ -24,10 +24,10 @@ class RequirementTally:
         self._valid += 1
         return new, violation.preventable and self._preventable.add(violation)
 
-    def counts(self, driven: int) -> RequirementCounts:
+    def counts(self, rated: int) -> RequirementCounts:
         """The funnel so far, given the episodes that rates are taken over."""
         steps = (self.violated, self._valid, self._distinct.count, self._preventable.count)
-        return _funnel(self._counts, steps, driven)
+        return _funnel(self._counts, steps, rated)
 
 
 def pooled_requirements(metrics: Sequence[RunMetrics]) -> dict[str, RequirementCounts]:
@@ -37,7 +37,7 @@ def pooled_requirements(metrics: Sequence[RunMetrics]) -> dict[str, RequirementC
         having = [each for each in metrics if name in each.requirements]
         own = [each.requirements[name] for each in having]
         steps = [sum(getattr(each, step) for each in own) for step in STEPS]
-        pooled[name] = _funnel(own[-1].counts, steps, sum(each.driven for each in having))
+        pooled[name] = _funnel(own[-1].counts, steps, sum(each.rated for each in having))
     return pooled
 
 
@@ -49,8 +49,8 @@ def requirement_cells(name: str, found: RequirementCounts) -> list[str]:
     return [name, found.counts, str(found.violated), *steps, rate]
 
 
-def _funnel(counts: str, steps: Sequence[int], driven: int) -> RequirementCounts:
+def _funnel(counts: str, steps: Sequence[int], rated: int) -> RequirementCounts:
     funnel = dict(zip(STEPS, steps, strict=True))
     hits = funnel["valid" if counts == "failure" else "violated"]
-    low, high = wilson_interval(hits, driven)
-    return RequirementCounts(counts=counts, **funnel, rate=hits / max(1, driven), rate_low=low, rate_high=high)
+    low, high = wilson_interval(hits, rated)
+    return RequirementCounts(counts=counts, **funnel, rate=hits / max(1, rated), rate_low=low, rate_high=high)

@@ -18,12 +18,12 @@ PER_STEPS = 1000  # environment steps over which the rate of distinct failures i
 
 def effective_collision_rate(counts: Counts) -> float:
     """ECR: valid contacts per episode, rejected scenes included, invalid ones not; 0 without. Source: Sec. IV."""
-    return _share(counts.collisions, counts.driven)
+    return _share(counts.collisions, counts.rated)
 
 
 def preventable_collision_rate(counts: Counts) -> float:
     """PCR: the preventable ones per episode."""
-    return _share(counts.preventable_collisions, counts.driven)
+    return _share(counts.preventable_collisions, counts.rated)
 
 
 def efficiency_score(tally: Tally) -> float:
@@ -38,7 +38,7 @@ def efficiency_score(tally: Tally) -> float:
 
     Source: RISK-SAC, Sec. IV.
     """
-    return 1 - tally.steps_to_failure / (tally.driven * tally.horizon_steps) if tally.driven else 0.0
+    return 1 - tally.steps_to_failure / (tally.rated * tally.horizon_steps) if tally.rated else 0.0
 
 
 def cost_rate(tally: Tally) -> float:
@@ -77,7 +77,7 @@ def _share(count: int, of: int) -> float:
 
 
 def _newest(counts: Counts) -> int:
-    return min(WINDOW, counts.driven)
+    return min(WINDOW, counts.rated)
 
 
 METRICS = (
@@ -87,7 +87,7 @@ METRICS = (
         meaning="valid contacts / episodes",
         formula=effective_collision_rate,
         field="ecr",
-        trials=lambda counts: counts.driven,
+        trials=lambda counts: counts.rated,
     ),
     Metric(
         name="pcr",
@@ -95,15 +95,15 @@ METRICS = (
         meaning="preventable contacts / episodes: valid ones that a reference driver would have prevented",
         formula=preventable_collision_rate,
         field="pcr",
-        trials=lambda counts: counts.driven,
+        trials=lambda counts: counts.rated,
     ),
     Metric(
         name="acr",
         symbol="ACR",
         meaning="avoidable contacts / episodes: valid ones that a reference driver, or full braking at once, would "
         "have prevented",
-        formula=lambda counts: _share(counts.avoidable, counts.driven),
-        trials=lambda counts: counts.driven,
+        formula=lambda counts: _share(counts.avoidable, counts.rated),
+        trials=lambda counts: counts.rated,
         tested=False,
     ),
     Metric(
@@ -196,26 +196,26 @@ RATIOS = (
         name="raw_rate",
         symbol="raw contacts",
         meaning="contacts of any kind / episodes",
-        formula=lambda counts: _share(counts.raw_collisions, counts.driven),
+        formula=lambda counts: _share(counts.raw_collisions, counts.rated),
     ),
     Ratio(
         name="artefact_rate",
         symbol="artefact",
         meaning="episodes whose contact was refused by a rule that speaks of the simulator or the control "
         f"({', '.join(sorted(ARTEFACT_RULES))}) / episodes",
-        formula=lambda counts: _share(counts.artefacts, counts.driven),
+        formula=lambda counts: _share(counts.artefacts, counts.rated),
     ),
     Ratio(
         name="degenerate_rate",
         symbol="degenerate",
         meaning="all refused contacts / episodes, artefacts among them",
-        formula=lambda counts: _share(counts.raw_collisions - counts.collisions, counts.driven),
+        formula=lambda counts: _share(counts.raw_collisions - counts.collisions, counts.rated),
     ),
     Ratio(
         name="rejected_rate",
         symbol="rejected",
         meaning="infeasible scenes / episodes",
-        formula=lambda counts: _share(counts.rejected, counts.driven),
+        formula=lambda counts: _share(counts.rejected, counts.rated),
     ),
     Ratio(
         name="unresponsive_share",

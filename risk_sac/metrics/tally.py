@@ -115,7 +115,7 @@ class Tally(Counts):
 
     def requirement_counts(self) -> dict[str, RequirementCounts]:
         """Requirement → its funnel, in the order in which they were first met; none without records of them."""
-        return {name: each.counts(self.driven) for name, each in self._requirements.items()} if self._measured else {}
+        return {name: each.counts(self.rated) for name, each in self._requirements.items()} if self._measured else {}
 
     def _add_violations(self, record: EpisodeRecord) -> None:
         self.failures += 1

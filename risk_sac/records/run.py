@@ -62,7 +62,7 @@ class Counts(Record):
         return {**values, **contacts}
 
     @property
-    def driven(self) -> int:
+    def rated(self) -> int:
         """Episodes that rates are taken over: all, but for those in which the ego failed to drive."""
         return self.episodes - self.invalid
 

@@ -67,7 +67,7 @@ def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: i
 class _Search:
     """What each episode of a run's search adds to its curves."""
 
-    driven: list[int] = field(default_factory=list)  # so far: episodes in which the ego did not fail to drive
+    rated: list[int] = field(default_factory=list)  # so far: episodes in which the ego did not fail to drive
     contacts: list[bool] = field(default_factory=list)  # valid ones, of these episodes alone
     preventable_contacts: list[bool] = field(default_factory=list)
     preventable: list[bool] = field(default_factory=list)
@@ -87,7 +87,7 @@ class _Search:
             contact = record["collision"]
             self.contacts.append(contact is not None and contact in valid)
             self.preventable_contacts.append(contact is not None and contact in preventable)
-        self.driven.append(len(self.contacts))
+        self.rated.append(len(self.contacts))
         self.preventable.append(bool(preventable))
         self.distinct.append(sum(map(self._kinds.add, valid)))
         self.distinct_preventable.append(sum(map(self._preventable_kinds.add, preventable)))
@@ -101,10 +101,10 @@ def _curves(run: StoredRun, search: _Search, points: int) -> RunCurves:
     at = spread(len(search.steps), points)
     steps, cost = (np.diff(_summed(each)[at], prepend=0.0) for each in (search.steps, search.cost))
     lines = {name: _summed(getattr(search, name))[at] for name in ("distinct", "preventable", "distinct_preventable")}
-    driven = np.array([0, *search.driven])[at]
+    rated = np.array([0, *search.rated])[at]
     lines |= {
-        "window_ecr": _window(search.contacts, driven),
-        "window_pcr": _window(search.preventable_contacts, driven),
+        "window_ecr": _window(search.contacts, rated),
+        "window_pcr": _window(search.preventable_contacts, rated),
         "dual_variable": np.array([0.0, *search.dual_variable])[at],
         "mean_cost": np.divide(cost, steps, out=np.full(len(at), np.nan), where=steps > 0.0),
     }

@@ -52,7 +52,7 @@ def rows(out: Path) -> Iterator[dict[str, object]]:
                 continue
             for name, counts in metrics.requirements.items():
                 if counts.counts == "failure":
-                    head = (spec.family, ego, spec.method, spec.seed, name, metrics.driven)
+                    head = (spec.family, ego, spec.method, spec.seed, name, metrics.rated)
                     steps = (counts.violated, counts.valid, counts.distinct)
                     yield dict(zip(COLUMNS, (*head, *steps), strict=True))
 

@@ -132,7 +132,7 @@ def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
             upper=high if high is not None else 1.0,
             hits=hits,
             what=what,
-            episodes=total.driven,
+            episodes=total.rated,
         )
 
 
@@ -141,7 +141,7 @@ class Measured(NamedTuple):
 
     family: str
     method: str
-    driven: int  # episodes
+    rated: int  # episodes
     requirements: Mapping[str, RequirementCounts]
 
     def comparisons(self, bounds: Bounds) -> Iterator[Comparison]:
@@ -156,7 +156,7 @@ class Measured(NamedTuple):
                     upper=found.rate_high,
                     hits=found.in_rate,
                     what="valid violation" if found.counts == "failure" else "violation",
-                    episodes=self.driven,
+                    episodes=self.rated,
                 )
 
 
@@ -164,8 +164,8 @@ def measured(results: Results) -> list[Measured]:
     """The requirements of a campaign by family and method, those of the i.i.d. phase last."""
     drawn = [(run, run.metrics) for run in results.runs if run.method in IID_METHODS and run.metrics is not None]
     return [
-        *(Measured(each.family, each.method, each.driven, each.requirements) for each in results.totals),
-        *(Measured(run.family, run.method, metrics.driven, metrics.requirements) for run, metrics in drawn),
+        *(Measured(each.family, each.method, each.rated, each.requirements) for each in results.totals),
+        *(Measured(run.family, run.method, metrics.rated, metrics.requirements) for run, metrics in drawn),
     ]
 
 
