@@ -50,6 +50,7 @@ def test_every_episode_of_every_run_is_a_row_with_its_fields(runs: Path, tmp_pat
             assert row["id"] == record.id_in(f"{family}-{method}-601")
             assert (row["outcome"], row["steps"], row["seed"]) == (record.outcome, record.steps, record.seed)
             assert dict(row["scene"]) == dict(record.scene)
+            assert row["driven_by"] == record.driven_by
             assert row["min_ttc_s"] == record.min_ttc_s
             assert (row["collision"] is None) == (record.collision is None)
             requirements = {name: result.model_dump() for name, result in record.requirements.items()}

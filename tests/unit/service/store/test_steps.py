@@ -9,12 +9,13 @@ from sqlalchemy import create_engine, inspect
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import EpisodeDone
-from risk_sac.records import Outcome, TriageState
+from risk_sac.records import DrivenBy, Outcome, TriageState
 from service.errors import StorageError
 from service.host.data_folder import hold_data_folder
 from service.settings import ServiceSettings
 from service.store.__main__ import main
 from service.store.database import held, newest_step, present_step, step_back
+from service.store.finding import Judged
 from service.store.reading import Store
 from service.store.stored import StoredCampaign
 from service.store.writing import Ledger
@@ -35,7 +36,9 @@ def fail(store: Store, campaign: StoredCampaign, episode: Callable[..., EpisodeD
     """A run at work, and its first failure."""
     number = campaign.runs[0].number
     Ledger(store).start_run(number)
-    Ledger(store).add_episodes([(number, episode(0, Outcome.FAILURE))])
+    event = episode(0, Outcome.FAILURE)
+    record = event.record.model_copy(update={"driven_by": DrivenBy.SCRIPT})
+    Ledger(store).add_episodes([(number, event.model_copy(update={"record": record}))])
 
 
 def tables(url: str) -> dict[str, object]:
@@ -76,6 +79,8 @@ def test_one_step_back_leaves_all_rows_to_the_version_before(settings, episode, 
     assert tables(settings.url) == newest
     assert repr(store.events(campaign.id, limit=9)) == told
     assert store.triage(campaign.id, FAILURE).comment == "seen"
+    (found,) = store.episodes(campaign.id, limit=9, judged=Judged(driven_by=DrivenBy.SCRIPT)).items
+    assert found.id == FAILURE
     store.close()
 
 
