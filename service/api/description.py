@@ -16,6 +16,7 @@ from risk_sac.config import FamilyName, MethodName
 from risk_sac.config.methods import RunMethod
 from risk_sac.records import StateChange
 from service.api.answers.responses import WAIT, header
+from service.api.examples import describe_calls
 from service.api.guards.gate import HEALTH, PUBLIC
 from service.api.posted import campaign_schemas, input_schemas
 from service.api.routes.episodes import PostedTriage
@@ -76,6 +77,7 @@ def _document(app: FastAPI) -> dict[str, Any]:
     _describe_guards(document)
     document["components"]["schemas"] = _simplified(schemas) | _CHOICES
     document["paths"] = _simplified(document["paths"])
+    describe_calls(document["paths"])
     _share(document)
     return document
 
@@ -97,8 +99,6 @@ def _describe_guards(document: dict[str, Any]) -> None:
         for operation in operations.values():
             if path in PUBLIC:
                 operation["security"] = []
-            if "\n" not in operation["description"]:
-                operation["summary"] = operation.pop("description")  # in place of the function's name
             body = _BODY if "requestBody" in operation else {}
             for status, (description, headers) in (body | answers).items():
                 operation["responses"].setdefault(status, _problem(description, headers))

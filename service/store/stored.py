@@ -24,6 +24,8 @@ class StoredRun(Run, RunResult):
     repetitions: Mapping[int, Repetition]
     """Of its distinct failures, by index of the episode; none if not replayed."""
     headline_candidates: int = 0
+    startup_s: float = 0.0
+    """Of `busy_s`, what passed until the first episode of each attempt."""
 
     @classmethod
     def from_row(cls, row: RunRow, campaign_id: str) -> Self:

@@ -28,6 +28,7 @@ class Ledger:
     def __init__(self, store: Store) -> None:
         self._store = store
         self._engine = store.engine.execution_options(**WRITING)
+        self._starting = set[int]()  # runs whose worker has not reported an episode yet
         self._repeated_s: dict[int, float] = {}  # time of runs that only repeated what was known
 
     def find(self, project: str, key: str, spec: CampaignSpec) -> StoredCampaign | None:
@@ -69,6 +70,7 @@ class Ledger:
             _move(session, row, State.RUNNING)
             row.started_at = row.started_at or time.time()
             row.attempts += 1
+            self._starting.add(number)
 
     def add_episodes(self, events: Sequence[tuple[int, EpisodeDone]]) -> set[int]:
         """Store episodes, each with its run's number, or replace those of which a resumed run reports another outcome.
@@ -86,6 +88,9 @@ class Ledger:
                 run, row = runs[number], known.get(_place(number, event))
                 campaign = campaigns[run.campaign_number]
                 self._repeated_s[number] = self._repeated_s.get(number, 0.0) + event.wall_s
+                if number in self._starting:
+                    self._starting.discard(number)
+                    run.startup_s += event.wall_s
                 if row is not None and row.record == stored(event.record) and row.series_sha256 == event.series_sha256:
                     continue
                 if row is None:

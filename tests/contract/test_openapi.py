@@ -1,3 +1,6 @@
+import json
+import re
+import shlex
 from pathlib import Path
 
 import httpx
@@ -7,6 +10,7 @@ import yaml
 from pydantic import BaseModel
 
 from risk_sac.config import CampaignSpec, LearnerConfig, Odd
+from service.api.examples import CAMPAIGNS as EXAMPLES
 from service.app import create_app, openapi
 from service.openapi import document
 from service.settings import ServiceSettings
@@ -29,7 +33,39 @@ def test_served_document_is_the_committed_one(base_url):
 
 
 def test_the_document_is_small():
-    assert COMMITTED.stat().st_size <= 172_300
+    assert COMMITTED.stat().st_size <= 184_500
+
+
+def operations():
+    document = yaml.safe_load(COMMITTED.read_text(encoding="utf-8"))
+    return [(method, path, each) for path, found in document["paths"].items() for method, each in found.items()]
+
+
+@pytest.mark.parametrize(("method", "path", "operation"), operations(), ids=lambda each: str(each)[:60])
+def test_every_call_has_a_readable_title_a_description_and_an_example_that_is_understood(
+    base_url, method, path, operation
+):
+    assert re.fullmatch(r"[A-Z][a-z]+( [a-z]+){1,3}", operation["summary"])
+    about, _, example = operation["description"].rpartition("\n\nExample: ")
+    assert len(about) > 20
+    words = shlex.split(example.strip("`"))
+    assert words[:2] == ["curl", "-s"]
+    address = next(word for word in words if word.startswith("http://")).replace("http://127.0.0.1:8000", base_url)
+    sent = (words.index("-X") + 1) if "-X" in words else None
+    assert (words[sent].lower() if sent else "get") == method
+    body = json.loads(words[words.index("-d") + 1]) if "-d" in words else None
+    if "--data-binary" in words or path == "/v1/campaigns/{campaign_id}/events":
+        return
+    answer = httpx.request(method, address, json=body, timeout=120)
+    unknown_ids = 404 if "{" in path or path == "/v1/regressions" else None
+    assert answer.status_code in (200, 202, unknown_ids), answer.text
+
+
+def test_every_body_that_is_an_example_is_taken(base_url):
+    for name, example in EXAMPLES.items():
+        answer = httpx.post(f"{base_url}/v1/campaigns/check", json=example, timeout=120)
+        wrong = [each["field"] for each in answer.json().get("errors", [])]
+        assert wrong == (["network"] if "network" in example else []), (name, answer.text)
 
 
 def test_every_error_is_declared_as_a_problem():

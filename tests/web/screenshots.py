@@ -67,7 +67,7 @@ def picture(browser: Browser, address: str, file: Path, viewport: dict[str, int]
     page.goto(address)
     page.get_by_role("heading", level=1).first.wait_for(timeout=60_000)
     page.wait_for_load_state("networkidle")
-    page.wait_for_function("!document.querySelector('.spinner')", timeout=60_000)
+    page.wait_for_function("() => !document.querySelector('.spinner')", timeout=60_000)
     page.screenshot(path=file)
     page.close()
 

@@ -154,6 +154,33 @@ def test_a_run_is_hidden_by_the_legend_and_by_its_card(page_at: Callable[..., Pa
     expect(entry).to_have_attribute("aria-pressed", "true")
 
 
+def test_importance_and_coverage_are_the_services(
+    page_at: Callable[..., Page], service: Service, campaign: str
+) -> None:
+    page = page_at(f"campaigns/{campaign}")
+    table = page.get_by_role("region", name="Importance of scene parameters")
+    matrix = page.get_by_role("region", name="Coverage of two parameters")
+    for family in service.get(campaign, "/scenes")["families"]:
+        page.get_by_role("group", name="Family of the scenes").get_by_role("button", name=family["family"]).click()
+        expect(table.locator("tbody tr")).to_have_count(len(family["parameters"]))
+        for row, parameter in zip(table.locator("tbody tr").all(), family["parameters"], strict=True):
+            expect(row).to_have_attribute("data-parameter", parameter["name"])
+            expect(row.locator("td").nth(1)).to_have_text(f"{parameter['effect']:.2f}")
+        down, across = family["pairs"][0]["parameters"]
+        page.get_by_role("combobox", name="Down").select_option(across)  # turned around
+        page.get_by_role("combobox", name="Across").select_option(down)
+        played, failed = (list(map(list, zip(*family["pairs"][0][name], strict=True))) for name in ("played", "failed"))
+        expect(matrix.locator("tbody td")).to_have_text(
+            [
+                f"{bad} of {all_}" if all_ else "–"
+                for row, bads in zip(played, failed, strict=True)
+                for all_, bad in zip(row, bads, strict=True)
+            ]
+        )
+    page.get_by_role("combobox", name="Across").select_option(across)
+    expect(page.get_by_text("Choose two different parameters.")).to_be_visible()
+
+
 def test_a_running_campaign_is_followed_to_its_end_without_a_reload(
     page_at: Callable[..., Page], service: Service
 ) -> None:

@@ -215,6 +215,26 @@ def test_presets_fill_the_form_and_the_cost_follows(page_at: Callable[..., Page]
     expect(page.locator(".tile").first).to_contain_text(f"{runs // 3 * 5 * body['budget']['episodes']:,}")
 
 
+def test_methods_that_most_need_come_first_with_their_cost_and_the_rest_is_folded(
+    page_at: Callable[..., Page], service: Service
+) -> None:
+    page = page_at("new")
+    group = page.get_by_role("group", name="Methods")
+    methods = service.client.get("/v1/methods").json()["items"]
+    usual = [each["name"] for each in methods if each["usual"]]
+    expect(group.locator(".choice-card b")).to_have_text(usual)
+    for each in methods[: len(usual)]:
+        expect(group.locator(".choice-card", has_text=each["summary"])).to_contain_text(
+            f"cost {each['episode_cost']:g}"
+        )
+    group.get_by_text("for comparisons").click()
+    expect(group.locator(".choice-card")).to_have_count(len(methods))
+    group.get_by_text("for comparisons").click()
+    expect(group.locator(".choice-card")).to_have_count(len(usual))
+    page.get_by_role("button", name="Compare methods").click()  # has chosen some of them
+    expect(page.get_by_role("checkbox", name="sac-lag", exact=True)).to_be_checked()
+
+
 def test_a_perfect_ego_has_neither_delay_nor_sensor(page_at: Callable[..., Page]) -> None:
     page = page_at("new")
     ego = opened(page, "Ego")

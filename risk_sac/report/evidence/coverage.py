@@ -151,6 +151,13 @@ def axis_of(parameter: Parameter, whole: Parameter, bins: int) -> Axis:
     return Axis(parameter, tuple(f"{low:.3g} to {high:.3g}" for low, high in pairwise(edges)), edges[1:-1])
 
 
+def axes_of(family: Family, odd: Odd, bins: int) -> list[Axis]:
+    """Divide the range that the ODD leaves each scene parameter into bins."""
+    whole = intersect(family.odd, odd)
+    every = with_environment(family.space, odd, whole)
+    return [axis_of(*both, bins) for both in zip(narrow(every, whole).parameters, every.parameters, strict=True)]
+
+
 def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Coverage:
     """Count what these episodes looked at; those from before the family had all its parameters are left out."""
     whole = intersect(family.odd, odd)
@@ -161,10 +168,7 @@ def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Cove
     columns = [np.array([record.scene[name] for record in known], dtype=np.float64) for name in space.names]
     played = np.array([record.outcome not in NOT_PLAYED for record in known], dtype=bool)
     failed = np.array([record.outcome is Outcome.FAILURE for record in known], dtype=bool)
-    fine, coarse = (
-        [axis_of(*both, bins) for both in zip(space.parameters, every.parameters, strict=True)]
-        for bins in (BINS, PAIR_BINS)
-    )
+    fine, coarse = (axes_of(family, odd, bins) for bins in (BINS, PAIR_BINS))
     placed = [(axis, axis.places(column)) for axis, column in zip(coarse, columns, strict=True)]
     return Coverage(
         family=family.name,

@@ -35,7 +35,9 @@ from service.store.stored import StoredCampaign
 from service.views.curves import Curves, curves
 from service.views.failure_table import FailureTable, failure_table
 from service.views.logs import log_tail
-from service.views.progress import campaign_body, retry_after_s, summary_body
+from service.views.progress import campaign_body, summary_body
+from service.views.scenes import SceneEffects, scene_effects
+from service.views.time_left import retry_after_s
 from service.views.totals import played, results
 
 LISTED = "campaigns"
@@ -178,6 +180,18 @@ def get_curves(
         service,
         caller,
         lambda found: curves(found, service.store.plain_episodes(found.number), points),
+    )
+
+
+@router.get("/{campaign_id}/scenes", response_model=SceneEffects, responses=UNKNOWN | LIVE)
+def get_scenes(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
+    """Which scene parameters set failing episodes apart, and which parts of the ODD were played."""
+    return _live(
+        campaign_id,
+        request,
+        service,
+        caller,
+        lambda found: scene_effects(found, service.store.plain_episodes(found.number)),
     )
 
 

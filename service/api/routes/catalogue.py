@@ -13,6 +13,7 @@ from risk_sac.records import Record
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import requirements_from_odd, widest
+from service.views.time_left import EPISODE_COST
 
 R = TypeVar("R", bound=BaseModel)
 
@@ -89,6 +90,11 @@ class NamedMethod(Method):
     """A search method."""
 
     name: MethodName
+    usual: bool
+    """Whether most campaigns need it; the others are for comparisons."""
+    episode_cost: float | None
+    """Processor time of an episode in `low`, as a multiple of what an episode of `random` takes, as measured; of a
+    learner, after its warm start. Null where it was not measured."""
 
 
 class Ego(Record):
@@ -127,7 +133,7 @@ class Egos(Record):
 
 
 class Methods(Record):
-    """All search methods."""
+    """All search methods, the usual ones first."""
 
     items: list[NamedMethod]
 
@@ -138,6 +144,8 @@ PROFILES = {
     "careful": "The default, with the braking of UN R157's driver on top.",
     "defensive": "The default, held back by the defensive reference driver.",
 }
+USUAL: tuple[MethodName, ...] = ("risk-sac-diverse", "archive", "random")
+"""Methods that most campaigns need: the two that find most for their time, and the control."""
 router = APIRouter(prefix="/v1", tags=["catalogue"])
 
 
@@ -186,11 +194,16 @@ def list_egos() -> Egos:
 
 @router.get("/methods")
 def list_methods() -> Methods:
-    """Search methods as rows of a table."""
-    return Methods(items=[_told(NamedMethod, method, name=name) for name, method in METHODS.items()])
+    """Search methods as rows of a table, with what an episode of each costs."""
+    names = [*USUAL, *(name for name in METHODS if name not in USUAL)]
+    return Methods(items=[_method(name) for name in names])
 
 
-def _told(record: type[R], row: object, **named: str) -> R:
+def _method(name: MethodName) -> NamedMethod:
+    return _told(NamedMethod, METHODS[name], name=name, usual=name in USUAL, episode_cost=EPISODE_COST.get(name))
+
+
+def _told(record: type[R], row: object, **named: object) -> R:
     """The record of a row of a table; `named`: what the row itself does not say."""
     said = {name: getattr(row, name) for name in record.model_fields.keys() - named.keys()}
     return record.model_validate(said | named)

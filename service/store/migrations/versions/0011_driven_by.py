@@ -1,4 +1,4 @@
-"""What drove the adversaries of an episode; unknown of those from before."""
+"""What drove the adversaries of an episode, and how long workers took to start; unknown of those from before."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -10,7 +10,8 @@ KINDS = ("policy", "model", "script", "random")
 
 
 def upgrade() -> None:
-    """Adds the column, and fills it from records that were stored before a step back."""
+    """Adds the columns, and fills the first from records that were stored before a step back."""
+    op.add_column("runs", sa.Column("startup_s", sa.Double, nullable=False, server_default="0"))
     op.add_column("episodes", sa.Column("driven_by", sa.String))
     written = {kind: f'%"driven_by":"{kind}"%' for kind in KINDS}
     cases = " ".join(f"WHEN record LIKE :{kind} THEN '{kind}'" for kind in KINDS)
@@ -19,5 +20,6 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Drops it; the records keep what it said."""
+    """Drops them; the records keep what drove the adversaries."""
+    op.drop_column("runs", "startup_s")
     op.drop_column("episodes", "driven_by")

@@ -13,6 +13,7 @@ import { Header } from "./header";
 import { useLive } from "./live";
 import { Newest } from "./newest";
 import { Runs } from "./runs";
+import { Scenes } from "./scenes";
 import "./campaign.css";
 
 export function CampaignScreen({ id }: { id: string }) {
@@ -71,6 +72,7 @@ export function CampaignScreen({ id }: { id: string }) {
           {curves ? <Empty>{ended(campaign) ? "No episode was finished." : "Curves begin with the first episode."}</Empty> : <Loading what="curves" />}
         </section>
       )}
+      {campaign.progress.episodes_done > 0 && <Scenes campaign={campaign} />}
       <Runs campaign={campaign} hidden={hidden} hide={hide} />
     </div>
   );

@@ -1,7 +1,7 @@
 /** A field of the form made from its schema, whatever it is. */
 
 import type { ComponentChildren } from "preact";
-import { useContext, useState } from "preact/hooks";
+import { useContext, useEffect, useState } from "preact/hooks";
 import { FormContext, isWithin, useField, type Wrong } from "./form";
 import { numbersOf, numbersText } from "./numbers";
 import type { Field, Json, Shape, Values } from "./schema";
@@ -218,35 +218,65 @@ function Switch({ field: { title, about }, path }: { field: Field; path: Path })
   );
 }
 
-/** Some of a few names, each with a box; `abouts` has a word on each. */
-export function Choices({ field, path, abouts = {} }: { field: Field; path: Path; abouts?: Values }) {
+interface Offered {
+  field: Field;
+  path: Path;
+  /** A word on each. */
+  abouts?: Values;
+  /** What each costs, in words. */
+  costs?: Values;
+  /** Those that are shown first; the others are folded away. Without it all are shown. */
+  first?: readonly string[];
+  help?: string;
+}
+
+/** Some of a few names, each with a box. */
+export function Choices({ field, path, abouts = {}, costs = {}, first, help }: Offered) {
   const { id, value, change, wrong } = useField<string[]>(path, true);
   const offered = field.shape.kind === "list" && field.shape.item.kind === "choice" ? field.shape.item.options : [];
   const options = [...new Set([...offered, ...value])]; // a clone may have what a form does not offer: a place of a map
   const toggle = (option: string) => options.filter((each) => (each === option) !== value.includes(each));
+  const shown = first ? [...first.filter((each) => options.includes(each))] : options;
+  const folded = options.filter((each) => !shown.includes(each));
+  const picked = folded.filter((each) => value.includes(each)).length;
+  const [opened, setOpened] = useState(picked > 0);
+  useEffect(() => {
+    if (picked > 0) setOpened(true); // by a preset
+  }, [picked > 0]);
+  const card = (option: string) => (
+    <label key={option} class={value.includes(option) ? "choice-card on" : "choice-card"}>
+      <input
+        type="checkbox"
+        aria-label={option}
+        aria-describedby={abouts[option] ? `${id}-${option}` : undefined}
+        checked={value.includes(option)}
+        onChange={() => change(toggle(option))}
+      />
+      <span>
+        <b>{option}</b>
+        {costs[option] && <span class="tag cost">{costs[option] as string}</span>}
+        {abouts[option] && (
+          <span class="small" id={`${id}-${option}`}>
+            {abouts[option] as string}
+          </span>
+        )}
+      </span>
+    </label>
+  );
   return (
     <fieldset class={wrong.length ? "choices is-wrong" : "choices"} id={id}>
       <legend>{field.title}</legend>
       <Wrongs id={id} wrong={wrong} />
-      {options.map((option) => (
-        <label key={option} class={value.includes(option) ? "choice-card on" : "choice-card"}>
-          <input
-            type="checkbox"
-            aria-label={option}
-            aria-describedby={abouts[option] ? `${id}-${option}` : undefined}
-            checked={value.includes(option)}
-            onChange={() => change(toggle(option))}
-          />
-          <span>
-            <b>{option}</b>
-            {abouts[option] && (
-              <span class="small" id={`${id}-${option}`}>
-                {abouts[option] as string}
-              </span>
-            )}
-          </span>
-        </label>
-      ))}
+      {help && <p class="help">{help}</p>}
+      {shown.map(card)}
+      {folded.length > 0 && (
+        <details class="more-choices" open={opened} onToggle={(event) => setOpened(event.currentTarget.open)}>
+          <summary>
+            {folded.length} more: {path.at(-1)} for comparisons{picked > 0 && <span class="tag running">{picked} selected</span>}
+          </summary>
+          {opened && <div class="choice-grid">{folded.map(card)}</div>}
+        </details>
+      )}
     </fieldset>
   );
 }

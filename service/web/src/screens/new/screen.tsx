@@ -106,7 +106,14 @@ function CampaignForm({ known: [description, families, methods], from, ground }:
             ) : (
               <Choices field={field("families")} path={["families"]} abouts={summaries(families.items)} />
             )}
-            <Choices field={field("methods")} path={["methods"]} abouts={summaries(methods.items)} />
+            <Choices
+              field={field("methods")}
+              path={["methods"]}
+              abouts={summaries(methods.items)}
+              costs={costs(methods.items)}
+              first={methods.items.filter(({ usual }) => usual).map(({ name }) => name)}
+              help={COST}
+            />
             <SchemaField field={{ ...field("seeds"), about: "Each method is run once with each; 0-4 is five of them." }} path={["seeds"]} />
           </section>
           <section class="card">
@@ -217,6 +224,13 @@ function itemOf(shape: Shape): Shape {
 function egoShape(shape: Shape, spec: Values): Shape {
   if (shape.kind !== "object" || !isPerfect(spec)) return shape;
   return { ...shape, fields: shape.fields.filter(({ name }) => !NOT_OF_PERFECT.includes(name)) };
+}
+
+const COST = "The cost is the measured processor time of an episode as a multiple of one of random. Learners begin with a warm start, which costs less.";
+
+/** What an episode of each method costs, in words. */
+function costs(items: Body<"Methods">["items"]): Values {
+  return Object.fromEntries(items.flatMap(({ name, episode_cost: cost }) => (cost === null ? [] : [[name, `cost ${cost}`]])));
 }
 
 function summaries(items: readonly { name: string; summary: string }[]): Values {
