@@ -85,6 +85,10 @@ class Manager:
             settle(self._settings.data_dir / "campaigns", self._store.exists)
         except OSError as error:
             raise StorageError(refused("tidying the data folder", self._settings.data_dir, error)) from error
+        if self._settings.runs is not None:
+            from service.runs.imported import import_runs  # here, because loading the report takes a while
+
+            import_runs(self._settings.runs, self._settings, self._ledger)
         threading.Thread(target=_tidy, args=(self._settings.data_dir, time.time()), name="tidy", daemon=True).start()
         resumed = self._ledger.resume()
         if resumed:
