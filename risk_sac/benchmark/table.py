@@ -52,7 +52,12 @@ def sections(detections: Sequence[Detection]) -> dict[str, list[Detection]]:
 
 def methods_table(detections: Sequence[Detection]) -> str:
     """Returns the table of methods: A12 and p are against random search."""
-    return table(METHODS, [_row(each) for each in summaries(detections)])
+    return table(METHODS, methods_rows(detections))
+
+
+def methods_rows(detections: Sequence[Detection]) -> list[list[str]]:
+    """Returns the rows of the table of methods, below the columns `METHODS`."""
+    return [_row(each) for each in summaries(detections)]
 
 
 def _row(each: Summary) -> list[str]:

@@ -12,7 +12,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from risk_sac.benchmark.power import Played, Run, measured, method_power, power_of, runs_of
-from risk_sac.cli.console import OK, number
+from risk_sac.cli.console import OK, folded_table, number, say
 from risk_sac.cli.parser import Commands, add_command
 from risk_sac.config import SHIPPED, MethodName
 from risk_sac.config.text import read_text
@@ -76,7 +76,8 @@ def add(commands: Commands) -> None:
 def _benchmark(options: argparse.Namespace) -> int:
     # Here, because loading the simulator takes seconds.
     from risk_sac.benchmark.runs import Benchmark, ended, play
-    from risk_sac.benchmark.table import methods_table, write
+    from risk_sac.benchmark.table import METHODS as COLUMNS
+    from risk_sac.benchmark.table import methods_rows, write
 
     test_set = [name for name, defect in DEFECTS.items() if defect.test_set]
     benchmark = Benchmark(
@@ -96,7 +97,7 @@ def _benchmark(options: argparse.Namespace) -> int:
                     write(found, options.out, options.typed)
                     written_s = time.monotonic()
     write(found, options.out, options.typed)
-    console.print(methods_table(found), markup=False, soft_wrap=True)
+    say(folded_table(COLUMNS, methods_rows(found)))
     return OK
 
 
@@ -113,7 +114,7 @@ def _power(options: argparse.Namespace) -> int:
     for each in found.defects:
         table.add_row(each.defect, each.family, str(each.detected), str(each.runs))
     console.print(table)
-    console.print(" ".join(found.sentences), markup=False, soft_wrap=True)
+    say(" ".join(found.sentences))
     return OK
 
 
@@ -130,5 +131,5 @@ def _power_of_folders(options: argparse.Namespace, runs: Sequence[Run]) -> int:
     ]
     found = power_of(campaign, played, runs)
     for line in (*found.lines, found.note):
-        console.print(line, markup=False, soft_wrap=True)
+        say(line)
     return OK

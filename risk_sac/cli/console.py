@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -10,6 +11,7 @@ from pydantic import BaseModel, TypeAdapter
 from pydantic_core import to_json
 from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
+from rich.markup import escape
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -39,7 +41,21 @@ def print_answer(options: argparse.Namespace, answer: Answer, *texts: Renderable
         console.out(to_json(plain, inf_nan_mode="null").decode(), highlight=False)
         return
     for text in texts:
-        console.print(text, markup=False, soft_wrap=isinstance(text, str))
+        say(text)
+
+
+def say(text: RenderableType) -> None:
+    """Prints a table, or text that wraps at spaces; a path stays whole, however long it is."""
+    if isinstance(text, str):
+        lines = (_wrapped(line, console.width) for line in text.splitlines())
+        console.print("\n".join(lines), markup=False, soft_wrap=True)
+    else:
+        console.print(text)
+
+
+def _wrapped(line: str, width: int) -> str:
+    indent = " " * (len(line) - len(line.lstrip()) + 2) if line.startswith(" ") else ""
+    return textwrap.fill(line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def number(type_: type[int] | type[float], least: float, most: float = math.inf) -> Callable[[str], float]:
@@ -106,6 +122,14 @@ def say_adjustments(found: Iterable[Adjustment]) -> None:
     """Says what episodes use otherwise than it was asked for."""
     for each in found:
         notes.print(f"Note: {each}.", markup=False, soft_wrap=True)
+
+
+def folded_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    """Returns a table whose cells wrap as far as the width of the terminal needs it."""
+    table = Table(*columns, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table
 
 
 REQUIREMENT_HEADS = ("requirement", "counts", "vio-\nlated", "valid", "dis-\ntinct", "preven-\ntable", "rate\n95 %")

@@ -7,11 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
-
 from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
-from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, progress_bar
+from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, folded_table, progress_bar, say
 from risk_sac.cli.parser import Commands, add_command, add_group
 from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
@@ -21,7 +18,7 @@ from risk_sac.egos.registry import SHIPPED, cards
 from risk_sac.machine import cores
 from risk_sac.metrics import COLUMNS as REQUIREMENT_COLUMNS
 from risk_sac.metrics import pooled_counts, pooled_requirements, requirement_cells, wilson_interval
-from risk_sac.terminal import complain, console
+from risk_sac.terminal import complain
 
 if TYPE_CHECKING:
     from risk_sac.report import FinishedRun
@@ -74,21 +71,22 @@ def add(commands: Commands) -> None:
 
 
 def _list(options: argparse.Namespace) -> int:
-    table = Table("name", "kind", "version", "responds within", "summary", box=SIMPLE_HEAD)
-    for name in PROFILES:
-        response_s = EgoConfig.model_validate({"profile": name}).response_s
-        table.add_row(name, "sumo", "", f"{response_s:g} s", "SUMO's models, named by `profile`")
+    rows = [
+        [name, "sumo", f"{EgoConfig.model_validate({'profile': name}).response_s:g} s", "SUMO's models"]
+        for name in PROFILES
+    ]
     for card in cards():
-        table.add_row(card.name, card.kind, card.version, f"{card.response_time_s:g} s", card.summary)
-    console.print(table)
+        rows.append([card.name, card.kind, f"{card.response_time_s:g} s", f"{card.summary} Version {card.version}"])
+    say(folded_table(("name", "kind", "responds\nwithin", "summary"), rows))
     return OK
 
 
 def _defects(options: argparse.Namespace) -> int:
-    table = Table("defect", "kind", "ego", "families", "sentence", box=SIMPLE_HEAD)
-    for name, defect in DEFECTS.items():
-        table.add_row(name, defect.kind, defect.base, " ".join(defect.families), defect.sentence)
-    console.print(table)
+    rows = [
+        [f"{name}\n{defect.kind}", f"{defect.base}\n{' '.join(defect.families)}", defect.sentence]
+        for name, defect in DEFECTS.items()
+    ]
+    say(folded_table(("defect\nkind", "ego\nfamilies", "sentence"), rows))
     return OK
 
 
@@ -116,7 +114,9 @@ def _ladder(options: argparse.Namespace) -> int:
     if requirements := [row for family in spec.families for row in _requirements(family, found)]:
         text += "\n" + table(["family", "ego", *REQUIREMENT_COLUMNS], requirements, left=4)
     (options.out / "ladder.md").write_text(f"`{options.typed}`\n\n{text}", encoding="utf-8")
-    console.print(text, markup=False, soft_wrap=True)
+    say(folded_table(COLUMNS, rows))
+    if requirements:
+        say(folded_table(("family", "ego", *REQUIREMENT_COLUMNS), requirements))
     return OK if all(found.values()) else FAILED
 
 

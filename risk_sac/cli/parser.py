@@ -124,8 +124,8 @@ def as_typed(error: ConfigError, options: argparse.Namespace) -> str:
         break
     if error.got != "nothing":
         return str(error)
-    hints = [f"choose {error.expected}" if error.expected else "", error.remedy]
-    return "; ".join([f"{error.field} is missing", *filter(None, hints)])
+    known = f"choose {error.expected}" if error.expected != "a value" else f"see `{options.parser.prog} --help`"
+    return "; ".join(filter(None, [f"{error.field} is missing", known, error.remedy]))
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -5,7 +5,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from risk_sac.cli.console import FAILED, OK, counted, print_answer
+from risk_sac.cli.console import FAILED, OK, counted, print_answer, say
 from risk_sac.cli.parser import Commands, add_command, add_failure_arguments, add_json_flag
 from risk_sac.errors import ConfigError, SimulationError
 from risk_sac.machine import cores
@@ -88,7 +88,7 @@ def _replay(options: argparse.Namespace) -> int:
     same &= played.signal_heads.tobytes() == bundle.signal_heads.tobytes()
     events = ", ".join(each.event for each in played.found) or "keeps every requirement that counts"
     outcome = "every array is as recorded" if same else "not as recorded"
-    console.print(printable(f"{manifest.id}: the ego {events}; {outcome}"), markup=False, soft_wrap=True)
+    say(printable(f"{manifest.id}: the ego {events}; {outcome}"))
     return OK if same else FAILED
 
 

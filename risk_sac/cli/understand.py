@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rich.text import Text
 
-from risk_sac.cli.console import OK, counted, narrow_table, print_answer
+from risk_sac.cli.console import OK, counted, narrow_table, print_answer, say
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Studied, note, valid_failure
@@ -112,7 +112,7 @@ def _minimise(options: argparse.Namespace) -> int:
     ]
     if options.out is not None:
         lines.append(f"Bundle: {options.out}")
-    console.print(printable("\n".join(lines)), markup=False, soft_wrap=True)
+    say(printable("\n".join(lines)))
     _note(asked, Studied(core=core))
     return OK
 

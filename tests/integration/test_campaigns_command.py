@@ -200,6 +200,7 @@ def test_list_is_newest_first_filtered_and_bounded(
     ids = [answer(*SUBMIT, "--label", label)["id"] for label in ("x", "x", hostile)]
     assert [each["id"] for each in answer("list", "--limit", 2)] == ids[:0:-1]
     assert [each["id"] for each in answer("list", "--label", "x", "--limit", 2)] == ids[1::-1]
+    assert answer("results")["campaign_id"] == ids[-1]  # of the newest, where none is named
     assert answer("list", "--state", "failed", "--family", "dense") == []
     assert answer("list", "--label", hostile)[0]["label"] == hostile
     assert call("list") == 0
@@ -241,12 +242,12 @@ def test_a_campaign_on_an_uploaded_map_is_submitted_by_its_names(
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["submit"], "families: "),
-        (["submit", "--families", "high"], "families[0]: "),
-        (["submit", "--spec", "nowhere.yaml"], "spec: "),
+        (["submit"], "--families is missing; see `risk-sac campaigns submit --help`"),
+        (["submit", "--families", "high"], "--families: "),
+        (["submit", "--spec", "nowhere.yaml"], "--spec: "),
         (["watch", "c0000"], "http://"),
         (["list", "--state", "asleep"], "http://"),
-        (["list", "--url", "nowhere"], "url: "),
+        (["list", "--url", "nowhere"], "--url: "),
     ],
 )
 def test_what_cannot_run_is_exit_status_2_without_a_traceback(

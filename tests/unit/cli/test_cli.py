@@ -12,35 +12,18 @@ from rich.console import Console
 
 from risk_sac import __version__, cli
 from risk_sac.cli.show import _table
-from risk_sac.config import Budget, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.execution.runs import run
 from risk_sac.records import ConflictType, Fault, Grade, Outcome, RunMetrics, Severity
 from risk_sac.run_folder.results import RecordedFailure, Results, read_results, write_results
 from tests.builders import judgement, violation
+from tests.unit.cli.conftest import SPEC, ignore
 from tests.unit.failures.staged import synthetic_contact
-
-SPEC = RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=3))
 
 
 def untimed(results: Results) -> Results:
     """Without what differs from one execution to the next."""
     return replace(results, wall_s=0.0, cpu_s=0.0, episode_cpu_s=())
-
-
-def ignore(done: int, metrics: RunMetrics | None) -> None:
-    pass
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A finished run with at least one contact."""
-    for seed in range(11, 31):
-        folder = tmp_path_factory.mktemp("run")
-        spec = SPEC.model_copy(update={"seed": seed, "budget": Budget(episodes=8)})
-        if run(spec, folder, ignore).failures:
-            return folder
-    raise AssertionError("no contact in 160 random episodes; wanted one to list and draw")
 
 
 def test_results_hold_spec_metrics_versions_and_failures(folder: Path) -> None:
@@ -237,12 +220,13 @@ def test_serve_becomes_the_service_with_its_settings(monkeypatch: pytest.MonkeyP
     calls: list[tuple[str, list[str], dict[str, str]]] = []
     monkeypatch.setattr(os, "execve", lambda *call: calls.append(call))
     monkeypatch.setenv("RISK_SAC_GRACE_S", "5")
-    cli.main(["serve", "--host", "0.0.0.0", "--port", "8001"])
+    cli.main(["serve", "--host", "0.0.0.0", "--port", "8001", "--runs", "/runs"])
     ((program, arguments, environment),) = calls
     assert (program, arguments) == (sys.executable, [sys.executable, "-m", "service"])
     assert (environment["RISK_SAC_HOST"], environment["RISK_SAC_PORT"]) == ("0.0.0.0", "8001")
     assert environment["RISK_SAC_GRACE_S"] == "5"
     assert environment["MALLOC_ARENA_MAX"] == "2"
+    assert environment["RISK_SAC_RUNS"] == "/runs"
     assert "RISK_SAC_DATA_DIR" not in environment
 
 
