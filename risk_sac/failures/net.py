@@ -192,6 +192,12 @@ def roads_of(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Surface
     return shipped_surfaces(found.layout(scene).net) if set(found.space.names) <= scene.keys() else ()
 
 
+def net_of(family: FamilyName, scene: Mapping[str, float]) -> Net | None:
+    """Returns a scene's net; None where the scene lacks parameters that its family has now."""
+    found = family_named(family)
+    return shipped_net(found.layout(scene).net) if set(found.space.names) <= scene.keys() else None
+
+
 @cache  # there are a few nets, and they stay as they are
 def shipped_net(name: str) -> Net:
     """Returns a net by its file's name."""

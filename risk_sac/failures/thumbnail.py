@@ -1,6 +1,6 @@
-"""Draws a failure as a small SVG from above: roads, the paths up to the violation, and the bodies at that time.
+"""Draws a failure as a small SVG from above: roads, signals, both paths, and the bodies at the violation.
 
-It is written by hand, because a screen shows dozens of them and matplotlib takes a second for each.
+The SVG is written by hand, because a screen shows dozens of them and matplotlib takes a second for each.
 """
 
 from collections.abc import Iterator, Sequence
@@ -9,6 +9,7 @@ import numpy as np
 
 from risk_sac.failures.net import Surface
 from risk_sac.failures.recording import BOX, Recording, on_body
+from risk_sac.failures.signals import LAMPS, SignalHead
 from risk_sac.types import STEP_S, Floats, Kind
 
 WIDTH, HEIGHT = 240, 150  # px
@@ -17,6 +18,8 @@ MARGIN_M = 5.0
 WIDTHS_M = (30.0, 56.0)  # least and greatest of the view
 LEAST_RADIUS = 3.5  # px, of a pedestrian
 STRIPE_M = 0.6  # of a crossing
+SCALES_M = (5, 10)  # lengths of the bar
+BAR_PX = 60  # greatest length of the bar
 EGO, STRIKER, GREY = "#0072b2", "#d55e00", "#808080"
 # Grey that is seen through suits a light and a dark ground.
 GROUND = {
@@ -26,16 +29,19 @@ GROUND = {
 }
 
 
-def thumbnail(recording: Recording, roads: Sequence[Surface]) -> str:
+def thumbnail(recording: Recording, roads: Sequence[Surface], signals: Sequence[SignalHead] = ()) -> str:
     """Returns an SVG with a transparent ground."""
     view, ends = _View(recording), [*zip(recording.involved, (EGO, STRIKER), strict=False)]
     if recording.series["kind"][ends[-1][0]] != Kind.PEDESTRIAN:
         ends.reverse()  # a small body lies over a large one
+    violated_s = float(recording["released_s"]) + recording.violation.time_s
     others = (actor for actor in range(len(recording.series["ids"])) if actor not in recording.involved)
     shapes = [
         *(shape for surface in roads if view.shows(surface) for shape in _ground(view, surface)),
+        *(shape for head in signals for shape in _signal(view, head, violated_s)),
         *(shape for actor in others for shape in _body(view, recording, actor, f'fill="{GREY}" fill-opacity=".6"')),
         *(shape for actor, colour in ends for shape in _actor(view, recording, actor, colour)),
+        *_scale_bar(view),
     ]
     size = f'width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>{"".join(shapes)}</svg>'
@@ -80,6 +86,20 @@ def _ground(view: _View, surface: Surface) -> Iterator[str]:
     yield _line(
         view(centre), GREY, width_m * view.scale, f' stroke-opacity=".4" stroke-dasharray="{STRIPE_M * view.scale:.1f}"'
     )
+
+
+def _signal(view: _View, head: SignalHead, time_s: float) -> Iterator[str]:
+    """Draws a bar across the lane; a green one leaves its middle open."""
+    for mark in head.marks(time_s):
+        yield _line(view(mark), LAMPS[head.colour(time_s)], 2.6, "")
+
+
+def _scale_bar(view: _View) -> Iterator[str]:
+    """Draws a length of a round number of metres at the lower left."""
+    length_m = max(each for each in SCALES_M if each * view.scale <= BAR_PX)
+    left, top = 6.0, HEIGHT - 6.0
+    yield _line(np.array([(left, top), (left + length_m * view.scale, top)]), GREY, 1.5, "")
+    yield f'<text x="{left}" y="{top - 4}" font-family="sans-serif" font-size="9" fill="{GREY}">{length_m} m</text>'
 
 
 def _actor(view: _View, recording: Recording, actor: int, colour: str) -> Iterator[str]:

@@ -121,6 +121,10 @@ class FailureTable(Record):
     """Whether it is the first of a kind in the headline."""
     distinct: list[bool]
     """Whether one of its valid violations is the first of its kind in its run and phase."""
+    niche: list[int | None]
+    """Which distinct failure of the campaign it is, counted from 0 over all runs; null where it is not valid."""
+    driven_by: list[DrivenBy | None]
+    """What drove the adversaries; null in what was stored before that was recorded."""
     kind: list[int]
     """Position in `kinds`."""
     striker: list[str | None]
@@ -240,7 +244,7 @@ def failure_table(
     """The table of these failures of the campaign, in their order; one without a triage is new."""
     runs = {run.number: run for run in campaign.runs}
     found: defaultdict[tuple[int, str], Kinds] = defaultdict(Kinds)
-    headline = Kinds()
+    headline, niches = Kinds(), dict[Niche, int]()
     failures, naming, rows = list(failures), [], []
     for each in failures:
         valid, every = violations_of(each.outcome, each.record)
@@ -253,6 +257,7 @@ def failure_table(
             | {"failed": [_requirement(violation) for violation in valid]}
             | {"headline": sum(map(headline.add, candidates)) > 0}
             | {"distinct": sum(map(kinds.add, valid)) > 0}
+            | {"niche": niches.setdefault(_niche(naming[-1]), len(niches)) if valid else None}
         )
     kinds_found = _kinds(naming, rows)
     places = {(kind.requirement, kind.name): place for place, kind in enumerate(kinds_found)}
@@ -285,6 +290,7 @@ def _row(run: StoredRun, failure: PlainEpisode, violation: Plain) -> dict[str, A
         "families": run.family,
         "methods": run.method,
         "seeds": run.seed,
+        "driven_by": failure.record.get("driven_by"),
         "indices": failure.index,
         "phases": failure.phase,
         "driven_by": failure.record.get("driven_by"),

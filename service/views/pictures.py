@@ -1,12 +1,13 @@
 """What is shown of one failure: pictures, the ground, and how its twin went."""
 
 import hashlib
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 
 from risk_sac import __version__
 from risk_sac.failures.net import SurfaceUse, roads_of
 from risk_sac.failures.question import Twin, read_twin
 from risk_sac.failures.recording import Recording
+from risk_sac.failures.signals import SignalColour, signal_heads
 from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.records import Collision, Episode, Record
 from risk_sac.run_folder.results import RecordedFailure
@@ -87,11 +88,24 @@ class Surface(Record):
     """Its corners, m, on the map that the series is on; the last one is joined to the first."""
 
 
+class SignalHead(Record):
+    """The signal at the end of a lane, or at one end of a crossing."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    """Along the lane."""
+    width_m: float
+    changes: list[tuple[float, SignalColour]]
+    """When it begins to show a colour, s, by the clock of the series."""
+
+
 class Roads(Record):
-    """The ground on which a failure came about."""
+    """The ground of a failure, and its signals."""
 
     surfaces: list[Surface]
     """In the order in which they are to be drawn; none where the scene's family had other roads then."""
+    signals: list[SignalHead]
 
 
 class TwinPlay(Record):
@@ -108,15 +122,16 @@ class TwinPlay(Record):
 
 
 def roads_body(failure: FailureOfARun) -> Roads:
-    """The surfaces of a failure's scene."""
-    roads = roads_of(failure.run.family, failure.episode.scene)
-    return Roads(surfaces=[Surface(use=road.use, outline=road.outline.round(MM).tolist()) for road in roads])
+    """Returns the surfaces and signals of a failure's scene."""
+    place = failure.run.family, failure.episode.scene
+    surfaces = [Surface(use=road.use, outline=road.outline.round(MM).tolist()) for road in roads_of(*place)]
+    return Roads(surfaces=surfaces, signals=[SignalHead.model_validate(asdict(head)) for head in signal_heads(*place)])
 
 
 def thumbnail_of(failure: FailureOfARun, settings: ServiceSettings) -> str:
     """A failure as a small SVG; SeriesLost if its time series is lost."""
-    roads = roads_of(failure.run.family, failure.episode.scene)
-    return thumbnail(recording_of(failure, settings), roads)
+    place = failure.run.family, failure.episode.scene
+    return thumbnail(recording_of(failure, settings), roads_of(*place), signal_heads(*place))
 
 
 def twin_body(twin: Twin, played: bytes) -> TwinPlay:

@@ -13,6 +13,7 @@ from risk_sac.errors import RiskSacError
 from risk_sac.failures.cases import Regression
 from risk_sac.failures.net import roads_of
 from risk_sac.failures.recording import Recording
+from risk_sac.failures.signals import signal_heads
 from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.document import Drawing
@@ -52,7 +53,8 @@ def draw(run: FinishedRun, folder: Path | None, index: int) -> Drawing:
         with (folder / FAILURES / series_name(index)).open("rb") as file, np.load(file, allow_pickle=False) as archive:
             series = {name: archive[name] for name in archive.files}
         recording = Recording(RecordedFailure.of(run.spec.id, record), series)
-        return Drawing(thumbnail(recording, roads_of(run.spec.family, record.scene)).encode())
+        place = run.spec.family, record.scene
+        return Drawing(thumbnail(recording, roads_of(*place), signal_heads(*place)).encode())
     except RiskSacError as error:  # of a place on a map
         return Drawing(None, str(error))
     except FileNotFoundError as error:

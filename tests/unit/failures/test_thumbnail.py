@@ -1,6 +1,7 @@
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from shapely import Polygon, box
 import sumo_nets
 from risk_sac.failures.net import read_net, roads_of, surfaces
 from risk_sac.failures.recording import Recording
+from risk_sac.failures.signals import LAMPS, signal_heads
 from risk_sac.failures.thumbnail import EGO, GREY, HEIGHT, STRIKER, WIDTH, thumbnail
 from risk_sac.run_folder.results import RecordedFailure
 from tests.builders import violation
@@ -88,7 +90,8 @@ def test_who_has_left_is_not_drawn_and_who_stands_by_is_grey() -> None:
     there = here | {name: np.nan_to_num(here[name], nan=310.0) for name in ("x_m", "y_m", "heading_rad")}
 
     def bystanders(series: Mapping[str, Any]) -> int:
-        return sum(shape.get("fill") == GREY for shape in drawn(series, roads=False))
+        shapes = drawn(series, roads=False)
+        return sum(shape.get("fill") == GREY and shape.tag == f"{SVG}polygon" for shape in shapes)
 
     assert (bystanders(here), bystanders(there)) == (0, 1)
 
@@ -111,3 +114,19 @@ def test_a_violation_near_nothing_shows_the_ego_and_its_path_up_to_then() -> Non
     assert len(points(path)) == pytest.approx(11, abs=1)
     end, ego = points(path)[-1], points(body(shapes, EGO)).mean(axis=0)
     np.testing.assert_allclose(end, ego, atol=5.0)
+
+
+def test_signals_have_their_colour_at_the_violation_and_a_bar_tells_the_scale() -> None:
+    contact = synthetic_contact()
+    recording, scene = Recording(contact, synthetic_series()), contact.episode.scene
+    heads = [replace(head, x_m=x_m, y_m=0.0) for head, x_m in zip(signal_heads("mixed", scene), (295, 305), strict=False)]
+    red, green = (replace(head, changes=[(0.0, "red"), (at, "green")]) for head, at in zip(heads, (9.0, 1.0), strict=True))
+    shapes = list(ET.fromstring(thumbnail(recording, (), (red, green))))
+    for head, marks in ((red, 1), (green, 2)):
+        colour = LAMPS[head.colour(0.1 + contact.episode.collision.time_s)]
+        assert sum(shape.get("stroke") == colour for shape in shapes) == marks
+    (length,) = (shape.text for shape in shapes if shape.tag == f"{SVG}text")
+    (bar,) = (points(shape) for shape in shapes if shape.get("stroke") == GREY)
+    (ego,) = (points(shape) for shape in shapes if shape.get("fill") == EGO)
+    metres = np.ptp(bar[:, 0]) / np.ptp(ego[:, 0]) * synthetic_series()["length_m"][0]
+    assert metres == pytest.approx(float(length.removesuffix(" m")), rel=0.02)

@@ -1,11 +1,8 @@
-/**
- * What a stage drew last, for tests and for whoever looks at the page from a console: `canvas.drawn`.
- *
- * It is a copy, made when it is read; nothing that is drawn goes by it.
- */
+/** What a stage drew last, for tests and the browser's console: `canvas.drawn`, a copy made when it is read. */
 
 import type { Camera } from "./camera";
-import { pixelX, pixelY, present, seen, type Scene } from "./scene";
+import { pixelX, pixelY, present, seen, type Box, type Scene } from "./scene";
+import { shownIn, type Lamp } from "./signals";
 
 export interface Drawn {
   time_s: number;
@@ -13,7 +10,9 @@ export interface Drawn {
   index: number;
   share: number;
   camera: Camera;
-  /** Of who was present; pixels are CSS pixels of the canvas. */
+  labels: Box[];
+  signals: { x_m: number; y_m: number; lamp: Lamp }[];
+  /** Those present; pixels are CSS pixels of the canvas. */
   actors: { id: string; part: string; x_m: number; y_m: number; heading_rad: number; px: number; py: number; seen: boolean }[];
 }
 
@@ -31,6 +30,8 @@ function drawnOf(scene: Scene): Drawn {
     time_s,
     ...instant,
     camera: { ...camera },
+    labels: [...scene.labels],
+    signals: shownIn(scene).map(({ signal: { x_m, y_m }, lamp }) => ({ x_m, y_m, lamp })),
     actors: recording.ids.flatMap((id, i) => {
       if (!present(scene, i)) return [];
       const [x_m, y_m, heading_rad] = poses.subarray(3 * i, 3 * i + 3) as unknown as [number, number, number];

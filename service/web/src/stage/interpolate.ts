@@ -1,4 +1,4 @@
-/** Where everybody is between two frames. */
+/** Poses of the actors between two frames. */
 
 import type { Recording } from "./recording";
 

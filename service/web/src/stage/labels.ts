@@ -1,72 +1,64 @@
-/** Names and numbers beside the bodies, placed so that they do not cover each other. */
+/** Names and numbers beside the bodies, placed so that they cover neither each other nor a body. */
 
+import { PART_COLOURS } from "./colours";
 import { placeOf } from "./moment";
 import { dangerousAt, marginsAt, ttcAt } from "./risk";
-import { pixelX, pixelY, present, seen, type Scene } from "./scene";
+import { pixelX, pixelY, present, seen, type Box, type Scene } from "./scene";
 
 const LINE_PX = 14;
-const GAP_PX = 6;
-const MOST = 96; // labels, and what they must not cover, of a picture
-const FAR_PX = 30;
-/** Right or left, below or above, near or far. */
+const GAPS_PX = [6, 30, 54, 86, 120]; // from the body; a line leads to a label that is not beside it
+/** Right or left, below or above. */
 const SIDES = [
-  [1, -1, GAP_PX],
-  [-1, -1, GAP_PX],
-  [1, 1, GAP_PX],
-  [-1, 1, GAP_PX],
-  [1, -1, FAR_PX],
-  [-1, -1, FAR_PX],
-  [1, 1, FAR_PX],
-  [-1, 1, FAR_PX],
+  [1, -1],
+  [-1, -1],
+  [1, 1],
+  [-1, 1],
 ] as const;
-const taken = new Float64Array(4 * MOST);
 
-/** The side on which each actor's label was last: it stays there as long as it can. */
+/** Where each actor's label was last: it stays there as long as it can. */
 export type Sides = Int8Array;
 
-export function drawLabels(scene: Scene, sides: Sides): void {
+/** Draws the labels that find room, and returns where they are; the ego's and the striker's come first. */
+export function drawLabels(scene: Scene, sides: Sides): Box[] {
   const { ctx, recording, layers, camera } = scene;
-  if (!layers.labels) return;
-  let count = reserved(scene);
+  if (!layers.labels) return [];
+  const taken = reserved(scene);
+  const before = taken.length;
   ctx.save();
   ctx.lineJoin = "round";
   ctx.textBaseline = "middle";
   for (const part of ["ego", "striker", "adversary", "background"] as const) {
     if (part === "background" && camera.scale < 4) continue;
-    for (let i = 0; i < recording.actors && count < MOST; i++)
-      if (recording.parts[i] === part && present(scene, i)) count = drawLabel(scene, i, count, sides);
+    for (let i = 0; i < recording.actors; i++) if (recording.parts[i] === part && present(scene, i)) drawLabel(scene, i, taken, sides);
   }
   ctx.restore();
+  return taken.slice(before);
 }
 
-function drawLabel(scene: Scene, i: number, count: number, sides: Sides): number {
-  const { ctx, recording, poses, view, camera, ink } = scene;
-  const px = pixelX(scene, poses[3 * i]!);
-  const py = pixelY(scene, poses[3 * i + 1]!);
-  if (px < 0 || py < 0 || px > view.width || py > view.height) return count;
+function drawLabel(scene: Scene, i: number, taken: Box[], sides: Sides): void {
+  const { ctx, recording, poses, view, ink } = scene;
+  const [px, py] = [pixelX(scene, poses[3 * i]!), pixelY(scene, poses[3 * i + 1]!)];
+  if (px < 0 || py < 0 || px > view.width || py > view.height) return;
   const lines = linesOf(scene, i);
   const background = recording.parts[i] === "background";
   ctx.font = `${background ? 11 : 12}px system-ui, sans-serif`;
-  let width = 0;
-  for (const line of lines) width = Math.max(width, ctx.measureText(line).width);
+  const width = Math.max(...lines.map((line) => ctx.measureText(line).width));
   const height = lines.length * LINE_PX;
-  const cos = Math.abs(Math.cos(poses[3 * i + 2]!));
-  const sin = Math.abs(Math.sin(poses[3 * i + 2]!));
-  const halfX = ((recording.length_m[i]! * cos + recording.width_m[i]! * sin) * camera.scale) / 2;
-  const halfY = ((recording.length_m[i]! * sin + recording.width_m[i]! * cos) * camera.scale) / 2;
-  const upright = halfY > halfX; // beside an upright body, above or below a lying one
-  const attempts = background ? 4 : SIDES.length;
-  for (let attempt = 0; attempt <= attempts; attempt++) {
-    const matters = attempt === attempts && (i === 0 || i === recording.striker); // is named whatever it covers
-    if (attempt === attempts && !matters) break;
-    const side = (sides[i]! + attempt) % attempts;
-    const [right, down, gap] = SIDES[side]!;
+  const [halfX, halfY] = halves(scene, i);
+  const places = SIDES.length * (background ? 1 : GAPS_PX.length);
+  for (let attempt = 0; attempt < places; attempt++) {
+    const place = (sides[i]! + attempt) % places;
+    const [right, down] = SIDES[place % SIDES.length]!;
+    const gap = GAPS_PX[Math.floor(place / SIDES.length)]!;
+    const upright = halfY > halfX; // beside an upright body, above or below a lying one
     const left = (upright ? px + right * (halfX + gap) : px + right * gap) - (right < 0 ? width : 0);
     const top = (upright ? py : py + down * (halfY + gap)) - (down < 0 ? height : 0);
-    const inside = left > 2 && top > 2 && left + width < view.width - 2 && top + height < view.height - 2;
-    if (!matters && (!inside || !free(left, top, left + width, top + height, count))) continue;
-    sides[i] = side;
-    take(count, left, top, left + width, top + height);
+    const box: Box = [left, top, left + width, top + height];
+    const inside = left > 2 && top > 2 && box[2] < view.width - 2 && box[3] < view.height - 2;
+    if (!inside || taken.some((other) => overlap(box, other))) continue;
+    sides[i] = place;
+    taken.push(box);
+    if (gap > GAPS_PX[0]!) lead(scene, i, px, py, box);
     ctx.strokeStyle = ink["--ground"];
     ctx.lineWidth = 3.5;
     lines.forEach((line, k) => {
@@ -76,39 +68,52 @@ function drawLabel(scene: Scene, i: number, count: number, sides: Sides): number
       ctx.strokeText(line, left, y);
       ctx.fillText(line, left, y);
     });
-    return count + 1;
+    return;
   }
-  return count;
 }
 
-/** Bodies that matter, the moment, and what stands in the corners. */
-function reserved(scene: Scene): number {
-  const { recording, poses, camera, view } = scene;
-  take(0, 0, 0, 130, 52);
-  take(1, view.width - 180, 0, view.width, 68);
-  take(2, 0, view.height - 36, 190, view.height);
-  let count = 3;
+/** A thin line from a body to the nearest place of its label. */
+function lead(scene: Scene, i: number, px: number, py: number, [left, top, right, bottom]: Box): void {
+  const { ctx, recording, ink } = scene;
+  ctx.strokeStyle = ink[PART_COLOURS[recording.parts[i]!]];
+  ctx.lineWidth = 1;
+  ctx.beginPath();
+  ctx.moveTo(px, py);
+  ctx.lineTo(Math.min(Math.max(px, left), right), Math.min(Math.max(py, top), bottom));
+  ctx.stroke();
+}
+
+/** The bodies, the moment, and the texts in the corners. */
+function reserved(scene: Scene): Box[] {
+  const { recording, poses, view } = scene;
+  const taken: Box[] = [
+    [0, 0, 130, 52],
+    [view.width - 180, 0, view.width, 68],
+    [0, view.height - 36, 190, view.height],
+  ];
   if (scene.original) {
     const [x, y] = placeOf(scene);
     const [px, py] = [pixelX(scene, x), pixelY(scene, y)];
-    take(count++, px - 8, py - 8, px + 8, py + 8);
+    taken.push([px - 8, py - 8, px + 8, py + 8]);
   }
-  for (let i = 0; i < recording.actors && count < MOST / 2; i++) {
-    if (recording.parts[i] === "background" || !present(scene, i)) continue;
-    const [cos, sin] = [Math.abs(Math.cos(poses[3 * i + 2]!)), Math.abs(Math.sin(poses[3 * i + 2]!))];
-    const halfX = ((recording.length_m[i]! * cos + recording.width_m[i]! * sin) * camera.scale) / 2;
-    const halfY = ((recording.length_m[i]! * sin + recording.width_m[i]! * cos) * camera.scale) / 2;
+  for (let i = 0; i < recording.actors; i++) {
+    if (!present(scene, i)) continue;
+    const [halfX, halfY] = halves(scene, i);
     const [px, py] = [pixelX(scene, poses[3 * i]!), pixelY(scene, poses[3 * i + 1]!)];
-    take(count++, px - halfX + 1, py - halfY + 1, px + halfX - 1, py + halfY - 1);
+    taken.push([px - halfX + 1, py - halfY + 1, px + halfX - 1, py + halfY - 1]);
   }
-  return count;
+  return taken;
 }
 
-function take(k: number, left: number, top: number, right: number, bottom: number): void {
-  taken[4 * k] = left;
-  taken[4 * k + 1] = top;
-  taken[4 * k + 2] = right;
-  taken[4 * k + 3] = bottom;
+/** Half the width and half the height of an actor's upright bounds, px. */
+function halves({ recording, poses, camera }: Scene, i: number): [number, number] {
+  const [cos, sin] = [Math.abs(Math.cos(poses[3 * i + 2]!)), Math.abs(Math.sin(poses[3 * i + 2]!))];
+  const [length, width] = [recording.length_m[i]! * camera.scale, recording.width_m[i]! * camera.scale];
+  return [(length * cos + width * sin) / 2, (length * sin + width * cos) / 2];
+}
+
+function overlap(a: Box, b: Box): boolean {
+  return a[0] < b[2] && a[2] > b[0] && a[1] < b[3] && a[3] > b[1];
 }
 
 function linesOf(scene: Scene, i: number): string[] {
@@ -123,17 +128,10 @@ function linesOf(scene: Scene, i: number): string[] {
   const ttc = ttcAt(scene, i);
   if (ttc !== null) lines.push(`TTC ${ttc.toFixed(1)} s`);
   const { along, across } = marginsAt(scene, i);
-  if (along !== null && across !== null) lines.push(`RSS ${signed(along)} m along, ${signed(across)} across`);
+  if (along !== null && across !== null) lines.push(`RSS ${signed(along)} m along, ${signed(across)} m across`);
   return lines;
 }
 
 export function signed(value: number, digits = 1): string {
   return value.toFixed(digits).replace("-", "−");
-}
-
-function free(left: number, top: number, right: number, bottom: number, count: number): boolean {
-  for (let k = 0; k < count; k++) {
-    if (left < taken[4 * k + 2]! && right > taken[4 * k]! && top < taken[4 * k + 3]! && bottom > taken[4 * k + 1]!) return false;
-  }
-  return true;
 }

@@ -29,6 +29,7 @@ export interface Panel {
 }
 
 const SERIES: Colour[] = ["--series-1", "--series-3", "--series-4", "--series-5", "--series-6", "--series-2"];
+const BEFORE_S = 1; // of the conflict
 const BOLD = 2.2;
 export const DASHES = { striker: [6, 3], other: [2, 3] };
 
@@ -63,7 +64,22 @@ function towards({ moment, ids, striker }: Recording): string {
 function distance(recording: Recording): Panel {
   const { time_s, series, striker } = recording;
   const curve: Curve = { name: towards(recording), time_s, values: column(series.distance_m, striker), colour: "--text" };
-  return { title: "Distance", unit: "m", curves: [curve], zero: true };
+  return { title: "Distance", unit: "m", curves: [curve], range: nearBy(recording), zero: true };
+}
+
+const LEAST_M = 5;
+
+/** From 0 to the greatest distance of the conflict: an approach from far away would flatten it. */
+export function nearBy(recording: Recording): [number, number] {
+  const from = opening(recording);
+  const values = column(recording.series.distance_m, recording.striker);
+  const near = values.filter((value, step) => value !== null && recording.time_s[step]! >= from) as number[];
+  return [0, 1.08 * Math.max(LEAST_M, ...near)];
+}
+
+/** Shortly before it becomes critical: where a replay opens, and what the camera fits. */
+export function opening(recording: Recording): number {
+  return (recording.conflict_s ?? -3) - BEFORE_S;
 }
 
 function timeToCollision(recording: Recording): Panel {

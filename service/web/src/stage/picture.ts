@@ -8,6 +8,7 @@ import { drawPaths } from "./paths";
 import { drawRisk } from "./risk";
 import { drawGround } from "./roads";
 import type { Scene } from "./scene";
+import { drawSignals, LAMP_COLOURS } from "./signals";
 import { drawShade, drawSightLines } from "./sight";
 
 export function drawPicture(scene: Scene, sides: Sides): void {
@@ -15,12 +16,13 @@ export function drawPicture(scene: Scene, sides: Sides): void {
   ctx.setTransform(density, 0, 0, density, 0, 0);
   drawGround(scene);
   drawShade(scene);
+  drawSignals(scene);
   drawPaths(scene);
   drawMoment(scene);
   drawSightLines(scene);
   drawRisk(scene);
   drawBodies(scene);
-  drawLabels(scene, sides);
+  scene.labels = drawLabels(scene, sides);
   drawScaleBar(scene);
   drawTime(scene);
   drawSignal(scene);
@@ -59,7 +61,6 @@ function drawTime({ ctx, time_s, ink, recording }: Scene): void {
 }
 
 const LAMPS = ["red", "yellow", "green"] as const;
-const LAMP_COLOURS = { red: "#e5484d", yellow: "#f5b700", green: "#30a46c" };
 
 /** The signal ahead of the ego, as a head of three lamps and in words. */
 function drawSignal({ ctx, view, recording, instant, ink }: Scene): void {

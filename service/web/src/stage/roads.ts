@@ -3,6 +3,7 @@
 import type { Body } from "../api/types";
 import { pixelX, pixelY, type Scene } from "./scene";
 
+type Roads = Body<"Roads">;
 type Surface = Body<"Surface">;
 
 interface Zebra {
@@ -16,11 +17,12 @@ export interface RoadPaths {
   junctions: Path2D;
   crossings: Path2D;
   zebras: Zebra[];
+  signals: Roads["signals"];
 }
 
 const STRIPE_M = 0.5;
 
-export function roadPaths(surfaces: Surface[]): RoadPaths {
+export function roadPaths({ surfaces, signals }: Roads): RoadPaths {
   const all = (use: Surface["use"]) => {
     const path = new Path2D();
     for (const surface of surfaces) if (surface.use === use) addRing(path, surface.outline);
@@ -32,6 +34,7 @@ export function roadPaths(surfaces: Surface[]): RoadPaths {
     junctions: all("junction"),
     crossings: all("crossing"),
     zebras: surfaces.filter(({ use, outline }) => use === "crossing" && outline.length >= 4).map(zebra),
+    signals,
   };
 }
 

@@ -1,26 +1,21 @@
-/** What replay and pair share: the moments worth a look, what the camera fits, the layers, and the time in the address. */
+/** What replay and pair share: moments, what the camera fits, layers, and the time in the address. */
 
 import { useCallback, useEffect, useRef } from "preact/hooks";
 import { placeOf, replace } from "../router";
 import { signal, useSignal } from "../signal";
 import type { Clock } from "./clock";
 import { boundsOf, type Bounds } from "./geometry";
+import { opening } from "./panels";
 import type { Recording } from "./recording";
 import type { Layer, Layers } from "./scene";
 import type { Mark } from "./transport";
 
-const BEFORE_S = 1; // of the conflict: where a replay opens, and what the camera fits
 const AFTER_S = 1; // of the moment: what the camera fits still
 
 export function marksOf({ released_s, conflict_s, moment }: Recording): Mark[] {
   const marks: Mark[] = [{ time_s: released_s, name: "Release", kind: "release" }];
   if (conflict_s !== null) marks.push({ time_s: conflict_s, name: "Conflict", kind: "conflict" });
   return [...marks, { time_s: 0, name: moment === "contact" ? "Contact" : "Violation", kind: "moment" }];
-}
-
-/** Shortly before it becomes critical. */
-export function opening(recording: Recording): number {
-  return (recording.conflict_s ?? -3) - BEFORE_S;
 }
 
 /** The ways of ego and striker through the conflict. */

@@ -34,7 +34,11 @@ export interface Scene {
   time_s: number;
   instant: Instant;
   poses: Poses;
+  /** Left, top, right and bottom of each label in the picture. */
+  labels: Box[];
 }
+
+export type Box = [left: number, top: number, right: number, bottom: number];
 
 export const pixelX = (scene: Scene, x: number) => projectX(scene.camera, scene.view, x);
 export const pixelY = (scene: Scene, y: number) => projectY(scene.camera, scene.view, y);

@@ -51,6 +51,7 @@ export function Stage(props: Props) {
       time_s: 0,
       instant: { index: 0, share: 0 },
       poses: new Float64Array(3 * recording.actors),
+      labels: [],
     };
     const sides = new Int8Array(recording.actors);
     const draw = () => {

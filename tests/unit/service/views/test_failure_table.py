@@ -35,7 +35,7 @@ def test_a_column_has_what_the_record_has(ledger):
         verdicts={"inside_limits": True, "ego_moving": False},
         judgement=judgement(None, conflict_s=-math.inf, severity=Severity.SEVERE, injury_risk=0.0123456, drivers={}),
     )
-    table = told(failure_table(campaign, [plain(run, 7, hit, REFUSED, scene={"lead_gap_m": 12.34567})], {}))
+    table = told(failure_table(campaign, [plain(run, 7, hit, REFUSED, scene={"lead_gap_m": 12.34567}, driven_by="script")], {}))
     kinds, scenes = table.pop("kinds"), table.pop("scenes")
     assert {name: values[0] for name, values in table.items()} == {
         "ids": "low-random-4-train-7",
@@ -55,6 +55,8 @@ def test_a_column_has_what_the_record_has(ledger):
         "prevented_by": [],
         "headline": False,
         "distinct": False,
+        "niche": None,
+        "driven_by": "script",
         "kind": 0,
         "striker": "lead",
         "striker_kind": "vehicle",
@@ -205,3 +207,11 @@ def test_the_headline_has_the_first_of_a_kind_over_all_runs_that_is_not_minor_an
         ("severe", False),  # as in the other run
         ("moderate", True),
     ]
+
+
+def test_what_two_runs_found_alike_is_one_failure_of_the_campaign(ledger):
+    campaign = ledger.create(SPEC)
+    first, second = campaign.runs
+    slow, other = collision(ego_speed_mps=2.0), collision(judgement=judgement(signature="leader"))
+    hits = [(first, 0, collision()), (first, 1, slow), (second, 0, collision()), (second, 1, other)]
+    assert failure_table(campaign, [plain(*each) for each in hits], {}).niche == [0, 1, 0, 2]

@@ -1,4 +1,4 @@
-/** One failure, as much of it as one needs to decide whether to look. */
+/** One distinct failure: what is needed to decide whether to open it. */
 
 import { address } from "../../router";
 import { number, words } from "../../ui/text";
@@ -6,7 +6,8 @@ import { reactionOf } from "./features";
 import { GradeTag, Mark } from "./grade";
 import { refusal } from "../../ui/verdicts";
 import { NO_CONTACT } from "../../ui/violations";
-import { halves, TRIAGE } from "./naming";
+import type { Found } from "./found";
+import { DRIVEN_BY, halves, TRIAGE } from "./naming";
 import { useThumbnail } from "./thumbnails";
 import type { FailureTable } from "./wire";
 
@@ -15,12 +16,11 @@ interface Props {
   table: FailureTable;
   /** Which one, by its place in the columns. */
   at: number;
-  /** How many valid failures of the campaign are of its kind. */
-  often: number;
+  found: Found;
   triage: (failure: number) => void;
 }
 
-export function Card({ campaign, table, at, often, triage }: Props) {
+export function Card({ campaign, table, at, found, triage }: Props) {
   const id = table.ids[at]!;
   const kind = table.kinds[table.kind[at]!]!.name;
   const [striker, ego] = halves(kind);
@@ -30,11 +30,11 @@ export function Card({ campaign, table, at, often, triage }: Props) {
     <article class="failure">
       <Thumbnail campaign={campaign} id={id} />
       <div class="judged">
-        <span class="tag">{words(table.requirement[at]!)}</span>
-        {table.valid[at] ? <GradeTag grade={table.grade[at] ?? "none"} /> : <Refusal rules={table.refused_by[at]!} />}
         {table.severity[at] && <span class="tag">{table.severity[at]}</span>}
         {table.fault[at] && <span class="tag">fault: {table.fault[at]}</span>}
+        {table.valid[at] ? <GradeTag grade={table.grade[at] ?? "none"} /> : <Refusal rules={table.refused_by[at]!} />}
         <Repeats repeats={table.repeats[at]!} />
+        {table.requirement[at] !== NO_CONTACT && <span class="tag">{words(table.requirement[at]!)}</span>}
       </div>
       <div class="what">
         <a href={address(["campaigns", campaign, "failures", id])} title={kind} data-go>
@@ -54,12 +54,18 @@ export function Card({ campaign, table, at, often, triage }: Props) {
             <Measure name="after release" value={number(table.time_s[at], 1)} unit="s" />
           </>
         )}
-        {table.valid[at] && <Measure name="of this kind" value={`${often}`} unit="" />}
+        {table.valid[at] && <Measure name="found in" value={`${found.episodes}`} unit={found.episodes === 1 ? "episode" : "episodes"} />}
       </dl>
       <div class="foot small">
-        <span class="faint" title={other === null ? `no other road user near, ${id}` : `${words(other)} (${table.striker_kind[at]}), ${id}`}>
-          <b>{other === null ? "ego alone" : words(other)}</b> · {table.families[at]} · {table.methods[at]}
-        </span>
+        <div class="found-by faint">
+          <p title={`${found.episodes} episodes of ${found.runs} runs`}>
+            Found by <b>{found.methods.join(", ")}</b>
+            {found.drivers.length > 0 && ` · driven by ${found.drivers.map((name) => DRIVEN_BY[name] ?? name).join(", ")}`}
+          </p>
+          <p title={other === null ? `no other road user near, ${id}` : `${words(other)} (${table.striker_kind[at]}), ${id}`}>
+            {table.families[at]} · {other === null ? "ego alone" : words(other)}
+          </p>
+        </div>
         <button class={`tag triage-${state}`} onClick={() => triage(at)} aria-label={`Triage: ${TRIAGE[state]}. Change`}>
           {TRIAGE[state]} ▾
         </button>
@@ -87,7 +93,7 @@ function Refusal({ rules }: { rules: readonly string[] }) {
 function Repeats({ repeats }: { repeats: FailureTable["repeats"][number] }) {
   if (repeats === null) return null;
   const [text, title] =
-    repeats === "verified" ? ["✓ verified", "It was the same each time it was replayed"] : ["≈ flaky", "It went another way when it was replayed"];
+    repeats === "verified" ? ["✓ verified", "Each replay was the same"] : ["≈ flaky", "A replay went differently"];
   return (
     <span class={`grade ${repeats}`} title={title}>
       {text}

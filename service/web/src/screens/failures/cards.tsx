@@ -1,21 +1,22 @@
-/** The cards in a grid of which only the rows in view are in the document: ten thousand scroll as a hundred do. */
+/** A grid of cards that keeps only the rows in view in the document. */
 
 import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { Signal } from "../../signal";
 import { useSize } from "./canvas";
 import { Card } from "./card";
 import { moved, rowsInView, type Grid } from "./rows";
+import type { Found } from "./found";
 import type { FailureTable } from "./wire";
 
 const LEAST_PX = 262;
-const HEIGHT_PX = 334; // as in failures.css
+const HEIGHT_PX = 372; // as in failures.css
 const GAP_PX = 14;
-const left = new Map<string, number>(); // place -> how far it was scrolled, for whoever comes back from a replay
+const left = new Map<string, number>(); // place -> how far it was scrolled, for the way back from a replay
 
 interface Props {
   campaign: string;
   table: FailureTable;
-  often: Int32Array;
+  found: readonly Found[];
   /** In the order of the cards. */
   shown: readonly number[];
   hovered: Signal<number | null>;
@@ -24,11 +25,11 @@ interface Props {
   place: string;
 }
 
-export function Cards({ campaign, table, often, shown, hovered, triage, place }: Props) {
+export function Cards({ campaign, table, found, shown, hovered, triage, place }: Props) {
   const list = useRef<HTMLUListElement>(null);
   const { width } = useSize(list);
   const [top, viewHeight] = useView(list);
-  const [focused, setFocused] = useState<string | null>(null); // stays in the document, wherever the view goes
+  const [focused, setFocused] = useState<string | null>(null); // its card stays in the document when it scrolls away
   const wanted = useRef<number | null>(null);
   const grid: Grid = { size: shown.length, width, least: LEAST_PX, height: HEIGHT_PX, gap: GAP_PX };
   const rows = rowsInView(grid, top, viewHeight);
@@ -80,7 +81,7 @@ export function Cards({ campaign, table, often, shown, hovered, triage, place }:
               onPointerEnter={() => hovered.set(failure)}
               onFocusIn={() => hovered.set(failure)}
             >
-              <Card {...{ campaign, table, triage }} at={failure} often={often[failure]!} />
+              <Card {...{ campaign, table, triage }} at={failure} found={found[failure]!} />
             </li>
           );
         })}
@@ -119,7 +120,7 @@ function bringIntoView(list: HTMLElement, row: number): void {
   else if (top > most) scrollBy(0, Math.min(top - most, top - least));
 }
 
-/** Scrolls to where one was before one went to a replay. */
+/** Scrolls back to where the list was before a replay was opened. */
 function useComingBack(ready: boolean, place: string): void {
   const latest = useRef(place);
   latest.current = place;

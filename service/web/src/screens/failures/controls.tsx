@@ -6,44 +6,58 @@ import { FACET_LABELS, valueWords } from "./naming";
 import type { FailureTable } from "./wire";
 
 const TYPING_MS = 150;
-const SHOWN: Record<Filters["tab"], readonly Facet[]> = {
-  failures: ["requirement", "family", "method", "run", "grade", "severity", "fault", "prevented_by", "kind", "striker", "broke", "ego_broke", "triage"],
-  refused: ["requirement", "family", "method", "run", "rule", "severity", "kind", "striker", "broke", "ego_broke"],
+const FIRST: Record<Filters["tab"], readonly Facet[]> = {
+  failures: ["severity", "fault", "grade", "driven_by", "method", "family"],
+  refused: ["rule", "severity", "driven_by", "method", "family"],
+};
+const MORE: Record<Filters["tab"], readonly Facet[]> = {
+  failures: ["requirement", "kind", "striker", "prevented_by", "broke", "ego_broke", "run", "triage"],
+  refused: ["requirement", "kind", "striker", "broke", "ego_broke", "run"],
 };
 
 interface Props {
   table: FailureTable;
   /** All of the tab: what can be chosen from. */
-  all: readonly number[];
+  episodes: readonly number[];
+  /** Whether distinct failures are counted, and not episodes. */
+  distinct: boolean;
   filters: Filters;
   change: (changed: Partial<Filters>) => void;
   resetAll: () => void;
 }
 
-export function Controls({ table, all, filters, change, resetAll }: Props) {
+export function Controls({ table, episodes, distinct, filters, change, resetAll }: Props) {
+  const more = MORE[filters.tab];
+  const [open, setOpen] = useState(() => more.some((facet) => filters[facet]));
+  const choice = (facet: Facet) => (
+    <FacetChoice key={facet} {...{ table, episodes, distinct, facet }} chosen={filters[facet]} choose={(value) => change({ [facet]: value })} />
+  );
   return (
     <form class="failure-filters" role="search" aria-label="Filter failures" onSubmit={(event) => event.preventDefault()}>
-      {SHOWN[filters.tab].map((facet) => (
-        <FacetChoice key={facet} {...{ table, all, facet }} chosen={filters[facet]} choose={(value) => change({ [facet]: value })} />
-      ))}
+      {FIRST[filters.tab].map(choice)}
       <Search text={filters.q} change={(q) => change({ q })} />
+      <button type="button" aria-expanded={open} onClick={() => setOpen(!open)}>
+        {open ? "Fewer filters" : "More filters"}
+      </button>
       <button type="button" onClick={resetAll} disabled={!isNarrowed(filters)}>
         Reset
       </button>
+      {open && <div class="more-filters">{more.map(choice)}</div>}
     </form>
   );
 }
 
 interface FacetProps {
   table: FailureTable;
-  all: readonly number[];
+  episodes: readonly number[];
+  distinct: boolean;
   facet: Facet;
   chosen: string;
   choose: (value: string) => void;
 }
 
-function FacetChoice({ table, all, facet, chosen, choose }: FacetProps) {
-  const counts = useMemo(() => tally(table, all, facet), [table, all, facet]);
+function FacetChoice({ table, episodes, distinct, facet, chosen, choose }: FacetProps) {
+  const counts = useMemo(() => tally(table, episodes, facet, distinct), [table, episodes, facet, distinct]);
   const known = counts.some(([value]) => value === chosen);
   return (
     <label data-on={chosen ? true : undefined}>
@@ -61,7 +75,7 @@ function FacetChoice({ table, all, facet, chosen, choose }: FacetProps) {
   );
 }
 
-/** Text is looked for when the typing pauses; the address does not follow every key. */
+/** Searches when the typing pauses, so that the address does not follow every key. */
 function Search({ text, change }: { text: string; change: (text: string) => void }) {
   const [typed, setTyped] = useState(text);
   const timer = useRef<ReturnType<typeof setTimeout>>();
@@ -73,7 +87,7 @@ function Search({ text, change }: { text: string; change: (text: string) => void
       <input
         type="search"
         value={typed}
-        placeholder="hiding red"
+        placeholder="words, such as red"
         onInput={(event) => {
           const next = event.currentTarget.value;
           setTyped(next);

@@ -1,4 +1,4 @@
-/** Failures that are there: filters, plots and cards, all of them by what the address says. */
+/** Filters, plots and cards of a campaign's failures, all by what the address says. */
 
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { keepListed } from "../../listed";
@@ -10,14 +10,24 @@ import { within, type Brushes } from "./brushes";
 import { Cards } from "./cards";
 import { Controls } from "./controls";
 import { outcomeFeatures, sceneFeatures } from "./features";
-import { inTab, isNarrowed, oftenOf, passing, queryOf, read, reset, type Filters } from "./filters";
+import { inTab, isNarrowed, passing, queryOf, read, reset, type Filters } from "./filters";
+import { foundOf } from "./found";
 import { Parallel } from "./parallel";
 import { RefusedBy } from "./refused";
 import { Scatter } from "./scatter";
-import { sorted, SORTS, SORTS_OF, type Sort } from "./sorting";
+import { oneEach, sorted, SORTS, SORTS_OF, type Sort } from "./sorting";
 import { TriageDialog, noted, useNoting } from "./triage";
 import type { FailureTable } from "./wire";
 
+/** As `risk_sac/failures/thumbnail.py` draws them. */
+const PICTURED = [
+  ["ego", "ego and its path"],
+  ["striker", "striker, or the nearest road user, and its path"],
+  ["other", "others"],
+  ["green", "signal: green"],
+  ["red", "red"],
+  ["yellow", "yellow"],
+] as const;
 const AXES = 7; // outcome features among the parallel coordinates; the scatter plot offers all of them
 const WIDE = "(min-width: 1000px)"; // as in failures.css
 
@@ -38,8 +48,12 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
     if (done) change({ brushes });
   };
 
-  const often = useMemo(() => oftenOf(read_), [read_]);
-  const all = useMemo(() => inTab(table, asked), [read_, asked.tab, asked.every]);
+  const found = useMemo(() => foundOf(read_), [read_]);
+  const often = useMemo(() => Int32Array.from(found, ({ episodes }) => episodes), [found]);
+  const distinct = asked.tab === "failures" && !asked.every;
+  const one = (some: readonly number[]) => (distinct ? oneEach(table, some, often) : some);
+  const episodes = useMemo(() => inTab(table, asked), [read_, asked.tab]);
+  const all = useMemo(() => one(episodes), [episodes, distinct]);
   const families = useMemo(() => [...new Set(table.families)], [read_]);
   const family = asked.family || (families.length === 1 ? families[0]! : "");
   const outcomes = useMemo(() => outcomeFeatures(read_), [read_]);
@@ -49,10 +63,10 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
   // What contacts are plotted by at first, a violation without contact does not have.
   const touched = asked.requirement ? asked.requirement === NO_CONTACT : read_.requirement.includes(NO_CONTACT);
   const plotted = useMemo(() => (asked.family ? all.filter((i) => table.families[i] === asked.family) : all), [all, asked.family]);
-  const passed = useMemo(() => passing(table, all, asked), [table, all, asked]);
+  const passed = useMemo(() => passing(table, episodes, asked), [table, episodes, asked]);
   const shown = useMemo(
-    () => sorted(table, within(passed, filters.brushes, features), asked.sort, often),
-    [table, passed, filters.brushes, features, asked.sort],
+    () => sorted(table, one(within(passed, filters.brushes, features)), asked.sort, often),
+    [table, passed, filters.brushes, features, asked.sort, distinct],
   );
   useEffect(() => keepListed({ campaign, ids: shown.map((at) => table.ids[at]!), query: query.toString() }), [shown, query.toString()]);
   const again = noting.refused;
@@ -63,7 +77,7 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
   };
   return (
     <>
-      <Controls {...{ table, all, filters: asked, change }} resetAll={() => show(reset(asked))} />
+      <Controls {...{ table, episodes, distinct, filters: asked, change }} resetAll={() => show(reset(asked))} />
       <div class="explorer" data-plots={plots || undefined}>
         {plots && (
           <aside class="plots" aria-label="Plots" tabIndex={0}>
@@ -83,11 +97,11 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
         <section class="found" aria-label="Failures">
           <div class="row found-head">
             <p role="status">
-              <b>{count(shown.length)}</b> of {count(all.length)} {asked.tab === "refused" ? "refused" : asked.every ? "failures" : "distinct failures"}
+              <b>{count(shown.length)}</b> of {count(all.length)} {asked.tab === "refused" ? "refused" : distinct ? "distinct failures" : "failing episodes"}
             </p>
             {asked.tab === "failures" && (
               <label>
-                <input type="checkbox" checked={asked.every} onChange={(event) => change({ every: event.currentTarget.checked })} /> every failure
+                <input type="checkbox" checked={asked.every} onChange={(event) => change({ every: event.currentTarget.checked })} /> every episode
               </label>
             )}
             <label class="sort">
@@ -104,8 +118,9 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
               Plots
             </button>
           </div>
+          <PictureLegend />
           {shown.length ? (
-            <Cards {...{ campaign, table, often, shown, hovered }} triage={setOpen} place={place(asked)} />
+            <Cards {...{ campaign, table, found, shown, hovered }} triage={setOpen} place={place(asked)} />
           ) : (
             <Nothing filters={filters} all={all.length} resetAll={() => show(reset(asked))} />
           )}
@@ -128,10 +143,23 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
   );
 }
 
+/** What the colours of the cards' pictures mean. */
+function PictureLegend() {
+  return (
+    <ul class="legend picture-legend small" aria-label="Legend of the pictures">
+      {PICTURED.map(([mark, name]) => (
+        <li key={mark}>
+          <span class={`key key-${mark}`} aria-hidden="true" /> {name}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
 function FamilyHint({ families, choose }: { families: readonly string[]; choose: (family: string) => void }) {
   return (
     <p class="row small faint hint">
-      Scene parameters of
+      Add the scene's parameters of
       {families.map((each) => (
         <button key={each} onClick={() => choose(each)}>
           {each}

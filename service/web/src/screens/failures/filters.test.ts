@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
-import { inTab, isNarrowed, oftenOf, passing, queryOf, read, reset, tally } from "./filters";
+import { inTab, isNarrowed, passing, queryOf, read, reset, tally } from "./filters";
+import { foundOf } from "./found";
 import { sample } from "./sample";
 
 const table = sample(40);
@@ -13,14 +14,13 @@ test("filters survive the address, and what is as usual is not in it", () => {
 });
 
 test("an order that is not known, or inherited, is the usual one", () => {
-  expect(of("sort=constructor").sort).toBe("grade");
+  expect(of("sort=constructor").sort).toBe("severity");
   expect(of("tab=x").tab).toBe("failures");
 });
 
-test("distinct failures, every failure and refused contacts", () => {
+test("a tab holds failures or refused contacts", () => {
   const all = table.ids.map((_, i) => i);
-  expect(inTab(table, of(""))).toEqual(all.filter((i) => i % 4 === 0));
-  expect(inTab(table, of("every=1"))).toEqual(all.filter((i) => i % 4 !== 3));
+  expect(inTab(table, of(""))).toEqual(all.filter((i) => i % 4 !== 3));
   expect(inTab(table, of("tab=refused"))).toEqual(all.filter((i) => i % 4 === 3));
 });
 
@@ -54,10 +54,24 @@ test("a contact that two rules refused counts for both", () => {
   expect(passing(table, refused, of("tab=refused&rule=ego_moving"))).toHaveLength(5);
 });
 
-test("how often a kind came counts valid failures alone", () => {
-  const often = oftenOf(table);
-  expect(often[0]).toBe(20); // even ones are all valid
-  expect(often[1]).toBe(10); // every second odd one was refused
+test("failures are found by what drove them", () => {
+  const every = inTab(table, of(""));
+  expect(passing(table, every, of("driven_by=model"))).toEqual(every.filter((i) => i % 5 === 1));
+  expect(passing(table, every, of("driven_by=unknown"))).toEqual(every.filter((i) => i % 5 === 4));
+});
+
+test("a facet counts episodes, or distinct failures", () => {
+  const every = inTab(table, of(""));
+  expect(tally(table, every, "family")).toEqual([["low", 20], ["mixed", 10]]);
+  expect(tally(table, every, "family", true)).toEqual([["low", 4], ["mixed", 2]]);
+});
+
+test("a distinct failure tells its episodes, and the methods that found it", () => {
+  const few = sample(6, { niche: [0, 0, 0, 1, null, null], methods: ["random", "archive", "archive", "random", "random", "random"] });
+  const [first, second, , other] = foundOf(few);
+  expect(first).toBe(second);
+  expect(first).toMatchObject({ episodes: 3, runs: 2, methods: ["archive", "random"] });
+  expect(other).toMatchObject({ episodes: 1, methods: ["random"], drivers: ["random"] });
 });
 
 test("a reset leaves tab, order and axes", () => {

@@ -5,13 +5,13 @@ import { SORTS, type Sort } from "./sorting";
 import type { FailureTable } from "./wire";
 
 /** Filters that want one value; the empty text wants any. */
-export const FACETS = ["requirement", "family", "method", "run", "grade", "severity", "fault", "prevented_by", "kind", "striker", "triage", "broke", "ego_broke", "rule"] as const;
+export const FACETS = ["requirement", "family", "method", "run", "grade", "severity", "fault", "driven_by", "prevented_by", "kind", "striker", "triage", "broke", "ego_broke", "rule"] as const;
 export type Facet = (typeof FACETS)[number];
 
 export interface Filters extends Record<Facet, string> {
   /** Failures, or the episodes whose violations a rule refused. */
   tab: "failures" | "refused";
-  /** Each failure, and not only the first of its kind in a run. */
+  /** Each failing episode, and not one of each distinct failure. */
   every: boolean;
   q: string;
   sort: Sort;
@@ -29,7 +29,7 @@ export function read(query: URLSearchParams): Filters {
     tab: text("tab") === "refused" ? "refused" : "failures",
     every: text("every") === "1",
     q: text("q"),
-    sort: Object.hasOwn(SORTS, sort) ? (sort as Sort) : "grade",
+    sort: Object.hasOwn(SORTS, sort) ? (sort as Sort) : "severity",
     x: text("x") || "reaction",
     y: text("y") || "closing",
     brushes: parsed(text("brush")),
@@ -44,7 +44,7 @@ export function queryOf(filters: Filters): Record<string, string> {
     every: every ? "1" : "",
     ...Object.fromEntries(FACETS.map((facet) => [facet, filters[facet]])),
     q,
-    sort: sort === "grade" ? "" : sort,
+    sort: sort === "severity" ? "" : sort,
     x: x === "reaction" ? "" : x,
     y: y === "closing" ? "" : y,
     brush: written(brushes),
@@ -61,7 +61,7 @@ export function isNarrowed(filters: Filters): boolean {
   return FACETS.some((facet) => filters[facet]) || !!filters.q.trim() || filters.brushes.size > 0;
 }
 
-/** What a failure has of a facet: none, one or several values. */
+/** The values that a failure has of a facet. */
 export function valuesOf(table: FailureTable, facet: Facet, i: number): readonly string[] {
   switch (facet) {
     case "requirement":
@@ -78,6 +78,8 @@ export function valuesOf(table: FailureTable, facet: Facet, i: number): readonly
       return [table.severity[i] ?? "none"];
     case "fault":
       return [table.fault[i] ?? "none"];
+    case "driven_by":
+      return [table.driven_by[i] ?? "unknown"];
     case "prevented_by":
       return table.prevented_by[i]!.length ? table.prevented_by[i]! : ["nothing"];
     case "kind":
@@ -95,16 +97,14 @@ export function valuesOf(table: FailureTable, facet: Facet, i: number): readonly
   }
 }
 
-/** The failures of the tab, before any filter. */
-export function inTab(table: FailureTable, { tab, every }: Pick<Filters, "tab" | "every">): number[] {
+/** The episodes of the tab, before any filter. */
+export function inTab(table: FailureTable, { tab }: Pick<Filters, "tab">): number[] {
   const found: number[] = [];
-  for (let i = 0; i < table.ids.length; i++) {
-    if (tab === "refused" ? !table.valid[i] : table.valid[i] && (every || table.distinct[i])) found.push(i);
-  }
+  for (let i = 0; i < table.ids.length; i++) if (table.valid[i] === (tab === "failures")) found.push(i);
   return found;
 }
 
-/** Those of the failures that pass every filter; brushes come later, see `within`. */
+/** The failures that pass every filter; brushes come later, see `within`. */
 export function passing(table: FailureTable, failures: readonly number[], filters: Filters): readonly number[] {
   const wanted = FACETS.filter((facet) => filters[facet]);
   const terms = filters.q.toLowerCase().split(/\s+/).filter(Boolean);
@@ -123,16 +123,15 @@ function said(table: FailureTable, i: number, terms: string[]): boolean {
   return terms.every((term) => all.includes(term));
 }
 
-/** Each value of a facet and how many failures have it, the most frequent first. */
-export function tally(table: FailureTable, failures: readonly number[], facet: Facet): [string, number][] {
-  const counts = new Map<string, number>();
-  for (const i of failures) for (const value of valuesOf(table, facet, i)) counts.set(value, (counts.get(value) ?? 0) + 1);
-  return [...counts].sort((a, b) => b[1] - a[1] || a[0].localeCompare(b[0]));
-}
-
-/** For each failure, how many of the campaign's valid ones are of its kind. */
-export function oftenOf(table: FailureTable): Int32Array {
-  const counts = new Int32Array(table.kinds.length);
-  table.kind.forEach((kind, i) => (counts[kind]! += table.valid[i] ? 1 : 0));
-  return Int32Array.from(table.kind, (kind) => counts[kind]!);
+/** Each value of a facet and how many episodes, or distinct failures, have it; the most frequent first. */
+export function tally(table: FailureTable, failures: readonly number[], facet: Facet, distinct = false): [string, number][] {
+  const found = new Map<string, Set<number>>();
+  for (const i of failures) {
+    for (const value of valuesOf(table, facet, i)) {
+      const those = found.get(value) ?? new Set();
+      found.set(value, those.add(distinct ? table.niche[i]! : i));
+    }
+  }
+  const counts = [...found].map(([value, those]): [string, number] => [value, those.size]);
+  return counts.sort((a, b) => b[1] - a[1] || a[0].localeCompare(b[0]));
 }

@@ -22,6 +22,7 @@ export function sample(size: number, changed: Partial<FailureTable> = {}): Failu
     prevented_by: column((i) => (i % 3 === 0 ? ["r157", "full_braking"] : i % 3 === 1 ? ["full_braking"] : [])),
     headline: column(() => false),
     distinct: column((i) => i % 4 === 0),
+    niche: column((i) => (i % 4 === 3 ? null : i % 8)),
     driven_by: column((i) => (["policy", "model", "script", "random", null] as const)[i % 5]!),
     kind: column((i) => i % 2),
     striker: column((i) => (i % 2 ? "pedestrian" : "left")),

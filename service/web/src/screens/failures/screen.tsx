@@ -1,4 +1,4 @@
-/** What a campaign found: its failures, and what looked like one and was refused. */
+/** A campaign's failures, and the violations that a rule refused. */
 
 import "./failures.css";
 import { useMemo } from "preact/hooks";
@@ -52,7 +52,7 @@ function Head({ campaign, about, query, table }: HeadProps) {
         <h1>Failures</h1>
         {about && <span class={`tag ${about.state}`}>{about.state}</span>}
         {funnel && (
-          <ol class="funnel" aria-label="From failures to what is worth a person's time">
+          <ol class="funnel" aria-label="From failing episodes to the headline">
             {funnel.map(([name, number, meaning]) => (
               <li key={name} title={meaning}>
                 <b>{count(number)}</b> {name}
@@ -76,14 +76,14 @@ function Head({ campaign, about, query, table }: HeadProps) {
 }
 
 /** Each step of the funnel: its name, how many, and what it takes. */
-function funnelOf({ valid, distinct, grade, headline, repeats }: FailureTable): [string, number, string][] {
-  const among = (test: (i: number) => boolean) => valid.reduce((sum, _, i) => sum + (test(i) ? 1 : 0), 0);
+function funnelOf({ valid, niche, grade, headline, repeats }: FailureTable): [string, number, string][] {
+  const distinct = (test: (i: number) => boolean) => new Set(niche.filter((each, i) => each !== null && test(i))).size;
   const replayed = repeats.some((each) => each !== null);
-  const found: [string, number, string][] = [["headline", among((i) => headline[i]!), "Preventable, not minor, and the same when replayed; each kind once over all runs"]];
+  const found: [string, number, string][] = [["headline", headline.filter(Boolean).length, "Preventable, at least moderate, and the same in each replay"]];
   return [
-    ["failures", among((i) => valid[i]!), "A requirement that counts was violated, and no rule refused it"],
-    ["distinct", among((i) => distinct[i]!), "The first of their kind in their run"],
-    ["preventable", among((i) => distinct[i]! && grade[i] === "preventable"), "Distinct, and a reference driver would have prevented them"],
+    ["failing episodes", valid.filter(Boolean).length, "Episodes in which a requirement that counts was violated, and no rule refused the violation"],
+    ["distinct", distinct(() => true), "Distinct failures; what several runs found alike counts once"],
+    ["preventable", distinct((i) => grade[i] === "preventable"), "Distinct failures that a reference driver would have prevented"],
     ...(replayed ? found : []),
   ];
 }
@@ -96,7 +96,7 @@ function NothingFound({ about }: { about: Body<"Campaign"> | undefined }) {
       {about && (
         <p>
           {count(about.progress.episodes_done)} of {count(about.progress.episodes_total)} episodes are done
-          {running ? "; what they find appears here." : "; in none of them was a requirement violated that counts."}
+          {running ? "; failures appear here as they are found." : "; none of them violated a requirement that counts."}
         </p>
       )}
       {about && <a href={address(["campaigns", about.id])}>To the campaign</a>}

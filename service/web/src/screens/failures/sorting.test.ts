@@ -1,7 +1,10 @@
 import { expect, test } from "vitest";
-import { oftenOf } from "./filters";
+import { foundOf } from "./found";
 import { sample } from "./sample";
-import { sorted, SORTS, type Sort } from "./sorting";
+import { oneEach, sorted, SORTS, type Sort } from "./sorting";
+import type { FailureTable } from "./wire";
+
+const oftenOf = (some: FailureTable) => foundOf(some).map(({ episodes }) => episodes);
 
 const table = sample(12);
 const all = table.ids.map((_, i) => i);
@@ -30,6 +33,21 @@ test("of equal grades the severe come first, and of those the ego's fault", () =
   expect(order).toEqual([5, 3, 4, 2, 1, 0]); // what touched nothing, 1, is no minor contact
 });
 
+test("by severity the severe come first, then the ego's fault, then the preventable", () => {
+  const severity = (["minor", "severe", "severe", "severe"] as const).slice();
+  const fault = (["ego", "other", "ego", "other"] as const).slice();
+  const grade = (["preventable", "unavoidable", "unavoidable", "preventable"] as const).slice();
+  const few = sample(4, { grade, severity, fault });
+  expect(sorted(few, [0, 1, 2, 3], "severity", oftenOf(few))).toEqual([2, 3, 1, 0]);
+});
+
+test("a distinct failure is shown by its headline episode, else by its worst", () => {
+  const severity = (["minor", "severe", "moderate", "severe"] as const).slice();
+  const few = sample(4, { severity, niche: [0, 0, 1, 1], headline: [false, false, true, false] });
+  expect(oneEach(few, [0, 1, 2, 3], oftenOf(few)).sort()).toEqual([1, 2]);
+  expect(oneEach(few, [0, 3], oftenOf(few)).sort()).toEqual([0, 3]);
+});
+
 test("who has no time to contact comes last", () => {
   expect(by("reaction").slice(0, 3)).toEqual([0, 1, 3]);
   expect(by("reaction").at(-1)).toBe(2);
@@ -38,8 +56,9 @@ test("who has no time to contact comes last", () => {
 test("fastest, newest, most frequent", () => {
   expect(table.relative_speed_mps[by("closing")[0]!]).toBe(9);
   expect(by("newest").slice(0, 2)).toEqual([11, 10]);
-  expect(by("often")[0]! % 2).toBe(0);
-  expect(by("rare")[0]! % 2).toBe(1);
+  const often = oftenOf(table);
+  expect(often[by("often")[0]!]).toBe(Math.max(...often));
+  expect(often[by("rare")[0]!]).toBe(1);
 });
 
 test("ten thousand are in order within a frame or two", () => {

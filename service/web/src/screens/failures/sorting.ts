@@ -1,4 +1,4 @@
-/** Orders of failures. */
+/** Orders of failures, and the episode that stands for a distinct one. */
 
 import { reactionOf } from "./features";
 import type { FailureTable } from "./wire";
@@ -7,7 +7,8 @@ export type Sort = keyof typeof SORTS;
 
 /** What people choose from; the first is meant where none is chosen. */
 export const SORTS = {
-  grade: "preventable and severe first",
+  severity: "severity, then fault",
+  grade: "preventable first",
   closing: "fastest closing",
   reaction: "least time to contact",
   newest: "newest",
@@ -17,7 +18,7 @@ export const SORTS = {
 
 /** Refused contacts have no grade, and are of no kind that counts. */
 export const SORTS_OF: Record<"failures" | "refused", readonly Sort[]> = {
-  failures: ["grade", "closing", "reaction", "newest", "often", "rare"],
+  failures: ["severity", "grade", "closing", "reaction", "newest", "often", "rare"],
   refused: ["closing", "reaction", "newest"],
 };
 
@@ -30,13 +31,14 @@ const FAULTS: readonly (string | null)[] = ["ego", "shared", "other", null];
 export function sorted(table: FailureTable, failures: readonly number[], sort: Sort, often: ArrayLike<number>): number[] {
   const closing = (i: number) => -(table.relative_speed_mps[i] ?? -Infinity);
   const worst = (...first: ((i: number) => number)[]) => by(table, failures, ...first, closing);
+  const grade = (i: number) => GRADES.indexOf(table.grade[i]!);
+  const severity = (i: number) => SEVERITIES.indexOf(table.severity[i]!);
+  const fault = (i: number) => FAULTS.indexOf(table.fault[i]!);
   switch (sort) {
+    case "severity":
+      return worst(severity, fault, grade);
     case "grade":
-      return worst(
-        (i) => GRADES.indexOf(table.grade[i]!),
-        (i) => SEVERITIES.indexOf(table.severity[i]!),
-        (i) => FAULTS.indexOf(table.fault[i]!),
-      );
+      return worst(grade, severity, fault);
     case "closing":
       return worst(closing);
     case "reaction":
@@ -48,6 +50,17 @@ export function sorted(table: FailureTable, failures: readonly number[], sort: S
     case "rare":
       return worst((i) => often[i]!);
   }
+}
+
+/** One episode for each distinct failure: that of the headline, else the worst. */
+export function oneEach(table: FailureTable, failures: readonly number[], often: ArrayLike<number>): number[] {
+  const found = new Map<number, number>();
+  for (const i of sorted(table, failures, "severity", often)) {
+    const niche = table.niche[i]!;
+    const before = found.get(niche);
+    if (before === undefined || (table.headline[i] && !table.headline[before])) found.set(niche, i);
+  }
+  return [...found.values()];
 }
 
 function by(table: FailureTable, failures: readonly number[], ...keys: ((i: number) => number)[]): number[] {

@@ -2,7 +2,7 @@
 
 import type { Sensor } from "../../stage/scene";
 import type { Curve, Panel } from "../../stage/panels";
-import { column, DASHES, softMinimum } from "../../stage/panels";
+import { column, DASHES, nearBy, softMinimum } from "../../stage/panels";
 import type { Recording } from "../../stage/recording";
 import type { Followed } from "../../stage/camera";
 import { instantAt, posesAt } from "../../stage/interpolate";
@@ -11,7 +11,7 @@ import { requirementOf } from "../../ui/violations";
 
 /** As the API names them, with what is different. */
 export const TWINS: Record<string, string> = {
-  idle: "Nobody attacks",
+  idle: "No attack",
   default: "Default ego",
   perfect: "Perfect ego",
   careful: "Careful ego",
@@ -59,7 +59,7 @@ export function pairPanels(failure: Recording, twin: Recording, name: string): P
     { title: "Ego's speed", unit: "m/s", curves: both(({ series }) => column(series.speed_mps, 0)) },
     ...(failure.striker < 0
       ? []
-      : [{ title: `Distance to ${failure.moment === "contact" ? "the striker" : failure.ids[failure.striker]}`, unit: "m", curves: both((recording) => column(recording.series.distance_m, striker(recording))), zero: true }]),
+      : [{ title: `Distance to ${failure.moment === "contact" ? "the striker" : failure.ids[failure.striker]}`, unit: "m", curves: both((recording) => column(recording.series.distance_m, striker(recording))), range: nearBy(failure), zero: true }]),
     {
       title: "Soft minimum, violated below 0",
       unit: "",
