@@ -1,4 +1,4 @@
-"""Draws the view from above: the roads, both paths, and the bodies at the violation and before it."""
+"""Draws the view from above: roads, signals, paths, and the bodies at the violation and before it."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,9 +9,11 @@ from matplotlib.patches import Polygon
 
 from risk_sac.config import FamilyName
 from risk_sac.failures.net import SurfaceUse, roads_of
+from risk_sac.failures.picture_labels import ASIDE, Labels
 from risk_sac.failures.recording import BOX, Recording, on_body
+from risk_sac.failures.signals import LAMPS, signal_heads
 from risk_sac.records import Collision
-from risk_sac.types import Kind, Role
+from risk_sac.types import Floats, Kind, Role
 
 EGO_COLOUR, OTHER_COLOUR, BYSTANDER_COLOUR = "tab:blue", "tab:red", "tab:gray"
 CONFLICT_COLOUR = "tab:orange"
@@ -23,32 +25,53 @@ def legend(axis: Axes, title: str | None = None) -> None:
 
 
 SURFACE_COLOURS: Mapping[SurfaceUse, str] = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
+APART_IN = 0.25  # earlier places of a body that are nearer on the page are drawn as one
 GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the violation, where the two bodies are drawn as well
 OUTLINE: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.3", "linewidth": 0.8}
 CONFLICT: dict[str, Any] = {"facecolor": "none", "edgecolor": CONFLICT_COLOUR, "linewidth": 1.4, "linestyle": "--"}
 
 
-def draw_from_above(axis: Axes, family: FamilyName, recording: Recording, apart_m: float) -> None:
-    """Draws everything on the ground; earlier places of a body that are nearer than `apart_m` are drawn as one."""
+def draw_from_above(
+    axis: Axes, family: FamilyName, recording: Recording, view: tuple[Floats, Floats], m_per_in: float
+) -> None:
+    """Draws everything on the ground.
+
+    Args:
+      axis: where to draw.
+      family: of the scene.
+      recording: of the failure, or of its twin.
+      view: corners of the ground that the axes show, m.
+      m_per_in: what an inch of the page shows.
+    """
+    labels = Labels(axis, *view, 1.3 * m_per_in / 72)  # the layout shrinks the axes by up to a third
     for surface in roads_of(family, recording.failure.episode.scene):
         colour = SURFACE_COLOURS[surface.use]
         axis.add_patch(Polygon(surface.outline, facecolor=colour, edgecolor="0.7", linewidth=0.5))
+    _draw_signals(axis, family, recording)
     bystanders = [actor for actor in range(len(recording.series["ids"])) if actor not in recording.involved]
     for actor in bystanders:
         _draw_actor(axis, recording, actor, BYSTANDER_COLOUR)
+    for actor in range(len(recording.series["ids"])):
+        if np.isfinite(recording.pose(actor, 0.0)).all():
+            labels.reserve(_body(recording, actor, 0.0))
     for actor, colour in [*zip(recording.involved, (EGO_COLOUR, OTHER_COLOUR), strict=False)][::-1]:
         _draw_actor(axis, recording, actor, colour, involved=True)
-        for times_s in _ghosts(recording, actor, apart_m):
+        for times_s in _ghosts(recording, actor, APART_IN * m_per_in):
             _draw_body(axis, recording, actor, -times_s[0], **OUTLINE | {"edgecolor": colour})
-            _label_body(axis, recording, actor, times_s, colour)
+            _label_body(labels, recording, actor, times_s, colour)
+    for actor in bystanders:
+        if np.isfinite(recording.pose(actor, 0.0)).all():
+            name = str(recording.series["ids"][actor])
+            labels.write(name, _body(recording, actor, 0.0), ASIDE, 6, "0.4")
     if recording.collision is not None and not recording.twin:
         _draw_contact_point(axis, recording, recording.collision)
     _draw_conflict(axis, recording)
     axis.set(xlabel="x, m", ylabel="y, m")
     axis.add_patch(Polygon(np.empty((0, 2)), label="earlier", **OUTLINE))  # for the legend alone
     if bystanders:
-        grey: dict[str, Any] = {"facecolor": BYSTANDER_COLOUR, "edgecolor": BYSTANDER_COLOUR, "alpha": 0.2}
+        grey: dict[str, Any] = {"facecolor": BYSTANDER_COLOUR, "edgecolor": BYSTANDER_COLOUR, "alpha": 0.3}
         axis.add_patch(Polygon(np.empty((0, 2)), label="others", **grey))
+    axis.plot([], [], color="0.3", linewidth=1.2, label="paths")
     when = "contact" if recording.collision else "violation"
     legend(axis, title=f"filled: at the {when}{' in the failure' if recording.twin else ''}")
 
@@ -77,38 +100,43 @@ def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, *, in
     if not np.isfinite(here).all():
         return
     label = ("ego" if actor == 0 else f"{name} ({driver})") if involved else None
-    alpha = 0.6 if involved else 0.2
+    alpha = 0.6 if involved else 0.3
     _draw_body(axis, recording, actor, 0.0, facecolor=colour, edgecolor=colour, alpha=alpha, label=label)
-    if not involved:
-        axis.annotate(name, here, fontsize=6, color=colour, ha="center", va="center", clip_on=True)
 
 
 def _draw_body(axis: Axes, recording: Recording, actor: int, time_s: float, **style: object) -> None:
     pose, size = recording.pose(actor, time_s), (recording["length_m"][actor], recording["width_m"][actor])
-    axis.add_patch(Polygon(on_body(pose, size, BOX), **style))  # type: ignore[arg-type]
+    axis.add_patch(Polygon(_body(recording, actor, time_s), **style))  # type: ignore[arg-type]
     if recording.series["kind"][actor] == Kind.VEHICLE:
         arrow = on_body(pose, size, [(0.45, 1), (1, 0), (0.45, -1)])
         axis.plot(arrow[:, 0], arrow[:, 1], color=str(style["edgecolor"]), linewidth=0.6)
 
 
-def _label_body(axis: Axes, recording: Recording, actor: int, times_s: list[float], colour: str) -> None:
-    """Writes the times beside a body, on the side that faces away from the other one."""
+def _body(recording: Recording, actor: int, time_s: float) -> Floats:
+    """Returns the corners of a body, `4 x 2`, m."""
+    size = recording["length_m"][actor], recording["width_m"][actor]
+    return on_body(recording.pose(actor, time_s), size, BOX)
+
+
+def _draw_signals(axis: Axes, family: FamilyName, recording: Recording) -> None:
+    """Draws a bar across each lane that ends at a signal, as it is at the violation; a green one is open."""
+    time_s = float(recording["released_s"]) + recording.violation.time_s
+    for head in signal_heads(family, recording.failure.episode.scene):
+        for mark in head.marks(time_s):
+            axis.plot(*mark.T, color=LAMPS[head.colour(time_s)], linewidth=2.5, solid_capstyle="butt")
+    if axis.lines:
+        for name in ("green", "yellow", "red"):
+            axis.plot([], [], color=LAMPS[name], linewidth=2.5, label=f"signal: {name}")
+
+
+def _label_body(labels: Labels, recording: Recording, actor: int, times_s: list[float], colour: str) -> None:
+    """Writes the times beside a body, if there is room on the side that faces away from the other one."""
     x, y, heading = recording.pose(actor, -times_s[0])
     partner_x, partner_y, _ = recording.pose((recording.other or 0) if actor == 0 else 0, -times_s[0])
     left = np.array((-np.sin(heading), np.cos(heading)))
     away = -left if left @ (partner_x - x, partner_y - y) > 0 else left
-    side = "left" if away[0] > 0.5 else "right" if away[0] < -0.5 else "center"
-    axis.annotate(
-        ", ".join(f"−{each:g}" for each in times_s) + " s",
-        tuple(np.array((x, y)) + away * recording["width_m"][actor] / 2),
-        tuple(away * (4, 8)),
-        textcoords="offset points",
-        ha=side,
-        va="center",
-        fontsize=7,
-        color=colour,
-        annotation_clip=True,
-    )
+    text = ", ".join(f"−{each:g}" for each in times_s) + " s"
+    labels.write(text, _body(recording, actor, -times_s[0]), (away, -away), 7, colour)
 
 
 def _draw_contact_point(axis: Axes, recording: Recording, collision: Collision) -> None:
@@ -130,4 +158,5 @@ def _draw_conflict(axis: Axes, recording: Recording) -> None:
             label = "as the conflict began" if actor == 0 else None
             _draw_body(axis, recording, actor, begin_s, label=label, **CONFLICT)
     place = judgement.conflict_x_m, judgement.conflict_y_m
-    axis.plot(*place, marker="D", color=CONFLICT_COLOUR, markersize=5, linestyle="none", zorder=5)
+    style = {"marker": "D", "color": CONFLICT_COLOUR, "markersize": 5, "linestyle": "none", "zorder": 5}
+    axis.plot(*place, label="striker then", **style)

@@ -25,9 +25,9 @@ SEEN_COLOUR, RELEASE_COLOUR, HIDDEN_COLOUR, ALSO_COLOUR = "tab:green", "tab:purp
 VIEW_S, PANELS_S = 3.0, 8.0  # before the violation: what the view from above holds, and the panels
 AFTER_S = 3.0  # after a violation without contact, in the panels
 MARGIN_M = 5.0
+LEAST_M = 5.0  # that a scale of distances reaches
 WIDTH_IN, PANEL_IN, DPI = 11.0, 1.5, 110
 PANEL_WIDTH_IN = 8.7  # what legends and labels leave of the width
-LABEL_IN = 0.25  # what a label needs on the page
 VIEW_IN = (2.2, 6.0)  # least and greatest height of the view from above
 
 
@@ -107,7 +107,15 @@ def _both(axis: Axes, recording: Recording, name: str) -> None:
 def _distance(axis: Axes, recording: Recording) -> None:
     _to_the_other(axis, recording, "distance_m")
     axis.set_ylabel("distance\nm")
-    axis.set_ylim(bottom=0)
+    if not recording.twin:  # which has the failure's scale
+        axis.set_ylim(0, _near_m(recording))
+
+
+def _near_m(recording: Recording) -> float:
+    """Returns a scale for the distances from 1 s before the conflict on; the approach before would flatten them."""
+    began_s = -VIEW_S if recording.conflict_s is None else recording.conflict_s
+    near = _least(recording, "distance_m")[recording.time_s >= began_s - 1.0]
+    return 1.08 * max(LEAST_M, *near[np.isfinite(near)].tolist())
 
 
 def _ttc(axis: Axes, recording: Recording) -> None:
@@ -116,10 +124,14 @@ def _ttc(axis: Axes, recording: Recording) -> None:
 
 
 def _to_the_other(axis: Axes, recording: Recording, name: str) -> None:
-    """Draws what was measured to the other; without one, the least to any actor."""
+    axis.plot(recording.time_s, _least(recording, name), color="black", linewidth=1.2)
+
+
+def _least(recording: Recording, name: str) -> Floats:
+    """Returns what was measured to the other, `T`; without one, the least to any actor."""
     values = recording[name]
-    least = np.fmin.reduce(values, axis=1) if recording.other is None else values[:, recording.other]
-    axis.plot(recording.time_s, least, color="black", linewidth=1.2)
+    least: Floats = np.fmin.reduce(values, axis=1) if recording.other is None else values[:, recording.other]
+    return least
 
 
 def _robustness(axis: Axes, recording: Recording) -> None:
@@ -203,7 +215,7 @@ def draw_recording(family: FamilyName, recording: Recording, twin: Recording | N
     grid = figure.subplots(len(heights), len(columns), height_ratios=heights, squeeze=False)
     figure.suptitle(caption(family, recording), fontsize=11)
     for each, (view, *axes) in zip(columns, grid.T, strict=True):
-        draw_from_above(view, family, each, apart_m=LABEL_IN * (high - low)[0] / PANEL_WIDTH_IN)
+        draw_from_above(view, family, each, (low, high), m_per_in=(high - low)[0] / PANEL_WIDTH_IN)
         view.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         if twin is not None:
             view.set_title(each.twin or "the failure", fontsize=10)

@@ -66,8 +66,9 @@ def test_a_contact_that_nobody_judged_is_drawn_without_a_conflict() -> None:
 def test_both_bodies_and_both_paths_are_drawn() -> None:
     view, *_ = draw_recording("mixed", Recording(synthetic_contact(), synthetic_series())).axes
     labels = [text.get_text() for text in view.get_legend().get_texts()]
-    drawn = ["pedestrian (adversary)", "ego", "touched here", "as the conflict began", "earlier", "others"]
-    assert sorted(labels) == sorted(drawn)
+    drawn = ["pedestrian (adversary)", "ego", "touched here", "as the conflict began", "striker then", "earlier"]
+    signals = ["signal: green", "signal: yellow", "signal: red"]
+    assert sorted(labels) == sorted([*drawn, "others", "paths", *signals])
     paths = [line for line in view.lines if len(np.ravel(line.get_xdata())) == 21]
     assert len(paths) == 3
 
@@ -168,3 +169,32 @@ def test_other_violations_of_the_episode_are_marked_and_named() -> None:
     _, panel, *_ = draw_recording("mixed", recording).axes
     (mark,) = (text for text in panel.texts if text.get_text() == "safe_ttc violated")
     assert mark.xy[0] == pytest.approx(-0.95)
+
+
+def test_no_label_covers_another_nor_a_body() -> None:
+    series, crowd = with_release(), 6
+    several = {
+        name: np.concatenate([values, *[values[..., -1:]] * crowd], axis=-1)
+        for name, values in series.items()
+        if values.shape and values.shape[-1] == len(series["ids"])
+    }
+    apart = np.concatenate((np.zeros(2), np.arange(crowd + 1) * 1.2))
+    several["x_m"] = np.concatenate((several["x_m"][:, :2], np.full((len(several["x_m"]), crowd + 1), 290.0)), axis=1)
+    several["y_m"], several["heading_rad"] = (np.nan_to_num(several[name]) for name in ("y_m", "heading_rad"))
+    several["y_m"] = several["y_m"] + apart
+    several["ids"] = np.array(["ego", "pedestrian", *(f"bystander_{k}" for k in range(crowd + 1))])
+    figure = draw_recording("mixed", Recording(synthetic_contact(), series | several))
+    figure.draw_without_rendering()
+    view = figure.axes[0]
+    boxes = [text.get_window_extent() for text in view.texts]
+    assert {"bystander_0", "−1 s"} <= {text.get_text() for text in view.texts}
+    assert not [1 for k, box in enumerate(boxes) for other in boxes[:k] if box.overlaps(other)]
+    (ego,) = (patch.get_window_extent() for patch in view.patches if patch.get_label() == "ego")
+    assert not [box for box in boxes if box.overlaps(ego)]
+
+
+def test_distances_have_the_scale_of_the_conflict() -> None:
+    series = with_release()
+    far = series | {"distance_m": np.where(series["time_s"][:, None] < 0.5, 150.0, series["distance_m"])}
+    _, _, _, distance, *_ = draw_recording("mixed", Recording(synthetic_contact(), far)).axes
+    assert distance.get_ylim()[1] < 40.0

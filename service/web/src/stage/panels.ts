@@ -64,7 +64,7 @@ function towards({ moment, ids, striker }: Recording): string {
 function distance(recording: Recording): Panel {
   const { time_s, series, striker } = recording;
   const curve: Curve = { name: towards(recording), time_s, values: column(series.distance_m, striker), colour: "--text" };
-  return { title: "Distance", unit: "m", curves: [curve], range: nearBy(recording), zero: true };
+  return { title: "Distance", unit: "m; scaled to the conflict", curves: [curve], range: nearBy(recording), zero: true };
 }
 
 const LEAST_M = 5;

@@ -58,7 +58,7 @@ export function PairScreen({ campaign, failure, twin, query }: Props) {
         {(known) => {
           const violation = worstOf(known);
           return known.series === null || violation === null ? (
-            <Empty>{known.series_problem ?? "Nothing of it was recorded that could be played."}</Empty>
+            <Empty>{known.series_problem ?? "It has no recording to play."}</Empty>
           ) : (
             <Pair campaign={campaign} path={path} twin={twin} known={known} series={known.series} violation={violation} query={query} />
           );
@@ -120,12 +120,15 @@ function Pair({ campaign, path, twin, known, series, violation, query }: PairPro
             )}
           </section>
         </div>
-        <Legend moment={failure.moment} />
+        <Legend recording={failure} layers={layers} signals={!!paths?.signals.length} />
         <Transport clock={clock} tripod={tripod} toggle={toggle} layers={layers} marks={marks} hidden={hidden} moment={failure.moment} />
       </div>
       {other && (
         <>
-          <p class="faint small time-hint">Time in s from the {failure.moment}. Grey: the {failure.moment === "contact" ? "striker" : "nearest road user"} is hidden from the failure's ego.</p>
+          <p class="faint small time-hint">
+            Time in s from the {failure.moment}. Blue: now; dotted: release{failure.conflict_s !== null && "; dashed: the conflict begins"}
+            {hidden.length > 0 && `; grey ground: the failure's ego does not see ${failure.ids[failure.striker]}`}.
+          </p>
           <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
         </>
       )}

@@ -59,7 +59,7 @@ export function pairPanels(failure: Recording, twin: Recording, name: string): P
     { title: "Ego's speed", unit: "m/s", curves: both(({ series }) => column(series.speed_mps, 0)) },
     ...(failure.striker < 0
       ? []
-      : [{ title: `Distance to ${failure.moment === "contact" ? "the striker" : failure.ids[failure.striker]}`, unit: "m", curves: both((recording) => column(recording.series.distance_m, striker(recording))), range: nearBy(failure), zero: true }]),
+      : [{ title: `Distance to ${failure.moment === "contact" ? "the striker" : failure.ids[failure.striker]}`, unit: "m; scaled to the conflict", curves: both((recording) => column(recording.series.distance_m, striker(recording))), range: nearBy(failure), zero: true }]),
     {
       title: "Soft minimum, violated below 0",
       unit: "",

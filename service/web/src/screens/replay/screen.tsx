@@ -1,4 +1,4 @@
-/** A failure, played again: seen from above, with what was measured, and what was judged of it. */
+/** The replay of a failure: the view from above, the measured curves and the verdict. */
 
 import { useMemo, useRef } from "preact/hooks";
 import { useAsked } from "../../api/asked";
@@ -45,7 +45,7 @@ export function ReplayScreen({ campaign, failure, query }: Props) {
           const violation = worstOf(known);
           return known.series === null || violation === null ? (
             <>
-              <Empty>{known.series_problem ?? "Nothing of it was recorded that could be played."}</Empty>
+              <Empty>{known.series_problem ?? "It has no recording to play."}</Empty>
               <Verdict failure={known} />
             </>
           ) : (
@@ -114,6 +114,7 @@ function Replay({ campaign, path, known, series, violation, query }: Played) {
   return (
     <div class="grid replay-screen">
       <div class="replay">
+        <div class="replay-main">
         <section class="card stage-card" ref={card} aria-label="Replay">
           <Stage
             recording={recording}
@@ -124,16 +125,18 @@ function Replay({ campaign, path, known, series, violation, query }: Played) {
             layers={layers}
             label="View from above; the table of actors says in text what is seen"
           />
-          <Legend moment={recording.moment} />
+          <Legend recording={recording} layers={layers} signals={!!paths?.signals.length} />
           <Transport clock={clock} tripod={tripod} toggle={toggle} layers={layers} marks={marks} hidden={hidden} moment={recording.moment} />
         </section>
+        <p class="faint small time-hint">
+          Time in s from the {recording.moment}. Blue: now; dotted: release
+          {recording.conflict_s !== null && "; dashed: the conflict begins"}
+          {hidden.length > 0 && `; grey ground: the ego does not see ${recording.ids[recording.striker]}`}.
+        </p>
+        <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
+        </div>
         <Verdict failure={known} />
       </div>
-      <p class="faint small time-hint">
-        Time in s from the {recording.moment}. Dotted: release
-        {recording.moment === "contact" ? "; dashed: the conflict begins. Grey: the striker is hidden from the ego." : `${recording.striker < 0 ? "." : `. Grey: ${recording.ids[recording.striker]} is hidden from the ego.`}`}
-      </p>
-      <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
       <Actors recording={recording} clock={clock} />
       <div class="replay-end">
         <Take campaign={campaign} run={known.run_id} failure={known.id} path={path} stage={card} />
