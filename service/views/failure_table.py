@@ -123,8 +123,6 @@ class FailureTable(Record):
     """Whether one of its valid violations is the first of its kind in its run and phase."""
     niche: list[int | None]
     """Which distinct failure of the campaign it is, counted from 0 over all runs; null where it is not valid."""
-    driven_by: list[DrivenBy | None]
-    """What drove the adversaries; null in what was stored before that was recorded."""
     kind: list[int]
     """Position in `kinds`."""
     striker: list[str | None]
@@ -290,7 +288,6 @@ def _row(run: StoredRun, failure: PlainEpisode, violation: Plain) -> dict[str, A
         "families": run.family,
         "methods": run.method,
         "seeds": run.seed,
-        "driven_by": failure.record.get("driven_by"),
         "indices": failure.index,
         "phases": failure.phase,
         "driven_by": failure.record.get("driven_by"),

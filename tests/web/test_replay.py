@@ -96,6 +96,54 @@ def test_who_struck_and_who_was_struck_are_told_apart(failure: dict[str, Any], p
     assert list(parts.values()).count("striker") == 1
 
 
+def test_signals_on_the_stage_show_what_the_series_recorded(
+    failure: dict[str, Any], page_at: Callable[..., Page]
+) -> None:
+    page = page_at(failure["place"])
+    series, time_s = failure["series"], times(failure)
+    ahead = [step for step, colour in enumerate(series["signal"]) if colour != "none"]
+    assert ahead, "wants a failure with a signal"
+    for step in (ahead[0], ahead[-1]):
+        lamps = {each["lamp"] for each in go_to(page, float(time_s[step]))["signals"]}
+        assert series["signal"][step] in lamps
+
+
+def test_labels_cover_neither_each_other_nor_what_matters(
+    failure: dict[str, Any], page_at: Callable[..., Page]
+) -> None:
+    page = page_at(failure["place"])
+    time_s = times(failure)
+    for step in range(0, len(time_s), max(1, len(time_s) // 8)):
+        drawn = go_to(page, float(time_s[step]))
+        boxes = drawn["labels"]
+        assert boxes
+        for k, (left, top, right, bottom) in enumerate(boxes):
+            for other in boxes[:k]:
+                assert left >= other[2] or right <= other[0] or top >= other[3] or bottom <= other[1]
+            for actor in drawn["actors"]:
+                assert not (left < actor["px"] < right and top < actor["py"] < bottom)
+
+
+def test_the_legend_names_what_is_drawn_and_only_that(failure: dict[str, Any], page_at: Callable[..., Page]) -> None:
+    page = page_at(failure["place"])
+    stage(page)
+    legend = page.get_by_role("list", name="Legend")
+    by_layer = {
+        "Sight": ("out of the ego's sight", "line of sight"),
+        "TTC, RSS": ("RSS margin ahead", "motion, and body at a predicted contact"),
+        "Trails": ("last 3 s, a dot each 0.5 s", "whole path"),
+    }
+    for layer, names in by_layer.items():
+        for name in names:
+            expect(legend.get_by_text(name, exact=True)).to_be_visible()
+        page.get_by_role("button", name=layer, exact=True).click()
+        for name in names:
+            expect(legend.get_by_text(name, exact=True)).to_have_count(0)
+        page.get_by_role("button", name=layer, exact=True).click()
+    for name in ("ego", "striker", "contact", "signal: green", "red"):
+        expect(legend.get_by_text(name, exact=True)).to_be_visible()
+
+
 def test_keys_step_frame_by_frame_and_play_and_pause(failure: dict[str, Any], page_at: Callable[..., Page]) -> None:
     page = page_at(failure["place"])
     time_s = times(failure)

@@ -119,8 +119,12 @@ def test_a_violation_near_nothing_shows_the_ego_and_its_path_up_to_then() -> Non
 def test_signals_have_their_colour_at_the_violation_and_a_bar_tells_the_scale() -> None:
     contact = synthetic_contact()
     recording, scene = Recording(contact, synthetic_series()), contact.episode.scene
-    heads = [replace(head, x_m=x_m, y_m=0.0) for head, x_m in zip(signal_heads("mixed", scene), (295, 305), strict=False)]
-    red, green = (replace(head, changes=[(0.0, "red"), (at, "green")]) for head, at in zip(heads, (9.0, 1.0), strict=True))
+    heads = [
+        replace(head, x_m=x_m, y_m=0.0) for head, x_m in zip(signal_heads("mixed", scene), (295, 305), strict=False)
+    ]
+    red, green = (
+        replace(head, changes=[(0.0, "red"), (at, "green")]) for head, at in zip(heads, (9.0, 1.0), strict=True)
+    )
     shapes = list(ET.fromstring(thumbnail(recording, (), (red, green))))
     for head, marks in ((red, 1), (green, 2)):
         colour = LAMPS[head.colour(0.1 + contact.episode.collision.time_s)]

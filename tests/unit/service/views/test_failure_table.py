@@ -35,7 +35,9 @@ def test_a_column_has_what_the_record_has(ledger):
         verdicts={"inside_limits": True, "ego_moving": False},
         judgement=judgement(None, conflict_s=-math.inf, severity=Severity.SEVERE, injury_risk=0.0123456, drivers={}),
     )
-    table = told(failure_table(campaign, [plain(run, 7, hit, REFUSED, scene={"lead_gap_m": 12.34567}, driven_by="script")], {}))
+    table = told(
+        failure_table(campaign, [plain(run, 7, hit, REFUSED, scene={"lead_gap_m": 12.34567}, driven_by="script")], {})
+    )
     kinds, scenes = table.pop("kinds"), table.pop("scenes")
     assert {name: values[0] for name, values in table.items()} == {
         "ids": "low-random-4-train-7",

@@ -1,13 +1,14 @@
 /** One distinct failure: what is needed to decide whether to open it. */
 
 import { address } from "../../router";
+import { drivenWords } from "../../ui/driven";
 import { number, words } from "../../ui/text";
 import { reactionOf } from "./features";
 import { GradeTag, Mark } from "./grade";
 import { refusal } from "../../ui/verdicts";
 import { NO_CONTACT } from "../../ui/violations";
 import type { Found } from "./found";
-import { DRIVEN_BY, halves, TRIAGE } from "./naming";
+import { halves, TRIAGE } from "./naming";
 import { useThumbnail } from "./thumbnails";
 import type { FailureTable } from "./wire";
 
@@ -60,7 +61,7 @@ export function Card({ campaign, table, at, found, triage }: Props) {
         <div class="found-by faint">
           <p title={`${found.episodes} episodes of ${found.runs} runs`}>
             Found by <b>{found.methods.join(", ")}</b>
-            {found.drivers.length > 0 && ` · driven by ${found.drivers.map((name) => DRIVEN_BY[name] ?? name).join(", ")}`}
+            {found.drivers.length > 0 && ` · driven ${found.drivers.map(drivenWords).join(", ")}`}
           </p>
           <p title={other === null ? `no other road user near, ${id}` : `${words(other)} (${table.striker_kind[at]}), ${id}`}>
             {table.families[at]} · {other === null ? "ego alone" : words(other)}

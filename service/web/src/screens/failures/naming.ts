@@ -1,5 +1,6 @@
 /** What can be filtered by, in words. */
 
+import { drivenWords } from "../../ui/driven";
 import { capital, words } from "../../ui/text";
 import { driverWords, GRADE_WORDS, refusal, type GradeName } from "../../ui/verdicts";
 import type { Facet } from "./filters";
@@ -12,15 +13,6 @@ export const TRIAGE: Record<TriageState, string> = {
   fixed: "Fixed",
 };
 
-/** What drives the adversaries of an episode. */
-export const DRIVEN_BY: Record<string, string> = {
-  policy: "policy",
-  model: "script model",
-  script: "script",
-  random: "random",
-  unknown: "not recorded",
-};
-
 export const FACET_LABELS: Record<Facet, string> = {
   requirement: "Requirement",
   family: "Family",
@@ -29,7 +21,7 @@ export const FACET_LABELS: Record<Facet, string> = {
   grade: "Grade",
   severity: "Severity",
   fault: "Fault",
-  driven_by: "Driven by",
+  driven_by: "Driven",
   prevented_by: "Prevented by",
   kind: "Kind",
   striker: "Striker",
@@ -46,7 +38,7 @@ export function valueWords(facet: Facet, value: string): string {
   if (facet === "grade" && Object.hasOwn(GRADE_WORDS, value)) return GRADE_WORDS[value as GradeName].short;
   if (facet === "triage" && Object.hasOwn(TRIAGE, value)) return TRIAGE[value as TriageState].toLowerCase();
   if (facet === "rule") return refusal(value);
-  if (facet === "driven_by") return DRIVEN_BY[value] ?? value;
+  if (facet === "driven_by") return value === "unknown" ? "not recorded" : drivenWords(value);
   if (facet === "prevented_by" && value !== "nothing") return driverWords(value);
   return WORDED.has(facet) ? words(value) : value;
 }

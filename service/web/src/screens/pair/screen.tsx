@@ -120,8 +120,8 @@ function Pair({ campaign, path, twin, known, series, violation, query }: PairPro
             )}
           </section>
         </div>
-        <Legend recording={failure} layers={layers} signals={!!paths?.signals.length} />
         <Transport clock={clock} tripod={tripod} toggle={toggle} layers={layers} marks={marks} hidden={hidden} moment={failure.moment} />
+        <Legend recording={failure} layers={layers} signals={!!paths?.signals.length} />
       </div>
       {other && (
         <>

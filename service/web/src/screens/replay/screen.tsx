@@ -125,8 +125,8 @@ function Replay({ campaign, path, known, series, violation, query }: Played) {
             layers={layers}
             label="View from above; the table of actors says in text what is seen"
           />
-          <Legend recording={recording} layers={layers} signals={!!paths?.signals.length} />
           <Transport clock={clock} tripod={tripod} toggle={toggle} layers={layers} marks={marks} hidden={hidden} moment={recording.moment} />
+          <Legend recording={recording} layers={layers} signals={!!paths?.signals.length} />
         </section>
         <p class="faint small time-hint">
           Time in s from the {recording.moment}. Blue: now; dotted: release
