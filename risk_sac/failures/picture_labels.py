@@ -30,7 +30,7 @@ class Labels:
         self._taken.append((corners.min(axis=0), corners.max(axis=0)))
 
     def write(self, text: str, body: Floats, ways: Iterable[Floats], size_pt: float, colour: str) -> None:
-        """Writes beside a body, on the first side that has room; leaves the text out if none has, or the body is out of view.
+        """Writes beside a body, on the first side with room; writes nothing without any, or out of view.
 
         Args:
           text: one line.
