@@ -158,5 +158,5 @@ def _draw_conflict(axis: Axes, recording: Recording) -> None:
             label = "as the conflict began" if actor == 0 else None
             _draw_body(axis, recording, actor, begin_s, label=label, **CONFLICT)
     place = judgement.conflict_x_m, judgement.conflict_y_m
-    style = {"marker": "D", "color": CONFLICT_COLOUR, "markersize": 5, "linestyle": "none", "zorder": 5}
+    style: dict[str, Any] = {"marker": "D", "color": CONFLICT_COLOUR, "markersize": 5, "linestyle": "none", "zorder": 5}
     axis.plot(*place, label="striker then", **style)

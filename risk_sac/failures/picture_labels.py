@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -51,7 +52,13 @@ class Labels:
                 if inside and not any(_overlap(box, other) for other in self._taken):
                     self._taken.append(box)
                     x, y = centre.tolist()
-                    style = {"fontsize": size_pt, "color": colour, "ha": "center", "va": "center", "clip_on": True}
+                    style: dict[str, Any] = {
+                        "fontsize": size_pt,
+                        "color": colour,
+                        "ha": "center",
+                        "va": "center",
+                        "clip_on": True,
+                    }
                     self.axis.text(x, y, text, path_effects=HALO, zorder=6, **style)
                     return
 

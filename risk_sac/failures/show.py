@@ -115,7 +115,7 @@ def _near_m(recording: Recording) -> float:
     """Returns a scale for the distances from 1 s before the conflict on; the approach before would flatten them."""
     began_s = -VIEW_S if recording.conflict_s is None else recording.conflict_s
     near = _least(recording, "distance_m")[recording.time_s >= began_s - 1.0]
-    return 1.08 * max(LEAST_M, *near[np.isfinite(near)].tolist())
+    return 1.08 * max([LEAST_M, *map(float, near[np.isfinite(near)])])
 
 
 def _ttc(axis: Axes, recording: Recording) -> None:
