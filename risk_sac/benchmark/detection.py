@@ -58,7 +58,6 @@ class Detection(Record):
 class _Candidates:
     """Observer that stops a run at each candidate, and at the budget's end."""
 
-    spec: RunSpec
     budget_steps: int
     judged: int
     """Episodes whose candidates an earlier call has refuted."""
@@ -70,7 +69,7 @@ class _Candidates:
         if record.index < len(self.records):
             return
         self.records.append(record)
-        if record.index >= self.judged and series is not None and candidates(self.spec, record):
+        if record.index >= self.judged and series is not None and candidates(record):
             self.waiting.append((record, series))
 
     def should_stop(self) -> bool:
@@ -114,7 +113,7 @@ def first_detection(spec: RunSpec, folder: Path, budget_steps: int) -> Detection
 
 def _play(spec: RunSpec, folder: Path, budget_steps: int, before: Detection | None) -> Detection:
     spec = spec.model_copy(update={"budget": Budget(episodes=MOST_EPISODES)})
-    seen = _Candidates(spec, budget_steps, judged=before.episodes if before else 0)
+    seen = _Candidates(budget_steps, judged=before.episodes if before else 0)
     found, refuted, failure = None, before.refuted if before else 0, None
     while found is None:
         train(spec, folder, seen)  # goes on where it stopped; libsumo is free in between

@@ -8,19 +8,17 @@ from contextlib import closing
 import numpy as np
 
 from risk_sac.config import RunSpec
-from risk_sac.egos.defects.catalogue import planted
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
 from risk_sac.failures.play import AFTER_S, Played, play
 from risk_sac.failures.recording import Series, actions_of
-from risk_sac.records import Collision, EpisodeRecord, Violation
+from risk_sac.records import NO_CONTACT, Collision, EpisodeRecord, Violation
 from risk_sac.types import STEP_S, Scene
 
 
-def candidates(spec: RunSpec, episode: EpisodeRecord) -> list[Collision | Violation]:
-    """Returns the preventable failures of an episode that violate what its ego's defects are to violate."""
-    wanted = {defect.requirement for defect in planted(spec.ego)}
-    return [each for each in episode.valid_violations if each.preventable and each.requirement in wanted]
+def candidates(episode: EpisodeRecord) -> list[Collision | Violation]:
+    """Returns the preventable contacts of an episode, any of which may show its ego's defects."""
+    return [each for each in episode.valid_violations if each.preventable and each.requirement == NO_CONTACT]
 
 
 def detected(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Collision | Violation | None:
@@ -33,7 +31,7 @@ def detected(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Collision
     Raises:
       SimulationError: SUMO failed in the repetition.
     """
-    failures = candidates(spec, episode)
+    failures = candidates(episode)
     if not failures:
         return None
     try:

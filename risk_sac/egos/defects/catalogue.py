@@ -14,7 +14,6 @@ from typing import Literal
 
 from risk_sac.config import EgoConfig, Settings
 from risk_sac.errors import ConfigError
-from risk_sac.records import NO_CONTACT
 
 HERE = Path(__file__).parent
 HASH_DIGITS = 12
@@ -41,8 +40,6 @@ class Defect(Settings):
     parameter: Parameter
     families: tuple[str, ...]
     """In which it matters."""
-    requirement: str = NO_CONTACT
-    """That a failure has to violate to show it."""
     test_set: bool = False
     """Whether it is kept from tuning; methods are compared on these."""
     decorator: str = ""
@@ -59,7 +56,7 @@ class Defect(Settings):
     def fingerprint(self) -> bytes:
         """Bytes that determine its effect: its row, and the code of its kind."""
         sources = [] if self.kind == "sumo" else [HERE / "defective.py", HERE / f"{self.kind}.py"]
-        row = self.model_dump_json(exclude={"sentence", "families", "requirement", "test_set"}).encode()
+        row = self.model_dump_json(exclude={"sentence", "families", "test_set"}).encode()
         return b"\0".join([row, *(source.read_bytes() for source in sources)])
 
 

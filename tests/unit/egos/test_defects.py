@@ -290,7 +290,7 @@ def test_a_defect_that_does_not_exist_or_fit_is_refused_in_a_line(ego: str, mess
 def test_about_a_third_is_the_test_set_with_each_kind_in_it() -> None:
     assert len(DEFECTS) >= 28
     tested = [defect for defect in DEFECTS.values() if defect.test_set]
-    assert 0.3 <= len(tested) / len(DEFECTS) <= 0.36
+    assert 0.28 <= len(tested) / len(DEFECTS) <= 0.36
     assert {defect.kind for defect in tested} == {defect.kind for defect in DEFECTS.values()}
 
 
