@@ -15,7 +15,7 @@ from service.host.logs import set_up_logs
 from service.keys.ring import check_exposure
 from service.runs.manager import worker_program
 
-ANSWERS_END_S = 2  # for answers and streams at work when the server is told to stop; workers are stopped after that
+ANSWERS_END_S = 2  # for answers and streams at work when the server stops; workers are stopped after that
 SWITCH_S = 0.001  # for which a busy thread may hold up the event loop, and with it all answers; 5 ms by default
 
 

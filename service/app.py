@@ -52,7 +52,7 @@ from service.views.studies import Studies, Tables
 
 
 def create_app(settings: ServiceSettings, executor: Executor | None = None) -> FastAPI:
-    """The service as an ASGI application; it touches neither disk nor processes until it is started.
+    """Makes the service as an ASGI application, which uses disk and processes only once started.
 
     Args:
       settings: the environment's settings.
@@ -95,7 +95,7 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
 def opened(
     settings: ServiceSettings, executor: Executor, latencies: Histogram, made: AuthEnabledFlag
 ) -> Iterator[Context]:
-    """The data folder, held exclusively, with its database open and its queue at work.
+    """Holds the data folder exclusively, opens its database and runs its queue.
 
     Raises:
       StorageError: the data folder is in use, or cannot be written.

@@ -8,7 +8,7 @@ class ServiceError(RiskSacError):
 
 
 class NotFoundError(ServiceError):
-    """Nothing has this id; `field` is the path parameter and `got` its value."""
+    """Unknown id; `field` is the path parameter and `got` its value."""
 
     def __init__(self, message: str, *, field: str, got: str) -> None:
         super().__init__(message)
@@ -17,7 +17,7 @@ class NotFoundError(ServiceError):
 
 
 class ConflictError(ServiceError):
-    """What is asked for does not fit what there is; `reason` is a stable name for why."""
+    """Request that conflicts with stored state; `reason` is a stable name."""
 
     def __init__(self, message: str, *, reason: str) -> None:
         super().__init__(message)
@@ -25,7 +25,7 @@ class ConflictError(ServiceError):
 
 
 class QuotaError(ServiceError):
-    """A project, or a key, has used up its share; asking again pays after `retry_after_s` seconds."""
+    """Exhausted share of a project or key; retry after `retry_after_s` seconds."""
 
     def __init__(self, message: str, retry_after_s: float) -> None:
         super().__init__(message)
@@ -33,31 +33,31 @@ class QuotaError(ServiceError):
 
 
 class KeysError(ServiceError):
-    """The file of the API keys cannot be read or written, is damaged, or has no such key."""
+    """Key file that is unreadable, not writable or damaged, or unknown key."""
 
 
 class StorageError(ServiceError):
-    """The database or the data folder refused a read or a write; the message is the reason."""
+    """Read or write that database or data folder refused; the message is the reason."""
 
 
 class OutdatedError(StorageError):
-    """What a stored campaign asks for is refused by now; it can be listed and deleted, and its runs fail."""
+    """Stored campaign that this version refuses: it can be listed and deleted; its runs fail."""
 
 
 class SeriesLost(StorageError):
-    """The time series of a failure was not recorded, or its file is gone or damaged."""
+    """Time series of a failure that was not recorded, is missing or damaged."""
 
 
 class NotPlayable(ServiceError):
-    """A failure does not repeat here, or cannot be played as was asked; the message says why."""
+    """Failure that does not repeat, or cannot be played as requested; the message says why."""
 
 
 class UploadError(ServiceError):
-    """An upload holds something that it must not, or does not load; the message says what and where."""
+    """Upload that is refused or does not load; the message says what and where."""
 
 
 class BusyError(ServiceError):
-    """As much is at work as may be; `reason` names what, and asking again pays after `retry_after_s` seconds."""
+    """Limit on concurrent work; `reason` names it; retry after `retry_after_s` seconds."""
 
     def __init__(self, message: str, retry_after_s: int, reason: str = "uploads_busy") -> None:
         super().__init__(message)
@@ -66,4 +66,4 @@ class BusyError(ServiceError):
 
 
 class TransitionError(ServiceError):
-    """A state change outside the table of transitions: a bug, never a user's mistake."""
+    """State change outside the table of transitions: a bug, not a user's mistake."""

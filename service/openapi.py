@@ -28,7 +28,7 @@ class _Dumper(yaml.SafeDumper):
 
 
 def document() -> str:
-    """The OpenAPI document as YAML, in the order in which the routes are declared."""
+    """Returns the OpenAPI document as YAML, in the order of the routes."""
     content = openapi(create_app(ServiceSettings()))
     return yaml.dump(content, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=LONGEST)
 

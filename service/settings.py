@@ -1,4 +1,4 @@
-"""Settings of the server process: RISK_SAC_* environment variables, or files of these names in a folder of secrets."""
+"""Settings of the server process: RISK_SAC_* variables, or files in a folder of secrets."""
 
 import os
 import re
@@ -20,7 +20,7 @@ SECRETS = os.environ.get("RISK_SAC_SECRETS_DIR")
 
 
 def _parsed(value: object) -> object:
-    """JSON as a variable holds it."""
+    """Parses JSON in a variable."""
     return from_json(value) if isinstance(value, str) else value
 
 
@@ -55,16 +55,16 @@ class ServiceSettings(RaySettings, BaseSettings):
     port: Annotated[int, Field(ge=1, le=65535)] = 8000
     """TCP port to listen on."""
     log_format: Literal["text", "json"] = "text"
-    """How the log is written; `json` has one object per line with campaign and run ids as fields."""
+    """Format of the log; `json` has one object per line with campaign and run ids as fields."""
 
     egos: FilePath | None = None
     """TOML file that registers egos in processes of their own, see `risk_sac/egos/README.md`."""
 
     executor: ExecutorName = "local"
-    """Where runs are executed; `local`: in processes of this machine; `ray`: on a cluster."""
+    """Executor of runs; `local`: processes of this machine; `ray`: a cluster."""
     max_workers: Annotated[int, Field(ge=1, le=MOST_WORKERS)] = Field(default_factory=_most_workers)
-    """Runs executed at the same time, each in a process of its own; by default one per core, or as many as the cluster
-    has room for."""
+    """Runs executed at the same time, each in its own process; by default one per core, or as many as fit the
+    cluster."""
     worker_module: str = "risk_sac.execution.worker"
     """Module that executes one run, started as `python -m`."""
     worker_niceness: Annotated[int, Field(ge=0, le=19)] = 5
@@ -72,52 +72,52 @@ class ServiceSettings(RaySettings, BaseSettings):
     worker_memory_bytes: Annotated[int, Field(ge=1 << 28)] = 4 << 30
     """Memory that a worker may take, bytes; a run that needs more fails."""
     grace_s: Annotated[float, Field(gt=0, le=600)] = 30.0
-    """How long a worker whose run is cancelled may finish its episode before it is killed, s."""
+    """Time that a worker whose run is cancelled has to finish its episode before it is killed, s."""
     stop_s: Annotated[float, Field(gt=0, le=600)] = 15.0
-    """The same when the server stops, s."""
+    """Time that a worker has to write a checkpoint when the server stops, s."""
     lease_s: Annotated[float, Field(gt=0, le=600)] = 4.0
-    """A worker that neither says anything nor uses its processor for so long is killed and its run resumed, s."""
+    """Time without a message or processor use after which a worker is killed and its run resumed, s."""
     stall_s: Annotated[float, Field(gt=0, le=86400)] = 600.0
-    """A worker that finishes no episode for so long is killed and its run resumed, s."""
+    """Time without a finished episode after which a worker is killed and its run resumed, s."""
     attempts: Annotated[int, Field(ge=1, le=100)] = 5
-    """Workers of one run that may die in a row without finishing an episode, before the run fails."""
+    """Workers of one run that may die in a row without a finished episode before the run fails."""
 
     replays: Annotated[int, Field(ge=0, le=10)] = TIMES
-    """How often each distinct failure of a finished run is replayed, in fresh processes; 0 leaves it out."""
+    """Replays of each distinct failure of a finished run, in fresh processes; 0 for none."""
 
     retention_days: Annotated[float, Field(gt=0)] | None = None
-    """Campaigns that ended so many days ago are deleted with their files; by default none is."""
+    """Age in days at which ended campaigns are deleted with their files; by default never."""
 
     allowed_hosts: Names = ["localhost", "127.0.0.1", "[::1]"]
-    """Host headers that are answered, a JSON list; `*` answers all. The address listened on is always one of them."""
+    """Accepted Host headers, a JSON list; `*` accepts all. The listening address is always accepted."""
     root_path: Annotated[str, BeforeValidator(_rooted), Field(pattern=ROOT_PATH)] = ""
-    """Path that a proxy in front has the service at, such as `/sim`, and takes off the requests."""
+    """Path of the service behind a proxy that strips it, such as `/sim`."""
     trusted_proxies: Names = []
-    """Addresses of proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` are believed, a JSON list."""
+    """Addresses of proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` are trusted, a JSON list."""
     cors_origins: Names = []
     """Origins whose web pages may call the service, a JSON list."""
     max_connections: Annotated[int, Field(ge=1)] | None = None
-    """Connections open at the same time; by default, and at most, what the limit of open files leaves room for."""
+    """Connections open at the same time; by default, and at most, what the limit of open files allows."""
     head_timeout_s: Annotated[float, Field(gt=0, le=600)] = 10.0
-    """How long a connection may take for the head of its next request, s."""
+    """Time for the head of the next request on a connection, s."""
     max_body_bytes: Annotated[int, Field(ge=1024)] = 1 << 20
-    """Largest body of a request, but for uploads, bytes."""
+    """Largest body of a request other than an upload, bytes."""
     max_upload_bytes: Annotated[int, Field(ge=1024)] = 32 << 20
     """Largest upload, bytes."""
     min_body_rate: Annotated[int, Field(ge=1)] = 1024
-    """Bytes per second at which a body has to come, on average."""
+    """Least average rate of a body, bytes per second."""
     body_patience_s: Annotated[float, Field(gt=0, le=600)] = 5.0
-    """How long a body may come more slowly than that, s."""
+    """Time that a body may arrive more slowly than that, s."""
     rate_limit: Annotated[int, Field(ge=1)] = 500
     """Requests per second that one key, or one address without a key, may make."""
     quota_queued_runs: Annotated[int, Field(ge=1)] = 10_000
-    """Runs that one project may have waiting."""
+    """Queued runs that one project may have."""
     quota_cpu_hours: Annotated[float, Field(gt=0)] | None = None
-    """Worker hours that one project may use in 24 hours; by default as many as there are."""
+    """Worker hours that one project may use in 24 hours; by default unlimited."""
 
     @property
     def url(self) -> str:
-        """Where the database is."""
+        """SQLAlchemy URL of the database."""
         return self.database_url or f"sqlite:///{self.data_dir / 'risk-sac.db'}"
 
     @property
@@ -136,9 +136,9 @@ class ServiceSettings(RaySettings, BaseSettings):
         return self.data_dir / "networks"
 
     def campaign_folder(self, campaign_id: str) -> Path:
-        """What one campaign leaves on disk."""
+        """Folder of one campaign's files."""
         return self.data_dir / "campaigns" / campaign_id
 
     def run_folder(self, campaign_id: str, run_id: str) -> Path:
-        """Where one run keeps its results, its recorded failures, its checkpoint and its log."""
+        """Folder of a run's results, recorded failures, checkpoint and log."""
         return self.campaign_folder(campaign_id) / run_id

@@ -1,6 +1,6 @@
-"""The cache of answers: an answer is given again to those who may see it, until the revision that it shows has passed.
+"""Caches answers per project until the revision that they show changes.
 
-The cache stands before the router, because finding and calling a route costs several times as much as a kept answer.
+The cache comes before the router, because routing costs several times as much as a cached answer.
 """
 
 import asyncio
@@ -60,7 +60,7 @@ def kept(
 
 
 class AnswerCache:
-    """ASGI middleware, behind the guards: whoever gets here may ask what they ask."""
+    """ASGI middleware behind the guards: callers are authorised already."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -70,7 +70,7 @@ class AnswerCache:
         self._bytes = 0
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Give the kept answer while it is valid, else have a route make one."""
+        """Sends the cached answer while it is valid, else calls the route."""
         if scope["type"] != "http" or scope["method"] != "GET" or CALLER not in scope:
             await self._app(scope, receive, send)
             return
@@ -84,7 +84,7 @@ class AnswerCache:
         await answer.response(Request(scope))(scope, receive, send)
 
     async def _find(self, asked: Asked, store: Store) -> KeptAnswer | None:
-        """An answer that shows what is stored now or later; None where a route has to make one."""
+        """Returns a current answer; None if a route has to make one."""
         before = self._passed_on
         while asked in self._answers:
             number, answer = self._answers[asked]
@@ -96,7 +96,7 @@ class AnswerCache:
         return None
 
     async def _renew(self, asked: Asked, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, and keep its answer once it begins: a client that reads slowly holds up nobody else."""
+        """Passes a request on and caches its answer once it begins, so slow readers do not block others."""
         self._passed_on += 1
         number, renewal = self._passed_on, asyncio.Event()
         if asked in self._answers:
@@ -118,7 +118,7 @@ class AnswerCache:
             finish()
 
     def _replace(self, asked: Asked, number: int, answer: KeptAnswer | None) -> None:
-        """Keep an answer in place of an older one, or nothing if there is none; the oldest answers make room for it."""
+        """Replaces a cached answer, or removes it for None; evicts the oldest."""
         if asked in self._answers:
             self._bytes -= _size(asked, self._answers.pop(asked)[1])
         if answer is not None and _size(asked, answer) <= MOST_BYTES // 2:  # else all others would make room for it

@@ -1,4 +1,4 @@
-"""What routes work with: the running service, and the caller whom the gate let in."""
+"""Dependencies of routes: the running service and the authorised caller."""
 
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -55,7 +55,7 @@ CALLER = "risk_sac.caller"  # in the ASGI scope, where the gate puts it
 
 @dataclass(frozen=True, slots=True)
 class Caller:
-    """Somebody whom the gate let in."""
+    """Authorised caller."""
 
     project: str  # owns what the caller posts
     scope: Scope
@@ -78,7 +78,7 @@ def check_scope(caller: Caller, scope: Scope) -> None:
 
 
 async def _caller(request: Request) -> Caller:
-    # Without a default: where the gate is not in place, nobody gets in.
+    # No default: without the gate every call is refused.
     return cast(Caller, request.scope[CALLER])
 
 
@@ -93,5 +93,5 @@ AskedCampaign = Annotated[StoredCampaign, Depends(_campaign)]
 
 
 async def require_admin(caller: CurrentCaller) -> None:
-    """A dependency for routes that want more than the gate does, which is `read` to look and `run` to change."""
+    """Requires an `admin` key, where the gate requires `read` or `run`."""
     check_scope(caller, Scope.ADMIN)

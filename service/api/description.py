@@ -83,14 +83,14 @@ def _document(app: FastAPI) -> dict[str, Any]:
 
 
 def _event_schemas() -> dict[str, Any]:
-    """What no response declares, because it travels within a stream."""
+    """Returns schemas of events, which no response declares."""
     schema = TypeAdapter(StateChange).json_schema(ref_template="#/components/schemas/{model}")
     schema.pop("$defs")
     return {"StateChange": schema}
 
 
 def _describe_guards(document: dict[str, Any]) -> None:
-    """Adds the key, and to each operation what the guards may answer; what a route declares itself goes first."""
+    """Adds the key scheme, and the guards' answers to each operation that declares none."""
     document["components"]["securitySchemes"] = _SECURITY
     # Either of them: whether a key is needed depends on the address and the keys of the server.
     document["security"] = [{"ApiKey": []}, {}]
@@ -111,7 +111,7 @@ def _problem(description: str, headers: dict[str, Any]) -> dict[str, Any]:
 
 
 def _simplified(node: Any) -> Any:
-    """Drops the titles that pydantic makes of names, and says the same in fewer words."""
+    """Drops pydantic's titles and shortens schemas."""
     if isinstance(node, list):
         return [_simplified(child) for child in node]
     if not isinstance(node, dict):
@@ -139,7 +139,7 @@ def _simplified(node: Any) -> Any:
 
 
 def _share(document: dict[str, Any]) -> None:
-    """Moves parameters, headers and responses that occur more than once to the components."""
+    """Moves repeated parameters, headers and responses to the components."""
     operations = [operation for path in document["paths"].values() for operation in path.values()]
     responses = [operation["responses"] for operation in operations]
     headers = [response["headers"] for each in responses for response in each.values() if "headers" in response]
@@ -150,7 +150,7 @@ def _share(document: dict[str, Any]) -> None:
 
 
 def _shared(kind: str, places: Sequence[Any]) -> dict[str, Any]:
-    """Replaces what occurs more than once in dictionaries or lists by references; returns what they refer to."""
+    """Replaces repeated entries by references; returns the referenced components."""
     found = [(each, key) for each in places for key in (each if isinstance(each, dict) else range(len(each)))]
     counts = Counter(json.dumps(each[key]) for each, key in found)
     shared: dict[str, Any] = {}

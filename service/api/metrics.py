@@ -1,6 +1,6 @@
-"""Metrics for Prometheus. Each app has a registry of its own; nothing is global.
+"""Prometheus metrics, in a registry per app.
 
-What is stored is counted when it is asked for, so that it survives restarts and costs nothing in between.
+Stored quantities are counted at each scrape, so they survive restarts and cost nothing in between.
 """
 
 import threading
@@ -65,7 +65,7 @@ RATES = {"ecr": "Valid contacts", "pcr": "Preventable contacts"}
 
 
 def request_latencies() -> Histogram:
-    """How long requests took until their answer began, by route, method and status; of one app."""
+    """Returns the histogram of times to the beginning of an answer, by route, method and status."""
     return Histogram(
         "risk_sac_request_seconds",
         "Time until an answer began.",
@@ -129,7 +129,7 @@ class CampaignMetrics(Collector):
             yield gauge
 
     def _requirements(self, statistics: Statistics) -> Iterator[Metric]:
-        """The funnel of each requirement; of users' requirements only so many names become labels, and stay labels."""
+        """Yields each requirement's funnel; the number of user-defined labels is bounded."""
         for row in statistics.requirements:
             if len(self._labelled) < len(SHIPPED_REQUIREMENTS) + MOST_OWN:
                 self._labelled.add(row.name)
@@ -141,7 +141,7 @@ class CampaignMetrics(Collector):
 
 
 def _of_cluster(cluster: Cluster | None) -> Iterator[Metric]:
-    """Each node of the cluster that runs execute on; nothing where they execute on this machine."""
+    """Yields metrics of each cluster node; none without a cluster."""
     if cluster is None:
         return
     yield GaugeMetricFamily("risk_sac_cluster_connected", "Whether there is a cluster.", value=int(bool(cluster.nodes)))
@@ -153,7 +153,7 @@ def _of_cluster(cluster: Cluster | None) -> Iterator[Metric]:
 
 
 class _Monotone:
-    """Sums over rows as counters: deleted rows must not look like a counter that began anew."""
+    """Turns sums over rows into counters: deleted rows must not look like a reset."""
 
     def __init__(self, labels: Sequence[str]) -> None:
         self._labels = labels
@@ -172,7 +172,7 @@ class _Monotone:
 
 
 def _states(statistics: Statistics) -> Iterator[Metric]:
-    """How many campaigns and runs are in each state; the queue are the runs that are queued."""
+    """Yields the number of campaigns and runs in each state."""
     for name, rows in (("campaigns", statistics.campaigns), ("runs", statistics.tallies)):
         family = GaugeMetricFamily(f"risk_sac_{name}", f"Stored {name} by state.", labels=["state"])
         for state in State:

@@ -1,4 +1,4 @@
-"""What every request and every answer passes: pure ASGI, because streams must pass too."""
+"""Middleware of every request, in pure ASGI because of event streams."""
 
 from fastapi import FastAPI
 from prometheus_client import Histogram
@@ -41,9 +41,9 @@ def add_middleware(app: FastAPI, settings: ServiceSettings, made: AuthEnabledFla
 
 
 class Compression(GZipMiddleware):
-    """Starlette's middleware, which also honours `gzip;q=0` and says so of all answers that may be kept.
+    """Starlette's gzip middleware that also honours `gzip;q=0` and sets Vary.
 
-    It leaves pictures, files and streams of events alone. Tags are made weak, so that they hold for both forms.
+    It skips pictures, files and event streams. Tags are made weak, so they hold for both forms.
     """
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -79,7 +79,7 @@ class Cors(CORSMiddleware):
 
 
 class SecurityHeaders:
-    """ASGI middleware: no browser guesses types, and no cache keeps what it was not told to keep."""
+    """ASGI middleware: forbids type sniffing, and caching by default."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -98,16 +98,16 @@ class SecurityHeaders:
 
 
 class ForwardedPrefix:
-    """ASGI middleware: links begin with what a proxy on this machine says that it took off the path.
+    """ASGI middleware: links begin with the prefix that a local proxy stripped.
 
-    It is believed without being configured, because nothing but the links of its own answer depends on it.
+    The header is trusted, because only the links of its own answer depend on it.
     """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on, with the prefix as the root path unless the settings have one."""
+        """Passes on with the prefix as root path, unless the settings have one."""
         if scope["type"] == "http" and not scope.get("root_path") and is_loopback((scope.get("client") or [""])[0]):
             prefix = Headers(scope=scope).get("x-forwarded-prefix", "").rstrip("/")
             if prefix and ROOT_PATH.fullmatch(prefix):
@@ -116,16 +116,16 @@ class ForwardedPrefix:
 
 
 class Head:
-    """ASGI middleware that answers HEAD as GET would be, without the body.
+    """ASGI middleware that answers HEAD like GET, without the body.
 
-    A stream would never end by itself, so the app is told that the client has left.
+    A stream would not end by itself, so the app sees a disconnected client.
     """
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on as GET, and ends the answer where its body would begin."""
+        """Passes on as GET and ends the answer before its body."""
         if scope["type"] != "http" or scope["method"] != "HEAD":
             await self._app(scope, receive, send)
             return

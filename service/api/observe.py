@@ -1,4 +1,4 @@
-"""What is noted of every request: how long it took, a line in the log, and an id by which both ends can name it."""
+"""Records every request: duration, log line and request id."""
 
 import logging
 import random
@@ -27,7 +27,7 @@ class Observe:
         self._latencies = latencies
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on, and note when the answer begins and when it is over."""
+        """Passes on and records when the answer begins and ends."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return

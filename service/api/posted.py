@@ -1,6 +1,6 @@
-"""Posted JSON, read strictly: `"3"` and `true` are no numbers, as the API's description says.
+"""Reads posted JSON strictly: `"3"` and `true` are no numbers.
 
-A campaign is of families, or of places of an uploaded network, which become families here.
+A campaign names families, or places of an uploaded network, which become families here.
 """
 
 import codecs
@@ -40,7 +40,7 @@ async def read_posted(request: Request, model: type[Model]) -> Model:
 
 
 async def _read_json(request: Request) -> tuple[bytes, Any]:
-    """The body as JSON, as it came and parsed; a problem unless it is JSON, of reasonable size, without repeats."""
+    """Returns the body raw and parsed; a problem unless it is JSON within limits, without repeated fields."""
     media_type(request, ["application/json"])
     content = (await request.body()).removeprefix(codecs.BOM_UTF8)
     if content.count(b",") > MOST_COMMAS:
@@ -55,7 +55,7 @@ async def _read_json(request: Request) -> tuple[bytes, Any]:
 
 
 def _refuse_repeats(pairs: list[tuple[str, Any]]) -> None:
-    """Refuses an object that has a field twice: of the two, readers differ in which one counts."""
+    """Refuses an object with a repeated field, which parsers read differently."""
     seen = set[str]()
     for name, _ in pairs:
         if name in seen:
@@ -75,7 +75,7 @@ def _validated(content: bytes, model: type[Model]) -> Model:
 
 
 def media_type(request: Request, wanted: Collection[str]) -> str:
-    """Returns the media type of a body; raises a 415 unless it is wanted, and one for a packed body."""
+    """Returns the media type of a body; 415 for others and for compressed bodies."""
     given = request.headers.get("content-type", "")
     declared = given.partition(";")[0].strip().lower()
     if declared not in wanted:
@@ -93,7 +93,7 @@ def _unsupported(detail: str) -> ProblemError:
 
 
 class Ground(Settings):
-    """Where on a network a campaign is run."""
+    """Network, pattern and places of a campaign."""
 
     network: Annotated[str, Field(max_length=40)]
     """Id of an uploaded network."""
@@ -137,21 +137,21 @@ def _families(ground: Ground, service: Context, caller: Caller) -> list[str]:
 
 
 def documented(*models: str) -> dict[str, Any]:
-    """How a route says that it takes a body of one of these schemas."""
+    """Returns the OpenAPI declaration of a body with one of these schemas."""
     schemas = [{"$ref": REFERENCE.format(model=model)} for model in models]
     schema = {"anyOf": schemas} if len(schemas) > 1 else schemas[0]
     return {"requestBody": {"required": True, "content": {"application/json": {"schema": schema}}}}
 
 
 def input_schemas(model: type[BaseModel]) -> dict[str, Any]:
-    """JSON schemas of the body and its parts, as components of the API's description."""
+    """Returns JSON schemas of the body and its parts, as OpenAPI components."""
     schema = model.model_json_schema(ref_template=REFERENCE)
     parts: dict[str, Any] = schema.pop("$defs", {})
     return parts | {model.__name__: schema}
 
 
 def campaign_schemas() -> dict[str, Any]:
-    """JSON schemas of both kinds of campaign, as components of the API's description."""
+    """Returns JSON schemas of both kinds of campaign, as OpenAPI components."""
     schemas = input_schemas(CampaignSpec)
     plain, ground = schemas[CampaignSpec.__name__], input_schemas(Ground)[Ground.__name__]
     reference = f"{REFERENCE}/properties/{{name}}"

@@ -1,4 +1,4 @@
-"""The names of requirements that a filter takes and that metrics are labelled with."""
+"""Names of requirements for filters and metric labels."""
 
 from typing import Annotated
 
@@ -21,7 +21,7 @@ def _known(
         ),
     ] = None,
 ) -> str | None:
-    """The requirement asked for; a 422 that names the campaign's unless it has this one."""
+    """Returns the requested requirement; 422 with the campaign's unless it has it."""
     if requirement is None:
         return None
     known = dict.fromkeys([*SHIPPED_REQUIREMENTS, *service.store.own_requirements(campaign_id, caller.sees)])

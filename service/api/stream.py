@@ -1,4 +1,4 @@
-"""Events as text: rendered once however many follow a campaign, and followed without asking the database in vain."""
+"""Event streams: rendered once for all followers, without needless database queries."""
 
 import asyncio
 import base64
@@ -28,7 +28,7 @@ _ID = re.compile(r"(\w+)-([1-9]\d{0,17})", re.ASCII)  # campaign; sequence of an
 
 @dataclass(frozen=True, slots=True)
 class Chunk:
-    """What happened next, as it is sent."""
+    """Batch of events as sent."""
 
     data: bytes
     position: int  # sequence of the last event that has been told then; 0: none
@@ -37,7 +37,7 @@ class Chunk:
 
 
 class Streams:
-    """All who follow campaigns. They look at the same moments, so that they ask for the same batches."""
+    """Shared polling of all followers, so that they request the same batches."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -46,13 +46,13 @@ class Streams:
     async def follow(
         self, campaign_id: str, position: int, stopping: anyio.Event, *, ended: bool
     ) -> AsyncIterator[bytes]:
-        """What happens after a position, until the campaign's final state, its deletion, or the server's end.
+        """Yields events after a position, until the campaign's end or deletion, or the server's stop.
 
-        No more than one batch is held for a client that reads slowly.
+        At most one batch is buffered for a slow client.
 
         Args:
           campaign_id: of the campaign.
-          position: sequence of the last event that has been told, 0 for none.
+          position: sequence of the last event sent, 0 for none.
           stopping: set when the server stops.
           ended: whether the campaign had already ended; its final state itself may be older than the record of changes.
         """
@@ -74,7 +74,7 @@ class Streams:
             logger.warning("a stream of events ends: %s", error, extra={"campaign": campaign_id})
 
     async def _revision(self, campaign_id: str) -> str:
-        """The campaign's revision; a thread is needed only where the database must be asked."""
+        """Returns the campaign's revision; uses a thread only for a database query."""
         known = self._store.known_revision(campaign_id)
         return known if known is not None else await run_in_threadpool(self._store.revision, campaign_id)
 
@@ -95,7 +95,7 @@ class Streams:
 
 
 def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None:
-    """Returns the position that an id of this campaign's events was made of; None if it never was."""
+    """Returns the position of an event id of this campaign; None if it is unknown."""
     try:
         text = base64.b64decode(event_id.encode("ascii"), altchars=b"-_", validate=True).decode("ascii")
     except (UnicodeError, binascii.Error):

@@ -1,4 +1,4 @@
-"""The data folder: private to its owner, and in use by one process at a time."""
+"""Data folder: private to its owner, used by one process at a time."""
 
 import os
 import stat
@@ -16,9 +16,9 @@ FILE_MODE, FOLDER_MODE = 0o600, 0o700
 
 
 def hold_data_folder(folder: Path) -> IO[bytes]:
-    """Makes and locks the data folder; close the returned file to give it back.
+    """Makes and locks the data folder; closing the returned file unlocks it.
 
-    The kernel gives it back when the process dies.
+    The kernel unlocks it when the process dies.
 
     Raises:
       StorageError: it is in use, cannot be written, or others may read it and that cannot be changed.
@@ -35,7 +35,7 @@ def hold_data_folder(folder: Path) -> IO[bytes]:
 
 
 def _close_to_others(folder: Path) -> None:
-    """Makes a data folder private; refuses one that other programs need, such as /var/lib."""
+    """Makes a data folder private; refuses folders of other programs, such as /var/lib."""
     status = folder.stat()
     mode, able = stat.S_IMODE(status.st_mode), os.geteuid() in (status.st_uid, 0)
     names = {path.name for path in folder.iterdir()} - NEW_VOLUME
@@ -56,12 +56,12 @@ def create_private(path: Path) -> None:
 
 
 def make_private(path: Path) -> None:
-    """Takes all permissions from group and others; a missing file or folder is left alone.
+    """Removes the permissions of group and others; ignores a missing path.
 
-    Of a file that another user owns the group may keep its permissions: that is how a volume is lent to a user.
+    The group keeps its permissions on a file of another user, as on a shared volume.
 
     Raises:
-      StorageError: everybody may read it, and it is not ours to change.
+      StorageError: others may read it, and another user owns it.
     """
     try:
         mode = stat.S_IMODE(path.stat().st_mode)

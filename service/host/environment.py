@@ -48,7 +48,7 @@ def _check_secrets() -> None:
 
 
 def _line(error: ErrorDetails) -> str:
-    """What one setting is, or what is in its list, and what it should be."""
+    """Describes one wrong setting, or the wrong entry of its list."""
     name, *item = error["loc"]
     field = ServiceSettings.model_json_schema()["properties"][name]
     text = repr(error["input"])
@@ -61,7 +61,7 @@ def _variable(name: str) -> str:
 
 
 def table() -> str:
-    """The settings as a markdown table: variable, what it takes, its default, its meaning."""
+    """Returns the settings as a Markdown table."""
     settings = ServiceSettings.model_json_schema()["properties"]
     rows = [
         f"| `{_variable(name)}` | {takes(field)} | {_default(field)} | {' '.join(field['description'].split())} |"
@@ -80,7 +80,7 @@ def with_table(text: str) -> str:
 
 
 def takes(field: dict[str, Any]) -> str:
-    """What a setting takes, by its JSON schema."""
+    """Returns what a setting takes, by its JSON schema."""
     if "anyOf" in field:  # one of them is null, which is what no variable means
         return next(takes(each) for each in field["anyOf"] if each["type"] != "null")
     if "const" in field:
@@ -93,7 +93,7 @@ def takes(field: dict[str, Any]) -> str:
 
 
 def _default(field: dict[str, Any]) -> str:
-    """As it would be written; a dash where it means none or depends on the machine."""
+    """Returns the default as a user writes it; a dash for none or machine-dependent ones."""
     default = field.get("default")
     if default is None:
         return "–"

@@ -1,4 +1,4 @@
-"""The server's log: lines for people, or one JSON object per line for machines; both name the campaign and the run."""
+"""Server log as text or JSON lines; both name the campaign and the run."""
 
 import logging
 import re
@@ -13,7 +13,7 @@ NAMES = {"levelname": "level", "name": "logger"}
 
 
 def shorten(record: logging.LogRecord) -> bool:
-    """Let uvicorn tell why the service cannot start by our reason alone, which it would end a traceback with."""
+    """Shortens uvicorn's startup error to our reason, without the traceback."""
     known = _OUR_ERROR.search(record.msg) if isinstance(record.msg, str) else None
     if known and record.msg.startswith("Traceback"):
         record.msg = f"cannot start: {known['reason'].strip()}"
@@ -43,7 +43,7 @@ def set_up_logs(log_format: Literal["text", "json"]) -> None:
 
 
 def json_formatter() -> logging.Formatter:
-    """One object per line: time, level, logger, message, and whatever the record carries beyond."""
+    """Makes one object per line: time, level, logger, message, extra fields."""
     return JsonFormatter(
         (*NAMES, "message"),
         rename_fields=NAMES,

@@ -1,1 +1,1 @@
-"""API keys: who may call the service, for which project, and how much."""
+"""API keys: authentication, projects, scopes and rate limits."""

@@ -1,4 +1,4 @@
-"""`python -m service.keys`: create, list and revoke API keys, or do without; a running server heeds it at once."""
+"""`python -m service.keys`: create, list and revoke API keys; a running server applies changes at once."""
 
 import argparse
 import re
@@ -103,7 +103,7 @@ def _open(settings: ServiceSettings, options: argparse.Namespace) -> None:
 
 
 def _file(settings: ServiceSettings) -> KeyFile:
-    """Returns the file of keys; raises a KeysError if it is missing although keys were made."""
+    """Returns the key file; raises KeysError if it is missing although keys were made."""
     file = KeyFile(settings.keys_file)
     if not file.path.exists() and ever_made(settings):
         raise missing(file.path)

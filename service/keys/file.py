@@ -28,7 +28,7 @@ _TOKEN = re.compile(r"rsk_([0-9a-f]{8})_([A-Za-z0-9_-]{43})")
 
 
 class Scope(StrEnum):
-    """What a key may do; each scope includes those before it."""
+    """Permissions of a key; each scope includes those before it."""
 
     READ = "read"  # look at its project's campaigns
     RUN = "run"  # post, cancel and delete them
@@ -41,7 +41,7 @@ class Scope(StrEnum):
 
 
 class Key(BaseModel):
-    """What the service knows of a key. Times are seconds since the epoch."""
+    """Stored record of a key. Times are seconds since the epoch."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -100,7 +100,7 @@ class KeyFile:
         return () if document is None else document.keys
 
     def create(self, project: str, name: str, scope: Scope) -> tuple[Key, str]:
-        """Adds a key; returns it with the token that its holder needs. From now on every caller needs a key."""
+        """Adds a key and returns it with its token; from now on every caller needs a key."""
         with self._turn():
             keys = self.read()
             key, token = _mint(project, name, scope, {key.id for key in keys})
@@ -108,7 +108,7 @@ class KeyFile:
         return key, token
 
     def create_anew(self, project: str, name: str, scope: Scope) -> tuple[Key, str]:
-        """Makes the first key of a new file in place of a lost or damaged one; refuses to replace a whole one."""
+        """Makes the first key of a new file; refuses to replace an intact one."""
         with self._turn():
             try:
                 whole = self.load() is not None
@@ -121,7 +121,7 @@ class KeyFile:
         return key, token
 
     def open_all(self) -> None:
-        """Forgets all keys, also lost and damaged ones, and lets in every process of this machine without one."""
+        """Forgets all keys; every local process may then call without a key."""
         with self._turn():
             self._write(Document(keys=(), open=True))
 
@@ -152,7 +152,7 @@ class KeyFile:
 
 
 def _mint(project: str, name: str, scope: Scope, taken: set[str]) -> tuple[Key, str]:
-    """A new key: its record, and the token that is shown once and kept nowhere."""
+    """Returns a new key's record and its token, which is shown once and not stored."""
     while (key_id := secrets.token_hex(4)) in taken:
         pass
     secret = secrets.token_urlsafe(32)
@@ -161,7 +161,7 @@ def _mint(project: str, name: str, scope: Scope, taken: set[str]) -> tuple[Key, 
 
 
 def split(token: str) -> tuple[str, str] | None:
-    """Id and secret of a token; None if it has not the shape of one."""
+    """Splits a token into id and secret; None if it is malformed."""
     found = _TOKEN.fullmatch(token)
     return None if found is None else (found[1], found[2])
 
@@ -171,7 +171,7 @@ def _hash(secret: str) -> str:
 
 
 def missing(path: Path) -> KeysError:
-    """What to raise where there is no file although keys were made."""
+    """Returns the error for a missing file although keys were made."""
     return KeysError(_unusable(path, "missing, although keys were made"))
 
 

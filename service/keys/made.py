@@ -1,7 +1,7 @@
-"""The fact that API keys were made, which the database keeps so that it outlives their file.
+"""Flag in the database that API keys were ever made, which outlives their file.
 
-The file of keys alone cannot tell a service that never had keys from one whose keys are lost. Whoever makes a key notes
-it in the database in the same step, and a server notes it when it sees a file that came another way.
+The key file alone cannot distinguish a service without keys from one whose keys are lost. Creating a key sets the flag
+in the same step, and a server sets it when it finds a key file that was copied here.
 """
 
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from service.store.server import keys_were_made, noting_keys
 
 
 class AuthEnabledFlag:
-    """What a running server knows of it.
+    """Cached flag of a running server.
 
     Attributes:
       known: whether a key was ever made; this never becomes false again.
@@ -27,7 +27,7 @@ class AuthEnabledFlag:
         self.known = self._noted = False
 
     def settle(self, engine: Engine, file: KeyFile) -> None:
-        """Learns from the database or tells it; to be called every now and then."""
+        """Reads the flag from the database or sets it there; call it regularly."""
         if self._noted:
             return
         if keys_were_made(engine):
@@ -39,14 +39,14 @@ class AuthEnabledFlag:
 
 
 def ever_made(settings: ServiceSettings) -> bool:
-    """Returns whether the database says that a key was ever made; a missing one says nothing."""
+    """Returns whether the database has the flag; false without a database."""
     with _database(settings) as engine:
         return engine is not None and present_step(engine) == newest_step() and keys_were_made(engine)
 
 
 @contextmanager
 def noting(settings: ServiceSettings) -> Iterator[None]:
-    """Notes that a key was made, if making it succeeds; makes the database where there is none."""
+    """Sets the flag if the body succeeds; makes the database if there is none."""
     with _database(settings, make=True) as engine:
         assert engine is not None
         if present_step(engine) != newest_step():

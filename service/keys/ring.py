@@ -1,4 +1,4 @@
-"""The keys as a running server sees them, and where it may listen."""
+"""Keys as a running server sees them, and the addresses that it may listen on."""
 
 import logging
 import os
@@ -18,10 +18,10 @@ _Signature = tuple[int, ...]
 
 
 class KeyRing:
-    """Finds keys; what a command changes in the file counts from the next request on.
+    """Finds keys; changes of the file count from the next request on.
 
-    A request costs one look at the file's metadata. A file that cannot be read is never taken for one
-    without keys, nor one that is missing for one that never was: each look raises until it is whole again.
+    A request costs one stat of the file. An unreadable file is not an empty one, and a missing file is not a service
+    without keys: each look-up raises until the file is intact again.
     """
 
     def __init__(self, path: Path, made: AuthEnabledFlag) -> None:
@@ -34,12 +34,12 @@ class KeyRing:
 
     @property
     def open(self) -> bool:
-        """Whether a process of this machine needs no key: none was ever made, or an administrator has said so."""
+        """Whether local processes need no key: none was ever made, or an administrator opened the service."""
         self.keys()
         return self._document is None or self._document.open
 
     def keys(self) -> Mapping[str, Key]:
-        """All keys by id, revoked ones too; raises a KeysError if the file is unreadable, damaged, or lost."""
+        """All keys by id, revoked ones too; raises KeysError if the file is unreadable, damaged or lost."""
         # Before the file is looked at, since it is there before anybody can know of its keys; and before it is read: a
         # change that comes between shows as another signature the next time.
         made = self._made.known
@@ -60,7 +60,7 @@ class KeyRing:
         return self._keys
 
     def find(self, token: str) -> Key | None:
-        """Returns the key that this is the token of; None if there is none that still counts."""
+        """Returns the valid key of a token, else None."""
         keys = self.keys()
         parts = split(token)
         if parts is None:
@@ -85,7 +85,7 @@ class KeyRing:
 
 
 def _signature(path: Path) -> _Signature:
-    """What differs after each replacement of the file; the error's number where it cannot be looked at."""
+    """Returns metadata that changes with each replacement of the file, or the error number."""
     try:
         status = os.stat(path)
     except OSError as error:
@@ -94,7 +94,7 @@ def _signature(path: Path) -> _Signature:
 
 
 def check_exposure(settings: ServiceSettings) -> None:
-    """Refuses to serve other machines without keys, and anybody with keys that cannot be read."""
+    """Refuses to serve other machines without keys, and anyone if the keys are unreadable."""
     keys = KeyFile(settings.keys_file).read()
     if is_loopback(settings.host) or any(key.revoked_at is None for key in keys):
         return

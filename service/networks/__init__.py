@@ -1,1 +1,1 @@
-"""Road networks that users upload: checked in a process of their own, kept as files, never believed."""
+"""Uploaded road networks: untrusted, checked in a sandboxed process, stored as files."""

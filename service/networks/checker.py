@@ -29,7 +29,7 @@ MOST_WARNINGS = 20
 
 
 def check(upload: Path) -> CheckReport:
-    """Writes the documents of an upload again in the current folder, reads the net, and lets the simulator load all."""
+    """Rewrites the documents of an upload, reads the net, and loads all in the simulator."""
     with tempfile.TemporaryDirectory(dir=".") as scratch:
         converted = present_net(upload, Path(scratch), "the upload")
         root = read_tree(converted.file)

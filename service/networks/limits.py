@@ -1,4 +1,4 @@
-"""What the check of an uploaded network, and the search for its places, may cost."""
+"""Limits on checking an uploaded network and searching its places."""
 
 CPU_S = 150  # a net of 50,000 edges takes 45
 WALL_S = 300

@@ -1,7 +1,7 @@
-"""Uploaded networks on disk: `PROJECT/ID/` with the files of a network and its record.
+"""Stores uploaded networks on disk: `PROJECT/ID/` with files and record.
 
-Whatever is there is whole: an upload is checked in a folder beside them and moved into place at the end. No name
-comes from a user, and what was sent is not kept, only what the checker wrote anew.
+Stored networks are complete: an upload is checked in a folder beside them and then moved into place. No file name comes
+from a user, and only what the checker rewrote is kept.
 """
 
 import hashlib
@@ -49,7 +49,7 @@ class NetworkStore:
         most: int = MOST,
         at_once: int = UPLOADS_AT_ONCE,
     ) -> None:
-        """Removes what an earlier server left unfinished; `most` networks of a project, `at_once` uploads."""
+        """Removes unfinished uploads; allows `most` networks per project and `at_once` uploads."""
         self._folder = folder
         self._most = most
         self._at_once = at_once
@@ -60,7 +60,7 @@ class NetworkStore:
 
     @contextmanager
     def receive(self, key_id: str | None = None) -> Iterator[Incoming]:
-        """Makes a place for one upload of a key, which is removed again unless `add` made a network of it."""
+        """Makes a folder for one upload, removed again unless `add` made a network of it."""
         with self._counting:
             self._check_share(key_id)
             self._at_work[key_id] += 1
@@ -104,14 +104,14 @@ class NetworkStore:
         return network
 
     def uploaded_before(self, incoming: Incoming, project: str) -> Network | None:
-        """Finds the project's network that was made of the same bytes as an upload that has arrived."""
+        """Finds the project's network with the same bytes as a received upload."""
         sha256 = incoming.complete()
         with _refusals("the networks cannot be read"):
             every = (network for path in self._paths(project) if (network := _readable(path)) is not None)
             return next((network for network in every if network.sha256 == sha256), None)
 
     def list(self, limit: int, before: int | None, project: str | None) -> StoredPage[Network]:
-        """Lists networks, newest first, `before` the `last` of an earlier page; logs and leaves out damaged ones."""
+        """Lists networks, newest first, before the `last` of an earlier page; skips damaged ones."""
         with _refusals("the networks cannot be read"):
             found = sorted((_number(path), path) for path in self._paths(project))
             older = [(number, path) for number, path in reversed(found) if before is None or number < before]
@@ -120,18 +120,18 @@ class NetworkStore:
         return StoredPage(items=tuple(items), last=page[-1][0] if len(older) > limit else None)
 
     def get(self, network_id: str, project: str | None) -> Network:
-        """Returns one network; raises a NotFoundError if there is none, or it is another project's."""
+        """Returns one network; raises NotFoundError if it is missing or another project's."""
         path = self._path(network_id, project)
         with _refusals("a network cannot be read"):
             return _read(path)
 
     def folder(self, network_id: str, project: str | None) -> Path:
-        """Where the files of a network are; raises what `get` does."""
+        """Returns the folder of a network; raises what `get` does."""
         self.get(network_id, project)
         return self._path(network_id, project)
 
     def check_files(self, folder: Path) -> None:
-        """Raises `StorageError` if a file of a network is not as the checker wrote it."""
+        """Raises `StorageError` if a file of a network differs from what the checker wrote."""
         with _refusals("a network cannot be read"):
             for file in _read(folder).files:
                 if hashlib.sha256((folder / file.name).read_bytes()).hexdigest() != file.sha256:
@@ -140,7 +140,7 @@ class NetworkStore:
                     )
 
     def delete(self, network_id: str, project: str | None) -> None:
-        """Removes a network; at once for those who look, then from the disk."""
+        """Removes a network, first from the listing and then from the disk."""
         path = self._path(network_id, project)
         grave = self._folder / INCOMING / f"deleted-{network_id}-{secrets.token_hex(4)}"
         with _refusals("a network cannot be deleted"):

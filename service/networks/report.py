@@ -1,6 +1,6 @@
-"""What server and checker share: the media types of an upload, and what the checker reports of it.
+"""Records that server and checker share: media types and the checker's report.
 
-No models of pydantic: to import that would take the checker more time and memory than most uploads.
+Plain dataclasses, since importing pydantic would cost the checker more time and memory than most uploads.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ PROGRESS = "progress"  # of the search, as long as it goes on
 
 
 class Kind(StrEnum):
-    """What a document is, told by its root element."""
+    """Kind of a document, by its root element."""
 
     NET = "net"
     ROUTES = "routes"
@@ -23,7 +23,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class NetworkFile:
-    """One of the files of a network, as the service has written it anew."""
+    """File of a network, as the service rewrote it."""
 
     name: str
     """Given by the service; the names in an archive are not kept."""
@@ -38,7 +38,7 @@ class NetworkFile:
 
 @dataclass(frozen=True, slots=True)
 class CheckReport:
-    """The last word of the checker; exactly one of `refused` and `summary` is there."""
+    """Result of the checker, with either `refused` or `summary`."""
 
     refused: str | None = None
     summary: Summary | None = None

@@ -1,4 +1,4 @@
-"""Receives uploads and starts the checker on them; this side reads reports, never uploads."""
+"""Receives uploads and starts the checker; this process parses reports, never uploads."""
 
 import hashlib
 import logging
@@ -24,7 +24,7 @@ _REPORTS = TypeAdapter(CheckReport)
 
 
 class Incoming:
-    """Writes an upload down as it comes; closing it is for whoever opened it."""
+    """Upload that is written to disk as it arrives; its opener closes it."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -47,7 +47,7 @@ class Incoming:
         return self._hash.hexdigest()
 
     def strip(self) -> None:
-        """Leave only what the checker wrote anew."""
+        """Removes all but the files that the checker rewrote."""
         for name in (UPLOAD, LOG):
             (self.folder / name).unlink()
 
@@ -58,7 +58,7 @@ class Incoming:
 
 
 def inspect(folder: Path, checker: str = CHECKER, wall_s: float = WALL_S) -> CheckReport:
-    """Checks the file `upload` in a folder, in a process of its own that writes it again, and waits for the report."""
+    """Checks the file `upload` of a folder in a separate process and returns its report."""
     try:
         result = run_helper(
             checker,

@@ -1,4 +1,4 @@
-"""Bodies of the responses about networks; what is stored is the same body."""
+"""Response bodies about networks, stored in the same form."""
 
 from datetime import datetime
 
@@ -10,7 +10,7 @@ from service.networks.report import NetworkFile
 
 
 class BoundingBox(Record):
-    """What all lanes lie in, m in the net's own coordinates."""
+    """Bounding box of all lanes, m in the net's own coordinates."""
 
     west: float
     south: float
@@ -19,7 +19,7 @@ class BoundingBox(Record):
 
 
 class Network(Record):
-    """A road network that was checked, loaded by the simulator once, and kept."""
+    """Stored road network, checked and loaded once by the simulator."""
 
     id: str
     label: str
@@ -56,7 +56,7 @@ class Spot(Record):
 
 
 class FoundPlace(Spot):
-    """Where a pattern fits."""
+    """Place that a pattern fits."""
 
     summary: str
     rare: bool = False
@@ -64,13 +64,13 @@ class FoundPlace(Spot):
 
 
 class Elsewhere(Spot):
-    """Where a pattern does not fit."""
+    """Place that a pattern does not fit."""
 
     why: str
 
 
 class Places(Record):
-    """Where the patterns fit on a network; in the order of the net."""
+    """Places of the patterns on a network, in the order of the net."""
 
     items: list[FoundPlace]
     elsewhere: list[Elsewhere]

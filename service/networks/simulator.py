@@ -1,4 +1,4 @@
-"""Whether libsumo can load a network, and what the process that tries may use."""
+"""Loads a network in libsumo, with limits on the process."""
 
 import os
 import resource
@@ -21,7 +21,7 @@ _OPTIONS = (
 
 
 def load(names: Mapping[Kind, Sequence[str]]) -> list[str]:
-    """Loads files of the current folder and runs a few steps, with no output on and no option of the user's.
+    """Loads files of the current folder and runs a few steps, without output or user options.
 
     Returns what SUMO warned of; an UploadError has SUMO's own message.
     """
@@ -42,7 +42,7 @@ def load(names: Mapping[Kind, Sequence[str]]) -> list[str]:
 
 def bind() -> None:
     """Bound what this process may use, for good."""
-    signal.alarm(WALL_S)  # should the server die and nobody watch
+    signal.alarm(WALL_S)  # in case the server dies
     _limit(resource.RLIMIT_CORE, 0)
     _limit(resource.RLIMIT_CPU, CPU_S)
     _limit(resource.RLIMIT_AS, MEMORY_BYTES)
@@ -51,7 +51,7 @@ def bind() -> None:
 
 
 def bind_simulator() -> None:
-    """Leave the simulator no room for output, and no more processes or threads unless they are root's."""
+    """Denies the simulator output files, and further processes or threads unless root."""
     _limit(resource.RLIMIT_FSIZE, LOG_BYTES)
     _limit(resource.RLIMIT_NPROC, 0)
 

@@ -1,7 +1,7 @@
-"""`service.networks.surveyor REPORT survey|keep …`: find the places of a network, or put some into the library.
+"""`service.networks.surveyor REPORT survey|keep …`: find places of a network, or store some in the library.
 
-Started by `service.networks.surveys` in the folder of a network that the checker has written, with bounds on time and
-memory: a search takes seconds in which a server would answer nobody.
+Started by `service.networks.surveys` in the folder of a checked network, with limits on time and memory, since a search
+takes seconds that would block the server.
 
     survey                 writes `places.json` and `places.png` beside the net
     keep PATTERN [PLACE]   keeps that place, or all of the pattern, and reports the names of the families that they are

@@ -1,4 +1,4 @@
-"""The places of networks: searched for once, in a process of its own, and kept beside the network."""
+"""Searches places of networks once, in a separate process, and stores them beside the network."""
 
 import json
 import os
@@ -30,7 +30,7 @@ Asked = tuple[str | None, ...]
 
 
 class Surveys:
-    """Searches for places on networks, as jobs that many requests may wait for."""
+    """Runs searches for places as jobs that several requests may await."""
 
     def __init__(self, networks: NetworkStore, library: Path, stopping: Callable[[], bool] = lambda: False) -> None:
         """Starts nothing; `library` is the folder of places that campaigns are run at, `stopping` ends searches."""
@@ -49,7 +49,7 @@ class Surveys:
             pool.shutdown(cancel_futures=True)
 
     def places(self, network_id: str, project: str | None) -> Places:
-        """Where the patterns fit on a network, and why elsewhere not; its progress is below 1 as long as it is unknown.
+        """Returns where the patterns fit on a network; its progress is below 1 while unknown.
 
         Raises:
           ConfigError: nothing can be found on it.
@@ -66,14 +66,14 @@ class Surveys:
         return read_sealed(folder / PLACES, Places)
 
     def picture(self, network_id: str, project: str | None) -> bytes:
-        """The network from above with its places, PNG; raises what `places` does, or `BusyError` until it is there."""
+        """Returns a PNG of the network with its places; raises as `places`, or `BusyError` until drawn."""
         if (places := self.places(network_id, project)).progress < 1:
             said = f"the places are searched for ({places.progress:.0%}); try again in {RETRY_AFTER_S} s"
             raise BusyError(said, RETRY_AFTER_S)
         return (self._networks.folder(network_id, project) / PICTURE).read_bytes()
 
     def keep(self, network_id: str, project: str | None, pattern: str, place: str | None) -> list[str]:
-        """Makes families of a place, or of all places of a pattern, that can be run; returns their names."""
+        """Stores a place, or all places of a pattern, as families; returns their names."""
         folder = self._networks.folder(network_id, project)
         asked = network_id, pattern, place
         arguments = ["keep", pattern, *([] if place is None else [place])]
@@ -84,7 +84,7 @@ class Surveys:
         return list(families)
 
     def _still_there(self, families: Sequence[str]) -> bool:
-        """Whether the library has them; it will go on doing so for a while, since they are wanted."""
+        """Returns whether the library has them, and marks them as used."""
         try:
             for name in families:
                 os.utime(self._library / name)
@@ -95,7 +95,7 @@ class Surveys:
         return True
 
     def _job(self, asked: Asked, folder: Path, arguments: Sequence[str]) -> Future[dict[str, Any]]:
-        """The job that answers a question: one that is at work or has answered it, or else a new one."""
+        """Returns the job for a question: a running or finished one, or else a new one."""
         with self._lock:
             job = self._jobs.get(asked)
             if job is not None and not (job.done() and (len(asked) == 1 or job.exception())):

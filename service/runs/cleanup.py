@@ -1,7 +1,7 @@
 """Removes campaigns with their folders, old campaigns, and places that no campaign names.
 
-A campaign goes whole or not at all, whenever the server dies: its folder is first renamed, then the rows go, then the
-renamed folder. What a server that died in between left behind says by its name how far it was.
+A deletion is atomic even if the server dies: the folder is renamed, then the rows are deleted, then the renamed folder.
+The name of a leftover folder says which step was reached.
 """
 
 import logging
@@ -26,7 +26,7 @@ UNUSED_S = 3600.0  # that a place is kept for a campaign that has only been chec
 
 
 def dispose(folder: Path, forget: Callable[[], None]) -> None:
-    """Removes a campaign's folder, which may be missing, and its rows; where `forget` raises, the folder stays."""
+    """Removes a campaign's folder, if any, and its rows; if `forget` raises, the folder stays."""
     grave = folder.with_name(f"{PREFIX}{folder.name}")
     if folder.exists():
         folder.rename(grave)
@@ -59,7 +59,7 @@ def settle(campaigns: Path, exists: Callable[[str], bool]) -> None:
 
 
 class Retention:
-    """Deletes campaigns that ended `retention_days` ago, a batch at a time, and places that no campaign names."""
+    """Deletes old campaigns in batches, and places that no campaign names."""
 
     def __init__(self, settings: ServiceSettings, store: Store) -> None:
         self._days = settings.retention_days
@@ -69,7 +69,7 @@ class Retention:
         self._retire_at = self._prune_at = 0.0  # monotonic times
 
     def retire(self, dispose: Callable[[str], None]) -> None:
-        """Deletes a batch of old campaigns with `dispose`, which takes an id, if it is time."""
+        """Deletes a batch of old campaigns by `dispose(id)`, if it is due."""
         if self._days is None or time.monotonic() < self._retire_at:
             return
         old = self._store.ended_before(time.time() - self._days * DAY_S, BATCH)

@@ -1,4 +1,4 @@
-"""Queue, limits, launch, retry, pause, cancel, recover, delete: the only writer of the database."""
+"""Runs campaigns: queue, limits, retry, pause, cancel, recover; the only writer of the database."""
 
 import logging
 import tempfile
@@ -71,12 +71,12 @@ class Manager:
 
     @property
     def cluster(self) -> Cluster | None:
-        """The cluster that runs execute on; None where they execute on this machine."""
+        """Cluster that runs execute on; None on this machine."""
         return self._executor.cluster
 
     @property
     def workers(self) -> int:
-        """Runs that are executed at once; 0 while there is nowhere to execute them."""
+        """Number of runs executed at once; 0 while no executor is available."""
         return int(min(self._settings.max_workers, self._executor.slots))
 
     def start(self) -> None:
@@ -96,7 +96,7 @@ class Manager:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stops all workers at their next episode boundary and leaves their runs queued.
+        """Stops all workers at their next episode boundary and requeues their runs.
 
         Runs whose worker cannot even be killed stay `running`; the next start puts them back in the queue.
         """
@@ -108,7 +108,7 @@ class Manager:
             logger.error("workers of runs %s did not end", sorted(self._scheduler.active))
 
     def submit(self, spec: CampaignSpec, *, project: str = "default", key: str | None = None) -> StoredCampaign:
-        """Queues a campaign, or finds the one that this idempotency key has queued before.
+        """Queues a campaign, or finds the one queued with this idempotency key.
 
         Raises:
           ConfigError: the campaign cannot be run; the error names the field.
@@ -182,14 +182,14 @@ class Manager:
 
     @contextmanager
     def _pausing(self, run: QueuedRun | None = None) -> Iterator[None]:
-        """Pauses where the database or the disk refuses; a run that is named has no worker any more and waits."""
+        """Pauses if database or disk refuse; a named run has lost its worker and waits."""
         try:
             yield
         except StorageError as error:
             self._pause(str(error), run)
 
     def _pause(self, reason: str, without_worker: QueuedRun | None = None) -> None:
-        """The disk refused: nothing is lost, since workers have their checkpoints; all wait until it has room."""
+        """Pauses all runs until the disk has room; checkpoints keep their progress."""
         self._storage.begin(reason)
         self._scheduler.abandon(self._settings.stop_s)
         numbers = set(self._scheduler.active)
@@ -198,7 +198,7 @@ class Manager:
     # What follows is the `RunStore` of the scheduler.
 
     def start_next(self) -> QueuedRun | None:
-        """The run that has waited longest, of the project that has the fewest at work."""
+        """Returns the oldest queued run of the project with the fewest running ones."""
         at_work = Counter(active.run.project for active in self._scheduler.active.values())
         while True:
             waiting = self._store.waiting()

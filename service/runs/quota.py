@@ -1,4 +1,4 @@
-"""What one project may take of the service. Pure."""
+"""Quotas of a project. Pure functions."""
 
 from service.errors import QuotaError
 from service.settings import ServiceSettings
@@ -9,7 +9,7 @@ HOUR_S = 3600.0
 
 
 def check_quota(usage: Usage, new_runs: int, settings: ServiceSettings) -> None:
-    """Raises QuotaError where too many of a project's runs would wait, or its worker hours are used up."""
+    """Raises QuotaError if a project has too many queued runs or no worker hours left."""
     if usage.queued_runs + new_runs > settings.quota_queued_runs:
         raise QuotaError(
             f"got {new_runs} runs with {usage.queued_runs} waiting already; wanted at most "
@@ -25,5 +25,5 @@ def check_quota(usage: Usage, new_runs: int, settings: ServiceSettings) -> None:
 
 
 def exhausted(usage: Usage, settings: ServiceSettings) -> bool:
-    """Whether a project's worker hours are used up, so that its runs wait."""
+    """Returns whether a project's worker hours are used up, so that its runs wait."""
     return settings.quota_cpu_hours is not None and usage.cpu_s >= settings.quota_cpu_hours * HOUR_S

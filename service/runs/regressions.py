@@ -1,7 +1,7 @@
-"""Campaigns' failures against other egos: queued in the campaigns' folders, played one after the other.
+"""Plays campaigns' failures against other egos, one regression at a time.
 
-A regression is a file below its campaign's folder, and goes with it. One that had not ended when the server died is
-played by the next one. Its id names what is played, so that posting the same again gives the one that there is.
+A regression is a file below its campaign's folder and is deleted with it. An unfinished one is played by the next
+server. Its id is a digest of the request, so posting the same request again returns the existing one.
 """
 
 import hashlib
@@ -116,7 +116,7 @@ class Regressions:
         return posted
 
     def get(self, regression_id: str) -> StoredRegression:
-        """The regression with this id; whether the caller may see its campaign has been asked.
+        """Returns the regression with this id; access to its campaign is checked before.
 
         Raises:
           NotFoundError: there is none.
@@ -167,7 +167,7 @@ def _read(file: Path) -> StoredRegression:
 
 
 def _write(file: Path, regression: StoredRegression) -> None:
-    """Into its campaign's folder, which must be there: a campaign that was deleted stays so."""
+    """Writes it into its campaign's folder, which must exist: a deleted campaign stays deleted."""
     try:
         file.parent.mkdir(exist_ok=True)
         replace_file(file, regression.model_dump_json(indent=2).encode())

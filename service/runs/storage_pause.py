@@ -1,4 +1,4 @@
-"""The pause while the disk refuses: when it began, what is shown of it, and when another try pays."""
+"""Pause while the disk refuses writes: its reason and the time of the next try."""
 
 import logging
 import time
@@ -17,7 +17,7 @@ CALM_S = 60.0  # a disk that behaved for so long is trusted again
 
 
 class StoragePause:
-    """Whether campaigns have to wait for the disk; the manager's thread alone begins and ends it."""
+    """State of the pause; only the manager's thread begins and ends it."""
 
     def __init__(self, store: Store, ledger: Ledger, data_dir: Path) -> None:
         self._store = store
@@ -27,7 +27,7 @@ class StoragePause:
 
     @property
     def reason(self) -> str | None:
-        """What the disk said, while it refuses."""
+        """The disk's error while the pause lasts."""
         return self._store.refusal
 
     def begin(self, reason: str) -> None:
@@ -39,14 +39,14 @@ class StoragePause:
         self._store.refusal = reason
 
     def write_down(self, numbers: Collection[int], reason: str) -> None:
-        """Stores which runs are paused, if the disk takes as much as that."""
+        """Stores which runs are paused, if the disk accepts it."""
         try:
             self._ledger.pause(numbers, reason)
         except StorageError:
             logger.info("the pause itself cannot be written down; it is shown all the same")
 
     def try_again(self) -> None:
-        """Ends the pause if the disk has room, else doubles the wait; does nothing before the wait is over."""
+        """Ends the pause if the disk has room, else doubles the wait; a no-op before it is over."""
         if time.monotonic() - self._refused_at < self._wait_s:
             return
         try:
@@ -62,7 +62,7 @@ class StoragePause:
 
 
 def refused(doing: str, folder: Path, error: OSError) -> str:
-    """What the disk said, in a line without paths, which the log has."""
+    """Returns the error in one line without paths; the log has the paths."""
     return f"storage failed while {doing}: {error.strerror} ({Path(error.filename or folder).name!r})"
 
 

@@ -1,5 +1,5 @@
-"""What the service keeps: tables, records of them, reading and writing.
+"""Database of the service: tables, records, reading and writing.
 
-Every function raises StorageError where the database cannot be read or written, and NotFoundError where the project has
-nothing with the id that was given; no project means all of them.
+Every function raises StorageError if the database cannot be read or written, and NotFoundError if the project has
+nothing with the given id; no project means all projects.
 """

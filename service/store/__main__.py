@@ -1,4 +1,4 @@
-"""`python -m service.store`: copy the database, or take its newest step back for the version of the service before."""
+"""`python -m service.store`: copy the database, or undo its newest migration step."""
 
 import argparse
 import sys

@@ -1,4 +1,4 @@
-"""What an episode adds to its row, its run's counts and its project's hours."""
+"""Updates row, run counts and project hours for an episode."""
 
 import time
 from collections.abc import Iterable
@@ -16,7 +16,7 @@ TOUCHED = f",{NO_CONTACT},"
 
 
 def add_usage(session: Session, project: str, busy_s: float) -> None:
-    """Adds worker time to what a project has used in the present hour."""
+    """Adds worker time to a project's usage in the current hour."""
     hour = int(time.time() // HOUR_S)
     row = session.get(UsageRow, (project, hour))
     if row is None:
@@ -26,7 +26,7 @@ def add_usage(session: Session, project: str, busy_s: float) -> None:
 
 
 def count(run: RunRow, row: EpisodeRow, sign: int) -> None:
-    """Adds an episode to its run's counts (+1), or takes it out (-1)."""
+    """Adds an episode to its run's counts (+1), or subtracts it (-1)."""
     run.episodes_done += sign
     run.rejected += sign * (row.outcome == Outcome.REJECTED)
     run.raw_collisions += sign * (TOUCHED in (row.violated or ""))
@@ -57,7 +57,7 @@ def fill(row: EpisodeRow, event: EpisodeDone) -> None:
 
 
 def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
-    """Writes an episode's record into its row, and the columns that are searched."""
+    """Writes an episode's record and the searched columns into its row."""
     row.phase = record.phase
     row.index = record.index
     row.outcome = record.outcome

@@ -44,7 +44,7 @@ def open_database(url: str) -> Engine:
 
 
 def connect(url: str) -> Engine:
-    """A database as it is, neither checked nor brought up to date; SQLite's file is made where there is none."""
+    """Connects without checks or migrations; makes a missing SQLite file."""
     try:
         kind = make_url(url).get_backend_name()
         if kind == "sqlite":
@@ -62,7 +62,7 @@ def connect(url: str) -> Engine:
 
 @contextmanager
 def connected(url: str, doing: str) -> Iterator[Engine]:
-    """The same for a while; what the driver raises meanwhile becomes a StorageError that says what was done."""
+    """Connects for the body; driver errors become a StorageError that names `doing`."""
     engine = connect(url)
     try:
         with storage_errors(doing):
@@ -79,7 +79,7 @@ def sqlite_file(url: str) -> Path | None:
 
 @contextmanager
 def held(engine: Engine) -> Iterator[None]:
-    """Keeps other servers from this database; SQLite's is guarded by the lock of the data folder."""
+    """Keeps other servers off this database; for SQLite the data folder's lock does."""
     if engine.dialect.name != "postgresql":
         yield
         return
@@ -95,7 +95,7 @@ def held(engine: Engine) -> Iterator[None]:
 
 @contextmanager
 def storage_errors(doing: str) -> Iterator[None]:
-    """Turns the driver's errors into StorageError; broken constraints and statements are bugs and pass through."""
+    """Turns driver errors into StorageError; broken constraints and statements pass as bugs."""
     try:
         yield
     except (IntegrityError, ProgrammingError):
@@ -105,7 +105,7 @@ def storage_errors(doing: str) -> Iterator[None]:
 
 
 def _keep_to_ourselves(file: Path | None) -> None:
-    """Make a SQLite database readable by its owner alone, a new one and an old one."""
+    """Makes a SQLite database readable by its owner alone."""
     if file is None:
         return
     create_private(file)
@@ -124,7 +124,7 @@ def _begin(connection: Connection) -> None:
 
 
 def _check(engine: Engine) -> None:
-    """Look at every page of a SQLite file; PostgreSQL looks after its own."""
+    """Checks every page of a SQLite file; PostgreSQL checks its own."""
     if engine.dialect.name != "sqlite":
         return
     with engine.connect() as connection:
@@ -137,7 +137,7 @@ def _check(engine: Engine) -> None:
 
 
 def present_step(engine: Engine) -> str | None:
-    """The step of `service.store.migrations` that the database is at; None for a new one."""
+    """Returns the migration step of the database; None for a new one."""
     with engine.connect() as connection:
         return MigrationContext.configure(connection).get_current_revision()
 
@@ -150,7 +150,7 @@ def newest_step() -> str:
 
 
 def step_forward(engine: Engine) -> None:
-    """Creates the tables of a new database, or takes all steps that are missing, in one transaction."""
+    """Creates the tables of a new database, or applies all missing steps in one transaction."""
     if present_step(engine) is None and not inspect(engine).has_table(ServerRow.__tablename__):
         _take(engine, _create)
     else:

@@ -1,4 +1,4 @@
-"""Rows by the ids that callers know, and pages of those that fit."""
+"""Finds rows by public ids, and pages of filtered rows."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass
@@ -70,7 +70,7 @@ def find_run(session: Session, campaign: CampaignRow, run_id: str) -> int:
 def episode_page(
     session: Session, query: Select[EpisodeRow], outcomes: Collection[Outcome], limit: int, after: int
 ) -> StoredPage[Episode]:
-    """The page of a query's episodes just after number `after`; no outcomes means all."""
+    """Returns the page of a query's episodes after number `after`; no outcomes means all."""
     # A query for each outcome: the index has the order of a page only within one.
     query = query.where(EpisodeRow.number > after).order_by(EpisodeRow.number).limit(limit + 1)
     queries = [query.where(EpisodeRow.outcome == outcome) for outcome in outcomes] or [query]
@@ -81,7 +81,7 @@ def episode_page(
 
 
 def find_failure(session: Session, campaign: CampaignRow, failure_id: str) -> EpisodeRow:
-    """The campaign's episode with this id in which a requirement that counts was violated."""
+    """Returns the campaign's failure with this id."""
     run_id, phase, index = _split(failure_id)
     query = (
         select(EpisodeRow)
@@ -104,7 +104,7 @@ def find_triage(session: Session, episode: EpisodeRow) -> TriageRow | None:
 
 
 def _split(failure_id: str) -> tuple[str, str, int]:
-    """Run, phase and index; an id of another shape yields a run that cannot exist."""
+    """Splits an id into run, phase and index; a malformed one yields an impossible run."""
     for phase in RECORDED.values():
         run_id, _, index = failure_id.rpartition(f"-{phase}-")  # the last: an i.i.d. run's own id has it too
         if "\0" not in run_id and index.isascii() and index.isdigit() and len(index) < 10:

@@ -1,4 +1,4 @@
-"""Reading the database. Nothing here writes: that is the manager's alone, in `service.store.writing`."""
+"""Reads the database; only the manager writes, in `service.store.writing`."""
 
 import time
 import zlib
@@ -81,7 +81,7 @@ class Store:
             return StoredPage(items=tuple(self._campaign(row) for row in rows[:limit]), last=last)
 
     def revision(self, campaign_id: str, project: str | None = None) -> str:
-        """A name for what a campaign, its runs and its episodes look like now; another one once they do not."""
+        """Returns the revision of a campaign, which changes with its runs and episodes."""
         known = self.known_revision(campaign_id, project)
         if known is not None:
             return known
@@ -90,23 +90,23 @@ class Store:
             return self._shown_revision(self.revisions.learn(row.id, row.project, row.revision))
 
     def known_revision(self, campaign_id: str, project: str | None = None) -> str | None:
-        """The same if the database need not be asked for it, else None."""
+        """Returns the revision if it is in memory, else None."""
         known = self.revisions.get(campaign_id)
         if known is None or project not in (None, known.project):
             return None
         return self._shown_revision(known.revision)
 
     def revision_of_all(self) -> str:
-        """A name for what all campaigns look like now; another one once any of them does not. Holds until a restart."""
+        """Returns the revision of all campaigns, valid until a restart."""
         return self._shown_revision(self.revisions.all)
 
     def events(self, campaign_id: str, *, limit: int, after: int = 0) -> StoredPage[Episode | StateChange]:
-        """Episodes of a campaign and changes of its state and its runs', in their one order, just after `after`."""
+        """Returns a campaign's episodes and state changes in event order, after `after`."""
         with self._reading() as session:
             return event_page(session, find_campaign(session, campaign_id), limit, after)
 
     def count_of_events(self, campaign_id: str) -> int:
-        """How many have happened so far, which is the newest one's sequence."""
+        """Returns the number of events so far, which is the newest one's sequence."""
         with self._reading() as session:
             return find_campaign(session, campaign_id).events
 
@@ -121,7 +121,7 @@ class Store:
         judged: Judged | None = None,
         project: str | None = None,
     ) -> StoredPage[Episode]:
-        """In order of arrival, from the episode just after number `after`; no outcomes means all."""
+        """Returns episodes in order of arrival, after number `after`; no outcomes means all."""
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
             if run_id is None:
@@ -132,7 +132,7 @@ class Store:
             return episode_page(session, query, outcomes, limit, after or 0)
 
     def plain_episodes(self, number: int, outcomes: Collection[Outcome] = ()) -> Iterator[PlainEpisode]:
-        """What searches did in the campaign with this number, in order of arrival; no outcomes means all episodes."""
+        """Yields the campaign's search episodes in order of arrival; no outcomes means all."""
         row = EpisodeRow
         query = select(row.number, row.run_number, row.phase, row.index, row.outcome, row.record)
         query = query.where(row.campaign_number == number, *Judged(iid=False).conditions()).order_by(row.number)
@@ -143,7 +143,7 @@ class Store:
                 yield PlainEpisode(*found[:-1], from_json(found.record))
 
     def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredFailure:
-        """The episode with this id in which a requirement that counts was violated."""
+        """Returns the failure with this id."""
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
             row = find_failure(session, campaign, failure_id)
@@ -169,7 +169,7 @@ class Store:
             return {row.episode_number: TriageState(row.state) for row in rows}
 
     def waiting(self) -> dict[str, int]:
-        """Number of the run that has waited longest, for each project that has runs in the queue."""
+        """Returns the number of the oldest queued run of each project."""
         query = (
             select(CampaignRow.project, func.min(RunRow.number).label("number"))
             .join(RunRow.campaign)
@@ -180,14 +180,14 @@ class Store:
             return {row.project: row.number for row in session.execute(query)}
 
     def campaign_of(self, number: int) -> StoredCampaign:
-        """The campaign of the run with this number, which there is, without its other runs: they may be thousands."""
+        """Returns the campaign of an existing run, without its other runs, which may be thousands."""
         with self._reading() as session:
             row = session.get_one(RunRow, number)
             campaign = row.campaign
             return StoredCampaign.from_row(campaign, self._shown_revision(campaign.revision), alone=row)
 
     def usage(self, project: str) -> Usage:
-        """What a project takes of the service now."""
+        """Returns a project's current usage."""
         queued = (
             select(func.count())
             .select_from(RunRow)
@@ -201,7 +201,7 @@ class Store:
             return Usage(queued_runs=session.scalar(queued) or 0, cpu_s=cpu_s)
 
     def ended_before(self, moment: float, limit: int) -> list[str]:
-        """Ids of campaigns that ended before a moment (seconds since the epoch), the oldest first."""
+        """Returns ids of campaigns that ended before a moment (epoch seconds), oldest first."""
         query = select(CampaignRow.id).where(CampaignRow.state.in_(FINAL), CampaignRow.finished_at < moment)
         with self._reading() as session:
             return list(session.scalars(query.order_by(CampaignRow.number).limit(limit)))

@@ -1,4 +1,4 @@
-"""The current revision of each campaign, in memory, so that a poll needs no database."""
+"""Keeps campaigns' revisions in memory, so that a poll needs no database."""
 
 import threading
 from typing import NamedTuple
@@ -28,7 +28,7 @@ class Revisions:
         return self._known.get(campaign_id)
 
     def learn(self, campaign_id: str, project: str, revision: int) -> int:
-        """Notes and returns the revision that was read, or a newer one that is known."""
+        """Stores and returns a revision, or the newer one that is known."""
         with self._lock:
             known = self._known.get(campaign_id)
             if known is None or known.revision < revision:

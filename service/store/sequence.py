@@ -1,7 +1,7 @@
-"""The one order of a campaign's events: its episodes, and the changes of its state and its runs'.
+"""Total order of a campaign's events: episodes and state changes.
 
-Both take the next number of their campaign in the transaction that writes them, which holds the campaign's row until it
-ends. So numbers become visible in their order and leave no gap: a reader of one has read all before it.
+Each takes the campaign's next number in the transaction that writes it and holds the campaign's row. So numbers become
+visible in order and without gaps: a reader of one has seen all before it.
 """
 
 from operator import itemgetter
@@ -16,7 +16,7 @@ from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RunRow
 
 
 def hold_campaigns(session: Session, runs: ColumnElement[bool]) -> list[CampaignRow]:
-    """Campaigns of these runs, to be read before anything else that is to be changed.
+    """Returns campaigns of these runs; read them before anything else that changes.
 
     PostgreSQL locks their rows until the transaction ends; SQLite has one writer anyway.
     """
@@ -26,7 +26,7 @@ def hold_campaigns(session: Session, runs: ColumnElement[bool]) -> list[Campaign
 
 
 def next_sequence(campaign: CampaignRow) -> int:
-    """The number of the event that is about to be written; the campaign must be held."""
+    """Returns the number of the next event; the campaign must be held."""
     campaign.events += 1
     return campaign.events
 

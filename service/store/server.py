@@ -1,4 +1,4 @@
-"""What the database remembers of the server itself: its secret, and that API keys were made."""
+"""Server state in the database: the cursor secret, and whether API keys were made."""
 
 import time
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ ONLY = 1  # number of the one row, which the migration wrote
 
 
 def cursor_secret(engine: Engine) -> bytes:
-    """What cursors are sealed with."""
+    """Returns the key that encrypts cursors."""
     with storage_errors("reading"), Session(engine) as session:
         return bytes.fromhex(session.get_one(ServerRow, ONLY).cursor_secret)
 

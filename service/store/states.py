@@ -1,4 +1,4 @@
-"""States of campaigns and runs, and what may follow what. Pure; stored and published elsewhere.
+"""States of campaigns and runs and their transitions. Pure.
 
 queued ──> running ──> succeeded | failed
    │ ^        │ └────> cancelling ──> cancelled (or the end it had already reached)
@@ -34,10 +34,10 @@ def advance(current: State, new: State) -> State:
 
 
 def campaign_state(current: State, runs: Collection[State]) -> State:
-    """State of a campaign whose runs, at least one, are in these states.
+    """Returns the state of a campaign whose runs (at least one) have these states.
 
-    A campaign ends with its last run. One failed run fails it, and one that was asked to cancel ends
-    cancelled unless every run had already succeeded.
+    A campaign ends with its last run. One failed run fails it; a cancelled campaign ends as cancelled unless every run
+    had already succeeded.
     """
     if current.final:
         return current

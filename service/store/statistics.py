@@ -1,4 +1,4 @@
-"""What the service has done and does now, for its monitoring: sums over runs, never over episodes."""
+"""Statistics for monitoring: sums over runs, never over episodes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class Statistics:
 
 
 def read_statistics(engine: Engine) -> Statistics:
-    """What the database says now."""
+    """Reads the current statistics from the database."""
     campaigns = select(CampaignRow.state, func.count().label("campaigns")).group_by(CampaignRow.state)
     sums = (func.sum(getattr(RunRow, name)).label(name) for name in TALLIED)
     kind = (RunRow.family, RunRow.method, RunRow.state)

@@ -1,4 +1,4 @@
-"""What the store hands out: frozen records of campaigns, runs and failures, each made of its row."""
+"""Frozen records of campaigns, runs and failures, made from rows."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class StoredRun(Run, RunResult):
 
     @classmethod
     def from_row(cls, row: RunRow, campaign_id: str) -> Self:
-        """The run; `row.campaign` is not asked for the id, since that costs as much as all else of it."""
+        """Makes a run; `row.campaign.id` would double the cost."""
         repetitions = _repetitions(row)
         verified = sum(repetition.verified for repetition in repetitions.values())
         read = {
@@ -45,7 +45,7 @@ class StoredRun(Run, RunResult):
 
     @property
     def iid(self) -> bool:
-        """Whether it belongs to an i.i.d. phase: what it counts is never added to what searches found."""
+        """Whether it belongs to an i.i.d. phase, whose counts are kept apart from searches."""
         return self.method in IID_METHODS
 
 
@@ -83,7 +83,7 @@ class StoredCampaign(CampaignHead):
 
     @property
     def headline(self) -> int | None:
-        """Headline failures of search and evaluation; what several runs found alike counts once."""
+        """Headline failures of search and evaluation; a kind found by several runs counts once."""
         phases = (phase for run in self.searches for phase in (run.metrics, run.evaluation) if phase is not None)
         return pooled_headline(phases)
 
@@ -95,7 +95,7 @@ class StoredCampaign(CampaignHead):
 
     @property
     def spec(self) -> CampaignSpec:
-        """What was posted, read on demand; OutdatedError if this version refuses it."""
+        """Posted spec, read on demand; OutdatedError if this version refuses it."""
         try:
             return _read_spec(self.spec_json)
         except ValidationError as error:
@@ -104,7 +104,7 @@ class StoredCampaign(CampaignHead):
             raise OutdatedError(f"an earlier version took {field}, which this one refuses: {first['msg']}") from error
 
     def run_spec(self, run: StoredRun) -> RunSpec:
-        """What a worker needs to know to execute one of the runs."""
+        """Returns the spec that a worker executes."""
         alone = {"families": (run.family,), "methods": (run.method,), "seeds": (run.seed,)}
         if run.iid:
             return next(spec for spec in self.spec.drawn() if spec.id == run.id)
@@ -112,7 +112,7 @@ class StoredCampaign(CampaignHead):
         return spec
 
     def paused(self, reason: str) -> "StoredCampaign":
-        """The same campaign, paused for a reason that could not be written down yet."""
+        """Returns the campaign as paused, for a reason that is not stored yet."""
         paused = {"state": State.PAUSED, "reason": reason}
         runs = (run.model_copy(update=paused) if run.state is State.RUNNING else run for run in self.runs)
         return self.model_copy(update=paused | {"runs": tuple(runs)})
@@ -141,7 +141,7 @@ _read_spec = lru_cache(maxsize=64)(CampaignSpec.model_validate_json)
 
 @dataclass(frozen=True, slots=True)
 class StoredFailure:
-    """An episode in which a requirement that counts was violated, with the file of its full time series."""
+    """Failure with the file of its full time series."""
 
     episode: Episode
     series: str | None  # name of the file
@@ -150,7 +150,7 @@ class StoredFailure:
 
 @dataclass(frozen=True, slots=True)
 class PlainEpisode:
-    """An episode of very many, whose record is not validated: that costs most of reading it."""
+    """Episode with an unvalidated record, since validation costs most of reading many."""
 
     number: int  # in the order of arrival, over all campaigns
     run_number: int
@@ -162,7 +162,7 @@ class PlainEpisode:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Usage:
-    """What a project takes of the service."""
+    """Usage of the service by a project."""
 
     queued_runs: int
     cpu_s: float  # worker time within the last 24 hours
@@ -173,7 +173,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StoredPage(Generic[T]):
-    """A part of a list; `last` is the number to continue after, None at the end."""
+    """Part of a list; `last` is the number to continue after, None at the end."""
 
     items: tuple[T, ...]
     last: int | None

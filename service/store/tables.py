@@ -1,8 +1,8 @@
-"""The database: campaigns, runs and their requirements, episodes, changes, triages, usage, the server's own.
+"""Tables: campaigns, runs and their requirements, episodes, changes, triages, usage, server.
 
-Records of the method are stored as the JSON that the worker sent; what is filtered or counted has a
-column of its own. Numbers are primary keys in order of arrival, so that a page continues where the
-last one ended however much was inserted meanwhile. Its history is in `service.store.migrations`.
+Records of the method are stored as the JSON that the worker sent; what is filtered or counted has a column of its own.
+Numbers are primary keys in order of arrival, so pages stay stable under insertion. `service.store.migrations` has the
+history.
 """
 
 from sqlalchemy import ForeignKey, Index, Text, text
@@ -124,7 +124,7 @@ class RequirementRow(Base):
 
 
 class EpisodeRow(Base):
-    """One episode of a run; a resumed run may report it again, which replaces it."""
+    """Episode of a run; a resumed run may report it again, which replaces it."""
 
     __tablename__ = "episodes"
     __table_args__ = (
@@ -179,7 +179,7 @@ class ChangeRow(Base):
 
 
 class TriageRow(Base):
-    """What people made of a failure."""
+    """Triage of a failure by a person."""
 
     __tablename__ = "triages"
     __table_args__ = (

@@ -23,7 +23,7 @@ from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, Requirement
 
 
 class Ledger:
-    """Each method is one transaction: it holds entirely or, with a StorageError, not at all."""
+    """Writes the database; each method is one transaction, or raises StorageError."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -32,7 +32,7 @@ class Ledger:
         self._repeated_s: dict[int, float] = {}  # time of runs that only repeated what was known
 
     def find(self, project: str, key: str, spec: CampaignSpec) -> StoredCampaign | None:
-        """The campaign that was created with this idempotency key; ConflictError if it differs."""
+        """Finds the campaign created with this idempotency key; ConflictError if it differs."""
         with storage_errors("reading"), Session(self._store.engine) as session:
             row = session.scalars(select(CampaignRow).filter_by(project=project, idempotency_key=key)).one_or_none()
             if row is None:
@@ -73,7 +73,7 @@ class Ledger:
             self._starting.add(number)
 
     def add_episodes(self, events: Sequence[tuple[int, EpisodeDone]]) -> set[int]:
-        """Store episodes, each with its run's number, or replace those of which a resumed run reports another outcome.
+        """Stores episodes with their run's number; replaces those that a resumed run reports differently.
 
         Returns:
           Numbers of the runs to which one was new.
@@ -149,7 +149,7 @@ class Ledger:
                     _settle(session, row.campaign)
 
     def resume(self) -> int:
-        """Queues or cancels runs without a worker, after a pause or a restart; returns how many were queued."""
+        """Queues or cancels runs without a worker; returns the number of queued ones."""
         with self._writing("resuming") as session:
             interrupted = RunRow.state.in_(RESUMED)
             hold_campaigns(session, interrupted)
@@ -160,7 +160,7 @@ class Ledger:
             return sum(row.state == State.QUEUED for row in rows)
 
     def cancel(self, campaign_id: str, project: str | None = None) -> list[int]:
-        """Cancels queued runs and marks running ones; returns the numbers of the runs to stop."""
+        """Cancels queued runs and marks running ones; returns the runs to stop."""
         with self._writing("cancelling a campaign") as session:
             campaign = find_campaign(session, campaign_id, project)
             session.refresh(campaign, with_for_update=True)  # held, as by `hold_campaigns`
@@ -227,7 +227,7 @@ class Ledger:
 
 
 def _refuse(session: Session, run: RunRow, flaky: Mapping[int, Collection[str]]) -> None:
-    """Takes violations that do not repeat, of these requirements by episode, out of the run's failures."""
+    """Removes violations that do not repeat, by episode and requirement, from the run's failures."""
     if not flaky:
         return
     failures = select(EpisodeRow).filter_by(run_number=run.number, outcome=Outcome.FAILURE)

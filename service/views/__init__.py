@@ -1,1 +1,1 @@
-"""What is shown of what is stored. Pure, but for the files of a run."""
+"""Response bodies made from stored records. Pure, except for reading files of a run."""

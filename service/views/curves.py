@@ -21,7 +21,7 @@ Counts = NDArray[np.int64]
 
 
 class RunCurves(Record):
-    """The search of one run: each list has an entry per point. Failures that were refused since do not count."""
+    """Search of one run: each list has an entry per point; later refused failures do not count."""
 
     run_id: str
     family: FamilyName
@@ -49,13 +49,13 @@ class RunCurves(Record):
 
 
 class Curves(Record):
-    """Curves of all runs of a campaign, in the order they are queued."""
+    """Curves of all runs of a campaign, in queue order."""
 
     runs: list[RunCurves]
 
 
 def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: int) -> Curves:
-    """Curves of all searches, with at most so many points each; episodes of a run come in their order."""
+    """Returns curves of all searches with at most `points` points; a run's episodes come in order."""
     searches = {run.number: _Search() for run in campaign.searches}
     for each in episodes:
         if each.phase == SEARCH:
@@ -65,7 +65,7 @@ def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: i
 
 @dataclass(slots=True)
 class _Search:
-    """What each episode of a run's search adds to its curves."""
+    """Running sums of a run's search."""
 
     rated: list[int] = field(default_factory=list)  # so far: episodes in which the ego did not fail to drive
     contacts: list[bool] = field(default_factory=list)  # valid ones, of these episodes alone
@@ -119,7 +119,7 @@ def _curves(run: StoredRun, search: _Search, points: int) -> RunCurves:
 
 
 def spread(count: int, points: int) -> Counts:
-    """At most so many of 1, 2, … count, evenly spread, the last included; none of none."""
+    """Returns at most `points` of 1, …, `count`, evenly spread, with the last."""
     if count == 0:
         return np.empty(0, dtype=np.int64)
     return np.unique(-(-count * np.arange(1, points + 1) // points))

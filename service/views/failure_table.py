@@ -84,7 +84,7 @@ class FamilyScenes(Record):
 
 
 class FailureTable(Record):
-    """Failures by columns: each list has an entry per failure, in the order of their arrival.
+    """Failures by columns: each list has an entry per failure, in order of arrival.
 
     An episode that violates several requirements is one failure; a contact names it, or else the first violation.
     Numbers are rounded to four decimals; the failure itself has all of them. Times count from the adversaries' release.
@@ -186,7 +186,7 @@ class Kinds:
 
 
 def violations_of(outcome: str, record: Plain) -> tuple[list[Plain], list[Plain]]:
-    """The violations of an episode, with and without contact: the valid ones, and all; a contact first."""
+    """Returns the valid violations of an episode, and all; a contact first."""
     contact = record["collision"]
     every = [*([] if contact is None else [contact]), *record.get("violations", [])]
     if outcome != Outcome.FAILURE:
@@ -212,7 +212,7 @@ def is_headline_candidate(violation: Plain) -> bool:
 
 
 def _judged(violation: Plain) -> Plain:
-    """What was judged of a violation, which a contact keeps apart."""
+    """Returns the verdicts of a violation; those of a contact are nested."""
     if "requirement" in violation:
         return violation
     return violation.get("judgement") or UNJUDGED
@@ -239,7 +239,7 @@ def _niche(violation: Plain) -> Niche:
 def failure_table(
     campaign: StoredCampaign, failures: Iterable[PlainEpisode], triages: Mapping[int, TriageState]
 ) -> FailureTable:
-    """The table of these failures of the campaign, in their order; one without a triage is new."""
+    """Returns the table of these failures in their order; one without a triage is new."""
     runs = {run.number: run for run in campaign.runs}
     found: defaultdict[tuple[int, str], Kinds] = defaultdict(Kinds)
     headline, niches = Kinds(), dict[Niche, int]()

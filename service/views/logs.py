@@ -12,7 +12,7 @@ _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u206
 
 
 def log_tail(log: Path, lines: int) -> str:
-    """The last lines of a log, at most so many, of those that are whole within `MOST_BYTES`.
+    """Returns the last lines of a log, at most `lines` and `MOST_BYTES`.
 
     They name no folders of this machine. U+FFFD replaces what is not UTF-8 and what would control a terminal.
     """
@@ -22,7 +22,7 @@ def log_tail(log: Path, lines: int) -> str:
 
 
 def _end(log: Path) -> bytes:
-    """The last bytes; without the rest of a line that began before, which may be half of a path."""
+    """Returns the last bytes without a partial first line, which may be half of a path."""
     try:
         with log.open("rb") as file:
             start = file.seek(max(0, file.seek(0, os.SEEK_END) - MOST_BYTES))

@@ -1,4 +1,4 @@
-"""A cache of what takes seconds to make: made on demand, one at a time, the newest kept."""
+"""Cache of content that takes seconds to make: made on demand, one at a time, the newest kept."""
 
 import threading
 from collections.abc import Callable, Hashable, Sequence
@@ -23,7 +23,7 @@ S = TypeVar("S", bound=Hashable)
 
 
 class OnDemandCache(Generic[S]):
-    """Makes content in threads of its own, which hold up no other request."""
+    """Makes content in its own threads, so that other requests do not wait."""
 
     def __init__(self, make: Callable[[S], bytes], what: str, kept: int = KEPT) -> None:
         """Makes nothing yet.

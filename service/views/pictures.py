@@ -1,4 +1,4 @@
-"""What is shown of one failure: pictures, the ground, and how its twin went."""
+"""Pictures, ground and twins of one failure."""
 
 import hashlib
 from dataclasses import asdict, dataclass, field, replace
@@ -47,7 +47,7 @@ class FailureOfARun:
 
 
 def recording_of(failure: FailureOfARun, settings: ServiceSettings) -> Recording:
-    """What is drawn of a failure; SeriesLost if its time series is lost."""
+    """Returns the recording to draw; SeriesLost if its time series is lost."""
     episode = failure.episode
     path, sha256 = series_file(failure.campaign.id, failure.stored, settings)
     arrays = load_arrays(path, sha256)
@@ -56,7 +56,7 @@ def recording_of(failure: FailureOfARun, settings: ServiceSettings) -> Recording
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """What is drawn."""
+    """Key of a picture: a failure, and optionally its twin."""
 
     failure: FailureOfARun
     twin: Twin | None = None
@@ -129,7 +129,7 @@ def roads_body(failure: FailureOfARun) -> Roads:
 
 
 def thumbnail_of(failure: FailureOfARun, settings: ServiceSettings) -> str:
-    """A failure as a small SVG; SeriesLost if its time series is lost."""
+    """Returns a failure as a small SVG; SeriesLost if its time series is lost."""
     place = failure.run.family, failure.episode.scene
     return thumbnail(recording_of(failure, settings), roads_of(*place), signal_heads(*place))
 

@@ -1,4 +1,4 @@
-"""Campaigns as they are answered, with how far they are. Pure."""
+"""Progress of a campaign. Pure."""
 
 from collections.abc import Sequence
 
@@ -28,7 +28,7 @@ def summary_body(campaign: StoredCampaign, workers: int) -> CampaignSummary:
 
 
 def progress(campaign: StoredCampaign, workers: int) -> Progress:
-    """Counts over all runs, present values of the runs at work, and the time left; `workers` as in `eta_s`."""
+    """Returns counts over all runs, current values of running ones, and the time left."""
     runs, searches = campaign.runs, campaign.searches
     present = _present(searches)
     sums = {name: sum(getattr(run, name) for run in runs) for name in OF_ALL}

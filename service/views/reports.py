@@ -1,4 +1,4 @@
-"""The report of a campaign: made of the folders of its finished runs, as `risk-sac evaluate` makes it."""
+"""Report of a campaign from the folders of its finished runs, as `risk-sac evaluate` makes it."""
 
 import hashlib
 import threading
@@ -38,7 +38,7 @@ class CampaignReport:
         return figure_names(self.comparison)
 
     def figure(self, name: str, format_: Format) -> bytes:
-        """One figure as a file, drawn once; NotFoundError if there is no such figure."""
+        """Returns one figure as a file, drawn once; NotFoundError if there is no such figure."""
         if name not in self.figures:
             message = f"campaign {self.campaign_id} has no figure {name!r}; GET its `figures` lists those there are"
             raise NotFoundError(message, field="name", got=name)
@@ -49,7 +49,7 @@ class CampaignReport:
 
 
 class Reports:
-    """Makes reports and keeps the newest, which a page asks for many times."""
+    """Makes reports and caches the newest."""
 
     def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
@@ -66,7 +66,7 @@ class Reports:
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:32]
 
     def report(self, campaign: StoredCampaign) -> CampaignReport:
-        """The report of a campaign as it stands; blocks for the seconds that the statistics take."""
+        """Returns the current report of a campaign; blocks for seconds while statistics run."""
         name = self.edition(campaign)
         with self._lock:
             if self._newest is None or self._newest[0] != name:

@@ -1,4 +1,4 @@
-"""Failures as they are answered, with the time series from the file that a worker wrote."""
+"""Response body of a failure, with the time series that a worker wrote."""
 
 import hashlib
 import io
@@ -23,7 +23,7 @@ _NAMED = {"kind": Kind, "role": Role, "signal": Signal}
 
 
 def failure_body(campaign_id: str, failure: StoredFailure, triage: Triage | None, settings: ServiceSettings) -> Failure:
-    """A failure with its time series, or with why there is none, and with its triage."""
+    """Returns a failure with its time series, or the reason for none, and its triage."""
     series, problem = None, None
     try:
         series = load_series(*series_file(campaign_id, failure, settings))
@@ -33,7 +33,7 @@ def failure_body(campaign_id: str, failure: StoredFailure, triage: Triage | None
 
 
 def series_file(campaign_id: str, failure: StoredFailure, settings: ServiceSettings) -> tuple[Path, str | None]:
-    """Path and SHA-256 of a failure's time series; SeriesLost if none was recorded."""
+    """Returns path and SHA-256 of a failure's time series; SeriesLost if none was recorded."""
     if failure.series is None:
         raise SeriesLost("no time series was recorded")
     folder = settings.run_folder(campaign_id, failure.episode.run_id) / FAILURES
@@ -46,7 +46,7 @@ def load_series(path: Path, sha256: str | None) -> Series:
 
 
 def series_body(arrays: Mapping[str, NDArray[Any]]) -> Series:
-    """The public arrays as a body; numbers that are not finite are None."""
+    """Returns the public arrays as a body; numbers that are not finite are None."""
     told = arrays.keys() & Series.model_fields.keys()
     return Series.model_validate({name: _plain(name, arrays[name]) for name in told})
 

@@ -1,6 +1,6 @@
-"""What helper processes make: studies of a failure, which need the simulator, and tables of all episodes.
+"""Studies of a failure and tables of episodes, which helper processes make.
 
-A table is made in a process of its own because the packages take 150 MB.
+A study needs the simulator; a table needs packages of 150 MB.
 """
 
 import contextlib
@@ -42,14 +42,14 @@ class Study:
 
 
 class Studies(OnDemandCache[Study]):
-    """Answers, one at a time; SeriesLost where the time series is lost, NotPlayable where nothing can be said."""
+    """Makes studies one at a time; raises SeriesLost or NotPlayable."""
 
     def __init__(self, settings: ServiceSettings, helper: Helper) -> None:
         super().__init__(self._answer, "failures")
         self._settings, self._helper = settings, helper
 
     async def get(self, subject: Study) -> bytes:
-        """The answer; what has no core or region is refused before anything waits or is played."""
+        """Returns the study; a failure without core or region is refused at once."""
         if subject.subject in ("core", "region"):
             episode = subject.failure.episode
             try:

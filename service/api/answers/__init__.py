@@ -1,1 +1,1 @@
-"""What answers are made of: problems, pages, media types and tags."""
+"""Parts of answers: problems, pages, media types and tags."""

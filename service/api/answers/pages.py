@@ -1,7 +1,7 @@
-"""Query parameters that lists share: how many items, from where, and which failures.
+"""Query parameters that lists share: limit, cursor and filters.
 
-A cursor holds the number of a row, which would tell how many rows all projects have. So it is encrypted and
-authenticated, deterministically: the same page has the same body.
+A cursor holds a row's number, which would reveal the number of rows of all projects. So it is encrypted with
+deterministic authentication: the same page has the same body.
 """
 
 import base64
@@ -27,19 +27,19 @@ Tier = Annotated[Literal["valid", "raw"], Query(description="`raw` adds episodes
 
 
 class Cursors:
-    """Makes cursors, and reads those that it made for the same list and the same reader."""
+    """Makes cursors, and reads its own for the same list and reader."""
 
     def __init__(self, secret: bytes) -> None:
         self._cipher = AESSIV(secret)
 
     def encode(self, number: int | None, listed: str, project: str | None) -> str | None:
-        """Makes the cursor for the number of the last item on a page, for one list and what its reader sees."""
+        """Makes the cursor after a page's last item, for one list and reader."""
         if number is None:
             return None
         return base64.urlsafe_b64encode(self._cipher.encrypt(number.to_bytes(8), _bound(listed, project))).decode()
 
     def decode(self, cursor: str | None, listed: str, project: str | None) -> int | None:
-        """Reads the number in a cursor; raises a 422 unless `encode` made it for this list and this reader."""
+        """Reads the number in a cursor; 422 unless `encode` made it for this list and reader."""
         if cursor is None:
             return None
         try:
@@ -50,5 +50,5 @@ class Cursors:
 
 
 def _bound(listed: str, project: str | None) -> list[bytes]:
-    """What a cursor holds for alone."""
+    """Returns the context that a cursor is bound to."""
     return [repr((listed, project)).encode()]

@@ -1,4 +1,4 @@
-"""The one place where errors become HTTP: problem details (RFC 9457) that name the field."""
+"""Maps errors to HTTP: problem details (RFC 9457) that name the field."""
 
 import logging
 import math
@@ -35,7 +35,7 @@ logger = logging.getLogger(__name__)
 
 
 class Reason(StrEnum):
-    """What went wrong, in one word that stays the same while messages change; see `detail` for the rest."""
+    """Stable name of an error; `detail` explains it."""
 
     MALFORMED_JSON = "malformed_json"
     UNKNOWN_HOST = "unknown_host"
@@ -81,7 +81,7 @@ class Problem(Record):
     """Empty when no field is to blame."""
 
 
-CLIENT_LEFT = 499  # in the middle of its request; nobody gets this answer, but the log and the metrics tell of it
+CLIENT_LEFT = 499  # during its request; no client gets this answer, but log and metrics have it
 _REASONS = {
     HTTPStatus.NOT_FOUND: Reason.UNKNOWN_ROUTE,
     HTTPStatus.METHOD_NOT_ALLOWED: Reason.METHOD_NOT_ALLOWED,
@@ -91,7 +91,7 @@ _REASONS = {
 
 
 class ProblemError(Exception):
-    """An error answer; `detail` says what was got, what was wanted and the remedy."""
+    """Error answer; `detail` has what was got, what was expected and the remedy."""
 
     def __init__(
         self,
@@ -109,7 +109,7 @@ class ProblemError(Exception):
 
 
 def invalid_field(field: str, got: object, wanted: str) -> ProblemError:
-    """The answer to a value that no schema could have told to be wrong."""
+    """Returns the answer to a wrong value that no schema detects."""
     detail = f"{field} is {shown(got)}; wanted {wanted}"
     return invalid(detail, FieldProblem(field=field, message=detail, got=shown(got), wanted=wanted))
 
@@ -137,7 +137,7 @@ def add_problem_handlers(app: FastAPI) -> None:
 
 
 def problem_response(path: str, problem: ProblemError) -> JSONResponse:
-    """A problem as a response, which is an ASGI application: middleware has no more than a path to say."""
+    """Returns a problem as a response for middleware, which knows the path alone."""
     body = Problem(
         type=f"urn:risk-sac:problem:{problem.status.name.lower().replace('_', '-')}",
         title=problem.status.phrase,
@@ -152,7 +152,7 @@ def problem_response(path: str, problem: ProblemError) -> JSONResponse:
 
 
 def route_path(scope: Scope) -> str:
-    """The path of a request without the one that a proxy in front has the service at."""
+    """Returns the path of a request without the proxy's prefix."""
     return str(scope["path"]).removeprefix(scope.get("root_path", ""))
 
 
@@ -162,7 +162,7 @@ async def _answer(request: Request, error: Exception) -> JSONResponse:
 
 
 def _problem(request: Request, error: Exception) -> ProblemError:
-    """What the client is told of an error."""
+    """Returns the problem of an error."""
     said = str(error)
     match error:
         case RequestValidationError():
@@ -204,7 +204,7 @@ def _invalid_request(error: RequestValidationError) -> ProblemError:
 
 
 def _of_validation(item: Mapping[str, Any], model: type[BaseModel] | None) -> FieldProblem:
-    """One error of a validation; `model`: what the body was to be, None where no body was validated."""
+    """Describes one validation error; `model` is the body's, None without a body."""
     part, *location = item["loc"]
     inside = location if part in ("body", "query", "path", "header") else item["loc"]
     message = str(item["msg"]).removeprefix("Value error, ")
@@ -247,9 +247,9 @@ async def _left(request: Request, error: Exception) -> Response:
 
 
 def _methods(request: Request, of_first: str) -> set[str]:
-    """Methods that some route answers at this path; Starlette names only those of the first.
+    """Returns the methods of all routes at this path; Starlette names those of the first.
 
-    A path without parameters is meant before one with them, as OpenAPI has it: `check` is no campaign's id.
+    A path without parameters takes precedence, as in OpenAPI: `check` is no campaign id.
     """
     paths: dict[str, dict[str, Any]] = request.app.openapi()["paths"]
     asked = route_path(request.scope)

@@ -1,4 +1,4 @@
-"""What a client wants to have, and whether it has it already."""
+"""Content negotiation and conditional requests."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ _QUALITY = re.compile(r"\s*q\s*=\s*([01](?:\.\d{0,3})?)\s*", re.IGNORECASE)
 
 
 def accepted(accept: str, offered: Sequence[str]) -> str:
-    """Returns the offered media type that an Accept header likes best, the first among equals; 406 for none."""
+    """Returns the best offered media type for an Accept header, the first of equals; else 406."""
     liked = dict(_range(part) for part in accept.split(",") if part.strip()) or {"*/*": 1.0}
 
     def quality(media_type: str) -> float:
@@ -40,7 +40,7 @@ def _range(part: str) -> tuple[str, float]:
 
 
 def entity_tag(*parts: str) -> str:
-    """A tag for a representation; weak, because it names what is shown and not the bytes of the picture."""
+    """Returns a weak tag, since it identifies the content and not the bytes."""
     return f'W/"{"-".join(parts)}"'
 
 
@@ -59,15 +59,15 @@ class NotModified(Exception):
 
 
 def cacheable(request: Request, *parts: str, others: Mapping[str, str] = {}) -> dict[str, str]:
-    """Headers of what may be kept, but is to be asked for again before it is used.
+    """Returns headers of an answer that clients may store but must revalidate.
 
     Args:
-      request: which the answer belongs to.
+      request: of the answer.
       parts: of the tag; they change whenever the representation does.
       others: headers beside those.
 
     Raises:
-      NotModified: the client has it already.
+      NotModified: the client's copy is current.
     """
     headers = {"Cache-Control": "no-cache", "ETag": entity_tag(*parts), **others}
     if has(request, headers["ETag"]):
@@ -76,10 +76,10 @@ def cacheable(request: Request, *parts: str, others: Mapping[str, str] = {}) -> 
 
 
 def link(request: Request, path: str) -> str:
-    """The path of a route, below the one that a proxy in front has the service at."""
+    """Returns the path of a route with the proxy's prefix."""
     return str(request.scope.get("root_path", "")) + path
 
 
 def as_json(record: BaseModel) -> Response:
-    """A record as it is answered; FastAPI's own way would write numbers that are not finite as strings."""
+    """Returns a record as JSON; FastAPI would write numbers that are not finite as strings."""
     return Response(wire(record), media_type="application/json")

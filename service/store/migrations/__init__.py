@@ -1,1 +1,1 @@
-"""How the database came to look as `service.store.tables` says; each version is a step from the one before."""
+"""Migrations to the schema of `service.store.tables`; each version is one step."""

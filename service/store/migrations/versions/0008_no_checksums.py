@@ -16,6 +16,6 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Adds it without values, which the version before takes for rows that are older than checksums."""
+    """Adds it without values, as in rows older than checksums."""
     for table in TABLES:
         op.add_column(table, sa.Column("checksum", sa.BigInteger))

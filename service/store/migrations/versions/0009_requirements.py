@@ -27,7 +27,7 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Drops them; StorageError if a failure has no contact, since the version before knows no such failure."""
+    """Drops them; StorageError if a failure has no contact, unknown to the version before."""
     without = "FROM episodes WHERE outcome IN ('failure', 'degenerate') AND violated NOT LIKE '%,no_contact,%'"
     campaigns = f"SELECT DISTINCT id FROM campaigns WHERE number IN (SELECT campaign_number {without})"
     if ids := list(op.get_bind().scalars(sa.text(campaigns))):

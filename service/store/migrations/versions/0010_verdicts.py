@@ -1,4 +1,4 @@
-"""Severity and fault of failures, headline failures of runs; other names of grades and of reference drivers."""
+"""Adds severity, fault and headline failures; renames grades and reference drivers."""
 
 import sqlalchemy as sa
 from alembic import op

@@ -1,4 +1,4 @@
-"""What drove the adversaries of an episode, and how long workers took to start; unknown of those from before."""
+"""Adds what drove an episode's adversaries and workers' start times; unknown for older ones."""
 
 import sqlalchemy as sa
 from alembic import op
