@@ -1,4 +1,4 @@
-"""`python -m service.demo`: starts the service, runs a campaign over REST and shows what it found."""
+"""`python -m service.demo`: starts the service, searches over REST for a planted defect, and shows what it found."""
 
 import argparse
 import contextlib
@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from risk_sac.cli.campaigns.gate import Bounds
@@ -18,14 +18,17 @@ from risk_sac.cli.campaigns.output import driven_by_table, results_table
 from risk_sac.cli.campaigns.watch import shown
 from risk_sac.cli.console import headline
 from risk_sac.client import Campaign, Client, ClientError, Episode, Results, Unreachable
+from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.records import State
 from risk_sac.run_folder.results import FAILURES, series_name
+from risk_sac.run_folder.series import read_series
 from risk_sac.terminal import console, run_command
 from service.settings import ServiceSettings
 
 START_S = 60.0
 STOP_S = 60.0
 AWAY_S = 10.0  # the service is not restarted
+DEFECT = "tailgates"  # within the demo's budget archive search mostly finds it, and random search mostly does not
 
 
 class DemoError(Exception):
@@ -37,6 +40,8 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         with _service(options.data_dir) as client:
+            planted = f"planted defect: {options.defect}: {DEFECTS[options.defect].sentence}"
+            console.print(planted, soft_wrap=True, markup=False)
             with shown() as show:
                 campaign = client.wait(client.submit(_spec(options)).id, show, away_s=AWAY_S)
             failures = list(client.failures(campaign.id))
@@ -48,8 +53,9 @@ def main(arguments: list[str] | None = None) -> int:
                 console.print(drove)
             console.print(f"results: {options.out}")
             console.print(f"recorded failures: {options.data_dir}/campaigns/{campaign.id}", soft_wrap=True)
+            first = first_detections(campaign, failures, options.data_dir)
             if failures:
-                command = draw_command(campaign, failures, options.data_dir)
+                command = draw_command(campaign, list(filter(None, first.values())) or failures, options.data_dir)
                 console.print(f"draw one: {command}", soft_wrap=True, markup=False)
             page = f"page/#/campaigns/{campaign.id}"
             if not options.keep:
@@ -57,6 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
                 place = f"http://127.0.0.1:8000/{page}"
                 console.print(f"look at all: {serve}, then {place}", soft_wrap=True, markup=False)
             status = conclude(campaign)
+            console.print(in_words(options.defect, campaign, first), soft_wrap=True, markup=False)
             if options.keep:
                 console.print(f"look at all: {client.url}/{page} (Ctrl+C ends it)", soft_wrap=True, markup=False)
                 with contextlib.suppress(KeyboardInterrupt):
@@ -69,7 +76,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m service.demo", description=__doc__)
-    parser.add_argument("--family", default="low", help="scenario family")
+    parser.add_argument("--defect", default=DEFECT, choices=DEFECTS, metavar="NAME", help="that the ego has")
+    parser.add_argument("--family", help="scenario family (default: the first in which the defect matters)")
     parser.add_argument(
         "--methods", nargs="+", default=["risk-sac-diverse", "random"], help="search methods, side by side"
     )
@@ -87,11 +95,13 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _spec(options: argparse.Namespace) -> dict[str, object]:
+    defect = DEFECTS[options.defect]
     return {
-        "label": "demo",
-        "families": [options.family],
+        "label": f"demo: {options.defect}",
+        "families": [options.family or defect.families[0]],
         "methods": options.methods,
         "seeds": options.seeds,
+        "ego": ({} if defect.base == "default" else {"driver": defect.base}) | {"defects": [defect.name]},
         "budget": {"episodes": options.episodes},
     }
 
@@ -147,6 +157,33 @@ def _write(out: Path, campaign: Campaign, results: Results, failures: Sequence[E
     }
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(found, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def first_detections(campaign: Campaign, failures: Sequence[Episode], data_dir: Path) -> Mapping[str, Episode | None]:
+    """Returns of each search, by id, the first failure that detects the defect; see `detected`."""
+    from risk_sac.failures.detected import detected  # here, because loading the simulator takes seconds
+
+    found: dict[str, Episode | None] = {}
+    for spec in campaign.spec.searches():
+        folder = ServiceSettings(data_dir=data_dir).run_folder(campaign.id, spec.id) / FAILURES
+        of_run = sorted((each for each in failures if each.run_id == spec.id), key=lambda each: each.index)
+        found[spec.id] = next(
+            (each for each in of_run if detected(spec, each, read_series(folder / series_name(each.index)))), None
+        )
+    return found
+
+
+def in_words(defect: str, campaign: Campaign, first: Mapping[str, Episode | None]) -> str:
+    """Says after how many episodes each search has found the defect."""
+    budget = campaign.spec.budget.episodes
+    several = len(campaign.spec.seeds) > 1
+    parts = []
+    for spec in campaign.spec.searches():
+        failure = first[spec.id]
+        name = f"{spec.method}, seed {spec.seed}" if several else spec.method
+        after = f"not within its {budget} episodes" if failure is None else f"after {failure.index + 1} episodes"
+        parts.append(f"{after} by {name}")
+    return f"the defect `{defect}` was found {'; '.join(parts)}"
 
 
 def _series(campaign_id: str, failure: Episode) -> str:

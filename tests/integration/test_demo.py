@@ -1,11 +1,13 @@
 import json
+import re
 import shlex
 from pathlib import Path
 
 from risk_sac import cli
 from risk_sac.client import Campaign, Episode, Run
+from risk_sac.config import Budget, CampaignSpec
 from risk_sac.records import Grade
-from service.demo import conclude, draw_command, main
+from service.demo import conclude, draw_command, in_words, main
 from tests.builders import collision, episode_record, judgement
 from tests.unit.client.scripted_server import PROGRESS
 from tests.unit.client.scripted_server import campaign as campaign_json
@@ -23,18 +25,21 @@ def test_a_demo_that_cannot_be_posted_says_so_and_leaves_no_service(tmp_path, ca
     assert "Finished server process" in (tmp_path / "data" / "service.log").read_text()
 
 
-def test_the_command_it_ends_with_draws_a_failure(tmp_path, capsys, monkeypatch):
+def test_it_ends_with_the_defect_that_was_found_and_a_command_that_draws_the_failure(tmp_path, capsys, monkeypatch):
     data_dir = tmp_path / "my data"
-    arguments = ["--family", "low", "--methods", "bo-only", "--episodes", "40", "--seeds", "78"]
+    arguments = ["--methods", "archive", "--episodes", "5", "--seeds", "523"]
     assert main([*arguments, "--out", str(tmp_path / "demo.json"), "--data-dir", str(data_dir)]) == 0
     found = json.loads((tmp_path / "demo.json").read_text())
     assert all((data_dir / failure["series"]).is_file() for failure in found["failures"])
     printed = capsys.readouterr().out
-    *_, drove = (line for line in printed.splitlines() if line.split()[:2] == ["low", "bo-only"])
-    assert drove.split()[::2] == ["low", "0", "0", "40", "0"]  # the headline failures of each in brackets
+    *_, drove = (line for line in printed.splitlines() if line.split()[:2] == ["low", "archive"])
+    assert sum(map(int, drove.split()[2::2])) == 5  # the headline failures of each in brackets
+    assert "planted defect: tailgates: Follows with a headway of 0.3 s, and brakes for an emergency only." in printed
+    last = re.fullmatch(r"the defect `tailgates` was found after ([1-5]) episodes by archive", printed.splitlines()[-1])
     (line,) = (line for line in printed.splitlines() if line.startswith("draw one: "))
     program, *command = shlex.split(line.removeprefix("draw one: "))
     assert Path(program).is_file()
+    assert command[2].endswith(f"-train-{int(last[1]) - 1}")
     monkeypatch.chdir(tmp_path)
     assert cli.main(command) == 0
     assert (tmp_path / "failure.png").read_bytes().startswith(b"\x89PNG")
@@ -55,3 +60,14 @@ def test_it_offers_to_draw_a_preventable_failure_where_there_is_one():
     failures = [failure(3, None), failure(5, Grade.FULL_BRAKING), failure(8, Grade.PREVENTABLE)]
     assert draw_command(searched, failures, Path()).endswith(" r-train-8 --out failure.png")
     assert draw_command(searched, failures[:2], Path()).endswith(" r-train-3 --out failure.png")
+
+
+def test_it_says_which_search_needed_how_many_episodes():
+    spec = CampaignSpec(families=("low",), methods=("archive", "random"), budget=Budget(episodes=200))
+    found = Episode.model_validate(
+        episode_record(30).model_dump() | {"id": "low-archive-0-train-30", "run_id": "low-archive-0", "wall_s": 1.0}
+    )
+    searched = campaign().model_copy(update={"spec": spec})
+    assert in_words("latency", searched, {"low-archive-0": found, "low-random-0": None}) == (
+        "the defect `latency` was found after 31 episodes by archive; not within its 200 episodes by random"
+    )

@@ -50,6 +50,12 @@ def test_the_numbers_on_the_screen_are_the_services(
     check_axe(page)
 
 
+def test_it_says_what_finding_nothing_is_worth(page_at: Callable[..., Page], service: Service, campaign: str) -> None:
+    (archive,) = service.get(campaign, "/power")["methods"]
+    shown = page_at(f"campaigns/{campaign}").get_by_role("region", name="What finding nothing is worth")
+    expect(shown).to_contain_text(f"archive: {archive['sentences'][0]}")
+
+
 def test_the_pointer_reads_the_curves_of_the_service(
     page_at: Callable[..., Page], service: Service, campaign: str
 ) -> None:

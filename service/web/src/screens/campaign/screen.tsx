@@ -14,6 +14,7 @@ import { useLive } from "./live";
 import { Newest } from "./newest";
 import { Runs } from "./runs";
 import { Scenes } from "./scenes";
+import { Worth } from "./worth";
 import "./campaign.css";
 
 export function CampaignScreen({ id }: { id: string }) {
@@ -74,6 +75,7 @@ export function CampaignScreen({ id }: { id: string }) {
       )}
       {campaign.progress.episodes_done > 0 && <Scenes campaign={campaign} />}
       <Runs campaign={campaign} hidden={hidden} hide={hide} />
+      <Worth campaign={campaign} />
     </div>
   );
 }

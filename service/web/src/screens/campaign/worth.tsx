@@ -1,0 +1,25 @@
+/** How many known defects the budget of a campaign detects: what it is worth that a search finds nothing. */
+
+import { useAsked } from "../../api/asked";
+import { ended } from "../../api/ended";
+import type { Body } from "../../api/types";
+
+const ASK_MS = 30_000; // steps are estimated by the episodes so far
+
+export function Worth({ campaign }: { campaign: Body<"Campaign"> }) {
+  const path = `v1/campaigns/${encodeURIComponent(campaign.id)}/power`;
+  const { value } = useAsked<Body<"Power">>(path, () => (ended(campaign) ? null : ASK_MS));
+  if (!value) return null;
+  return (
+    <section class="card" aria-labelledby="worth-title">
+      <h2 id="worth-title" title={value.note}>
+        What finding nothing is worth
+      </h2>
+      {value.methods.map(({ method, sentences }) => (
+        <p key={method} title={sentences.slice(1).join(" ")}>
+          <b>{method}</b>: {sentences[0]}
+        </p>
+      ))}
+    </section>
+  );
+}
