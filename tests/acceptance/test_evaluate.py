@@ -103,7 +103,7 @@ def test_folder_of_another_comparison_is_refused_and_kept(
     assert cli.main(["evaluate", *FLAGS, "--seeds", "3", "--episodes", "7"]) == 2
     complaint = capsys.readouterr().err
     got = f"got {whole / 'out'}, which holds a comparison with another seeds, budget"
-    assert complaint.startswith(f"out: {got}; wanted an empty")
+    assert complaint.startswith(f"--out: {got}; wanted an empty")
     assert (whole / "out" / "spec.yaml").read_bytes() == before
 
 
@@ -206,9 +206,9 @@ def test_two_comparisons_do_not_share_a_folder(
 @pytest.mark.parametrize(
     ("flags", "complaint"),
     [
-        (["--seeds", "0"], "seeds: got 0; wanted 1 to 100 seeds"),
-        (["--seeds", "1", "--first-seed", "-1"], "seeds[0]: "),
-        (["--jobs", "0"], "jobs: got 0; wanted at least one process"),
+        (["--seeds", "0"], "--seeds: got 0; wanted 1 to 100 seeds"),
+        (["--seeds", "1", "--first-seed", "-1"], "--seeds: "),
+        (["--jobs", "0"], "--jobs: got 0; wanted at least one process"),
     ],
 )
 def test_wrong_settings_are_one_line_and_leave_no_folder(

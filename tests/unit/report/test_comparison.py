@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.metrics import bootstrap_interval, wilson_interval
+from risk_sac.metrics import wilson_interval
 from risk_sac.report import compare
 from risk_sac.report.comparison import declared
 from risk_sac.report.paired import holm
@@ -34,7 +34,7 @@ def test_a_cell_is_the_mean_over_seeds_and_sums_over_seeds(comparison):
     found = cell(comparison, "risk-sac")
     ecr = found.estimates["ecr"]
     assert (ecr.mean, ecr.runs) == (0.5, 2)  # 3/4 and 1/4
-    assert (ecr.low, ecr.high) == bootstrap_interval([0.75, 0.25], 0) == (0.25, 0.75)
+    assert (ecr.low, ecr.high) == wilson_interval(4, 8)  # wider than the bootstrap, 0.25 to 0.75
     assert found.estimates["es"].mean == pytest.approx(4 * (1 - 50 / HORIZON) / 8)
     assert found.estimates["rho_c"].mean == pytest.approx(0.2)
     assert (found.episodes, found.failures, found.environment_steps) == (8, 4, 350)
@@ -49,7 +49,7 @@ def test_the_funnel_and_pcr_are_those_of_all_seeds(comparison):
     assert (found.raw_collisions, found.failures) == (4, 4)
     assert (found.distinct_failures, found.preventable, found.distinct_preventable) == (3, 3, 2)  # F counts in neither
     pcr = found.estimates["pcr"]
-    assert (pcr.mean, pcr.low, pcr.high) == (0.375, 0.25, 0.5)  # 2/4 and 1/4
+    assert (pcr.mean, pcr.low, pcr.high) == (0.375, *wilson_interval(3, 8))  # 2/4 and 1/4
     assert (found.unresponsive, found.unresponsive_share) == (1, 1 / 4)
     assert cell(comparison, "no-adversary").unresponsive_share is None
 

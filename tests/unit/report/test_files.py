@@ -47,7 +47,7 @@ def test_page_has_command_digest_tables_and_the_paper(comparison, spec):
     assert "```\nrisk-sac evaluate --out d\n```" in page
     assert spec.digest in page
     _, _, first, second, *_ = section(page, "## low, search")
-    assert first.startswith("| risk-sac | 2 | 0.500 [0.250, 0.750] | 0.375 [0.250, 0.500] |")
+    assert first.startswith("| risk-sac | 2 | 0.500 [0.215, 0.785] | 0.375 [0.137, 0.694] |")
     preventable, kinds = "5.833 [5.000, 6.667]", "1.000 [1.000, 1.000]"
     assert f"| 0.167 (1 of 2 seeds) | {preventable} | {kinds} | 117 | 40.0 | 0.0 % | 0.0 % | 12.5 % |" in first
     assert second.startswith("| sac | 2 | 0.125")
