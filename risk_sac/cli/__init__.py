@@ -14,6 +14,7 @@ from risk_sac.cli import (
     egos,
     export,
     places,
+    pretrain,
     regress,
     replay,
     report,
@@ -90,6 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"risk-sac {__version__}")
     parser.set_defaults(on_error=FAILED)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    for module in (run, places, egos, show, replay, understand, export, regress, report, benchmark, serve, campaigns):
+    first = (run, places, egos, show, replay, understand, export, regress)
+    for module in (*first, report, benchmark, pretrain, serve, campaigns):
         module.add(commands)
     return parser

@@ -97,6 +97,13 @@ class Iid(Settings):
     """Of scenes, actions and SUMO; no stream of a search is the same, whatever its seed."""
 
 
+PriorName = Literal["shipped", "none"]
+
+
+def _shipped(prior: PriorName) -> bool:
+    return prior == "shipped"
+
+
 class RunSpec(Settings):
     """One run: the unit of scheduling, checkpoint and retry."""
 
@@ -108,6 +115,7 @@ class RunSpec(Settings):
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     learner: LearnerConfig = LearnerConfig()
+    prior: Annotated[PriorName, Field(exclude_if=_shipped)] = "shipped"
 
     @property
     def id(self) -> str:
@@ -145,6 +153,8 @@ class CampaignSpec(Settings):
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     learner: LearnerConfig = LearnerConfig()
+    prior: Annotated[PriorName, Field(exclude_if=_shipped)] = "shipped"
+    """What methods with a prior start from: the shipped one, or none."""
     iid: Annotated[Iid | None, Field(exclude_if=lambda iid: iid is None)] = None  # else old digests would change
     """Null: none, and nothing is said of how often the ego fails."""
 
@@ -199,4 +209,4 @@ class CampaignSpec(Settings):
         )
 
     def _shared(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in ("ego", "odd", "requirements", "learner")}
+        return {name: getattr(self, name) for name in ("ego", "odd", "requirements", "learner", "prior")}

@@ -16,6 +16,7 @@ MethodName = Literal[
     "ddpg-lag",
     "ddpg",
     "archive",
+    "archive-replay",
     "bo-only",
     "random",
     "no-adversary",
@@ -42,6 +43,8 @@ class Method(Settings):
     independently of the other, uniformly over the ODD."""
     takes_turns: bool = False
     """Whether a learner's warm start goes on beside it: scripts and policy act in turn, by what they yield."""
+    prior: Literal["none", "library", "all"] = "none"
+    """What its scripts start from: nothing, the shipped library of scripts, or that and the shipped script model."""
     needs: str = ""
     """A package that is not installed with this one, as it is imported."""
     summary: str
@@ -74,7 +77,8 @@ METHODS: dict[MethodName, Method] = {
         replay="rper",
         scenes="archive",
         takes_turns=True,
-        summary="RISK-SAC and archive search in one loop: each learns from what the other finds.",
+        prior="all",
+        summary="RISK-SAC and archive search in one loop, from the shipped script model and library on.",
     ),
     "risk-sac-only-rper": Method(
         agent="sac", lagrangian=True, replay="rper", scenes="botorch", summary="Ablation: no reward shaping."
@@ -96,6 +100,12 @@ METHODS: dict[MethodName, Method] = {
         agent="scripts",
         scenes="archive",
         summary="Search without learning: scenes and adversaries' scripts, bred from those that made the ego fail.",
+    ),
+    "archive-replay": Method(
+        agent="scripts",
+        scenes="archive",
+        prior="library",
+        summary="Control: archive search that starts from the shipped library; nothing that was learnt proposes.",
     ),
     "bo-only": Method(
         agent="scripted", scenes="botorch", summary="Control: BoTorch scenes, and adversaries that follow one script."

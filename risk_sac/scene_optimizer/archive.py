@@ -152,6 +152,7 @@ class ArchiveOptimizer(SceneOptimizer):
     """Breeds points from elites; scores them so that every method's records carry f_e."""
 
     kind = "archive"
+    initial = INITIAL  # points that are drawn at random at first
 
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:
         super().__init__(dimension, config, seed)
@@ -165,7 +166,7 @@ class ArchiveOptimizer(SceneOptimizer):
         self._asked += 1
         pool = self._elites.pool()
         random_share = max(RANDOM_SHARE, 1.0 / (2 + self._elites.failures))
-        if self._asked <= INITIAL or not pool or self._random.random() < random_share:
+        if self._asked <= self.initial or not pool or self._random.random() < random_share:
             self._parent, self.driven_by = None, DrivenBy.RANDOM
             return self._random.random(self._dimension)
         self._parent, self.driven_by = self._elites.draw(pool, self._random), DrivenBy.SCRIPT

@@ -13,6 +13,7 @@ _SAC, _DDPG, _SCRIPTED = 9.0, 8.5, 0.7
 EPISODE_COST: Mapping[str, float] = {
     "risk-sac-diverse": _SCRIPTED,  # its policy rarely gets a turn within 250 episodes
     "archive": _SCRIPTED,
+    "archive-replay": _SCRIPTED,
     "random": 1.0,
     "risk-sac": _SAC,
     "risk-sac-only-rper": _SAC,

@@ -7,9 +7,10 @@ import pytest
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunMethod, RunSpec, WarmStartConfig
+from risk_sac.errors import ConfigError
 from risk_sac.problem import Problem
 from risk_sac.records import DrivenBy, EpisodeRecord, Grade, Outcome
-from risk_sac.scene_optimizer import Encounter
+from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
 from risk_sac.searchers import GUIDE, OWN, Searchers, Turns
 from risk_sac.train import train
 from tests.builders import collision, episode_record, judgement
@@ -127,7 +128,7 @@ def test_the_policy_drives_in_the_scenes_of_its_own_archive_and_scripts_in_the_g
         drove.setdefault(type(searcher.actor), set()).add(subject.driven_by(learning=True))
         subject.tell(point, 0.0, Encounter(collision=struck))
         subject.add(episode_record(index, Outcome.FAILURE, collision=struck))
-    assert drove == {ScriptFollower: {DrivenBy.RANDOM, DrivenBy.SCRIPT}, Learner: {DrivenBy.POLICY}}
+    assert drove == {ScriptFollower: {DrivenBy.MODEL, DrivenBy.RANDOM, DrivenBy.SCRIPT}, Learner: {DrivenBy.POLICY}}
 
 
 def test_the_frozen_policy_is_on_its_own() -> None:
@@ -148,3 +149,12 @@ def test_a_search_ends_when_its_processor_time_is_spent_and_is_then_evaluated(tm
 def test_processor_time_does_not_cut_off_the_least_episodes(tmp_path: Path) -> None:
     budget = Budget(episodes=50, least_episodes=6, cpu_s=0.1)  # which the third episode at the latest has spent
     assert len(played(tmp_path, spec("random", budget))) == 6
+
+
+def test_without_a_prior_scripts_are_bred_and_the_control_is_refused() -> None:
+    cold = spec("risk-sac-diverse", Budget(episodes=100)).model_copy(update={"prior": "none"})
+    subject = Searchers(cold, Problem.from_spec(cold), observation_size=20, action_size=4)
+    assert type(subject.next(learning=True).sampler) is ArchiveOptimizer
+    control = cold.model_copy(update={"method": "archive-replay"})
+    with pytest.raises(ConfigError, match="prior is none, and archive-replay at low"):
+        Searchers(control, Problem.from_spec(control), observation_size=20, action_size=4)

@@ -1,0 +1,28 @@
+"""The egos that the prior is trained on. Planners and the catalogue's test set are not among them.
+
+Choice: weak ones are among them, since they give the first failures, and what is learnt on them carries over.
+"""
+
+from risk_sac.config import EgoConfig
+from risk_sac.egos.defects.catalogue import DEFECTS
+
+SOUND: dict[str, EgoConfig] = {
+    "default": EgoConfig(),
+    "slow": EgoConfig(reaction_time_s=1.0),
+    "fast": EgoConfig(reaction_time_s=0.1),
+    "careful": EgoConfig(profile="careful"),
+    "defensive": EgoConfig(profile="defensive"),
+    "idm-aeb": EgoConfig(driver="idm-aeb"),
+    "r157": EgoConfig(driver="r157"),
+    "rss": EgoConfig(driver="rss"),
+}
+
+
+def training_egos(family: str) -> dict[str, EgoConfig]:
+    """Returns the egos of a shipped family by name: the sound ones, and those with a defect of the training part."""
+    faulty = {
+        name: EgoConfig(driver="idm-aeb", defects=(name,))
+        for name, defect in DEFECTS.items()
+        if not defect.test_set and defect.kind != "sumo" and family in defect.families
+    }
+    return SOUND | faulty

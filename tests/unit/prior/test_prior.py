@@ -1,0 +1,146 @@
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from risk_sac.config import Interval, SceneOptimizerConfig
+from risk_sac.errors import ConfigError
+from risk_sac.prior.sampler import Arm, PriorOptimizer, ReplayOptimizer
+from risk_sac.prior.shipped import (
+    DATA,
+    MOST_BYTES,
+    Prior,
+    Translation,
+    inputs_of,
+    read_prior,
+    shipped_prior,
+    write_prior,
+)
+from risk_sac.records import DrivenBy
+from risk_sac.scenario.families import FAMILIES
+
+FAMILY = "low"
+
+
+def shipped() -> Prior:
+    prior = shipped_prior(FAMILY)
+    assert prior is not None
+    return prior
+
+
+def optimizer(kind: type[PriorOptimizer] = PriorOptimizer, seed: int = 1) -> PriorOptimizer:
+    space = FAMILIES[FAMILY].space
+    return kind(inputs_of(FAMILY), SceneOptimizerConfig(), seed, shipped(), Translation(space, space))
+
+
+def test_a_prior_is_shipped_for_each_family_within_three_megabytes() -> None:
+    assert {path.stem for path in DATA.glob("*.npz")} == set(FAMILIES)
+    assert sum(path.stat().st_size for path in DATA.glob("*.npz")) <= MOST_BYTES
+    for family in FAMILIES:
+        prior = shipped_prior(family)
+        assert prior is not None
+        assert prior.library.shape == (len(prior.library_kinds), inputs_of(family))
+        assert len(prior.library) <= 300
+
+
+def test_the_test_set_and_planners_are_not_among_the_training_egos() -> None:
+    from risk_sac.egos.defects.catalogue import DEFECTS
+
+    for family in FAMILIES:
+        prior = shipped_prior(family)
+        assert prior is not None
+        egos = set(prior.model.egos)
+        assert not egos & {name for name, defect in DEFECTS.items() if defect.test_set}
+        assert not egos & {"fop", "fiss", "fiss-plus"}
+
+
+def test_a_prior_is_read_as_it_was_written(tmp_path: Path) -> None:
+    write_prior(tmp_path / "low.npz", shipped())
+    again = read_prior(tmp_path / "low.npz")
+    points = shipped().library[:20]
+    np.testing.assert_array_equal(
+        again.model.predict(points, again.model.unknown()).fails,
+        shipped().model.predict(points, shipped().model.unknown()).fails,
+    )
+
+
+def test_damaged_oversized_and_pickled_files_are_refused_with_one_line(tmp_path: Path) -> None:
+    whole = (DATA / "low.npz").read_bytes()
+    pickled = io.BytesIO()
+    np.savez(pickled, meta=np.array([{"family": "low"}], dtype=object))
+    for name, content in {
+        "damaged": whole[: len(whole) // 2],
+        "empty": b"",
+        "pickled": pickled.getvalue(),
+        "oversized": b"0" * (MOST_BYTES + 1),
+    }.items():
+        path = tmp_path / f"{name}.npz"
+        path.write_bytes(content)
+        with pytest.raises(ConfigError, match=f"{name}.npz") as refused:
+            read_prior(path)
+        assert "\n" not in str(refused.value)
+
+
+def test_a_prior_of_another_layout_is_refused(tmp_path: Path) -> None:
+    prior = shipped()
+    other = Prior("dense", prior.model, prior.library, prior.library_kinds, {})
+    write_prior(tmp_path / "other.npz", other)
+    with pytest.raises(ConfigError, match=r"other\.npz: points of 33"):
+        read_prior(tmp_path / "other.npz")
+
+
+def test_points_of_a_narrower_problem_keep_their_values() -> None:
+    space = FAMILIES[FAMILY].space
+    first = space.parameters[0]
+    middle = (first.low + first.high) / 2
+    narrow = space.narrow({first.name: Interval(low=middle, high=first.high)})
+    translation = Translation(narrow, space)
+    point = np.full((1, inputs_of(FAMILY)), 0.5)
+    known = translation.known(point)
+    assert known[0, 0] == pytest.approx(0.75)
+    np.testing.assert_allclose(translation.own(known), point)
+
+
+def test_a_belief_moves_to_egos_that_would_have_failed_too() -> None:
+    model = shipped().model
+    point = shipped().library[0]
+    each = model.predict(np.repeat(point[None], len(model.egos), 0), np.eye(len(model.egos))).fails
+    failed = model.believe(model.unknown(), point, failed=True)
+    safe = model.believe(model.unknown(), point, failed=False)
+    assert failed.sum() == pytest.approx(1.0)
+    assert failed[each.argmax()] > 1.0 / len(model.egos) > failed[each.argmin()]
+    assert safe[each.argmin()] > 1.0 / len(model.egos) > safe[each.argmax()]
+
+
+def test_it_proposes_from_all_its_arms_points_of_the_cube() -> None:
+    subject = optimizer()
+    drivers = set()
+    for _ in range(60):
+        point = subject.ask()
+        assert point.shape == (inputs_of(FAMILY),)
+        assert 0.0 <= point.min() <= point.max() <= 1.0
+        drivers.add(subject.driven_by)
+        subject.tell(point, 0.0)
+    assert drivers == {DrivenBy.MODEL, DrivenBy.SCRIPT, DrivenBy.RANDOM}
+
+
+def test_the_control_never_asks_the_model() -> None:
+    subject = optimizer(ReplayOptimizer)
+    assert Arm.MODEL not in subject.arms
+    for _ in range(40):
+        subject.tell(subject.ask(), 0.0)
+        assert subject.driven_by is not DrivenBy.MODEL
+
+
+def test_it_goes_on_from_its_state_exactly() -> None:
+    subject = optimizer()
+    for _ in range(10):
+        subject.tell(subject.ask(), 0.0)
+    again = optimizer()
+    again.load(subject.state())
+    for _ in range(10):
+        one, other = subject.ask(), again.ask()
+        np.testing.assert_array_equal(one, other)
+        subject.tell(one, 0.0)
+        again.tell(other, 0.0)
