@@ -56,10 +56,13 @@ def places(page: Page) -> None:
 
 # What reaches beyond its parent to the right; not what scrolls, floats above the page, or hangs out by its margin.
 WIDER_THAN_PARENT = """() => [...document.querySelectorAll("#page *")].flatMap((each) => {
-    const parent = each.parentElement;
+    let parent = each.parentElement;
+    while (getComputedStyle(parent).display === "contents") parent = parent.parentElement;
     const style = getComputedStyle(each);
+    const around = getComputedStyle(parent);
+    const shortened = around.textOverflow === "ellipsis" || around.webkitLineClamp !== "none";
     if (parent.closest("svg, select") || ["absolute", "fixed"].includes(style.position)) return [];
-    if (getComputedStyle(parent).overflowX !== "visible" || style.display === "contents") return [];
+    if (["auto", "scroll"].includes(around.overflowX) || shortened || style.display === "contents") return [];
     const hangs = Math.min(0, parseFloat(style.marginRight));
     const beyond = each.getBoundingClientRect().right + hangs - parent.getBoundingClientRect().right;
     return beyond > 1 ? [`${each.outerHTML.slice(0, 120)} by ${beyond.toFixed(0)} px`] : [];
