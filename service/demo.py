@@ -108,7 +108,7 @@ def _spec(options: argparse.Namespace) -> dict[str, object]:
 
 @contextlib.contextmanager
 def _service(data_dir: Path) -> Iterator[Client]:
-    """A client of the service on a free loopback port, which is stopped at the end."""
+    """Runs the service on a free loopback port for the body; yields its client."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]
     data_dir.mkdir(mode=0o700, parents=True, exist_ok=True)  # the mode that the service asks for
@@ -193,13 +193,13 @@ def _series(campaign_id: str, failure: Episode) -> str:
 
 
 def draw_command(campaign: Campaign, failures: Sequence[Episode], data_dir: Path) -> str:
-    """The command that draws the first preventable failure in the order of the runs, or else the first failure."""
+    """Returns the command that draws the first preventable failure, or else the first failure."""
     order = [run.id for run in campaign.runs]
     first = min(failures, key=lambda each: (not _preventable(each), order.index(each.run_id)))
     program, here = Path(sys.executable).with_name("risk-sac"), Path.cwd()
     program = program.relative_to(here) if program.is_relative_to(here) else program
     folder = ServiceSettings(data_dir=data_dir).run_folder(campaign.id, first.run_id)
-    return shlex.join(map(str, (program, "show", folder, first.id, "--out", "failure.png")))
+    return shlex.join(map(str, (program, "show", folder, first.id, "--out", data_dir / "failure.png")))
 
 
 def _preventable(failure: Episode) -> bool:

@@ -23,7 +23,7 @@ from service.errors import KeysError
 from service.host.data_folder import FILE_MODE, FOLDER_MODE
 
 PROJECT = "[a-z0-9][a-z0-9-]{0,39}"
-REMEDY = "restore their file from a copy, or begin anew with `risk-sac keys create --anew`"
+REMEDY = "restore their file from a copy, or make a new one by `risk-sac keys create --anew`"
 _TOKEN = re.compile(r"rsk_([0-9a-f]{8})_([A-Za-z0-9_-]{43})")
 
 

@@ -76,7 +76,7 @@ class KeyRing:
         self._made.known = True
         revoked = sum(key.revoked_at is not None for key in document.keys)
         if document.open:
-            logger.warning("an administrator has let in every process of this machine without an API key")
+            logger.warning("an administrator allows every local process to call without an API key")
         elif revoked == len(document.keys):
             logger.warning("all %d API keys are revoked: every request is refused until one is created", revoked)
         else:

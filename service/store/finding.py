@@ -17,7 +17,7 @@ from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """Which episodes are asked for, by what drove them and what was judged of them; None: any."""
+    """Filter of episodes by what drove them and by their verdicts; None: any."""
 
     requirement: str | None = None
     valid: bool = False

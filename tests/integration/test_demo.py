@@ -42,7 +42,7 @@ def test_it_ends_with_the_defect_that_was_found_and_a_command_that_draws_the_fai
     assert command[2].endswith(f"-train-{int(last[1]) - 1}")
     monkeypatch.chdir(tmp_path)
     assert cli.main(command) == 0
-    assert (tmp_path / "failure.png").read_bytes().startswith(b"\x89PNG")
+    assert (data_dir / "failure.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_its_last_line_counts_what_is_worth_a_persons_time_and_no_repeats(capsys):

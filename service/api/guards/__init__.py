@@ -1,1 +1,1 @@
-"""Guards before all routes: who may come in, and how long a client may keep the server waiting."""
+"""Guards before all routes: authorisation, rates and slow clients."""

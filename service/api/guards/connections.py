@@ -1,8 +1,7 @@
-"""Guards against clients that keep the server waiting: with connections, request heads, bodies or unread answers.
+"""Guards against slow clients: idle connections, slow heads and bodies, unread answers.
 
-A connection costs a descriptor, and the database and the workers need descriptors, too. So the number of connections
-is bounded; a newcomer takes the place of the connection that has owed a request head for longest, or else of one whose
-client takes nothing of its answer.
+A connection costs a descriptor, which database and workers need too. So the number of connections is bounded. A new one
+replaces the connection that has owed a request head for longest, or else one whose client does not read its answer.
 """
 
 import asyncio
@@ -75,7 +74,7 @@ class Room:
         self._full_at = float("-inf")
 
     def enter(self, connection: "Connection") -> None:
-        """Makes room for a new connection: if there are too many, drops the one that has kept the server waiting."""
+        """Makes room for a new connection by dropping the slowest if there are too many."""
         if len(connection.connections) <= self._most:  # of the server, as uvicorn counts them
             return
         now = time.monotonic()
@@ -98,7 +97,7 @@ class Room:
 
 
 def most_connections(settings: ServiceSettings) -> int:
-    """How many connections may be open: as many as there are descriptors for, or fewer if the settings say so."""
+    """Returns the number of connections that descriptors and settings allow."""
     descriptors = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
     workers = settings.max_workers if settings.executor == "local" else 0
     # Closed connections may still hold their descriptors when the next ones are accepted.
@@ -174,7 +173,7 @@ class Connection(HttpToolsProtocol):
         self._head_due = self.loop.call_later(self._room.head_s, self._hang_up)  # also if it comes byte by byte
 
     def _hang_up(self) -> None:
-        self.transport.close()  # which first writes what is left of an answer
+        self.transport.close()  # which first writes the rest of an answer
         self._await_reading()
 
     def _await_reading(self) -> None:
@@ -196,7 +195,7 @@ class BodyLimit:
         self._settings = settings
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on; where the body is refused, reading it raises the refusal, which the app answers with."""
+        """Passes on; reading a refused body raises the refusal, which the app answers with."""
         headers = dict(scope["headers"]) if scope["type"] == "http" else {}
         if b"content-length" not in headers and b"transfer-encoding" not in headers:
             await self._app(scope, receive, send)

@@ -1,6 +1,6 @@
-"""Whom the service lets in, decided before a body is read and before a route is looked up.
+"""Authorises requests before a body is read and before routing.
 
-A route that is added tomorrow is therefore guarded today: it wants a key unless `PUBLIC` or `PAGE` names it.
+So a new route is guarded by default: it requires a key unless `PUBLIC` or `PAGE` names it.
 """
 
 import re
@@ -103,14 +103,14 @@ class Gate:
             return False
 
     def _caller(self, headers: RequestHeaders) -> Caller:
-        """Finds the caller by the key that a request carries; raises a 401, or a 503 where that cannot be known."""
+        """Finds the caller by the request's key; raises 401, or 503 if the keys are unreadable."""
         try:
             if self._keys.open and self._keyless:
                 return LOCAL
             scheme, _, token = headers.get(b"authorization", b"").decode("latin-1").partition(" ")
             key = self._keys.find(token.strip()) if scheme.lower() == "bearer" else None
         except KeysError as error:
-            detail = f"the API keys are lost or damaged, so nobody is let in; whoever runs the service: {REMEDY}"
+            detail = f"the API keys are lost or damaged, so calls are refused; the operator has to {REMEDY}"
             raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.KEYS_UNAVAILABLE, detail) from error
         if key is None:
             given = "not one that counts" if scheme else "missing"
@@ -143,14 +143,14 @@ class RateLimit:
 
 
 class Shares:
-    """Bounds the requests that each key has open, such as streams, so that one key cannot take all connections."""
+    """Bounds the open requests of each key, so that one key cannot take all connections."""
 
     def __init__(self, connections: int) -> None:
         self._connections = connections
         self._open = Counter[str]()
 
     def take(self, key_id: str | None) -> None:
-        """Counts a request; refuses it where its key has its share: one is left for a key that has none open yet."""
+        """Counts a request; refuses it if its key has its share. One is reserved for a new key."""
         if key_id is None:
             return
         keys = len(self._open.keys() | {key_id})
@@ -174,7 +174,7 @@ def allowed_hosts(hosts: Iterable[str]) -> frozenset[str]:
 
 
 def check_host(scope: Scope, headers: RequestHeaders, allowed: frozenset[str]) -> None:
-    """Refuses a Host that names another service: a web page that rebinds its own name to this address.
+    """Refuses a foreign Host, as in DNS rebinding.
 
     Not Starlette's TrustedHostMiddleware: any address that the connection was made to is allowed, and a refusal is a
     problem.
@@ -196,7 +196,7 @@ def _host_name(host: str) -> str:
 
 
 def check_origin(method: str, headers: RequestHeaders, allowed: frozenset[str]) -> None:
-    """Refuses a change that a foreign web page asks for; programs send no Origin."""
+    """Refuses changes by foreign web pages; programs send no Origin."""
     given = headers.get(b"origin")
     if given is None or "*" in allowed or method in SAFE:
         return

@@ -1,4 +1,4 @@
-"""/v1/campaigns: post, list, look, cancel, delete."""
+"""/v1/campaigns: post, list, read, cancel, delete."""
 
 from collections.abc import Callable
 from hashlib import blake2b
@@ -75,7 +75,7 @@ def post_campaign(
 
 @router.post("/check", responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
 def check_campaign(spec: PostedCampaign) -> CampaignCheck:
-    """Check a campaign as posting it would, and say what its episodes would use otherwise; nothing is kept."""
+    """Validate a campaign without queuing it; `adjustments` has the values that its episodes would use instead."""
     return CampaignCheck(adjustments=adjustments(problem.checked_campaign(spec)))
 
 
@@ -101,7 +101,7 @@ def list_campaigns(
     limit: Limit = 50,
     cursor: Cursor = None,
 ) -> Response:
-    """Campaigns, newest first; what is posted meanwhile comes before the first page."""
+    """Campaigns, newest first; new ones appear before the first page."""
     revision = service.store.revision_of_all()
     page = service.store.campaigns(
         limit,
@@ -122,14 +122,14 @@ def list_campaigns(
 
 @router.post("/{campaign_id}/cancel", status_code=202, response_model=Campaign, responses=UNKNOWN | ACCEPTED)
 def cancel_campaign(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """Stop a campaign and keep what it found; changes nothing once it has ended. With an `admin` key any project's."""
+    """Stop a campaign and keep its results; no effect once it has ended. An `admin` key may stop any project's."""
     campaign = service.manager.cancel(campaign_id, caller.sees)
     return _accepted(request, campaign, service)
 
 
 @router.delete("/{campaign_id}", status_code=204, responses=UNKNOWN | NOT_ENDED)
 def delete_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> None:
-    """Remove a campaign that has ended, with all that it found and its files. With an `admin` key any project's."""
+    """Delete an ended campaign with its results and files. An `admin` key may delete any project's."""
     service.manager.delete(campaign_id, caller.sees)
 
 
@@ -141,7 +141,7 @@ def get_campaign(campaign_id: str, request: Request, service: Service, caller: C
 
 @router.get("/{campaign_id}/results", response_model=Results, responses=UNKNOWN | LIVE)
 def get_results(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """What a campaign has found; partial until it has ended."""
+    """Results of a campaign; partial until it has ended."""
     return _live(campaign_id, request, service, caller, results)
 
 
@@ -173,7 +173,7 @@ def get_failure_table(
 def get_curves(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, points: Points = 200
 ) -> Response:
-    """How the search of each run has gone: rates, distinct failures, λ and cost over its episodes."""
+    """Curves of each run: rates, distinct failures, λ and cost over its episodes."""
     return _live(
         campaign_id,
         request,
@@ -204,7 +204,7 @@ def get_log(
     caller: CurrentCaller,
     lines: Annotated[int, Query(ge=1, le=1000, description="At most; fewer where they are long.")] = 200,
 ) -> Response:
-    """The last lines that the workers of a run printed, without the server's folders; empty before there are any."""
+    """Last lines that a run's workers printed, without the server's folders; empty before the first."""
     campaign = service.store.campaign(campaign_id, caller.sees)
     if run_id not in {run.id for run in campaign.runs}:
         message = f"campaign {campaign_id} has no run {run_id!r}; GET it lists all runs"
@@ -236,6 +236,6 @@ def _accepted(request: Request, campaign: StoredCampaign, service: Context) -> R
 
 
 def _retry_after(campaign: StoredCampaign, service: Context) -> dict[str, str]:
-    """The header that says when to ask again; none once the campaign has ended."""
+    """Returns the Retry-After header; none once the campaign has ended."""
     wait_s = retry_after_s(campaign, service.manager.workers)
     return {} if wait_s is None else {"Retry-After": str(wait_s)}

@@ -1,4 +1,4 @@
-"""What can be posted."""
+"""Catalogues: families, methods, formats, egos."""
 
 from typing import Literal, TypeVar
 
@@ -49,7 +49,7 @@ class Family(Record):
 
 
 class Signal(Record):
-    """What the formula of a requirement may speak of, with a value in every step."""
+    """Signal that formulas may use, with a value in every step."""
 
     name: str
     unit: str

@@ -1,6 +1,6 @@
-"""The entrance, the page that describes the API, and the page for people; none loads anything from elsewhere.
+"""Entry point, API description and web page; none loads anything from other hosts.
 
-Whoever may open a connection may ask for these, so each is read and packed once.
+They need no key, so each is read and compressed once.
 """
 
 import gzip
@@ -63,7 +63,7 @@ router = APIRouter()
 
 @dataclass(frozen=True, slots=True)
 class StaticBody:
-    """Content that many ask for, as it is and packed."""
+    """Static content, plain and compressed."""
 
     content: bytes
     packed: bytes | None  # None where packing gains little
@@ -72,13 +72,13 @@ class StaticBody:
 
     @classmethod
     def of(cls, content: bytes, media_type: str) -> "StaticBody":
-        """Packs the content if it is long text."""
+        """Compresses long text."""
         text = media_type.startswith("text/") or media_type in ("application/json", "image/svg+xml")
         packed = gzip.compress(content, mtime=0) if text and len(content) >= LEAST_BYTES else None
         return cls(content, packed, media_type, blake2b(content, digest_size=8).hexdigest())
 
     def response(self, request: Request, others: Mapping[str, str] = {}) -> Response:
-        """The content, packed where the client takes that; raises NotModified where it has it."""
+        """Returns the content, compressed if accepted; raises NotModified if the client has it."""
         headers = cacheable(request, self.tag, others=others)
         if self.packed and request.headers.get("accept-encoding") == "gzip":  # which `Compression` leaves alone
             return Response(self.packed, headers=headers | {"Content-Encoding": "gzip"}, media_type=self.media_type)
@@ -87,7 +87,7 @@ class StaticBody:
 
 @router.get("/", tags=["operations"], response_model=Entrance)
 async def get_entrance(request: Request) -> Entrance | Response:
-    """Where to go from here; a browser is sent to the page."""
+    """Entry points of the service; redirects a browser to the page."""
     accept = request.headers.get("accept", "")
     if "text/html" in accept and accepted(accept, ("application/json", "text/html")) == "text/html":
         return RedirectResponse("page/", status_code=303, headers={"Vary": "Accept"})
@@ -111,14 +111,14 @@ def _description(app: FastAPI, prefix: str) -> StaticBody:
 
 @router.get("/docs", include_in_schema=False)
 async def get_docs() -> HTMLResponse:
-    """The API's description, to read and to try. Its links are relative, so that a proxy may put it elsewhere."""
+    """Returns the interactive API description, with relative links for proxies."""
     page = get_swagger_ui_html(
         openapi_url="openapi.json",
         title="RISK-SAC",
         swagger_js_url=f"docs/{SCRIPT}",
         swagger_css_url=f"docs/{STYLE}",
         swagger_favicon_url=f"docs/{ICON}",
-        swagger_ui_parameters={"validatorUrl": None},  # it would ask somebody else whether the description is right
+        swagger_ui_parameters={"validatorUrl": None},  # it would send the description to another host
     )
     page.headers["Content-Security-Policy"] = DOCS_POLICY
     return page

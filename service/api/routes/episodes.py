@@ -1,4 +1,4 @@
-"""/v1/campaigns/{id}/episodes and failures: what a campaign did, one by one."""
+"""/v1/campaigns/{id}/episodes and failures."""
 
 from typing import Annotated
 
@@ -35,12 +35,12 @@ AskedDrivenBy = Annotated[DrivenBy | None, Query(description="Only those whose a
 
 
 class PostedTriage(Settings):
-    """What to note of a failure."""
+    """Triage to store for a failure."""
 
     state: TriageState
-    """new: undecided; confirmed: the ego is to be mended; dismissed: it is not; fixed: it has been."""
+    """new: undecided; confirmed: the ego has to be fixed; dismissed: it has not; fixed: it has been."""
     comment: Annotated[str, Field(max_length=2000, pattern=TEXT)] = ""
-    """Why; plain text, which is shown as it is."""
+    """Reason, as plain text."""
 
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
@@ -62,7 +62,7 @@ def list_episodes(
     limit: Limit = 50,
     cursor: Cursor = None,
 ) -> Response:
-    """Episodes of a campaign in the order of their arrival."""
+    """Episodes of a campaign in order of arrival."""
     page = service.store.episodes(
         campaign_id,
         limit=limit,
@@ -98,7 +98,7 @@ def list_failures(
     limit: Limit = 50,
     cursor: Cursor = None,
 ) -> Response:
-    """Violations of requirements that count, contacts among them, in the order of their arrival."""
+    """Failures in order of arrival: violations of requirements that count, contacts included."""
     page = service.store.episodes(
         campaign_id,
         limit=limit,
@@ -137,7 +137,7 @@ def put_triage(
     service: Service,
     caller: CurrentCaller,
 ) -> Triage:
-    """Note what you make of a failure, in place of what was noted before; it goes with the campaign."""
+    """Store the triage of a failure, replacing an earlier one; it is deleted with the campaign."""
     return service.manager.triage(campaign_id, failure_id, posted.state, posted.comment, caller.sees)
 
 

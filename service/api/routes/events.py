@@ -1,4 +1,4 @@
-"""/v1/campaigns/{id}/events: what happens, as it happens, to be taken up again where a connection broke."""
+"""/v1/campaigns/{id}/events: resumable server-sent events."""
 
 from typing import Annotated
 
@@ -43,7 +43,7 @@ EVENTS: Responses = {
         " far. `state`: a StateChange. A run's end comes after all its episodes; the campaign's ends the stream.",
         "content": {"text/event-stream": {"schema": EVENT, "example": EXAMPLE}},
     },
-    204: {"description": "The campaign has ended and all was told; do not come back."},
+    204: {"description": "The campaign has ended and all events were sent; do not reconnect."},
 }
 LastEventId = Annotated[
     str | None,
@@ -71,7 +71,7 @@ async def get_events(
     last_event_id: LastEventId = None,
     newest: Newest = None,
 ) -> Response:
-    """Server-sent events: episodes, failures and changes of state, all of them or those after the last one received."""
+    """Server-sent events: episodes, failures and state changes, all or those after the last one received."""
     position, ended = await run_in_threadpool(_start, service.store, campaign_id, caller.sees, last_event_id, newest)
     if position is None:
         return Response(status_code=204)
@@ -88,14 +88,14 @@ async def get_events(
 def _start(
     store: Store, campaign_id: str, project: str | None, event_id: str | None, newest: int | None
 ) -> tuple[int | None, bool]:
-    """Where to begin, None where nothing is left to tell; and whether the campaign has ended."""
-    store.campaign(campaign_id, project)  # that the caller may know of it
+    """Returns the first position, None if all was sent, and whether the campaign has ended."""
+    store.campaign(campaign_id, project)  # 404 unless the caller may see it
     position = _position(store, campaign_id, event_id, newest)
     if position is None:
         raise invalid_field(
             "Last-Event-ID", event_id, "the id of an event of this campaign, unchanged; else leave it out"
         )
-    ended = store.campaign(campaign_id, project).state.final  # after the position: what is told later counts as such
+    ended = store.campaign(campaign_id, project).state.final  # after the position, so later events count as later
     told = ended and not store.events(campaign_id, after=position, limit=1).items
     return None if told else position, ended
 

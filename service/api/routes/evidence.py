@@ -1,4 +1,4 @@
-"""/v1/campaigns/{id}/report: what was found, how often it happens where nobody searched, and where nobody looked.
+"""/v1/campaigns/{id}/report: failures, bounds of the i.i.d. phase, and coverage.
 
 A sync route, so that it is made in FastAPI's thread pool.
 """

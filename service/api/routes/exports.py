@@ -1,4 +1,4 @@
-"""/v1/campaigns/{id}/export and failures/{id}/export: all episodes, or one failure, in a format of other tools."""
+"""/v1/campaigns/{id}/export and failures/{id}/export: episodes or one failure for other tools."""
 
 from functools import partial
 from http import HTTPStatus
@@ -52,7 +52,7 @@ EpisodesFormat = Annotated[
     responses=made(*(FORMATS[name].media_type for name in names("failure"))) | PLAYED | LACKING,
 )
 async def get_export(failure: Asked, format: FailureFormat, headers: Headers, service: Service) -> Response:
-    """One failure in a format of other tools, see `GET /v1/formats`; some are several files, and come as a zip."""
+    """One failure in a format of `GET /v1/formats`; several files come as a zip."""
     content = await service.studies.get(Study(failure, "export", format=format))
     row = FORMATS[format]
     name = f"{failure.episode.id}-{failure.edition[:8]}{f'-{format}' if row.media_type == ZIP else ''}{row.suffix}"
@@ -69,7 +69,7 @@ async def get_export(failure: Asked, format: FailureFormat, headers: Headers, se
     | CROWDED,
 )
 async def get_episodes_export(campaign: AskedCampaign, format: EpisodesFormat, service: Service) -> Response:
-    """All episodes so far, whatever their outcome, as a table for other tools, see `GET /v1/formats`."""
+    """All episodes so far as a table in a format of `GET /v1/formats`."""
     folders = [service.settings.run_folder(campaign.id, run.id) for run in campaign.runs]
     table = await run_in_threadpool(Table.of, folders, format)
     if not table.folders:

@@ -1,4 +1,4 @@
-"""/v1/networks: upload, list, look, delete."""
+"""/v1/networks: upload, list, read, delete."""
 
 import asyncio
 from http import HTTPStatus
@@ -78,7 +78,7 @@ async def post_network(
     caller: CurrentCaller,
     label: Annotated[str, Query(max_length=200, description="A note of your own.")] = "",
 ) -> Network:
-    """Receive an upload, have it checked, and keep it."""
+    """Receives, checks and stores an upload."""
     try:
         with service.networks.receive(caller.key_id) as incoming:
             async with asyncio.timeout(RECEIVE_S):
@@ -105,13 +105,13 @@ def list_networks(service: Service, caller: CurrentCaller, limit: Limit = 50, cu
 
 @router.get("/{network_id}", responses=UNKNOWN)
 def get_network(network_id: str, service: Service, caller: CurrentCaller) -> Network:
-    """What a network has, and which files it is kept as."""
+    """Content and files of a network."""
     return service.networks.get(network_id, caller.sees)
 
 
 @router.get("/{network_id}/places", responses=UNKNOWN | FINDING | SEARCHING)
 def get_places(network_id: str, response: Response, service: Service, caller: CurrentCaller) -> Places:
-    """Where the patterns fit on a network, and why elsewhere they do not; searched for when first asked for."""
+    """Places where the patterns fit, and reasons elsewhere; searched at the first request."""
     places = service.surveys.places(network_id, caller.sees)
     if places.progress < 1:
         response.status_code = HTTPStatus.ACCEPTED
@@ -121,11 +121,11 @@ def get_places(network_id: str, response: Response, service: Service, caller: Cu
 
 @router.get("/{network_id}/places.png", response_class=Response, responses=UNKNOWN | FINDING | DRAWN)
 def get_places_picture(network_id: str, service: Service, caller: CurrentCaller) -> Response:
-    """The network from above with its places."""
+    """Picture of the network with its places."""
     return Response(service.surveys.picture(network_id, caller.sees), media_type="image/png")
 
 
 @router.delete("/{network_id}", status_code=204, responses=UNKNOWN)
 def delete_network(network_id: str, service: Service, caller: CurrentCaller) -> None:
-    """Remove a network and its files. With an `admin` key any project's."""
+    """Delete a network and its files. An `admin` key may delete any project's."""
     service.networks.delete(network_id, caller.sees)

@@ -1,4 +1,4 @@
-"""What those who run the service ask it: is it alive, can it work, and how it does."""
+"""Liveness, readiness and metrics for operators."""
 
 from http import HTTPStatus
 from typing import Literal
@@ -33,7 +33,7 @@ router = APIRouter(tags=["operations"])
 
 @router.get("/healthz", responses=STOPPED)
 async def get_health(service: Service) -> Health:
-    """Whether the service is alive; if it is not, start it anew."""
+    """Liveness: restart the service if this fails."""
     if not service.manager.alive:
         detail = "the manager has stopped; the log has the reason"
         raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.MANAGER_STOPPED, detail)
@@ -42,7 +42,7 @@ async def get_health(service: Service) -> Health:
 
 @router.get("/readyz", responses=UNREADY)
 def get_readiness(service: Service) -> Ready:
-    """Whether campaigns can be posted and make progress; if not, it goes on by itself once the cause is gone."""
+    """Readiness: whether campaigns can be posted and progress; recovers once the cause is gone."""
     problem = service.manager.storage_problem
     if problem is not None:
         raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.STORAGE_UNAVAILABLE, problem)

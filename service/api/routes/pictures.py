@@ -1,4 +1,4 @@
-"""/v1/campaigns/{id}/failures/{id}/…: what a page shows of a failure, made when it is asked for."""
+"""/v1/campaigns/{id}/failures/{id}/…: pictures and files of a failure, made on demand."""
 
 from typing import Annotated
 
@@ -21,7 +21,7 @@ PLAYED = problem(409, "The failure does not repeat here, or cannot be played")
 
 
 def made(*media_types: str) -> Responses:
-    """Responses of what is made of a failure."""
+    """Responses of content that is made on demand."""
     return TAGGED | LOST | CROWDED | {200: TAGGED[200] | {"content": {each: {} for each in media_types}}}
 
 
@@ -46,7 +46,7 @@ Headers = Annotated[dict[str, str], Depends(_headers)]
 
 @router.get("/failures/{failure_id}/roads", response_model=Roads, responses=TAGGED)
 def get_roads(failure: Asked, headers: Headers) -> Response:
-    """The ground on which a failure came about, as polygons on the map that its time series is on."""
+    """Ground of a failure as polygons, in the coordinates of its time series."""
     return Response(roads_body(failure).model_dump_json(), headers=headers, media_type=JSON)
 
 
@@ -56,44 +56,44 @@ def get_roads(failure: Asked, headers: Headers) -> Response:
     responses=TAGGED | LOST | {200: made(SVG)[200]},
 )
 def get_thumbnail(failure: Asked, headers: Headers, service: Service) -> Response:
-    """One failure from above, small: the roads, the paths in the last 3 s, and the bodies at that moment."""
+    """Small picture of a failure from above: roads, paths of the last 3 s, bodies."""
     return Response(thumbnail_of(failure, service.settings), headers=headers, media_type=SVG)
 
 
 @router.get("/failures/{failure_id}/picture.png", response_class=Response, responses=made(PNG))
 async def get_picture(failure: Asked, headers: Headers, service: Service) -> Response:
-    """One failure, valid or not: the paths from above, and what was measured along the way."""
+    """Picture of a failure, valid or not: paths from above, and measured series."""
     return Response(await service.pictures.get(Picture(failure)), headers=headers, media_type=PNG)
 
 
 @router.get("/failures/{failure_id}/bundle.npz", response_class=Response, responses=made(ZIP) | PLAYED)
 async def get_bundle(failure: Asked, headers: Headers, service: Service) -> Response:
-    """One failure in a file that stands alone, once it was played again; `risk-sac replay` plays it anywhere."""
+    """Self-contained file of a failure, made after a replay; `risk-sac replay` plays it anywhere."""
     return Response(await service.studies.get(Study(failure, "bundle")), headers=headers, media_type=ZIP)
 
 
 @router.get("/failures/{failure_id}/core.npz", response_class=Response, responses=made(ZIP) | PLAYED)
 async def get_core(failure: Asked, headers: Headers, service: Service) -> Response:
-    """The same with all taken away that the failure does not need; takes up to 150 episodes, some 10 s."""
+    """The failure reduced to what it needs; takes up to 150 episodes, some 10 s."""
     return Response(await service.studies.get(Study(failure, "core")), headers=headers, media_type=ZIP)
 
 
 @router.get("/failures/{failure_id}/region", response_model=Region, responses=made(JSON) | PLAYED)
 async def get_region(failure: Asked, headers: Headers, service: Service) -> Response:
-    """How many of its neighbours fail as it does: nearby scenes, other traffic, other actions; takes 170 episodes."""
+    """Share of its neighbours that fail alike: nearby scenes, other traffic, other actions; takes 170 episodes."""
     return Response(await service.studies.get(Study(failure, "region")), headers=headers, media_type=JSON)
 
 
 @router.get("/failures/{failure_id}/twins/{twin}.png", response_class=Response, responses=made(PNG) | PLAYED)
 async def get_twin(failure: Asked, twin: Twin, headers: Headers, service: Service) -> Response:
-    """One failure beside the same scene without an attack (`idle`), or with another ego, on one clock."""
+    """Picture of a failure beside the same scene without an attack (`idle`) or with another ego."""
     played = await service.studies.get(Study(failure, "twin", twin))
     return Response(await service.pictures.get(Picture(failure, twin, played)), headers=headers, media_type=PNG)
 
 
 @router.get("/failures/{failure_id}/twins/{twin}", response_model=TwinPlay, responses=made(JSON) | PLAYED)
 async def get_twin_play(failure: Asked, twin: Twin, headers: Headers, service: Service) -> Response:
-    """What the same scene comes to without an attack (`idle`), or with another ego, and its full time series."""
+    """Outcome and time series of the same scene without an attack (`idle`) or with another ego."""
     played = await service.studies.get(Study(failure, "twin", twin))
     body = await run_in_threadpool(lambda: wire(twin_body(twin, played)))
     return Response(body, headers=headers, media_type=JSON)

@@ -17,10 +17,10 @@ from service.runs.regressions import campaign_of
 
 
 class PostedRegression(Settings):
-    """What to play against what."""
+    """Campaign and ego of a regression."""
 
     campaign_id: Annotated[str, Field(max_length=100, pattern=r"^[A-Za-z0-9]+$")]
-    """Whose distinct failures; it has ended."""
+    """Ended campaign whose distinct failures are played."""
     ego: EgoConfig
     """The other ego, such as `{"profile": "careful"}`."""
 
@@ -48,7 +48,7 @@ async def post_regression(
     service: Service,
     caller: CurrentCaller,
 ) -> CampaignRegression:
-    """Play the distinct failures of a campaign against another ego; posting the same again gives the one there is."""
+    """Play the distinct failures of a campaign against another ego; the same request returns the existing one."""
     campaign = await run_in_threadpool(service.store.campaign, posted.campaign_id, caller.sees)
     regression = await run_in_threadpool(service.regressions.post, campaign, posted.ego)
     response.headers["Location"] = link(request, f"/v1/regressions/{regression.id}")
@@ -57,6 +57,6 @@ async def post_regression(
 
 @router.get("/{regression_id}", responses=UNKNOWN)
 def get_regression(regression_id: str, service: Service, caller: CurrentCaller) -> CampaignRegression:
-    """What became of each failure: fixed, still failing, a new kind, flaky, or not comparable, and why."""
+    """Verdict of each failure: fixed, still failing, a new kind, flaky, or not comparable, with the reason."""
     service.store.campaign(campaign_of(regression_id), caller.sees)  # which another project's caller does not see
     return service.regressions.get(regression_id)

@@ -1,4 +1,4 @@
-"""/v1/campaigns/{id}/table and figures: the report that `risk-sac evaluate` writes; and the spec to have it again.
+"""/v1/campaigns/{id}/table, figures, clusters and spec: the report of `risk-sac evaluate`.
 
 Sync routes, so that statistics and drawing take place in FastAPI's thread pool.
 """
@@ -26,7 +26,7 @@ from service.views.reports import CampaignReport
 
 
 class Clusters(Record):
-    """The failures of the finished runs, sorted into kinds; flaky ones are left out."""
+    """Failures of the finished runs by kind, without flaky ones."""
 
     complete: bool
     """Whether all runs are in them."""
@@ -40,7 +40,7 @@ class FigureFile(Record):
     format: Literal["png", "svg"]
     media_type: Annotated[str, Field(examples=["image/svg+xml"])]
     href: Annotated[str, Field(examples=["/v1/campaigns/ca39e56a9cd896b07/figures/ecr_low.svg"])]
-    """Where it is."""
+    """Path of the file."""
 
 
 class Figure(Record):
@@ -122,7 +122,7 @@ def get_table(
     campaign: AskedCampaign,
     format_: Annotated[TableFormat | None, FOR_BROWSERS] = None,
 ) -> Response:
-    """The methods compared over seeds by the runs that have finished, with the others named; empty before the first."""
+    """Comparison of methods over the seeds of finished runs; names the missing runs."""
     name = chosen(request, format_, TABLES)
     report, headers = reported(request, service, campaign, name, others=BY_ACCEPT)
     command, spec_command = commands(request, campaign.id)
@@ -132,7 +132,7 @@ def get_table(
 
 @router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED)
 def get_clusters(request: Request, service: Service, campaign: AskedCampaign) -> Response:
-    """Which different failures the finished runs have found, named in words, and one of each to look at first."""
+    """Kinds of failures that the finished runs found, in words, with an example of each."""
     report, headers = reported(request, service, campaign, "clusters")
     body = Clusters(complete=not report.comparison.missing, families=report.comparison.overviews)
     return Response(body.model_dump_json(), headers=headers, media_type=MEDIA_TYPES["json"])
@@ -140,7 +140,7 @@ def get_clusters(request: Request, service: Service, campaign: AskedCampaign) ->
 
 @router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED)
 def list_figures(request: Request, service: Service, campaign: AskedCampaign) -> Response:
-    """The figures that the finished runs allow: how the methods search, what they reach, λ and α."""
+    """Figures of the finished runs: search, results, λ and α."""
     report, headers = reported(request, service, campaign, "figures")
     items = [Figure(name=name, files=_files(request, campaign.id, name)) for name in report.figures]
     body = Figures(complete=not report.comparison.missing, items=items)
@@ -149,7 +149,7 @@ def list_figures(request: Request, service: Service, campaign: AskedCampaign) ->
 
 @router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED)
 def get_figure(name: str, format: Format, request: Request, service: Service, campaign: AskedCampaign) -> Response:
-    """One figure; drawn when it is first asked for, and again once more runs have finished."""
+    """One figure, drawn on demand and again once more runs have finished."""
     report, headers = reported(request, service, campaign, name, format)
     return Response(report.figure(name, format), headers=headers, media_type=MEDIA_TYPES[format])
 
@@ -158,13 +158,13 @@ def get_figure(name: str, format: Format, request: Request, service: Service, ca
 def get_spec(
     request: Request, campaign: AskedCampaign, format_: Annotated[SpecFormat | None, FOR_BROWSERS] = None
 ) -> Response:
-    """The campaign alone: JSON to post again, or YAML for `risk-sac run --spec` and `risk-sac evaluate --spec`."""
+    """Spec of the campaign: JSON to post again, or YAML for `risk-sac run --spec` and `risk-sac evaluate --spec`."""
     name = chosen(request, format_, SPECS)
     return Response(SPECS[name](campaign.spec), headers=BY_ACCEPT, media_type=MEDIA_TYPES[name])
 
 
 def chosen(request: Request, given: str | None, offered: Iterable[str]) -> str:
-    """The format that a query names, or else the Accept header; raises what `accepted` does."""
+    """Returns the format of the query, or else of the Accept header; raises as `accepted`."""
     names = {MEDIA_TYPES[name]: name for name in offered}
     return given or names[accepted(", ".join(request.headers.getlist("accept")), list(names))]
 
@@ -172,7 +172,7 @@ def chosen(request: Request, given: str | None, offered: Iterable[str]) -> str:
 def reported(
     request: Request, service: Context, campaign: StoredCampaign, *parts: str, others: Mapping[str, str] = {}
 ) -> tuple[CampaignReport, dict[str, str]]:
-    """The report, and the headers of what is shown of it; arguments and errors as `cacheable` has them."""
+    """Returns the report and the headers of its answer; arguments and errors as in `cacheable`."""
     headers = cacheable(request, service.reports.edition(campaign), *parts, others=others)
     report = service.reports.report(campaign)
     if not report.lasting:
@@ -186,7 +186,7 @@ def _files(request: Request, campaign_id: str, name: str) -> list[FigureFile]:
 
 
 def commands(request: Request, campaign_id: str) -> tuple[str, str]:
-    """What to type to queue the campaign again, and to have it as a file for the command line."""
+    """Returns the commands that queue the campaign again and that save its spec."""
     campaigns = f"{request.base_url}v1/campaigns"
     spec, post, as_yaml = map(
         shlex.quote, (f"{campaigns}/{campaign_id}/spec", campaigns, f"{campaigns}/{campaign_id}/spec?format=yaml")

@@ -77,7 +77,7 @@ def test_the_command_takes_lost_keys_for_lost(
         capsys.readouterr()
         for command in (["list"], CREATE, ["revoke", old.id]):
             assert main(command) == 1
-            assert "begin anew with `risk-sac keys create --anew`" in capsys.readouterr().err
+            assert "make a new one by `risk-sac keys create --anew`" in capsys.readouterr().err
         assert main([*CREATE, "--anew"]) == 0
         (new,) = file.read()
         assert new.id != old.id
