@@ -12,7 +12,7 @@ with Client("http://127.0.0.1:8000") as client:
         Path(f"{found.id}.png").write_bytes(client.picture(campaign.id, found.id))
 """
 
-from risk_sac.client.client import Client, Event
+from risk_sac.client.client import Client
 from risk_sac.client.errors import (
     ClientError,
     Overdue,
@@ -21,6 +21,7 @@ from risk_sac.client.errors import (
     UnexpectedAnswer,
     Unreachable,
 )
+from risk_sac.client.following import Event
 from risk_sac.records import (
     Campaign,
     CampaignSummary,

@@ -1,24 +1,19 @@
 """One RISK-SAC service, as Python methods."""
 
 import json
-import math
 import os
-import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import Any, Literal, Self, TypeVar
 from urllib.parse import quote
 from uuid import uuid4
 
-import httpx
-
 from risk_sac.client.address import DEFAULT_URL, api_key, checked_key, checked_url
-from risk_sac.client.errors import Overdue, StreamLost, UnexpectedAnswer, Unreachable
+from risk_sac.client.errors import UnexpectedAnswer
+from risk_sac.client.following import AWAY_S, Event, events, follow
 from risk_sac.client.transport import Transport, read
 from risk_sac.config import CampaignSpec, EgoConfig
 from risk_sac.failures.cases import CampaignRegression
 from risk_sac.records import (
-    FINAL,
     Campaign,
     CampaignPage,
     CampaignSummary,
@@ -40,26 +35,9 @@ PATIENCE_S = 10.0  # with a service that does not answer
 MAKING_S = 300.0  # with one that has something to play for its answer
 PAGE = 100  # items that are asked for at a time
 PNG, BUNDLE = "image/png", "application/zip"
-AWAY_S = 120.0  # how long a service that was there may be away, as when it is restarted
-SILENCE_S = 45.0  # three times what the service leaves between two signs of life
-LOOK_S = 1.0  # between two looks at a campaign, and between two streams of events
 
 Query = dict[str, str | int | None]
 R = TypeVar("R", bound=Record)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Event:
-    """An event of a campaign."""
-
-    id: str  # opaque; the stream goes on after it
-    name: str  # episode | failure (instead of it) | state
-    data: dict[str, Any]
-
-    @property
-    def last(self) -> bool:
-        """Whether the campaign has ended with it."""
-        return self.name == "state" and self.data.get("run_id") is None and self.data.get("state") in FINAL
 
 
 class NetworkName(Record):
@@ -169,7 +147,7 @@ class Client:
         return self._get(Results, f"{_path(campaign_id)}/results")
 
     def power(self, campaign_id: str) -> Power:
-        """How many known defects the budget of a campaign detects, by stored benchmark runs."""
+        """Number of known defects that the budget of a campaign detects, by stored benchmark runs."""
         return self._get(Power, f"{_path(campaign_id)}/power")
 
     def failures(
@@ -251,7 +229,7 @@ class Client:
         self._transport.ask("DELETE", _path(campaign_id), repeatable=False)
 
     def events(self, campaign_id: str, last_event_id: str | None = None, *, away_s: float = AWAY_S) -> Iterator[Event]:
-        """Finished episodes, failures and changes of state, until the campaign has ended.
+        """Yields finished episodes, failures and changes of state until the campaign has ended.
 
         A stream that breaks continues after the last event that arrived.
 
@@ -260,53 +238,17 @@ class Client:
           last_event_id: `id` of an event; the stream starts after it.
           away_s: how long the service may be unreachable in between.
         """
-        path, patience_s = f"{_path(campaign_id)}/events", self._transport.patience_s
-        while True:
-            heard = False
-            try:
-                for message in self._transport.listen(path, last_event_id, silence_s=SILENCE_S, patience_s=patience_s):
-                    event = Event(id=message.id, name=message.event, data=json.loads(message.data))
-                    heard, last_event_id = True, event.id or last_event_id
-                    yield event
-                    if event.last:
-                        return
-                # A stream also ends when the service stops; the next one continues it.
-                if not heard and self._get(Campaign, _path(campaign_id), away_s).ended:
-                    return
-            except StreamLost:
-                pass
-            patience_s = away_s
-            time.sleep(LOOK_S)
+        return events(self._transport, _path(campaign_id), last_event_id, away_s)
 
     def follow(self, campaign_id: str, *, timeout_s: float | None = None, away_s: float = AWAY_S) -> Iterator[Campaign]:
-        """The campaign now, and whenever it has changed, until it has ended.
+        """Yields the campaign now, and whenever it has changed, until it has ended.
 
         Args:
           campaign_id: of the campaign.
           timeout_s: after which `Overdue` is raised.
           away_s: how long the service may be unreachable once the campaign was seen.
         """
-        deadline = math.inf if timeout_s is None else time.monotonic() + timeout_s
-        patience_s, headers = self._transport.patience_s, dict[str, str]()
-        known: Campaign | None = None
-        while (left_s := deadline - time.monotonic()) > 0:
-            try:
-                response = self._transport.ask(
-                    "GET", _path(campaign_id), headers=headers, patience_s=min(patience_s, left_s)
-                )
-            except Unreachable:
-                if time.monotonic() < deadline:
-                    raise
-                break
-            if response.status_code != httpx.codes.NOT_MODIFIED:
-                campaign = read(Campaign, response)
-                if campaign != known:
-                    yield campaign
-                if campaign.ended:
-                    return
-                patience_s, headers, known = away_s, {"If-None-Match": response.headers.get("etag", "")}, campaign
-            time.sleep(min(LOOK_S, max(0.0, deadline - time.monotonic())))
-        raise Overdue(f"it did not end within {timeout_s:g} s; it goes on, and can be followed again")
+        return follow(self._transport, _path(campaign_id), timeout_s, away_s)
 
     def wait(
         self,

@@ -1,4 +1,4 @@
-"""Imports run folders of the command line as campaigns that have ended. The folders are copied and never changed."""
+"""Imports run folders of the command line as ended campaigns; the folders are copied."""
 
 import hashlib
 import logging

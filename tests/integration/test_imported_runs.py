@@ -37,6 +37,7 @@ def test_runs_of_the_command_line_are_campaigns_that_have_ended(serve, runs):
     failure = service.get(campaign["id"], f"/failures/{found[0]['id']}")
     assert len(failure["series"]["time_s"]) > failure["steps"]
 
+    assert f"the page is at http://127.0.0.1:{service.port}/page/" in service.log.read_text()
     service.stop()
     service.start()
     assert len(service.client.get("/v1/campaigns").json()["items"]) == 1
