@@ -16,7 +16,7 @@ export const GRADE_WORDS: Record<GradeName, GradeWords> = {
   preventable: { short: "preventable", long: "A reference driver would have prevented it" },
   full_braking: { short: "by full braking", long: "Only full braking at once would have prevented it" },
   unavoidable: { short: "unavoidable", long: "Neither a reference driver nor full braking at once would have prevented it" },
-  none: { short: "not graded", long: "No reference driver was asked" },
+  none: { short: "not graded", long: "No reference driver was tried" },
 };
 
 const FULL_BRAKING = "full_braking";
@@ -87,14 +87,14 @@ function braked(after_s: number | null, by: string): string {
 
 /** Why a violation was refused: what a rule found. */
 const RULES: Record<string, string> = {
-  no_teleport: "the simulator moved somebody by a jump",
+  no_teleport: "the simulator made a road user jump",
   no_spawn_overlap: "two bodies overlapped before the release",
   conflict_after_release: "the conflict began less than 1 s after the release",
   inside_limits: "an adversary left its limits",
   inside_grip: "the striker drove beyond the road's grip",
   solid_bodies: "two bodies overlapped before the contact",
   ego_model_saw: "SUMO does not list the collision",
-  repeats: "it went another way when replayed",
+  repeats: "a replay went differently",
   not_from_behind: "the ego was struck from behind",
   ego_moving: "the ego stood, or nearly",
   no_sideswipe: "the adversary swiped the ego's side",

@@ -24,8 +24,8 @@ export function Verdicts({ what, family, rows }: Props) {
         <section class="block">
           <h3>PCR by reference driver</h3>
           <p class="faint small">
-            Valid contacts that this one would have prevented, per episode, with their 95 % interval; a dash where it was asked of no contact. Full braking at once makes nothing
-            preventable. R157's time-to-collision rule is asked of cut-ins alone.
+            Valid contacts that each driver would have prevented, per episode, with their 95 % interval; a dash where it was tried on no contact. Full braking alone makes no contact
+            preventable. R157's time-to-collision rule applies to cut-ins only.
           </p>
           <Grid {...{ what, rows }} label={`PCR by reference driver: ${family}`} columns={drivers.map((name) => capital(driverWords(name)))}>
             {(row) => drivers.map((name) => <Pcr key={name} found={row.pcr_by_driver[name]} />)}

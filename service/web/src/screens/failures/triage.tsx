@@ -101,7 +101,7 @@ function TriageForm({ begun, error, save, close }: { begun: Begun; error: Error 
     <form onSubmit={submit}>
       {error && (
         <p class="bad" role="alert">
-          It was not kept: {error instanceof TypeError ? "the service does not answer." : error.message}
+          The note was not saved: {error instanceof TypeError ? "the service does not answer." : error.message}
         </p>
       )}
       <fieldset class="states">

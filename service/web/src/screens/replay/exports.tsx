@@ -37,7 +37,7 @@ export function Exports({ failure, path, attempt }: Props) {
         </select>
       </label>
       <button onClick={make} disabled={making || chosen.missing.length > 0}>
-        {making ? "Is made…" : "Download"}
+        {making ? "Preparing …" : "Download"}
       </button>
       <p class="faint small">{chosen.what}</p>
     </div>

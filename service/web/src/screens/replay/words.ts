@@ -50,7 +50,7 @@ export function verdictOf(failure: Failure): string {
   const violation = worstOf(failure);
   const prevented = violation && preventedBy(violation);
   if (prevented) return `${capital(prevented)}.`;
-  return outcome === "failure" ? "It counts as a failure; no reference driver was asked." : "It is refused as a failure.";
+  return outcome === "failure" ? "It counts as a failure; no reference driver was tried." : "A rule refused it as a failure.";
 }
 
 /** Names of the rules that refused it, with what each means. */
