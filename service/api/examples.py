@@ -90,7 +90,7 @@ def title(name: str) -> str:
 
 
 def example_of(operation: str, parameter: str) -> str:
-    """What a parameter may be in a call of an operation."""
+    """Returns an example of a parameter in a call of an operation."""
     return QUERIES.get(operation, {}).get(parameter) or PARAMETERS[parameter]
 
 

@@ -30,7 +30,7 @@ class RaySettings(BaseSettings):
     ray_scratch_dir: Path = Path("/tmp/risk-sac")
     """Folder of every node in which runs work."""
     ray_lease_s: Annotated[float, Field(ge=1, le=600)] = 15.0
-    """A node of which nothing is heard for so long is lost, and its runs are resumed elsewhere, s."""
+    """Silence after which a node counts as lost and its runs are resumed elsewhere, s."""
 
 
 def read_settings() -> RaySettings:
