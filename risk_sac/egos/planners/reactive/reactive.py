@@ -116,7 +116,7 @@ class Reactive:
         if found is None:
             return None
         states = found[0].state_list
-        time_s = np.arange(len(states)) * self._step_s
+        time_s = np.arange(len(states), dtype=np.float64) * self._step_s
         places = [(*s.position, s.orientation, s.velocity) for s in states]
         x, y, headings, speeds = np.array(places).T
         return Trajectory(time_s, x + rear_m * np.cos(headings), y + rear_m * np.sin(headings), speeds)
