@@ -1,7 +1,8 @@
 """Updates row, run counts and project hours for an episode."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
+from statistics import fmean, median_low
 
 from pydantic_core import from_json
 from sqlalchemy.orm import Session
@@ -12,6 +13,8 @@ from risk_sac.records import NO_CONTACT, Collision, EpisodeRecord, Funnel, Outco
 from service.store.tables import EpisodeRow, RequirementRow, RunRow, UsageRow
 
 HOUR_S = 3600
+NEWEST = 40  # episodes that tell the pace of a run
+STALL = 10.0  # times the median: compilation, or a machine that stood still
 TOUCHED = f",{NO_CONTACT},"
 
 
@@ -23,6 +26,12 @@ def add_usage(session: Session, project: str, busy_s: float) -> None:
         session.add(UsageRow(project=project, hour=hour, busy_s=busy_s))
     else:
         row.busy_s += busy_s
+
+
+def pace_s(newest_s: Collection[float]) -> float:
+    """Mean wall time of a run's newest episodes, s, without stalls; there is at least one."""
+    longest_s = STALL * median_low(newest_s)
+    return fmean(each for each in newest_s if each <= longest_s)
 
 
 def count(run: RunRow, row: EpisodeRow, sign: int) -> None:

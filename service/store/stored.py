@@ -24,8 +24,8 @@ class StoredRun(Run, RunResult):
     repetitions: Mapping[int, Repetition]
     """Of its distinct failures, by index of the episode; none if not replayed."""
     headline_candidates: int = 0
-    startup_s: float = 0.0
-    """Of `busy_s`, what passed until the first episode of each attempt."""
+    pace_s: float | None = None
+    """Wall time of an episode of late, s, without the start of the worker and compilation; None before the second."""
 
     @classmethod
     def from_row(cls, row: RunRow, campaign_id: str) -> Self:

@@ -96,7 +96,7 @@ class RunRow(Base):
     headline_candidates: Mapped[int] = mapped_column(default=0)
     headline: Mapped[int | None]  # null before its failures were replayed
     busy_s: Mapped[float] = mapped_column(default=0.0)
-    startup_s: Mapped[float] = mapped_column(default=0.0)  # of it, until the first episode of each attempt
+    pace_s: Mapped[float | None]  # mean of its newest episodes; null before the second one
     attempts: Mapped[int] = mapped_column(default=0)
     metrics: Mapped[str | None] = mapped_column(Text)
     evaluation: Mapped[str | None] = mapped_column(Text)

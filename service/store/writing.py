@@ -2,6 +2,7 @@
 
 import secrets
 import time
+from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
@@ -12,7 +13,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.records import REPEATS, EpisodeRecord, Outcome, State, Triage, TriageState, stored
 from service.errors import ConflictError
-from service.store.counting import add_usage, count, fill, fill_record, tally
+from service.store.counting import NEWEST, add_usage, count, fill, fill_record, pace_s, tally
 from service.store.database import WRITING, storage_errors
 from service.store.finding import find_campaign, find_failure, find_triage
 from service.store.reading import Store
@@ -28,7 +29,7 @@ class Ledger:
     def __init__(self, store: Store) -> None:
         self._store = store
         self._engine = store.engine.execution_options(**WRITING)
-        self._starting = set[int]()  # runs whose worker has not reported an episode yet
+        self._newest_s: dict[int, deque[float]] = {}  # wall times of episodes, by the runs whose worker has told one
         self._repeated_s: dict[int, float] = {}  # time of runs that only repeated what was known
 
     def find(self, project: str, key: str, spec: CampaignSpec) -> StoredCampaign | None:
@@ -70,7 +71,7 @@ class Ledger:
             _move(session, row, State.RUNNING)
             row.started_at = row.started_at or time.time()
             row.attempts += 1
-            self._starting.add(number)
+            self._newest_s.pop(number, None)
 
     def add_episodes(self, events: Sequence[tuple[int, EpisodeDone]]) -> set[int]:
         """Stores episodes with their run's number; replaces those that a resumed run reports differently.
@@ -88,9 +89,9 @@ class Ledger:
                 run, row = runs[number], known.get(_place(number, event))
                 campaign = campaigns[run.campaign_number]
                 self._repeated_s[number] = self._repeated_s.get(number, 0.0) + event.wall_s
-                if number in self._starting:
-                    self._starting.discard(number)
-                    run.startup_s += event.wall_s
+                newest_s = self._newest_s.get(number)
+                if newest_s is None:  # its time includes the start of the worker
+                    self._newest_s[number] = deque(maxlen=NEWEST)
                 if row is not None and row.record == stored(event.record) and row.series_sha256 == event.series_sha256:
                     continue
                 if row is None:
@@ -103,6 +104,9 @@ class Ledger:
                     count(run, row, -1)
                 fill(row, event)
                 count(run, row, +1)
+                if newest_s is not None:
+                    newest_s.append(event.wall_s)
+                    run.pace_s = pace_s(newest_s)
                 if event.record.evaluating:
                     run.evaluation = stored(event.metrics)
                 else:
@@ -122,6 +126,7 @@ class Ledger:
     def end_run(self, number: int, state: State, reason: str | None = None, result: Finished | None = None) -> None:
         """Ends a run, and its campaign with the last one."""
         with self._run(number, "ending a run") as (session, row):
+            self._newest_s.pop(number, None)
             _move(session, row, state, reason)
             row.finished_at = time.time()
             if result is not None:

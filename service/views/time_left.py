@@ -1,10 +1,11 @@
 """Estimates how long a campaign takes until it ends, from its pace and the cost of each method's episodes. Pure.
 
-The time to start a worker is kept apart from the pace: a run spends it once, not once per episode.
+The pace of a run leaves out the start of its worker, which is spent once and not once per episode.
 """
 
 import math
 from collections.abc import Mapping, Sequence
+from statistics import fmean
 
 from risk_sac.config import METHODS, CampaignSpec
 from service.store.stored import StoredCampaign, StoredRun
@@ -56,12 +57,11 @@ def eta_s(runs: Sequence[StoredRun], spec: CampaignSpec, workers: int) -> float 
       workers: runs that are executed at once; 0 while that is unknown.
     """
     work = [_Work(run, spec) for run in runs]
-    paced_s, paced = sum(each.worked_s for each in work), sum(each.done for each in work)
-    if paced == 0 or workers == 0:
+    paces_s = [each.pace_s for each in work if each.pace_s is not None]
+    if not paces_s or workers == 0:
         return None
-    starts = sum(run.attempts for run in runs if run.episodes_done)
-    start_s = sum(run.startup_s for run in runs) / max(1, starts)
-    left = [each.left_s(paced_s / paced, start_s) for each in work if not each.run.state.final]
+    mean_s, start_s = fmean(paces_s), min(each.start_s for each in work if each.pace_s is not None)
+    left = [each.left_s(mean_s, start_s) for each in work if not each.run.state.final]
     return max(max(left, default=0.0), sum(left) / workers)
 
 
@@ -74,7 +74,7 @@ def retry_after_s(campaign: StoredCampaign, workers: int) -> int | None:
 
 
 class _Work:
-    """A run's work in units of `EPISODE_COST`: done and left, without the first episode after each start."""
+    """What a run still has to do, in units of `EPISODE_COST`."""
 
     def __init__(self, run: StoredRun, spec: CampaignSpec) -> None:
         self.run = run
@@ -84,20 +84,21 @@ class _Work:
         self._warm_until = _warm_until(run, spec) if learns else 0
         self._search = run.episodes_total - (0 if run.iid else spec.budget.evaluation_episodes)
         self._cpu_s = math.inf if spec.budget.cpu_s is None or run.iid else spec.budget.cpu_s
-        self.worked_s = max(0.0, run.busy_s - run.startup_s)
-        self.done = self._units(min(run.attempts, run.episodes_done), run.episodes_done)
+        done, took_s = run.episodes_done, run.pace_s
+        self.pace_s = None if took_s is None else took_s / self._units(done - 1, done)
+        self.start_s = 0.0 if took_s is None else max(0.0, run.busy_s - done * took_s)
 
     def left_s(self, mean_pace_s: float, start_s: float) -> float:
-        """Time that the run still needs, s; `mean_pace_s` where it has no pace of its own."""
-        done = self.run.episodes_done
-        pace_s = self.worked_s / self.done if self.done else mean_pace_s
-        search_s = pace_s * self._units(done, max(done, self._search))
-        evaluation_s = pace_s * self._units(max(done, self._search), max(done, self.run.episodes_total))
-        return min(search_s, max(0.0, self._cpu_s - self.worked_s)) + evaluation_s + (0.0 if done else start_s)
+        """Time that the run still needs, s; `mean_pace_s` and `start_s` are used where it has no pace of its own."""
+        done, total = self.run.episodes_done, max(self.run.episodes_done, self.run.episodes_total)
+        pace_s = mean_pace_s if self.pace_s is None else self.pace_s
+        searched = max(done, self._search)
+        search_s = min(pace_s * self._units(done, searched), max(0.0, self._cpu_s - self.run.busy_s))
+        return search_s + pace_s * self._units(searched, total) + (0.0 if done else start_s)
 
     def _units(self, first: int, last: int) -> float:
         """Work of the episodes from `first` up to `last`; a frozen policy costs as much as a warm start."""
-        learning = max(0, min(last, self._search) - max(first, self._warm_until))
+        learning = max(0.0, min(last, self._search) - max(first, self._warm_until))
         return learning * self._cost + (last - first - learning) * self._cheap
 
 

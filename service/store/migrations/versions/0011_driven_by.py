@@ -1,4 +1,4 @@
-"""Adds what drove an episode's adversaries and workers' start times; unknown for older ones."""
+"""Adds what drove an episode's adversaries and the pace of runs; unknown for older ones."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -11,7 +11,7 @@ KINDS = ("policy", "model", "script", "random")
 
 def upgrade() -> None:
     """Adds the columns, and fills the first from records that were stored before a step back."""
-    op.add_column("runs", sa.Column("startup_s", sa.Double, nullable=False, server_default="0"))
+    op.add_column("runs", sa.Column("pace_s", sa.Double))
     op.add_column("episodes", sa.Column("driven_by", sa.String))
     written = {kind: f'%"driven_by":"{kind}"%' for kind in KINDS}
     cases = " ".join(f"WHEN record LIKE :{kind} THEN '{kind}'" for kind in KINDS)
@@ -21,5 +21,5 @@ def upgrade() -> None:
 
 def downgrade() -> None:
     """Drops them; the records keep what drove the adversaries."""
-    op.drop_column("runs", "startup_s")
+    op.drop_column("runs", "pace_s")
     op.drop_column("episodes", "driven_by")

@@ -70,7 +70,7 @@ def test_one_step_back_leaves_all_rows_to_the_version_before(settings, episode, 
     assert f"is at step {BEFORE}" in capsys.readouterr().out
     before = tables(settings.url)
     assert newest.keys() == before.keys()
-    for table, column in (("episodes", "driven_by"), ("runs", "startup_s")):
+    for table, column in (("episodes", "driven_by"), ("runs", "pace_s")):
         gone = set(newest[table][0]) - set(before[table][0])
         assert {name for name, *_ in gone} == {column}
     assert main(["back"]) == 1, "no further"

@@ -64,19 +64,21 @@ def test_an_episode_reported_twice_is_stored_and_counted_once(store, ledger, epi
     assert store.usage("default").cpu_s == 2.5
 
 
-def test_the_start_of_each_attempt_is_known_apart(store, ledger, episode):
+def test_the_pace_leaves_out_the_start_of_each_attempt_stalls_and_repetitions(store, ledger, episode):
     campaign = ledger.create(SPEC)
     number = start(store, ledger)
-    ledger.add_episodes(
-        [(number, episode(index).model_copy(update={"wall_s": took})) for index, took in ((0, 9.0), (1, 0.5))]
-    )
+
+    def paced(*took):
+        for index, took_s in took:
+            ledger.add_episodes([(number, episode(index).model_copy(update={"wall_s": took_s}))])
+        return store.campaign(campaign.id).runs[0].pace_s
+
+    assert paced((0, 9.0)) is None
+    assert paced((1, 0.5), (2, 0.5), (3, 40.0), (4, 0.5)) == 0.5
     ledger.requeue_run(number)
     ledger.start_run(number)
-    ledger.add_episodes(
-        [(number, episode(index).model_copy(update={"wall_s": took})) for index, took in ((1, 7.0), (2, 0.5))]
-    )
-    run = store.campaign(campaign.id).runs[0]
-    assert (run.startup_s, run.busy_s, run.attempts) == (16.0, 17.0, 2)
+    assert paced((3, 7.0), (4, 0.0), (5, 0.25), (6, 0.75)) == 0.5
+    assert store.campaign(campaign.id).runs[0].busy_s == 58.5
 
 
 def test_an_episode_that_comes_out_otherwise_replaces_the_first(store, ledger, episode):
