@@ -74,6 +74,7 @@ ROUTES = {
     ("GET", f"{CAMPAIGN}/failure-table"): ("read", 200),
     ("GET", f"{CAMPAIGN}/curves"): ("read", 200),
     ("GET", f"{CAMPAIGN}/power"): ("read", 200),
+    ("GET", f"{CAMPAIGN}/scenes"): ("read", 200),
     ("GET", f"{CAMPAIGN}/clusters"): ("read", 200),
     ("GET", f"{CAMPAIGN}/report"): ("read", 200),
     ("GET", f"{CAMPAIGN}/export"): ("read", 422),  # without a format

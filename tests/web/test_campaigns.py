@@ -91,7 +91,7 @@ def test_filters_are_the_apis_and_stay_in_the_address(
     expect(rows(page)).to_have_count(1)
     assert shown_ids(page) == [campaign]
     page.get_by_label("State").select_option("failed")
-    expect(page.get_by_text("No campaign is like that.")).to_be_visible()
+    expect(page.get_by_text("No campaign matches.")).to_be_visible()
     page.get_by_role("button", name="All campaigns").click()
     expect(rows(page)).to_have_count(3)
     page.get_by_label("Search").fill(HOSTILE)
@@ -109,7 +109,7 @@ def test_words_of_a_label_or_an_id_find_a_campaign_while_they_are_typed(
         expect(page.locator("td.campaign-name a")).to_have_count(1)
         expect(page.locator("td.campaign-name a")).to_have_attribute("href", f"#/campaigns/{found}")
     page.get_by_label("Search").fill("100% more")  # no wildcard
-    expect(page.get_by_text("No campaign is like that.")).to_be_visible()
+    expect(page.get_by_text("No campaign matches.")).to_be_visible()
     page.reload()
     expect(page.get_by_label("Search")).to_have_value("100% more")
 

@@ -51,7 +51,7 @@ def question(page: Page) -> None:
 
 def places(page: Page) -> None:
     page.get_by_alt_text("The map from above").wait_for()
-    page.get_by_text("Why elsewhere not").click()
+    page.get_by_text("Where no pattern fits").click()
 
 
 # What reaches beyond its parent to the right; not what scrolls, floats above the page, or hangs out by its margin.

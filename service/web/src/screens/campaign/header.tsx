@@ -114,7 +114,7 @@ function Actions({ campaign, again }: { campaign: Campaign; again: () => void })
       {asking === "cancel" && (
         <Confirm title="Cancel this campaign?" verb="Cancel the campaign" act={async () => { await send("POST", `${path}/cancel`); again(); }} close={() => setAsking(undefined)}>
           <p>
-            Its runs stop after the episode they are at. What was found stays. A cancelled campaign cannot go on, but it can be cloned.
+            Its runs stop after their current episode. What was found stays. A cancelled campaign cannot go on, but it can be cloned.
           </p>
         </Confirm>
       )}

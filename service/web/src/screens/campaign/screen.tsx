@@ -32,7 +32,7 @@ export function CampaignScreen({ id }: { id: string }) {
     return (
       <div class="state" role="alert">
         <h1>There is no such campaign</h1>
-        <p class="breaking">“{id}” was deleted, or never was.</p>
+        <p class="breaking">No campaign has the id “{id}”; it may have been deleted.</p>
         <a href="#/campaigns">To the campaigns</a>
       </div>
     );

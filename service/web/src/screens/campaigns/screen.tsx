@@ -93,7 +93,7 @@ function Nothing({ filtered }: { filtered: boolean }) {
   return (
     <Empty>
       {filtered ? (
-        <p>No campaign is like that.</p>
+        <p>No campaign matches.</p>
       ) : (
         <>
           <h2>No campaign yet</h2>

@@ -148,7 +148,7 @@ function Listed({ id, found }: { id: string; found: Places }) {
       </ul>
       {fits.length > most && <button onClick={() => setMost(most + SHOWN)}>Show more</button>}
       <details class="map-elsewhere">
-        <summary>Why elsewhere not ({count(misfits.length)})</summary>
+        <summary>Where no pattern fits ({count(misfits.length)})</summary>
         <ul class="spots">
           {misfits.slice(0, most).map((spot) => (
             <Row key={spot.pattern + spot.place} spot={spot} said={spot.why} />

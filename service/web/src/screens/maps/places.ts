@@ -14,9 +14,9 @@ export function again(found: Places): number | null {
 
 /** The patterns in the order of the API's description, with what happens in each. */
 export const PATTERNS: readonly { name: Pattern; title: string; about: string }[] = [
-  { name: "car_following", title: "Car following", about: "who is ahead or beside brakes, adapts speed and cuts in" },
+  { name: "car_following", title: "Car following", about: "vehicles ahead and beside brake, adapt their speed and cut in" },
   { name: "crossing", title: "Hidden pedestrian", about: "a pedestrian steps out from behind a vehicle at a crossing" },
-  { name: "junction", title: "Junction", about: "others cross or turn, and a pedestrian walks" },
+  { name: "junction", title: "Junction", about: "vehicles cross or turn, and a pedestrian walks" },
 ];
 
 export const MOST_PLACES = 100; // of one campaign

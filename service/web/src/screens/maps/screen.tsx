@@ -22,7 +22,7 @@ export function MapsScreen() {
     <div class="maps grid">
       <div class="head">
         <h1>Maps</h1>
-        <span class="faint">Campaigns can be run on roads of yours.</span>
+        <span class="faint">Run campaigns on your own roads.</span>
       </div>
       <Upload />
       <Shown asked={asked} what="the maps">
