@@ -1,8 +1,10 @@
 """Each defect changes what its sentence says, and nothing else."""
 
+import csv
 import math
 from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +12,7 @@ import pytest
 
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
-from risk_sac.egos.defects.catalogue import DEFECTS, planted
+from risk_sac.egos.defects.catalogue import DEFECTS, planted, version_of
 from risk_sac.egos.defects.planted import Planted
 from risk_sac.egos.idm_aeb import IdmAeb
 from risk_sac.egos.registry import pinned
@@ -21,6 +23,8 @@ from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Signal, 
 CAR, TRUCK, WALKER = (Kind.VEHICLE, 4.6, 1.85), (Kind.VEHICLE, 8.0, 2.4), (Kind.PEDESTRIAN, 0.5, 0.5)
 Actor = tuple[str, tuple[Kind, float, float], float, float, float, float]
 """Name, body, m ahead of the ego's centre, m to its left, velocity along and across, m/s."""
+ADMISSION = Path(__file__).parents[3] / "risk_sac/report/measured/admission.csv"  # of tests.acceptance.defects
+LEAST_SCENES = 100
 PYTHON = [name for name, defect in DEFECTS.items() if defect.kind != "sumo"]
 
 
@@ -292,6 +296,19 @@ def test_about_a_third_is_the_test_set_with_each_kind_in_it() -> None:
     tested = [defect for defect in DEFECTS.values() if defect.test_set]
     assert 0.28 <= len(tested) / len(DEFECTS) <= 0.36
     assert {defect.kind for defect in tested} == {defect.kind for defect in DEFECTS.values()}
+
+
+def test_every_row_is_admitted_in_its_first_family() -> None:
+    rows = {row["defect"]: row for row in csv.DictReader(ADMISSION.read_text(encoding="utf-8").splitlines())}
+    assert rows.keys() == DEFECTS.keys()
+    for name, row in rows.items():
+        assert row["version"] == version_of(read_ego(f"{DEFECTS[name].base}+{name}")), (
+            f"{name} has changed; play it again"
+        )
+        assert row["family"] == DEFECTS[name].families[0]
+        assert int(row["undisturbed_scenes"]) >= LEAST_SCENES, name
+        assert row["undisturbed_detected"] == "0", name
+        assert 0 < int(row["detected"]) <= 200_000, name
 
 
 def test_a_row_says_the_value_that_it_sets() -> None:
