@@ -53,7 +53,7 @@ def add(commands: Commands) -> None:
     parser.group("execution").add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help=jobs)
     shown = "write the tables of the runs that have ended so far; play nothing"
     parser.group("execution").add_argument("--tables-only", action="store_true", help=shown)
-    out = "a folder for each run, and detections.csv, benchmark.md and curves.svg of those that have ended"
+    out = "a folder for each run, and tables and figures of those that have ended"
     parser.group("output").add_argument("--out", type=Path, required=True, metavar="DIR", help=out)
     worth = add_command(
         commands,
@@ -76,6 +76,7 @@ def add(commands: Commands) -> None:
 def _benchmark(options: argparse.Namespace) -> int:
     # Here, because loading the simulator takes seconds.
     from risk_sac.benchmark.runs import Benchmark, ended, play
+    from risk_sac.benchmark.statistics import balanced
     from risk_sac.benchmark.table import METHODS as COLUMNS
     from risk_sac.benchmark.table import methods_rows, write
 
@@ -97,7 +98,7 @@ def _benchmark(options: argparse.Namespace) -> int:
                     write(found, options.out, options.typed)
                     written_s = time.monotonic()
     write(found, options.out, options.typed)
-    say(folded_table(COLUMNS, methods_rows(found)))
+    say(folded_table(COLUMNS, methods_rows(balanced(found))))
     return OK
 
 
