@@ -1,4 +1,4 @@
-"""Another body along the ego's path, which may bend, and the conflict with one that drives the ego's way.
+"""Locates another body along the ego's path; detects conflicts with same-direction vehicles.
 
 Source: UN Regulation 157, Annex 3 (guidance on traffic disturbance critical scenarios): a cut-in is perceived 0.375 m
 off the lane's centre, a leader's braking from 5 m/s² on, and both are a danger below 2 s to collision. One beside the
@@ -35,7 +35,10 @@ class Along(NamedTuple, Generic[F]):
 
 @compiled
 def along(path: Path, first: int, s: float, speed: float, size: Size, other: Body[float]) -> Along[float]:
-    """Places a body along the ego's path; the ego is at `s`, and `first` is the last point it has passed."""
+    """Places a body along the ego's path, which may bend.
+
+    The ego is at `s`; `first` is the last point of the path that it has passed.
+    """
     other_s, across, heading = project(path, first, other.x, other.y)
     turn = other.heading - heading
     cos, sin, (half_length, half_width) = abs(math.cos(turn)), abs(math.sin(turn)), other.size
@@ -67,7 +70,7 @@ def _along_rows(path: Path, speed: Floats, size: Size, other: Body[Floats]) -> F
 
 @compiled
 def towards(across_m: float, offset_m: float, lane_width_m: float) -> float:
-    """How far a vehicle is off the centre of the lane beside the ego's, towards the ego, m.
+    """Computes a vehicle's offset from its lane's centre towards the ego, m.
 
     SUMO's offset jumps by a lane's width when the vehicle passes to the next lane; where it stands across the ego's
     path tells which lane's centre is meant. Without a recorded offset (NaN) that place alone decides.
@@ -86,7 +89,7 @@ def towards(across_m: float, offset_m: float, lane_width_m: float) -> float:
 def lane_conflict(
     other: Along[float], speed_mps: float, offset_m: float, accel_mps2: float, lane_width_m: float, wary: bool
 ) -> tuple[bool, bool]:
-    """Whether a conflict begins with a vehicle that drives the ego's way, and whether one goes on that had begun.
+    """Detects the beginning and the continuation of a conflict with a same-direction vehicle.
 
     A cut-in begins when the vehicle is more than 0.375 m off its lane's centre towards the ego, and less than 2 s
     ahead, or alongside and coming nearer; a conflict with a leader when it brakes harder than 5 m/s², or is less than

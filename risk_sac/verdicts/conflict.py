@@ -1,4 +1,4 @@
-"""When, where and how the conflict with the striker began.
+"""Finds when, where and how the conflict with the striker began.
 
 Sources: UN Regulation 157, Annex 3, for cut-ins and leaders; for pedestrians and crossing vehicles R157's driver
 after Engström et al., "Modeling road user response timing in naturalistic traffic conflicts" (arXiv 2208.08651).
@@ -43,7 +43,7 @@ BRAKES_MPS2 = 1.5  # Krauss's drivers dawdle with up to σ · accel = 1.3 m/s²,
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conflict:
-    """How the conflict that ended in the contact came about."""
+    """Origin of the conflict that ended in the contact."""
 
     type: ConflictType
     frame: int  # when it began for a driver that sees what the ego sees
@@ -114,7 +114,9 @@ def _lane_conflicts(evidence: Evidence, striker: int, seen: Along[Floats], *, wa
 
 
 def left_its_place(evidence: Evidence) -> int | None:
-    """Finds when the ego's front came to be more than 0.375 m beside its place; None if it is not in the last frame.
+    """Finds when the ego's front left its place by more than 0.375 m.
+
+    Returns None if it is back in its place in the last frame.
 
     Its place is the one that it had across its lane 3 s before the last frame.
     """
@@ -124,7 +126,9 @@ def left_its_place(evidence: Evidence) -> int | None:
 
 
 def left_its_lane(evidence: Evidence, striker: int) -> int | None:
-    """Finds the frame in which the ego left its lane and so came over to the striker; None if it did not.
+    """Finds the frame in which the ego left its lane towards the striker.
+
+    Returns None if it did not.
 
     Choice: it came over if it would not have touched the striker up to 1 s after the contact, had it kept its place.
     """
@@ -142,7 +146,10 @@ def left_its_lane(evidence: Evidence, striker: int) -> int | None:
 
 
 def came_further(evidence: Evidence, striker: int, seen: Along[Floats]) -> bool:
-    """Tells whether the striker moved further across in the last 3 s, towards the ego, than the ego towards it."""
+    """Tells whether the striker moved further across than the ego in 3 s.
+
+    Each one's movement counts towards the other.
+    """
     e, first = evidence, evidence.since(TURN_WINDOW_S)
     side = math.copysign(1.0, seen.across_m[-1])
     own = front_moved_across(e)
@@ -151,7 +158,10 @@ def came_further(evidence: Evidence, striker: int, seen: Along[Floats]) -> bool:
 
 
 def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
-    """Whether the ego was on a visible collision course for 1.5 s or more until the contact and never braked in it."""
+    """Tells whether the ego never braked on a visible collision course.
+
+    The course lasted for 1.5 s or more, until the contact.
+    """
     first = conflict.course_from
     lasted = evidence.time_s[-1] - evidence.time_s[first] >= UNRESPONSIVE_S - 1e-6
     return bool(lasted and (evidence.accel_mps2[first:, 0] > -BRAKES_MPS2).all())
@@ -159,7 +169,10 @@ def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
 
 @compiled
 def lasting_since(begins: Bools, lasts: Bools) -> int:
-    """The first frame in which a condition begins that then lasts until the last frame, in which it holds anyway."""
+    """Finds the first frame of a condition that lasts until the last frame.
+
+    In the last frame the condition holds anyway.
+    """
     first, missing = len(begins) - 1, 0
     for t in range(len(begins) - 2, -1, -1):
         if begins[t]:
@@ -187,9 +200,9 @@ def collision_courses(path: Path, speed: Floats, size: Size, motion: Body[Floats
 
 
 def _at_the_carriageway(evidence: Evidence, striker: int) -> Bools:
-    """Whether the pedestrian is on the carriageway, or at most 1 s from its kerb.
+    """Tells whether the pedestrian is on the carriageway or within 1 s of it.
 
-    It is not asked of a pedestrian that was struck beside the carriageway: the ego came to it.
+    It holds in all frames for a pedestrian that was struck beside the carriageway: there the ego left the carriageway.
     """
     e, ground = evidence, evidence.ground
     x, y, areas = e.x_m[:, striker], e.y_m[:, striker], ground.roadway + ground.crossings
@@ -199,7 +212,9 @@ def _at_the_carriageway(evidence: Evidence, striker: int) -> Bools:
 
 
 def _drives_the_same_way(evidence: Evidence, striker: int, turn_rad: Floats) -> bool:
-    """Whether the striker drives the ego's way: in the last 3 s within 60 degrees of its path, and once within 30.
+    """Tells whether the striker drives in the ego's direction.
+
+    In the last 3 s its direction stays within 60 degrees of the ego's path, and is once within 30.
 
     One that the ego follows round a bend does; one that turns into the ego's way comes from across.
     """
@@ -210,7 +225,9 @@ def _drives_the_same_way(evidence: Evidence, striker: int, turn_rad: Floats) -> 
 
 
 def _way_to_corridor(path: Path, evidence: Evidence, striker: int) -> Floats:
-    """Metres that the striker still had to go to the ego's corridor, `T`; inf earlier than 4 s before the contact.
+    """Computes the striker's remaining way to the ego's corridor, `T`, m.
+
+    It is inf earlier than 4 s before the contact.
 
     Both paths are on record, so where they meet is known, and that both come there too.
     """

@@ -8,7 +8,7 @@ from risk_sac.jit import compiled
 from risk_sac.types import Floats
 from risk_sac.verdicts.path import Path, pose_at
 
-HORIZON_S = 4.0  # nobody foresees further
+HORIZON_S = 4.0  # look-ahead of every driver
 LOOK_S = 0.05  # between two looks at what is foreseen; at 30 m/s of closing 1.5 m, less than a car is long
 CORRIDOR_M = 0.375  # the ego's corridor is this much wider than itself to either side
 
@@ -29,7 +29,7 @@ class Body(NamedTuple, Generic[F]):
 
 @compiled
 def with_margin(size: Size) -> Size:
-    """What an ego of this size takes up on its way, with a margin to either side."""
+    """Adds the corridor's margin to either side of an ego of this size."""
     return Size(size.half_length, size.half_width + CORRIDOR_M)
 
 
@@ -41,7 +41,9 @@ def at(motion: Body[Floats], t: int) -> Body[float]:
 
 @compiled
 def time_to_touch(path: Path, s: float, speed: float, size: Size, other: Body[float], horizon: float) -> float:
-    """Time until the ego, keeping its speed along its path, touches a body that keeps its velocity, s; or inf.
+    """Computes the time until the ego touches another body, s; inf if never.
+
+    The ego keeps its speed along its path, the body its velocity.
 
     The ego is at `s` on its path; `size` is its own, or its corridor's. Looks at which the two are too far apart, even
     if they came straight towards each other, are left out.
@@ -68,7 +70,9 @@ def time_to_touch(path: Path, s: float, speed: float, size: Size, other: Body[fl
 def entry_distance(
     path: Path, first: int, reach_s: float, size: Size, x: Floats, y: Floats, heading: Floats, other_size: Size
 ) -> tuple[float, float]:
-    """Metres that a body has to go until it is in the ego's corridor, and where along the ego's path that is.
+    """Computes a body's way to the ego's corridor, and where it enters.
+
+    The way is in metres, and so is the place, along the ego's path.
 
     Args:
       path: of the ego; its corridor is what the ego's body sweeps from the `first` point on, up to `reach_s`.

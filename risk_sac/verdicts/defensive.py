@@ -1,20 +1,20 @@
 """Computes how much the defensive driver speeds up or brakes.
 
-1. It keeps a speed at which it can stop, at 3.4 m/s² after 0.75 s, before a place that it does not see and from which a
-   pedestrian could come into its way before it has passed: a crossing with 2 m of waiting area at either end, or the
-   kerb behind a vehicle that stands beside its path.
+1. It keeps a speed at which it can stop, at 3.4 m/s² after 0.75 s, before a place that it does not see. That is a place
+   from which a pedestrian could come into its way before it has passed: a crossing with 2 m of waiting area at either
+   end, or the kerb behind a vehicle that stands beside its path.
 2. Where a vehicle stops at the crossing in another lane of its direction, all of the crossing has to be in sight.
-3. It does not start or speed up while a pedestrian is within 1.5 m of its corridor, or a pedestrian or a crossing
-   vehicle would reach the corridor within 3 s. From 0.75 s after it saw a pedestrian on the carriageway or at a
-   crossing it can stop before it.
+3. It does not start or speed up while a pedestrian is within 1.5 m of its corridor. Nor does it while a pedestrian or a
+   crossing vehicle would reach the corridor within 3 s. From 0.75 s after it saw a pedestrian on the carriageway or at
+   a crossing it can stop before it.
 4. It brakes for a conflict: with 3.4 m/s² after 0.75 s if that is enough, or else as R157's driver, until the conflict
    has been over for 1 s.
 
 Choices: it creeps past what it cannot see, so that it never stands for ever. A pedestrian that stands with its whole
 body beside the carriageway on red, or has stood there for 4 s, waits; on the carriageway the driver creeps past one
-that has stood for 4 s. While the ego's signal gives it priority, a crossing is taken as empty, and traffic from across
-is expected to stop if it still can, unless it has passed its own signal. Vehicles ahead on its own lane that move hide
-nothing: they go through first.
+that has stood for 4 s. While the ego's signal gives it priority, a crossing is taken as empty. Traffic from across is
+then expected to stop if it still can, unless it has passed its own signal. Vehicles ahead on its own lane that move
+hide nothing: they go through first.
 
 Sources: 3.4 m/s² and the 2.5 s of a driver that is not prepared: AASHTO, "A Policy on Geometric Design of Highways and
 Streets" (Green Book), stopping sight distance. 0.75 s and full braking: UN R157, Annex 3; the driver is prepared.

@@ -1,4 +1,4 @@
-"""Which failures are different ones: by signature first, then by cells of what varies within it.
+"""Tells distinct failures apart, by signature and then by cells of severity.
 
 Choice: fixed cells, not the distance to failures found before: the number of filled cells does not depend on the
 order, so a resumed run or two pooled runs count alike. The edges are where people begin to die (30 km/h) and where a
@@ -56,7 +56,7 @@ def cell(values: Sequence[float]) -> Cell:
 
 
 def niche_of(violation: Collision | Violation) -> Niche:
-    """What two violations share that are not distinct."""
+    """Returns the key that violations share if they are not distinct."""
     return violation.requirement, violation.signature, cell_of(violation)
 
 
@@ -67,7 +67,7 @@ def kind_name(violation: Collision | Violation) -> str:
 
 
 class DistinctFailures:
-    """Counts distinct failures, one by one; a policy that repeats its one way to make the ego fail is paid once."""
+    """Count of distinct failures; repeating one failure counts once."""
 
     def __init__(self) -> None:
         self._found: set[Niche] = set()

@@ -35,7 +35,7 @@ RSS = RssParameters(
 
 
 class Situation(NamedTuple):
-    """What a driver goes by, besides the time."""
+    """Input of a reference driver, besides the time."""
 
     along: Along[float]  # the striker along the ego's path
     speed_mps: float  # its own
@@ -65,7 +65,9 @@ def full_braking(grip: float) -> float:
 
 @compiled
 def fuzzy(situation: Situation) -> float:
-    """Braking that the fuzzy safety model asks for, m/s²; 0 where the striker is not, and will not be, in the way.
+    """Computes the braking that the fuzzy safety model asks for, m/s².
+
+    It is 0 where the striker is not in the way and will not be.
 
     Choice: beside leaders and cut-ins, anybody in the ego's corridor, or on the way into it, is taken for a leader that
     drives with its speed along the ego's path.
@@ -94,7 +96,10 @@ def rss(situation: Situation) -> float:
 
 @compiled
 def towards_command(braking_mps2: float, wanted: float, grip: float, step_s: float) -> float:
-    """The braking after a step in which it may change by 12.65 m/s³ and stays below 0.774 g and the road's grip."""
+    """Limits the change and the size of the braking over one step.
+
+    It changes by at most 12.65 m/s³ and stays below 0.774 g and the road's grip.
+    """
     wanted = min(wanted, FULL_MPS2, grip)
     change = JERK_MPS3 * step_s
     return min(max(wanted, braking_mps2 - change), braking_mps2 + change)

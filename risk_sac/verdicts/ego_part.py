@@ -26,7 +26,9 @@ SLOW_MPS = 3.0  # an ego that stands looks as far ahead as at this speed
 
 
 def ego_part(evidence: Evidence, striker: int, conflict: Conflict, yields: str | None) -> EgoPart:
-    """States what the ego did about the actor in column `striker` until it touched it in the last frame.
+    """Computes the ego's reaction to the actor in column `striker` until the contact.
+
+    The contact is in the last frame.
 
     `yields` names which had to yield to the other: ego | striker | None, as for `left_first`.
     """
@@ -50,7 +52,10 @@ def ego_part(evidence: Evidence, striker: int, conflict: Conflict, yields: str |
 
 
 def in_view_from(evidence: Evidence, striker: int) -> int | None:
-    """Finds the frame since which the striker was in view without a break of more than 0.5 s; None if it is not."""
+    """Finds the frame since which the striker was continuously in view.
+
+    Breaks of up to 0.5 s are ignored. Returns None if it is out of view at the end.
+    """
     frames = np.flatnonzero(evidence.known[:, striker])
     flicker = round(FLICKER_S / evidence.step_s)
     if len(frames) == 0 or len(evidence.time_s) - 1 - frames[-1] > flicker:
@@ -87,7 +92,9 @@ def _gained(speed: Floats, responds: int) -> float:
 
 
 def _started(evidence: Evidence, striker: int, conflict: Conflict, near: Bools) -> bool:
-    """Whether the ego stood or braked within the last 4 s, and then drove on though it saw the striker there.
+    """Tells whether the ego drove on although it saw the striker in its way.
+
+    It did so if it stood or braked within the last 4 s and then sped up.
 
     That is in its way or beside it. A crossing vehicle is there once it is in the junction, whether it moves or stands.
     """
@@ -105,7 +112,9 @@ def _started(evidence: Evidence, striker: int, conflict: Conflict, near: Bools) 
 
 
 def _sight_speed(sighted: int, seen: Along[Floats]) -> float | None:
-    """Computes the speed from which the ego could have stopped before the place where the striker came into view.
+    """Computes the speed from which the ego could have stopped in time.
+
+    It would have stopped before the place where the striker came into view.
 
     It would respond within R157's 0.75 s and brake with 3.4 m/s². None if the striker was in view all along, or was not
     ahead.

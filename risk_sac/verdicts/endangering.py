@@ -45,7 +45,10 @@ def endangered_ego(evidence: Evidence, striker: int, conflict: Conflict) -> tupl
 
 
 def changes_lane_unsafely(evidence: Evidence, striker: int, seen: Along[Floats]) -> bool:
-    """Tells whether a vehicle came into the ego's lane beside it, or with less room than UN R157 allows."""
+    """Tells whether a vehicle entered the ego's lane without enough room.
+
+    Beside the ego there is none; ahead of it UN R157 says how much.
+    """
     if np.ptp(seen.across_m[evidence.since(RECENT_S) :]) <= WANDER_M:  # it kept its place
         return False
     return not enters_safely(evidence, striker, seen, R157_GAP_M)
@@ -63,10 +66,10 @@ def enters_safely(evidence: Evidence, striker: int, seen: Along[Floats], least_g
 
 
 def checks_brakes(evidence: Evidence, striker: int, seen: Along[Floats], began: int) -> bool:
-    """Tells whether a vehicle before the ego braked by over 4 m/s² for 0.5 s without a reason on record.
+    """Tells whether a vehicle before the ego braked hard without a reason.
 
-    It is asked of the last 3 s, or from frame `began` of the conflict on. A reason is a road user within 30 m ahead of
-    it, or a signal at which it may have to stop.
+    Hard is over 4 m/s² for 0.5 s, in the last 3 s or from frame `began` of the conflict on. A reason is a road user
+    within 30 m ahead of it, or a signal at which it may have to stop.
     """
     e = evidence
     first = min(began, e.since(RECENT_S))
@@ -78,9 +81,9 @@ def checks_brakes(evidence: Evidence, striker: int, seen: Along[Floats], began: 
 
 
 def turns_into_path(evidence: Evidence, striker: int) -> bool:
-    """Tells whether a pedestrian turned by 30° or more into the way of an ego that it could see.
+    """Tells whether a pedestrian turned into the way of an ego in sight.
 
-    It is asked of the last 4 s. What the ego sees can see the ego.
+    It turned by 30° or more within the last 4 s. What the ego sees can see the ego.
     """
     e = evidence
     first = e.since(HORIZON_S)
@@ -97,7 +100,10 @@ def turns_into_path(evidence: Evidence, striker: int) -> bool:
 
 
 def _intrusion(evidence: Evidence, striker: int, seen: Along[Floats]) -> int:
-    """Finds the frame in which the striker last came 0.3 m into the ego's lane; the contact's if it did not."""
+    """Finds when the striker last came 0.3 m into the ego's lane.
+
+    Returns the frame of the contact if it did not.
+    """
     e = evidence
     reach = (
         np.abs(np.sin(seen.turn_rad)) * e.length_m[striker] + np.abs(np.cos(seen.turn_rad)) * e.width_m[striker]
@@ -108,7 +114,10 @@ def _intrusion(evidence: Evidence, striker: int, seen: Along[Floats]) -> int:
 
 
 def _any_ahead(evidence: Evidence, vehicle: int, frames: NDArray[np.int64]) -> Bools:
-    """Tells whether another road user is within 30 m before a vehicle and in its way, or about to be."""
+    """Tells whether a road user is, or soon will be, before a vehicle.
+
+    It is within 30 m ahead and in the vehicle's way.
+    """
     e = evidence
     others = np.delete(np.arange(len(e.ids)), vehicle)
     dx, dy = (each[np.ix_(frames, others)] - each[frames, vehicle, None] for each in (e.x_m, e.y_m))

@@ -1,4 +1,4 @@
-"""What is recorded of an episode up to its contact, as arrays: all that a judge may look at."""
+"""Record of an episode up to its contact, as arrays; the judge's only input."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ PER_ACTOR = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ground:
-    """Where an episode takes place, as far as a verdict depends on it."""
+    """Place of an episode, as far as a verdict depends on it."""
 
     friction: float = 1.0
     speed_limit_mps: float = 13.89
@@ -41,14 +41,17 @@ class Ground:
 
     @classmethod
     def of(cls, layout: Layout, speed_limit_mps: float) -> "Ground":
-        """Where a layout is."""
+        """Reads the place from a layout."""
         names = ("friction", "lane_width_m", "crossings", "junctions", "roadway", "net")
         return cls(speed_limit_mps=speed_limit_mps, **{name: getattr(layout, name) for name in names})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evidence:
-    """`T` frames up to and including the contact's, `n` actors; the ego is column 0, NaN where an actor has left."""
+    """Arrays of `T` frames up to the contact and `n` actors.
+
+    The ego is column 0. Values are NaN where an actor has left.
+    """
 
     time_s: Floats  # T, from the adversaries' release; negative before it
     ids: tuple[str, ...]
@@ -109,7 +112,10 @@ class Evidence:
 
 
 def inside(areas: Sequence[Area], x_m: Floats, y_m: Floats, margin_m: float = 0.0) -> Bools:
-    """Which points lie in any of the areas, or no further than `margin_m` outside one."""
+    """Tells which points lie in any of the areas.
+
+    Points up to `margin_m` outside an area count too.
+    """
     found = np.zeros(np.shape(x_m), dtype=np.bool_)
     for area in areas:
         here = np.ones(np.shape(x_m), dtype=np.bool_)
@@ -122,7 +128,10 @@ def inside(areas: Sequence[Area], x_m: Floats, y_m: Floats, margin_m: float = 0.
 def soon_inside(
     areas: Sequence[Area], x_m: Floats, y_m: Floats, vx_mps: Floats, vy_mps: Floats, ahead_s: float
 ) -> Bools:
-    """Which points are in one of the areas now or, keeping their velocity, within `ahead_s`."""
+    """Tells which points are in one of the areas within `ahead_s`.
+
+    They keep their velocity.
+    """
     t = np.linspace(0.0, ahead_s, KERB_STEPS + 1)[:, None]
     soon: Bools = np.any(inside(areas, x_m + t * vx_mps, y_m + t * vy_mps), axis=0)
     return soon

@@ -18,7 +18,9 @@ REST_M = 2.0  # d1: wanted between the two when both stand
 
 @compiled
 def proactive(gap: float, ego: float, leader: float) -> float:
-    """PFS: 0 where the ego could still stop in comfort behind a leader that brakes hard, 1 where not even at its best.
+    """Computes PFS, the proactive fuzzy metric: 0 is safe, 1 is unsafe.
+
+    0: the ego could stop in comfort behind a leader that brakes hard. 1: it could not even with its hardest braking.
 
     d_safe = u_e τ + u_e²/(2 b_comf) − u_l²/(2 b_lead),  d_unsafe = u_e τ + u_e²/(2 b_max) − u_l²/(2 b_lead)
 
@@ -32,12 +34,15 @@ def proactive(gap: float, ego: float, leader: float) -> float:
 
 @compiled
 def critical(gap: float, ego: float, ego_accel: float, leader: float) -> float:
-    """CFS: 0 where comfortable braking after the reaction avoids a leader that keeps its speed, 1 where none does.
+    """Computes CFS, the critical fuzzy metric: 0 is safe, 1 is unsafe.
+
+    0: comfortable braking after the reaction avoids a leader that keeps its speed. 1: no braking does.
 
     u_next = u_e + a' τ with a' = max(a_e, −b_comf);  d_new = ((u_e + u_next)/2 − u_l) τ
-    d_safe = d_new + (u_next − u_l)²/(2 b_comf),  d_unsafe = d_new + (u_next − u_l)²/(2 b_max)
-    and, where the ego is the slower one within the reaction already, d_safe = d_unsafe = (u_e − u_l)²/(2 |a'|).
 
+    d_safe = d_new + (u_next − u_l)²/(2 b_comf),  d_unsafe = d_new + (u_next − u_l)²/(2 b_max)
+
+    Where the ego is the slower one within the reaction already, d_safe = d_unsafe = (u_e − u_l)²/(2 |a'|).
     In between CFS is linear.
     """
     if ego <= leader:
@@ -53,9 +58,10 @@ def critical(gap: float, ego: float, ego_accel: float, leader: float) -> float:
 
 @compiled
 def braking(gap: float, ego: float, ego_accel: float, leader: float) -> float:
-    """What the model brakes with, m/s²: up to 4 as PFS grows, from 4 to 6 as CFS does.
+    """Computes the model's braking, m/s².
 
-    Who comes towards the ego has a negative speed, which only CFS can make sense of.
+    It rises to 4 with PFS, then to 6 with CFS. A leader that comes towards the ego has a negative speed,
+    which only CFS can handle.
     """
     urgency = critical(gap, ego, ego_accel, leader)
     if urgency > 0.0:

@@ -65,7 +65,9 @@ def collision_of(
 
 
 def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflict | None = None) -> Judgement:
-    """Judges how the contact in the last frame came about, and which driver would have prevented a valid one.
+    """Judges a contact: how it began, its fault, its severity, its grade.
+
+    The contact is in the last frame. Only a valid one is graded, by the drivers that would have prevented it.
 
     A valid contact passed every rule of `artefact_verdicts` and `validity_verdicts`. The conflict is found again if not
     given.

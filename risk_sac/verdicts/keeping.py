@@ -99,14 +99,20 @@ def _keeps(name: str, gauge: Gauge, history: History, index: int, met: MetActor 
 
 
 def _anticipating(e: Evidence, path: Path, met: MetActor | None, index: int) -> tuple[Floats, int]:
-    """Drives the defensive driver along the path: metres per frame until 3 s after the violation, and when it acts."""
+    """Drives the defensive driver along the path.
+
+    Returns its metres per frame until 3 s after the violation, and the frame in which it acts.
+    """
     striker, began = (None, index) if met is None else (met.column, met.conflict.frame)
     s, acts = driven(e.until(index), Path(*(each[: index + 1] for each in path)), striker, began, index)
     return (path.s.copy() if acts == index else s), acts
 
 
 def _braking(name: str, e: Evidence, path: Path, met: MetActor | None, after_steps: int) -> tuple[Floats, int]:
-    """Drives along the path: metres per frame, NaN once the driver stands, and the frame from which it brakes."""
+    """Drives a braking driver along the path.
+
+    Returns its metres per frame, NaN once it stands, and the frame from which it brakes.
+    """
     last = len(e.time_s) - 1
     if met is None:
         return path.s.copy(), last

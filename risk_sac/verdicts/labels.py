@@ -62,7 +62,10 @@ def ground(evidence: Evidence, striker: int) -> str:
 
 
 def manoeuvre(evidence: Evidence) -> str:
-    """straight, left_turn, right_turn or lane_change: what the ego drove in the last 3 s or 12 m, whichever is more."""
+    """Names the ego's manoeuvre: straight, left_turn, right_turn or lane_change.
+
+    It is what the ego drove in the last 3 s or 12 m, whichever is more.
+    """
     driven_m = np.cumsum(evidence.speed_mps[:, 0]) * evidence.step_s
     first = min(evidence.since(RECENT_S), int(np.searchsorted(driven_m, driven_m[-1] - RECENT_M)))
     heading = np.unwrap(evidence.heading_rad[first:, 0])
@@ -116,7 +119,7 @@ def signature(
 
     It names no zone of a body: a pedestrian of half a metre has four, and one failure would be four. Nor does it name a
     side where the mirrored scene is the same failure (a cut-in, a pedestrian). Traffic from the left and from the right
-    is told apart: it has other rules and other distances.
+    is distinguished: it has other rules and other distances.
     """
     who = " ".join((_striker(evidence, striker, conflict), *(IN_WORDS[name] for name in broke)))
     if evidence.role[striker] == Role.BACKGROUND:

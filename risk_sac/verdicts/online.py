@@ -26,13 +26,14 @@ OVER_S = 1.0  # a conflict that has been gone for so long is over
 
 
 def conflicts_now(frame: Frame, path: Path, known: Bools, ground: Ground, *, wary: bool = False) -> Bools:
-    """Which of `frame.ids` a driver in the ego's place is in a conflict with.
+    """Tells with which of `frame.ids` a driver in the ego's place is in conflict.
 
     A crossing vehicle that has to stop or to yield, and still can at 3.4 m/s², is expected to: in a record the contact
-    tells that it did not.
+    shows that it did not.
 
-    `path` is the ego's path ahead, from its centre; `known` says whom the ego knows of, `n`. For a wary driver whoever
-    hangs over beside the ego counts, if it comes nearer or not, and who brakes is not trusted.
+    `path` is the ego's path ahead, from its centre; `known` marks the actors that the ego knows of, `n`. For a wary
+    driver a vehicle that hangs over beside the ego counts even if it does not come nearer, and a braking vehicle is not
+    trusted.
 
     Returns:
       `n`; False for the ego.
@@ -53,7 +54,7 @@ class Reflex(Protocol):
     """Braking of an ego that SUMO drives, beside that of SUMO's models; one for each episode."""
 
     def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
-        """How hard it brakes now, m/s²; 0 where SUMO's models may drive as they like."""
+        """Computes its braking now, m/s²; 0 leaves driving to SUMO's models."""
 
 
 def reflex_of(profile: str, ground: Ground) -> Reflex | None:
@@ -73,7 +74,10 @@ class R157Reflex:
         self._last_s = 0.0
 
     def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
-        """How hard it brakes now, m/s²; 0 while it perceives no conflict. Arguments as of `conflicts_now`."""
+        """Computes its braking now, m/s²; 0 while it perceives no conflict.
+
+        Arguments as of `conflicts_now`.
+        """
         now = frame.time_s
         if conflicts_now(frame, path, seen, self._ground).any():
             self._since_s, self._last_s = (now if self._since_s is None else self._since_s), now
@@ -97,7 +101,10 @@ class DefensiveReflex:
         self._priority_s = -math.inf  # when its signal last gave it priority
 
     def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
-        """How hard it brakes now, m/s²; 0 where nothing restrains it. Arguments as of `conflicts_now`."""
+        """Computes its braking now, m/s²; 0 where nothing restrains it.
+
+        Arguments as of `conflicts_now`.
+        """
         if frame.ids != self._ids:
             before, self._memory = self._memory, nothing_remembered(len(frame.ids))
             for column, id_ in enumerate(frame.ids):

@@ -46,7 +46,7 @@ def polyline(x: Floats, y: Floats, heading_rad: float = 0.0) -> Path:
 
 @compiled
 def pose_at(path: Path, s: float) -> Pose:
-    """Where the body is after `s` metres: x, y, heading."""
+    """Computes the body's pose after `s` metres: x, y, heading."""
     last = len(path.s) - 1
     if s >= path.s[last] or last == 0:
         beyond, h = s - path.s[last], path.heading[last]
@@ -65,7 +65,9 @@ def pose_at(path: Path, s: float) -> Pose:
 
 @compiled
 def project(path: Path, first: int, x: float, y: float) -> tuple[float, float, float]:
-    """The nearest point of the path from its `first` point on: metres along, metres to the left, heading there.
+    """Projects a place onto the path, from its `first` point on.
+
+    Returns metres along, metres to the left and the heading there.
 
     The straight continuation counts, behind the `first` point too.
     """

@@ -109,7 +109,9 @@ def _on_one_lane(evidence: Evidence, striker: int, began: int, seen: Along[Float
 def _leaves(
     evidence: Evidence, speed: Floats, began: int, brake_mps2: float, tolerance_mps: float, yields: bool = False
 ) -> float:
-    """Finds the first frame in which a speed towards the other is above that of the proper response; inf if none.
+    """Finds the first frame with a speed above the proper response's; inf if none.
+
+    The speed is the one towards the other.
 
     One that has to yield responds at once.
     """

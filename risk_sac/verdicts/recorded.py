@@ -36,7 +36,9 @@ def ego_path(evidence: Evidence) -> Path:
 
 
 def front_moved_across(evidence: Evidence) -> Floats:
-    """Sums how far the ego's front moved across its lanes since the first frame, `T`, m, positive to the left.
+    """Sums the lateral motion of the ego's front bumper, `T`, m, positive to the left.
+
+    The sum starts in the first frame and goes on across lanes.
 
     It is the front bumper's offset from the lane that SUMO has it on, without the jumps to the next lane; beside the
     road SUMO goes on with the last lane. Without recorded offsets it is the sum of the lateral speed, which drifts

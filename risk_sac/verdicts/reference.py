@@ -40,7 +40,7 @@ AVOIDED = ReferenceOutcome(avoids=True, impact_speed_mps=0.0)
 
 
 def reference_outcomes(evidence: Evidence, striker: int, conflict: Conflict) -> Mapping[str, ReferenceOutcome]:
-    """How each reference driver fares in the ego's place against the actor in column `striker`.
+    """Computes each reference driver's outcome against the actor in column `striker`.
 
     A reference driver brakes and does not steer: it keeps the lane that the ego was in when the conflict began, or when
     the ego left it for the striker. Where the ego left its lane, others may be in the reference driver's way, so it has
@@ -70,7 +70,7 @@ def reference_outcomes(evidence: Evidence, striker: int, conflict: Conflict) -> 
 
 
 def _met(evidence: Evidence, path: Path, striker: int) -> list[int]:
-    """Lists the other known actors that came near the ego's place on a path that it did not take."""
+    """Lists other known actors near the ego's place on an untaken path."""
     e = evidence
     apart_m = np.hypot(e.x_m - path.x[:, None], e.y_m - path.y[:, None])
     near = np.where(e.known & np.isfinite(apart_m), apart_m, np.inf).min(axis=0) <= NEAR_M
@@ -115,7 +115,10 @@ def _track(evidence: Evidence, other: int) -> Body[Floats]:
 
 
 def _outcome(evidence: Evidence, other: int, ending: Ending | None, *, kept: bool) -> ReferenceOutcome:
-    """What an ending means; `kept`: on a path that the ego did not take. None: as the ego fared."""
+    """Converts an ending into an outcome; None takes the ego's own.
+
+    `kept`: the driver is on a path that the ego did not take.
+    """
     if ending is None:
         return AVOIDED if kept else ReferenceOutcome(avoids=False, impact_speed_mps=float(evidence.speed_mps[-1, 0]))
     size, other_size = recorded_size(evidence, 0), recorded_size(evidence, other)

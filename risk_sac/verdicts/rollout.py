@@ -1,4 +1,6 @@
-"""A reference driver in the ego's place: the striker's motion is kept, the ego's path too, its speed is the driver's.
+"""Rolls out a reference driver in the ego's place.
+
+The motion of the striker and the path of the ego are kept; the speed is the driver's.
 
 The recorded ego is followed until the driver perceives the conflict; from then on the driver's own profile counts,
 even where the ego was braking harder.
@@ -37,7 +39,7 @@ STANDING_MPS = 0.1
 
 
 class Ending(NamedTuple):
-    """How a rollout ended; the poses are those of the contact."""
+    """Ending of a rollout; the poses are those of the contact."""
 
     touched: bool
     speed_mps: float
@@ -130,7 +132,7 @@ def drive(
 
 @compiled
 def _wanted(driver: int, path: Path, s: float, speed: float, braking: float, size: Size, other: Body[float]) -> float:
-    """What a driver that goes by what it sees would brake with now."""
+    """Computes the braking that a driver wants for what it sees now."""
     first = max(int(np.searchsorted(path.s, s, side="right")) - 1, 0)
     seen = along(path, first, s, speed, size, other)
     direction = other.heading - seen.turn_rad

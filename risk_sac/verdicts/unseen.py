@@ -27,7 +27,10 @@ class Crossings(NamedTuple):
 
 
 def boxes_of(crossings: Sequence[Area]) -> Floats:
-    """Rectangles about crossings, `k x 6`: centre, direction of the longest side, half the size along it and across."""
+    """Computes the rectangles about crossings, `k x 6`.
+
+    A row is: centre, direction of the longest side, half the size along it and across it.
+    """
     found = np.empty((len(crossings), 6))
     for row, area in zip(found, crossings, strict=True):
         corners = np.array(_corners(area))
@@ -91,7 +94,10 @@ def crossings_on(path: Path, from_m: float, to_m: float, boxes: Floats, half_wid
 
 @compiled
 def walls_of(state: Floats, hides: Bools) -> Floats:
-    """Bodies that hide what is behind them, `w x 6`: centre, cosine and sine of the heading, half the size."""
+    """Lists the bodies that hide what is behind them, `w x 6`.
+
+    A row is: centre, cosine and sine of the heading, half the size.
+    """
     found, count = np.empty((len(hides), 6)), 0
     for i in range(len(hides)):
         if hides[i] and not math.isnan(state[X, i]):  # it has left
@@ -116,7 +122,10 @@ def is_in_view(walls: Floats, eye_x: float, eye_y: float, body: Body[float]) -> 
 
 @compiled
 def is_hidden(walls: Floats, eye_x: float, eye_y: float, x: float, y: float) -> bool:
-    """Whether a body lies between the eye and a place; one that stands on the place hides nothing there."""
+    """Tells whether a body lies between the eye and a place.
+
+    A body that stands on the place hides nothing there.
+    """
     for k in range(len(walls)):
         cos, sin, half_length, half_width = walls[k, 2], walls[k, 3], walls[k, 4], walls[k, 5]
         ex, ey = eye_x - walls[k, 0], eye_y - walls[k, 1]

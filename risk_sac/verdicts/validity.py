@@ -31,7 +31,7 @@ CROSSING_VISIBLE_S = 1.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EpisodeFacts:
-    """What only the running episode knows of a contact."""
+    """Facts of a contact that only the running episode knows."""
 
     teleported: bool
     inside_limits: bool  # every adversary, up to the contact
@@ -76,7 +76,9 @@ def validity_verdicts(evidence: Evidence, striker: int, contact: Contact, facts:
 
 
 def inside_grip(evidence: Evidence, striker: int) -> bool:
-    """Whether the striker's driving of the last 2 s fits into the road's friction circle: |a| ≤ 1.05 μ g.
+    """Tells whether the striker's driving stays within the friction circle.
+
+    In the last 2 s: |a| ≤ 1.05 μ g.
 
     |a| covers braking, lane changes and cornering alike. Pedestrians pass.
     """
@@ -87,9 +89,11 @@ def inside_grip(evidence: Evidence, striker: int) -> bool:
 
 
 def used_grip(evidence: Evidence, striker: int) -> Floats:
-    """|a| of the striker at the middle of each second within the last 2 s, m/s²; empty with less than 0.5 s on record.
+    """Estimates the striker's |a| in windows of the last 2 s, m/s².
 
-    It is what the striker drove, not what it was told: x(t) ≈ x0 + v t + a t²/2 by least squares over a second of its
+    A value belongs to the middle of a window of 1 s; with less than 0.5 s on record there is none.
+
+    It is the driven, not the commanded acceleration: x(t) ≈ x0 + v t + a t²/2 by least squares over a second of its
     front bumper's positions, and y alike; |a| = √(a_x² + a_y²). The front follows its lane, whose polyline has kinks,
     and a lateral move starts and stops within a step; a second is what a real vehicle needs to yaw.
     """

@@ -28,7 +28,10 @@ def prevented_by(violation: Collision | Violation) -> str | None:
 
 
 def known(collision: Collision) -> str:
-    """Returns since when the ego knew of the striker, to follow its name: "of which it had known for 1.0 s"."""
+    """Says for how long the ego had known of the striker.
+
+    It follows the striker's name: "of which it had known for 1.0 s".
+    """
     seen_s, judged = collision.visible_for_s, collision.judgement
     if judged is not None and judged.hidden:
         if seen_s > 0.0:
