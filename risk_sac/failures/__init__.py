@@ -1,1 +1,1 @@
-"""What is done with a failure once it is found."""
+"""Replays, minimises, studies, draws and exports failures."""

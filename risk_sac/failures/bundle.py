@@ -1,7 +1,8 @@
-"""Reads and writes bundles: a failure in one file, with all that it takes to play it again anywhere.
+"""Reads and writes bundles: one failure in one file, ready to replay.
 
-The file is an .npz: the arrays of the episode's series, the letters of all signal heads, `manifest` as a JSON text, and
-for a failure on a map of the user's the place with its piece of net. Nothing in it is executed or trusted.
+The file is an .npz. It holds the arrays of the episode's series, the letters of all signal heads, and `manifest` as a
+JSON text. For a failure on a user's map it also holds the place with its piece of net. Nothing in it is executed or
+trusted.
 """
 
 import hashlib
@@ -39,7 +40,7 @@ MANIFEST, HEADS, LAYER = "manifest", "signal_heads", "policy_layer_"  # the laye
 
 
 class Manifest(Record):
-    """What a bundle says of its failure."""
+    """Description of a bundle's failure."""
 
     format: Literal[1, 2, 3] = 1  # another one with whatever an older reader would misread
     """2 of those that hold a policy, 3 of those that hold a place."""
@@ -76,7 +77,7 @@ class Bundle:
     manifest: Manifest
     series: Series
     signal_heads: NDArray[np.uint8]  # T since the release x heads, SUMO's letters
-    policy: FrozenPolicy | None = None  # that the run came to; None where it learnt none, or left none that fits
+    policy: FrozenPolicy | None = None  # of the run; None where it learnt no policy or its policy does not fit
 
 
 def make_bundle(

@@ -31,7 +31,11 @@ def carried(family: FamilyName) -> dict[str, NDArray[np.uint8]]:
 
 
 def unpack(family: FamilyName, arrays: MutableMapping[str, NDArray[Any]]) -> None:
-    """Moves the arrays of a place into the library of this machine; a ValueError if they are no such place."""
+    """Moves a bundle's place into this machine's library of places.
+
+    Raises:
+      ValueError: the arrays are no such place.
+    """
     text, net = arrays.pop(PLACE, None), arrays.pop(NET, None)
     if text is None or net is None or family in SHIPPED:
         return

@@ -1,4 +1,4 @@
-"""What became of old failures with another ego; see `risk_sac.failures.regress`."""
+"""Results of old failures with another ego; see `risk_sac.failures.regress`."""
 
 from collections import Counter
 from datetime import datetime
@@ -12,7 +12,7 @@ from risk_sac.records import Grade, Record, State
 
 
 class Verdict(StrEnum):
-    """What became of a failure."""
+    """Result of an old failure with another ego."""
 
     FIXED = "fixed"
     STILL_FAILING = "still_failing"
@@ -40,7 +40,7 @@ class Case(Record):
 
     @property
     def passed(self) -> bool:
-        """Whether it keeps nobody from going on."""
+        """Whether it passes: it is fixed, or known from the baseline."""
         return self.known or self.verdict is Verdict.FIXED
 
     @property
@@ -66,12 +66,15 @@ class Regression(Record):
 
     @property
     def counts_in_words(self) -> str:
-        """How many cases there are of each verdict."""
+        """Counts the cases of each verdict, in words."""
         counts = Counter(_words(case.verdict) for case in self.cases)
         return ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items()))
 
     def beside(self, baseline: "Regression") -> "Regression":
-        """With the cases marked as known that the baseline has, with the same verdict and the same failure instead."""
+        """Marks the cases that the baseline has too as known.
+
+        Such a case has the same verdict and the same failure instead.
+        """
         known = {(case.digest, case.verdict, case.found) for case in baseline.cases}
         cases = tuple(
             case.model_copy(update={"known": (case.digest, case.verdict, case.found) in known}) for case in self.cases

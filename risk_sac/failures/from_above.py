@@ -119,7 +119,10 @@ def _body(recording: Recording, actor: int, time_s: float) -> Floats:
 
 
 def _draw_signals(axis: Axes, family: FamilyName, recording: Recording) -> None:
-    """Draws a bar across each lane that ends at a signal, as it is at the violation; a green one is open."""
+    """Draws a bar across each lane that ends at a signal.
+
+    It shows the signal at the violation; a green one is open.
+    """
     time_s = float(recording["released_s"]) + recording.violation.time_s
     for head in signal_heads(family, recording.failure.episode.scene):
         for mark in head.marks(time_s):
@@ -130,7 +133,10 @@ def _draw_signals(axis: Axes, family: FamilyName, recording: Recording) -> None:
 
 
 def _label_body(labels: Labels, recording: Recording, actor: int, times_s: list[float], colour: str) -> None:
-    """Writes the times beside a body, if there is room on the side that faces away from the other one."""
+    """Writes the times beside a body, if there is room.
+
+    The side that faces away from the other body comes first.
+    """
     x, y, heading = recording.pose(actor, -times_s[0])
     partner_x, partner_y, _ = recording.pose((recording.other or 0) if actor == 0 else 0, -times_s[0])
     left = np.array((-np.sin(heading), np.cos(heading)))

@@ -1,4 +1,4 @@
-"""Minimises a failure: the least that adversaries have to do, in the plainest scene, for the ego to fail as it did.
+"""Minimises a failure: fewest actions, plainest scene, same failure.
 
 Source: delta debugging, Zeller and Hildebrandt, "Simplifying and isolating failure-inducing input" (IEEE TSE 28, 2002).
 """
@@ -21,17 +21,17 @@ from risk_sac.types import STEP_S, Bools, Floats
 MOST = 150  # episodes that are played for one failure
 COPIES, HELD, SHARE = 10, 8, 0.01  # a reduction counts if so many copies, perturbed by that much, still fail
 SEGMENT = round(0.5 / STEP_S)  # steps
-AMPLITUDES = (0.5, 0.7, 0.85)  # of what is left, the least first
+AMPLITUDES = (0.5, 0.7, 0.85)  # of the remaining actions, the least first
 
 Unit = TypeVar("Unit")
 Cell = tuple[slice, slice]  # steps and columns of the actions
 
 
 def minimise(bundle: Bundle, most: int = MOST) -> Bundle:
-    """Takes away what a failure does not need, by playing at most so many episodes.
+    """Removes what a failure does not need, playing at most `most` episodes.
 
-    `manifest.core` says what is left and how surely it fails. Where nothing can be taken away, it is the failure
-    itself.
+    `manifest.core` states the remaining actions and how surely they fail. Where nothing can be removed, it is the
+    failure itself.
 
     Raises:
       ConfigError: the bundle holds no valid failure that can be played here.
@@ -45,13 +45,13 @@ def minimise(bundle: Bundle, most: int = MOST) -> Bundle:
 
 
 class _Search:
-    """What is left of a failure."""
+    """Search for a minimal failure."""
 
     def __init__(self, bundle: Bundle, most: int) -> None:
         self.stage = Stage(bundle)
         self.left = self.stage.original
         self._most = most
-        self._random = np.random.default_rng(0)  # new copies each time: what is left would be fitted to the same ones
+        self._random = np.random.default_rng(0)  # new copies each time, or the search would fit fixed ones
 
     @property
     def neutral(self) -> Floats:
@@ -64,7 +64,7 @@ class _Search:
         return np.array([bool(parameter.categories) for parameter in self.stage.space.parameters])
 
     def take(self, variant: Variant) -> bool:
-        """Goes on with a variant if it fails in the same way, and so do most of its copies."""
+        """Adopts a variant if it and most of its copies fail alike."""
         if self.stage.played + 1 + COPIES > self._most - COPIES - 1:  # as many are counted afresh in the end
             return False
         found = alike(self.stage.play(variant)[:1], self.stage.failure)
@@ -83,7 +83,7 @@ class _Search:
         return failed == HELD
 
     def bundle(self, origin: Bundle) -> Bundle:
-        """What is left, as a failure of its own."""
+        """Returns the minimised failure as a bundle of its own."""
         stage, left = self.stage, self.left
         # Other copies than those that it was chosen by.
         held = sum(stage.fails(copy) for copy in stage.copies(left, SHARE, COPIES, self._random))
@@ -114,7 +114,10 @@ def _active_adversaries(search: _Search) -> list[int]:
 
 
 def _units(search: _Search) -> Iterator[list[Cell]]:
-    """Yields what the adversaries may not need to do, the coarsest first, each time of what is left by then."""
+    """Yields candidates for removal, the coarsest first.
+
+    Each group is made from the actions that remain by then.
+    """
     always = slice(None)
     yield [(always, _columns(k)) for k in _active_adversaries(search)]
     yield [(always, slice(c, c + 1)) for c in np.flatnonzero(search.left.actions.any(axis=0)).tolist()]
@@ -123,7 +126,10 @@ def _units(search: _Search) -> Iterator[list[Cell]]:
 
 
 def _reduce_actions(search: _Search) -> None:
-    """Leaves adversaries to SUMO: altogether, their drive or steering, or for 0.5 s; then weakens what is left."""
+    """Hands adversaries over to SUMO, then weakens the remaining actions.
+
+    It tries whole adversaries, then their drive or steering, then segments of 0.5 s.
+    """
     for units in _units(search):
         without(units, lambda cells: search.take(_zeroed(search.left, cells)))
     while search.left.actions.any() and any(search.take(_weaker(search.left, factor)) for factor in AMPLITUDES):
@@ -145,7 +151,7 @@ def _reduce_scene(search: _Search) -> None:
 
 
 def without(units: Sequence[Unit], unneeded: Callable[[Sequence[Unit]], bool]) -> None:
-    """Tries to do without all units, then halves, quarters and so on of what is left, then each.
+    """Tries to remove all units, then halves, quarters and so on, then each.
 
     `unneeded` tries to do without some from now on, and returns whether that is possible.
     """

@@ -72,7 +72,10 @@ class Program:
         return sum(duration for duration, _ in self.phases)
 
     def letters(self, time_s: float) -> str:
-        """Returns the letters a moment before a time since the start of the cycle, as in SUMO's own step."""
+        """Returns the letters just before a time of the cycle.
+
+        So SUMO shows them in its own step.
+        """
         left = (time_s - 1e-6 - self.offset_s) % self.cycle_s
         for duration, letters in self.phases:
             if left < duration:

@@ -112,7 +112,10 @@ def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: S
 
 
 def twin_recording(spec: RunSpec, recording: Recording, changed: EgoConfig | None, name: str = "") -> Recording:
-    """Returns the twin of a recorded failure, to be drawn beside it under the name of the other ego."""
+    """Plays a recorded failure's twin, to be drawn beside it.
+
+    The twin bears the other ego's name.
+    """
     played = twin(spec, recording.failure.episode, actions_of(recording.series), changed)
     told = TwinPlay.of(changed, recording.violation, played.found, name)
     return replace(recording, series=played.series, twin=told.title)

@@ -35,7 +35,7 @@ class Question(Record):
 
 
 class TwinPlay(Record):
-    """What was changed in a scene, and what came of it."""
+    """Change to a scene, and its outcome."""
 
     changed: str
     """Such as "nobody attacks"."""

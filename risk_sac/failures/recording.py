@@ -69,12 +69,15 @@ class Recording:
 
     @property
     def released_s(self) -> float:
-        """When the adversaries were released."""
+        """Time of the adversaries' release."""
         return -self.violation.time_s
 
     @property
     def conflict_s(self) -> float | None:
-        """When the conflict began; None in a twin, without a judged contact, or if it was before the recording."""
+        """Time when the conflict began; None if not recorded.
+
+        It is None in a twin, without a judged contact, or if it was before the recording.
+        """
         if self.twin or self.collision is None or self.collision.judgement is None:
             return None
         began_s = self.collision.judgement.conflict_s - self.collision.time_s
@@ -82,13 +85,16 @@ class Recording:
 
     @cached_property
     def other(self) -> int | None:
-        """Column of the actor that mattered most, which in a contact was touched; None without one. The ego's is 0."""
+        """Column of the touched or most relevant actor; None without one.
+
+        The ego's column is 0.
+        """
         other = self.violation.other_id
         return None if other is None else [str(id_) for id_ in self.series["ids"]].index(other)
 
     @property
     def moment(self) -> str:
-        """What happens at time 0, in words."""
+        """Names the event at time 0."""
         return "contact" if self.collision else f"{self.violation.requirement} violated"
 
     @property

@@ -130,7 +130,7 @@ def _judge(bundle: Bundle, ego: EgoConfig) -> _Ending:
 
 
 def compared(found: Sequence[Collision | Violation], wanted: Sequence[Collision | Violation]) -> _Ending:
-    """What became of the violations of a failure, by what the other ego violates."""
+    """Compares the violations of an old failure with another ego's."""
     if still := [each for each in found if any(alike([each], old) for old in wanted)]:
         return _Ending(Verdict.STILL_FAILING, _events(still), still[0].signature)
     if valid := [each for each in found if each.valid]:

@@ -29,7 +29,10 @@ Prepared = Mapping[Path, tuple[Results, RiskSacEnv]]
 
 
 def _prepared(file: Path, folders: Sequence[Path]) -> Prepared:
-    """The runs that can be played here; of each other one a line says why not, such as that its ego is not there."""
+    """Opens the runs that can be played here.
+
+    For each other run a line states why not, such as an ego that is not installed.
+    """
     found = {}
     for folder in folders:
         results = read_results(folder)

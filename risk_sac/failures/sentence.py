@@ -13,13 +13,16 @@ from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
 from risk_sac.verdicts.labels import ONCOMING_COS, RESPONSES
 from risk_sac.verdicts.offences import IN_WORDS, STANDING_MPS
 
-IN_LANE_M = 1.5  # who is nearer to the ego's axis leads it, or follows
-ACROSS_MPS = 0.2  # slower than that nobody changes its place in a lane
+IN_LANE_M = 1.5  # a vehicle nearer to the ego's axis leads it, or follows
+ACROSS_MPS = 0.2  # slower lateral motion does not change the place in a lane
 ACTS_MPS2 = 1.5
 
 
 def sentence(series: Series, collision: Collision) -> str:
-    """Returns, e.g., "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.5 s late"."""
+    """Describes a collision in one sentence.
+
+    E.g. "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.5 s late".
+    """
     judged = collision.judgement
     assert judged is not None
     since = series["time_s"] - series["released_s"]
@@ -77,7 +80,10 @@ def _who(series: Series, striker: int, at: int, broke: str) -> str:
 
 
 def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
-    """Returns what a striker does of its own, and since which frame; None if it goes on as it did."""
+    """Describes a striker's own action and the frame of its start.
+
+    Returns None if it goes on as it did.
+    """
     accel, across = series["accel_mps2"][begins:, striker], series["lateral_mps"][begins:, striker]
     vehicle = series["kind"][striker] == Kind.VEHICLE
     acts = ACTS_MPS2 if vehicle else ACTS_MPS2 / 3

@@ -1,4 +1,4 @@
-"""Draws one failure as the paper's Fig. 2 does: both paths from above, and what was measured along the way."""
+"""Draws one failure like the paper's Fig. 2: paths from above, and measures."""
 
 import textwrap
 from collections.abc import Callable, Iterator
@@ -112,7 +112,10 @@ def _distance(axis: Axes, recording: Recording) -> None:
 
 
 def _near_m(recording: Recording) -> float:
-    """Returns a scale for the distances from 1 s before the conflict on; the approach before would flatten them."""
+    """Returns a scale for the distances from 1 s before the conflict on.
+
+    The distances of the approach before it would flatten them.
+    """
     began_s = -VIEW_S if recording.conflict_s is None else recording.conflict_s
     near = _least(recording, "distance_m")[recording.time_s >= began_s - 1.0]
     return 1.08 * max([LEAST_M, *map(float, near[np.isfinite(near)])])
@@ -159,7 +162,7 @@ def _mark_instants(axis: Axes, recording: Recording) -> None:
 
 
 def _name_instants(axis: Axes, recording: Recording) -> None:
-    """Writes names above the first panel, each in a row of its own so that they do not overlap."""
+    """Writes names above the first panel, each in its own row."""
     for row, (time_s, name, colour) in enumerate(_instants(recording)):
         axis.annotate(
             name,
@@ -234,7 +237,10 @@ def draw_recording(family: FamilyName, recording: Recording, twin: Recording | N
 
 
 def _extent(recording: Recording) -> tuple[Floats, Floats]:
-    """Corners of the ground that both took in the last seconds, grown to a shape that fits the page."""
+    """Computes the corners of the ground that both covered in the last seconds.
+
+    They are widened to a shape that fits the page.
+    """
     begin_s = recording.conflict_s
     shown = recording.time_s >= min(-VIEW_S, max(begin_s, -PANELS_S) if begin_s is not None else 0.0)
     shown &= recording.time_s < STEP_S

@@ -37,7 +37,10 @@ class SignalHead:
         return self.changes[max(begun - 1, 0)][1]
 
     def marks(self, time_s: float) -> list[Floats]:
-        """Returns lines across the lane, `2 x 2` each: one that closes it, or an end on each side where it is green."""
+        """Returns lines across the lane, `2 x 2` each.
+
+        One closes it; where it is green there is an end on each side.
+        """
         across = np.array((-np.sin(self.heading_rad), np.cos(self.heading_rad))) * self.width_m / 2
         ends = ((-1.0, 1.0),) if self.colour(time_s) != "green" else ((-1.0, 2 * OPEN - 1), (1 - 2 * OPEN, 1.0))
         return [np.array((self.x_m, self.y_m)) + np.outer(pair, across) for pair in ends]
@@ -60,7 +63,10 @@ def signal_heads(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Sig
 
 
 def _places(lane: Lane) -> list[tuple[float, float, float]]:
-    """Returns x, y and heading at the end of a lane; of a crossing, which is entered from both sides, at both."""
+    """Returns x, y and heading at the end of a lane.
+
+    A crossing is entered from both sides, so it has two.
+    """
     ends = [(lane.centre[-1], lane.centre[-1] - lane.centre[-2])]
     if lane.use == "crossing":
         ends.append((lane.centre[0], lane.centre[0] - lane.centre[1]))

@@ -1,4 +1,7 @@
-"""What playing failures of a run again has told of them: a file for each core and each region, beside the results."""
+"""Results of replaying a run's failures: cores and regions.
+
+Each is a file beside the results.
+"""
 
 import re
 from collections.abc import Mapping
@@ -13,7 +16,7 @@ from risk_sac.run_folder.durable import replace_file
 
 
 class Extent(Record):
-    """How much the adversaries do."""
+    """Amount of the adversaries' actions."""
 
     adversaries: int
     """That do anything but drive on as SUMO's drivers would, or walk on."""
@@ -26,7 +29,7 @@ class Extent(Record):
 
 
 class Core(Record):
-    """What was left of a failure, and how surely it fails."""
+    """Minimised failure, and how surely it fails."""
 
     before: Extent
     after: Extent
@@ -75,7 +78,7 @@ class Share(Record):
 
 
 class Region(Record):
-    """What surrounds a failure; the shares in the order of `region`."""
+    """Surroundings of a failure; the shares in the order of `region`."""
 
     shares: tuple[Share, ...]
 
@@ -106,7 +109,10 @@ class _Note(Studied):
 
 
 def note(folder: Path, digest: str, index: int, studied: Studied) -> None:
-    """Writes the core or the region of an episode's failure into a run's folder, with the digest of its results."""
+    """Writes the core or the region of a failure into a run's folder.
+
+    The digest of the run's results goes with it.
+    """
     file = folder / STUDIES / f"{index:06d}-{'region' if studied.core is None else 'core'}.json"
     file.parent.mkdir(exist_ok=True)
     replace_file(file, _Note(digest=digest, **dict(studied)).model_dump_json(indent=2).encode())
@@ -121,7 +127,10 @@ def edition(folder: Path) -> str:
 
 
 def read_studies(folder: Path, digest: str) -> Mapping[int, Studied]:
-    """Returns what was noted for results with this digest, by index of the episode; damaged files are left out."""
+    """Reads the studies of results with this digest, by episode index.
+
+    Damaged files are left out.
+    """
     found: dict[int, Studied] = {}
     for file in sorted((folder / STUDIES).glob("*.json")):
         name = _NAME.fullmatch(file.name)

@@ -21,7 +21,9 @@ from risk_sac.run_folder.series import read_series
 
 
 def answer(question: Question) -> bytes:
-    """Returns a bundle, a core or an export as files, a region as JSON, a twin with its time series.
+    """Answers a question about a failure, as bytes.
+
+    A bundle, a core and an export are files, a region is JSON, a twin has its time series.
 
     Raises:
       SimulationError: the failure does not repeat here.

@@ -1,4 +1,6 @@
-"""Draws a failure as a small SVG from above: roads, signals, both paths, and the bodies at the violation.
+"""Draws a failure as a small SVG from above.
+
+It shows roads, signals, both paths, and the bodies at the violation.
 
 The SVG is written by hand, because a screen shows dozens of them and matplotlib takes a second for each.
 """

@@ -1,4 +1,7 @@
-"""Plays variants of a failure: in another scene, with other actions, in other traffic; and counts which still fail."""
+"""Plays variants of a failure and counts which still fail.
+
+A variant has another scene, other actions or other traffic.
+"""
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing
@@ -44,7 +47,9 @@ class Variant:
 
 
 class Stage:
-    """Plays variants of one failure; `original` is the failure up to the violation, and a tail of no action.
+    """Player for variants of one failure.
+
+    `original` is the failure up to the violation, and a tail of no action.
 
     Attributes:
       failure: the violation that names it.
@@ -117,7 +122,10 @@ def _alike(found: Collision | Violation, wanted: Collision | Violation) -> bool:
 
 
 def _up_to(failure: Collision | Violation, actions: Floats, horizon_steps: int) -> Floats:
-    """The actions up to a failure; then none, for a while after a contact, or else to the horizon."""
+    """Cuts or pads the actions of a failure to its end.
+
+    After a contact no action follows for a while; else none follows up to the horizon.
+    """
     if isinstance(failure, Collision):
         steps = min(round(TAIL_S / STEP_S), horizon_steps - len(actions))
     else:
@@ -127,9 +135,9 @@ def _up_to(failure: Collision | Violation, actions: Floats, horizon_steps: int) 
 
 
 def region(bundle: Bundle) -> Region:
-    """Plays a failure in scenes near its own, in other traffic, and with other actions: 170 episodes.
+    """Plays a failure in scenes near its own, in other traffic, with other actions.
 
-    Which of them fail as it did is told by `alike`.
+    It plays 170 episodes. `alike` decides which of them fail as the failure did.
 
     Raises:
       ConfigError: the bundle holds no valid failure that can be played here.

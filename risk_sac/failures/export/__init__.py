@@ -1,1 +1,4 @@
-"""A failure, or all episodes of runs, in the formats of other tools: one module a format, and one table of them."""
+"""Exports a failure, or all episodes of runs, to other tools' formats.
+
+There is one module a format, and one table of them.
+"""

@@ -1,4 +1,4 @@
-"""Writes OpenDRIVE 1.7: a road for each edge of the net, and one for each lane inside a junction."""
+"""Writes OpenDRIVE 1.7: a road per edge and per lane in a junction."""
 
 import xml.etree.ElementTree as ET
 from collections import defaultdict
@@ -102,7 +102,10 @@ def _road(lanes: Sequence[Lane], number: int) -> Road:
 
 
 def _turn(number: int, start: Lane, inside: Sequence[Lane], end: Lane | None) -> Road:
-    """Lays a road along the lanes inside a junction, in the directions of the roads before and after it."""
+    """Lays a road along lanes inside a junction.
+
+    It keeps the directions of the roads before and after it.
+    """
     points = np.concatenate([inside[0].centre[:1], *(lane.centre[1:] for lane in inside)])
     height_m = np.concatenate([inside[0].height_m[:1], *(lane.height_m[1:] for lane in inside)])
     way_out = None if end is None else _way(end.centre[:2])

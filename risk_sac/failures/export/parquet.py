@@ -87,7 +87,7 @@ def _rows(folder: Path, results: Results, id_: str) -> list[dict[str, Any]]:
 
 
 def _verdict(record: EpisodeRecord) -> dict[str, Any]:
-    """Returns how bad a failure is, which party caused it, and what would have prevented it; nothing of others."""
+    """Returns severity, fault and prevention of a failure; empty for other episodes."""
     worst = record.worst_violation if record.outcome is Outcome.FAILURE else None
     if worst is None:
         return {}

@@ -46,7 +46,7 @@ class Actor:
 
     @property
     def type(self) -> Literal["pedestrian", "truck", "car"]:
-        """What other tools take it for."""
+        """Names its type for other tools."""
         return "pedestrian" if self.pedestrian else "truck" if self.length_m > TRUCK_FROM_M else "car"
 
 
@@ -112,7 +112,10 @@ class Recorded:
 
     @property
     def striker(self) -> int | None:
-        """Column of the actor that the ego touched, or else of the one that mattered most; None without one."""
+        """Finds the column of the actor that the ego touched.
+
+        Without a contact it is the actor that mattered most; None without one.
+        """
         ids = [actor.id for actor in self.actors]
         return None if self.violation.other_id is None else ids.index(self.violation.other_id)
 
@@ -129,7 +132,7 @@ class Recorded:
 
     @property
     def released_s(self) -> float:
-        """When the adversaries were released, since the first frame."""
+        """Computes the release of the adversaries, s since the first frame."""
         return float(self.series["released_s"] - self.series["time_s"][0])
 
     @cached_property
@@ -151,7 +154,10 @@ class Recorded:
         return letters
 
     def offset_s(self, signal: str, frame: int) -> float:
-        """Where a signal is in its program at a frame, which may be one after the last."""
+        """Computes a signal's position in its program at a frame, s.
+
+        The frame may be one after the last.
+        """
         begins_s = self.layout.signal_offset_s if signal == self.layout.signal else 0.0
         return begins_s + float(self.series["time_s"][0]) + frame * STEP_S
 
@@ -185,7 +191,10 @@ def _check(manifest: Manifest, series: Series) -> None:
 
 
 def goal(failure: Recorded) -> tuple[Lane, Floats]:
-    """Returns where a free ego is to go: a lane of its last road, and x, y and heading of a place on it."""
+    """Returns the goal of a free ego: a lane and a place on it.
+
+    The lane is one of its last road; the place is x, y and heading.
+    """
     start = failure.layout.ego
     lanes, last = failure.net.lanes, start.route[-1]
     reached, ahead = None, [lanes[f"{start.route[0]}_{start.lane}"]]

@@ -1,4 +1,7 @@
-"""SUMO: net, vehicle types, and a script that has the `sumo` binary do what libsumo did, with equal states."""
+"""Exports to SUMO: net, vehicle types and a replay script.
+
+With the script the `sumo` binary repeats the states of the episode.
+"""
 
 import json
 import xml.etree.ElementTree as ET

@@ -90,7 +90,9 @@ def packed(format_: Format, files: Files) -> bytes:
 
 
 def write(format_: Format, files: Files, out: Path) -> None:
-    """Writes an export into one file, or, where it is several files and `out` names no zip, into a new folder.
+    """Writes an export into one file or a new folder.
+
+    It is a folder if there are several files and `out` names no zip.
 
     Raises:
       ConfigError: the folder is there and not empty.
