@@ -1,4 +1,6 @@
-"""Car following: a leader, and on either side a neighbour where there is a lane, brake, adapt their speed and cut in.
+"""Car following: a leader and neighbours brake, adapt their speed and cut in.
+
+A neighbour is on either side where there is a lane.
 
 Source: RISK-SAC, Sec. IV-A.2.
 """
@@ -13,7 +15,7 @@ from risk_sac.types import Role
 
 BEHIND_M, AHEAD_M = 15.0, 25.0  # of the neighbours' fronts from the ego's
 LEAST_FOLLOWING_M, MOST_FOLLOWING_M = 10.0, 40.0  # gap behind the ego
-CLEAR_M = 1.0  # that a track has left behind whoever is last on it
+CLEAR_M = 1.0  # that a track has left behind the last vehicle on it
 DISTANT_M = 60.0  # beyond the leader
 LEAST_BEHIND_M = 8.0  # room that a place must have behind the ego
 

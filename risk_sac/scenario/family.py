@@ -1,4 +1,4 @@
-"""What a scenario family is, and what all patterns have in common."""
+"""Scenario families, and the code that all patterns share."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -38,7 +38,7 @@ def friction() -> Parameter:
 
 
 def top_speed(limit_mps: float) -> float:
-    """The highest initial speed on a road, to a tenth of a m/s, so that it is within the limit."""
+    """Computes the highest initial speed, the limit rounded down to 0.1 m/s."""
     return math.floor(limit_mps * 10 + 1e-9) / 10
 
 

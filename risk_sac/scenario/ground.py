@@ -13,7 +13,10 @@ ON_THE_EDGE_M2 = 1e-9  # twice the area of a triangle that counts as none
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """A convex polygon: where nx·x + ny·y <= c for each of its sides, (nx, ny) the side's unit normal outwards."""
+    """Convex polygon: nx·x + ny·y <= c for each of its sides.
+
+    (nx, ny) is the side's unit normal outwards.
+    """
 
     sides: tuple[tuple[float, float, float], ...]  # nx, ny, c of each
 
@@ -75,7 +78,7 @@ def triangles(outline: Sequence[Point]) -> list[list[Point]]:
     found = []
     while len(ring) > 2:
         ear = next((i for i in range(len(ring)) if _is_ear(ring, i)), None)
-        if ear is None:  # it crosses itself, so what is left has no inside
+        if ear is None:  # it crosses itself, so the rest has no inside
             break
         corner = [ring[ear - 1], ring[ear], ring[(ear + 1) % len(ring)]]
         if _doubled_area(corner) > ON_THE_EDGE_M2:

@@ -1,8 +1,8 @@
-"""A hidden pedestrian at a crossing, and a vehicle that stands between who walks and who drives.
+"""A pedestrian at a crossing, hidden from the ego by a standing vehicle.
 
 The vehicle waits before the crossing on a lane to the ego's right, and the pedestrian comes from there. Where the ego's
-road has no such lane, it is one that came the other way and is just beyond the crossing, as the end of a queue is, and
-the pedestrian comes from the left.
+road has no such lane, the pedestrian comes from the left. The vehicle then came the other way and stands just beyond
+the crossing, like the end of a queue.
 
 Source: RISK-SAC, Sec. IV-A.2.
 """

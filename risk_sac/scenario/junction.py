@@ -21,7 +21,7 @@ from risk_sac.scenario.place import JunctionPlace, Leg, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.types import Role
 
-NEAREST_M, FARTHEST_M = 10.0, 90.0  # whoever attacks, and the ego, from the stop line
+NEAREST_M, FARTHEST_M = 10.0, 90.0  # attacker and ego, from the stop line
 LEAST_RANGE_M = 10.0  # of those distances at a place
 STREAM_MPS, STREAM_M = 9.0, 30.0
 WIDEST_GAP_M = 40.0  # of the background
@@ -84,7 +84,10 @@ class _Approach(NamedTuple):
         return vehicle(self.name, role, self.track, self.before_m, self.speed_mps)
 
     def taken_m(self) -> tuple[float, float]:
-        """Where no background vehicle may be at the release, or it is too close then or at the start."""
+        """Returns the range closed to background vehicles at the release.
+
+        There they would be too close then or at the start.
+        """
         least_m, gains_m = CAR_LENGTH_M + LEAST_GAP_M, LEAD_IN_S * (self.speed_mps - STREAM_MPS)
         return self.before_m - least_m + min(gains_m, 0.0), self.before_m + least_m + max(gains_m, 0.0)
 

@@ -1,4 +1,4 @@
-"""Where everybody starts: the plain data between a scene and a simulator."""
+"""Layout: plain data of all actors' starts, between a scene and a simulator."""
 
 import math
 from collections.abc import Iterable, Mapping

@@ -1,4 +1,6 @@
-"""The folder of places on users' nets: each with a piece of its net, under a name that holds the digest of both.
+"""Library of places on users' nets, a folder.
+
+A place is stored with a piece of its net, under a name that holds the digest of both.
 
 `RISK_SAC_PLACES` says where it is. Campaigns name the places of maps like families, so a process that plays or draws an
 episode needs the folder that its place was kept in.
@@ -37,12 +39,15 @@ def library() -> Path:
 
 
 def keep(place: Place, net: bytes, id_: str = "") -> str:
-    """Puts a place and the piece of net around it into the library; returns the name of its family.
+    """Puts a place and its piece of net into the library.
 
     Args:
       place: on the piece.
       net: the piece, as SUMO reads it.
-      id_: how its map calls the place; the name tells it as far as it has letters and digits.
+      id_: the map's name of the place; its letters and digits become part of the family's name.
+
+    Returns:
+      The name of its family.
     """
     text = place.model_copy(update={"net": NET}).model_dump_json().encode()
     words = re.sub("^-", "minus_", id_.lower())  # of two directions of a road
@@ -115,7 +120,9 @@ def kept(name: str) -> Place:
 
 
 def prune(folder: Path, named: Collection[str], unused_s: float, started_at: float) -> list[str]:
-    """Removes the places of a service's library that were put there long ago and are not named; returns their names.
+    """Removes a service's places that are old and not named.
+
+    Returns their names.
 
     Args:
       folder: the library; never that of a person, whose run folders are unknown.

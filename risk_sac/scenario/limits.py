@@ -46,7 +46,7 @@ class Limits:
 
     @cached_property
     def approach_mps2(self) -> float:
-        """Braking that the circle leaves to who drives a curve as planned and changes lane in it."""
+        """Computes the braking left for a lane change in a curve driven as planned."""
         lateral = self.cornering_mps2 + self.lateral_accel_mps2
         return min(self.brake_mps2, math.sqrt(self.grip_mps2**2 - lateral**2))
 

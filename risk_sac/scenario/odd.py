@@ -147,7 +147,7 @@ SHIPPED_REQUIREMENTS = (
 
 
 def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...]:
-    """The STL requirements that an ego has to meet in this ODD, thresholds included.
+    """Derives the ego's STL requirements, with their thresholds, from an ODD.
 
     Contacts and entering on red make an episode a failure; the others are reported, unless a user lets them count.
 
@@ -172,7 +172,7 @@ def requirements_from_odd(odd: Odd, response_s: float) -> tuple[Requirement, ...
       odd: complete, as `intersect` returns it; pedestrians and red light count where it has them.
       response_s: within which the ego responds.
 
-    Source: Hayward 1972 for TTC; the scales are medians over episodes that nobody disturbs.
+    Source: Hayward 1972 for TTC; the scales are medians over undisturbed episodes.
     """
     ttc_s = max(MIN_TTC_S, response_s + 1.0)
     ttc_scale_s = max(UNDISTURBED_ENCOUNTER_S - ttc_s, 1.0)

@@ -1,6 +1,7 @@
-"""Where on a net a pattern is played: plain data that a finder derives from the net (`risk_sac.scenario.maps`).
+"""Places of patterns on a net: plain data that a finder derives from it.
 
-The places of the shipped families lie beside their nets, in `sumo_nets/`. A place names edges; patterns never do.
+The finders are in `risk_sac.scenario.maps`. The places of the shipped families lie beside their nets, in `sumo_nets/`.
+A place names edges; patterns never do.
 """
 
 from typing import Annotated, Literal
@@ -36,7 +37,7 @@ class Track(Settings):
 
     @property
     def room_m(self) -> float:
-        """How far before the reference the track begins."""
+        """Length of the track before its reference, m."""
         return self.pieces[0].reach_m
 
     def start(self, before_m: float, lead_m: float = 0.0) -> tuple[tuple[str, ...], Piece, float]:
@@ -53,7 +54,7 @@ class Track(Settings):
 
 
 class Walk(Settings):
-    """Where a pedestrian steps off the kerb."""
+    """Start of a pedestrian's walk, off the kerb."""
 
     x_m: float
     y_m: float
@@ -123,7 +124,7 @@ class _Somewhere(Settings):
 
 
 class Stretch(_Somewhere):
-    """A road where the ego follows somebody; the reference is where the ego starts."""
+    """A road where the ego follows a leader; the reference is the ego's start."""
 
     pattern: Literal["car_following"] = "car_following"
     ego: Track

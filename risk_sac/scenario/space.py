@@ -72,7 +72,10 @@ class SceneSpace:
         return Scene(self.family, dict(zip(self.names, values.tolist(), strict=True)))
 
     def to_unit(self, scene: Scene) -> Floats:
-        """The point of the unit cube at which a scene lies, `d`; a parameter without room lies at 0."""
+        """Maps a scene into the unit cube, `d`.
+
+        A parameter without room maps to 0.
+        """
         self.check(scene)
         offset = np.array([scene.values[name] for name in self.names]) - self.low
         width = self.high - self.low

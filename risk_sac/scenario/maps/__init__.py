@@ -1,1 +1,1 @@
-"""Where the patterns fit on any net of SUMO's: reading it, finding places, cutting out a place's piece of it."""
+"""Reads any SUMO net, finds places for the patterns, cuts them out."""

@@ -12,10 +12,10 @@ from risk_sac.scenario.maps.clearance import is_near, outlines
 from risk_sac.scenario.maps.net import Crossing, Net
 from risk_sac.scenario.place import Ground, Signal, Walk
 
-CROSSINGS_M = 60.0  # so far from a place a crossing is told of
-WALKED_M = 40.0  # so far a pedestrian may get in an episode
+CROSSINGS_M = 60.0  # crossings up to this far from a place are recorded
+WALKED_M = 40.0  # a pedestrian's longest way in an episode
 JUNCTIONS_M = 120.0
-KERB_M = 0.05  # of the crossing before its ends: whoever stands at the kerb is on the road's edge
+KERB_M = 0.05  # of the crossing before its ends: a pedestrian at the kerb is on the road's edge
 CLEAR_M, MOST_BACK_M = 0.3, 5.0  # of the kerb from cars that turn across it, and how far it is moved for that
 BESIDE_M = WALK_OFFSET_M + 0.25  # from the crossing's axis, that a pedestrian may reach
 LEGS = 3  # of a junction where ways can cross
@@ -47,9 +47,10 @@ def ground_around(net: Net, x_m: float, y_m: float, *, walked: bool) -> Ground:
 
 
 def walk_over(net: Net, crossing: Crossing, driven_rad: float) -> Walk:
-    """From the kerb on the right of who drives in a direction, over a crossing.
+    """Returns a walk over a crossing, from the kerb on a driver's right.
 
-    Where cars turn round the corner across the end of a crossing, the kerb is beyond them: who waits there is clear.
+    Where cars turn round the corner across the end of a crossing, the kerb is beyond them, so a waiting pedestrian is
+    clear.
     """
     right = (math.sin(driven_rad), -math.cos(driven_rad))
     (x0, y0), (x1, y1) = crossing.line[0], crossing.line[-1]
@@ -63,7 +64,7 @@ def walk_over(net: Net, crossing: Crossing, driven_rad: float) -> Walk:
 
 
 def _turned_over_m(net: Net, junction: str, kerb: Walk) -> float:
-    """How far behind a kerb who waits there is clear of the cars that turn round the corner across it."""
+    """Computes how far a kerb moves back to be clear of turning cars."""
     links = [link for edge in net.arriving[junction] for lane in edge.drivable for link in net.onward.get(lane.id, ())]
     if not links:
         return 0.0

@@ -1,14 +1,14 @@
-"""Whether vehicles that drive or wait in a junction leave each other room.
+"""Checks that vehicles in a junction leave each other room.
 
-A vehicle lies along the chord from its front to where its rear comes by. Round a bend the chord is shorter than the
+A vehicle lies along the chord from its front to where its rear passes. Round a bend the chord is shorter than the
 way, so its tail swings out; and between the two the chord cuts the corner.
 
 Ways from lanes beside each other are no foes of one another where they do not cross: SUMO's drivers ignore each other
 there. Where netconvert bends both sharply, they come nearer to each other than cars are wide.
 
-SUMO lets a turning driver wait where the middle of its front comes to the edge of the lane that it is to cross. A car
-that stands askew there has a corner in that lane, and a driver with the right of way does not see it. A driver that
-crosses its way before that place, or joins it, is told of it by SUMO.
+SUMO lets a turning driver wait where the middle of its front reaches the edge of the lane that it is to cross. A car
+that stands askew there has a corner in that lane, and a driver with the right of way does not see it. SUMO does warn a
+driver that crosses its way before that place, or joins it.
 """
 
 import math
@@ -29,7 +29,10 @@ CLEAR_M = CAR_WIDTH_M / 2 + 0.1  # of the box of who waits from the middle of a 
 
 
 def outlines(link: Link, length_m: float, width_m: float) -> Floats:
-    """Points on both sides of a vehicle, wherever it is on its way; x and y in rows, m."""
+    """Samples points on both sides of a vehicle along its way.
+
+    Returns x and y in rows, m.
+    """
     line = np.array([*link.source.line, *link.line, *link.target.line])
     station_m = _stations_m(line)
     stop_m = station_m[len(link.source.line) - 1]
@@ -68,7 +71,9 @@ def too_near(net: Net, link: Link) -> Link | None:
 
 
 def truck_reaches(net: Net, beside: Link, own: Link) -> bool:
-    """Whether a truck that drives one way across a junction reaches into a car on the way beside it.
+    """Tells whether a truck reaches into a car on the way beside it.
+
+    Both cross the junction.
 
     Where their lanes fork into several of the next road, SUMO's drivers may take any of them.
     """
@@ -88,7 +93,10 @@ def _come_near(line: Sequence[Point], other: Sequence[Point]) -> bool:
 
 
 def waits_in_the_way(net: Net, link: Link) -> Lane | None:
-    """A lane of those who have the right of way, which a car that waits for them reaches into; None if it is clear."""
+    """Finds a priority lane that a car waiting for it reaches into.
+
+    Returns None if the way is clear.
+    """
     for before, behind in pairwise(link.inside):
         for lane in net.waits_for.get(behind.id, ()):
             joins = lane.line[-1] == link.inside[-1].line[-1]
@@ -98,7 +106,10 @@ def waits_in_the_way(net: Net, link: Link) -> Lane | None:
 
 
 def _off_m(waiting: Lane, other: Lane) -> float:
-    """How far a lane comes from a car whose front is at the end of another; 0 if it comes within it."""
+    """Computes a lane's distance from a car that waits at another's end.
+
+    It is 0 if the lane comes within the car.
+    """
     (x, y), heading = waiting.line[-1], waiting.way_out_rad
     cos, sin = math.cos(heading), math.sin(heading)
     dx, dy = _sampled(np.array(other.line)) - np.array([[x], [y]])

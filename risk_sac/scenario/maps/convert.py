@@ -38,7 +38,7 @@ OPTIONS: dict[str, list[str]] = {  # by the root of a map
 
 @dataclass(frozen=True, slots=True)
 class Converted:
-    """A net that can be read, what was remarked on the way to it, and the documents that came with it."""
+    """Readable net, with the warnings of its conversion and other documents."""
 
     file: Path
     warnings: tuple[str, ...]
@@ -81,7 +81,11 @@ def remarks(said: str, severity: str) -> list[str]:
 
 
 def netconvert() -> tuple[str, dict[str, str]]:
-    """The program, and the environment in which it finds its own files; raises `MapError` if it is not installed."""
+    """Finds the netconvert program and its environment.
+
+    Raises:
+      MapError: it is not installed.
+    """
     package = importlib.util.find_spec("sumo")
     for home in package.submodule_search_locations or () if package else ():
         if program := shutil.which("netconvert", path=str(Path(home) / "bin")):
@@ -103,7 +107,10 @@ def _version(attributes: Mapping[str, str]) -> tuple[int, ...]:
 
 
 def _convert(found: Document, net: Path, name: str) -> str:
-    """Runs netconvert in the folder of its files, since a comma in a path makes a list; returns its messages."""
+    """Runs netconvert in the folder of its files; returns its messages.
+
+    A comma in a path would make a list.
+    """
     program, environment = netconvert()
     files = [found.file.name, "--output-file", net.name, "--xml-validation", "never"]
     command = [program, *OPTIONS[found.root], *files]

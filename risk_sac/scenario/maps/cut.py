@@ -1,8 +1,8 @@
-"""Cuts the piece of a net around a place out of it, so that an episode does not load a town.
+"""Cuts the piece of a net around a place out of it.
 
-Every junction that vehicles may come to stays as it is, with all its roads, ways and signals; where the piece ends,
-junctions become dead ends. Nothing is computed anew, so the right of way is unchanged. Signals get a fixed programme,
-also those that would count vehicles: an episode sets where in its cycle a signal is.
+An episode then loads no town. Every junction that vehicles may reach stays as it is, with all its roads, ways and
+signals; where the piece ends, junctions become dead ends. Nothing is recomputed, so the right of way is unchanged.
+Signals get a fixed programme, also those that would count vehicles: an episode sets where in its cycle a signal is.
 """
 
 import math
@@ -14,7 +14,7 @@ from risk_sac.scenario.maps.net import Net
 from risk_sac.scenario.maps.ways import edges_on
 from risk_sac.scenario.place import CrossingPlace, JunctionPlace, Place, Stretch, Track
 
-AROUND_M = 100.0  # so far from a place roads stay although nobody drives there: a picture shows them
+AROUND_M = 100.0  # unused roads up to this far from a place stay: a picture shows them
 
 
 def cut(net: Net, root: ET.Element, fit: Fit) -> bytes:
@@ -33,7 +33,7 @@ def cut(net: Net, root: ET.Element, fit: Fit) -> bytes:
 
 
 def tracks(place: Place) -> list[Track]:
-    """All tracks that somebody may start on."""
+    """Lists all tracks on which a vehicle may start."""
     match place:
         case Stretch():
             return [track for track in (place.ego, place.left, place.right) if track is not None]

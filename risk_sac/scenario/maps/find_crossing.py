@@ -1,7 +1,7 @@
-"""Where on a net a pedestrian may be hidden: at a crossing before which the ego has a lane on its right.
+"""Finds crossings where a vehicle can hide a pedestrian from the ego.
 
-Or one for those who come the other way on its left: who has just passed the crossing there hides a pedestrian from the
-left. So it is where roads have one lane in each direction.
+The ego has a lane on its right there. Or there is a lane of oncoming traffic on its left: a vehicle that has just
+passed the crossing on it hides a pedestrian from the left. So it is where roads have one lane in each direction.
 """
 
 import math
@@ -38,7 +38,11 @@ def spots(net: Net) -> Iterator[Spot]:
 
 
 def place(net: Net, spot: Spot) -> CrossingPlace:
-    """The crossing at the end of a road; raises `NoFit` where nothing can hide a pedestrian, or there is no room."""
+    """Makes a place of the crossing at the end of a road.
+
+    Raises:
+      NoFit: nothing can hide a pedestrian, or there is no room.
+    """
     edge = net.edges[spot.id]
     crossing = net.crossings_of[edge.end, edge.id][0]
     check_limit(edge.drivable[0])
@@ -68,7 +72,10 @@ def place(net: Net, spot: Spot) -> CrossingPlace:
 
 
 def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[Lane, Track, Track, Link]:
-    """The leftmost lane that leads on for an episode and has one to its right that leads anywhere, and clear of it."""
+    """Finds the leftmost lane for the ego beside a lane for the occluder.
+
+    The occluder is on its right. The ego's lane leads on for an episode and is clear of the occluder's.
+    """
     whys = []
     for right, own in reversed(list(pairwise(edge.drivable))):
         try:

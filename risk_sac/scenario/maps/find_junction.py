@@ -1,6 +1,6 @@
-"""Where on a net the junction pattern fits: a road to a junction whose ways are crossed or joined by another's.
+"""Finds junctions where another way crosses or joins the ego's.
 
-Whose ways cross is what the net says: the foe bits of its links.
+The net says which ways cross, by the foe bits of its links.
 """
 
 import math
@@ -26,14 +26,17 @@ UNREGULATED = "unregulated"
 
 @dataclass(frozen=True, slots=True)
 class Approach:
-    """A road to a junction, with the ways on from it: from left to right, one for each road they lead to."""
+    """Road to a junction, with the ways on from it.
+
+    They are ordered from left to right, one for each road they lead to.
+    """
 
     edge: Edge
     links: tuple[Link, ...]
 
     @property
     def driven_rad(self) -> float:
-        """Direction in which it comes to the junction."""
+        """Direction in which it reaches the junction."""
         return self.links[0].source.way_out_rad
 
 
@@ -47,7 +50,11 @@ def spots(net: Net) -> Iterator[Spot]:
 
 
 def place(net: Net, spot: Spot) -> JunctionPlace:
-    """The junction at the end of a road; raises `NoFit` where nothing crosses, or there is too little road."""
+    """Makes a place of the junction at the end of a road.
+
+    Raises:
+      NoFit: nothing crosses, or there is too little road.
+    """
     edge = net.edges[spot.id]
     at = net.junctions[edge.end]
     own = approach(net, edge)
@@ -85,7 +92,11 @@ def place(net: Net, spot: Spot) -> JunctionPlace:
 
 
 def approach(net: Net, edge: Edge) -> Approach:
-    """The ways on from a road, each from the leftmost lane that leads there; raises `NoFit` at a dead end."""
+    """Finds the ways on from a road, each from its leftmost lane.
+
+    Raises:
+      NoFit: the road is a dead end.
+    """
     by_target: dict[str, Link] = {}
     for lane in edge.drivable:  # from right to left, so that the leftmost stays
         for link in net.onward.get(lane.id, ()):
@@ -99,7 +110,11 @@ def approach(net: Net, edge: Edge) -> Approach:
 
 
 def leg(net: Net, road: Approach, name: str, onward_s: float) -> Leg:
-    """Where a vehicle comes from and may go to; raises `NoFit` where no way has room."""
+    """Finds a vehicle's tracks from a road across the junction.
+
+    Raises:
+      NoFit: no way has room.
+    """
     tracks, whys = [], []
     check_limit(road.links[0].source)
     limit_mps = road.links[0].source.limit_mps
@@ -163,7 +178,10 @@ def stream(net: Net, road: Approach) -> Track | None:
 
 
 def _others(net: Net, own: Approach) -> Mapping[str, Approach]:
-    """The roads with a way that is a foe of the ego's; of several from one side, the one squarest to it."""
+    """Finds the roads with a way that is a foe of the ego's.
+
+    Of several from one side it takes the one most square to the ego's.
+    """
     best: dict[str, tuple[float, Approach]] = {}
     for edge in net.arriving[own.edge.end]:
         links = [link for lane in edge.drivable for link in net.onward.get(lane.id, ())]

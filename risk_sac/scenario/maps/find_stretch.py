@@ -1,4 +1,7 @@
-"""Where on a net car following fits: on a lane that can be driven on for an episode, with room behind the ego."""
+"""Finds lanes for car following.
+
+Such a lane can be driven on for an episode, and has room behind the ego.
+"""
 
 from collections.abc import Iterator
 from contextlib import suppress

@@ -43,7 +43,11 @@ def survey(
 
 
 def place_at(net: Net, pattern: Pattern, id_: str) -> Fit:
-    """One place, with its ground; raises `MapError` if the map has no such spot or the pattern does not fit there."""
+    """Makes the place of a pattern at a spot, with its ground.
+
+    Raises:
+      MapError: the map has no such spot, or the pattern does not fit there.
+    """
     spot = next((spot for spot in _spots(net, (pattern,)) if spot.id == id_), None)
     if spot is None:
         raise MapError("place", _nowhere(net, pattern, id_))
@@ -86,7 +90,11 @@ class Map:
         self.net: Net = read_net(file, self._root)
 
     def fits(self, pattern: Pattern, place: str | None) -> Sequence[Fit]:
-        """One place, or all at which a pattern fits; raises `MapError` if it does not fit at the one."""
+        """Makes one place, or all places that a pattern fits.
+
+        Raises:
+          MapError: it does not fit at the one.
+        """
         return [place_at(self.net, pattern, place)] if place is not None else survey(self.net, (pattern,)).fits
 
     def keep(self, fit: Fit) -> str:

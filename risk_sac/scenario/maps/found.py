@@ -1,4 +1,4 @@
-"""What a search of a map comes to."""
+"""Results of a search for places on a map."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class Fit:
 
     @property
     def summary(self) -> str:
-        """What can happen there."""
+        """Summarises the place and its rare contacts."""
         return self.place.summary + (" Contacts are rare here: nobody can cut in." if self.rare else "")
 
     def told(self) -> dict[str, object]:

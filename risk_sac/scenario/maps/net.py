@@ -54,7 +54,7 @@ class Edge:
 
 @dataclass(frozen=True, eq=False)
 class Link:
-    """How a lane leads on to another, across a junction."""
+    """Connection of a lane to another, across a junction."""
 
     source: Lane
     target: Lane
@@ -74,7 +74,7 @@ class Link:
 
     @cached_property
     def turn_rad(self) -> float:
-        """How far it turns to the left."""
+        """Angle by which it turns to the left."""
         return math.remainder(self.target.way_in_rad - self.source.way_out_rad, math.tau)
 
 

@@ -13,7 +13,7 @@ from risk_sac.scenario.maps.net import Crossing, Edge, Junction, Lane, Link, Net
 
 DRIVER = "passenger"  # the class of every vehicle of ours
 TURNAROUND = "t"
-STOP = "rRyYu"  # red, yellow, and red with yellow: of the colours of a signal, those that let nobody go
+STOP = "rRyYu"  # red, yellow, and red with yellow: the colours that stop all traffic
 DEFAULT_WIDTH_M = 3.2
 LEAST_LIMIT_MPS = 0.01  # of a closed lane, so that driving it takes a finite time
 FARTHEST = 1e8  # m; the Earth's circumference is 4e7
@@ -30,7 +30,11 @@ def read_tree(path: Path) -> ET.Element:
 
 
 def read_net(path: Path, root: ET.Element | None = None) -> Net:
-    """Reads a net, or takes its XML from `root`; raises `MapError` if no place could be found on it."""
+    """Reads a net from a file or from its XML `root`.
+
+    Raises:
+      MapError: no place could be found on it.
+    """
     net = parse_net(read_tree(path) if root is None else root)
     if net.keeps_left:
         raise MapError("network", 'left-hand traffic (lefthand="true")', "right-hand traffic")
@@ -97,7 +101,10 @@ def _link(
     index_of: Mapping[str, int],
     states: Mapping[str, Sequence[str]],
 ) -> dict[str, str]:
-    """Notes how lanes lead on, unless a signal never lets anybody go there; returns the signal of each crossing."""
+    """Notes the connections of lanes; returns the signal of each crossing.
+
+    A connection whose signal never opens is left out.
+    """
     lights, follows, outer = dict[str, str](), dict[str, str](), []
     for c in root.iter("connection"):
         a, source = c.attrib, f"{c.attrib['from']}_{c.attrib['fromLane']}"
@@ -123,7 +130,10 @@ def _link(
 
 
 def _is_closed(connection: Mapping[str, str], states: Mapping[str, Sequence[str]]) -> bool:
-    """Whether its signal stays red: such programmes are made for somebody to switch between."""
+    """Tells whether a connection's signal stays red.
+
+    Such programmes are made to be switched by hand.
+    """
     phases = states.get(connection.get("tl", ""), ())
     return bool(phases) and all(state[int(connection["linkIndex"])] in STOP for state in phases)
 

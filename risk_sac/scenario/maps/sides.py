@@ -30,7 +30,7 @@ M_PER_DEG = 111_320.0
 
 
 def side_remarks(file: Path) -> list[str]:
-    """What a user of a map that is read as right-hand traffic should know.
+    """Returns remarks on a map that is read as right-hand traffic.
 
     Choice: where the evidence contradicts itself, as where one road has its sides swapped, most of it decides.
 
@@ -139,7 +139,10 @@ class _Map:
 
 
 def _around(lines: Sequence[Floats]) -> float:
-    """How far lines go round the middle of all their points, m²; above 0 counter-clockwise."""
+    """Computes the signed area that lines sweep about their middle, m².
+
+    It is above 0 counter-clockwise.
+    """
     middle = np.concatenate(lines).mean(axis=0)
     found = 0.0
     for line in lines:

@@ -1,4 +1,4 @@
-"""What a net has, and what a user should know who wants to find places on it."""
+"""Summarises a net, with remarks for finding places on it."""
 
 from collections import defaultdict
 from collections.abc import Set
@@ -9,7 +9,7 @@ from risk_sac.scenario.maps.net import Net
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a net has; edges and lanes are those outside junctions."""
+    """Contents of a net; edges and lanes are those outside junctions."""
 
     edges: int
     junctions: int
@@ -49,7 +49,7 @@ def net_remarks(net: Net) -> list[str]:
 
 
 def _roads_meet(net: Net) -> bool:
-    """Whether somebody could drive from one road to another; the way back from a dead end is none."""
+    """Tells whether any road leads to another, except back from a dead end."""
     leaving = defaultdict(set)
     for edge in net.edges.values():
         if edge.drivable:

@@ -1,4 +1,4 @@
-"""Unpacks a map that is packed by gzip or zip, or not packed, and counts every byte of it."""
+"""Unpacks a plain, gzip or zip map, and counts its bytes."""
 
 import gzip
 import re

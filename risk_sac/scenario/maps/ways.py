@@ -8,10 +8,10 @@ from risk_sac.scenario.maps.found import NoFit
 from risk_sac.scenario.maps.net import Lane, Link, Net, once
 from risk_sac.scenario.place import Piece, Track
 
-DRIVEN_S = 17.0  # an episode and a bit: the ego may not come to the end of the map before it is over
+DRIVEN_S = 17.0  # longer than an episode: the ego must not reach the end of the map
 AFTER_S = 15.5  # the same behind a stop line: what is driven until the adversaries' release comes off
-BEFORE_M = 160.0  # of road before a reference that anybody could start on
-PIECES_M = 160.0  # beyond a reference that somebody may start beyond
+BEFORE_M = 160.0  # of road before a reference where vehicles could start
+PIECES_M = 160.0  # of road beyond a reference where vehicles may start
 TRIES = 300  # lanes that are looked at for a way on
 
 
@@ -24,7 +24,9 @@ class Way:
 
 
 def way_on(net: Net, first: Lane, seconds: float, through: Link | None = None) -> Way:
-    """The straightest way on from a lane that takes `seconds` at the speed limits, no edge of it twice.
+    """Finds the straightest way on that takes `seconds` at the speed limits.
+
+    It uses no edge twice.
 
     Raises:
       NoFit: every way is too short.
@@ -138,7 +140,7 @@ def _reach(net: Net, lane: Lane, following: Sequence[str]) -> int:
 
 
 def edges_on(*tracks: Track) -> set[str]:
-    """All edges that somebody may come to."""
+    """Lists all edges that vehicles on the tracks may reach."""
     return {piece.edge for track in tracks for piece in track.pieces} | {e for track in tracks for e in track.onward}
 
 
