@@ -28,7 +28,7 @@ from risk_sac.run_folder.durable import replace_file
 
 COLUMNS = (
     *("defects", "family", "method", "seed", "budget_steps", "steps", "episodes"),
-    *("reached", "triggered", "detected", "refuted", "signature"),
+    *("reached", "triggered", "detected", "refuted", "signature", "driven_by"),
 )
 METHODS = (
     *("method", "runs", "falsification rate (95 %)", "mean steps", "median steps"),
@@ -91,7 +91,8 @@ def detections_csv(detections: Sequence[Detection]) -> bytes:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     for each in detections:
-        told = each.model_dump() | {"defects": "+".join(each.defects)}
+        driven_by = each.episode.driven_by if each.episode else None
+        told = each.model_dump() | {"defects": "+".join(each.defects), "driven_by": driven_by or ""}
         writer.writerow(told[name] for name in COLUMNS)
     return text.getvalue().encode()
 
