@@ -65,7 +65,9 @@ def _first_contact(before: Floats, now: Floats) -> tuple[float, int]:
 
 @compiled
 def _first_touch(before: Floats, now: Floats, other: int) -> float:
-    """Share of the step, in [0, 1], after which the ego first touches `other`; inf if it does not.
+    """Computes the share of the step, in [0, 1], until the ego touches `other`.
+
+    It is inf if the ego does not.
 
     Conservative advancement: bodies that are clear along an axis do not touch before they could close in along it.
     Source: Mirtich 1996, "Impulse-based dynamic simulation of rigid body systems", sec. 2.3.
@@ -99,7 +101,10 @@ def _first_touch(before: Floats, now: Floats, other: int) -> float:
 
 @compiled
 def _between(before: Floats, now: Floats, other: int, share: float) -> Floats:
-    """State of the ego and `other` alone, `share` of the way between two frames; the velocities are those of now."""
+    """Interpolates the state of the ego and `other` between two frames.
+
+    `share` is the part of the way; the velocities are those of now.
+    """
     pair = np.empty((WIDTH + 1, 2))
     for column, actor in enumerate((0, other)):
         turn = now[HEADING, actor] - before[HEADING, actor]

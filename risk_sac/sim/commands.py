@@ -28,7 +28,9 @@ class VehicleCommand(NamedTuple):
 
 @compiled
 def taper(distance: float, rate: float) -> float:
-    """Largest value that falls to 0 by at most `rate` per second while its sum over steps stays within `distance`.
+    """Computes the largest value that can fall to 0 within a distance.
+
+    It falls by at most `rate` per second, and its sum over steps stays within `distance`.
 
     With decrements of c = rate·dt and D = distance/dt, k full decrements fit, k(k+1)/2·c <= D, and the rest is
     spread over k + 1 steps. The continuous √(2·rate·distance) would overshoot by up to half a decrement.

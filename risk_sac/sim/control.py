@@ -1,4 +1,6 @@
-"""Control of all adversaries of an episode: from the joint action in [-1, 1] to commands, and whether they were kept.
+"""Turns the joint action in [-1, 1] into commands of all adversaries.
+
+It also checks whether the commands were kept.
 
 Vehicles take (longitudinal acceleration, lateral velocity), pedestrians (acceleration, heading rate).
 """
@@ -40,9 +42,10 @@ class PedestrianControl:
         return limits.walk_brake_mps2, limits.walk_jerk_mps3, limits.walk_disc_mps2 / limits.heading_rate_radps
 
     def step(self, drive: float, turn: float, others: Others | None = None) -> Walker:
-        """One step; acceleration and heading rate (clockwise below 0) are shares of what is allowed, -1 to 1.
+        """Moves the pedestrian by one step.
 
-        It keeps clear of others where they are told.
+        Acceleration and heading rate (clockwise below 0) are shares of what is allowed, -1 to 1. It keeps clear of
+        `others` if they are given.
         """
         for wanted in ((drive, turn), (-1.0, 0.0)):
             walker, across_mps2 = self._walk(*wanted)
@@ -71,7 +74,10 @@ class PedestrianControl:
         return walker, across_mps2
 
     def _accelerate(self, drive: float, turn: float) -> tuple[float, float]:
-        """Acceleration along and across: towards what is wanted on the disc, by at most the jerk."""
+        """Computes acceleration along and across, towards the action on the disc.
+
+        It changes by at most the jerk.
+        """
         limits, along, across = self.limits, self.state.accel_mps2, self.across_mps2
         jerk = limits.walk_jerk_mps3
         low = -taper(self.state.speed_mps, jerk)

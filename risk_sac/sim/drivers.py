@@ -1,4 +1,4 @@
-"""SUMO's drivers of an episode, and what each has to stop for or to follow in the next step.
+"""Decides what SUMO's drivers stop for or follow in the next step.
 
 The distance is ours; the speed for it comes from the driver's own car-following model (`getStopSpeed`,
 `getFollowSpeed`). The smaller of that and of what SUMO's models want anyway is driven.
@@ -29,11 +29,13 @@ EMERGENCY_MODE = 26  # without those of safe speed and of deceleration
 
 
 class Driver:
-    """Driver of one vehicle that SUMO drives; it decides once per reaction time, as SUMO's models do.
+    """Driver of one vehicle that SUMO drives; decides once per reaction time.
+
+    SUMO's models do so too.
 
     Attributes:
       telling: whether it is held to a speed at present.
-      cruise_mps: the speed it is told to keep where nothing else binds; below 0 SUMO chooses.
+      cruise_mps: its commanded speed where nothing else binds; below 0 SUMO chooses.
       period: its reaction time in steps.
       step: how many there have been.
       wanted_mps2: the acceleration that it decided on; None if nothing binds it.
@@ -66,7 +68,10 @@ class Driver:
         self._hold_to(self.wanted_mps2, speed_mps, accel_mps2)
 
     def brake(self, speed_mps: float, accel_mps2: float, braking_mps2: float) -> None:
-        """Makes it brake by at least `braking_mps2` in the next step, whatever it was told."""
+        """Makes it brake by at least `braking_mps2` in the next step.
+
+        That holds whatever its command was.
+        """
         accel = -min(braking_mps2, self._emergency_mps2)
         if self.wanted_mps2 is None or accel < self.wanted_mps2:
             self._hold_to(accel, speed_mps, accel_mps2)
@@ -103,7 +108,10 @@ class Driver:
 
 
 class Drivers:
-    """Tells the ego of all actors it knows of, and the others that SUMO drives of the pedestrians near them."""
+    """Informs SUMO's drivers of the actors that they know.
+
+    The ego gets all actors that it knows of, the others the pedestrians near them.
+    """
 
     def __init__(self, layout: Layout, reaction_time_s: float, roads: Roads) -> None:
         """Makes a driver for every vehicle; all have been inserted. The reaction time is the ego's."""

@@ -93,12 +93,18 @@ class Perception:
         return column
 
     def in_view_for(self, id_: str, time_s: float) -> float:
-        """How long `id_` has been in sight without a break, s; 0 if it is not."""
+        """Returns how long `id_` has been continuously in sight, s.
+
+        It is 0 if it is out of sight.
+        """
         since_s = float(self._of(id_)[SINCE_S])
         return 0.0 if math.isnan(since_s) else time_s - since_s
 
     def ever_seen(self, id_: str) -> bool:
-        """Whether `id_` has been in sight at any time in this episode, and has not left the net since."""
+        """Tells whether `id_` has been in sight in this episode.
+
+        It must not have left the net since.
+        """
         return not math.isnan(self._of(id_)[SEEN_S])
 
 

@@ -11,7 +11,10 @@ from risk_sac.errors import SimulationError
 
 
 class Holder:
-    """Lets one owner at a time use libsumo; one that was garbage-collected, or is the parent process's, gives way."""
+    """Lock that lets one owner at a time use libsumo.
+
+    An owner that was garbage-collected, or is the parent process's, gives way.
+    """
 
     def __init__(self) -> None:
         self._owner: ref[object] | None = None

@@ -73,7 +73,10 @@ def _on_route(route: Sequence[str], ids: Sequence[str], links: dict[str, list[st
 
 
 def _through(lane: str, following: str, links: dict[str, list[str]]) -> set[str]:
-    """The lanes of a way through a junction, from its first one; none if it does not lead to that edge."""
+    """Collects the lanes of a way through a junction.
+
+    `lane` is its first one; there are none if the way does not lead to the `following` edge.
+    """
     way: set[str] = set()
     while lane in links and lane.startswith(":") and lane not in way:
         way.add(lane)

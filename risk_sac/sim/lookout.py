@@ -1,4 +1,6 @@
-"""Actors on a collision course with a vehicle's corridor, which its driver has to stop for or to follow.
+"""Finds actors on a collision course with a vehicle's corridor.
+
+Its driver has to stop for them or to follow them.
 
 SUMO's drivers see pedestrians on crossings from one side only, none inside a junction or beside a crossing, and take a
 tilted car for a straight one: `MSPModel_Striping` derives the walking direction of a person that is moved by command
@@ -29,7 +31,10 @@ NEAR_M = 40.0  # beyond it no vehicle has to brake for a pedestrian yet
 
 @compiled
 def near_pedestrians(state: Floats, vehicle: Bools) -> Bools:
-    """Which of the `n` actors have a pedestrian within `NEAR_M`; pedestrians have themselves."""
+    """Tells which of the `n` actors have a pedestrian within `NEAR_M`.
+
+    Pedestrians have themselves.
+    """
     x, y, n = state[X], state[Y], len(vehicle)
     near = np.zeros(n, dtype=np.bool_)
     for k in range(n):
@@ -41,7 +46,10 @@ def near_pedestrians(state: Floats, vehicle: Bools) -> Bools:
 
 @compiled
 def project(points: Floats, x: float, y: float) -> tuple[float, float, float]:
-    """Station, offset to the left, and heading of the nearest place on a path; its ends go on straight."""
+    """Projects a place onto a path: station, offset to the left, heading.
+
+    The path's ends go on straight.
+    """
     path_x, path_y, path_station = points[paths.X], points[paths.Y], points[paths.STATION]
     path_cos, path_sin = points[paths.COS], points[paths.SIN]
     best, nearest, station, offset = math.inf, 0, 0.0, 0.0
@@ -72,7 +80,10 @@ def project(points: Floats, x: float, y: float) -> tuple[float, float, float]:
 
 @compiled
 def stretch(points: Floats, first_m: float, last_m: float) -> Floats:
-    """The segments of a path between two stations; the rest may come back beside them, as behind a roundabout."""
+    """Selects the segments of a path between two stations.
+
+    The rest may come back beside them, as behind a roundabout.
+    """
     stations, first, last = points[paths.STATION], 0, points.shape[1] - 1
     while first + 1 < last and stations[first + 1] <= first_m:
         first += 1
@@ -83,7 +94,10 @@ def stretch(points: Floats, first_m: float, last_m: float) -> Floats:
 
 @compiled
 def foreseen(points: Floats, front_m: float, speed_mps: float, accel_mps2: float) -> Floats:
-    """Stations of a front bumper at each tick of LOOK_S if it speeds up by `accel_mps2`, `ticks`; slow in bends."""
+    """Predicts the stations of a front bumper at each tick of LOOK_S, `ticks`.
+
+    It speeds up by `accel_mps2` and is slow in bends.
+    """
     ticks = round(LOOK_S / TICK_S) + 1
     front = np.empty(ticks)
     stations, limit_mps = points[paths.STATION], points[paths.LIMIT]
@@ -101,7 +115,7 @@ def foreseen(points: Floats, front_m: float, speed_mps: float, accel_mps2: float
 
 @compiled
 def _turned(angle: float) -> tuple[float, float]:
-    """How long a body of unit length, turned by so much, is along and across."""
+    """Computes the extent of a turned body of unit length, along and across."""
     return abs(math.cos(angle)), abs(math.sin(angle))
 
 
@@ -116,7 +130,7 @@ def targets(
     vehicle: Bools,
     candidate: Bools,
 ) -> Floats:
-    """What a driver has to stop for or to follow.
+    """Finds the actors that a driver has to stop for or to follow.
 
     Args:
       points: of the path that it will drive.

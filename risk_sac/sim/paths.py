@@ -82,7 +82,10 @@ def way_of(route: Sequence[str], lane: str) -> Way:
 
 
 def controlled_links() -> dict[tuple[str, str], tuple[str, int]]:
-    """Maps each lane, and the lane behind its stop line, to a signal and the index of its letter."""
+    """Maps pairs of lanes at a stop line to their signal.
+
+    A pair is a lane and the lane behind the line; a signal comes with the index of the letter.
+    """
     return {
         (before, via or after): (signal, index)
         for signal in libsumo.trafficlight.getIDList()
@@ -92,7 +95,10 @@ def controlled_links() -> dict[tuple[str, str], tuple[str, int]]:
 
 
 def leading_lane(route: Sequence[str], lane: str) -> str:
-    """Returns the nearest lane of the same edge that leads on along the route; the lane itself if none does."""
+    """Returns the nearest lane of an edge that leads on along the route.
+
+    It is the lane itself if none does.
+    """
     edge, _, index = lane.rpartition("_")
     beside = sorted(range(libsumo.edge.getLaneNumber(edge)), key=lambda other: abs(other - int(index)))
     return next((other for other in (f"{edge}_{i}" for i in beside) if leads_on(route, other)), lane)

@@ -55,7 +55,10 @@ class EgoTold(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """A frame and what its drivers look at; rows are those of the frame, vehicles first, the ego 0."""
+    """A frame with its drivers' views.
+
+    Rows are those of the frame: vehicles first, the ego is row 0.
+    """
 
     frame: Frame
     vehicles: tuple[str, ...]
@@ -139,7 +142,10 @@ class Reader:
         return Reading(frame, self._vehicles, self._row, speed_and_accel, offsets, self._drives, self._walks, near)
 
     def _ahead(self, ego: EgoTold | None) -> tuple[str, float]:
-        """Returns the letter of the ego's signal and the distance to its stop line; "" and inf without one."""
+        """Returns the letter of the ego's signal and the distance to it.
+
+        The distance is to its stop line; "" and inf without a signal.
+        """
         if self._signal is None:
             return "", math.inf
         if ego is not None:
@@ -148,7 +154,10 @@ class Reader:
         return (ahead[0][3], ahead[0][2]) if ahead else ("", math.inf)
 
     def _links(self, ego: str, walkers: Mapping[str, Walker]) -> NDArray[np.uint8]:
-        """The letter of the signal ahead of the ego and of each adversary; a pedestrian's is that of its crossing."""
+        """Reads the signal letters ahead of the ego and of each adversary.
+
+        A pedestrian's letter is that of its crossing.
+        """
         links = np.zeros(len(self._ids), dtype=np.uint8)
         if self._signal is None:
             return links

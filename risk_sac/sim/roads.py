@@ -16,7 +16,10 @@ ROUNDED_M = 0.05  # by which a lane's length may differ from that of its line wi
 
 
 class Room(NamedTuple):
-    """Lateral room up to the edges of the drivable lanes: from a vehicle's sides, or from a lane's middle."""
+    """Lateral room up to the edges of the drivable lanes.
+
+    It counts from a vehicle's sides, or from a lane's middle.
+    """
 
     left_m: float
     right_m: float
@@ -66,7 +69,10 @@ class Roads:
         return Room(left_m + spare - offset_m, right_m + spare + offset_m), self._along(vehicle, lane, offset_m)
 
     def room(self, vehicle: str, lane: str) -> Room:
-        """Returns the room from a lane's middle to the edges of the lanes that lead on along a vehicle's route."""
+        """Returns the room from a lane's middle along a vehicle's route.
+
+        It reaches to the edges of the lanes that lead on along the route.
+        """
         return self._room(self._routes[vehicle], lane)
 
     def _along(self, vehicle: str, lane: str, offset_m: float) -> Along:
@@ -89,7 +95,10 @@ def _stretch(lane: str) -> float:
 
 
 def _room(route: tuple[str, ...], lane: str) -> Room:
-    """Returns the room from a lane's middle to the edges of the lanes beside it that lead on along `route`."""
+    """Returns the room from a lane's middle along `route`.
+
+    It reaches to the edges of the lanes beside it that lead on along `route`.
+    """
     edge, _, index = lane.rpartition("_")
     widths = [_width_on_route(f"{edge}_{i}", route) for i in range(libsumo.edge.getLaneNumber(edge))]
     own, half_m = int(index), libsumo.lane.getWidth(lane) / 2
@@ -98,5 +107,8 @@ def _room(route: tuple[str, ...], lane: str) -> Room:
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
-    """Returns a lane's width, m; 0 if cars may not use it or it does not lead to the route's next edge."""
+    """Returns a lane's width, m; 0 if the route cannot use it.
+
+    Cars may not use it, or it does not lead to the route's next edge.
+    """
     return float(libsumo.lane.getWidth(lane)) if leads_on(route, lane) else 0.0

@@ -132,7 +132,9 @@ def _segment(path: Floats, first: int, station_m: float) -> int:
 
 @compiled
 def _foresee(state: Floats, own: int, speed: float, brake_mps2: float) -> Floats:
-    """Foresees the others, `rows x n`; `rows x 0` if none can be met before the adversary has stopped.
+    """Predicts the others' motion, `rows x n`.
+
+    It is `rows x 0` if none can be met before the adversary has stopped.
 
     A body that the adversary is inside of is left out.
     """

@@ -199,7 +199,7 @@ class SumoSimulation:
         return self._drivers.intended_accel(self._reading)
 
     def along(self, vehicle: str) -> Along:
-        """Where a vehicle is on its path."""
+        """Locates a vehicle on its path."""
         if self._moved is not None and vehicle == self._layout.ego.id:
             return self._moved.along
         return self._roads.along(vehicle)
@@ -210,7 +210,10 @@ class SumoSimulation:
         return self._roads.way_ahead(self._layout.ego.id, float(frame.x_m[0]), float(frame.y_m[0]))
 
     def place(self, vehicle: str) -> tuple[Room, Along] | None:
-        """How far `vehicle` may move sideways, and where it is on its path; None once it left the net."""
+        """Returns a vehicle's lateral room and its place on its path.
+
+        Returns None once it left the net.
+        """
         row = self._reading.row.get(vehicle)
         if row is None:
             return None

@@ -97,7 +97,7 @@ class VehicleControl:
         Args:
           drive: longitudinal acceleration as a share of the limit, -1 (hardest braking) to 1.
           steer: lateral velocity as a share of the limit, -1 (right) to 1 (left).
-          room: what is left of the road on both sides.
+          room: of the road on both sides of the vehicle.
           along: where it is on the path it takes if it does not steer.
           intended_mps2: acceleration that its driver would choose without a command.
           others: whom it keeps clear of.
@@ -181,7 +181,9 @@ def _steer(
     room_m: float,
     curvature: float,
 ) -> float:
-    """Moves across the lane as a car can: on a path whose curvature is bounded, so not at a standstill.
+    """Moves across the lane on a path of bounded curvature.
+
+    So a car cannot move across at a standstill.
 
     Keeping its heading, a car that brakes loses lateral speed with the longitudinal; `limits.slip` is such that
     this alone is within the limit on lateral acceleration, and both bounds below always leave something.
@@ -200,7 +202,9 @@ def _steer(
 
 
 def bends(path: Path, limits: Limits) -> Floats:
-    """The bends of a path at the stations 0, GRID_M, 2·GRID_M …, and how fast they can be approached; `3 x stations`.
+    """Computes a path's bends, and the speeds to approach them; `3 x stations`.
+
+    The stations are 0, GRID_M, 2·GRID_M …
 
     v(s)² = min over s' ≥ s of  a / κ(s') + 2 b (s' - s),   a the planned cornering, b the braking left beside it
     """
