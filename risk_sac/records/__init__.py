@@ -1,4 +1,4 @@
-"""What a run produces and what the service stores of it: one model per thing, frozen.
+"""Records of runs and of the service: one frozen model per thing.
 
 A record is stored as JSON, answered by the service and read by the client; a field is declared once, here.
 """

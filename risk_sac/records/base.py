@@ -1,4 +1,4 @@
-"""What all records share: how a number that is not finite is written and read."""
+"""Base of all records; writes and reads numbers that are not finite."""
 
 import math
 from typing import Annotated, Any, Generic, TypeVar
@@ -16,8 +16,8 @@ def _without_defaults(schema: dict[str, Any]) -> None:
 class Record(BaseModel):
     """A frozen model that is stored as JSON, answered by the service and read by its client.
 
-    Stored JSON, in the folder of a run and in the database, has a number that is not finite as the string "Infinity",
-    "-Infinity" or "NaN", so that it reads back; `wire` writes null instead.
+    Stored JSON, in a run's folder and in the database, has a non-finite number as the string "Infinity", "-Infinity" or
+    "NaN". So it reads back. `wire` writes null instead.
     """
 
     model_config = ConfigDict(
@@ -82,7 +82,7 @@ class Adjustment(Record):
 
 
 class FieldProblem(Record):
-    """What is wrong with one field."""
+    """Error in one field of an input."""
 
     field: str
     """Dotted path as it was written, such as `budget.episodes`."""

@@ -10,7 +10,7 @@ from risk_sac.series import Real
 
 
 class Progress(Record):
-    """How far a campaign is, and what its searches have found."""
+    """Progress of a campaign, and the findings of its searches."""
 
     episodes_done: int
     """Of the i.i.d. phase too, if there is one; what follows the totals is of the searches alone."""
@@ -53,7 +53,7 @@ class Driver(Record):
 
 
 class CampaignHead(Record):
-    """What is known of a campaign without its runs."""
+    """A campaign's data without its runs."""
 
     id: str
     label: str
@@ -94,7 +94,7 @@ class Campaign(CampaignSummary):
 
 
 class CampaignCheck(Record):
-    """What a campaign would run with, where that is not what was asked for."""
+    """Changes from the requested settings to those that a campaign would use."""
 
     adjustments: tuple[Adjustment, ...]
 
@@ -160,7 +160,7 @@ class Total(Counts):
 
 
 class Results(Record):
-    """What a campaign found so far."""
+    """Results of a campaign so far."""
 
     campaign_id: str
     state: State

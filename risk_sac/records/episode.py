@@ -13,7 +13,7 @@ from risk_sac.series import Series
 
 
 class Outcome(StrEnum):
-    """How an episode ended; exactly one holds."""
+    """Outcome of an episode; exactly one holds."""
 
     REJECTED = "rejected"  # C_hard refused the scene; nothing was simulated
     SAFE = "safe"  # no requirement that counts was violated
@@ -75,7 +75,10 @@ class EpisodeRecord(Record):
 
     @property
     def valid_violations(self) -> tuple[Collision | Violation, ...]:
-        """What makes the episode a failure: valid violations of requirements that count, a contact first."""
+        """Lists valid violations of requirements that count, a contact first.
+
+        They make the episode a failure.
+        """
         contact = () if self.collision is None else (self.collision,)
         return tuple(each for each in (*contact, *self.violations) if each.valid)
 
@@ -90,7 +93,7 @@ class EpisodeRecord(Record):
         return tuple(each.requirement for each in found if each is not None and rule in each.broken)
 
     def id_in(self, run_id: str) -> str:
-        """How the episode is called wherever it is spoken of, unique within a campaign."""
+        """Returns the episode's name, unique within a campaign."""
         return f"{run_id}-{self.phase}-{self.index}"
 
     @property
@@ -100,7 +103,10 @@ class EpisodeRecord(Record):
 
     @property
     def evaluating(self) -> bool:
-        """Whether it belongs to the evaluation of the frozen policy, the second phase of a run that has one."""
+        """Whether it belongs to the evaluation of the frozen policy.
+
+        That is the second phase of a run that has one.
+        """
         return self.phase == RECORDED["evaluation"]
 
     def refused(self, rule: str, requirements: Collection[str]) -> "EpisodeRecord":
@@ -124,7 +130,7 @@ class EpisodeRecord(Record):
 
 
 class Ending(NamedTuple):
-    """How an episode that was played to its end is recorded, by its violations of requirements that count."""
+    """Ending of an episode, by its violations of requirements that count."""
 
     outcome: Outcome
     reason: str
@@ -150,7 +156,7 @@ class SeriesFile:
 
 
 class Repetition(Record):
-    """How often an episode was played again, in a fresh process each time, and what came of it."""
+    """Replays of an episode, each in a fresh process, and their result."""
 
     times: int
     same: int
@@ -179,7 +185,7 @@ class EpisodePage(Page[Episode]):
 
 
 class TriageState(StrEnum):
-    """What people make of a failure; any may follow any."""
+    """State that people gave a failure; any may follow any."""
 
     NEW = "new"
     CONFIRMED = "confirmed"
@@ -188,7 +194,7 @@ class TriageState(StrEnum):
 
 
 class Triage(Record):
-    """What people made of a failure."""
+    """Assessment of a failure by people."""
 
     state: TriageState
     comment: str

@@ -1,4 +1,4 @@
-"""How a contact came about, what the ego did about it, and how it was judged."""
+"""Judgement of a contact: its origin, the ego's part and the verdict."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -10,7 +10,7 @@ from risk_sac.records.base import Real, Record
 
 
 class ConflictType(StrEnum):
-    """How the striker came into the ego's way, or the ego into the striker's."""
+    """Way in which striker and ego came into conflict."""
 
     CUT_IN = "cut_in"
     MERGE = "merge"  # the ego came over to a vehicle beside it, which kept its lane
@@ -33,7 +33,7 @@ class Grade(StrEnum):
 
 
 class Fault(StrEnum):
-    """Which party caused a valid failure; see `risk_sac.verdicts`, README.md."""
+    """Party that caused a valid failure; see `risk_sac.verdicts`, README.md."""
 
     EGO = "ego"
     SHARED = "shared"
@@ -41,7 +41,10 @@ class Fault(StrEnum):
 
 
 class Severity(StrEnum):
-    """How bad a contact is, by closing speed and risk of injury; see `risk_sac.verdicts.severity`."""
+    """Severity of a contact, by closing speed and risk of injury.
+
+    See `risk_sac.verdicts.severity`.
+    """
 
     MINOR = "minor"  # between vehicles that close at less than 2 m/s
     MODERATE = "moderate"
@@ -59,7 +62,7 @@ TOO_FAST = 1.1  # times the speed that the sight allows
 
 
 class ReferenceOutcome(Record):
-    """How a reference driver fares in the ego's place."""
+    """Outcome of a reference driver in the ego's place."""
 
     avoids: bool
     """No contact, or it stands when it is struck, or is struck from behind; false if it passed the striker before."""
@@ -68,7 +71,7 @@ class ReferenceOutcome(Record):
 
 
 class EgoPart(Record):
-    """What the ego did about the striker: facts, from the frames up to the contact."""
+    """The ego's reaction to the striker: facts from the frames up to the contact."""
 
     seen_s: Real
     """How long it had seen the striker without a break."""
@@ -102,7 +105,10 @@ class EgoPart(Record):
 
 
 class Judgement(Record):
-    """How a contact came about, and which reference driver would have prevented it. Times count from the release."""
+    """Origin of a contact, and the reference drivers that would have prevented it.
+
+    Times count from the release.
+    """
 
     definitions: int
     """Version of the definitions it was judged by."""

@@ -1,4 +1,7 @@
-"""What finding nothing is worth: known defects that a campaign's budget detects, as benchmark runs have shown."""
+"""Number of known defects that a campaign's budget detects.
+
+It comes from benchmark runs, and says what finding nothing is worth.
+"""
 
 from typing import Literal
 
@@ -6,7 +9,7 @@ from risk_sac.records.base import Real, Record
 
 
 class RunBudget(Record):
-    """What each run of a method may spend in a family."""
+    """Budget of each run of a method in a family."""
 
     family: str
     runs: int
@@ -22,7 +25,7 @@ class RunBudget(Record):
 
 
 class DefectPower(Record):
-    """How often benchmark runs of a method have detected a known defect within the budget."""
+    """Share of benchmark runs that detected a known defect within the budget."""
 
     defect: str
     family: str
@@ -33,7 +36,7 @@ class DefectPower(Record):
 
 
 class MethodPower(Record):
-    """How many known defects a method detects with the budget."""
+    """Number of known defects that a method detects with the budget."""
 
     method: str
     budgets: tuple[RunBudget, ...]
@@ -54,7 +57,10 @@ class MethodPower(Record):
 
 
 class Power(Record):
-    """How many known defects a campaign's budget detects, by stored benchmark runs. Nothing is run for it."""
+    """Number of known defects that a campaign's budget detects, by stored benchmark runs.
+
+    Nothing is run for it.
+    """
 
     note: str
     """What the figures rest on."""

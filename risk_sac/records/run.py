@@ -12,7 +12,7 @@ from risk_sac.records.base import Real, Record
 
 
 class DrivenBy(StrEnum):
-    """What drives the adversaries of an episode."""
+    """Driver of the adversaries of an episode."""
 
     POLICY = "policy"  # the learner's own
     MODEL = "model"  # a script that the script model proposed
@@ -102,7 +102,7 @@ class DriverPcr(Record):
 
 
 class RunMetrics(Counts):
-    """What a run has achieved so far; rates come with their 95 % interval."""
+    """Measures of a run so far; rates come with their 95 % interval."""
 
     # Fields with a default can be read from what was stored before they were counted.
 
@@ -179,7 +179,7 @@ class Funnel(Record):
 
 
 class State(StrEnum):
-    """Where a campaign or a run stands."""
+    """State of a campaign or a run."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -219,7 +219,7 @@ class RunSummary(Record):
 
 
 class Run(RunSummary):
-    """How far a run is. Counts are sums of search and evaluation."""
+    """Progress of a run. Counts are sums of search and evaluation."""
 
     attempts: int
     """Workers that were started for it; more than one where some were lost."""
@@ -236,7 +236,7 @@ class Run(RunSummary):
 
 
 class RunResult(RunSummary):
-    """What one run found."""
+    """Results of one run."""
 
     evaluation: RunMetrics | None
     """Of the frozen policy; null until, or unless, the budget has evaluation episodes."""

@@ -29,7 +29,10 @@ NO_CONTACT = "no_contact"  # the requirement that a contact violates
 
 
 def _early(name: str) -> Any:
-    """A minimum that ends 1 s before the contact is called so; under its plain name in what was stored before."""
+    """Declares a minimum that ends 1 s before the contact.
+
+    Older records store it under its plain name.
+    """
     return Field(validation_alias=AliasChoices(f"early_{name}", name), serialization_alias=f"early_{name}")
 
 
@@ -62,7 +65,7 @@ class Violated(Record, ABC):
     @property
     @abstractmethod
     def blamed(self) -> Fault | None:
-        """Which party caused it; None where it is not valid, or was never judged."""
+        """Party that caused it; None where it is not valid or not judged."""
 
     @property
     @abstractmethod
@@ -135,12 +138,12 @@ class Violation(Violated):
 
     @property
     def event(self) -> str:
-        """What the ego does, such as "violates never_fast after 3.4 s, at 13.2 m/s"."""
+        """Describes the ego's violation: "violates never_fast after 3.4 s, at 13.2 m/s"."""
         return f"violates {self.requirement} after {self.time_s:.1f} s, at {self.ego_speed_mps:.1f} m/s"
 
 
 class RequirementResult(Record):
-    """How far an episode kept one requirement after the adversaries' release."""
+    """Result of one requirement after the adversaries' release."""
 
     counts: str
     """failure | report"""
@@ -211,7 +214,7 @@ class Collision(Violated):
 
     @property
     def severity(self) -> Severity | None:
-        """How bad it is; None in older records."""
+        """Its severity; None in older records."""
         return None if self.judgement is None else self.judgement.severity
 
     @property
@@ -232,7 +235,10 @@ class Collision(Violated):
 
     @property
     def event(self) -> str:
-        """What the ego does, such as "touches lead with an impact speed of 9.0 m/s"; the speed is its own."""
+        """Describes the ego's contact: "touches lead with an impact speed of 9.0 m/s".
+
+        The speed is the ego's own.
+        """
         return f"touches {self.other_id} with an impact speed of {self.ego_speed_mps:.1f} m/s"
 
     @property
