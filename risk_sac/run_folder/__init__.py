@@ -1,1 +1,1 @@
-"""What a run leaves in its folder, and how it is written so that no crash spoils it."""
+"""Files of a run's folder, written so that no crash spoils them."""

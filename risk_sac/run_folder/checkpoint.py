@@ -29,7 +29,9 @@ _DIGEST_BYTES = hashlib.sha256().digest_size
 
 
 def save(path: Path, state: State, run_digest: str) -> None:
-    """Replaces the checkpoint at `path` and keeps the one before it; a crash at any moment leaves a good one.
+    """Replaces the checkpoint at `path` and keeps the one before it.
+
+    A crash at any moment leaves a good one.
 
     One writer per path. Tensors are stored as they are on the CPU, views without the storage they look into.
 
@@ -44,7 +46,7 @@ def save(path: Path, state: State, run_digest: str) -> None:
 
 
 def previous(path: Path) -> Path:
-    """Where the checkpoint before the one at `path` is kept."""
+    """Returns the path of the checkpoint before the one at `path`."""
     return path.with_name(f"{path.name}.previous")
 
 
@@ -54,9 +56,10 @@ def exists(path: Path) -> bool:
 
 
 def load_newest(path: Path, run_digest: str) -> State | None:
-    """The newest of the two checkpoints that is undamaged, or None: a run can always begin anew.
+    """Loads the newer of the two checkpoints that is undamaged.
 
-    A damaged one is renamed, so that it never takes the place of a good one.
+    Returns None if neither is: a run can always restart. A damaged one is renamed, so that it never replaces a good
+    one.
 
     Raises:
         CheckpointError: it belongs to another run.

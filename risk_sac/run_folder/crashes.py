@@ -73,7 +73,10 @@ class CrashGuard:
         os.close(self._current)
 
     def begin(self, episode: int) -> bool:
-        """Notes that an episode begins and the one before ended; returns False if it is to be left out."""
+        """Notes that an episode begins and the one before ended.
+
+        Returns False if it is to be left out.
+        """
         if self._playing is not None and self._crashes.places.pop(self._playing, []):
             self._write()  # it can be played to its end, so it was not to blame
         playable = not self._crashes.fatal(episode)

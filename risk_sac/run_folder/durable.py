@@ -30,7 +30,9 @@ LOCK = ".lock"  # in a folder that one process at a time may work in
 
 
 def replace_file(path: Path, content: bytes | memoryview, *, keep: Path | None = None, mode: int = 0o666) -> None:
-    """Replaces a file in one step: a crash or a full disk leaves the old file or the new one.
+    """Replaces a file in one step.
+
+    A crash or a full disk leaves the old file or the new one.
 
     Args:
       path: in an existing folder; it has one writer at a time.

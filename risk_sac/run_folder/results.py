@@ -64,7 +64,10 @@ class Results:
     failures: Annotated[tuple[RecordedFailure, ...], Field(validation_alias=AliasChoices("failures", "contacts"))] = ()
 
     def failure(self, id_: str) -> RecordedFailure:
-        """Returns the failure with this id, with or without the run's id in front, or with this episode number."""
+        """Finds a failure by its id or its episode number.
+
+        The id may stand with or without the run's id in front.
+        """
         for failure in self.failures:
             episode = failure.episode
             known = (failure.id, episode.id_in(self.spec.id), f"{episode.phase}-{episode.index}")

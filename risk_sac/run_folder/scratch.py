@@ -28,7 +28,10 @@ def scratch_name() -> str:
 
 @contextlib.contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Makes a temporary folder, which is removed at the end or, if this process is killed, by the next one."""
+    """Makes a temporary folder and removes it at the end.
+
+    If this process is killed, the next one removes it.
+    """
     folder = Path(tempfile.gettempdir(), scratch_name())
     handle = claim(folder)
     try:
@@ -80,7 +83,10 @@ def _locked(folder: Path) -> int:
 
 
 def remove_temporaries(folder: Path, before: float) -> None:
-    """Removes the temporary files of ours below a folder that were last written before a moment, s since the epoch."""
+    """Removes our temporary files below a folder that are older than `before`.
+
+    They were last written before that moment, s since the epoch.
+    """
     for parent, _, names in os.walk(folder):
         for name in filter(_TEMPORARY.fullmatch, names):
             with contextlib.suppress(OSError):

@@ -61,7 +61,10 @@ class Trace:
         return min(m.soft_min for m in self.since_release)
 
     def encounters_s(self, actors: Collection[str]) -> dict[str, float]:
-        """The smallest time to encounter of each of some actors, s, while ahead and in sight, the ego on the move."""
+        """Computes the smallest time to encounter of each of some actors, s.
+
+        Only times count at which the actor is ahead and in sight, and the ego on the move.
+        """
         least: dict[str, float] = {}
         for frame, measures in zip(self.frames[self.released :], self.since_release, strict=True):
             if frame.ego_speed_mps < ON_THE_MOVE_MPS:

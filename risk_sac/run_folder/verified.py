@@ -1,4 +1,4 @@
-"""Which failures of a run repeat: `verified.json` in its folder, beside the results that it speaks of."""
+"""Records which failures of a run repeat, in `verified.json` beside its results."""
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -14,7 +14,7 @@ from risk_sac.run_folder.results import Results
 from risk_sac.verdicts.distinct import DistinctFailures, Niche, kind_name, niche_of
 
 VERIFIED = "verified.json"
-TIMES = 3  # that a failure is replayed, if nobody says otherwise
+TIMES = 3  # that a failure is replayed by default
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,9 +32,9 @@ class Verified:
         return frozenset(index for index, repetition in self.episodes.items() if not repetition.verified)
 
     def judged(self, records: Sequence[EpisodeRecord]) -> tuple[EpisodeRecord, ...]:
-        """A run's episodes; violations that do not repeat are refused by that rule, and those like them in their phase.
+        """Marks violations that do not repeat as refused by that rule.
 
-        Those of an episode that was replayed itself and does repeat stay.
+        So are violations like them in their phase, except in an episode that was replayed itself and does repeat.
         """
         if not self.flaky:
             return tuple(records)
@@ -80,7 +80,9 @@ def _kinds(episode: EpisodeRecord) -> Mapping[tuple[str, Niche], str]:
 
 
 def distinct_failures(results: Results) -> list[EpisodeRecord]:
-    """Episodes with the first violation of a kind in their phase, the first preventable one, or the first candidate.
+    """Selects episodes with the first failure of a kind in their phase.
+
+    It is the first valid, the first preventable, or the first candidate.
 
     A candidate is one for the headline. The episodes come in their order.
     """
@@ -102,7 +104,10 @@ def write_verified(folder: Path, verified: Verified) -> None:
 
 
 def read_verified(folder: Path, digest: str) -> Verified | None:
-    """What was found of the results with this digest; None if nothing was, or if the file is damaged."""
+    """Reads what was found of the results with this digest.
+
+    Returns None if nothing was, or if the file is damaged.
+    """
     try:
         found = read_sealed(folder / VERIFIED, Verified)
     except (FileNotFoundError, DamagedError):
