@@ -39,7 +39,7 @@ class Exited:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Program:
-    """How a worker is started and when it is killed.
+    """Settings of a worker's start and of its time limits.
 
     A worker gets its run as a line of JSON on its standard input. The end of that means that nothing reads its words.
     """

@@ -46,7 +46,10 @@ class Lease:
         self._silent_s = self._stalled_s = 0.0
 
     def passed(self, watched_s: float, signs: Signs) -> str | None:
-        """Adds `watched_s`, of the time since the last call, s; returns the reason why the worker is lost, if it is."""
+        """Adds `watched_s`, the time since the last call, s.
+
+        Returns the reason why the worker is lost, if it is.
+        """
         before, self._signs = self._signs, signs
         self._silent_s = 0.0 if signs != before else self._silent_s + watched_s
         self._stalled_s = 0.0 if signs.episodes != before.episodes else self._stalled_s + watched_s
@@ -58,9 +61,10 @@ class Lease:
 
 
 class LocalExecutor:
-    """Executes each attempt in a subprocess, with a thread that reads its words and notices its end at once.
+    """Executor of each attempt in a subprocess, watched by a thread.
 
-    The thread checks five times a second whether the worker overstays or has fallen silent.
+    The thread reads the worker's words and notices its end at once. Five times a second it checks whether the worker
+    overstays or has fallen silent.
     """
 
     slots = math.inf  # the caller knows this machine
@@ -122,7 +126,7 @@ class _Worker:
         self._lease = Lease(program.lease_s, program.stall_s)
         self._lines = self._episodes = 0  # heard so far
         self._last = self._told_to_stop = False
-        self._stop_by = self._leave_by = math.inf  # monotonic times: since it was told to; since it is not heard
+        self._stop_by = self._leave_by = math.inf  # monotonic times: after the order to stop; after its silence
         self._given_up: Exited | None = None
         self._looked_at = time.monotonic()
 

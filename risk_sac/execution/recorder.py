@@ -1,4 +1,4 @@
-"""Writes a run down as it goes; what its folder then holds is told in `risk_sac.run_folder.results`."""
+"""Writes a run to its folder; `risk_sac.run_folder.results` describes the files."""
 
 import logging
 import os
@@ -20,12 +20,12 @@ logger = logging.getLogger(__name__)
 
 
 class Recorder:
-    """The observer that writes a run down and hands on to another one what it is told.
+    """Observer that writes a run to its folder, then informs another observer.
 
-    A resumed run tells of its checkpoint's episodes again, so the file of episodes is always begun anew.
+    A resumed run repeats its checkpoint's episodes, so the file of episodes is always rewritten.
 
     Attributes:
-      results: what results.json says.
+      results: the content of results.json.
     """
 
     def __init__(self, spec: RunSpec, folder: Path, observer: Observer) -> None:
@@ -60,7 +60,10 @@ class Recorder:
         self._observer.episode(record, metrics, series)
 
     def finish(self, summary: RunSummary) -> Results:
-        """Writes down what the run came to; its episodes first, so that no digest stands without them."""
+        """Writes the results of the run, after its episodes.
+
+        So no digest stands without its episodes.
+        """
         os.fsync(self._episodes.fileno())
         results = replace(
             self.results,
@@ -85,7 +88,7 @@ class Recorder:
 
 
 def _results_so_far(spec: RunSpec, folder: Path) -> Results:
-    """What earlier invocations left, or an empty start that claims the folder for `spec`."""
+    """Reads earlier results, or claims the folder for `spec`."""
     if (folder / RESULTS).exists():
         results = _read(spec, folder)
         if results.spec_digest != spec.digest:
@@ -108,7 +111,9 @@ def _claim(spec: RunSpec, folder: Path) -> Results:
 
 
 def _read(spec: RunSpec, folder: Path) -> Results:
-    """What results.json says; an empty start if it is damaged, since the run writes it anew.
+    """Reads results.json; starts empty if it is damaged.
+
+    The run then rewrites it.
 
     Raises:
       ConfigError: no run was ever in this folder, so the file is not ours to replace.

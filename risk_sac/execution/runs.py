@@ -1,4 +1,7 @@
-"""One run without a server: started or resumed in a folder, written down as it goes, stopped by Ctrl-C."""
+"""Executes one run without a server, in a folder.
+
+The run is started or resumed, written to the folder as it goes, and stopped by Ctrl-C.
+"""
 
 import signal
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +24,9 @@ Progress = Callable[[int, RunMetrics | None], None]
 
 
 def run(spec: RunSpec, folder: Path, progress: Progress) -> Results:
-    """Executes a run, or goes on with the one in `folder`; SIGINT and SIGTERM end it after the episode.
+    """Executes a run, or resumes the one in `folder`.
+
+    SIGINT and SIGTERM end it after the episode.
 
     Raises:
       ConfigError: the spec poses no problem that can be run, or the folder is in use or holds another run.

@@ -1,4 +1,4 @@
-"""Starts waiting runs, passes on what their workers say, and decides what becomes of a run whose worker is gone.
+"""Starts waiting runs, passes on workers' messages, retries lost runs.
 
 `risk-sac evaluate` and the service share it; each keeps its runs in a store of its own.
 """
@@ -48,7 +48,10 @@ class RunStore(Protocol):
         """It has succeeded, with a result, has failed, for a reason, or was cancelled; its worker has left."""
 
     def requeued(self, run: QueuedRun, reason: str | None) -> None:
-        """It waits again; `reason` says why its worker was lost, None that the scheduler stops."""
+        """Notes that it waits again.
+
+        `reason` says why its worker was lost; without one the scheduler stops.
+        """
 
     def storage_refused(self, run: QueuedRun, reason: str) -> None:
         """Its worker has left because the disk refused."""
@@ -65,7 +68,9 @@ class Active:
 
 
 class Scheduler:
-    """Keeps runs at work until nothing waits; not safe for threads without a lock around it, but for `hear`.
+    """Scheduler that keeps runs at work until none waits.
+
+    It is not safe for threads without a lock around it, but for `hear`.
 
     Attributes:
       active: runs whose workers live, by number.
@@ -74,7 +79,10 @@ class Scheduler:
     """
 
     def __init__(self, executor: Executor, store: RunStore, attempts: int) -> None:
-        """Starts nothing yet; `attempts` are the workers that a run may lose in a row without a new episode."""
+        """Starts nothing yet.
+
+        A run may lose `attempts` workers in a row without a new episode.
+        """
         self.active: dict[int, Active] = {}
         self.restarts: Counter[str] = Counter()
         self.stopping = False
@@ -97,7 +105,10 @@ class Scheduler:
                 self._store.not_started(run, error)
 
     def hear(self, timeout_s: float, gather_s: float = 0.0) -> list[tuple[int, Event | Exited]]:
-        """What workers say, waiting up to `timeout_s`; episodes are gathered, since one write of many costs less."""
+        """Collects workers' messages, waiting up to `timeout_s`.
+
+        Episodes are gathered, since one write of many costs less.
+        """
         heard = more = self._executor.events(timeout_s)
         until = time.monotonic() + gather_s
         while more and all(isinstance(message, EpisodeDone) for _, message in more) and len(heard) < MOST_AT_ONCE:

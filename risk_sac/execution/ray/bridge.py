@@ -106,7 +106,10 @@ class Attempt:
                 return exited
 
     async def _report(self) -> Any:
-        """Waits for the next report for as long as the lease; a time for which this process stood still is one look."""
+        """Waits for the next report for as long as the lease.
+
+        The lease is divided into looks; a time for which this process stood still is one look.
+        """
         lease_s = self._settings.ray_lease_s
         report = asyncio.wrap_future(self._actor.poll.remote(lease_s / BEATS).future())
         try:

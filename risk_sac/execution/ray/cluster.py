@@ -1,4 +1,7 @@
-"""The way to a cluster, and what has to hold before the first run, told with the setting to blame."""
+"""Connects to a cluster and checks it before the first run.
+
+An error names the setting to blame.
+"""
 
 import contextlib
 import ipaddress
@@ -27,8 +30,8 @@ def connect(settings: RaySettings) -> None:
     """Makes this process a client of the cluster.
 
     Raises:
-      ConfigError: nothing answers, it is no head, it has another version or token, it is open to other machines
-        without a token, or a node cannot do what it will have to.
+      ConfigError: nothing answers; it is no head; it has another version or token; it is open to other machines without
+        a token; or a node lacks what its runs need.
     """
     if settings.ray_address != "auto":
         _check_head(settings.ray_address)

@@ -1,4 +1,7 @@
-"""Runs on a Ray cluster, seen from the server: it knows Ray only through the bridge, a process of its own."""
+"""Executes runs on a Ray cluster, through a bridge process.
+
+The server knows Ray only through the bridge.
+"""
 
 import contextlib
 import logging
@@ -32,10 +35,10 @@ CLOSE_S = 10.0
 
 
 class RayExecutor:
-    """Orders attempts and passes on what is said of them.
+    """Executor of attempts on a Ray cluster.
 
-    A thread listens to the bridge. When the cluster is lost, so is what was at work on it and what is submitted before
-    there is one again.
+    A thread listens to the bridge. When the cluster is lost, so are the attempts on it, and those that are submitted
+    before there is a cluster again.
 
     Attributes:
       cluster: as it was a few seconds ago; without nodes while it is lost.
@@ -182,7 +185,7 @@ class _Bridge:
         return False
 
     def messages(self) -> Iterator[tuple[Any, ...]]:
-        """What it says until it ends."""
+        """Yields its messages until it ends."""
         with contextlib.suppress(EOFError, OSError):
             while True:
                 yield self._connection.recv()

@@ -1,4 +1,6 @@
-"""What is executed on a node: an actor per attempt, which starts the worker and hands on its words and files.
+"""Runs an attempt on a node: an actor that starts the worker.
+
+The actor hands on the worker's words and files.
 
 The worker is a process of the local executor, so one that falls silent, lingers or dies is treated as on one machine.
 It works in a folder of its node, which begins with the files of the run's folder on the server's machine.
@@ -183,7 +185,9 @@ def versions() -> Versions:
 
 
 def differing(found: Versions, expected: Versions) -> str:
-    """Which of those that the server's machine has are of another version here, in words; empty if none is.
+    """Lists the versions that differ from the server's machine, in words.
+
+    Returns "" if none differs.
 
     An ego that is installed here alone is no difference: no campaign can name it.
     """

@@ -1,4 +1,4 @@
-"""What the executor on Ray has to be told: RISK_SAC_RAY_* environment variables."""
+"""Settings of the executor on Ray: RISK_SAC_RAY_* environment variables."""
 
 import os
 from pathlib import Path
@@ -12,7 +12,7 @@ from risk_sac.errors import ConfigError
 
 
 class RaySettings(BaseSettings):
-    """Where the cluster is, and what a run takes of it."""
+    """Address of the cluster, and the resources of a run."""
 
     model_config = SettingsConfigDict(
         env_prefix="RISK_SAC_",
