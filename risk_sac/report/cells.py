@@ -29,7 +29,7 @@ def metrics_of(phase: Phase) -> tuple[Metric, ...]:
 
 
 class Cell(Counts):
-    """What a method achieved in a family and phase, over all its finished runs."""
+    """Results of a method in a family and phase, over its finished runs."""
 
     family: FamilyName
     method: RunMethod

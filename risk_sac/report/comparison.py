@@ -30,7 +30,7 @@ class MissingRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """What the report shows. The same runs give the same comparison."""
+    """Content of the report. The same runs give the same comparison."""
 
     spec: CampaignSpec
     command: str  # what a reader types to get the same
@@ -73,7 +73,7 @@ class Comparison:
         return tuple(cell for cell in self.cells if (cell.family, cell.phase) == (family, phase))
 
     def studies(self, family: FamilyName) -> Mapping[str, Studied]:
-        """What was told of failures that were played again, by id."""
+        """Collects the studies of replayed failures, by id."""
         return {
             record.id_in(run.spec.id): run.studies[record.index]
             for run in self.runs
@@ -174,7 +174,10 @@ def declared(test: PairedTest) -> bool:
 
 
 def _paid_tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[FinishedRun]) -> Iterator[PairedTest]:
-    """Our own search against every other one, corrected per family; the first method where it does not take part."""
+    """Tests our own search against every other one, corrected per family.
+
+    Where it does not take part, the first method takes its place.
+    """
     first = PAID_REFERENCE if PAID_REFERENCE in methods else methods[0]
     for family in spec.families:
         values = {
@@ -185,7 +188,7 @@ def _paid_tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequenc
 
 
 def _paid(run: FinishedRun) -> float | None:
-    """What a user pays for."""
+    """Counts the headline failures within the tested budget."""
     found = found_within(run, TESTED)
     return None if found is None else float(found.headline)
 

@@ -32,7 +32,7 @@ STYLE: dict[Any, Any] = {
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How a method is drawn in every figure."""
+    """Style of a method in every figure."""
 
     colour: str
     dashes: str
@@ -124,7 +124,7 @@ def _bars(comparison: Comparison, drawn: Bars) -> Figure:
             x = middle + (place - (len(methods) - 1) / 2) * width
             counts += [estimate.runs] if estimate and estimate.runs else []
             mean = estimate.mean if estimate else None
-            if not mean:  # a bar that nobody sees
+            if not mean:  # an invisible bar
                 axes.text(x, 0, "–" if mean is None else "0", ha="center", va="bottom", color="0.4", fontsize=7)
             axes.bar(x, mean or 0.0, 0.9 * width, color=LOOKS[method].colour, label="" if middle else method)
             if estimate and mean is not None and estimate.low is not None and estimate.high is not None:

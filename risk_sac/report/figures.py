@@ -1,4 +1,4 @@
-"""The figures of a comparison: how the methods search (the paper's Fig. 4a), what they reach (Fig. 4b-d), λ and α.
+"""Draws a comparison: searches (the paper's Fig. 4a), results (Fig. 4b-d), λ and α.
 
 Loads matplotlib once a figure is drawn, which takes a second: a server lists many and draws few.
 """
@@ -37,7 +37,10 @@ class Curve:
     timed: bool = False  # over processor time
 
     def over(self, runs: Sequence[FinishedRun]) -> tuple[Floats, Floats]:
-        """Where it is drawn, `n`, and the runs' values there, `runs x n`; no further than all runs came."""
+        """Computes the places to draw at, `n`, and the runs' values, `runs x n`.
+
+        They go no further than the shortest run.
+        """
         if not self.timed:
             each = [self.values(run) for run in runs]
             shortest = min(map(len, each))  # in processor time, runs play as many episodes as they can
@@ -108,7 +111,7 @@ class Curves:
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """How long after the release a family's conflicts and contacts came."""
+    """Times from the release to a family's conflicts and contacts."""
 
     family: FamilyName
     phase: Phase
@@ -123,7 +126,7 @@ class Bars:
 
 
 def figure_names(comparison: Comparison) -> tuple[str, ...]:
-    """What there is to draw."""
+    """Lists the figures that can be drawn."""
     return tuple(_figures(comparison))
 
 

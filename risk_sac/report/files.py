@@ -108,7 +108,7 @@ def write_report(comparison: Comparison, folder: Path) -> None:
 
 
 def table_of(comparison: Comparison) -> Table:
-    """What `table.json` holds."""
+    """Builds the content of `table.json`."""
     return Table(
         format_version=FORMAT_VERSION,
         command=comparison.command,

@@ -138,7 +138,10 @@ class Tables:
         return _filled(["method", *COLUMNS], rows, left=3)
 
     def budgets(self, family: FamilyName) -> str:
-        """What a user gets for processor time and for episodes: median over seeds, and the least and the most."""
+        """Tabulates findings within limits of processor time and of episodes.
+
+        A cell is the median over seeds, with the least and the most.
+        """
         rows = []
         for method in self._comparison.methods:
             runs = self._comparison.of_cell(family, method)
@@ -151,7 +154,7 @@ class Tables:
         )
 
     def times(self, family: FamilyName, phase: Phase) -> str:
-        """How long after the release conflicts and contacts come."""
+        """Tabulates the times from the release to conflicts and contacts."""
         bins = {
             (cell.method, until): counts
             for cell in self._comparison.group(family, phase)
@@ -163,7 +166,7 @@ class Tables:
         return _filled(columns, ([*name, *map(str, counts[:seconds])] for name, counts in bins.items()), left=2)
 
     def signatures(self, family: FamilyName, phase: Phase) -> str:
-        """How often each class of failures was found, the most frequent first."""
+        """Tabulates the counts of each class of failures, the most frequent first."""
         cells = [cell for cell in self._comparison.group(family, phase) if cell.signatures]
         total = sum((Counter(cell.signatures) for cell in cells), Counter[str]())
         rows = ([name, *(str(cell.signatures.get(name, 0)) for cell in cells)] for name, _ in total.most_common())
@@ -200,7 +203,7 @@ class Tables:
         return _filled(columns, rows, left=2)
 
     def regions(self, family: FamilyName) -> str:
-        """How many neighbours of failures fail too, where that was asked for."""
+        """Tabulates the failing neighbours of failures, where that was requested."""
         found = {id_: each.region for id_, each in self._comparison.studies(family).items() if each.region}
         columns = [
             "failure",
@@ -218,7 +221,7 @@ class Tables:
         return _filled(columns, rows)
 
     def controls(self) -> str:
-        """How often the simulator makes a contact by itself."""
+        """Tabulates the rate of contacts that the simulator makes by itself."""
         rows = (
             [cell.family, cell.phase, str(cell.episodes), percent(cell.raw_rate)]
             for cell in self._comparison.cells
@@ -262,7 +265,7 @@ def _spread(values: Sequence[int]) -> str:
 
 
 def verified(runs: Sequence[FinishedRun], phase: Phase) -> str:
-    """How many of the distinct failures that were replayed were the same each time."""
+    """Counts the replayed distinct failures that were the same each time."""
     if not all(run.verified for run in runs):
         return DASH
     repetitions = [

@@ -1,4 +1,4 @@
-"""What the sections of a page share: tables and numbers in Markdown, and the machine."""
+"""Formats tables and numbers in Markdown, and describes the machine."""
 
 import platform
 from collections.abc import Iterable, Mapping, Sequence

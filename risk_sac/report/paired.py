@@ -135,7 +135,7 @@ def pairs_needed(hypotheses: int, level: float) -> int:
 
 
 class Power(NamedTuple):
-    """What the number of pairs lets tests say."""
+    """Statistical power of tests with this number of pairs."""
 
     hypotheses: int  # that have a p
     pairs: int
@@ -145,7 +145,7 @@ class Power(NamedTuple):
 
 
 def power_of(tests: Sequence[PairedTest]) -> Power:
-    """What so many pairs can show."""
+    """Computes what tests with so many pairs can show."""
     hypotheses, pairs = sum(test.p is not None for test in tests), max(test.pairs for test in tests)
     corrected = hypotheses * smallest_p(pairs)
     needed = pairs_needed(hypotheses, LEVEL) if corrected > LEVEL else None
@@ -168,7 +168,9 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def vargha_delaney(first: Sequence[float], second: Sequence[float]) -> float:
-    """A12: the chance that a value of the first is larger than one of the second, ties counted half.
+    """Computes A12: the chance that a first value exceeds a second one.
+
+    Ties count half.
 
     Source: Vargha & Delaney 2000, A critique and improvement of the CL common language effect size statistics.
     """

@@ -43,7 +43,7 @@ class FinishedRun:
 
     @property
     def cell(self) -> tuple[FamilyName, RunMethod]:
-        """Where it belongs in the table."""
+        """Its cell in the table."""
         return self.spec.family, self.spec.method
 
     def phase(self, phase: Phase) -> tuple[EpisodeRecord, ...]:
@@ -66,7 +66,7 @@ class FinishedRun:
 
     @cached_property
     def found(self) -> tuple[Found, ...]:
-        """What the search had found after each of its episodes."""
+        """Counts of the search's findings after each of its episodes."""
         tally, found = Tally(horizon_steps=family_named(self.spec.family).horizon_steps), []
         for record in self.phase("search"):
             tally.add(record)
@@ -144,7 +144,10 @@ LIMITS = (Limit("10 CPU s", cpu_s, 10.0), TESTED, Limit("300 episodes", episodes
 
 
 def found_within(run: FinishedRun, limit: Limit) -> Found | None:
-    """What the search had found with the last episode that ended within the limit; None if it never got so far."""
+    """Counts the search's findings within the limit.
+
+    The last episode that counts has ended within it. Returns None if the search ended before the limit.
+    """
     spent = limit.spent(run)
     if not spent or spent[-1] < limit.most:
         return None

@@ -12,7 +12,10 @@ CLASSES = [*reversed(Severity), *(f"fault: {each}" for each in Fault)]
 
 
 def driver_rows(cells: Sequence[Cell]) -> Table:
-    """Returns the drivers' names, and per cell the PCR of each; a dash where it was asked of no contact."""
+    """Returns the drivers' names, and per cell the PCR of each.
+
+    It is a dash for a driver that judged no contact.
+    """
     names = list(dict.fromkeys(name for cell in cells for name in cell.pcr_by_driver))
     return names, [[_pcr(cell, name) for name in names] for cell in cells if names]
 
@@ -23,7 +26,10 @@ def _pcr(cell: Cell, name: str) -> str:
 
 
 def class_rows(cells: Sequence[Cell]) -> Table:
-    """Returns the classes, and per cell how many are of each, with the share of those that were judged."""
+    """Returns the classes, and per cell the number and share of each.
+
+    The share is of those that were judged.
+    """
     if not any(cell.by_severity or cell.by_fault for cell in cells):
         return [], []
     return CLASSES, [

@@ -1,4 +1,4 @@
-"""Evidence with its limits: how often an ego fails where nobody searched, where nobody looked, and a report of it.
+"""Evidence of a campaign with its limits: failure rates, coverage and report.
 
 evidence = gathered(comparison)                      # bounds and coverage, as data
 document = report(comparison, evidence, origin, power)

@@ -1,4 +1,6 @@
-"""Which part of the ODD was looked at: bins of each scene parameter and of each pair, and cells of the taxonomy.
+"""Computes the covered part of the ODD.
+
+It counts bins of each scene parameter and of each pair, and cells of the taxonomy.
 
 A bin is looked at by an episode that was played in it; a scene that is refused before its first step tells nothing.
 """
@@ -89,7 +91,7 @@ class PairCoverage(Record):
 
 
 class Kinds(Record):
-    """What a family's valid contacts are, in the taxonomy's terms."""
+    """Kinds of a family's valid contacts, in the taxonomy's terms."""
 
     cells: int
     """Of the taxonomy; most can hold nothing."""
@@ -105,7 +107,7 @@ class Kinds(Record):
 
 
 class Coverage(Record):
-    """What was looked at in one family."""
+    """Coverage of one family's ODD."""
 
     family: FamilyName
     episodes: int

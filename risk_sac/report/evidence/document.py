@@ -1,4 +1,7 @@
-"""What a report is made of, and how it is written as HTML and Markdown. All text is plain until then."""
+"""Builds a report from blocks; writes it as HTML and Markdown.
+
+All text is plain until then.
+"""
 
 import base64
 import re
@@ -33,7 +36,7 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Commands:
-    """What to type."""
+    """Commands for the reader to type."""
 
     lines: Sequence[str]
 
@@ -85,7 +88,7 @@ class Document:
     sections: Sequence[Section]
 
 
-# For whoever opens it, as a file or from a server.
+# For a browser that opens it, as a file or from a server.
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 # Control characters, what turns the direction of text, and halves of pairs.
 _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufeff]")

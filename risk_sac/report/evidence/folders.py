@@ -20,7 +20,7 @@ AGAIN = "risk-sac evaluate --spec spec.yaml --out campaign"  # with the spec tha
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """What lies in some folders."""
+    """Runs found in some folders."""
 
     comparison: Comparison
     folders: Mapping[str, Path]  # by digest of the run's spec
@@ -60,7 +60,7 @@ def campaign_in(paths: Sequence[Path]) -> tuple[CampaignSpec, Mapping[Path, Resu
     whole = paths[0] if len(paths) == 1 and (paths[0] / SPEC).is_file() else None
     if whole is None:
         results = {path: read_results(path) for path in paths}
-    else:  # which of its runs a damaged results.json was of, nobody can tell; it is missing
+    else:  # a damaged results.json does not tell which run it was of; that run is missing
         results = dict(_readable(sorted((whole / RUNS).glob("*/"))))
     if not results:
         raise ConfigError("RUNS", f"there is no run in {paths[0]}")

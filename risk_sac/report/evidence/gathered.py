@@ -1,4 +1,7 @@
-"""What a report says as data: bounds of the i.i.d. phase, and coverage of the search and of that phase apart."""
+"""Gathers a report's data: bounds of the i.i.d. phase, and coverage.
+
+Coverage of the search and of that phase are kept apart.
+"""
 
 from collections.abc import Iterable, Mapping
 
@@ -15,7 +18,7 @@ CRASHED = "sim_crash"  # the reason of an episode that was left out because the 
 
 
 class Bound(Record):
-    """How often something happened, and 95 % bounds of its rate."""
+    """Count of an event, and 95 % bounds of its rate."""
 
     count: int
     low: float
@@ -25,7 +28,7 @@ class Bound(Record):
 
 
 class RequirementBound(Record):
-    """How often a requirement was violated."""
+    """Count of a requirement's violations, with bounds."""
 
     counts: str
     """failure | report"""
@@ -36,7 +39,7 @@ class RequirementBound(Record):
 
 
 class Drawn(Record):
-    """What came of the scenes of one family and one kind of traffic."""
+    """Results of the scenes of one family and one kind of traffic."""
 
     family: FamilyName
     method: IidName
@@ -59,7 +62,7 @@ class Drawn(Record):
 
 
 class FamilyCoverage(Record):
-    """What was searched in one family, and by which methods."""
+    """Coverage of one family by searches and by the i.i.d. phase."""
 
     search: Coverage
     """By all searches together, the evaluation of frozen policies among them."""
@@ -68,7 +71,7 @@ class FamilyCoverage(Record):
 
 
 class Evidence(Record):
-    """What a campaign can say of how often its ego fails, and of where it looked."""
+    """Evidence of a campaign on its ego's failure rate, and its coverage."""
 
     complete: bool
     """Whether all runs are in it."""

@@ -1,4 +1,4 @@
-"""Sections of a report on the ODD: what it is, how often the ego fails in it, and where nobody looked."""
+"""Writes a report's sections on the ODD: content, failure rates, coverage."""
 
 from collections.abc import Iterator, Mapping
 
@@ -41,7 +41,7 @@ def odd(comparison: Comparison) -> Section:
 
 
 def bounds(comparison: Comparison, evidence: Evidence) -> Section:
-    """How often the ego fails where nobody has searched."""
+    """Writes the section on failure rates in scenes that no search chose."""
     title = "How often it fails where nobody searched"
     if comparison.spec.iid is None:
         return Section("bounds", title, [NO_IID, Commands(["iid: {episodes: 300}", "--iid 300"])])
@@ -112,7 +112,7 @@ def _requirements(each: Drawn) -> Iterator[list[str]]:
 
 
 def coverage(evidence: Evidence) -> Section:
-    """Which part of the ODD was looked at, and what never was."""
+    """Writes the section on the covered and the uncovered parts of the ODD."""
     text = (
         f"The range of each scene parameter within the ODD is parted into {BINS} bins of equal width, and that of each "
         f"pair into {PAIR_BINS} × {PAIR_BINS} cells. A bin says how many episodes began in it, and how many of them "
@@ -168,7 +168,7 @@ def _named(each: ParameterCoverage) -> str:
 
 
 def _never(found: FamilyCoverage) -> Iterator[str]:
-    """What neither has looked at, in words."""
+    """Lists in words the parts that neither phase has covered."""
     both = [each for each in (found.search, found.iid) if each is not None]
     for several in zip(*(each.parameters for each in both), strict=True):
         bins = [name for name in several[0].never if all(name in each.never for each in several)]

@@ -1,4 +1,4 @@
-"""Where a report comes from: commands, folders, and the drawing of a failure."""
+"""Origin of a report: commands, folders, and the drawing of a failure."""
 
 import shlex
 import zipfile
@@ -24,14 +24,14 @@ from risk_sac.run_folder.results import FAILURES, RecordedFailure, series_name
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """What only the caller knows: where the runs lie, and what to type."""
+    """Places of the runs and commands to type, known to the caller only."""
 
     report: str  # the command that makes this report
     data: str  # the command that gives bounds and coverage as JSON
     show: Callable[[FinishedRun, str], str]  # of a run and the id of one of its failures: the command that draws it
     regress: str  # the command that plays the failures against another ego
     folders: Mapping[str, Path] = field(default_factory=dict)  # by digest of the run's spec
-    regression: Regression | None = None  # the campaign's failures against another ego, where somebody has played them
+    regression: Regression | None = None  # the campaign's failures against another ego, if played
 
 
 def again(comparison: Comparison, run: FinishedRun) -> str:

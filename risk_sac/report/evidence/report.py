@@ -1,4 +1,7 @@
-"""The report of a campaign as a document: what was found, how often it happens, where nobody looked, what to doubt."""
+"""Writes the report of a campaign as a document.
+
+It says what was found, how often it happens, what is not covered, and what to doubt.
+"""
 
 from collections.abc import Iterator
 

@@ -25,7 +25,7 @@ FUNNEL = [
 
 
 def budget(comparison: Comparison) -> Section:
-    """What was spent, and on what."""
+    """Writes the section on the spent budget."""
     spec = comparison.spec
     allowed = [f"{spec.budget.episodes} search episodes"]
     if spec.budget.evaluation_episodes:
@@ -103,7 +103,7 @@ def funnel(comparison: Comparison) -> Section:
 
 
 def _verdicts(cells: Sequence[Cell]) -> Iterator[Block]:
-    """What each reference driver would have prevented, how bad the contacts are, and which party caused them."""
+    """Yields blocks on prevention by reference drivers, severity and fault."""
     (drivers, pcr), (classes, counts) = driver_rows(cells), class_rows(cells)
     named = [[cell.family, cell.method] for cell in cells]
     if drivers:
@@ -129,7 +129,7 @@ def _verdicts(cells: Sequence[Cell]) -> Iterator[Block]:
 
 
 def clusters(comparison: Comparison, origin: Origin) -> Section:
-    """Which failures there are, one of each as a picture."""
+    """Writes the section on the kinds of failures, with a picture of each."""
     text = (
         "Contacts of one kind share who strikes, the type of conflict, from where, how the ego responds, whether it "
         "saw the other, and the ground; other violations share the requirement, the ego's manoeuvre and the actor that "
@@ -178,7 +178,7 @@ def _card(cluster: Cluster, run: FinishedRun, record: EpisodeRecord, origin: Ori
 
 
 def _fault(violation: Collision | Violation) -> Iterator[str]:
-    """Which party caused it, and what the ego did about the striker."""
+    """Describes the party at fault and the ego's reaction to the striker."""
     if violation.blamed is not None:
         judged = violation.judgement if isinstance(violation, Collision) else None
         did = f"; the ego {ego_did(judged.ego_part)}" if judged and judged.ego_part else ""
@@ -216,7 +216,7 @@ def _violation(violation: Violation) -> str:
 
 
 def regression(origin: Origin) -> Section:
-    """What became of the failures with another ego."""
+    """Writes the section on the failures with another ego."""
     found = origin.regression
     if found is None:
         none = "No other ego was played against these failures. To do so, and to be told here:"
@@ -234,7 +234,7 @@ def regression(origin: Origin) -> Section:
 
 
 def worth(power: Power) -> Section:
-    """How many known defects the budget detects."""
+    """Writes the section on the number of known defects that the budget detects."""
     text = "Had the ego a fault that we know, would this budget have found it? Nothing was run for the answer. "
     return Section("worth", "What finding nothing is worth", [text + power.note, Items(power.lines)])
 

@@ -35,7 +35,7 @@ FIELDS: Mapping[str, tuple[str, str]] = {
 
 
 def ego_in_words(ego: EgoConfig) -> str:
-    """Who drives, how fast it reacts, and what it sees."""
+    """Describes the ego's driver, its response time and its sight."""
     if ego.driver is not None:
         parts = [f"registered driver {ego.driver}", f"responds within {ego.response_s:g} s"]
     else:
@@ -49,7 +49,7 @@ def ego_in_words(ego: EgoConfig) -> str:
 
 
 def _sight(ego: EgoConfig) -> Iterator[str]:
-    """What it sees."""
+    """Describes the ego's sensor."""
     if ego.sensor is None:
         yield "sees everything"
         return
