@@ -1,1 +1,4 @@
-"""Measures of risk and realism, and the requirements they are judged by; one family of pure functions a module."""
+"""Measures risk and realism, and monitors requirements.
+
+There is one family of pure functions a module.
+"""

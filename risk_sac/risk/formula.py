@@ -1,6 +1,6 @@
 """Past-time STL of a requirement: grammar, types, windows and cost of monitoring.
 
-Choice: formulas are parsed here, not by rtamt, whose grammar reads `a - b + c` as `a - (b + c)`, `a/b` as one name and
+Choice: formulas are parsed here, not by rtamt. Its grammar reads `a - b + c` as `a - (b + c)`, `a/b` as one name and
 `p q` as `q` alone, drops unknown characters, and gives no useful position.
 """
 

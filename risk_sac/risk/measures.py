@@ -69,7 +69,10 @@ class Gauge:
         self._own.reset(carriageway)
 
     def measure(self, frame: Frame, before: Frame | None, seen: Bools, struck: int = 0) -> Measures:
-        """Measures the next frame, given the one before, and which of the others the ego sees and has touched."""
+        """Measures the next frame, given the one before.
+
+        `seen` says which others the ego sees; `struck` is the column of one that it has touched, or 0.
+        """
         assessment = assess(frame, self._rss, seen, struck)
         signals = publish(frame, before, assessment.least, self._own.measure(frame))
         robustness = self._monitor.update(signals)

@@ -172,7 +172,9 @@ def overtakes(edges: Floats, state: Floats) -> bool:
 
 @compiled
 def headway(state: Floats, kind: NDArray[np.int8], curvature: float) -> float:
-    """Computes the time gap to the vehicle that the ego follows, s: from bumper to body, at the ego's speed.
+    """Computes the time gap to the vehicle that the ego follows, s.
+
+    The gap is from bumper to body, at the ego's speed.
 
     The corridor is as wide as the ego, along the arc that it drives now (ISO 15622 predicts the way alike). Vehicles
     that come towards it or cross at more than 60° are not followed.

@@ -51,7 +51,7 @@ class Assessment(NamedTuple):
 
     @property
     def seen(self) -> Bools:
-        """Which of them are in the ego's sight."""
+        """Tells which of the others are in the ego's sight."""
         seen: Bools = self.others[SEEN] != 0.0
         return seen
 
@@ -95,7 +95,7 @@ def _assess(
 
 @compiled
 def in_charge(view: RelativeView) -> Bools:
-    """Which actors the ego answers for, `n`: those ahead of it or alongside.
+    """Tells which actors the ego answers for, `n`: those ahead or alongside.
 
     Choice: an actor from behind must keep the distance (RSS, rule 1), so TTC and RSS do not count it.
     """
@@ -157,7 +157,10 @@ def red_light_margin(frame: Frame, before: Frame | None) -> float:
 
 
 def red_light_braking(frame: Frame, before: Frame | None) -> float:
-    """Braking that stops the ego at a red signal's line, v² / (2 d), m/s²; its cap in the step that crosses it."""
+    """Computes the braking that stops the ego at a red signal's line, m/s².
+
+    It is v² / (2 d), and its cap in the step that crosses the line.
+    """
     if _crossed_on_red(frame, before):
         return RED_LIGHT_BRAKING_CAP_MPS2
     if frame.signal is not Signal.RED:

@@ -60,8 +60,8 @@ def risk_reward(
 class ViolationDepth:
     """Measures how deeply an episode has violated requirements without contact.
 
-    Choice: each requirement that counts pays for its depth, up to a scale and once, so that nothing is gained by
-    staying in a violation, and nothing for what was violated before the adversaries were released.
+    Choice: each requirement that counts pays for its depth once, up to a scale. So nothing is gained by staying in a
+    violation, nor by one from before the adversaries' release.
     """
 
     def __init__(self, requirements: Sequence[Requirement]) -> None:
@@ -137,7 +137,10 @@ def shaped_reward(
 
 @dataclass(frozen=True, slots=True)
 class TrainingReward:
-    """What the policy is trained on: R of (3), and R' of (8) for methods with shaping; Alg. 1, l. 9-10."""
+    """Training reward: R of (3), and R' of (8) for methods with shaping.
+
+    Alg. 1, l. 9-10.
+    """
 
     method: Method
     config: LearnerConfig

@@ -30,7 +30,9 @@ SCALED_LOW, SCALED_HIGH = -3.0, 2.0
 
 @compiled
 def stopping(speed_mps: float, response_s: float, accel_mps2: float, brake_mps2: float) -> float:
-    """Way until standstill, (v + v_ρ) ρ/2 + v_ρ |v_ρ| / (2 b) with v_ρ = v + ρ a, m; negative if it moves away.
+    """Computes the way until standstill, m; negative if it moves away.
+
+    (v + v_ρ) ρ/2 + v_ρ |v_ρ| / (2 b) with v_ρ = v + ρ a.
 
     v is towards the other; it accelerates with a in the response time ρ and brakes with b thereafter.
     """
@@ -40,7 +42,10 @@ def stopping(speed_mps: float, response_s: float, accel_mps2: float, brake_mps2:
 
 @compiled
 def same_direction(rear_mps: float, front_mps: float, parameters: RssParameters) -> float:
-    """d_min = [v_r ρ + a ρ²/2 + (v_r + ρ a)² / (2 b_min) − v_f² / (2 b_max)]_+ , m  (Def. 1)."""
+    """Computes the safe longitudinal distance behind a vehicle, m (Def. 1).
+
+    d_min = [v_r ρ + a ρ²/2 + (v_r + ρ a)² / (2 b_min) − v_f² / (2 b_max)]_+
+    """
     p = parameters
     way = stopping(rear_mps, p.response_s, p.accel_mps2, p.brake_min_mps2)
     return behind(way, front_mps, p)
@@ -63,7 +68,9 @@ def opposite_direction(ego_mps: float, other_mps: float, parameters: RssParamete
 
 @compiled
 def lateral(closing_ego_mps: float, closing_other_mps: float, parameters: RssParameters) -> float:
-    """d_min = μ + [Σ_i (v_i + v_i,ρ) ρ/2 + v_i,ρ |v_i,ρ| / (2 b_lat)]_+ , m  (Def. 6).
+    """Computes the safe lateral distance, m (Def. 6).
+
+    d_min = μ + [Σ_i (v_i + v_i,ρ) ρ/2 + v_i,ρ |v_i,ρ| / (2 b_lat)]_+
 
     Deviation: the paper's formula has v_i,ρ² for v_i,ρ |v_i,ρ|. The two differ for a vehicle that moves away after ρ.
     It goes on doing so while it brakes, as Def. 6 says in words; v² would count that way as closing in.

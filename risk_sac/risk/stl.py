@@ -1,8 +1,8 @@
 """Online monitoring of STL requirements by rtamt's operators.
 
 rtamt supplies every operator with its state. Its own walk over the tree is replaced, because it keys an operator's
-state by its text, so that a sub-formula that occurs twice is updated twice per step and sees half its window; it also
-visits the operands of `+` and `not` twice, and nodes by name, which takes several times as long.
+state by its text. So a sub-formula that occurs twice is updated twice per step and sees half its window. It also visits
+the operands of `+` and `not` twice, and nodes by name, which takes several times as long.
 
 Source: RISK-SAC, Sec. III-C; Nickovic, Yamaguchi, "RTAMT: online robustness monitors from STL", ATVA 2020.
 """

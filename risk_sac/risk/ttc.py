@@ -34,8 +34,8 @@ def time_to_encounter(view: RelativeView, walks: Bools) -> Floats:
 
     τ = min_{t ≥ 0} [ t + max_k (|s_k + v_k t| − r_k)₊ / c_k ],   c_k = c + δ (u_e |n_k · h_e| + u_o |n_k · h_o|)
 
-    Both keep their velocity until t; the gap that is left then along a separating axis n_k (distance s_k of the
-    centres, relative velocity v_k, reach r_k of the bodies) is closed by unforeseen motion at a speed c_k: a share δ of
+    Both keep their velocity until t. Along a separating axis n_k a gap remains then (distance s_k of the
+    centres, relative velocity v_k, reach r_k of the bodies). Unforeseen motion closes it at a speed c_k: a share δ of
     the speeds u along the headings h, and c. On a collision course τ ≤ TTC. Every term is convex in t, so the minimum
     is where the lines that fall by more than 1 a second meet the others, or at t = 0.
 
@@ -66,7 +66,10 @@ def time_to_encounter(view: RelativeView, walks: Bools) -> Floats:
 
 @compiled
 def _least(slope: Floats, start: Floats) -> float:
-    """min_{t ≥ 0} [ t + max_l (start_l + slope_l t) ], for lines of which the steepest ones have a rising opposite."""
+    """Computes min_{t ≥ 0} [ t + max_l (start_l + slope_l t) ] over lines.
+
+    Every steepest line has a rising opposite.
+    """
     time = 0.0
     for steep in range(len(slope)):
         if slope[steep] < -1.0:
