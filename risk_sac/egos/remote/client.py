@@ -23,7 +23,10 @@ OPTIONS = [("grpc.max_receive_message_length", LONGEST), ("grpc.enable_retries",
 
 
 class RemoteEgo:
-    """A session for each episode, over one connection that is made anew when it breaks."""
+    """Ego in another process: a session per episode, over one connection.
+
+    The connection is renewed when it breaks.
+    """
 
     def __init__(self, name: str, address: str, version: str, deadline_s: float) -> None:
         """Does not connect yet: replays fork after this, and a connection does not survive that.
@@ -125,7 +128,10 @@ class RemoteEgo:
 
 
 class _Stream:
-    """A stream of questions and answers in turn, with a deadline for each answer; gRPC has one for a whole stream."""
+    """Stream of questions and answers in turn, each with a deadline.
+
+    gRPC has one deadline for a whole stream.
+    """
 
     def __init__(self, method: Callable[[Iterator[bytes]], Any], deadline_s: float) -> None:
         self._deadline_s = deadline_s

@@ -56,7 +56,7 @@ class OsiEgo(ABC):
         request = self.drive(ground_truth(perceived, self._numbers, self._road) + self._lanes)
         return trajectory_of(request, perceived, self._vehicle.wheelbase_m / 2)
 
-    def close(self) -> None:  # noqa: B027 - whoever holds something overrides it
+    def close(self) -> None:  # noqa: B027 - an ego that holds something overrides it
         """Holds nothing."""
 
 

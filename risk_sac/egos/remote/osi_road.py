@@ -1,4 +1,6 @@
-"""Converts the road to ASAM OSI 3: lanes, their boundaries and speed limits, and the lights at stop lines.
+"""Converts the road to ASAM OSI 3.
+
+That is lanes, their boundaries and speed limits, and the lights at stop lines.
 
 Source: ASAM OSI 3.8, osi_lane.proto, osi_logicallane.proto and osi_trafficlight.proto.
 """
