@@ -1,4 +1,4 @@
-"""What the actor-critic agents share: their interface, losses and checkpoints."""
+"""Base of the actor-critic agents: interface, losses and checkpoints."""
 
 import copy
 import math

@@ -39,7 +39,7 @@ class Control:
         """Nothing to learn."""
 
     def state(self) -> dict[str, Any]:
-        """What the next episode depends on."""
+        """Returns the state that the next episode depends on."""
         return {}
 
     def load(self, state: dict[str, Any]) -> None:
@@ -90,7 +90,10 @@ class RandomAgent(Control):
 
 
 class ScriptedAgent(Control):
-    """A vehicle ahead of the ego in its direction moves into its path and brakes; all others keep on."""
+    """Fixed rule: a vehicle ahead of the ego cuts in and brakes.
+
+    It drives in the ego's direction. All others keep on.
+    """
 
     driven_by = DrivenBy.SCRIPT
 

@@ -1,8 +1,8 @@
-"""Decisions that hold for several environment steps, and what such a step of the policy has brought.
+"""Holds a decision for several environment steps; merges them into one transition.
 
-Choice: the policy acts every 0.5 s, though it is asked in every step of 0.1 s. Adversaries have bounded jerk, so that
-noise which is drawn anew in every step averages out, and a policy explores next to nothing; and what an attack of
-several seconds comes to is learnt over a fifth of the steps.
+Choice: the policy acts every 0.5 s, though it is asked in every step of 0.1 s. Adversaries have bounded jerk, so noise
+that is redrawn in every step averages out, and a policy explores next to nothing. The outcome of an attack of several
+seconds is learnt over a fifth of the steps.
 
 Source: Sutton, Precup and Singh, "Between MDPs and semi-MDPs", 1999, for options that last a fixed time.
 """
@@ -37,12 +37,12 @@ class Held:
 
 
 class Decision:
-    """Collects the environment steps of a decision into the one transition that they make.
+    """Merges the environment steps of a decision into one transition.
 
-    R = Σ_i γ^i r_i, costs alike, over the k steps of the decision; what follows is discounted by γ^k. So the shaping
-    of (6) needs no sum: γ^k φ(s_k) - φ(s_0) is what the steps' own terms come to.
+    R = Σ_i γ^i r_i, costs alike, over the k steps of the decision; the following return is discounted by γ^k. So the
+    shaping of (6) needs no sum: γ^k φ(s_k) - φ(s_0) equals the sum of the steps' own terms.
 
-    Choice: the action of a decision that others have taken, who act anew in every step, is the mean of theirs.
+    Choice: for a decision of other drivers, which act in every step, the action is the mean of theirs.
     """
 
     def __init__(self, steps: int, discount: float) -> None:
@@ -56,7 +56,10 @@ class Decision:
         self._taken: list[Transition] = []
 
     def add(self, step: Transition) -> Transition | None:
-        """The transition that has become complete with this step, by number of steps or by the end of the world."""
+        """Adds a step; returns the transition that it completes, if any.
+
+        It is complete by the number of steps or by the end of the world.
+        """
         self._taken.append(step)
         if len(self._taken) < self._steps and not step.terminated:
             return None

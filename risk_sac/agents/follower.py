@@ -15,7 +15,9 @@ STANDING_MPS, STANDING_STEPS = 0.5, 30  # an ego that stands for so long waits f
 
 
 class ScriptFollower(Control):
-    """Each adversary acts by genes of its own, which an episode is begun with; λ and α are 0.
+    """Drives each adversary by genes of its own; λ and α are 0.
+
+    An episode begins with the genes.
 
     Attributes:
       can_stop_early: whether the rest of the episode is not worth playing: all adversaries that act have fallen
@@ -52,7 +54,7 @@ class ScriptFollower(Control):
         return actions.ravel()
 
     def _since_cue_s(self, i: int, seen: Seen | None) -> float:
-        """How long ago an adversary had its cue, s; negative before."""
+        """Returns the time since an adversary's cue, s; negative before."""
         script = self._scripts[i]
         if self._cued[i] is None and script and seen and cue(script, seen, self._pedestrian[i]):
             self._cued[i] = self._step

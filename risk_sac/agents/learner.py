@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 
 
 class Learner:
-    """What happens between two environment steps; of the method it reads all but the scene sampler.
+    """Learner that acts, stores and trains between environment steps.
+
+    It reads all settings of the method but the scene sampler.
 
     Attributes:
       device: where the networks live.
@@ -78,11 +80,14 @@ class Learner:
 
     @property
     def driven_by(self) -> DrivenBy:
-        """What chooses the next action while exploring; the frozen policy always acts itself."""
+        """Driver of the next action while exploring.
+
+        The frozen policy always acts itself.
+        """
         return DrivenBy.RANDOM if self._steps < self._config.agent.warmup_steps else DrivenBy.POLICY
 
     def begin(self, genes: Floats) -> None:
-        """An episode begins, whoever acts in it; there are no genes."""
+        """Begins an episode, for any driver; there are no genes."""
         self._held.begin()
         self._decision.begin()
 
@@ -95,11 +100,13 @@ class Learner:
         return self._agent.frozen()
 
     def observe(self, transition: Transition, *, own: bool = True) -> None:
-        """Store what a step has brought, and price its cost if it is the policy's; what the warm-up draws is not.
+        """Stores a step, and prices its cost if it is the policy's.
+
+        The costs of the warm-up's actions are not priced.
 
         Args:
           transition: the step.
-          own: whether this learner acted, and nobody else.
+          own: whether this learner acted, and no other driver.
         """
         self._acted |= own
         self._steps += own or not self._acted

@@ -83,8 +83,8 @@ def bounded_log_std(raw: Tensor) -> Tensor:
 def tanh_gaussian(mean: Tensor, log_std: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:
     """Reparameterised action and its exact log-probability.
 
-    a = tanh(u),  u = μ + σ ε
-    log π(a|s) = Σ_k [-ε_k²/2 - log σ_k - log(2π)/2 - log(1 - tanh² u_k)]
+    a = tanh(u),  u = μ + σ ε.
+    log π(a|s) = Σ_k [-ε_k²/2 - log σ_k - log(2π)/2 - log(1 - tanh² u_k)].
     log(1 - tanh² u) = 2 (log 2 - u - softplus(-2u)), which stays finite where 1 - tanh² u rounds to 0.
 
     Args:

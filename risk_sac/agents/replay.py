@@ -63,7 +63,9 @@ SCALARS = ("risk_reward", "cost", "robustness", "next_robustness", "terminated")
 
 
 class UniformReplay:
-    """Ring buffer of transitions, each of which is drawn as likely; one packed row each, so that a batch is one gather.
+    """Ring buffer of transitions, drawn uniformly.
+
+    A transition is one packed row, so that a batch is one gather.
 
     Every replay memory has these methods.
     """
@@ -102,7 +104,10 @@ class UniformReplay:
         return self.gather(generator.integers(len(self), size=batch_size), np.ones(batch_size))
 
     def update(self, indices: Indices, td_errors: Floats) -> None:
-        """Takes note of the |δ| just measured, which do not matter here; of a repeated index the last one holds."""
+        """Ignores the measured |δ|, which other memories use.
+
+        Of a repeated index the last one holds.
+        """
 
     def state(self) -> dict[str, Any]:
         """Returns everything that sampling depends on, the filled part only; tensors and plain values."""
@@ -141,12 +146,12 @@ class UniformReplay:
 class RiskPrioritizedReplay:
     """RPER: transitions are drawn in proportion to (9) and weighted by (10).
 
-    The measured terms of (9) are kept for every transition, so each leaf of the tree equals (9) under
-    the current scales once its |δ| is told. The scales are taken from all stored terms again, and the tree
-    is rebuilt, whenever the number of additions has doubled or grown by RESCALE_EVERY.
+    The measured terms of (9) are kept for every transition, so each leaf of the tree equals (9) under the current
+    scales once its |δ| is measured. The scales are taken from all stored terms again, and the tree is rebuilt, whenever
+    the number of additions has doubled or grown by RESCALE_EVERY.
 
-    Choice: |δ| is measured of all new transitions together, just before the next draw, the first that it can matter
-    to (the paper does it one by one at insertion).
+    Choice: |δ| is measured of all new transitions together, just before the next draw, the first that it can affect
+    (the paper does it one by one at insertion).
     """
 
     # About 1 ms of work for 100,000 stored, spread over this many additions.
@@ -166,7 +171,7 @@ class RiskPrioritizedReplay:
         return len(self._storage)
 
     def add(self, transition: Transition) -> None:
-        """Stores a transition; it is drawn once its |δ| is told."""
+        """Stores a transition; it is drawn once its |δ| is measured."""
         terms = (0.0, transition.accumulated_reward, -transition.robustness)
         if not np.isfinite(terms).all():
             raise NotFinite(f"R̂ and -ρ are {terms[1:]}; wanted finite numbers. Check the reward and the monitor.")

@@ -96,9 +96,9 @@ class Temperature(nn.Module):
 class SacAgent(Agent):
     """Policy, twin critics with targets and learned temperature; one generator draws all noise.
 
-    Choice: the critics' hidden layers are normalised. A memory of a few thousand transitions, replayed at the pace of
-    the steps, otherwise makes them overrate actions that were never tried (Ball et al., "Efficient online reinforcement
-    learning with offline data", 2023, Sec. 4.2).
+    Choice: the critics' hidden layers are normalised. Otherwise a memory of a few thousand transitions, replayed at the
+    pace of the steps, makes them overrate untried actions. Source: Ball et al., "Efficient online reinforcement
+    learning with offline data", 2023, Sec. 4.2.
     """
 
     def __init__(

@@ -29,7 +29,7 @@ from risk_sac.types import Floats, Vector
 
 
 class _Spaces(gym.Env[Vector, Vector]):
-    """What a model is built from; nothing ever happens in it."""
+    """Spaces from which a model is built; it is never stepped."""
 
     def __init__(self, observation_size: int, action_size: int) -> None:
         self.observation_space = gym.spaces.Box(-np.inf, np.inf, (observation_size,), np.float32)

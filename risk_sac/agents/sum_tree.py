@@ -10,9 +10,10 @@ Indices = NDArray[np.int64]
 
 
 class SumTree:
-    """Priorities at the leaves of a binary tree, at each node above them the sum of its two children.
+    """Binary tree of priorities; a node holds the sum of its children.
 
-    A node above a changed leaf is summed anew from its children, in double precision, so rounding never accumulates.
+    The leaves hold the priorities. A node above a changed leaf is summed again from its children, in double precision,
+    so rounding never accumulates.
     """
 
     def __init__(self, capacity: int) -> None:
