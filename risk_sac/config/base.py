@@ -1,4 +1,4 @@
-"""What every setting has in common."""
+"""Base of all settings."""
 
 from typing import Annotated, Self
 

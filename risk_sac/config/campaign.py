@@ -1,4 +1,4 @@
-"""What a user posts, and the runs it expands to.
+"""Campaigns as users post them, and the runs that they expand to.
 
 The same `CampaignSpec` is the REST body, the CLI's YAML and the stored record.
 """
@@ -23,7 +23,7 @@ FAMILY_NAME = re.compile(rf"^({'|'.join(SHIPPED)}|{PLACED})$")
 
 
 def _family_name(name: str) -> str:
-    if not FAMILY_NAME.fullmatch(name):  # as pydantic says it of literals, so that clients are told alike
+    if not FAMILY_NAME.fullmatch(name):  # as pydantic says it of literals, so that clients get the same text
         *others, last = map(repr, SHIPPED)
         expected = f"{', '.join(others)} or {last}, or the name of a place on a map"
         raise PydanticCustomError("literal_error", "Input should be {expected}", {"expected": expected})
@@ -60,7 +60,7 @@ class Requirement(Settings):
 
 
 class Budget(Settings):
-    """What each run may spend; equal for all methods of a campaign."""
+    """Budget of each run; equal for all methods of a campaign."""
 
     episodes: Annotated[int, Field(ge=1, le=100_000)] = 300
     """Search episodes, rejected scenes included."""
@@ -85,7 +85,7 @@ class Budget(Settings):
 
 
 class Iid(Settings):
-    """What a campaign ends with where it is to say how often its ego fails: scenes that no search has chosen.
+    """Final phase that estimates the ego's failure rate in scenes that no search chose.
 
     They are drawn from the ODD independently, uniformly between each parameter's bounds, and played with undisturbed
     traffic and with random adversaries, in runs of their own.
@@ -129,7 +129,10 @@ class RunSpec(Settings):
 
     @property
     def stream(self) -> int:
-        """What all its generators are seeded with: its seed; in an i.i.d. phase a number that no search has."""
+        """Seed of all its generators.
+
+        In an i.i.d. phase it is a number that no search has.
+        """
         if not self.iid:
             return self.seed
         drawn = hashlib.sha256(f"{self.family} {self.method} {self.seed}".encode()).digest()

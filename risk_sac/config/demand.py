@@ -1,4 +1,4 @@
-"""How much memory a run comes to need, told before it begins."""
+"""Estimates the memory that a run needs, before it begins."""
 
 import math
 from collections.abc import Sequence
@@ -28,7 +28,9 @@ def check_demand(spec: RunSpec, observation_size: int, action_size: int, horizon
 
 
 def demand_bytes(spec: RunSpec, observation_size: int, action_size: int, horizon_steps: int) -> dict[str, int]:
-    """Memory at a run's fullest moment, when a checkpoint is written at its end, by the field that asks for it.
+    """Computes the memory at a run's fullest moment, by the field that asks for it.
+
+    That is when a checkpoint is written at the run's end.
 
     parameters: P floats; of a network that learns 4 live (value, gradient, two moments of Adam) and 6 in a checkpoint
     (values and moments, copied and written), of a target 2 and 2.

@@ -1,4 +1,4 @@
-"""The vehicle under test: who drives it and what it can see."""
+"""The vehicle under test: its driver and its sight."""
 
 import math
 from typing import Annotated, Literal, Self
@@ -44,7 +44,7 @@ class EgoConfig(Settings):
     """Time between two decisions (SUMO's actionStepLength), s; a multiple of 0.1."""
     sensor: SensorConfig | None = SensorConfig()
     """None: the ego sees everything."""
-    # What is younger is left out of JSON where it is not set: specs from before keep their digests.
+    # Fields added later are left out of JSON where they are not set: older specs keep their digests.
     driver: Annotated[EgoName | None, Field(exclude_if=_left_out)] = None
     """Name of a registered ego, as `GET /v1/egos` lists them; null: SUMO's models drive."""
     version: Annotated[str | None, Field(exclude_if=_left_out, min_length=1, max_length=100)] = None

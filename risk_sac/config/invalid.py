@@ -1,4 +1,4 @@
-"""What a validation found, as the errors of fields."""
+"""Converts a validation's findings into errors of fields."""
 
 import json
 import re

@@ -15,7 +15,7 @@ MOST_TEMPERATURE = 100.0  # α
 
 
 class AgentConfig(Settings):
-    """What all agents share: networks, optimisers and the pace of learning."""
+    """Settings of all agents: networks, optimisers and the pace of learning."""
 
     hidden_sizes: Annotated[tuple[Width, ...], Field(min_length=1, max_length=4)] = (64, 64)
     """Units of each hidden layer, actor and critics alike."""
@@ -108,7 +108,12 @@ class RewardConfig(Settings):
 
 
 class WarmStartConfig(Settings):
-    """Episodes of an archive search that fill a learner's memory before its policy acts; the same for all learners."""
+    """Warm start of a learner's memory by episodes of an archive search.
+
+    They come before its policy acts; they are the same for all learners.
+
+    It is the same for all learners.
+    """
 
     episodes: Annotated[int, Field(ge=0, le=10_000)] = 150
     """At most; 0: the policy acts from the first episode on, uniformly at random for `warmup_steps`."""

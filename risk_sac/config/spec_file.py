@@ -48,7 +48,9 @@ def read_posted(file: Path | None, flags: Mapping[str, Any]) -> CampaignSpec | d
 
 
 def read_ego(text: str) -> EgoConfig:
-    """Returns the ego that a command line names: a profile or a registered ego, or a file with its fields.
+    """Reads the ego that a command line names.
+
+    It is a profile, a registered ego, or a file with its fields.
 
     Defects follow a name, such as `idm-aeb+blind-right`. Whether they and an ego of this name exist is found out later.
     """
@@ -73,7 +75,10 @@ def _with_budget(data: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _only_run(data: dict[str, Any], picked: Mapping[str, Any]) -> RunSpec:
-    """The one run of a campaign that the flags leave, of its searches or, by its method's name, of its i.i.d. phase."""
+    """Picks the one run of a campaign that the flags leave.
+
+    It is of the searches or, by its method's name, of the i.i.d. phase.
+    """
     if picked.get("method") in IID_METHODS:
         drawn = _validate(CampaignSpec, data).drawn()
         runs = [run for run in drawn if all(getattr(run, name) == value for name, value in picked.items())]

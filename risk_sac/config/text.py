@@ -19,7 +19,9 @@ MARKS = {  # the longer ones first
 
 
 def read_text(file: Path, field: str) -> str:
-    """Read a file in UTF-8, or in what its byte order mark names; lines end with a line feed.
+    """Reads a text file in UTF-8 or its byte order mark's encoding.
+
+    Lines end with a line feed.
 
     Raises:
       ConfigError: it cannot be read, or is no text; it names the field.
