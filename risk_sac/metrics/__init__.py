@@ -1,4 +1,4 @@
-"""What a run achieved: ECR, PCR, ES, ρ̄_c and OFD with their 95 % intervals, and the digest of its records.
+"""Computes ECR, PCR, ES, ρ̄_c and OFD with 95 % intervals, and the records' digest.
 
 A figure is a row of `rows`: its names, its formula, and how runs are pooled. `tally` counts what formulas take.
 

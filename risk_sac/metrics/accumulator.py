@@ -1,4 +1,7 @@
-"""What a run's records add up to: its metrics so far, and the digest by which results are compared."""
+"""Accumulates a run's records into its metrics and its digest.
+
+The digest is what results are compared by.
+"""
 
 import hashlib
 import json

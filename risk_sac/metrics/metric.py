@@ -1,4 +1,4 @@
-"""What a row of the metrics says: names, formula, and how runs are pooled. Pure."""
+"""A row of the metrics: names, formula, and pooling of runs. Pure."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -103,7 +103,10 @@ def pooled_headline(metrics: Iterable[RunMetrics]) -> int | None:
 
 
 def headline_driven_by(metrics: Iterable[RunMetrics]) -> dict[str, int]:
-    """Headline failures of several runs by what drove the first of each kind; none where that is not known."""
+    """Counts headline failures of several runs by the first one's driver.
+
+    The first one of each kind counts; a kind without a known driver is left out.
+    """
     first: dict[str, DrivenBy | None] = {}
     for each in metrics:
         for kind, driven_by in zip(each.headline_kinds, each.headline_kinds_driven_by, strict=False):

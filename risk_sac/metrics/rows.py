@@ -27,7 +27,7 @@ def preventable_collision_rate(counts: Counts) -> float:
 
 
 def efficiency_score(tally: Tally) -> float:
-    """How much of the horizon an episode saves by failing early, ES.
+    """Computes the share of the horizon saved by failing early, ES.
 
     ES = 1 - (mean steps to the first valid contact) / T
 

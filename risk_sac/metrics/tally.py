@@ -26,7 +26,10 @@ def preventable(record: EpisodeRecord) -> bool:
 
 
 class Tally(Counts):
-    """The counts and sums of a run, at a cost per episode that grows only with the number of failures."""
+    """Counts and sums of a run.
+
+    The cost per episode grows only with the number of failures.
+    """
 
     model_config = ConfigDict(frozen=False)
 
@@ -154,5 +157,8 @@ class Tally(Counts):
             self.contacts_by_second[self._second(collision.time_s)] += 1
 
     def _second(self, time_s: float) -> int:
-        """The bin of a time; what began before the release is in the first, and the horizon's end in the last."""
+        """Returns the bin of a time.
+
+        What began before the release is in the first, and the horizon's end in the last.
+        """
         return min(max(0, math.floor(time_s)), len(self.contacts_by_second) - 1)
