@@ -1,4 +1,7 @@
-"""Ask / tell search over initial scenes in the unit cube, Eq. 11 and Alg. 1, l. 1, 4, 21-22."""
+"""Searches initial scenes in the unit cube by ask and tell.
+
+Source: RISK-SAC, Eq. 11 and Alg. 1, l. 1, 4, 21-22.
+"""
 
 from risk_sac.scene_optimizer.archive import ArchiveOptimizer
 from risk_sac.scene_optimizer.bandit import DiscountedBandit

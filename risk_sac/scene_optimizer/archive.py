@@ -198,7 +198,9 @@ class ArchiveOptimizer(SceneOptimizer):
 
 
 def mutated(parent: Floats, other: Floats, random: np.random.Generator) -> Floats:
-    """Returns a point near `parent`, perhaps on the way to `other`; what would leave the unit cube is reflected.
+    """Returns a point near `parent`, perhaps on the way to `other`.
+
+    A point outside the unit cube is reflected into it.
 
     Source: the line between two elites is that of Vassiliades and Mouret, "Discovering the elite hypervolume by
     leveraging interspecies correlation" (arXiv 1804.03906).

@@ -36,7 +36,10 @@ class DiscountedBandit:
 
     @property
     def probability(self) -> float:
-        """Chance with which arm 1 is to be pulled next; both arms' pulls are taken to need equal effort."""
+        """Returns the probability of pulling arm 1 next.
+
+        Both arms' pulls are taken to need equal effort.
+        """
         first, second = (
             ((worth + self._prior_worth) / (spent + self._prior_cost)) ** 2
             for worth, spent in zip(self._worth, self._spent, strict=True)

@@ -25,7 +25,7 @@ EPSILON = 1e-3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Encounter:
-    """What the ego met in an episode.
+    """Outcome of an episode for the ego.
 
     Attributes:
       collision: its contact, if there was one.
@@ -41,7 +41,7 @@ class Encounter:
 
     @property
     def valid_violations(self) -> tuple[Collision | Violation, ...]:
-        """What makes the episode a failure."""
+        """Lists the violations that make the episode a failure."""
         contact = () if self.collision is None else (self.collision,)
         return tuple(each for each in (*contact, *self.violations) if each.valid)
 
@@ -50,7 +50,7 @@ NOBODY = Encounter()
 
 
 def objective(mean_return: float | Floats, running_maximum: float) -> Floats:
-    """How far an episode stays below the best returns, f_e; smaller is riskier.
+    """Computes f_e, an episode's distance below the best returns; smaller is riskier.
 
     f_e(ξ) = max(0, M̄_e - R̄_e(ξ)) / (|M̄_e| + ε)                                  (11)
 

@@ -74,9 +74,9 @@ class BotorchOptimizer(SceneOptimizer):
     def scores(self) -> Floats:
         """Returns f_e of every kept observation, oldest first, `n`.
 
-        M̄_e moves, so all are computed against the current one. Choice: a rejected scene is taken to be as bad as the
-        worst scored one (1 if there is none), so that the model learns to avoid C_hard without the cliff in f that a
-        fixed large penalty would fit.
+        M̄_e moves, so all are computed against the current one. Choice: a rejected scene counts as bad as the worst
+        scored one (1 if there is none). So the model learns to avoid C_hard without the cliff in f that a fixed large
+        penalty would fit.
         """
         scores = objective(self._returns, self._maximum.smoothed)
         rejected = np.isnan(scores)

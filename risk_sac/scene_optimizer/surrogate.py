@@ -61,7 +61,9 @@ def fit(points: Tensor, values: Tensor, start: Hyperparameters | None, seed: int
 
 
 def maximise_expected_improvement(model: SingleTaskGP, choices: Tensor) -> Tensor:
-    """Returns the point of largest LogEI, `d`, by a short gradient ascent from the best of the choices, `k x d`.
+    """Returns the point of largest LogEI, `d`.
+
+    A short gradient ascent starts from the best of the choices, `k x d`.
 
     Choice: the incumbent is the best posterior mean at the observed points. It is not fooled by one lucky noisy value
     as the best observation would be, and costs one pass, where (q)LogNEI integrates over the incumbent by sampling.
