@@ -1,6 +1,6 @@
-"""What the scenes of a campaign tell: which parameters set failing ones apart, and which parts of the ODD were played.
+"""Computes scene parameters' effects on failures, and the played parts of the ODD.
 
-Scenes of the searches alone; a scene that was refused before its first step tells nothing. Pure.
+Scenes of the searches alone count; a scene that was refused before its first step does not. Pure.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,7 +21,7 @@ Counts = NDArray[np.int64]
 
 
 class SceneParameterEffect(Record):
-    """How a scene parameter differs between failing and safe episodes, and how often each part of it was played."""
+    """Effect of a scene parameter on failure, and the episodes played in each part of it."""
 
     name: str
     unit: str
@@ -41,7 +41,7 @@ class SceneParameterEffect(Record):
 
 
 class PairPlayed(Record):
-    """Which cells of two scene parameters were played."""
+    """Cells of two scene parameters, with the episodes played in each."""
 
     parameters: tuple[str, str]
     played: list[list[int]]
