@@ -111,8 +111,6 @@ class WarmStartConfig(Settings):
     """Warm start of a learner's memory by episodes of an archive search.
 
     They come before its policy acts; they are the same for all learners.
-
-    It is the same for all learners.
     """
 
     episodes: Annotated[int, Field(ge=0, le=10_000)] = 150

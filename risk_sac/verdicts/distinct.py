@@ -1,4 +1,6 @@
-"""Tells distinct failures apart, by signature and then by cells of severity.
+"""Tells distinct failures apart, by signature and then by cells.
+
+The cells divide what varies within a signature.
 
 Choice: fixed cells, not the distance to failures found before: the number of filled cells does not depend on the
 order, so a resumed run or two pooled runs count alike. The edges are where people begin to die (30 km/h) and where a

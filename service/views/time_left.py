@@ -1,4 +1,4 @@
-"""Estimates how long a campaign takes until it ends, from its pace and the cost of each method's episodes. Pure.
+"""Estimates a campaign's remaining time from pace and cost of episodes. Pure.
 
 The pace of a run leaves out the start of its worker, which is spent once and not once per episode.
 """
@@ -43,7 +43,9 @@ SOONEST_S, LATEST_S = 1, 30
 
 
 def eta_s(runs: Sequence[StoredRun], spec: CampaignSpec, workers: int) -> float | None:
-    """Seconds until all runs have ended; None until a run has played two episodes, or while nothing can execute them.
+    """Estimates the seconds until all runs have ended.
+
+    Returns None until a run has played two episodes, or while nothing can execute them.
 
     eta = max(longest run at work, work left / workers)
 
@@ -66,7 +68,10 @@ def eta_s(runs: Sequence[StoredRun], spec: CampaignSpec, workers: int) -> float 
 
 
 def retry_after_s(campaign: StoredCampaign, workers: int) -> int | None:
-    """Seconds after which to ask again: a twentieth of the time left, or None once the campaign has ended."""
+    """Computes when to ask again, s: after a twentieth of the time left.
+
+    Returns None once the campaign has ended.
+    """
     if campaign.state.final:
         return None
     left_s = eta_s(campaign.runs, campaign.spec, workers) or 0.0
@@ -74,7 +79,7 @@ def retry_after_s(campaign: StoredCampaign, workers: int) -> int | None:
 
 
 class _Work:
-    """What a run still has to do, in units of `EPISODE_COST`."""
+    """Remaining work of a run, in units of `EPISODE_COST`."""
 
     def __init__(self, run: StoredRun, spec: CampaignSpec) -> None:
         self.run = run
@@ -89,7 +94,10 @@ class _Work:
         self.start_s = 0.0 if took_s is None else max(0.0, run.busy_s - done * took_s)
 
     def left_s(self, mean_pace_s: float, start_s: float) -> float:
-        """Time that the run still needs, s; `mean_pace_s` and `start_s` are used where it has no pace of its own."""
+        """Computes the time that the run still needs, s.
+
+        `mean_pace_s` and `start_s` are used where it has no pace of its own.
+        """
         done, total = self.run.episodes_done, max(self.run.episodes_done, self.run.episodes_total)
         pace_s = mean_pace_s if self.pace_s is None else self.pace_s
         searched = max(done, self._search)
@@ -97,13 +105,19 @@ class _Work:
         return search_s + pace_s * self._units(searched, total) + (0.0 if done else start_s)
 
     def _units(self, first: int, last: int) -> float:
-        """Work of the episodes from `first` up to `last`; a frozen policy costs as much as a warm start."""
+        """Computes the work of the episodes from `first` up to `last`.
+
+        A frozen policy costs as much as a warm start.
+        """
         learning = max(0.0, min(last, self._search) - max(first, self._warm_until))
         return learning * self._cost + (last - first - learning) * self._cheap
 
 
 def _warm_until(run: StoredRun, spec: CampaignSpec) -> float:
-    """The episode with which a learner's warm start ends: where it has ended by its failures, in proportion to them."""
+    """Estimates the episode with which a learner's warm start ends.
+
+    Where it has ended by its failures, it is in proportion to them.
+    """
     warm_start = spec.learner.warm_start
     if run.failures >= warm_start.failures:
         return min(warm_start.episodes, run.episodes_done * warm_start.failures / run.failures)
