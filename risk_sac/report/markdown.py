@@ -138,10 +138,7 @@ class Tables:
         return _filled(["method", *COLUMNS], rows, left=3)
 
     def budgets(self, family: FamilyName) -> str:
-        """Tabulates findings within limits of processor time and of episodes.
-
-        A cell is the median over seeds, with the least and the most.
-        """
+        """Tabulates findings within each limit: median over seeds, least and most."""
         rows = []
         for method in self._comparison.methods:
             runs = self._comparison.of_cell(family, method)
