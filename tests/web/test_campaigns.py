@@ -94,7 +94,7 @@ def test_filters_are_the_apis_and_stay_in_the_address(
     expect(page.get_by_text("No campaign matches.")).to_be_visible()
     page.get_by_role("button", name="All campaigns").click()
     expect(rows(page)).to_have_count(3)
-    page.get_by_label("Search").fill(HOSTILE)
+    page.get_by_role("searchbox", name="Search").fill(HOSTILE)
     expect(rows(page)).to_have_count(1)
     assert shown_ids(page) == [small[HOSTILE]]
 
@@ -105,13 +105,13 @@ def test_words_of_a_label_or_an_id_find_a_campaign_while_they_are_typed(
     page = page_at("campaigns")
     expect(rows(page)).to_have_count(3)
     for text, found in (("MORE one", small["one more"]), ("b>7", campaign), (campaign[3:12], campaign)):
-        page.get_by_label("Search").fill(text)
+        page.get_by_role("searchbox", name="Search").fill(text)
         expect(page.locator("td.campaign-name a")).to_have_count(1)
         expect(page.locator("td.campaign-name a")).to_have_attribute("href", f"#/campaigns/{found}")
-    page.get_by_label("Search").fill("100% more")  # no wildcard
+    page.get_by_role("searchbox", name="Search").fill("100% more")  # no wildcard
     expect(page.get_by_text("No campaign matches.")).to_be_visible()
     page.reload()
-    expect(page.get_by_label("Search")).to_have_value("100% more")
+    expect(page.get_by_role("searchbox", name="Search")).to_have_value("100% more")
 
 
 def test_a_long_label_pushes_nothing_off(page_at: Callable[..., Page], service: Service) -> None:
