@@ -142,16 +142,18 @@ def test_a_resumed_archive_search_breeds_on_as_if_never_interrupted(tmp_path: Pa
 
 
 @pytest.mark.parametrize("limit", [*(pytest.param(limit, marks=pytest.mark.torture) for limit in (1, 3)), 7])
-def test_a_resumed_search_by_two_takes_turns_as_if_never_interrupted(tmp_path: Path, limit: int) -> None:
+@pytest.mark.parametrize("prior", ["none", "shipped"])
+def test_a_resumed_search_by_two_takes_turns_as_if_never_interrupted(tmp_path: Path, prior: str, limit: int) -> None:
     at_once = LEARNER.model_copy(update={"warm_start": WarmStartConfig(episodes=0)})  # both act from the beginning on
-    changes = {"budget": Budget(episodes=9), "learner": at_once}
+    changes = {"budget": Budget(episodes=9), "learner": at_once, "prior": prior}
     shared = spec(seed=2, method="risk-sac-diverse").model_copy(update=changes)
     whole, first, rest = Listener(), Listener(limit), Listener()
     expected = train(shared, tmp_path / "whole", whole)
     train(shared, tmp_path / "parts", first)
     resumed = train(shared, tmp_path / "parts", rest)
     learned = [one.temperature != two.temperature for one, two in pairwise(whole.records)]
-    assert {True, False} == set(learned[3:])  # past the warm-up, and it learns only where it acts
+    if prior == "none":  # with a prior the policy hardly gets a turn in nine episodes
+        assert {True, False} == set(learned[3:])  # past the warm-up, and it learns only where it acts
     assert len(first.records) == limit
     assert records_to_json(rest.records) == records_to_json(whole.records)
     assert resumed.digest == expected.digest

@@ -117,9 +117,9 @@ def test_an_interrupted_comparison_goes_on_and_equals_one_that_never_was(whole: 
     )
     wait_for(process, lambda: any(path.stat().st_size for path in runs.glob("*-sac-*/episodes.jsonl")))
     os.kill(process.pid, signal.SIGINT)
-    printed, complaint = process.communicate()
+    _, complaint = process.communicate()
     assert process.returncode == 130, complaint
-    assert "The same command again goes on" in printed
+    assert "The same command again goes on" in complaint
     partial = table(tmp_path)
     assert 0 < len(partial["runs"]) < RUNS
     assert len(partial["runs"]) + len(partial["missing"]) == RUNS

@@ -255,8 +255,8 @@ def test_an_ego_that_sees_nothing_fixes_nothing(failures: Path, tmp_path: Path, 
 def test_what_is_asked_of_a_failure_names_one(run: Path, failure: Path, tell: Tell) -> None:
     for asked, complaint in (
         (("minimise", run, "--out", "x"), "which is a folder; wanted a bundle, or a failure of its run too"),
-        (("minimise", failure), "--out: got nothing; wanted a file for the core of a bundle"),
-        (("region", run, "nobody"), "got 'nobody'; wanted one of the failures"),
+        (("minimise", failure), "--out is missing; choose a file for the core of a bundle"),
+        (("region", run, "nobody"), "got 'nobody'; wanted one of"),
     ):
         status, out, err = tell(*asked)
         assert (status, out) == (2, "")

@@ -11,7 +11,8 @@ import pytest
 
 from risk_sac.failures.export.commonroad import ACTORS, LANELETS, STATES
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.failures.export.recorded import Recorded, colour
+from risk_sac.failures.export.recorded import Recorded
+from risk_sac.failures.net import colour
 from tests.exports.conftest import CHECKERS, CM, ask_checkers, checked
 from tests.exports.make_examples import FAMILIES
 

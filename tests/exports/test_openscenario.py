@@ -13,7 +13,8 @@ from lxml import etree
 from shapely.affinity import rotate, translate
 
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.failures.export.recorded import Actor, Recorded, colour
+from risk_sac.failures.export.recorded import Actor, Recorded
+from risk_sac.failures.net import colour
 from tests.exports.conftest import CM, ask_checkers, checked
 from tests.exports.make_examples import FAMILIES
 from tests.exports.read_opendrive import dangling, middles

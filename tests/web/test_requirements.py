@@ -60,6 +60,7 @@ def test_failures_are_filtered_by_requirement(page_at: Callable[..., Page], fast
     expect(card).to_contain_text("never fast")
     expect(card).to_contain_text("after release")
     expect(card.locator("img.thumbnail")).to_have_count(1)
+    page.get_by_role("button", name="More filters").click()
     page.get_by_label("Requirement").select_option("never_fast")
     expect(page.locator(".found-head p b")).to_have_text("12")
     expect(page.get_by_label("Requirement").locator("option")).not_to_have_count(0)
