@@ -1,10 +1,10 @@
-"""Which addresses are this machine's own; what goes there goes through no proxy."""
+"""Recognises addresses of this machine; requests to them bypass any proxy."""
 
 import ipaddress
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only processes of this machine reach a server that listens there: `127.8.9.1`, `[::1]`, `localhost`."""
+    """Returns whether a host is a loopback address, such as `127.8.9.1`, `[::1]` or `localhost`."""
     host = host.lower().removeprefix("[").removesuffix("]")
     try:
         address = ipaddress.ip_address(host)

@@ -109,7 +109,10 @@ class Problem:
 
 
 def _own(field: str, requirement: Requirement, shipped: Mapping[str, Requirement]) -> Requirement | None:
-    """A user's requirement; where it only says what a shipped one counts as, that one, if this ODD has it."""
+    """Returns a user's requirement as a run monitors it.
+
+    One without a formula changes what the shipped requirement of its name counts as; None if this ODD has none.
+    """
     name = requirement.name
     if name not in shipped:
         if not requirement.formula:

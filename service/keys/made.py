@@ -1,4 +1,4 @@
-"""Flag in the database that API keys were ever made, which outlives their file.
+"""Remembers in the database that API keys were made, even if their file is lost.
 
 The key file alone cannot distinguish a service without keys from one whose keys are lost. Creating a key sets the flag
 in the same step, and a server sets it when it finds a key file that was copied here.
