@@ -29,7 +29,7 @@ from risk_sac.scene_optimizer import (
     SobolOptimizer,
 )
 from risk_sac.types import Floats, Scene
-from risk_sac.verdicts.distinct import DistinctFailures
+from risk_sac.verdicts.distinct import Finds
 
 CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
     "scripted": ScriptedAgent,
@@ -43,7 +43,6 @@ Actor = Learner | IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
 """A joint policy that drives all adversaries."""
 GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
 STEP_COSTS = 1.0, 8.0  # processor time of an environment step: of the guide, and of a policy with its share of updates
-NEW, NEW_CANDIDATE = 1.0, 4.0  # worth of a distinct failure, and what is added for a candidate for the headline
 # Scripts that find a failure in one episode of thirty may find none in fifty and still be worth their time.
 DISCOUNT = 0.995
 PRIOR_WORTH, PRIOR_STEPS = 0.05, 1000.0
@@ -187,7 +186,7 @@ class Turns:
         self._bandit = DiscountedBandit(
             discount=DISCOUNT, prior_worth=PRIOR_WORTH, prior_cost=PRIOR_STEPS, least=LEAST, unit_costs=STEP_COSTS
         )
-        self._found, self._candidates = DistinctFailures(), DistinctFailures()
+        self._finds = Finds()
 
     def draw(self) -> int:
         """Draws the arm of the next episode."""
@@ -195,9 +194,4 @@ class Turns:
 
     def tell(self, arm: int, steps: int, violations: Sequence[Collision | Violation]) -> None:
         """Counts an episode and its valid violations; what either arm has found is new to neither."""
-        worth = 0.0
-        for violation in violations:
-            worth += NEW * self._found.add(violation)
-            if violation.headline_candidate:
-                worth += NEW_CANDIDATE * self._candidates.add(violation)
-        self._bandit.tell(arm, worth, steps)
+        self._bandit.tell(arm, self._finds.add(violations), steps)

@@ -83,8 +83,9 @@ class _Candidates:
 
 
 def answer_of(folder: Path, budget_steps: int) -> Detection | None:
-    """Returns the outcome of a run with this budget; None if it has not been called with so much.
+    """Returns the outcome of a run with this budget.
 
+    None if the run has not been called with so much.
     A run that detected early ends alike with any larger budget. It counts for that once it is called with it, as the
     runs beside it that detected nothing do; else those that detected would be the first to count.
     """

@@ -34,7 +34,7 @@ class Run(NamedTuple):
 
 
 class Played(NamedTuple):
-    """What a run of a campaign's search has played so far."""
+    """Counts what a run of a search has played."""
 
     family: str
     method: str
@@ -130,7 +130,10 @@ def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequ
 
 
 def _chance(each: DefectPower, seeds: int) -> float:
-    """Share of the choices of so many of the measured runs, or all of them, in which one detects the defect."""
+    """Returns the chance that one of so many seeds detects the defect.
+
+    It is the share of all choices of that many measured runs, or of all runs, in which at least one detected it.
+    """
     chosen = min(seeds, each.runs)
     return 1 - comb(each.runs - each.detected, chosen) / comb(each.runs, chosen)
 

@@ -52,7 +52,10 @@ class Benchmark:
 
 
 def ego_with(defect: str) -> EgoConfig:
-    """Returns a defect's base ego with the defect; a name that no defect has is refused when the ego is pinned."""
+    """Returns a defect's base ego with the defect.
+
+    A name that no defect has is refused when the ego is pinned.
+    """
     base = DEFECTS[defect].base if defect in DEFECTS else "idm-aeb"
     return read_ego(f"{base}+{defect}")
 

@@ -44,7 +44,7 @@ class Summary:
 
 
 def balanced(detections: Sequence[Detection]) -> list[Detection]:
-    """Returns the runs of those defects and seeds that every method has played, so that all have the same tasks."""
+    """Returns the runs of defects and seeds that every method has played."""
     methods = {each.method for each in detections}
     played: dict[tuple[object, ...], set[RunMethod]] = defaultdict(set)
     for each in detections:
@@ -93,7 +93,9 @@ def restricted_means(detections: Sequence[Detection]) -> tuple[list[RunMethod], 
 
 
 def friedman(means: Floats) -> float | None:
-    """P value of the Friedman test that methods rank alike over defects; None if there are too few of either.
+    """Returns the P value of the Friedman test over defects.
+
+    It tests that all methods rank alike. None if there are too few methods or defects.
 
     Args:
       means: `defects x methods`.

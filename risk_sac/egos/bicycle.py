@@ -63,18 +63,20 @@ def _advanced(
     )
 
 
-AHEAD_S = 0.5
+AHEAD_S = 0.5  # of the place that it steers for
+FOLLOW_S = 0.2  # within which the car reaches its plan's speed
 
 
 def track(trajectory: Trajectory, motion: Motion, vehicle: Vehicle) -> Control:
     """Returns the control that follows a valid trajectory.
 
     Choice: it aims at the place of `AHEAD_S` from now, but no nearer than `LEAST_LOOKAHEAD_M` where the trajectory goes
-    so far, else straight on: nearer aims make a slow car turn its wheels to and fro.
+    so far, else straight on: nearer aims make a slow car turn its wheels to and fro. It takes on the
+    speed of `FOLLOW_S` from now: with `AHEAD_S` it braked too late for stop lines.
     """
     t = trajectory
-    speed = float(np.interp(AHEAD_S, t.time_s, t.speed_mps))
-    accel = (speed - motion.speed_mps) / AHEAD_S
+    speed = float(np.interp(FOLLOW_S, t.time_s, t.speed_mps))
+    accel = (speed - motion.speed_mps) / FOLLOW_S
     away_m = np.hypot(t.x_m - motion.x_m, t.y_m - motion.y_m)
     far = np.flatnonzero((t.time_s >= AHEAD_S) & (away_m >= LEAST_LOOKAHEAD_M))
     if not len(far):

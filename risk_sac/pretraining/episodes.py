@@ -50,7 +50,6 @@ class ScriptEpisode:
     kind: str = ""  # of the valid violation; empty without one
     preventable: bool = False
     candidate: bool = False  # for the headline: preventable and not minor
-    contact: bool = False
 
 
 @dataclass(slots=True)
@@ -184,7 +183,6 @@ def outcome_of(encounter: Encounter, point: Floats, ego: str, steps: int) -> Scr
         kind="" if worst is None else kind_name(worst),
         preventable=worst is not None and worst.preventable,
         candidate=worst is not None and worst.headline_candidate,
-        contact=encounter.collision is not None,
     )
 
 
@@ -201,7 +199,7 @@ def write_episodes(path: Path, episodes: list[ScriptEpisode]) -> None:
         ego=np.array([each.ego for each in episodes]),
         steps=np.array([each.steps for each in episodes], np.int16),
         kind=np.array([each.kind for each in episodes]),
-        flags=np.array([(each.preventable, each.candidate, each.contact) for each in episodes]),
+        flags=np.array([(each.preventable, each.candidate) for each in episodes]),
     )
     replace_file(path, buffer.getvalue())
 
@@ -212,8 +210,6 @@ def read_episodes(path: Path) -> list[ScriptEpisode]:
         columns = [arrays[name].tolist() for name in ("ego", "steps", "kind", "flags")]
         points = arrays["point"] / GRID
     return [
-        ScriptEpisode(
-            point=point, ego=ego, steps=steps, kind=kind, preventable=flags[0], candidate=flags[1], contact=flags[2]
-        )
+        ScriptEpisode(point=point, ego=ego, steps=steps, kind=kind, preventable=flags[0], candidate=flags[1])
         for point, ego, steps, kind, flags in zip(points, *columns, strict=True)
     ]

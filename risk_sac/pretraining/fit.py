@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.stats import rankdata
 from torch.nn import functional
 
 from risk_sac.errors import ConfigError
 from risk_sac.prior.script_model import CANDIDATE, FAILS, HEADS, MEMBERS, Member, ScriptModel
-from risk_sac.prior.shipped import Prior
+from risk_sac.prior.shipped import GRID, Prior
+from risk_sac.report.paired import vargha_delaney
 
 LIBRARY = 300  # points of a library, at most
 LEAST_FAILURES = 50  # to fit a model to
@@ -40,7 +40,7 @@ class Dataset:
         for path in sorted(folder.glob(f"{family}-*.npz")):
             with np.load(path, allow_pickle=False) as arrays:
                 flags, kind = arrays["flags"], arrays["kind"]
-                points.append(arrays["point"].astype(np.float32) / 65535.0)
+                points.append(arrays["point"].astype(np.float32) / GRID)
                 heads.append(np.stack([kind != "", flags[:, 0], flags[:, 1]], 1).astype(np.float32))
                 kinds.append(kind)
                 egos.append(arrays["ego"])
@@ -151,9 +151,8 @@ def _loss(member: Member, data: Tensors, rows: torch.Tensor, belief: torch.Tenso
 
 
 def auc(scores: NDArray[np.float32], positive: NDArray[np.bool_]) -> float:
-    """Area under the ROC curve."""
-    ranks, hits = rankdata(scores), int(positive.sum())
-    return float((ranks[positive].sum() - hits * (hits + 1) / 2) / (hits * (len(scores) - hits)))
+    """Computes the area under the ROC curve."""
+    return vargha_delaney(scores[positive].tolist(), scores[~positive].tolist())
 
 
 def library_of(data: Dataset, model: ScriptModel) -> tuple[NDArray[np.float32], tuple[str, ...]]:

@@ -3,7 +3,6 @@
 Three arms share the episodes by what they have found lately: the script model, the library, and the archive search.
 """
 
-from collections import Counter
 from enum import IntEnum
 
 import numpy as np
@@ -15,9 +14,8 @@ from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
 from risk_sac.scene_optimizer.archive import DEVIATIONS, SHARES
 from risk_sac.scene_optimizer.base import State
 from risk_sac.types import Floats
-from risk_sac.verdicts.distinct import kind_name
+from risk_sac.verdicts.distinct import NEW, NEW_CANDIDATE, Finds
 
-NEW, NEW_CANDIDATE = 1.0, 4.0  # worth of a distinct failure, and what is added for a candidate for the headline
 CANDIDATES = 1024  # points among which the model chooses
 FREE_SCENES = 0.5  # of its episodes, those whose scene it chooses too
 SCENES = 32  # among which it chooses then
@@ -85,8 +83,7 @@ class PriorOptimizer(ArchiveOptimizer):
         self._yields = Yields(self.arms)
         self._arm = Arm.ARCHIVE
         self._played: list[int] = []  # rows of the library
-        self._kinds: Counter[str] = Counter()  # of the failures so far
-        self._candidates: set[str] = set()  # kinds with a candidate for the headline
+        self._finds = Finds()
 
     def ask(self) -> Floats:
         """See `SceneOptimizer.ask`."""
@@ -105,7 +102,7 @@ class PriorOptimizer(ArchiveOptimizer):
         if len(self._played) == len(self._library):
             self._played.clear()
         rows = np.setdiff1d(np.arange(len(self._library)), self._played)
-        weights = np.array([_novelty(self._kinds[self._library_kinds[row]]) for row in rows])
+        weights = np.array([_novelty(self._finds.kinds[self._library_kinds[row]]) for row in rows])
         row = int(self._random.choice(rows, p=weights / weights.sum()))
         self._played.append(row)
         point: Floats = self._library[row].copy()
@@ -120,7 +117,7 @@ class PriorOptimizer(ArchiveOptimizer):
         points[:, size:] = self._scripts(CANDIDATES)
         prediction = self._model.predict(self._translation.known(points), self._belief)
         worth = NEW * prediction.fails + NEW_CANDIDATE * prediction.candidate
-        novelty = np.array([_novelty(self._kinds[kind]) for kind in self._model.kinds])
+        novelty = np.array([_novelty(self._finds.kinds[kind]) for kind in self._model.kinds])
         best: Floats = points[int((worth * (prediction.kinds @ novelty)).argmax())]
         return best
 
@@ -141,17 +138,10 @@ class PriorOptimizer(ArchiveOptimizer):
         super()._learn(point, mean_return, score, encounter)
         if mean_return is None:
             return
-        worth = 0.0
-        for violation in encounter.valid_violations:
-            kind = kind_name(violation)
-            worth += NEW * (kind not in self._kinds)
-            if violation.headline_candidate and kind not in self._candidates:
-                worth += NEW_CANDIDATE
-                self._candidates.add(kind)
-            self._kinds[kind] += 1
-        self._yields.tell(self._arm, worth)
-        known = self._translation.known(point[None])[0]
-        self._belief = self._model.believe(self._belief, known, failed=bool(encounter.valid_violations))
+        self._yields.tell(self._arm, self._finds.add(encounter.valid_violations))
+        if Arm.MODEL in self.arms:
+            known = self._translation.known(point[None])[0]
+            self._belief = self._model.believe(self._belief, known, failed=bool(encounter.valid_violations))
 
     def state(self) -> State:
         """See `SceneOptimizer.state`."""
@@ -160,8 +150,7 @@ class PriorOptimizer(ArchiveOptimizer):
             "belief": self._belief.tolist(),
             "yields": self._yields.state(),
             "played": list(self._played),
-            "kinds": dict(self._kinds),
-            "kinds_of_candidates": sorted(self._candidates),
+            "finds": self._finds.state(),
         }
 
     def load(self, state: State) -> None:
@@ -170,7 +159,7 @@ class PriorOptimizer(ArchiveOptimizer):
         self._belief = np.array(state["belief"])
         self._yields.load(state["yields"])
         self._played = list(state["played"])
-        self._kinds, self._candidates = Counter(state["kinds"]), set(state["kinds_of_candidates"])
+        self._finds.load(state["finds"])
 
 
 class ReplayOptimizer(PriorOptimizer):

@@ -1,7 +1,7 @@
 """Script model: predicts from a scene, a script and a belief about the ego how the episode ends.
 
 Three perceptrons with two hidden layers of 256. Each has logits for: the episode fails; a reference driver would have
-prevented it; it is a candidate for the headline; and, given that it fails, of which kind.
+prevented it, which only helps training; it is a candidate for the headline; and, given that it fails, of which kind.
 
 The belief is a distribution over the training egos: which of them the ego under test behaves like. It begins uniform
 and follows by Bayes' rule from the episodes that were played.
@@ -41,15 +41,11 @@ class Member(nn.Module):
         self.norms = nn.ModuleList([nn.LayerNorm(WIDTH), nn.LayerNorm(WIDTH)])
         self.last, self.dropout = nn.Linear(WIDTH, outputs), nn.Dropout(dropout)
 
-    def hidden(self, points: torch.Tensor) -> torch.Tensor:
-        """Features of points in the unit cube with a belief behind, `n x inputs`; returns `n x WIDTH`."""
-        first = self.dropout(functional.silu(self.norms[0](self.first(2.0 * points - 1.0))))
-        second: torch.Tensor = self.dropout(functional.silu(self.norms[1](self.second(first))))
-        return second
-
     def forward(self, points: torch.Tensor) -> torch.Tensor:
-        """Logits, `n x outputs`."""
-        logits: torch.Tensor = self.last(self.hidden(points))
+        """Returns logits, `n x outputs`, for points in the unit cube with a belief behind, `n x inputs`."""
+        first = self.dropout(functional.silu(self.norms[0](self.first(2.0 * points - 1.0))))
+        second = self.dropout(functional.silu(self.norms[1](self.second(first))))
+        logits: torch.Tensor = self.last(second)
         return logits
 
 
@@ -120,6 +116,8 @@ class ScriptModel:
                     {name: torch.from_numpy(value.astype(np.float32)) for name, value in own.items()}
                 )
                 members.append(member)
+                if not all(np.isfinite(value).all() for value in own.values()):
+                    raise ValueError("weights that are no finite numbers")
         except (KeyError, IndexError, RuntimeError) as error:
             raise ValueError(f"no script model with {len(kinds)} kinds: {error}") from error
         return cls(members, kinds, egos)

@@ -174,8 +174,9 @@ def vargha_delaney(first: Sequence[float], second: Sequence[float]) -> float:
 
     Source: Vargha & Delaney 2000, A critique and improvement of the CL common language effect size statistics.
     """
-    larger = sum((one > other) + 0.5 * (one == other) for one in first for other in second)
-    return larger / (len(first) * len(second))
+    ordered = np.sort(np.asarray(second, np.float64))
+    below, up_to = (int(np.searchsorted(ordered, first, side).sum()) for side in ("left", "right"))
+    return (below + up_to) / 2 / (len(first) * len(second))
 
 
 def _doubled_ranks(values: NDArray[np.float64]) -> list[int]:

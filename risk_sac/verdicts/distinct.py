@@ -11,8 +11,9 @@ families and methods, so that counts compare, and most of it is empty.
 """
 
 from bisect import bisect_right
+from collections import Counter
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from risk_sac.errors import NotFinite
 from risk_sac.records import Collision, ConflictType, Judgement, Violation
@@ -30,6 +31,7 @@ Niche = tuple[str, str, Cell]  # requirement, signature, cell
 VISIBLE_S = (0.6, 2.0)
 CLOSING_MPS = (5.0, 10.0)
 BRAKED_MPS2 = 3.0  # more than a driver does for comfort
+NEW, NEW_CANDIDATE = 1.0, 4.0  # worth of a distinct failure, and what a candidate for the headline adds
 MANOEUVRES, ROLES = 4, 2
 # Cut-in, merge, leader, crossing; front, left, right: a contact at the ego's rear is not valid.
 VEHICLE_TYPES, ZONES = 4, 3
@@ -90,6 +92,40 @@ class DistinctFailures:
             return False
         self._found.add(niche)
         return True
+
+
+class Finds:
+    """Counts the kinds of failures that a search has found, and what each find is worth.
+
+    Choice: a distinct failure is worth 1, and 4 more if it is the first of its kind that counts for the headline.
+
+    Attributes:
+      kinds: how often each kind was found, by `kind_name`.
+    """
+
+    def __init__(self) -> None:
+        self.kinds: Counter[str] = Counter()
+        self._candidates: set[str] = set()  # kinds with a candidate for the headline
+
+    def add(self, violations: Sequence[Collision | Violation]) -> float:
+        """Counts the valid violations of an episode; returns what is new among them, by worth."""
+        worth = 0.0
+        for violation in violations:
+            kind = kind_name(violation)
+            worth += NEW * (kind not in self.kinds)
+            self.kinds[kind] += 1
+            if violation.headline_candidate and kind not in self._candidates:
+                self._candidates.add(kind)
+                worth += NEW_CANDIDATE
+        return worth
+
+    def state(self) -> dict[str, Any]:
+        """Returns plain values to continue from."""
+        return {"kinds": dict(self.kinds), "candidates": sorted(self._candidates)}
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Continues from `state()`."""
+        self.kinds, self._candidates = Counter(state["kinds"]), set(state["candidates"])
 
 
 def distinct_failures(violations: Sequence[Collision | Violation]) -> tuple[int, ...]:

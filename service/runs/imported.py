@@ -17,6 +17,7 @@ from risk_sac.report.runs import read_records, read_run
 from risk_sac.run_folder.results import EPISODES, FAILURES, RESULTS, read_results, series_name
 from risk_sac.scenario.families import family_named
 from service.settings import ServiceSettings
+from service.store.stored import StoredCampaign
 from service.store.writing import Ledger
 
 logger = logging.getLogger(__name__)
@@ -64,6 +65,14 @@ def _import(spec: CampaignSpec, folders: Mapping[str, Path], settings: ServiceSe
     if ledger.find("default", f"imported {key}", spec) is not None:
         return
     campaign = ledger.create(spec, key=f"imported {key}")
+    try:
+        _copy(campaign, folders, settings, ledger)
+    finally:  # else a worker would play what was not imported
+        ledger.cancel(campaign.id)
+    logger.info("%d runs imported", len(runs), extra={"campaign": campaign.id})
+
+
+def _copy(campaign: StoredCampaign, folders: Mapping[str, Path], settings: ServiceSettings, ledger: Ledger) -> None:
     for stored in campaign.runs:
         if stored.spec_digest not in folders:
             continue
@@ -74,8 +83,6 @@ def _import(spec: CampaignSpec, folders: Mapping[str, Path], settings: ServiceSe
         while some := [(stored.number, event) for event in islice(events, AT_ONCE)]:
             ledger.add_episodes(some)
         ledger.end_run(stored.number, State.SUCCEEDED, result=_finished(folder))
-    ledger.cancel(campaign.id)
-    logger.info("%d runs imported", len(runs), extra={"campaign": campaign.id})
 
 
 def _events(folder: Path) -> Iterator[EpisodeDone]:

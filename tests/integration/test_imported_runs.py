@@ -1,6 +1,7 @@
 """Runs of the command line, opened in the service."""
 
 import hashlib
+import shutil
 from pathlib import Path
 
 import pytest
@@ -47,3 +48,13 @@ def test_runs_of_the_command_line_are_campaigns_that_have_ended(serve, runs):
 def test_a_folder_without_a_run_is_named(serve, tmp_path):
     with pytest.raises(AssertionError, match="which holds no run"):
         serve("risk_sac.execution.worker", runs=tmp_path / "nothing")
+
+
+def test_a_damaged_run_is_not_played_in_the_place_of_its_import(serve, runs, tmp_path):
+    shutil.copytree(runs / "mine", tmp_path / "damaged")
+    for series in (tmp_path / "damaged").rglob("*.npz"):
+        series.unlink()
+    service = serve("risk_sac.execution.worker", runs=tmp_path)
+    (campaign,) = service.client.get("/v1/campaigns").json()["items"]
+    assert campaign["state"] == "cancelled"
+    assert "is not imported" in service.log.read_text()

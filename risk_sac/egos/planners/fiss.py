@@ -24,7 +24,6 @@ PIECE_M = 50.0  # of a lane; the planner's step takes as long as the lanes near 
 GROWN_M = 0.2  # by which others are longer and wider
 MOVING_MPS = 0.5  # from which another's heading is that of its velocity
 MOST_BRAKING_MPS2 = 8.0  # that a plan may have; in an emergency the car brakes as it can
-FOLLOW_S = 0.2  # within which the car reaches its plan's speed
 BEYOND_M = 20.0  # by which the lanes it looks at reach beyond the longest plan; more of them only take time
 BEYOND_S = 0.5  # by which predictions reach beyond the longest plan
 
@@ -32,9 +31,8 @@ BEYOND_S = 0.5  # by which predictions reach beyond the longest plan
 class FrenetPlanner:
     """The package's local planner on the road that the seam tells; the car follows its plans.
 
-    It steers as the seam's tracker does. Its speed is the plan's of `FOLLOW_S` from now: with the tracker's 0.5 s it
-    braked too late into a stop. The package's own MPC does not know the wheels' angle. In three staged starts, which
-    are too few to tell them apart, that went up to 1.4 m beyond a plan's widest point, the tracker up to 0.4 m.
+    The seam's tracker follows them. The package's own MPC does not know the wheels' angle. In three staged starts,
+    which are too few to tell them apart, that went up to 1.4 m beyond a plan's widest point, the tracker up to 0.4 m.
     """
 
     kind: ClassVar[str]
@@ -65,10 +63,8 @@ class FrenetPlanner:
             return Control(-self._car.brake_mps2)
         t = plan.trajectory
         planned = Trajectory(*(np.asarray(row) for row in (t.t, t.x, t.y, t.v)))
-        steering = track(planned, Motion(ego.x, ego.y, ego.yaw, ego.v, ego.a), self._car).steering_rad
-        wanted = float(np.interp(FOLLOW_S, planned.time_s, planned.speed_mps))
-        accel = -self._car.brake_mps2 if plan.emergency else (wanted - ego.v) / FOLLOW_S
-        return Control(accel, steering)
+        control = track(planned, Motion(ego.x, ego.y, ego.yaw, ego.v, ego.a), self._car)
+        return control._replace(accel_mps2=-self._car.brake_mps2) if plan.emergency else control
 
     def close(self) -> None:
         """Releases nothing."""
