@@ -103,7 +103,9 @@ def test_signals_on_the_stage_show_what_the_series_recorded(
     series, time_s = failure["series"], times(failure)
     ahead = [step for step, colour in enumerate(series["signal"]) if colour != "none"]
     assert ahead, "wants a failure with a signal"
-    page.wait_for_function("() => document.querySelector('canvas.stage')?.drawn?.signals.length")  # the roads come later
+    page.wait_for_function(
+        "() => document.querySelector('canvas.stage')?.drawn?.signals.length"
+    )  # the roads come later
     for step in (ahead[0], ahead[-1]):
         lamps = {each["lamp"] for each in go_to(page, float(time_s[step]))["signals"]}
         assert series["signal"][step] in lamps
