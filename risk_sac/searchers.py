@@ -14,10 +14,9 @@ from risk_sac.agents.learner import Learner
 from risk_sac.config import RunSpec, method_of
 from risk_sac.errors import ConfigError
 from risk_sac.prior.sampler import PriorOptimizer, ReplayOptimizer
-from risk_sac.prior.shipped import Translation, prior_of
+from risk_sac.prior.start import start_of
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Outcome, Violation
-from risk_sac.scenario.families import FAMILIES
 from risk_sac.scene_optimizer import (
     NOBODY,
     ArchiveOptimizer,
@@ -77,10 +76,9 @@ class Searchers:
             self.agent = Learner(observation_size, action_size, method, spec.learner, spec.stream)
         self._space = problem.space
         self._spec = spec
-        self._prior = prior_of(problem) if method.prior != "none" and spec.prior == "shipped" else None
-        if method.agent == "scripts" and method.prior == "library" and self._prior is None:
-            got = f"{spec.prior}, and {spec.method} at {spec.family}"
-            raise ConfigError("prior", got, "a shipped prior of the family's pattern", "choose the method archive")
+        self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
+        if method.agent == "scripts" and method.prior == "library" and self._start is None:
+            raise ConfigError("prior", f"none, and the method {spec.method}", "one", "choose the method archive")
         self._own = self._searcher(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1
         self._guide = self._searcher(ScriptFollower(problem.family), ArchiveOptimizer) if method.learns else None
         self._turns = Turns(spec.stream) if method.takes_turns else None
@@ -167,11 +165,10 @@ class Searchers:
     def _searcher(self, actor: Actor, sampler: type[SceneOptimizer]) -> Searcher:
         dimension = self._space.dimension + actor.genes
         arguments = dimension, self._spec.learner.scenes, self._spec.stream
-        if self._prior is None or not actor.genes:
+        if self._start is None or not actor.genes:
             return Searcher(sampler(*arguments), actor)
         whole = method_of(self._spec.method).prior == "all"
-        translation = Translation(self._space, FAMILIES[self._prior.family].space)
-        return Searcher((PriorOptimizer if whole else ReplayOptimizer)(*arguments, self._prior, translation), actor)
+        return Searcher((PriorOptimizer if whole else ReplayOptimizer)(*arguments, self._start), actor)
 
 
 class Turns:

@@ -97,10 +97,10 @@ class Iid(Settings):
     """Of scenes, actions and SUMO; no stream of a search is the same, whatever its seed."""
 
 
-PriorName = Literal["shipped", "none"]
+PriorName = Annotated[str, Field(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f]+$")]
 
 
-def _shipped(prior: PriorName) -> bool:
+def _shipped(prior: str) -> bool:
     return prior == "shipped"
 
 
@@ -157,7 +157,8 @@ class CampaignSpec(Settings):
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     learner: LearnerConfig = LearnerConfig()
     prior: Annotated[PriorName, Field(exclude_if=_shipped)] = "shipped"
-    """What methods with a prior start from: the shipped one, or none."""
+    """What methods with a prior start from: `shipped`, `none`, or the scripts of an earlier campaign, by its id; on the
+    command line the folder of a run or campaign. They are copied, and the copy's name takes the place of this one."""
     iid: Annotated[Iid | None, Field(exclude_if=lambda iid: iid is None)] = None  # else old digests would change
     """Null: none, and nothing is said of how often the ego fails."""
 

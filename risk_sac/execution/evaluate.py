@@ -19,6 +19,7 @@ from risk_sac.execution.jobs import Job, Progress, execute, worker_program
 from risk_sac.execution.runs import STOPPING, stop_signal
 from risk_sac.execution.verify import verify
 from risk_sac.machine import cores
+from risk_sac.prior.earlier import pinned_prior
 from risk_sac.problem import checked_campaign
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
 from risk_sac.run_folder.durable import held, replace_file
@@ -63,6 +64,7 @@ def evaluate(
         raise ConfigError("verify", f"{times}", "0 or more")
     folder = folder.absolute()  # an ego may change the working directory
     spec = checked_campaign(spec)  # before the folder is claimed
+    spec = spec.model_copy(update={"prior": pinned_prior(spec.prior, spec.families)})
     make_executor = executor_named(executor)
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
     with _claimed(spec, folder), stop_signal((*STOPPING, *hung_up)) as stopping:

@@ -12,6 +12,7 @@ from types import FrameType
 
 from risk_sac.config import RunSpec
 from risk_sac.execution.recorder import Recorder
+from risk_sac.prior.earlier import pinned_prior
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.durable import held
@@ -34,7 +35,8 @@ def run(spec: RunSpec, folder: Path, progress: Progress) -> Results:
       OSError: the folder cannot be written.
     """
     folder = folder.absolute()  # an ego may change the working directory
-    spec = spec.model_copy(update={"ego": Problem.from_spec(spec).ego})  # before the folder is claimed
+    ego, prior = Problem.from_spec(spec).ego, pinned_prior(spec.prior, [spec.family])  # before the folder is claimed
+    spec = spec.model_copy(update={"ego": ego, "prior": prior})
     with (
         held(folder),
         stop_signal() as stopping,

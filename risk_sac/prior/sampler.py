@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.prior.shipped import Prior, Translation
+from risk_sac.prior.start import Start
 from risk_sac.records import DrivenBy
 from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
 from risk_sac.scene_optimizer.archive import DEVIATIONS, SHARES
@@ -21,6 +21,7 @@ FREE_SCENES = 0.5  # of its episodes, those whose scene it chooses too
 SCENES = 32  # among which it chooses then
 RANDOM_SCRIPTS = 0.25  # of the scripts among which it chooses
 DISCOUNT, PRIOR_EPISODES, LEAST = 0.97, 5.0, 0.08
+EARLIER_SHARE = 0.5  # of the draws from the library, from what an earlier run found
 UNTRIED = 0.5, 1.0, 1.0  # worth per episode that arms are credited with at first
 
 
@@ -73,13 +74,11 @@ class PriorOptimizer(ArchiveOptimizer):
     initial = 0
     arms: tuple[Arm, ...] = (Arm.ARCHIVE, Arm.LIBRARY, Arm.MODEL)
 
-    def __init__(
-        self, dimension: int, config: SceneOptimizerConfig, seed: int, prior: Prior, translation: Translation
-    ) -> None:
+    def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int, start: Start) -> None:
         super().__init__(dimension, config, seed)
-        self._model, self._translation = prior.model, translation
-        self._library, self._library_kinds = translation.own(prior.library), prior.library_kinds
-        self._belief = prior.model.unknown()
+        self._model, self._translation = start.model, start.translation
+        self._library, self._library_kinds, self._earlier = start.library, start.library_kinds, start.earlier
+        self._belief = start.belief
         self._yields = Yields(self.arms)
         self._arm = Arm.ARCHIVE
         self._played: list[int] = []  # rows of the library
@@ -98,10 +97,16 @@ class PriorOptimizer(ArchiveOptimizer):
         return self._from_model()
 
     def _from_library(self) -> Floats:
-        """Draws a row that was not played yet, the more likely the rarer its kind is so far; then all over again."""
+        """Draws a row that was not played yet, the more likely the rarer its kind is so far; then all over again.
+
+        Some of the draws are from what an earlier run found, while some of that was not played.
+        """
         if len(self._played) == len(self._library):
             self._played.clear()
         rows = np.setdiff1d(np.arange(len(self._library)), self._played)
+        earlier = rows[rows < self._earlier]
+        if len(earlier) and self._random.random() < EARLIER_SHARE:
+            rows = earlier
         weights = np.array([_novelty(self._finds.kinds[self._library_kinds[row]]) for row in rows])
         row = int(self._random.choice(rows, p=weights / weights.sum()))
         self._played.append(row)

@@ -1,7 +1,4 @@
-"""The prior of a pattern: what was trained on its shipped family, and how a problem's points map onto that.
-
-A family at a place of the user has the parameters of its pattern, perhaps with other bounds. So points are translated
-by the parameters' names and values.
+"""The prior of a pattern: what was trained on its shipped family.
 
 prior/weights/<family>.npz   plain arrays; README.md says how they were made
 """
@@ -20,9 +17,7 @@ from numpy.typing import NDArray
 
 from risk_sac.errors import ConfigError
 from risk_sac.prior.script_model import ScriptModel
-from risk_sac.problem import Problem
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.space import SceneSpace
 from risk_sac.scripts.motions import SIZE
 from risk_sac.types import Floats
 
@@ -85,50 +80,6 @@ def inputs_of(family: str) -> int:
 
 
 @cache
-def shipped_prior(family: str) -> Prior | None:
-    """Returns the prior of a shipped family; None if it has none."""
-    path = DATA / f"{family}.npz"
-    return read_prior(path) if path.exists() else None
-
-
-def prior_of(problem: Problem) -> Prior | None:
-    """Returns the prior of a problem's pattern; None if there is none, or not for as many adversaries."""
-    for name, shipped in FAMILIES.items():
-        alike = (shipped.vehicles, shipped.pedestrians) == (problem.family.vehicles, problem.family.pedestrians)
-        if alike and set(shipped.space.names) <= set(problem.space.names):
-            return shipped_prior(name)
-    return None
-
-
-class Translation:
-    """Maps points of a problem onto those of a shipped family, by the scene parameters' names and values.
-
-    Attributes:
-      scene_size: scene parameters of the problem.
-    """
-
-    def __init__(self, problem: SceneSpace, shipped: SceneSpace) -> None:
-        self.scene_size, self._shipped = problem.dimension, shipped.dimension
-        self._places = [problem.names.index(name) for name in shipped.names]
-        self._problem = problem.low, problem.high - problem.low
-        self._known = shipped.low, shipped.high - shipped.low
-
-    def known(self, points: Floats) -> Floats:
-        """Translates points of the problem, `n x (d + genes)`."""
-        low, width = self._problem
-        values = (low + points[:, : self.scene_size] * width)[:, self._places]
-        return np.concatenate([_unit(values, *self._known), points[:, self.scene_size :]], 1)
-
-    def own(self, known: Floats) -> Floats:
-        """Translates points of the shipped family; parameters that it lacks are put to their middle."""
-        low, width = self._known
-        scenes = np.full((len(known), self.scene_size), 0.5)
-        own_low, own_width = self._problem
-        values = low + known[:, : self._shipped] * width
-        scenes[:, self._places] = _unit(values, own_low[self._places], own_width[self._places])
-        return np.concatenate([scenes, known[:, self._shipped :]], 1)
-
-
-def _unit(values: Floats, low: Floats, width: Floats) -> Floats:
-    offset = values - low
-    return np.clip(np.divide(offset, width, out=np.zeros_like(offset), where=width > 0), 0.0, 1.0)
+def shipped_prior(family: str) -> Prior:
+    """Returns the prior of a shipped family."""
+    return read_prior(DATA / f"{family}.npz")

@@ -1,5 +1,6 @@
 """The families by name: those that are shipped, and those at places that the library keeps."""
 
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -27,6 +28,14 @@ def _shipped(name: str) -> Family:
 
 
 FAMILIES: dict[str, Family] = {name: _shipped(name) for name in SHIPPED}
+
+
+ALIKE: Mapping[str, str] = {"car_following": "low", "crossing": "mixed", "junction": "dense"}
+
+
+def shipped_alike(name: str) -> str:
+    """Returns the shipped family of a family's pattern."""
+    return name if name in FAMILIES else next(shipped for pattern, shipped in ALIKE.items() if name.startswith(pattern))
 
 
 def family_named(name: str) -> Family:

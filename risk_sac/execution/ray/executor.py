@@ -26,6 +26,7 @@ from risk_sac.execution.messages import Event
 from risk_sac.execution.ray.node import Order
 from risk_sac.execution.ray.settings import ADDRESS, read_settings
 from risk_sac.run_folder.scratch import scratch_name
+from risk_sac.prior.earlier import SHIPPED_OR_NONE, file_of
 from risk_sac.scenario import library
 
 logger = logging.getLogger(__name__)
@@ -90,6 +91,9 @@ class RayExecutor:
         if spec.family not in SHIPPED:
             place = (library.library() / spec.family).resolve()
             beside |= {f"places/{spec.family}/{file.name}": file for file in place.iterdir()}
+        if spec.prior not in SHIPPED_OR_NONE:
+            beside[f"places/{file_of(spec.prior)}"] = (library.library() / file_of(spec.prior)).resolve()
+        if any(name.startswith("places/") for name in beside):
             environment[library.VARIABLE] = str(scratch / "places")
         program = replace(self._program, environment=environment)
         return Order(number=number, spec=spec, program=program, folder=folder, scratch=scratch, beside=beside)

@@ -1,0 +1,188 @@
+"""Scripts of an earlier run or campaign, from which a search goes on.
+
+They are copied under a name that holds their digest into the folder `priors` of the library of places. So a run that
+is resumed starts from what it started from at first, whatever became of its source.
+"""
+
+import hashlib
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from pydantic import ValidationError
+
+from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.machine import UNWRITABLE
+from risk_sac.records import EpisodeRecord, Outcome
+from risk_sac.run_folder.durable import read_sealed, replace_file, seal
+from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
+from risk_sac.scenario.families import family_named, shipped_alike
+from risk_sac.scenario.library import library
+from risk_sac.verdicts.distinct import kind_name
+
+FOLDER = "priors"
+KEPT = re.compile(r"[a-z0-9_]{0,41}[0-9a-f]{12}")
+MOST_FAILURES, LATEST = 300, 300  # of a family
+PLAYED = (Outcome.SAFE, Outcome.DEGENERATE, Outcome.FAILURE)
+SHIPPED_OR_NONE = ("shipped", "none")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlayedScript:
+    """A scene and a script that a run played, and how the episode ended."""
+
+    scene: Mapping[str, float]
+    genes: tuple[float, ...]
+    kind: str = ""  # of its valid violation; empty: there was none
+    candidate: bool = False  # for the headline
+
+    @classmethod
+    def of(cls, record: EpisodeRecord) -> Self:
+        """Returns the script of an episode that followed one."""
+        valid = sorted(record.valid_violations, key=lambda each: each.headline_candidate)
+        worst = valid[-1] if valid else None
+        return cls(
+            scene=record.scene,
+            genes=record.script or (),
+            kind="" if worst is None else kind_name(worst),
+            candidate=worst is not None and worst.headline_candidate,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FamilyScripts:
+    """Scripts that runs of one family played."""
+
+    adversaries: tuple[str, ...]
+    failures: tuple[PlayedScript, ...]  # one of each kind first, and candidates for the headline before others
+    latest: tuple[PlayedScript, ...]  # whatever they ended in
+
+    @classmethod
+    def of(cls, family: str, records: Sequence[EpisodeRecord]) -> Self:
+        """Selects from a family's episodes in the order in which they were played."""
+        played = [PlayedScript.of(each) for each in records if each.script and each.outcome in PLAYED]
+        rank, places = Counter[str](), []
+        for number, each in sorted(enumerate(played), key=lambda pair: not pair[1].candidate):
+            if each.kind:
+                places.append((rank[each.kind], not each.candidate, number))
+                rank[each.kind] += 1
+        failures = [played[number] for *_, number in sorted(places)[:MOST_FAILURES]]
+        adversaries = family_named(family).adversaries
+        return cls(adversaries=adversaries, failures=tuple(failures), latest=tuple(played[-LATEST:]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EarlierScripts:
+    """Scripts of a run, or of a campaign's runs, by family."""
+
+    families: Mapping[str, FamilyScripts]
+
+    def alike(self, family: str) -> tuple[FamilyScripts, ...]:
+        """Returns the scripts of this family or, without any, those of all families of its pattern."""
+        if family in self.families:
+            return (self.families[family],)
+        pattern = shipped_alike(family)
+        return tuple(found for name, found in self.families.items() if shipped_alike(name) == pattern)
+
+
+def pinned_prior(prior: str, families: Sequence[str], folder_of: Callable[[str], Path] = Path) -> str:
+    """Copies the scripts that a prior names; returns the copy's name, or `shipped` or `none` as it is.
+
+    Args:
+      prior: as a user wrote it, or what this returned.
+      families: that are to be searched.
+      folder_of: returns the folder of a run or campaign.
+
+    Raises:
+      ConfigError: there is no such run, it followed no scripts, or it is of another pattern.
+    """
+    if prior in SHIPPED_OR_NONE:
+        return prior
+    copied = KEPT.fullmatch(prior) is not None and _path(prior).exists()
+    scripts = kept(prior) if copied else _taken(prior, folder_of(prior))
+    for family in families:
+        if not scripts.alike(family):
+            got = f"{prior}, whose runs are of {', '.join(scripts.families)}"
+            raise ConfigError("prior", got, f"one with a run of {family}, or of the same pattern")
+    return prior if copied else _keep(scripts, re.sub("[^a-z0-9]+", "_", Path(prior).name.lower()).strip("_"))
+
+
+def kept(name: str) -> EarlierScripts:
+    """Reads scripts that `pinned_prior` has copied.
+
+    Raises:
+      ConfigError: there is no such copy.
+      DamagedError: it is not as it was written.
+    """
+    path = _path(name)
+    if KEPT.fullmatch(name) is None or not path.exists():
+        raise ConfigError("prior", f"{name!r}", "shipped, none, or an earlier run or campaign")
+    if not name.endswith(_digest(path.read_bytes())):
+        raise DamagedError(f"the prior {name!r} in {path.parent} is damaged; name its run once more")
+    return read_sealed(path, EarlierScripts)
+
+
+def prune(named: Callable[[], set[str]], before: float) -> None:
+    """Removes copies that were written before a time, s since the epoch, and that are not named."""
+    old = [path for path in (library() / FOLDER).glob("*.json") if path.stat().st_mtime < before]
+    for path in old:
+        if path.stem not in named():
+            path.unlink()
+
+
+def file_of(name: str) -> Path:
+    """Returns the file of a copy, relative to the library of places."""
+    return Path(FOLDER, f"{name}.json")
+
+
+def _taken(prior: str, folder: Path) -> EarlierScripts:
+    """Reads the scripts of a run's folder or of all runs in a campaign's folder."""
+    runs = list(_runs(folder))
+    if not runs:
+        raise ConfigError("prior", f"{prior!r}", "shipped, none, or an earlier run or campaign")
+    records: dict[str, list[EpisodeRecord]] = {}
+    for run in runs:
+        try:
+            found = records_from_lines((run / EPISODES).read_bytes())
+            records.setdefault(read_results(run).spec.family, []).extend(found)
+        except (OSError, ValidationError, ConfigError) as error:
+            raise ConfigError("prior", f"{prior}, whose run {run.name} cannot be read", "one that is whole") from error
+    scripts = {family: FamilyScripts.of(family, each) for family, each in records.items()}
+    scripts = {family: each for family, each in scripts.items() if each.latest}
+    if not scripts:
+        remedy = "name a run of risk-sac-diverse, archive or archive-replay"
+        raise ConfigError("prior", f"{prior}, whose episodes followed no scripts", "one that did", remedy)
+    return EarlierScripts(families=scripts)
+
+
+def _runs(folder: Path) -> Iterator[Path]:
+    """Yields the folders of runs: this one, or those of a campaign by the command line or the service."""
+    for file in (folder / RESULTS, *sorted(folder.glob(f"runs/*/{RESULTS}")), *sorted(folder.glob(f"*/{RESULTS}"))):
+        if file.is_file() and (file.parent / EPISODES).is_file():
+            yield file.parent
+
+
+def _keep(scripts: EarlierScripts, label: str) -> str:
+    content = seal(scripts)
+    name = "_".join(filter(None, (label[:40].strip("_"), _digest(content))))
+    path = _path(name)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        replace_file(path, content)
+    except OSError as error:
+        if error.errno not in UNWRITABLE:
+            raise
+        got = f"{path.parent}, which cannot be written ({error.strerror})"
+        raise ConfigError("prior", got, "a folder that can be written") from error
+    return name
+
+
+def _path(name: str) -> Path:
+    return library() / file_of(name)
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:12]
