@@ -57,6 +57,7 @@ class FamilyScripts:
     """Scripts that runs of one family played."""
 
     adversaries: tuple[str, ...]
+    mirrored: bool
     failures: tuple[PlayedScript, ...]  # one of each kind first, and candidates for the headline before others
     latest: tuple[PlayedScript, ...]  # whatever they ended in
 
@@ -70,8 +71,13 @@ class FamilyScripts:
                 places.append((rank[each.kind], not each.candidate, number))
                 rank[each.kind] += 1
         failures = [played[number] for *_, number in sorted(places)[:MOST_FAILURES]]
-        adversaries = family_named(family).adversaries
-        return cls(adversaries=adversaries, failures=tuple(failures), latest=tuple(played[-LATEST:]))
+        of = family_named(family)
+        return cls(
+            adversaries=of.adversaries,
+            mirrored=of.mirrored,
+            failures=tuple(failures),
+            latest=tuple(played[-LATEST:]),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -78,7 +78,7 @@ class PriorOptimizer(ArchiveOptimizer):
         super().__init__(dimension, config, seed)
         self._model, self._translation = start.model, start.translation
         self._library, self._library_kinds, self._earlier = start.library, start.library_kinds, start.earlier
-        self._belief = start.belief
+        self._library_worth, self._belief = start.library_worth, start.belief
         self._yields = Yields(self.arms)
         self._arm = Arm.ARCHIVE
         self._played: list[int] = []  # rows of the library
@@ -107,7 +107,8 @@ class PriorOptimizer(ArchiveOptimizer):
         earlier = rows[rows < self._earlier]
         if len(earlier) and self._random.random() < EARLIER_SHARE:
             rows = earlier
-        weights = np.array([_novelty(self._finds.kinds[self._library_kinds[row]]) for row in rows])
+        novelty = np.array([_novelty(self._finds.kinds[self._library_kinds[row]]) for row in rows])
+        weights = novelty * self._library_worth[rows]
         row = int(self._random.choice(rows, p=weights / weights.sum()))
         self._played.append(row)
         point: Floats = self._library[row].copy()

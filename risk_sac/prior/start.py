@@ -8,7 +8,7 @@ import numpy as np
 from risk_sac.prior.earlier import SHIPPED_OR_NONE, FamilyScripts, PlayedScript, kept
 from risk_sac.prior.script_model import ScriptModel
 from risk_sac.prior.shipped import shipped_prior
-from risk_sac.prior.translation import Coordinates, Translation
+from risk_sac.prior.translation import Coordinates, Scripted, Translation
 from risk_sac.problem import Problem
 from risk_sac.scenario.families import FAMILIES, shipped_alike
 from risk_sac.types import Floats
@@ -28,6 +28,7 @@ class Start:
     translation: Translation
     library: Floats  # n x d
     library_kinds: tuple[str, ...]  # n
+    library_worth: Floats  # n; less than 1 where a row fails less often here than where it was found
     belief: Floats  # E
     earlier: int = 0
 
@@ -45,12 +46,15 @@ def start_of(problem: Problem, prior: str) -> Start:
     shipped = shipped_prior(shipped_alike(problem.family.name))
     own = Coordinates.of(problem)
     translation = Translation(own, Coordinates.of(FAMILIES[shipped.family]))
+    model, library, unknown = shipped.model, translation.own(shipped.library), shipped.model.unknown()
+    there, here = (model.predict(each, unknown).fails for each in (shipped.library, translation.known(library)))
     start = Start(
-        model=shipped.model,
+        model=model,
         translation=translation,
-        library=translation.own(shipped.library),
+        library=library,
         library_kinds=shipped.library_kinds,
-        belief=shipped.model.unknown(),
+        library_worth=np.minimum(here / there, 1.0).astype(np.float64),
+        belief=unknown,
     )
     return start if prior in SHIPPED_OR_NONE else _after(start, own, kept(prior).alike(problem.family.name))
 
@@ -59,24 +63,25 @@ def _after(start: Start, own: Coordinates, found: tuple[FamilyScripts, ...]) -> 
     """Puts what earlier runs found before the shipped library, and believes in what their egos did."""
     model, belief = start.model, start.belief
     for each in found:
-        known = start.translation.known(_points(own, each.adversaries, each.latest))
+        known = start.translation.known(_points(own, each, each.latest))
         for point, script in zip(known, each.latest, strict=True):
             belief = model.believe(belief, point, failed=bool(script.kind))
-    failures = np.concatenate([_points(own, each.adversaries, each.failures) for each in found])
+    failures = np.concatenate([_points(own, each, each.failures) for each in found])
     kinds = tuple(script.kind for each in found for script in each.failures)
     return Start(
         model=model,
         translation=start.translation,
         library=np.concatenate([failures, start.library]),
         library_kinds=(*kinds, *start.library_kinds),
+        library_worth=np.concatenate([np.ones(len(kinds)), start.library_worth]),
         belief=(1.0 - DOUBT) * belief + DOUBT * model.unknown(),
         earlier=len(kinds),
     )
 
 
-def _points(own: Coordinates, adversaries: tuple[str, ...], scripts: Iterable[PlayedScript]) -> Floats:
-    rows = [
-        own.placed(tuple(each.scene), np.array([list(each.scene.values())]), adversaries, np.array([each.genes]))
-        for each in scripts
-    ]
-    return np.concatenate([np.empty((0, own.dimension)), *rows])
+def _points(own: Coordinates, family: FamilyScripts, scripts: Iterable[PlayedScript]) -> Floats:
+    found = [np.empty((0, own.dimension))]
+    for each in scripts:
+        values, genes = np.array([list(each.scene.values())]), np.array([each.genes])
+        found.append(own.placed(Scripted(tuple(each.scene), values, family.adversaries, genes, family.mirrored)))
+    return np.concatenate(found)

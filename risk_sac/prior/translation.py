@@ -14,8 +14,35 @@ from risk_sac.scenario.space import SceneSpace
 from risk_sac.scripts.motions import SIZE, Genes
 from risk_sac.types import Floats
 
-MIDDLE = 0.5  # of a scene parameter or gene that the other side lacks
-PASSIVE = Genes(*[MIDDLE] * SIZE)._replace(active=0.0)  # an adversary that the other side lacks does nothing
+MIDDLE = 0.5  # of a scene parameter or gene that the source lacks
+PASSIVE = Genes(*[MIDDLE] * SIZE)._replace(active=0.0)  # an adversary that the source lacks does nothing
+STEER = Genes._fields.index("steer")
+OTHER_SIDE = {"left": "right", "right": "left"}
+
+
+class Scripted(NamedTuple):
+    """Scenes and scripts of one family."""
+
+    parameters: Sequence[str]  # k
+    values: Floats  # n x k, in their units
+    adversaries: Sequence[str]  # a
+    genes: Floats  # n x SIZE a
+    mirrored: bool
+
+    def reflected(self) -> "Scripted":
+        """Returns the same, seen in a mirror that lies along the ego's way.
+
+        Vehicles steer towards the ego or away from it, so their genes stay. Pedestrians turn to the left or right.
+        """
+        values, genes = self.values.copy(), self.genes.copy()
+        if "pedestrian_offset_m" in self.parameters:  # to the right of where the pedestrian faces
+            values[:, self.parameters.index("pedestrian_offset_m")] *= -1.0
+        if "pedestrian" in self.adversaries:
+            steer = SIZE * self.adversaries.index("pedestrian") + STEER
+            genes[:, steer] = 1.0 - genes[:, steer]
+        parameters = [_other_side(name) for name in self.parameters]
+        adversaries = [_other_side(name) for name in self.adversaries]
+        return Scripted(parameters, values, adversaries, genes, not self.mirrored)
 
 
 class Coordinates(NamedTuple):
@@ -23,38 +50,43 @@ class Coordinates(NamedTuple):
 
     space: SceneSpace
     adversaries: tuple[str, ...]
+    mirrored: bool
 
     @classmethod
     def of(cls, posed: Problem | Family) -> Self:
         """Returns the coordinates of a problem's points, or of a family's."""
         family = posed.family if isinstance(posed, Problem) else posed
-        return cls(posed.space, family.adversaries)
+        return cls(posed.space, family.adversaries, family.mirrored)
 
     @property
     def dimension(self) -> int:
         """Numbers of a point."""
         return self.space.dimension + SIZE * len(self.adversaries)
 
-    def placed(self, names: Sequence[str], values: Floats, adversaries: Sequence[str], genes: Floats) -> Floats:
-        """Returns the points of scenes and scripts that another family may have.
+    def scripted(self, points: Floats) -> Scripted:
+        """Returns the scenes and scripts of points, `n x dimension`."""
+        low, high, size = self.space.low, self.space.high, self.space.dimension
+        values = low + points[:, :size] * (high - low)
+        return Scripted(self.space.names, values, self.adversaries, points[:, size:], self.mirrored)
+
+    def placed(self, found: Scripted) -> Floats:
+        """Returns the points of scenes and scripts of any family of the pattern, `n x dimension`.
 
         Values are clipped to the bounds. A missing parameter is put to its middle, and a missing adversary is passive.
-
-        Args:
-          names: of the scene parameters, `k`.
-          values: of these, `n x k`, in their units.
-          adversaries: `a`.
-          genes: of these, `n x SIZE a`.
         """
-        points = np.full((len(values), self.dimension), MIDDLE)
-        size = self.space.dimension
-        rows = [(i, names.index(parameter)) for i, parameter in enumerate(self.space.names) if parameter in names]
-        own, other = [i for i, _ in rows], [j for _, j in rows]
-        points[:, own] = _unit(values[:, other], self.space.low[own], (self.space.high - self.space.low)[own])
+        if found.mirrored != self.mirrored:
+            found = found.reflected()
+        points = np.full((len(found.values), self.dimension), MIDDLE)
+        low, width, size = self.space.low, self.space.high - self.space.low, self.space.dimension
+        shared = [(i, found.parameters.index(n)) for i, n in enumerate(self.space.names) if n in found.parameters]
+        own, other = [i for i, _ in shared], [j for _, j in shared]
+        points[:, own] = _unit(found.values[:, other], low[own], width[own])
         for i, adversary in enumerate(self.adversaries):
-            block = points[:, size + SIZE * i : size + SIZE * (i + 1)]
-            k = adversaries.index(adversary) if adversary in adversaries else None
-            block[:] = PASSIVE if k is None else genes[:, SIZE * k : SIZE * (k + 1)]
+            genes: Floats | Genes = PASSIVE
+            if adversary in found.adversaries:
+                first = SIZE * found.adversaries.index(adversary)
+                genes = found.genes[:, first : first + SIZE]
+            points[:, size + SIZE * i : size + SIZE * (i + 1)] = genes
         return points
 
 
@@ -71,17 +103,17 @@ class Translation:
 
     def known(self, points: Floats) -> Floats:
         """Translates points of the problem, `n x (d + genes)`."""
-        return _translated(points, self._problem, self._shipped)
+        return self._shipped.placed(self._problem.scripted(points))
 
     def own(self, known: Floats) -> Floats:
         """Translates points of the shipped family."""
-        return _translated(known, self._shipped, self._problem)
+        return self._problem.placed(self._shipped.scripted(known))
 
 
-def _translated(points: Floats, source: Coordinates, target: Coordinates) -> Floats:
-    space = source.space
-    values = space.low + points[:, : space.dimension] * (space.high - space.low)
-    return target.placed(space.names, values, source.adversaries, points[:, space.dimension :])
+def _other_side(name: str) -> str:
+    """Exchanges left and right at the beginning of a name."""
+    side, _, rest = name.partition("_")
+    return "_".join(filter(None, (OTHER_SIDE.get(side, side), rest)))
 
 
 def _unit(values: Floats, low: Floats, width: Floats) -> Floats:

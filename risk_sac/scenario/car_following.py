@@ -50,6 +50,7 @@ def family(name: str, place: Stretch) -> Family:
         vehicles=("lead", *beside),
         pedestrians=(),
         layout=layout,
+        mirrored=tuple(beside) == ("right",),  # most failures of the shipped family come from its left
     )
 
 

@@ -25,6 +25,7 @@ class Family:
     pedestrians: tuple[str, ...]  # adversary pedestrians, after the vehicles
     layout: Callable[[Mapping[str, float]], Layout]
     horizon_steps: int = 150  # of 0.1 s
+    mirrored: bool = False  # whether what is on the left at the pattern's shipped family is on the right, or vice versa
 
     @property
     def adversaries(self) -> tuple[str, ...]:

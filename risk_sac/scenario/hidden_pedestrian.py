@@ -59,6 +59,7 @@ def family(name: str, place: CrossingPlace) -> Family:
         vehicles=("occluder",),
         pedestrians=("pedestrian",),
         layout=layout,
+        mirrored=any(site.beyond for site in place.sites),  # its pedestrian comes from the left
     )
 
 

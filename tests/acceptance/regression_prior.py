@@ -35,7 +35,7 @@ PAIRS: tuple[tuple[FamilyName, str, str], ...] = (
     ("dense", "crossing-yields", "tailgates"),
 )
 SEEDS = (1, 2, 3)
-CAMPAIGN_STEPS, MOST_STEPS, EPISODES = 5_000, 10_000, 2_000
+CAMPAIGN_STEPS, MOST_STEPS, EPISODES = 5_000, 5_000, 2_000
 ARMS = ("campaign", "shipped", "none")
 Case = tuple[FamilyName, str, str, int, str]
 
