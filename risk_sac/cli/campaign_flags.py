@@ -59,10 +59,16 @@ def ego_flag(options: argparse.Namespace) -> dict[str, Any]:
     return {"ego": None if options.ego is None else read_ego(options.ego).model_dump(mode="json")}
 
 
+def add_prior_flag(parser: Parser, earlier: str = "the folder of an earlier run or campaign") -> None:
+    """Adds the flag that says what a search starts from; `earlier` is what else it may name."""
+    what = f"what a search starts from: shipped, none, or {earlier} (default: shipped)"
+    parser.group("search").add_argument("--prior", metavar="PRIOR", help=what)
+
+
 def campaign_flags(options: argparse.Namespace, seeds: int) -> dict[str, Any]:
     """Fields of a campaign; None where a flag was not given."""
     flags = {"families": options.families, "methods": options.methods} | budget_flags(options)
-    return flags | {"seeds": _seeds(options, seeds), "iid": _iid(options)}
+    return flags | {"seeds": _seeds(options, seeds), "iid": _iid(options), "prior": vars(options).get("prior")}
 
 
 def _iid(options: argparse.Namespace) -> dict[str, int] | None:

@@ -15,6 +15,7 @@ from risk_sac.cli.campaign_flags import (
     add_campaign_flags,
     add_ego_flag,
     add_map_flags,
+    add_prior_flag,
     budget_flags,
     campaign_flags,
     ego_flag,
@@ -70,6 +71,7 @@ def add(commands: Commands) -> None:
     search.add_argument(
         "--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags override them"
     )
+    add_prior_flag(run)
     add_budget_flags(run)
     run.group("output").add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
     add_json_flag(run)
@@ -84,6 +86,7 @@ def add(commands: Commands) -> None:
     )
     add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
     add_ego_flag(evaluate)
+    add_prior_flag(evaluate)
     add_map_flags(evaluate, several=True)
     execution = evaluate.group("execution")
     jobs = "runs at a time (default: one per core, or as many as a cluster has room for)"
@@ -105,7 +108,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.spec is None and options.family is None:
         remedy = "or a map with --network, or a file with --spec"
         raise ConfigError("family", "nothing", "low, mixed or dense", remedy)
-    named = {name: getattr(options, name) for name in ("family", "method", "seed")}
+    named = {name: getattr(options, name) for name in ("family", "method", "seed", "prior")}
     spec = read_spec(options.spec, named | budget_flags(options) | ego_flag(options))
     say_adjustments(adjustments(spec))
     from risk_sac.execution.runs import run  # here, because loading torch takes seconds

@@ -7,7 +7,7 @@ is resumed starts from what it started from at first, whatever became of its sou
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -113,7 +113,10 @@ def pinned_prior(prior: str, families: Sequence[str], folder_of: Callable[[str],
         if not scripts.alike(family):
             got = f"{prior}, whose runs are of {', '.join(scripts.families)}"
             raise ConfigError("prior", got, f"one with a run of {family}, or of the same pattern")
-    return prior if copied else _keep(scripts, re.sub("[^a-z0-9]+", "_", Path(prior).name.lower()).strip("_"))
+    if copied:
+        _path(prior).touch()  # it is wanted again: see `prune`
+        return prior
+    return _keep(scripts, re.sub("[^a-z0-9]+", "_", Path(prior).name.lower()).strip("_"))
 
 
 def kept(name: str) -> EarlierScripts:
@@ -131,11 +134,18 @@ def kept(name: str) -> EarlierScripts:
     return read_sealed(path, EarlierScripts)
 
 
-def prune(named: Callable[[], set[str]], before: float) -> None:
-    """Removes copies that were written before a time, s since the epoch, and that are not named."""
-    old = [path for path in (library() / FOLDER).glob("*.json") if path.stat().st_mtime < before]
+def prune(places: Path, named: Callable[[], Collection[str]], before: float) -> None:
+    """Removes copies from a service's library that no campaign names.
+
+    Args:
+      places: the library.
+      named: returns the names of those that stay; asked if there are old copies.
+      before: when a copy was last made for it to be old, s since the epoch.
+    """
+    old = [path for path in (places / FOLDER).glob("*.json") if path.stat().st_mtime < before]
+    stay = named() if old else ()
     for path in old:
-        if path.stem not in named():
+        if path.stem not in stay:
             path.unlink()
 
 

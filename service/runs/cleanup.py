@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from risk_sac.prior import earlier
 from risk_sac.scenario import library
 from service.errors import StorageError
 from service.settings import ServiceSettings
@@ -79,11 +80,12 @@ class Retention:
             self._retire_at = time.monotonic() + RETENTION_S
 
     def remove_unused_places(self) -> None:
-        """Removes places that no campaign names, if it is time."""
+        """Removes places and copies of earlier scripts that no campaign names, if it is time."""
         if time.monotonic() < self._prune_at:
             return
         try:
             removed = library.prune(self._places, self._store.families(), UNUSED_S, self._started_at)
+            earlier.prune(self._places, self._store.priors, time.time() - UNUSED_S)
         except OSError as error:
             raise StorageError(f"the library of places cannot be tidied ({error.strerror})") from error
         self._prune_at = time.monotonic() + LOOK_S

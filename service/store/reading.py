@@ -211,6 +211,12 @@ class Store:
         with self._reading() as session:
             return set(session.scalars(select(RunRow.family).distinct()))
 
+    def priors(self) -> set[str]:
+        """All copies of earlier scripts that any campaign names."""
+        query = select(CampaignRow.spec).where(CampaignRow.spec.contains('"prior":"'))
+        with self._reading() as session:
+            return {from_json(spec)["prior"] for spec in session.scalars(query)}
+
     def exists(self, campaign_id: str) -> bool:
         """Whether there is a campaign with this id."""
         with self._reading() as session:

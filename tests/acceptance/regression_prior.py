@@ -27,7 +27,7 @@ from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import RESULTS, read_results
 from risk_sac.train import train
 
-# Family, fault of version 1, fault of version 2: np.random.default_rng(44) drew them from the catalogue's training part.
+# Family, faults of versions 1 and 2; np.random.default_rng(44) drew them from the catalogue's training part.
 PAIRS: tuple[tuple[FamilyName, str, str], ...] = (
     ("low", "short-horizon", "blind-right"),
     ("low", "short-horizon", "late-braking"),
@@ -99,20 +99,28 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
-    firsts = list(dict.fromkeys((family, before, seed) for seed in SEEDS for family, before, _ in PAIRS))
-    cases: list[Case] = [(*pair, seed, arm) for seed in SEEDS for pair in PAIRS for arm in ARMS]
+    cases: list[Case] = []
+    found: list[Detection] = []
     with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
-        list(pool.map(partial(campaign, options.out), *zip(*firsts, strict=True)))  # two cases may share one
-        found = list(pool.map(partial(detection, options.out), cases))
+        for seed in SEEDS:
+            firsts = list(dict.fromkeys((family, before) for family, before, _ in PAIRS))  # two pairs may share one
+            list(pool.map(partial(campaign, options.out, seed=seed), *zip(*firsts, strict=True)))
+            own: list[Case] = [(*pair, seed, arm) for pair in PAIRS for arm in ARMS]
+            cases, found = cases + own, [*found, *pool.map(partial(detection, options.out), own)]
+            write(options.out / "runs.csv", cases, found)
+
+
+def write(file: Path, cases: Sequence[Case], found: Sequence[Detection]) -> None:
+    """Writes the runs so far, and prints what they come to."""
     told = list(rows(cases, found))
-    with (options.out / "runs.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, told[0])
+    with file.open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, told[0])
         writer.writeheader()
         writer.writerows(told)
     for arm in ARMS:
         times = [each.detected or MOST_STEPS for case, each in zip(cases, found, strict=True) if case[-1] == arm]
         detected = sum(each.detected is not None for case, each in zip(cases, found, strict=True) if case[-1] == arm)
-        print(f"{arm}: detected {detected} of {len(times)}, restricted mean {mean(times):.0f} steps")
+        print(f"prior {arm}: detected {detected} of {len(times)}, restricted mean {mean(times):.0f} steps", flush=True)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,14 @@ from pathlib import Path
 from rich.progress import BarColumn, Progress
 
 from risk_sac.adjustments import adjustments
-from risk_sac.cli.campaign_flags import add_campaign_flags, add_ego_flag, add_place_flags, campaign_flags, ego_flag
+from risk_sac.cli.campaign_flags import (
+    add_campaign_flags,
+    add_ego_flag,
+    add_place_flags,
+    add_prior_flag,
+    campaign_flags,
+    ego_flag,
+)
 from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, named_rate, verdict
 from risk_sac.cli.campaigns.junit import junit
 from risk_sac.cli.campaigns.output import add_newest_command, chosen_id, figures, line, results_tables
@@ -41,6 +48,7 @@ def add(commands: Commands) -> None:
     )
     add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
     add_ego_flag(parser)
+    add_prior_flag(parser, "the id of an earlier campaign")
     add_place_flags(parser, MAP_UPLOADED)
     service = parser.group("service")
     service.add_argument("--label", metavar="TEXT", help="text to find the campaign by")

@@ -25,8 +25,8 @@ from risk_sac.execution.executor import Cause, Cluster, Exited, Messages, Progra
 from risk_sac.execution.messages import Event
 from risk_sac.execution.ray.node import Order
 from risk_sac.execution.ray.settings import ADDRESS, read_settings
-from risk_sac.run_folder.scratch import scratch_name
 from risk_sac.prior.earlier import SHIPPED_OR_NONE, file_of
+from risk_sac.run_folder.scratch import scratch_name
 from risk_sac.scenario import library
 
 logger = logging.getLogger(__name__)

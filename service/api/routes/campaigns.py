@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import PlainTextResponse
 
-from risk_sac import __version__, problem
+from risk_sac import __version__
 from risk_sac.adjustments import adjustments
 from risk_sac.benchmark.power import power_of
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
@@ -74,9 +74,9 @@ def post_campaign(
 
 
 @router.post("/check", responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
-def check_campaign(spec: PostedCampaign) -> CampaignCheck:
+def check_campaign(spec: PostedCampaign, service: Service, caller: CurrentCaller) -> CampaignCheck:
     """Validate a campaign without queuing it; `adjustments` has the values that its episodes would use instead."""
-    return CampaignCheck(adjustments=adjustments(problem.checked_campaign(spec)))
+    return CampaignCheck(adjustments=adjustments(service.manager.checked(spec, caller.project)))
 
 
 @router.get("", response_model=CampaignPage, responses=TAGGED)

@@ -4,19 +4,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from risk_sac.config import Interval, SceneOptimizerConfig
+from risk_sac.config import RunSpec, SceneOptimizerConfig
 from risk_sac.errors import ConfigError
 from risk_sac.prior.sampler import Arm, PriorOptimizer, ReplayOptimizer
 from risk_sac.prior.shipped import (
     DATA,
     MOST_BYTES,
     Prior,
-    Translation,
     inputs_of,
     read_prior,
     shipped_prior,
     write_prior,
 )
+from risk_sac.prior.start import start_of
+from risk_sac.problem import Problem
 from risk_sac.records import DrivenBy
 from risk_sac.scenario.families import FAMILIES
 
@@ -24,14 +25,12 @@ FAMILY = "low"
 
 
 def shipped() -> Prior:
-    prior = shipped_prior(FAMILY)
-    assert prior is not None
-    return prior
+    return shipped_prior(FAMILY)
 
 
 def optimizer(kind: type[PriorOptimizer] = PriorOptimizer, seed: int = 1) -> PriorOptimizer:
-    space = FAMILIES[FAMILY].space
-    return kind(inputs_of(FAMILY), SceneOptimizerConfig(), seed, shipped(), Translation(space, space))
+    problem = Problem.from_spec(RunSpec(family=FAMILY, method="risk-sac-diverse", seed=seed))
+    return kind(inputs_of(FAMILY), SceneOptimizerConfig(), seed, start_of(problem, "shipped"))
 
 
 def test_a_prior_is_shipped_for_each_family_within_three_megabytes() -> None:
@@ -39,7 +38,6 @@ def test_a_prior_is_shipped_for_each_family_within_three_megabytes() -> None:
     assert sum(path.stat().st_size for path in DATA.glob("*.npz")) <= MOST_BYTES
     for family in FAMILIES:
         prior = shipped_prior(family)
-        assert prior is not None
         assert prior.library.shape == (len(prior.library_kinds), inputs_of(family))
         assert len(prior.library) <= 300
 
@@ -49,7 +47,6 @@ def test_the_test_set_and_planners_are_not_among_the_training_egos() -> None:
 
     for family in FAMILIES:
         prior = shipped_prior(family)
-        assert prior is not None
         egos = set(prior.model.egos)
         assert not egos & {name for name, defect in DEFECTS.items() if defect.test_set}
         assert not egos & {"fop", "fiss", "fiss-plus"}
@@ -88,18 +85,6 @@ def test_a_prior_of_another_layout_is_refused(tmp_path: Path) -> None:
     write_prior(tmp_path / "other.npz", other)
     with pytest.raises(ConfigError, match=r"other\.npz: points of 33"):
         read_prior(tmp_path / "other.npz")
-
-
-def test_points_of_a_narrower_problem_keep_their_values() -> None:
-    space = FAMILIES[FAMILY].space
-    first = space.parameters[0]
-    middle = (first.low + first.high) / 2
-    narrow = space.narrow({first.name: Interval(low=middle, high=first.high)})
-    translation = Translation(narrow, space)
-    point = np.full((1, inputs_of(FAMILY)), 0.5)
-    known = translation.known(point)
-    assert known[0, 0] == pytest.approx(0.75)
-    np.testing.assert_allclose(translation.own(known), point)
 
 
 def test_a_belief_moves_to_egos_that_would_have_failed_too() -> None:

@@ -1,0 +1,39 @@
+"""Folders of runs that a search can go on from; nothing is simulated."""
+
+from pathlib import Path
+
+from risk_sac.config import FamilyName, RunSpec
+from risk_sac.prior.shipped import shipped_prior
+from risk_sac.records import EpisodeRecord, Outcome
+from risk_sac.run_folder.results import EPISODES, Results, write_results
+from risk_sac.scenario.families import FAMILIES
+from tests.builders import collision, episode_record
+
+FAILURES, SAFE = 2, 3
+
+
+def _episodes(family: str, *, scripts: bool = True) -> list[EpisodeRecord]:
+    """Two failures of one kind, then safe ones; the point of each is another row of the shipped library."""
+    space, points, found = FAMILIES[family].space, shipped_prior(family).library, []
+    for index in range(FAILURES + SAFE):
+        scene, genes = space.from_unit(points[index][: space.dimension]), points[index][space.dimension :]
+        failed = index < FAILURES
+        found.append(
+            episode_record(
+                index,
+                Outcome.FAILURE if failed else Outcome.SAFE,
+                scene=scene.values,
+                script=tuple(genes) if scripts else None,
+                collision=collision() if failed else None,
+            )
+        )
+    return found
+
+
+def run_folder(folder: Path, family: FamilyName = "low", *, scripts: bool = True) -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    spec = RunSpec(family=family, method="archive", seed=0)
+    write_results(folder, Results(spec=spec, spec_digest=spec.digest, finished=True))
+    lines = (record.model_dump_json() + "\n" for record in _episodes(family, scripts=scripts))
+    (folder / EPISODES).write_text("".join(lines))
+    return folder
