@@ -78,7 +78,7 @@ class Searchers:
         self._spec = spec
         self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
         if method.agent == "scripts" and method.prior == "library" and self._start is None:
-            raise ConfigError("prior", f"none, and the method {spec.method}", "one", "choose the method archive")
+            raise ConfigError("prior", f"none, and the method {spec.method}", remedy="choose the method archive")
         self._own = self._searcher(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1
         self._guide = self._searcher(ScriptFollower(problem.family), ArchiveOptimizer) if method.learns else None
         self._turns = Turns(spec.stream) if method.takes_turns else None

@@ -29,7 +29,8 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
     given = {name: value for name, value in flags.items() if value is not None}
     data = _with_budget({"method": "risk-sac", "seed": 0} if file is None else read_fields(file, "spec"), given)
     if data.keys() & {"label", "iid", *CAMPAIGN_ONLY.values()}:
-        return _only_run(data, given)
+        shared = {name: value for name, value in given.items() if name not in CAMPAIGN_ONLY}
+        return _only_run(data | shared, {name: given[name] for name in CAMPAIGN_ONLY if name in given})
     return _validate(RunSpec, data | given)
 
 

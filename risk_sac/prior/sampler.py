@@ -39,9 +39,10 @@ class Yields:
     An arm that is not drawn keeps its yield.
     """
 
-    def __init__(self, arms: tuple[Arm, ...]) -> None:
+    def __init__(self, arms: tuple[Arm, ...], trust: float = 1.0) -> None:
+        """Tries nothing yet; `trust` is the share of their credit that library and model have."""
         self._arms = arms
-        self._worth = {arm: UNTRIED[arm] * PRIOR_EPISODES for arm in arms}
+        self._worth = {arm: UNTRIED[arm] * PRIOR_EPISODES * (1.0 if arm is Arm.ARCHIVE else trust) for arm in arms}
         self._episodes = dict.fromkeys(arms, PRIOR_EPISODES)
 
     def draw(self, random: np.random.Generator) -> Arm:
@@ -79,7 +80,7 @@ class PriorOptimizer(ArchiveOptimizer):
         self._model, self._translation = start.model, start.translation
         self._library, self._library_kinds, self._earlier = start.library, start.library_kinds, start.earlier
         self._library_worth, self._belief = start.library_worth, start.belief
-        self._yields = Yields(self.arms)
+        self._yields = Yields(self.arms, float(start.library_worth.mean()))
         self._arm = Arm.ARCHIVE
         self._played: list[int] = []  # rows of the library
         self._finds = Finds()

@@ -61,7 +61,8 @@ def spec_of(family: FamilyName, fault: str, seed: int, prior: str) -> RunSpec:
 def campaign(out: Path, family: FamilyName, fault: str, seed: int) -> Path:
     """Searches a version 1, unless that was done."""
     folder = out / f"{family}-{fault}-{seed}"
-    if not (folder / RESULTS).exists() or read_results(folder).metrics is None:
+    metrics = read_results(folder).metrics if (folder / RESULTS).exists() else None
+    if metrics is None or metrics.environment_steps < CAMPAIGN_STEPS:
         spec = spec_of(family, fault, seed, "shipped")
         with closing(Recorder(spec, folder, Until(CAMPAIGN_STEPS))) as recorder:
             recorder.finish(train(spec, folder, recorder))

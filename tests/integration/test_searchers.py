@@ -156,5 +156,5 @@ def test_without_a_prior_scripts_are_bred_and_the_control_is_refused() -> None:
     subject = Searchers(cold, Problem.from_spec(cold), observation_size=20, action_size=4)
     assert type(subject.next(learning=True).sampler) is ArchiveOptimizer
     control = cold.model_copy(update={"method": "archive-replay"})
-    with pytest.raises(ConfigError, match="prior: got none, and archive-replay at low"):
+    with pytest.raises(ConfigError, match="none, and the method archive-replay"):
         Searchers(control, Problem.from_spec(control), observation_size=20, action_size=4)

@@ -48,6 +48,12 @@ def test_flags_pick_one_run_of_a_campaign(tmp_path: Path) -> None:
     assert (picked.family, picked.method, picked.seed) == ("mixed", "sac", 2)
 
 
+def test_flags_change_what_the_runs_of_a_campaign_share(tmp_path: Path) -> None:
+    file = yaml_file(tmp_path, "families: [low]\nmethods: [random]\nseeds: [1]\n")
+    spec = read_spec(file, FLAGS | {"prior": "none", "ego": {"profile": "careful"}})
+    assert (spec.prior, spec.ego.profile) == ("none", "careful")
+
+
 @pytest.mark.parametrize(
     ("text", "field", "message"),
     [

@@ -6,7 +6,7 @@ import pytest
 
 from risk_sac.config import RunSpec, SceneOptimizerConfig
 from risk_sac.errors import ConfigError
-from risk_sac.prior.sampler import Arm, PriorOptimizer, ReplayOptimizer
+from risk_sac.prior.sampler import Arm, PriorOptimizer, ReplayOptimizer, Yields
 from risk_sac.prior.shipped import (
     DATA,
     MOST_BYTES,
@@ -129,3 +129,19 @@ def test_it_goes_on_from_its_state_exactly() -> None:
         np.testing.assert_array_equal(one, other)
         subject.tell(one, 0.0)
         again.tell(other, 0.0)
+
+
+@pytest.mark.parametrize(("trust", "at_first", "later"), [(1.0, 0.2, 0.4), (0.1, 0.6, 0.6)])
+def test_a_useless_prior_loses_its_share_and_soon_where_it_is_not_trusted(
+    trust: float, at_first: float, later: float
+) -> None:
+    shares = []
+    for seed in range(20):
+        random, subject, drawn = np.random.default_rng(seed), Yields(tuple(Arm), trust), []
+        for _ in range(150):
+            drawn.append(subject.draw(random))
+            subject.tell(drawn[-1], float(drawn[-1] is Arm.ARCHIVE and random.random() < 0.1))
+        shares.append([np.mean([arm is Arm.ARCHIVE for arm in part]) for part in (drawn[:50], drawn[75:])])
+    first, last = np.mean(shares, 0)
+    assert first > at_first
+    assert last > later
