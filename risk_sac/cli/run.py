@@ -145,7 +145,7 @@ def _found(metrics: RunMetrics | None) -> str:
     return (
         f"contacts {metrics.raw_collisions} → valid {metrics.collisions}  failures {metrics.failures} → "
         f"distinct {metrics.distinct_failures} → preventable {metrics.distinct_preventable}  "
-        f"window ECR {metrics.window_ecr:.2f} PCR {metrics.window_pcr:.2f}  λ {metrics.dual_variable:.3f}"
+        f"sliding ECR {metrics.window_ecr:.2f} PCR {metrics.window_pcr:.2f}  λ {metrics.dual_variable:.3f}"
     )
 
 

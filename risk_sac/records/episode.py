@@ -33,7 +33,7 @@ class EpisodeRecord(Record):
     index: int
     """0-based within the run, rejected scenes included."""
     phase: str
-    """train | evaluate | iid"""
+    """train (the search) | evaluate (the evaluation) | iid (the i.i.d. phase)"""
     seed: int
     scene: Mapping[str, Real]
     outcome: Outcome

@@ -146,7 +146,7 @@ def test_failures_are_filtered_by_severity_fault_and_what_drove_them(
         wait_for(page, sum(table[column][i] == value for i in valid))
         page.get_by_role("button", name="Reset", exact=True).click()
     driven = table["driven_by"][valid[0]]
-    page.get_by_role("combobox", name="Driven", exact=True).select_option(driven or "unknown")
+    page.get_by_role("combobox", name="Driven by", exact=True).select_option(driven or "unknown")
     wait_for(page, sum(table["driven_by"][i] == driven for i in valid))
     page.get_by_role("button", name="Reset", exact=True).click()
     page.get_by_role("button", name="More filters").click()

@@ -1,7 +1,8 @@
 /** Numbers and times in words; what is unknown is a dash. */
 
 export function number(value: number | null | undefined, digits = 2): string {
-  return value === null || value === undefined || !Number.isFinite(value) ? "–" : value.toFixed(digits);
+  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
+  return value.toFixed(digits).replace(/^-(?=[0.]*$)/, ""); // no minus before a zero
 }
 
 export function count(value: number): string {

@@ -47,6 +47,11 @@ export function CampaignScreen({ id }: { id: string }) {
         <section class="card" aria-labelledby="funnel-title">
           <h2 id="funnel-title">From failures to what is worth your time</h2>
           <Funnel counts={progress} />
+          {campaign.runs.length > 1 && (
+            <p class="stage-note small faint">
+              Distinct, preventable and not minor are summed over the runs; headline counts what several runs found alike once.
+            </p>
+          )}
         </section>
         <section class="card tiles" aria-label="Where the search stands">
           <Tile name="headline failures" value={known(progress.headline)} title={HEADLINE} />
@@ -54,7 +59,7 @@ export function CampaignScreen({ id }: { id: string }) {
           <Tile name="sliding PCR" value={percent(progress.window_pcr)} title={OVER} />
           <Tile name="dual variable λ" value={number(progress.dual_variable)} title={OVER} />
           <Tile name="preventable, repeats too" value={count(progress.preventable)} />
-          <Tile name="scenes refused" value={count(progress.rejected)} />
+          <Tile name="scenes rejected" value={count(progress.rejected)} />
           <Tile name="runs ended" value={`${campaign.runs.filter((run) => ended(run)).length} of ${campaign.runs.length}`} />
         </section>
         {!ended(campaign) && <Newest campaign={id} found={found} />}

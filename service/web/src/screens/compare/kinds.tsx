@@ -1,8 +1,9 @@
-/** Which different failures there are, who found them, and one of each to look at. */
+/** Which different failures there are, what found them, and one of each to look at. */
 
 import type { Body } from "../../api/types";
 import { address } from "../../router";
 import { count } from "../../ui/text";
+import { GRADE_WORDS, type GradeName } from "../../ui/verdicts";
 
 interface Found {
   campaign: string;
@@ -20,8 +21,7 @@ export function Kinds({ campaign, family, overview, cells }: Found) {
         Kinds of failures <span class="faint">({overview.clusters.length})</span>
       </h3>
       <p class="faint small">
-        The distinct ones are as various as {overview.vendi.toFixed(1)} that have nothing in common (Vendi score). They lie in {overview.covered} of the taxonomy's{" "}
-        {count(overview.cells)} cells.
+        Effective number of kinds (Vendi score): {overview.vendi.toFixed(1)}. The failures lie in {overview.covered} of the taxonomy's {count(overview.cells)} cells.
       </p>
       <div class="scroll" tabIndex={0} role="region" aria-label={`Kinds of failures: ${family}`}>
         <table class="kinds">
@@ -42,7 +42,7 @@ export function Kinds({ campaign, family, overview, cells }: Found) {
               <tr key={kind.name}>
                 <th scope="row">
                   <a href={address(["campaigns", campaign, "failures", kind.representative])}>{kind.name}</a>{" "}
-                  {kind.grade && <span class={`tag ${kind.grade}`}>{kind.grade}</span>}
+                  {kind.grade && <span class={`tag ${kind.grade}`}>{GRADE_WORDS[kind.grade as GradeName]?.short ?? kind.grade}</span>}
                 </th>
                 {cells.map((cell) => (
                   <Heat key={cell.method} value={cell.signatures[kind.name] ?? 0} most={most} />

@@ -122,7 +122,7 @@ const MEASURES: [string, string, (row: Row) => string][] = [
   ["contacts", "episodes in which the ego touched something", (row) => count(row.raw_collisions)],
   ["artefacts", "contacts that the simulator or the control made", (row) => count(row.more.artefacts)],
   ["unresponsive", "valid contacts with a visible collision course of 1.5 s in which the ego never braked", (row) => percent(row.more.unresponsive_share)],
-  ["refused scenes", "infeasible scenes", (row) => count(row.rejected)],
+  ["rejected scenes", "infeasible scenes", (row) => count(row.rejected)],
   ["steps", "environment steps", (row) => count(row.more.environment_steps)],
 ];
 

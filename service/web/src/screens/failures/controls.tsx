@@ -87,7 +87,7 @@ function Search({ text, change }: { text: string; change: (text: string) => void
       <input
         type="search"
         value={typed}
-        placeholder="words, such as red"
+        placeholder="such as red"
         onInput={(event) => {
           const next = event.currentTarget.value;
           setTyped(next);

@@ -21,7 +21,7 @@ export const FACET_LABELS: Record<Facet, string> = {
   grade: "Grade",
   severity: "Severity",
   fault: "Fault",
-  driven_by: "Driven",
+  driven_by: "Driven by",
   prevented_by: "Prevented by",
   kind: "Kind",
   striker: "Striker",

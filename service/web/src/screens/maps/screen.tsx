@@ -62,7 +62,9 @@ function Table({ maps, remove }: { maps: readonly Network[]; remove: (map: Netwo
           {maps.map((map) => (
             <tr key={map.id}>
               <td class="breaking">
-                <a href={address(["maps", map.id])}>{nameOf(map)}</a>
+                <a href={address(["maps", map.id])} title={nameOf(map)}>
+                  {nameOf(map)}
+                </a>
               </td>
               <td class="number">{count(map.edges)}</td>
               <td class="number">{(map.length_m / 1000).toFixed(1)} km</td>

@@ -134,6 +134,9 @@ function CampaignForm({ known: [description, families, methods], from, ground }:
           <Group title="Requirements" path={["requirements"]} changed={tally("requirements") > 0} open={tally("requirements") > 0}>
             <Requirements shape={itemOf(field("requirements").shape)} signals={families.signals} families={chosen} />
           </Group>
+          <Group title="Prior" path={["prior"]} changed={tally("prior") > 0} open={tally("prior") > 0}>
+            <SchemaField field={{ ...field("prior"), title: "Start from" }} path={["prior"]} />
+          </Group>
           <Group title="Learner" about={aboutOf(field("learner"))} path={["learner"]} changed={tally("learner") > 0} open={tally("learner") > 0}>
             <Fields shape={field("learner").shape} path={["learner"]} />
           </Group>
