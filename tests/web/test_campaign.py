@@ -207,6 +207,22 @@ def test_a_running_campaign_is_followed_to_its_end_without_a_reload(
     assert page.evaluate("window.neverReloaded")
 
 
+def test_an_episode_has_the_number_that_its_id_ends_in(page_at: Callable[..., Page], service: Service) -> None:
+    running = service.post(families=["mixed"], methods=["risk-sac-diverse"], budget={"episodes": 5000})
+    service.wait_for(running, lambda seen: seen["progress"]["failures"] >= 2)
+    page = page_at(f"campaigns/{running}")
+    page.locator(".newest li").first.wait_for()
+    service.client.post(f"/v1/campaigns/{running}/cancel")
+    for shown in page.locator(".newest li").all():
+        failure = str(shown.get_by_role("link").get_attribute("href")).rsplit("/", 1)[1]
+        expect(shown).to_contain_text(re.compile(rf", episode {failure.rsplit('-', 1)[1]}\b"))
+    service.wait(running)
+    items = service.get(running, "/failures", limit=500)["items"]
+    assert [each["id"].rsplit("-", 1)[1] for each in items] == [str(each["index"]) for each in items]
+    page = page_at(f"campaigns/{running}/failures/{items[0]['id']}")
+    expect(page.locator(".crumbs")).to_contain_text(items[0]["id"])
+
+
 def test_events_draw_curves_that_equal_those_of_the_service(page_at: Callable[..., Page], service: Service) -> None:
     running = service.post(families=["low"], methods=["archive"], seeds=[601], budget={"episodes": 60})
     page = page_at(f"campaigns/{running}", allowed=("ERR_FAILED",))

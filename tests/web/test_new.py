@@ -42,6 +42,13 @@ def small(page: Page, label: str = "") -> None:
     page.get_by_label("Episodes", exact=True).fill("3")
 
 
+def test_a_campaign_can_start_without_the_shipped_prior(page_at: Callable[..., Page]) -> None:
+    page = page_at("new")
+    small(page)
+    opened(page, "Prior").get_by_label("Start from").fill("none")
+    assert curl_body(page)["prior"] == "none"
+
+
 def test_what_is_shown_is_what_is_sent_and_what_the_api_then_has(
     page_at: Callable[..., Page], service: Service
 ) -> None:
@@ -229,6 +236,7 @@ def test_methods_that_most_need_come_first_with_their_cost_and_the_rest_is_folde
         )
     group.get_by_text("for comparisons").click()
     expect(group.locator(".choice-card")).to_have_count(len(methods))
+    expect(group.locator(".cost")).to_have_count(len(methods))
     group.get_by_text("for comparisons").click()
     expect(group.locator(".choice-card")).to_have_count(len(usual))
     page.get_by_role("button", name="Compare methods").click()  # has chosen some of them
