@@ -10,17 +10,23 @@ from numpy.typing import NDArray
 from risk_sac.errors import NotFinite
 from risk_sac.types import Vector
 
+EPSILON = 1e-5  # added to a variance, as `torch.nn.functional.layer_norm` does
 Layers = Sequence[NDArray[np.float32]]
 """Weights, `in x out`, and biases, `out`, in turn."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrozenPolicy:
-    """tanh of a perceptron with ReLU between its layers: what each of the learners does without exploring."""
+    """tanh of a perceptron with ReLU between its layers: what each of the learners does without exploring.
+
+    Attributes:
+      normalised: whether each hidden layer is, see `respond`.
+    """
 
     layers: tuple[NDArray[np.float32], ...]
     action_size: int
     """The first of the network's outputs; a tanh-Gaussian's log σ follow."""
+    normalised: bool = False
 
     def __call__(self, observation: Vector) -> Vector:
         """Action in [-1, 1], `action_size`.
@@ -29,7 +35,7 @@ class FrozenPolicy:
           NotFinite: the network is none that anybody has learnt.
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            action = np.tanh(respond(self.layers, observation)[: self.action_size])
+            action = np.tanh(respond(self.layers, observation, normalised=self.normalised)[: self.action_size])
         if not np.isfinite(action).all():
             raise NotFinite("the policy acts by no number")
         return action
@@ -55,12 +61,13 @@ class FrozenPolicy:
             raise ValueError("a policy of other than finite numbers in 32 bits")
 
 
-def respond(layers: Layers, inputs: Vector) -> Vector:
+def respond(layers: Layers, inputs: Vector, *, normalised: bool = False) -> Vector:
     """Evaluates a perceptron for one input.
 
     Args:
       layers: of the network.
       inputs: `in`.
+      normalised: whether each hidden layer has mean 0 and variance 1 before its ReLU.
 
     Returns:
       `out`.
@@ -68,5 +75,8 @@ def respond(layers: Layers, inputs: Vector) -> Vector:
     weights, biases = layers[::2], layers[1::2]
     activation = np.asarray(inputs, np.float32)
     for weight, bias in zip(weights[:-1], biases[:-1], strict=True):
-        activation = np.maximum(activation @ weight + bias, 0.0)
+        activation = activation @ weight + bias
+        if normalised:
+            activation = (activation - activation.mean()) / np.sqrt(activation.var() + EPSILON)
+        activation = np.maximum(activation, 0.0)
     return np.asarray(activation @ weights[-1] + biases[-1])

@@ -13,6 +13,8 @@ from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.config import RunSpec, method_of
 from risk_sac.errors import ConfigError
+from risk_sac.prior.learner import PretrainedLearner
+from risk_sac.prior.policy import Layout, pretrained_for
 from risk_sac.prior.sampler import PriorOptimizer, ReplayOptimizer
 from risk_sac.prior.start import start_of
 from risk_sac.problem import Problem
@@ -41,7 +43,7 @@ OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
 Actor = Learner | IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
 """A joint policy that drives all adversaries."""
 GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
-STEP_COSTS = 1.0, 8.0  # processor time of an environment step: of the guide, and of a policy with its share of updates
+COLD_STEP, PRETRAINED_STEP = 8.0, 2.0  # processor time of a policy's step and its updates, as a multiple of the guide's
 # Scripts that find a failure in one episode of thirty may find none in fifty and still be worth their time.
 DISCOUNT = 0.995
 PRIOR_WORTH, PRIOR_STEPS = 0.05, 1000.0
@@ -67,21 +69,28 @@ class Searchers:
 
     def __init__(self, spec: RunSpec, problem: Problem, observation_size: int, action_size: int) -> None:
         method = method_of(spec.method)
+        self._space = problem.space
+        self._spec = spec
+        self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
+        pretrained = None if self._start is None or not method.learns else pretrained_for(problem)
+        if method.prior == "library" and self._start is None:
+            raise ConfigError("prior", f"none, and the method {spec.method}", remedy="choose the method archive")
+        if method.prior == "policy" and pretrained is None:
+            got = f"{spec.prior}, and the method {spec.method} at {spec.family}"
+            raise ConfigError("prior", got, "a pretrained policy of the family's pattern", "choose the method risk-sac")
         self.agent: Actor  # Alg. 1, l. 2
         if method.agent in CONTROLS:
             self.agent = CONTROLS[method.agent](action_size, spec.stream)
         elif method.agent == "scripts":
             self.agent = ScriptFollower(problem.family)
+        elif pretrained is not None:
+            self.agent = PretrainedLearner(pretrained, Layout.of(problem), method, spec.learner, spec.stream)
         else:
             self.agent = Learner(observation_size, action_size, method, spec.learner, spec.stream)
-        self._space = problem.space
-        self._spec = spec
-        self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
-        if method.agent == "scripts" and method.prior == "library" and self._start is None:
-            raise ConfigError("prior", f"none, and the method {spec.method}", remedy="choose the method archive")
         self._own = self._searcher(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1
         self._guide = self._searcher(ScriptFollower(problem.family), ArchiveOptimizer) if method.learns else None
-        self._turns = Turns(spec.stream) if method.takes_turns else None
+        policy_step = COLD_STEP if pretrained is None else PRETRAINED_STEP
+        self._turns = Turns(spec.stream, policy_step) if method.takes_turns else None
         self._next = self._own
         self._episodes, self._failures = 0, 0  # of the search
 
@@ -102,6 +111,8 @@ class Searchers:
     @property
     def _warm(self) -> bool:
         """Whether the guide has done its part; one that takes turns goes on until it has found enough."""
+        if isinstance(self.agent, PretrainedLearner):
+            return True  # it needs none
         warm_start = self._spec.learner.warm_start
         spent = self._episodes >= warm_start.episodes and not (self._turns and warm_start.episodes)
         return spent or self._failures >= warm_start.failures
@@ -178,10 +189,12 @@ class Turns:
     to the same turns.
     """
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, policy_step: float) -> None:
+        """Args: the processor time of a policy's step, as a multiple of the guide's."""
         self._random = np.random.default_rng(seed)
+        costs = 1.0, policy_step
         self._bandit = DiscountedBandit(
-            discount=DISCOUNT, prior_worth=PRIOR_WORTH, prior_cost=PRIOR_STEPS, least=LEAST, unit_costs=STEP_COSTS
+            discount=DISCOUNT, prior_worth=PRIOR_WORTH, prior_cost=PRIOR_STEPS, least=LEAST, unit_costs=costs
         )
         self._finds = Finds()
 

@@ -5,10 +5,13 @@ In frames it is at rest, straight ahead and of a car's size. Records tell of an 
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from risk_sac.prior.policy import GOALS, Layout, PretrainedPolicy
 from risk_sac.records import (
     Collision,
     ConflictType,
@@ -228,3 +231,16 @@ def run_metrics(episodes: int = 4, **changes: Any) -> RunMetrics:
         "temperature": 0.0,
     }
     return RunMetrics(episodes=episodes, **(values | changes))
+
+
+def pretrained_policy(layout: Layout, goals: tuple[str, ...]) -> PretrainedPolicy:
+    """A small pretrained policy of random weights that survive half precision."""
+    random = np.random.default_rng(3)
+    seen, acted, hidden = layout.observation_size + GOALS + 1, layout.action_size, 8
+
+    def layers(count: int, *sizes: int) -> tuple[NDArray[np.float32], ...]:
+        shapes = [shape for rows, out in pairwise(sizes) for shape in ((count, rows, out), (count, 1, out))]
+        return tuple(random.integers(-8, 9, shape).astype(np.float32) / 16 for shape in shapes)
+
+    policy, critics = layers(1, seen, hidden, hidden, 2 * acted), layers(2, seen + acted, hidden, hidden, 1)
+    return PretrainedPolicy("low", layout, policy, critics, 0.03, goals, {"episodes": 12})

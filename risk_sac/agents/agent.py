@@ -79,7 +79,8 @@ class Agent(ABC):
 
     def frozen(self) -> FrozenPolicy:
         """Returns a copy of the policy that acts without exploring and no longer learns."""
-        return FrozenPolicy(tuple(layer.copy() for layer in self._policy.layers()), self._action_size)
+        layers = tuple(layer.copy() for layer in self._policy.layers())
+        return FrozenPolicy(layers, self._action_size, self._policy.normalised)
 
     def state(self) -> dict[str, Any]:
         """Copies networks, optimisers and generator; tensors and plain values only."""

@@ -162,7 +162,10 @@ class Learner:
     def _decide(self, observation: Vector, explore: bool) -> Vector:
         if explore and self.driven_by is DrivenBy.RANDOM:
             return self._generator.uniform(-1.0, 1.0, self._action_size).astype(np.float32)
-        return self._agent.act(observation, explore)  # Alg. 1, l. 7
+        return self._drawn(observation, explore)  # Alg. 1, l. 7
+
+    def _drawn(self, observation: Vector, explore: bool) -> Vector:
+        return self._agent.act(observation, explore)
 
     def _make_agent(self, observation_size: int, action_size: int, seed: int) -> "Agent | Sb3Agent":
         sizes, config = (observation_size, action_size), self._config

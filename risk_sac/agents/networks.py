@@ -4,8 +4,10 @@ import math
 from collections.abc import Sequence
 from itertools import chain, pairwise
 
+import numpy as np
 import torch
 import torch.nn.functional as F  # noqa: N812  # the usual name
+from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from risk_sac.frozen_policy import Layers, respond
@@ -32,7 +34,7 @@ class Mlp(nn.Module):
             normalization", 2016, without gain and bias).
         """
         super().__init__()
-        self._normalised = normalised
+        self.normalised = normalised
         self._count = count
         self._layers: list[tuple[nn.Parameter, nn.Parameter]] = []  # weight, count x in x out; bias, count x 1 x out
         for fan_in, out in pairwise(sizes):
@@ -57,7 +59,7 @@ class Mlp(nn.Module):
         hidden = inputs.expand(self._count, *inputs.shape)
         for (weight, bias), gain in zip(self._layers[:-1], self._gains, strict=False):
             hidden = torch.bmm(hidden, weight).add_(bias)
-            if self._normalised:
+            if self.normalised:
                 hidden = F.layer_norm(hidden, hidden.shape[-1:], *gain)
             hidden = F.relu(hidden, inplace=True)
         weight, bias = self._layers[-1]
@@ -69,15 +71,44 @@ class Mlp(nn.Module):
         layers[1::2] = [bias[0] for bias in layers[1::2]]
         return layers
 
-    def respond(self, inputs: Vector) -> Tensor:
-        """Evaluates the first network for one input, `out`; numpy, which is faster than torch for one row."""
-        return torch.from_numpy(respond(self.layers(), inputs))
+    def arrays(self) -> tuple[NDArray[np.float32], ...]:
+        """Copies weights, `count x in x out`, and biases, `count x 1 x out`, in turn."""
+        return tuple(each.detach().cpu().numpy().copy() for each in chain.from_iterable(self._layers))
+
+    @torch.no_grad()
+    def copy_from(self, layers: Layers) -> None:
+        """Takes over what `arrays` returns."""
+        for parameter, layer in zip(chain.from_iterable(self._layers), layers, strict=True):
+            parameter.copy_(torch.from_numpy(layer))
+
+    @torch.no_grad()
+    def set_last_bias(self, first: int, value: float) -> None:
+        """Sets the outputs' biases from the `first` on."""
+        self._layers[-1][1][..., first:] = value
+
+    def respond(self, inputs: Vector, shift: Vector | None = None) -> Tensor:
+        """Evaluates the first network for one input, `out`; numpy, which is faster than torch for one row.
+
+        Args:
+          inputs: `in`.
+          shift: added to the first bias.
+        """
+        layers = list(self.layers())
+        if shift is not None:
+            layers[1] = layers[1] + shift
+        return torch.from_numpy(respond(layers, inputs, normalised=self.normalised))
 
 
 def bounded_log_std(raw: Tensor) -> Tensor:
     """Squashes the network's output into [LOG_STD_MIN, LOG_STD_MAX], elementwise and smoothly."""
     middle, half = 0.5 * (LOG_STD_MAX + LOG_STD_MIN), 0.5 * (LOG_STD_MAX - LOG_STD_MIN)
     return half * torch.tanh(raw) + middle
+
+
+def raw_log_std(deviation: float) -> float:
+    """Output of a network that `bounded_log_std` turns into log of this σ, within its bounds."""
+    middle, half = 0.5 * (LOG_STD_MAX + LOG_STD_MIN), 0.5 * (LOG_STD_MAX - LOG_STD_MIN)
+    return math.atanh((math.log(deviation) - middle) / half)
 
 
 def tanh_gaussian(mean: Tensor, log_std: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:

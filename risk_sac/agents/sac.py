@@ -20,9 +20,10 @@ from risk_sac.agents.agent import (
     minimise,
     td_target,
 )
-from risk_sac.agents.networks import Mlp, bounded_log_std, tanh_gaussian
+from risk_sac.agents.networks import Mlp, bounded_log_std, raw_log_std, tanh_gaussian
 from risk_sac.agents.replay import Batch
 from risk_sac.config.learner import MOST_TEMPERATURE, AgentConfig, SacConfig
+from risk_sac.frozen_policy import Layers
 from risk_sac.types import Vector
 
 
@@ -109,13 +110,17 @@ class SacAgent(Agent):
         sac: SacConfig,
         seed: int,
         device: str = "cpu",
+        *,
+        normalised: bool = False,
     ) -> None:
+        """Draws the networks; `normalised` says whether the policy's hidden layers are, too."""
         self._config = config
         self._action_size = action_size
         self._target_entropy = sac.target_entropy_per_action * action_size
         self._generator = torch.Generator(torch.device(device)).manual_seed(seed)
         critic_sizes = (observation_size + action_size, *config.hidden_sizes, 1)
-        self._policy = Mlp((observation_size, *config.hidden_sizes, 2 * action_size), self._generator)
+        policy_sizes = (observation_size, *config.hidden_sizes, 2 * action_size)
+        self._policy = Mlp(policy_sizes, self._generator, normalised=normalised)
         self._critics = Mlp(critic_sizes, self._generator, count=2, normalised=True)
         self._targets = copy.deepcopy(self._critics)
         self._temperature = Temperature(sac.initial_temperature, self._generator.device)
@@ -141,12 +146,28 @@ class SacAgent(Agent):
         """α."""
         return self._temperature.log.detach().exp().item()
 
+    def spread(self, deviation: float) -> None:
+        """Makes the policy begin with about this σ, instead of the 0.22 of a network drawn at random."""
+        self._policy.set_last_bias(self._action_size, raw_log_std(deviation))
+
+    def networks(self) -> tuple[Layers, Layers]:
+        """Returns the arrays of policy and critics, see `Mlp.arrays`."""
+        return self._policy.arrays(), self._critics.arrays()
+
     @torch.no_grad()
-    def act(self, observation: Vector, explore: bool) -> Vector:
-        """See `Agent.act`: a draw from the policy, or tanh of its mean."""
-        mean, raw_log_std = self._policy.respond(observation).chunk(2)
+    def begin_from(self, policy: Layers, critics: Layers, temperature: float) -> None:
+        """Takes over networks, as `networks` returns them, and α."""
+        self._policy.copy_from(policy)
+        for networks in (self._critics, self._targets):
+            networks.copy_from(critics)
+        self._temperature.log.fill_(math.log(temperature))
+
+    @torch.no_grad()
+    def act(self, observation: Vector, explore: bool, shift: Vector | None = None) -> Vector:
+        """See `Agent.act`: a draw from the policy, or tanh of its mean; for `shift` see `Mlp.respond`."""
+        mean, raw = self._policy.respond(observation, shift).chunk(2)
         if explore:
-            mean = mean + bounded_log_std(raw_log_std).exp() * self._noise(self._action_size).cpu()
+            mean = mean + bounded_log_std(raw).exp() * self._noise(self._action_size).cpu()
         return torch.tanh(mean).numpy()
 
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
@@ -178,8 +199,8 @@ class SacAgent(Agent):
         return self._target(batch, reward) - values(self._critics, batch.observation, batch.action)
 
     def _sample(self, observation: Tensor) -> tuple[Tensor, Tensor]:
-        mean, raw_log_std = self._policy(observation)[0].chunk(2, dim=1)
-        return tanh_gaussian(mean, bounded_log_std(raw_log_std), self._noise(*mean.shape))
+        mean, raw = self._policy(observation)[0].chunk(2, dim=1)
+        return tanh_gaussian(mean, bounded_log_std(raw), self._noise(*mean.shape))
 
     def _noise(self, *shape: int) -> Tensor:
         return torch.randn(shape, generator=self._generator, device=self._generator.device)

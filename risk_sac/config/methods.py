@@ -8,6 +8,7 @@ from risk_sac.config.base import Settings
 MethodName = Literal[
     "risk-sac",
     "risk-sac-diverse",
+    "risk-sac-pretrained",
     "risk-sac-only-rper",
     "risk-sac-only-rs",
     "sac-lag",
@@ -43,8 +44,8 @@ class Method(Settings):
     independently of the other, uniformly over the ODD."""
     takes_turns: bool = False
     """Whether a learner's warm start goes on beside it: scripts and policy act in turn, by what they yield."""
-    prior: Literal["none", "library", "all"] = "none"
-    """What its scripts start from: nothing, the shipped library of scripts, or that and the shipped script model."""
+    prior: Literal["none", "library", "policy", "all"] = "none"
+    """What of the prior it starts from: nothing, the library of scripts, the policy, or these and the script model."""
     needs: str = ""
     """A package that is not installed with this one, as it is imported."""
     summary: str
@@ -78,7 +79,16 @@ METHODS: dict[MethodName, Method] = {
         scenes="archive",
         takes_turns=True,
         prior="all",
-        summary="RISK-SAC and archive search in one loop, from the shipped script model and library on.",
+        summary="RISK-SAC and archive search in one loop, from the shipped policy, script model and library on.",
+    ),
+    "risk-sac-pretrained": Method(
+        agent="sac",
+        lagrangian=True,
+        shaping=True,
+        replay="rper",
+        scenes="botorch",
+        prior="policy",
+        summary="The paper's method, starting from the shipped policy instead of from nothing.",
     ),
     "risk-sac-only-rper": Method(
         agent="sac", lagrangian=True, replay="rper", scenes="botorch", summary="Ablation: no reward shaping."

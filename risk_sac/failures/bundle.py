@@ -37,6 +37,7 @@ CODE, WORLD = "risk_sac", "sumo_nets"
 MOST_ARRAYS, MOST_FILE_BYTES, MOST_BYTES = 64, 2**25, 2**28  # a full series of dense has 23 arrays and some 5 MB
 MOST_POLICY_BYTES = 2**23
 MANIFEST, HEADS, LAYER = "manifest", "signal_heads", "policy_layer_"  # the layers are numbered
+NORMALISED = "policy_normalised"  # there if the policy is
 
 
 class Manifest(Record):
@@ -144,6 +145,8 @@ def bundle_bytes(bundle: Bundle) -> bytes:
     arrays |= carried(bundle.manifest.spec.family)
     if bundle.policy is not None:
         arrays |= {f"{LAYER}{place}": layer for place, layer in enumerate(bundle.policy.layers)}
+        if bundle.policy.normalised:
+            arrays[NORMALISED] = np.array(True)
     np.savez_compressed(content, allow_pickle=False, **arrays)
     return content.getvalue()
 
@@ -190,6 +193,7 @@ def _bundle(content: bytes) -> Bundle:
         raise ValueError(f"it lacks {', '.join(missing)}")
     manifest = Manifest.model_validate_json(str(arrays.pop(MANIFEST)))
     heads = arrays.pop(HEADS)
+    normalised = arrays.pop(NORMALISED, None) is not None
     layers = tuple(arrays.pop(f"{LAYER}{place}") for place in range(sum(name.startswith(LAYER) for name in arrays)))
     unpack(manifest.spec.family, arrays)
     if trajectory_digest(arrays) != manifest.digest:
@@ -198,7 +202,7 @@ def _bundle(content: bytes) -> Bundle:
     _check_playable(problem, manifest, arrays)
     policy = None
     if layers:
-        policy = FrozenPolicy(layers, problem.action_size)
+        policy = FrozenPolicy(layers, problem.action_size, normalised)
         policy.check(problem.observation_size)
     return Bundle(manifest=manifest, series=arrays, signal_heads=heads, policy=policy)
 

@@ -18,7 +18,7 @@ from risk_sac.agents.follower import ScriptFollower
 from risk_sac.config import RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
-from risk_sac.pretraining.egos import training_egos
+from risk_sac.pretraining.egos import drawn_ego, training_egos
 from risk_sac.prior.shipped import GRID
 from risk_sac.records import Collision, Violation
 from risk_sac.run_folder.durable import replace_file
@@ -30,8 +30,8 @@ from risk_sac.verdicts.distinct import kind_name
 CHUNK, TURN = 250, 25  # episodes: of a chunk, and in a row before one ego, since libsumo runs one simulation
 UNIFORM_SCENES, SCENE_DEVIATION = 0.6, 0.08
 RANDOM_SCRIPTS, UNCHANGED, FAITHFUL = 0.3, 0.3, 0.5  # of the bred ones: not mutated; put before their own scene
+SOUND_SHARE = 0.5  # of the draws, egos without a defect
 CANDIDATES = 0.7  # of the parents, those that led to a candidate for the headline
-SOUND_SHARE = 0.5  # of the egos without a defect
 
 
 def play_stream(family: str, seed: int, stream: int, folder: Path, chunks: int) -> None:
@@ -107,19 +107,13 @@ class Stream:
         random = np.random.default_rng((*self._key, chunk))
         episodes: list[ScriptEpisode] = []
         while len(episodes) < CHUNK:
-            ego = self._ego(random)
+            ego = drawn_ego(self._egos, random, SOUND_SHARE)
             with closing(self._envs[ego]):
                 for _ in range(TURN):
                     episode = self._episode(ego, self._point(random), int(random.integers(1 << 30)))
                     if episode is not None:
                         episodes.append(episode)
         return episodes[:CHUNK]
-
-    def _ego(self, random: np.random.Generator) -> str:
-        faulty = [name for name, ego in self._egos.items() if ego.defects]
-        sound = [name for name, ego in self._egos.items() if not ego.defects]
-        names = sound if random.random() < SOUND_SHARE else faulty
-        return names[random.integers(len(names))]
 
     def _point(self, random: np.random.Generator) -> Floats:
         """Draws a scene and a script, on the grid that files keep."""

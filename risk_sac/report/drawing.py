@@ -50,6 +50,7 @@ _MUTED = ("#CC6677", "#332288", "#117733", "#882255", "#88CCEE", "#44AA99", "#DD
 _DASHES = ("-", "--", "-.")
 _OWN: dict[RunMethod, Look] = {
     REFERENCE: Look("#000000", "-", 2.0),
+    "risk-sac-pretrained": Look("#000000", "--", 2.0),
     "archive-replay": Look("#555555", "--"),
     "bo-only": Look("#555555", "-."),
     "random": Look("#777777", ":"),

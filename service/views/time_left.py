@@ -13,6 +13,7 @@ from service.store.stored import StoredCampaign, StoredRun
 _SAC, _DDPG, _SCRIPTED = 9.0, 8.5, 0.7
 EPISODE_COST: Mapping[str, float] = {
     "risk-sac-diverse": _SCRIPTED,  # its policy rarely gets a turn within 250 episodes
+    "risk-sac-pretrained": 3.5,
     "archive": _SCRIPTED,
     "archive-replay": _SCRIPTED,
     "random": 1.0,

@@ -1,9 +1,15 @@
+import multiprocessing
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from risk_sac.pretraining import episodes
+from risk_sac.agents.replay import Transition
+from risk_sac.pretraining import episodes, policy
 from risk_sac.pretraining.episodes import Stream
+from risk_sac.pretraining.policy import PolicyTraining
+from risk_sac.pretraining.rollouts import PolicyEpisode
 
 
 def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -19,3 +25,60 @@ def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path: Path, mon
     assert names == [f"low-00-000{k}.npz" for k in range(3)]
     for name in names:
         assert (whole / name).read_bytes() == (parts / name).read_bytes()
+
+
+def trained(folder: Path, episodes: tuple[int, ...], jobs: int, seed: int = 5) -> PolicyTraining:
+    """A policy trained in as many pieces; each is another process's work."""
+    folder.mkdir()
+    for count in episodes:
+        training = PolicyTraining("low", seed)
+        with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
+            list(training.run(pool, count, folder))
+    return training
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A training with few episodes in which the policy already acts and learns."""
+    monkeypatch.setattr(policy, "EPISODES", 1)
+    monkeypatch.setattr(policy, "TURNS", 2)
+    monkeypatch.setattr(policy, "RANDOM_DECISIONS", 40)
+    monkeypatch.setattr(policy, "EVALUATED_EVERY", 3)
+    monkeypatch.setattr(policy, "EVALUATION_TURNS", 2)
+
+
+@pytest.mark.usefixtures("short")
+def test_a_policy_is_the_same_however_it_was_trained(tmp_path: Path) -> None:
+    """One process or two, in one go or interrupted."""
+    whole = trained(tmp_path / "whole", (12,), 2)
+    parts = trained(tmp_path / "parts", (6, 12), 1)
+    assert whole.curve == parts.curve
+    assert [point["episodes"] for point in whole.curve] == [6, 12]
+    for one, two in zip(whole.agent.networks(), parts.agent.networks(), strict=True):
+        for own, other in zip(one, two, strict=True):
+            np.testing.assert_array_equal(own, other)
+
+
+def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached() -> None:
+    training = PolicyTraining("low", 5)
+    size = training.pretrained().layout
+    step = Transition(
+        observation=np.zeros(size.observation_size, np.float32),
+        action=np.zeros(size.action_size, np.float32),
+        risk_reward=20.0,
+        cost=0.0,
+        robustness=0.0,
+        next_robustness=0.0,
+        next_observation=np.ones(size.observation_size, np.float32),
+        terminated=True,
+        accumulated_reward=0.0,
+    )
+    goals = [training.goals.add(name) for name in ("one", "other")]
+    episode = PolicyEpisode(
+        ego="default", asked=goals[1], decisions=[step], goal="one", kind="a", candidate=True, bonus=20.0, steps=5
+    )
+    training.learn([episode])
+    stored = training.replay.gather(np.arange(2), np.ones(2))
+    asked = stored.observation[:, size.observation_size :].argmax(1).tolist()
+    rewards = dict(zip(asked, stored.risk_reward.tolist(), strict=True))
+    assert rewards == pytest.approx({goals[0]: 20.0, goals[1]: 20.0 * (1.0 - policy.MISSED)})

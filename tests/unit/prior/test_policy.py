@@ -1,0 +1,111 @@
+"""The pretrained policy: files, and networks folded into a problem's own layout."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from risk_sac.config import RunSpec
+from risk_sac.errors import ConfigError
+from risk_sac.frozen_policy import respond
+from risk_sac.observation_layout import PER_ADVERSARY, PER_EGO
+from risk_sac.prior.policy import Folded, Layout, PretrainedPolicy, read_policy, with_goal, write_policy
+from risk_sac.problem import Problem
+from risk_sac.types import Vector
+from tests.builders import pretrained_policy
+
+GOAL_NAMES = ("no_contact: cut-in, ahead, in a lane", "no_contact: leader, ahead, in a lane")
+
+
+@pytest.fixture
+def layout() -> Layout:
+    return Layout.of(Problem.from_spec(RunSpec(family="low", method="risk-sac", seed=0)))
+
+
+@pytest.fixture
+def pretrained(layout: Layout) -> PretrainedPolicy:
+    return pretrained_policy(layout, GOAL_NAMES)
+
+
+def plain(layers: tuple[np.ndarray, ...], member: int = 0) -> list[np.ndarray]:
+    """Layers of one network as `respond` takes them."""
+    return [layer[member] if layer.shape[1] > 1 else layer[member, 0] for layer in layers]
+
+
+def observed(layout: Layout) -> Vector:
+    return np.random.default_rng(4).random(layout.observation_size).astype(np.float32)
+
+
+def test_a_file_gives_back_what_was_written(tmp_path: Path, pretrained: PretrainedPolicy) -> None:
+    path = tmp_path / "low-policy.npz"
+    write_policy(path, pretrained)
+    known = read_policy(path)
+    assert (known.family, known.layout, known.goals) == ("low", pretrained.layout, GOAL_NAMES)
+    assert known.card == {"episodes": 12}
+    for own, other in zip((*known.policy, *known.critics), (*pretrained.policy, *pretrained.critics), strict=True):
+        np.testing.assert_array_equal(own, other)
+
+
+@pytest.mark.parametrize("damage", ["cut", "text", "layout", "nan"])
+def test_other_files_are_refused_in_one_line(tmp_path: Path, pretrained: PretrainedPolicy, damage: str) -> None:
+    path = tmp_path / "low-policy.npz"
+    if damage == "layout":
+        pretrained = replace(pretrained, layout=replace(pretrained.layout, requirements=("no_contact",)))
+    if damage == "nan":
+        pretrained.critics[0][:] = np.nan
+    write_policy(path, pretrained)
+    if damage == "cut":
+        path.write_bytes(path.read_bytes()[:-100])
+    if damage == "text":
+        path.write_text("no arrays")
+    with pytest.raises(ConfigError, match=r"^prior: .*low-policy.npz") as raised:
+        read_policy(path)
+    assert "\n" not in str(raised.value)
+
+
+def test_networks_folded_into_their_own_layout_do_the_same(pretrained: PretrainedPolicy, layout: Layout) -> None:
+    folded, seen = Folded.of(pretrained, layout), observed(layout)
+    for goal in range(len(GOAL_NAMES) + 1):
+        layers = plain(folded.policy)
+        if goal:
+            layers[1] = layers[1] + folded.shifts[goal - 1]
+        np.testing.assert_allclose(
+            respond(layers, seen), respond(plain(pretrained.policy), with_goal(seen, goal)), atol=1e-4
+        )
+    action = np.linspace(-1, 1, layout.action_size, dtype=np.float32)
+    for member in range(2):
+        value = respond(plain(folded.critics, member), np.concatenate((seen, action)))
+        wanted = respond(plain(pretrained.critics, member), np.concatenate((with_goal(seen, 0), action)))
+        np.testing.assert_allclose(value, wanted, atol=1e-4)
+
+
+def test_another_layout_is_read_by_names_and_values(pretrained: PretrainedPolicy, layout: Layout) -> None:
+    """The other problem has its adversaries in another order and one more, other bounds, and lacks a requirement."""
+    (name, low, high), *others = layout.scene
+    own = Layout(
+        adversaries=("stranger", *reversed(layout.adversaries)),
+        scene=((name, low - 1.0, high + 1.0), *others),
+        requirements=layout.requirements[1:],
+    )
+    seen = observed(own)
+    adversaries = {a: seen[PER_ADVERSARY * i : PER_ADVERSARY * (i + 1)] for i, a in enumerate(own.adversaries)}
+    rest = seen[PER_ADVERSARY * len(own.adversaries) :]
+    value = low - 1.0 + rest[PER_EGO] * (high - low + 2.0)
+    known = np.concatenate(
+        [
+            *(adversaries[each] for each in layout.adversaries),
+            rest[:PER_EGO],
+            [(value - low) / (high - low)],
+            rest[PER_EGO + 1 : PER_EGO + len(own.scene)],
+            [1.0],
+            rest[PER_EGO + len(own.scene) :],
+        ]
+    ).astype(np.float32)
+
+    mean, log_std = np.split(respond(plain(Folded.of(pretrained, own).policy), seen), 2)
+    wanted = np.split(respond(plain(pretrained.policy), with_goal(known, 0)), 2)
+    for got, expected in zip((mean, log_std), wanted, strict=True):
+        assert not got[:2].any()  # the stranger does as it likes
+        by_name = {a: expected[2 * i : 2 * i + 2] for i, a in enumerate(layout.adversaries)}
+        np.testing.assert_allclose(got[2:], np.concatenate([by_name[a] for a in own.adversaries[1:]]), atol=1e-4)
