@@ -87,7 +87,5 @@ def test_the_diverse_search_shares_its_episodes_between_scripts_and_policy() -> 
 def test_without_a_pretrained_policy_the_method_is_refused(monkeypatch: pytest.MonkeyPatch, family: str) -> None:
     monkeypatch.setattr(searchers, "pretrained_for", lambda problem: None)
     wanted = spec("risk-sac-pretrained").model_copy(update={"family": family})
-    with pytest.raises(
-        ConfigError, match=f"^prior: got shipped, .* at {family}; .* choose the method risk-sac$"
-    ):
+    with pytest.raises(ConfigError, match=f"^prior: got shipped, .* at {family}; .* choose the method risk-sac$"):
         searchers_of(wanted)
