@@ -3,9 +3,10 @@
     python -m tests.acceptance.planner_table OUT [--ego NAME] [--families NAME ...] [--methods NAME ...] [--seeds N]
         [--steps N]
 
-plays what OUT lacks, seeds outermost, and rewrites OUT/table.md and OUT/table.csv after each run from those that have
-ended. A run ends with the episode in which it has spent its steps. Counts are those of `risk-sac run`; the failures are
-not replayed, so the last of them are candidates of headline failures.
+plays what OUT lacks, seeds outermost, and rewrites OUT/table.md and OUT/table.csv after each run. A run ends with the
+episode in which it has spent its steps; with more steps it goes on. What ends after the steps does not count, so longer
+runs are cut. Counts are those of `risk-sac run`; the failures are not replayed, so the last of them are candidates of
+headline failures.
 """
 
 import argparse
@@ -13,7 +14,7 @@ import csv
 from collections.abc import Iterator, Sequence
 from itertools import product
 from pathlib import Path
-from statistics import mean
+from statistics import median
 
 from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
@@ -24,22 +25,31 @@ from risk_sac.scenario.families import family_named
 from tests.acceptance.ego_ladder import in_own_process, play
 
 FIRST_SEED = 1
+MOST_EPISODES = 10_000  # of a run, which ends by its steps; fixed, so that it can go on with more of them
 COUNTS = ("distinct_failures", "distinct_preventable", "headline_candidates")
 COLUMNS = ("family", "method", "seed", "episodes", "environment_steps", *COUNTS)
 Row = dict[str, str | int]
 
 
-def spec_of(family: str, method: str, ego: str, seed: int, steps: int) -> RunSpec:
-    """The run of a method; it may play an episode a step, which is more than it needs."""
-    fields = {"family": family, "method": method, "seed": seed, "budget": {"episodes": steps}}
+def spec_of(family: str, method: str, ego: str, seed: int) -> RunSpec:
+    """Returns the run of a method."""
+    fields = {"family": family, "method": method, "seed": seed, "budget": {"episodes": MOST_EPISODES}}
     return RunSpec.model_validate(fields | {"ego": pinned(read_ego(ego))})
 
 
-def counted(spec: RunSpec, folder: Path) -> Row:
-    """Returns the counts of a run that has ended."""
+def spent(folder: Path, steps: int) -> bool:
+    """Returns whether a run has ended and spent so many steps."""
+    file = folder / EPISODES
+    return file.exists() and records_from_lines(file.read_bytes())[-1].environment_steps >= steps
+
+
+def counted(spec: RunSpec, folder: Path, steps: int) -> Row:
+    """Returns the counts of a run's episodes that end within the steps."""
     found = MetricsAccumulator(family_named(spec.family).horizon_steps)
     for record in records_from_lines((folder / EPISODES).read_bytes()):
-        metrics = found.add(record)
+        if record.environment_steps <= steps:
+            found.add(record)
+    metrics = found.metrics()
     return {name: getattr(spec, name) if hasattr(spec, name) else getattr(metrics, name) for name in COLUMNS}
 
 
@@ -49,21 +59,34 @@ def write(rows: Sequence[Row], out: Path) -> str:
         table = csv.DictWriter(file, COLUMNS)
         table.writeheader()
         table.writerows(rows)
-    text = "\n".join(_lines(rows)) + "\n"
+    text = "\n".join(lines(rows)) + "\n"
     (out / "table.md").write_text(text)
     return text
 
 
-def _lines(rows: Sequence[Row]) -> Iterator[str]:
-    """A line per family and method: means over the seeds, and in brackets each seed."""
-    yield "| family | method | seeds | episodes | steps | distinct | preventable distinct | headline candidates |"
-    yield "|---|---|---|---|---|---|---|---|"
-    for cell in dict.fromkeys((row["family"], row["method"]) for row in rows):
-        runs = [row for row in rows if (row["family"], row["method"]) == cell]
-        means = [f"{mean(int(run[name]) for run in runs):.0f}" for name in ("episodes", "environment_steps")]
-        each = [[int(run[name]) for run in runs] for name in COUNTS]
-        counts = [f"{mean(values):.1f} ({', '.join(map(str, values))})" for values in each]
-        yield f"| {' | '.join([*map(str, cell), str(len(runs)), *means, *counts])} |"
+def lines(rows: Sequence[Row]) -> Iterator[str]:
+    """Yields a line per family and method: median and range over the seeds, and p against random search."""
+    yield "| family | method | seeds | distinct | preventable distinct | headline candidates |"
+    yield "|---|---|---|---|---|---|"
+    for family, method in dict.fromkeys((str(row["family"]), str(row["method"])) for row in rows):
+        cells = [family, method, str(len(values(rows, family, method, "seed")))]
+        for name in COUNTS:
+            found, reference = (values(rows, family, each, name) for each in (method, "random"))
+            cell = f"{median(found):g} ({min(found)} to {max(found)})"
+            cells.append(cell if method == "random" or not reference else f"{cell}, p {p_value(found, reference):.2f}")
+        yield f"| {' | '.join(cells)} |"
+
+
+def values(rows: Sequence[Row], family: str, method: str, name: str) -> list[int]:
+    """Returns what each run of a family and a method counted."""
+    return [int(row[name]) for row in rows if (row["family"], row["method"]) == (family, method)]
+
+
+def p_value(first: Sequence[int], second: Sequence[int]) -> float:
+    """Returns the two-sided p of the Mann-Whitney test; 1 where all counts are equal."""
+    from scipy.stats import mannwhitneyu
+
+    return 1.0 if len({*first, *second}) == 1 else float(mannwhitneyu(first, second).pvalue)
 
 
 def main() -> None:
@@ -74,16 +97,16 @@ def main() -> None:
     parser.add_argument("--families", nargs="+", default=["low", "mixed", "dense"], metavar="NAME")
     parser.add_argument("--methods", nargs="+", default=["archive", "random"], metavar="NAME")
     parser.add_argument("--seeds", type=int, default=5, metavar="N", help="(default: %(default)s)")
-    parser.add_argument("--steps", type=int, default=20_000, metavar="N", help="of each run (default: %(default)s)")
+    parser.add_argument("--steps", type=int, default=5_000, metavar="N", help="of each run (default: %(default)s)")
     given = parser.parse_args()
     rows: list[Row] = []
     seeds = range(FIRST_SEED, FIRST_SEED + given.seeds)
     for seed, family, method in product(seeds, given.families, given.methods):
-        spec = spec_of(family, method, given.ego, seed, given.steps)
-        folder = given.out / f"{spec.id}-{given.steps}"
-        if not (folder / EPISODES).exists():
+        spec = spec_of(family, method, given.ego, seed)
+        folder = given.out / spec.id
+        if not spent(folder, given.steps):
             in_own_process(play, spec, folder, given.steps)
-        rows.append(counted(spec, folder))
+        rows.append(counted(spec, folder, given.steps))
         print(write(rows, given.out))
 
 

@@ -1,14 +1,18 @@
-"""Chooses the lanes that a planner drives along, and the stop lines that hold for it; cuts long lanes."""
+"""Tells a planner what holds for it: lanes along the route, stop lines, room beside, others in view; cuts lanes."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from heapq import heappop, heappush
 
 import numpy as np
 
 from risk_sac.egos.driving import LAST_STOP_MPS2
-from risk_sac.egos.seam import Perceived
-from risk_sac.types import HEADING, LENGTH, SPEED, Floats, Lane, Road, Signal, X, Y
+from risk_sac.egos.seam import Perceived, Vehicle
+from risk_sac.types import HEADING, LENGTH, SPEED, WIDTH, Bools, Floats, Kind, Lane, Road, Signal, X, Y
+
+BEGINS_MPS2 = 2.5  # braking at which a planner without stop lines of its own begins to stop at one
+BEFORE_LINE_M = 1.0  # where it stops
+BESIDE_M = 0.1  # between its body and the lane's edge
 
 
 def lanes_ahead(road: Road, start: str) -> list[str]:
@@ -50,6 +54,36 @@ def stops(road: Road, perceived: Perceived) -> list[bool]:
         yellow = signal is Signal.YELLOW and speed * speed <= 2.0 * LAST_STOP_MPS2 * ahead_m
         found.append(holds and (yellow or signal is Signal.RED))
     return found
+
+
+def way_to_stop_m(p: Perceived) -> float | None:
+    """Returns the way to where a signal stops the ego; None if none does, or none yet.
+
+    A yellow one does where the ego can still stop.
+    """
+    speed, left_m = float(p.state[SPEED, 0]), p.stop_line_m
+    late = p.signal is Signal.YELLOW and speed * speed > 2.0 * LAST_STOP_MPS2 * left_m
+    if p.signal not in (Signal.YELLOW, Signal.RED) or late:
+        return None
+    way_m = left_m - BEFORE_LINE_M
+    return way_m if way_m < speed * speed / (2.0 * BEGINS_MPS2) + speed + 5.0 else None
+
+
+def room_aside_m(lanes: Sequence[Lane], p: Perceived, car: Vehicle) -> float:
+    """Returns how far from the middle of the ego's lane its body still lies within it."""
+    x_m, y_m = p.state[[X, Y], 0]
+    own = min(lanes, key=lambda lane: float(np.hypot(lane.line[0] - x_m, lane.line[1] - y_m).min()))
+    return max(own.width_m / 2 - car.width_m / 2 - BESIDE_M, BESIDE_M)
+
+
+def in_view(p: Perceived) -> Bools:
+    """Returns which objects a planner heeds: all others but the vehicles behind in its lane, which react."""
+    x_m, y_m, heading, length_m, width_m = p.state[[X, Y, HEADING, LENGTH, WIDTH], 0]
+    away_x, away_y = p.state[X] - x_m, p.state[Y] - y_m
+    along_m = away_x * math.cos(heading) + away_y * math.sin(heading)
+    across_m = away_y * math.cos(heading) - away_x * math.sin(heading)
+    behind = (p.kind == Kind.VEHICLE) & (along_m < -length_m / 2) & (np.abs(across_m) < width_m)
+    return ~behind & (np.arange(len(p.kind)) > 0)
 
 
 def in_pieces(road: Road, piece_m: float, spacing_m: float) -> Road:

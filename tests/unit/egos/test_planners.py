@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from risk_sac.egos import registry
-from risk_sac.egos.bicycle import advance
+from risk_sac.egos.bicycle import advance, track
 from risk_sac.egos.guard import Guarded
-from risk_sac.egos.planners.route import in_pieces, lanes_ahead, stops
+from risk_sac.egos.planners.route import in_pieces, in_view, lanes_ahead, room_aside_m, stops, way_to_stop_m
 from risk_sac.egos.seam import Episode, Perceived, Trajectory, Vehicle
 from risk_sac.errors import ConfigError
 from risk_sac.sim.pilot import Motion
@@ -182,6 +182,49 @@ def test_the_signal_of_another_direction_does_not_count() -> None:
     lanes = tuple(each._replace(on_route=each.id != "b_own") for each in road.lanes)
     view = perceived(Motion(250.0, 0.0, 0.0, 12.0), 0.0, [], Signal.RED)
     assert stops(road._replace(lanes=lanes), view) == [False, True]
+
+
+def test_a_plan_is_followed_to_the_speed_that_it_has_a_fifth_of_a_second_on() -> None:
+    time_s = np.array([0.0, 0.2, 0.5, 3.0])
+    plan = Trajectory(time_s, 10.0 * time_s, 0.0 * time_s, np.array([10.0, 9.6, 5.0, 0.0]))
+    command = track(plan, Motion(0.0, 0.0, 0.0, 10.0), VEHICLE)
+    assert command == (pytest.approx(-2.0), pytest.approx(0.0))
+
+
+@pytest.mark.parametrize(
+    ("signal", "speed", "line_m", "way_m"),
+    [
+        (Signal.RED, 10.0, 30.0, 29.0),
+        (Signal.RED, 10.0, 60.0, None),  # braking by 2.5 m/s² begins later
+        (Signal.YELLOW, 10.0, 15.0, 14.0),
+        (Signal.YELLOW, 10.0, 10.0, None),  # would take more than 4.5 m/s²
+        (Signal.GREEN, 10.0, 30.0, None),
+        (Signal.RED, 0.0, 0.5, -0.5),
+    ],
+)
+def test_a_planner_without_stop_lines_stops_a_metre_before_a_signal(
+    signal: Signal, speed: float, line_m: float, way_m: float | None
+) -> None:
+    view = perceived(Motion(0.0, 0.0, 0.0, speed), 0.0, [], signal)._replace(stop_line_m=line_m)
+    assert way_to_stop_m(view) == (None if way_m is None else pytest.approx(way_m))
+
+
+@pytest.mark.parametrize("y_m", [0.2, -WIDTH_M])
+def test_there_is_as_much_room_aside_as_the_lane_is_wider_than_the_car(y_m: float) -> None:
+    lanes = [each._replace(width_m=4.0) if each.id == "a_beside" else each for each in two_lanes().lanes]
+    view = perceived(Motion(0.0, y_m, 0.0, 10.0), 0.0, [], Signal.NONE)
+    width_m = 4.0 if y_m < -1.0 else WIDTH_M
+    assert room_aside_m(lanes, view, VEHICLE) == pytest.approx((width_m - VEHICLE.width_m) / 2 - 0.1)
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, math.pi])
+def test_vehicles_behind_in_the_lane_are_out_of_view(heading_rad: float) -> None:
+    sign = math.cos(heading_rad)
+    others = [(-20.0 * sign, 0.0, 5.0), (-20.0 * sign, WIDTH_M, 5.0), (20.0 * sign, 0.0, 5.0), (-1.0 * sign, 0.0, 5.0)]
+    view = perceived(Motion(0.0, 0.0, heading_rad, 10.0), 0.0, others, Signal.NONE)
+    assert in_view(view).tolist() == [False, False, True, True, True]
+    pedestrians = view._replace(kind=np.full_like(view.kind, Kind.PEDESTRIAN))
+    assert in_view(pedestrians).tolist() == [False, True, True, True, True]
 
 
 def test_a_planner_that_is_not_installed_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,20 +15,16 @@ from commonroad_rp.utility.config import ReactivePlannerConfiguration
 from commonroad_rp.utility.utils_coordinate_system import create_coordinate_system
 
 from risk_sac.egos.bicycle import track
+from risk_sac.egos.planners.route import BEFORE_LINE_M, in_view, room_aside_m, way_to_stop_m
 from risk_sac.egos.road import LIMIT, STATION, point_at
 from risk_sac.egos.seam import Control, Episode, Perceived, Trajectory
 from risk_sac.sim.pilot import Motion
-from risk_sac.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Floats, Kind, Signal, X, Y
+from risk_sac.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Floats, X, Y
 
-LAST_STOP_MPS2 = 4.5  # by which it still stops at yellow
-BEGINS_MPS2 = 2.5  # braking at which it begins to stop at a line
-BEFORE_LINE_M = 1.0  # where it stops
 SPACING_M = 2.0  # of points along the path, which the package's smoothing needs on straights too
 BEHIND_M, AHEAD_M = 20.0, 100.0  # by which the path goes on beyond its ends, where the package can project nothing
 MARGIN_M = 0.3  # around others; without one, which is the package's default, it drives up to them
-BESIDE_M = 0.1  # between its body and the lane's edge
 SLOWEST_MPS = 0.01  # the package takes 0 for "not given"
-FOLLOW_S = 0.2  # within which the car reaches its plan's speed
 
 
 class Reactive:
@@ -70,8 +66,7 @@ class Reactive:
             return Control(-self._car.brake_mps2)
         plan = self._plan._replace(time_s=self._plan.time_s - (self._age - 1) * self._step_s)
         motion = Motion(*(float(ego[row]) for row in (X, Y, HEADING, SPEED, ACCEL)))
-        speed = float(np.interp(FOLLOW_S, plan.time_s, plan.speed_mps))
-        return Control((speed - motion.speed_mps) / FOLLOW_S, track(plan, motion, self._car).steering_rad)
+        return track(plan, motion, self._car)
 
     def close(self) -> None:
         """Releases nothing."""
@@ -97,9 +92,9 @@ class Reactive:
         )
         planner._low_vel_mode = speed < self._config.planning.low_vel_mode_threshold
         planner.reset(initial_state_cart=state, collision_checker=self._others(p))
-        aside_m = self._aside_m(p)
+        aside_m = room_aside_m(self._lanes, p, self._car)
         planner.set_d_sampling_parameters(-aside_m, aside_m)
-        stop_m = self._stop_m(p)
+        stop_m = way_to_stop_m(p)
         if stop_m is None:
             self._config.sampling.longitudinal_mode = "velocity_keeping"
             limit = p.path[LIMIT, np.searchsorted(p.path[STATION], p.station_m, side="right") - 1]
@@ -121,31 +116,10 @@ class Reactive:
         x, y, headings, speeds = np.array(places).T
         return Trajectory(time_s, x + rear_m * np.cos(headings), y + rear_m * np.sin(headings), speeds)
 
-    def _stop_m(self, p: Perceived) -> float | None:
-        """Returns the way to where a signal makes it stop; None if none does."""
-        speed, left_m = float(p.state[SPEED, 0]), p.stop_line_m
-        late = p.signal is Signal.YELLOW and speed * speed > 2.0 * LAST_STOP_MPS2 * left_m
-        if p.signal not in (Signal.YELLOW, Signal.RED) or late:
-            return None
-        way_m = left_m - BEFORE_LINE_M
-        return way_m if way_m < speed * speed / (2.0 * BEGINS_MPS2) + speed + 5.0 else None
-
-    def _aside_m(self, p: Perceived) -> float:
-        """Returns how far from the path a sample may end in the lane that the ego is on."""
-        x_m, y_m = p.state[[X, Y], 0]
-        own = min(self._lanes, key=lambda lane: np.hypot(lane.line[0] - x_m, lane.line[1] - y_m).min())
-        return max(own.width_m / 2 - self._car.width_m / 2 - BESIDE_M, BESIDE_M)
-
     def _others(self, p: Perceived) -> pycrcc.CollisionChecker:
         """Predicts all others at their velocity, but for vehicles behind in its lane, which react."""
         checker = pycrcc.CollisionChecker()
-        x_m, y_m, heading, length_m = p.state[[X, Y, HEADING, LENGTH], 0].tolist()
-        rows = p.state[[X, Y, HEADING, VX, VY, LENGTH, WIDTH], 1:].T.tolist()
-        for kind, (x, y, yaw, vx, vy, length, width) in zip(p.kind[1:].tolist(), rows, strict=True):
-            along_m = (x - x_m) * math.cos(heading) + (y - y_m) * math.sin(heading)
-            across_m = (y - y_m) * math.cos(heading) - (x - x_m) * math.sin(heading)
-            if kind == Kind.VEHICLE and along_m < -length_m / 2 and abs(across_m) < self._car.width_m:
-                continue
+        for x, y, yaw, vx, vy, length, width in p.state[[X, Y, HEADING, VX, VY, LENGTH, WIDTH]][:, in_view(p)].T.tolist():
             body = pycrcc.TimeVariantCollisionObject(0)
             for step in range(self._config.planning.time_steps_computation + 1):
                 t = step * self._step_s
