@@ -119,7 +119,9 @@ class Reactive:
     def _others(self, p: Perceived) -> pycrcc.CollisionChecker:
         """Predicts all others at their velocity, but for vehicles behind in its lane, which react."""
         checker = pycrcc.CollisionChecker()
-        for x, y, yaw, vx, vy, length, width in p.state[[X, Y, HEADING, VX, VY, LENGTH, WIDTH]][:, in_view(p)].T.tolist():
+        for x, y, yaw, vx, vy, length, width in p.state[[X, Y, HEADING, VX, VY, LENGTH, WIDTH]][
+            :, in_view(p)
+        ].T.tolist():
             body = pycrcc.TimeVariantCollisionObject(0)
             for step in range(self._config.planning.time_steps_computation + 1):
                 t = step * self._step_s
