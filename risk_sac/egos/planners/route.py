@@ -82,8 +82,9 @@ def in_view(p: Perceived) -> Bools:
     away_x, away_y = p.state[X] - x_m, p.state[Y] - y_m
     along_m = away_x * math.cos(heading) + away_y * math.sin(heading)
     across_m = away_y * math.cos(heading) - away_x * math.sin(heading)
-    behind = (p.kind == Kind.VEHICLE) & (along_m < -length_m / 2) & (np.abs(across_m) < width_m)
-    return ~behind & (np.arange(len(p.kind)) > 0)
+    behind: Bools = (p.kind == Kind.VEHICLE) & (along_m < -length_m / 2) & (np.abs(across_m) < width_m)
+    behind[0] = True  # the ego itself
+    return ~behind
 
 
 def in_pieces(road: Road, piece_m: float, spacing_m: float) -> Road:
