@@ -23,8 +23,6 @@ from risk_sac.verdicts.distinct import kind_name
 
 DECISION_STEPS, DISCOUNT = 5, 0.99  # as in `AgentConfig`
 COST_WEIGHT = 0.05  # of C_soft in the reward
-# Choice: less for what counts for no headline than a run pays, or a policy settles for contacts that nobody can avoid.
-REWARD = RewardConfig(unpreventable=0.25, unavoidable=0.1, minor=0.3)
 
 
 class Turn(NamedTuple):
@@ -39,6 +37,7 @@ class Turn(NamedTuple):
     key: tuple[int, ...]
     asked: tuple[int, ...]  # the goal of each episode; 0: any failure
     layers: Layers | None  # of the policy; None: uniformly random actions
+    reward: RewardConfig
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,21 +71,17 @@ class Player:
 
     def __init__(self, family: FamilyName) -> None:
         self._family = family
-        self._envs: dict[str, RiskSacEnv] = {}
+        self._envs: dict[tuple[str, RewardConfig], RiskSacEnv] = {}
 
     def play(self, turn: Turn, random: np.random.Generator) -> list[PolicyEpisode]:
         """Plays the episodes of a turn."""
-        if turn.name not in self._envs:
-            spec = RunSpec(
-                family=self._family,
-                method="sac",
-                seed=turn.key[0],
-                ego=turn.ego,
-                learner=LearnerConfig(reward=REWARD),
-            )
-            self._envs[turn.name] = RiskSacEnv.of(spec)
+        key = turn.name, turn.reward
+        if key not in self._envs:
+            learner = LearnerConfig(reward=turn.reward)
+            spec = RunSpec(family=self._family, method="sac", seed=turn.key[0], ego=turn.ego, learner=learner)
+            self._envs[key] = RiskSacEnv.of(spec)
         played: list[PolicyEpisode] = []
-        with closing(self._envs[turn.name]) as env:
+        with closing(self._envs[key]) as env:
             while len(played) < len(turn.asked):
                 episode = _episode(env, turn, turn.asked[len(played)], random)
                 if episode is not None:

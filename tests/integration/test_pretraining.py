@@ -42,7 +42,8 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """A training with few episodes in which the policy already acts and learns."""
     monkeypatch.setattr(policy, "EPISODES", 1)
     monkeypatch.setattr(policy, "TURNS", 2)
-    monkeypatch.setattr(policy, "RANDOM_DECISIONS", 40)
+    stages = [stage._replace(begins=begins, decisions=40) for stage, begins in zip(policy.STAGES, (0, 6), strict=True)]
+    monkeypatch.setattr(policy, "STAGES", tuple(stages))
     monkeypatch.setattr(policy, "EVALUATED_EVERY", 3)
     monkeypatch.setattr(policy, "EVALUATION_TURNS", 2)
 
