@@ -6,7 +6,7 @@ import pytest
 
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
-from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunMethod, RunSpec, WarmStartConfig
+from risk_sac.config import AgentConfig, Budget, FamilyName, LearnerConfig, RunMethod, RunSpec, WarmStartConfig
 from risk_sac.errors import ConfigError
 from risk_sac.problem import Problem
 from risk_sac.records import DrivenBy, EpisodeRecord, Grade, Outcome
@@ -19,10 +19,12 @@ from tests.listener import Listener
 WARM = 3
 
 
-def spec(method: RunMethod, budget: Budget, warm_start: WarmStartConfig | None = None) -> RunSpec:
+def spec(
+    method: RunMethod, budget: Budget, warm_start: WarmStartConfig | None = None, family: FamilyName = "low"
+) -> RunSpec:
     agent = AgentConfig(hidden_sizes=(8,), batch_size=8, warmup_steps=50)
     learner = LearnerConfig(agent=agent, warm_start=warm_start or WarmStartConfig(episodes=WARM))
-    return RunSpec(family="low", method=method, seed=5, budget=budget, learner=learner)
+    return RunSpec(family=family, method=method, seed=5, budget=budget, learner=learner)
 
 
 def played(folder: Path, wanted: RunSpec) -> list[EpisodeRecord]:
@@ -44,8 +46,8 @@ def test_a_learner_is_warmed_by_what_an_archive_search_would_have_tried(tmp_path
     assert {record.temperature for record in warmed[:WARM]} == {warmed[0].temperature}  # nothing is learned meanwhile
 
 
-def searchers(method: RunMethod, warm_start: WarmStartConfig) -> Searchers:
-    wanted = spec(method, Budget(episodes=100), warm_start)
+def searchers(method: RunMethod, warm_start: WarmStartConfig, family: FamilyName = "low") -> Searchers:
+    wanted = spec(method, Budget(episodes=100), warm_start, family)
     return Searchers(wanted, Problem.from_spec(wanted), observation_size=20, action_size=4)
 
 
@@ -68,9 +70,10 @@ def test_a_guide_has_done_its_part_after_so_many_episodes_or_failures() -> None:
 
 
 def test_a_guide_that_goes_on_anyway_has_time_until_it_has_found_enough() -> None:
+    """At a family whose policy begins from nothing."""
     few = WarmStartConfig(episodes=3, failures=2)
-    assert makers(searchers("risk-sac-diverse", few), [Outcome.SAFE] * 20) == [ScriptFollower] * 21
-    taken = makers(searchers("risk-sac-diverse", few), [Outcome.FAILURE] * 2 + [Outcome.SAFE] * 60)
+    assert makers(searchers("risk-sac-diverse", few, "mixed"), [Outcome.SAFE] * 20) == [ScriptFollower] * 21
+    taken = makers(searchers("risk-sac-diverse", few, "mixed"), [Outcome.FAILURE] * 2 + [Outcome.SAFE] * 60)
     assert taken[:2] == [ScriptFollower] * 2
     assert set(taken[2:]) == {ScriptFollower, Learner}
 
@@ -115,7 +118,7 @@ def test_each_method_says_what_drives_the_adversaries(
 
 
 def test_the_policy_drives_in_the_scenes_of_its_own_archive_and_scripts_in_the_guides() -> None:
-    wanted = spec("risk-sac-diverse", Budget(episodes=100), WarmStartConfig(episodes=3, failures=2))
+    wanted = spec("risk-sac-diverse", Budget(episodes=100), WarmStartConfig(episodes=3, failures=2), "mixed")
     wanted = wanted.model_copy(
         update={"learner": wanted.learner.model_copy(update={"agent": AgentConfig(warmup_steps=0)})}
     )
@@ -132,7 +135,7 @@ def test_the_policy_drives_in_the_scenes_of_its_own_archive_and_scripts_in_the_g
 
 
 def test_the_frozen_policy_is_on_its_own() -> None:
-    subject = searchers("risk-sac-diverse", WarmStartConfig())
+    subject = searchers("risk-sac-diverse", WarmStartConfig(), "mixed")
     assert type(subject.next(learning=False).actor) is Learner
 
 
