@@ -8,6 +8,7 @@ import json
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, get_args
 
@@ -25,7 +26,7 @@ LONG_LABEL = "crossroads of the old town, as exported on the first of March, wit
 SEARCHED = {"families": ["mixed", "dense"], "seeds": [601], "budget": {"episodes": 150}}
 NIGHTLY = SEARCHED | {"label": "nightly", "methods": ["risk-sac-diverse", "archive", "random"]}
 SECOND = {"label": "ego with a slow response", "methods": ["archive"], "seeds": [602], "budget": {"episodes": 60}}
-LIVE = {"label": "at work", "families": ["low"], "methods": ["archive", "random"], "budget": {"episodes": 20_000}}
+LIVE = SEARCHED | {"label": "at work", "methods": ["risk-sac-diverse", "archive"], "budget": {"episodes": 20_000}}
 WIDE_FIRST = {"failures"}  # a phone hides the plots that are prepared
 GRADES = ("preventable", "full_braking", "unavoidable")
 
@@ -44,11 +45,12 @@ def main(wanted: list[str], data: Path) -> None:
     """Draws the named screens, or all, in both themes and at both widths."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     screens = {name: each for name, each in (SCREENS | PLAIN).items() if name in wanted or not wanted}
-    with servers(data) as start, sync_playwright() as playwright:
+    with servers(data) as start, sync_playwright() as playwright, ExitStack() as ending:
         service = start("risk_sac.execution.worker", replays=3)
         ids = played(service, data / "ids.json")
         if "live" in screens:
             ids["live"] = service.post(**LIVE)
+            ending.callback(service.client.post, f"/v1/campaigns/{ids['live']}/cancel")
             service.wait_for(ids["live"], lambda seen: seen["progress"]["failures"] > 0)
         browser = playwright.chromium.launch(executable_path=EXECUTABLE, args=["--no-sandbox"])
         for name, (place, prepare) in screens.items():
@@ -64,8 +66,6 @@ def main(wanted: list[str], data: Path) -> None:
             page = opened(browser, f"{service.client.base_url}/page/#/{place}", SCREENS["replay"][1], WIDE, "light")
             page.screenshot(path=README_PICTURE)
         browser.close()
-        if "live" in ids:
-            service.client.post(f"/v1/campaigns/{ids['live']}/cancel")
 
 
 def played(service: Service, known: Path) -> dict[str, str]:
@@ -116,7 +116,7 @@ def show_all(page: Page) -> None:
             await new Promise(requestAnimationFrame);
         }
     }""")
-    page.wait_for_load_state("networkidle")
+    page.wait_for_function("() => [...document.images].every(({ complete }) => complete)")
     page.wait_for_function("() => !document.body.innerText.includes('Loading …')")
     page.evaluate("scrollTo(0, 0)")
 

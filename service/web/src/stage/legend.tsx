@@ -52,7 +52,7 @@ export function Legend({ recording: { moment, parts }, layers, signals }: Props)
             <rect x="1" y="1" width="24" height="12" fill={ink["--shade"]} stroke={ink["--line"]} />
           </Item>
           <Item name="line of sight">{line(ink["--striker"], undefined, 1)}</Item>
-          <Item name="blocked from the cross on">
+          <Item name="blocked beyond the cross">
             {line(ink["--striker"], "2 3", 1)}
             <path d="M3 4 9 10M9 4 3 10" stroke={ink["--striker"]} />
           </Item>
