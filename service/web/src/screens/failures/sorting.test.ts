@@ -56,6 +56,7 @@ test("who has no time to contact comes last", () => {
 test("fastest, newest, most frequent", () => {
   expect(table.relative_speed_mps[by("closing")[0]!]).toBe(9);
   expect(by("newest").slice(0, 2)).toEqual([11, 10]);
+  expect(sorted(table, [3, 9, 1], "newest", oftenOf(table))).toEqual([9, 3, 1]); // whatever the order before
   const often = oftenOf(table);
   expect(often[by("often")[0]!]).toBe(Math.max(...often));
   expect(often[by("rare")[0]!]).toBe(1);

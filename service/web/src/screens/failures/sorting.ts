@@ -44,7 +44,7 @@ export function sorted(table: FailureTable, failures: readonly number[], sort: S
     case "reaction":
       return worst((i) => reactionOf(table, i) ?? Infinity);
     case "newest":
-      return [...failures].reverse();
+      return [...failures].sort((a, b) => b - a);
     case "often":
       return worst((i) => -often[i]!);
     case "rare":
