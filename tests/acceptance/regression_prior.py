@@ -11,7 +11,7 @@ import argparse
 import csv
 import multiprocessing
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, wait
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -100,19 +100,18 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
-    cases: list[Case] = []
-    found: list[Detection] = []
+    cases: list[Case] = [(*pair, seed, arm) for seed in SEEDS for pair in PAIRS for arm in ARMS]
+    firsts = dict.fromkeys((case[0], case[1], case[3]) for case in cases)  # two pairs may share one
     with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
-        for seed in SEEDS:
-            firsts = list(dict.fromkeys((family, before) for family, before, _ in PAIRS))  # two pairs may share one
-            list(pool.map(partial(campaign, options.out, seed=seed), *zip(*firsts, strict=True)))
-            own: list[Case] = [(*pair, seed, arm) for pair in PAIRS for arm in ARMS]
-            cases, found = cases + own, [*found, *pool.map(partial(detection, options.out), own)]
-            write(options.out / "runs.csv", cases, found)
+        campaigns = [pool.submit(campaign, options.out, *first) for first in firsts]
+        others = [pool.submit(detection, options.out, case) for case in cases if case[-1] != "campaign"]
+        wait([*campaigns, *others])
+        found = list(pool.map(partial(detection, options.out), cases))
+    write(options.out / "runs.csv", cases, found)
 
 
 def write(file: Path, cases: Sequence[Case], found: Sequence[Detection]) -> None:
-    """Writes the runs so far, and prints what they come to."""
+    """Writes the runs, and prints what they come to."""
     told = list(rows(cases, found))
     with file.open("w", newline="") as stream:
         writer = csv.DictWriter(stream, told[0])
