@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.machine import UNWRITABLE
 from risk_sac.records import EpisodeRecord, Outcome
-from risk_sac.run_folder.durable import read_sealed, replace_file, seal
+from risk_sac.run_folder.durable import LOCK, lock, read_sealed, replace_file, seal
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
 from risk_sac.scenario.families import family_named, shipped_alike
 from risk_sac.scenario.library import library
@@ -187,7 +187,8 @@ def _keep(scripts: EarlierScripts, label: str) -> str:
     path = _path(name)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(path, content)
+        with lock(path.parent / LOCK, wait=True):  # `replace_file` has one writer at a time
+            replace_file(path, content)
     except OSError as error:
         if error.errno not in UNWRITABLE:
             raise

@@ -3,6 +3,7 @@
 import os
 import shutil
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,14 @@ def test_the_copy_outlives_its_source_and_has_the_digest_of_its_content(tmp_path
     other = run_folder(source)
     (other / EPISODES).write_text("".join((other / EPISODES).read_text().splitlines(keepends=True)[1:]))
     assert pinned_prior(str(other), ["low"]) != prior
+
+
+def test_runs_that_begin_at_once_share_a_copy(tmp_path: Path) -> None:
+    source = str(run_folder(tmp_path / "v1"))
+    with ThreadPoolExecutor(8) as pool:
+        names = set(pool.map(lambda _: pinned_prior(source, ["low"]), range(24)))
+    assert len(names) == 1
+    assert kept(*names).families["low"].failures
 
 
 def test_a_damaged_copy_is_refused(tmp_path: Path) -> None:
