@@ -5,13 +5,12 @@ from collections import deque
 
 import numpy as np
 
-from risk_sac.egos.defects.defective import PEDESTRIAN, VEHICLE, Defective, in_front, moving, only, turned
+from risk_sac.egos.defects.defective import PEDESTRIAN, VEHICLE, Defective, in_front, moving, turned
 from risk_sac.egos.seam import Perceived
 from risk_sac.sim.lookout import project
 from risk_sac.types import HEADING, VX, VY, Floats, X, Y
 
 SAME_WAY, CROSSING = 0.7, 0.7  # cosines of headings: above the one the same way, within the other across
-BRAKES_MPS2 = 1.5
 
 
 def offsets(p: Perceived) -> Floats:
@@ -50,24 +49,6 @@ class KerbWaits(Defective):
     def sees(self, p: Perceived) -> Perceived:
         """Stops pedestrians beside its way."""
         return moving(p, (p.kind == PEDESTRIAN) & (np.abs(offsets(p)) > self.value), 0.0, 0.0)
-
-
-class BrakingYields(Defective):
-    """Takes a vehicle that does not go its way and brakes for one that yields, for some seconds."""
-
-    def begin(self) -> None:
-        """Knows no speed yet."""
-        self._speeds: dict[str, float] = {}
-        self._braked_s: dict[str, float] = {}
-
-    def sees(self, p: Perceived) -> Perceived:
-        """Drops vehicles that braked recently."""
-        speeds = dict(zip(p.ids, np.hypot(p.state[VX], p.state[VY]).tolist(), strict=True))
-        lost = {id_: (self._speeds.get(id_, speed) - speed) / self.step_s for id_, speed in speeds.items()}
-        self._speeds = speeds
-        self._braked_s |= {id_: p.time_s for id_, lost_mps2 in lost.items() if lost_mps2 > BRAKES_MPS2}
-        since_s = p.time_s - np.array([self._braked_s.get(id_, -math.inf) for id_ in p.ids])
-        return only(p, ~((since_s < self.value) & (p.kind == VEHICLE) & (turned(p) < SAME_WAY)))
 
 
 class NeighboursKeepLane(Defective):
