@@ -43,11 +43,22 @@ OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
 Actor = Learner | IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
 """A joint policy that drives all adversaries."""
 GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
-COLD_STEP, PRETRAINED_STEP = 8.0, 2.0  # processor time of a policy's step and its updates, as a multiple of the guide's
 # Scripts that find a failure in one episode of thirty may find none in fifty and still be worth their time.
-DISCOUNT = 0.995
-PRIOR_WORTH, PRIOR_STEPS = 0.05, 1000.0
-LEAST = 0.01  # share of the processor time for either; more would be lost on a policy that yields nothing
+DISCOUNT, PRIOR_STEPS = 0.995, 1000.0
+
+
+class Terms(NamedTuple):
+    """On which guide and policy take turns."""
+
+    policy_step: float  # processor time of a policy's step and its updates, as a multiple of the guide's
+    prior_worth: float  # of PRIOR_STEPS that either is credited with at first
+    least: float  # share of the processor time for either
+
+
+COLD = Terms(8.0, 0.05, 0.01)  # more would be lost on a policy that yields nothing
+# Choice: between 1.5 with a planner under test and 6 with SUMO's driver. Both are credited with much: neither is to be
+# given up for the first find of the other.
+PRETRAINED = Terms(2.0, 10.0, 0.1)
 
 
 class Searcher(NamedTuple):
@@ -89,8 +100,8 @@ class Searchers:
             self.agent = Learner(observation_size, action_size, method, spec.learner, spec.stream)
         self._own = self._searcher(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1
         self._guide = self._searcher(ScriptFollower(problem.family), ArchiveOptimizer) if method.learns else None
-        policy_step = COLD_STEP if pretrained is None else PRETRAINED_STEP
-        self._turns = Turns(spec.stream, policy_step) if method.takes_turns else None
+        terms = COLD if pretrained is None else PRETRAINED
+        self._turns = Turns(spec.stream, terms) if method.takes_turns else None
         self._next = self._own
         self._episodes, self._failures = 0, 0  # of the search
 
@@ -189,12 +200,14 @@ class Turns:
     to the same turns.
     """
 
-    def __init__(self, seed: int, policy_step: float) -> None:
-        """Args: the processor time of a policy's step, as a multiple of the guide's."""
+    def __init__(self, seed: int, terms: Terms) -> None:
         self._random = np.random.default_rng(seed)
-        costs = 1.0, policy_step
         self._bandit = DiscountedBandit(
-            discount=DISCOUNT, prior_worth=PRIOR_WORTH, prior_cost=PRIOR_STEPS, least=LEAST, unit_costs=costs
+            discount=DISCOUNT,
+            prior_worth=terms.prior_worth,
+            prior_cost=PRIOR_STEPS,
+            least=terms.least,
+            unit_costs=(1.0, terms.policy_step),
         )
         self._finds = Finds()
 

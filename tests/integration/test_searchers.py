@@ -11,7 +11,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.problem import Problem
 from risk_sac.records import DrivenBy, EpisodeRecord, Grade, Outcome
 from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
-from risk_sac.searchers import GUIDE, OWN, Searchers, Turns
+from risk_sac.searchers import COLD, GUIDE, OWN, Searchers, Turns
 from risk_sac.train import train
 from tests.builders import collision, episode_record, judgement
 from tests.listener import Listener
@@ -80,7 +80,7 @@ def test_a_guide_that_goes_on_anyway_has_time_until_it_has_found_enough() -> Non
 
 def shares(*findings: tuple[int, str, Grade]) -> list[float]:
     """Share of the policy's turns among 2,000, after each finding."""
-    turns, found = Turns(seed=0, policy_step=8.0), []
+    turns, found = Turns(0, COLD), []
     for arm, signature, grade in findings:
         turns.tell(arm, 100, [collision(judgement=judgement(grade, signature=signature))])
         found.append(sum(turns.draw() for _ in range(2000)) / 2000)

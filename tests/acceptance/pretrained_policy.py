@@ -1,0 +1,61 @@
+"""What the shipped policy of a family finds in random scenes, frozen, beside random actions.
+
+    python -m tests.acceptance.pretrained_policy [--family low] [--seed 301] [--episodes 60] EGO ...
+
+An ego is `default`, a driver, or a driver and a defect such as `idm-aeb+latency`. The policy is asked for each kind in
+turn, and for any failure.
+"""
+
+import argparse
+from collections.abc import Iterator
+
+from risk_sac.config import SHIPPED, EgoConfig, RewardConfig
+from risk_sac.egos.registry import pinned
+from risk_sac.frozen_policy import Layers
+from risk_sac.pretraining.rollouts import PolicyEpisode, Turn, play_turn
+from risk_sac.prior.policy import shipped_policy
+
+EPISODES = 10  # of a turn
+
+
+def ego_of(name: str) -> EgoConfig:
+    """Returns the ego of a name as the command takes it."""
+    driver, *defects = name.split("+")
+    return pinned(EgoConfig() if name == "default" else EgoConfig(driver=driver, defects=tuple(defects)))
+
+
+def episodes(name: str, layers: Layers | None, goals: int, options: argparse.Namespace) -> Iterator[PolicyEpisode]:
+    """Plays the episodes of an ego; None as layers stands for random actions."""
+    for turn in range(options.episodes // EPISODES):
+        asked = tuple((EPISODES * turn + k) % (goals + 1) for k in range(EPISODES))
+        yield from play_turn(
+            Turn(options.family, ego_of(name), name, (options.seed, turn), asked, layers, RewardConfig())
+        )
+
+
+def main() -> None:
+    """Prints a row for each ego and driver."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("egos", nargs="+", metavar="EGO")
+    parser.add_argument("--family", choices=SHIPPED, default="low")
+    parser.add_argument("--seed", type=int, default=301)
+    parser.add_argument("--episodes", type=int, default=60)
+    options = parser.parse_args()
+    pretrained = shipped_policy(options.family)
+    if pretrained is None:
+        parser.error(f"--family: {options.family} has no shipped policy")
+    layers = [layer[0] if layer.shape[1] > 1 else layer[0, 0] for layer in pretrained.policy]
+    print("| ego | driven by | failures | distinct | candidates, distinct | steps |\n|---|---|---|---|---|---|")
+    for name in options.egos:
+        for driver, network in (("policy", layers), ("random", None)):
+            played = list(episodes(name, network, len(pretrained.goals), options))
+            failed = [each for each in played if each.kind]
+            kinds, candidates = {each.kind for each in failed}, {each.kind for each in failed if each.candidate}
+            steps = sum(each.steps for each in played)
+            print(
+                f"| `{name}` | {driver} | {len(failed)} of {len(played)} | {len(kinds)} | {len(candidates)} | {steps} |"
+            )
+
+
+if __name__ == "__main__":
+    main()
