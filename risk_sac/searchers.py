@@ -83,7 +83,7 @@ class Searchers:
         self._space = problem.space
         self._spec = spec
         self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
-        pretrained = None if self._start is None or not method.learns else pretrained_for(problem)
+        pretrained = None if self._start is None or not method.learns else pretrained_for(problem.family)
         if method.prior == "library" and self._start is None:
             raise ConfigError("prior", f"none, and the method {spec.method}", remedy="choose the method archive")
         if method.prior == "policy" and pretrained is None:

@@ -12,20 +12,24 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.config import METHODS, CampaignSpec
 from risk_sac.errors import ConfigError
 from risk_sac.observation_layout import PER_ADVERSARY, PER_EGO, observation_size
-from risk_sac.prior.shipped import DATA, MOST_BYTES
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, Violation
-from risk_sac.scenario.families import shipped_alike
+from risk_sac.scenario.families import family_named, shipped_alike
+from risk_sac.scenario.family import Family
 from risk_sac.types import Vector
 
+MOST_BYTES = 3_000_000  # of a file
+DATA = Path(str(files("risk_sac.prior"))) / "weights"
 GOALS = 15  # kinds of failures that can be asked for, at most
 MANNERS = re.compile(r" (speeding|on red)")
 ABSENT_SCENE, ABSENT_REQUIREMENT = 0.5, 1.0  # entries of an observation for what a problem lacks; 0 for an adversary's
@@ -152,9 +156,25 @@ def shipped_policy(family: str) -> PretrainedPolicy | None:
     return read_policy(path) if path.exists() else None
 
 
-def pretrained_for(problem: Problem) -> PretrainedPolicy | None:
-    """Returns the pretrained policy of a problem's pattern; None without one, and where traffic keeps to the left."""
-    return None if problem.family.mirrored else shipped_policy(shipped_alike(problem.family.name))
+def pretrained_for(family: Family) -> PretrainedPolicy | None:
+    """Returns the pretrained policy of a family's pattern; None without one, and at mirrored places."""
+    return None if family.mirrored else shipped_policy(shipped_alike(family.name))
+
+
+def check_priors(spec: CampaignSpec) -> None:
+    """Refuses methods that start from what is not there.
+
+    Raises:
+      ConfigError: naming the method.
+    """
+    for place, name in enumerate(spec.methods):
+        wanted = METHODS[name].prior
+        if wanted in ("library", "policy") and spec.prior == "none":
+            raise ConfigError(f"methods[{place}]", f"{name} with `prior: none`", "a prior to start from")
+        lacking = [each for each in spec.families if wanted == "policy" and not pretrained_for(family_named(each))]
+        if lacking:
+            got = f"{name} at {', '.join(lacking)}, which has no pretrained policy"
+            raise ConfigError(f"methods[{place}]", got, "a family that has one", "choose risk-sac there")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -16,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.errors import ConfigError
+from risk_sac.prior.policy import DATA, MOST_BYTES
 from risk_sac.prior.script_model import ScriptModel
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scripts.motions import SIZE
 from risk_sac.types import Floats
 
 GRID = 65535  # of points in files
-MOST_BYTES = 3_000_000
-DATA = Path(str(files("risk_sac.prior"))) / "weights"
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,7 @@ from risk_sac.execution.executor import FOLDER, Cluster, Executor, Program
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import MOST_AT_ONCE, QueuedRun, Scheduler
 from risk_sac.prior.earlier import pinned_prior
+from risk_sac.prior.policy import check_priors
 from risk_sac.problem import checked_campaign
 from risk_sac.records import State, Triage, TriageState
 from risk_sac.run_folder.scratch import remove_abandoned, remove_temporaries
@@ -143,6 +144,7 @@ class Manager:
             return self._settings.campaign_folder(campaign_id)
 
         spec = checked_campaign(spec)
+        check_priors(spec)
         try:
             return spec.model_copy(update={"prior": pinned_prior(spec.prior, spec.families, folder_of)})
         except NotFoundError as error:

@@ -338,7 +338,7 @@ def test_a_stream_ends_with_its_key(world):
         began = time.monotonic()
         for _ in received:  # what was on its way already
             pass
-    assert time.monotonic() - began < 10
+    assert time.monotonic() - began < 60  # at the next event or heartbeat, and long before the campaign's end
     assert ask(world, "GET", f"{CAMPAIGN}/events", token).status == 401
     world.service.client.post(f"/v1/campaigns/{busy}/cancel")
 

@@ -34,7 +34,7 @@ def layout() -> Layout:
 @pytest.fixture(autouse=True)
 def shipped(monkeypatch: pytest.MonkeyPatch, layout: Layout) -> None:
     """A small policy in the place of the shipped one."""
-    monkeypatch.setattr(searchers, "pretrained_for", lambda problem: pretrained_policy(layout, GOALS))
+    monkeypatch.setattr(searchers, "pretrained_for", lambda family: pretrained_policy(layout, GOALS))
 
 
 def searchers_of(wanted: RunSpec) -> Searchers:
@@ -85,7 +85,7 @@ def test_the_diverse_search_shares_its_episodes_between_scripts_and_policy() -> 
 
 @pytest.mark.parametrize("family", ["low", "mixed"])
 def test_without_a_pretrained_policy_the_method_is_refused(monkeypatch: pytest.MonkeyPatch, family: str) -> None:
-    monkeypatch.setattr(searchers, "pretrained_for", lambda problem: None)
+    monkeypatch.setattr(searchers, "pretrained_for", lambda family: None)
     wanted = spec("risk-sac-pretrained").model_copy(update={"family": family})
     with pytest.raises(ConfigError, match=f"^prior: got shipped, .* at {family}; .* choose the method risk-sac$"):
         searchers_of(wanted)

@@ -2,15 +2,16 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from risk_sac.config import RunSpec
+from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.frozen_policy import respond
 from risk_sac.observation_layout import PER_ADVERSARY, PER_EGO
-from risk_sac.prior.policy import Folded, Layout, PretrainedPolicy, read_policy, with_goal, write_policy
+from risk_sac.prior.policy import Folded, Layout, PretrainedPolicy, check_priors, read_policy, with_goal, write_policy
 from risk_sac.problem import Problem
 from risk_sac.types import Vector
 from tests.builders import pretrained_policy
@@ -109,3 +110,26 @@ def test_another_layout_is_read_by_names_and_values(pretrained: PretrainedPolicy
         assert not got[:2].any()  # the stranger does as it likes
         by_name = {a: expected[2 * i : 2 * i + 2] for i, a in enumerate(layout.adversaries)}
         np.testing.assert_allclose(got[2:], np.concatenate([by_name[a] for a in own.adversaries[1:]]), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("method", "changed", "message"),
+    [
+        ("risk-sac-pretrained", {"families": ("low", "dense")}, "methods[1]: got risk-sac-pretrained at dense"),
+        ("risk-sac-pretrained", {"prior": "none"}, "methods[1]: got risk-sac-pretrained with `prior: none`"),
+        ("archive-replay", {"prior": "none"}, "methods[1]: got archive-replay with `prior: none`"),
+        ("risk-sac-pretrained", {}, ""),
+        ("archive-replay", {"families": ("low", "dense")}, ""),
+        ("risk-sac-diverse", {"prior": "none"}, ""),
+    ],
+)
+def test_methods_without_their_prior_are_refused_before_they_run(
+    method: str, changed: dict[str, Any], message: str
+) -> None:
+    spec = CampaignSpec.model_validate({"families": ("low",), "methods": ("random", method), **changed})
+    if not message:
+        check_priors(spec)
+        return
+    with pytest.raises(ConfigError) as raised:
+        check_priors(spec)
+    assert str(raised.value).startswith(message)
