@@ -12,9 +12,8 @@ from risk_sac.agents.controls import IdleAgent, RandomAgent, ScriptedAgent
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.config import RunSpec, method_of
-from risk_sac.errors import ConfigError
 from risk_sac.prior.learner import PretrainedLearner
-from risk_sac.prior.policy import Layout, pretrained_for
+from risk_sac.prior.policy import Layout, check_prior, pretrained_for
 from risk_sac.prior.sampler import PriorOptimizer, ReplayOptimizer
 from risk_sac.prior.start import start_of
 from risk_sac.problem import Problem
@@ -80,15 +79,11 @@ class Searchers:
 
     def __init__(self, spec: RunSpec, problem: Problem, observation_size: int, action_size: int) -> None:
         method = method_of(spec.method)
+        check_prior(spec.method, spec.family, spec.prior)
         self._space = problem.space
         self._spec = spec
         self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
         pretrained = None if self._start is None or not method.learns else pretrained_for(problem.family)
-        if method.prior == "library" and self._start is None:
-            raise ConfigError("prior", f"none, and the method {spec.method}", remedy="choose the method archive")
-        if method.prior == "policy" and pretrained is None:
-            got = f"{spec.prior}, and the method {spec.method} at {spec.family}"
-            raise ConfigError("prior", got, "a pretrained policy of the family's pattern", "choose the method risk-sac")
         self.agent: Actor  # Alg. 1, l. 2
         if method.agent in CONTROLS:
             self.agent = CONTROLS[method.agent](action_size, spec.stream)
@@ -99,7 +94,8 @@ class Searchers:
         else:
             self.agent = Learner(observation_size, action_size, method, spec.learner, spec.stream)
         self._own = self._searcher(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1
-        self._guide = self._searcher(ScriptFollower(problem.family), ArchiveOptimizer) if method.learns else None
+        guided = method.takes_turns or (method.learns and pretrained is None)
+        self._guide = self._searcher(ScriptFollower(problem.family), ArchiveOptimizer) if guided else None
         terms = COLD if pretrained is None else PRETRAINED
         self._turns = Turns(spec.stream, terms) if method.takes_turns else None
         self._next = self._own

@@ -16,6 +16,7 @@ from risk_sac.types import Vector
 # Choice: log σ is squashed smoothly into these bounds; a hard clamp has no gradient outside them.
 LOG_STD_MIN = -5.0
 LOG_STD_MAX = 2.0
+LOG_STD_MIDDLE, LOG_STD_HALF = 0.5 * (LOG_STD_MAX + LOG_STD_MIN), 0.5 * (LOG_STD_MAX - LOG_STD_MIN)
 
 
 class Mlp(nn.Module):
@@ -101,14 +102,12 @@ class Mlp(nn.Module):
 
 def bounded_log_std(raw: Tensor) -> Tensor:
     """Squashes the network's output into [LOG_STD_MIN, LOG_STD_MAX], elementwise and smoothly."""
-    middle, half = 0.5 * (LOG_STD_MAX + LOG_STD_MIN), 0.5 * (LOG_STD_MAX - LOG_STD_MIN)
-    return half * torch.tanh(raw) + middle
+    return LOG_STD_HALF * torch.tanh(raw) + LOG_STD_MIDDLE
 
 
 def raw_log_std(deviation: float) -> float:
     """Output of a network that `bounded_log_std` turns into log of this σ, within its bounds."""
-    middle, half = 0.5 * (LOG_STD_MAX + LOG_STD_MIN), 0.5 * (LOG_STD_MAX - LOG_STD_MIN)
-    return math.atanh((math.log(deviation) - middle) / half)
+    return math.atanh((math.log(deviation) - LOG_STD_MIDDLE) / LOG_STD_HALF)
 
 
 def tanh_gaussian(mean: Tensor, log_std: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:

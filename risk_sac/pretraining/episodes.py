@@ -20,7 +20,6 @@ from risk_sac.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.pretraining.egos import drawn_ego, training_egos
 from risk_sac.prior.shipped import GRID
-from risk_sac.records import Collision, Violation
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.scene_optimizer import Encounter
 from risk_sac.scene_optimizer.archive import mutated
@@ -168,8 +167,7 @@ def play(
 
 def outcome_of(encounter: Encounter, point: Floats, ego: str, steps: int) -> ScriptEpisode:
     """Returns an episode's row; of several valid violations the one that is worth most counts."""
-    valid = sorted(encounter.valid_violations, key=_worth, reverse=True)
-    worst = valid[0] if valid else None
+    worst = encounter.worst
     return ScriptEpisode(
         point=point,
         ego=ego,
@@ -178,10 +176,6 @@ def outcome_of(encounter: Encounter, point: Floats, ego: str, steps: int) -> Scr
         preventable=worst is not None and worst.preventable,
         candidate=worst is not None and worst.headline_candidate,
     )
-
-
-def _worth(violation: Collision | Violation) -> tuple[bool, bool]:
-    return violation.headline_candidate, violation.preventable
 
 
 def write_episodes(path: Path, episodes: list[ScriptEpisode]) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.agents.decisions import Decision, Held
-from risk_sac.agents.networks import LOG_STD_MAX, LOG_STD_MIN
+from risk_sac.agents.networks import LOG_STD_HALF, LOG_STD_MIDDLE
 from risk_sac.agents.replay import Transition
-from risk_sac.config import EgoConfig, FamilyName, LearnerConfig, RewardConfig, RunSpec
+from risk_sac.config import AgentConfig, EgoConfig, FamilyName, LearnerConfig, RewardConfig, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.frozen_policy import Layers, respond
@@ -21,7 +21,7 @@ from risk_sac.scene_optimizer import Encounter
 from risk_sac.types import Vector
 from risk_sac.verdicts.distinct import kind_name
 
-DECISION_STEPS, DISCOUNT = 5, 0.99  # as in `AgentConfig`
+DECISION_STEPS, DISCOUNT = AgentConfig().decision_steps, AgentConfig().discount
 COST_WEIGHT = 0.05  # of C_soft in the reward
 
 
@@ -100,8 +100,7 @@ def _episode(env: RiskSacEnv, turn: Turn, asked: int, random: np.random.Generato
     try:
         observation, info = env.reset(seed=seed, options={"scene": scene})
         while not ended and steps < env.problem.family.horizon_steps:
-            seen = with_goal(observation, asked)
-            action = held.act(partial(sampled, turn.layers, seen, size, random))
+            action = held.act(partial(_decided, turn.layers, observation, asked, size, random))
             before = observation
             observation, risk_reward, terminated, truncated, info = env.step(action)
             steps += 1
@@ -117,8 +116,7 @@ def _episode(env: RiskSacEnv, turn: Turn, asked: int, random: np.random.Generato
         return None
     violations = env.violations(env.requirement_results())
     met = Encounter(collision=info.get("collision"), violations=violations)
-    valid = sorted(met.valid_violations, key=lambda each: (each.headline_candidate, each.preventable), reverse=True)
-    worst = valid[0] if valid else None
+    worst = met.worst
     return PolicyEpisode(
         ego=turn.name,
         asked=asked,
@@ -131,14 +129,13 @@ def _episode(env: RiskSacEnv, turn: Turn, asked: int, random: np.random.Generato
     )
 
 
-def sampled(layers: Layers | None, seen: Vector, size: int, random: np.random.Generator) -> Vector:
+def _decided(layers: Layers | None, observation: Vector, asked: int, size: int, random: np.random.Generator) -> Vector:
     """Draws an action of a tanh-Gaussian policy; uniform without one."""
     if layers is None:
         return random.uniform(-1.0, 1.0, size).astype(np.float32)
-    mean, raw = np.split(respond(layers, seen, normalised=True), 2)
-    middle, half = 0.5 * (LOG_STD_MAX + LOG_STD_MIN), 0.5 * (LOG_STD_MAX - LOG_STD_MIN)
-    noise = np.exp(half * np.tanh(raw) + middle) * random.standard_normal(size)
-    return np.tanh(mean + noise).astype(np.float32)
+    mean, raw = np.split(respond(layers, with_goal(observation, asked), normalised=True), 2)
+    deviation = np.exp(LOG_STD_HALF * np.tanh(raw) + LOG_STD_MIDDLE)
+    return np.tanh(mean + deviation * random.standard_normal(size)).astype(np.float32)
 
 
 def _transition(

@@ -6,30 +6,25 @@ that they read the observation of a problem whose actors, scene parameters and r
 prior/weights/<family>-policy.npz   plain arrays; README.md says how they were made
 """
 
-import io
-import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.config import METHODS, CampaignSpec
+from risk_sac.config import FamilyName, RunMethod, method_of
 from risk_sac.errors import ConfigError
 from risk_sac.observation_layout import PER_ADVERSARY, PER_EGO, observation_size
+from risk_sac.prior.files import DATA, arrays_of, write_arrays
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, Violation
 from risk_sac.scenario.families import family_named, shipped_alike
 from risk_sac.scenario.family import Family
 from risk_sac.types import Vector
 
-MOST_BYTES = 3_000_000  # of a file
-DATA = Path(str(files("risk_sac.prior"))) / "weights"
 GOALS = 15  # kinds of failures that can be asked for, at most
 MANNERS = re.compile(r" (speeding|on red)")
 ABSENT_SCENE, ABSENT_REQUIREMENT = 0.5, 1.0  # entries of an observation for what a problem lacks; 0 for an adversary's
@@ -100,12 +95,9 @@ def write_policy(path: Path, pretrained: PretrainedPolicy) -> None:
         "temperature": pretrained.temperature,
         **pretrained.card,
     }
-    arrays: dict[str, NDArray[np.float16] | NDArray[np.uint8]] = {
-        "meta": np.frombuffer(json.dumps(meta).encode(), np.uint8)
-    }
-    for name, layers in (("policy", pretrained.policy), ("critics", pretrained.critics)):
-        arrays |= {f"{name}-{i}": layer.astype(np.float16) for i, layer in enumerate(layers)}
-    np.savez_compressed(path, **arrays)  # type: ignore[arg-type]  # numpy's stub takes a name for `allow_pickle`
+    networks = (("policy", pretrained.policy), ("critics", pretrained.critics))
+    arrays = {f"{name}-{i}": layer.astype(np.float16) for name, layers in networks for i, layer in enumerate(layers)}
+    write_arrays(path, meta, arrays)
 
 
 def read_policy(path: Path) -> PretrainedPolicy:
@@ -114,25 +106,19 @@ def read_policy(path: Path) -> PretrainedPolicy:
     Raises:
       ConfigError: the file is damaged, too large, or its networks do not fit its layout.
     """
-    if path.stat().st_size > MOST_BYTES:
-        raise ConfigError("prior", f"{path.name} of {path.stat().st_size} bytes", f"at most {MOST_BYTES}")
-    try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
-            meta = json.loads(arrays["meta"].tobytes())
-            count = 2 * (HIDDEN_LAYERS + 1)
-            policy, critics = (
-                tuple(arrays[f"{name}-{i}"].astype(np.float32) for i in range(count)) for name in ("policy", "critics")
-            )
+    with arrays_of(path) as (meta, arrays):
+        count = 2 * (HIDDEN_LAYERS + 1)
+        policy, critics = (
+            tuple(arrays[f"{name}-{i}"].astype(np.float32) for i in range(count)) for name in ("policy", "critics")
+        )
         scene = tuple((str(name), float(low), float(high)) for name, low, high in meta.pop("scene"))
         layout = Layout(tuple(meta.pop("adversaries")), scene, tuple(meta.pop("requirements")))
         family, goals, temperature = meta.pop("family"), tuple(meta.pop("goals")), float(meta.pop("temperature"))
         seen, acted = layout.observation_size + GOALS + 1, layout.action_size
         _check(policy, (1, seen, 2 * acted))
         _check(critics, (2, seen + acted, 1))
-    except (ValueError, KeyError, TypeError, EOFError, BadZipFile) as error:
-        raise ConfigError(
-            "prior", f"{path.name}: {error}", "what `risk-sac pretrain` writes, as this version"
-        ) from error
+        if len(goals) > GOALS or not temperature > 0.0:
+            raise ValueError(f"{len(goals)} goals, of at most {GOALS}, and a temperature of {temperature}")
     return PretrainedPolicy(family, layout, policy, critics, temperature, goals, meta)
 
 
@@ -161,20 +147,18 @@ def pretrained_for(family: Family) -> PretrainedPolicy | None:
     return None if family.mirrored else shipped_policy(shipped_alike(family.name))
 
 
-def check_priors(spec: CampaignSpec) -> None:
-    """Refuses methods that start from what is not there.
+def check_prior(name: RunMethod, family: FamilyName, prior: str) -> None:
+    """Refuses a method that starts from what is not there.
 
     Raises:
-      ConfigError: naming the method.
+      ConfigError: the method starts from a prior, and there is none at this family.
     """
-    for place, name in enumerate(spec.methods):
-        wanted = METHODS[name].prior
-        if wanted in ("library", "policy") and spec.prior == "none":
-            raise ConfigError(f"methods[{place}]", f"{name} with `prior: none`", "a prior to start from")
-        lacking = [each for each in spec.families if wanted == "policy" and not pretrained_for(family_named(each))]
-        if lacking:
-            got = f"{name} at {', '.join(lacking)}, which has no pretrained policy"
-            raise ConfigError(f"methods[{place}]", got, "a family that has one", "choose risk-sac there")
+    wanted = method_of(name).prior
+    if wanted in ("library", "policy") and prior == "none":
+        raise ConfigError("prior", f"none, and the method {name}", "one", "choose archive or risk-sac instead")
+    if wanted == "policy" and pretrained_for(family_named(family)) is None:
+        got = f"{name} at {family}, which has no pretrained policy"
+        raise ConfigError("method", got, "a family that has one", "choose risk-sac there")
 
 
 @dataclass(frozen=True, slots=True)

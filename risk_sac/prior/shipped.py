@@ -3,19 +3,14 @@
 prior/weights/<family>.npz   plain arrays; README.md says how they were made
 """
 
-import io
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 
-from risk_sac.errors import ConfigError
-from risk_sac.prior.policy import DATA, MOST_BYTES
+from risk_sac.prior.files import DATA, arrays_of, write_arrays
 from risk_sac.prior.script_model import ScriptModel
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scripts.motions import SIZE
@@ -39,12 +34,8 @@ def write_prior(path: Path, prior: Prior) -> None:
     """Writes a prior as plain arrays."""
     names = {"kinds": prior.model.kinds, "egos": prior.model.egos, "library_kinds": prior.library_kinds}
     meta = {"family": prior.family, **names, **prior.card}
-    arrays: dict[str, NDArray[np.float16] | NDArray[np.uint16] | NDArray[np.uint8]] = {
-        "meta": np.frombuffer(json.dumps(meta).encode(), np.uint8),
-        "library": np.round(prior.library * GRID).astype(np.uint16),
-        **prior.model.arrays(),
-    }
-    np.savez_compressed(path, **arrays)  # type: ignore[arg-type]  # numpy's stub takes a name for `allow_pickle`
+    library = np.round(prior.library * GRID).astype(np.uint16)
+    write_arrays(path, meta, {"library": library, **prior.model.arrays()})
 
 
 def read_prior(path: Path) -> Prior:
@@ -53,21 +44,13 @@ def read_prior(path: Path) -> Prior:
     Raises:
       ConfigError: the file is damaged, too large, or for scenes and scripts of another layout.
     """
-    if path.stat().st_size > MOST_BYTES:
-        raise ConfigError("prior", f"{path.name} of {path.stat().st_size} bytes", f"at most {MOST_BYTES}")
-    try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
-            meta = json.loads(arrays["meta"].tobytes())
-            library = arrays["library"].astype(np.float64) / GRID
-            model = ScriptModel.from_arrays(arrays, tuple(meta.pop("kinds")), tuple(meta.pop("egos")))
+    with arrays_of(path) as (meta, arrays):
+        library = arrays["library"].astype(np.float64) / GRID
+        model = ScriptModel.from_arrays(arrays, tuple(meta.pop("kinds")), tuple(meta.pop("egos")))
         family, kinds = meta.pop("family"), tuple(meta.pop("library_kinds"))
         wanted = inputs_of(family)
         if library.shape != (len(kinds), wanted) or model.inputs != wanted:
             raise ValueError(f"points of {model.inputs} and {library.shape[1:]} numbers, not {wanted}")
-    except (ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise ConfigError(
-            "prior", f"{path.name}: {error}", "what `risk-sac pretrain` writes, as this version"
-        ) from error
     return Prior(family, model, library, kinds, meta)
 
 

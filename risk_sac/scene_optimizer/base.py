@@ -45,6 +45,11 @@ class Encounter:
         contact = () if self.collision is None else (self.collision,)
         return tuple(each for each in (*contact, *self.violations) if each.valid)
 
+    @property
+    def worst(self) -> Collision | Violation | None:
+        """Returns the valid violation that counts most: for the headline, then a preventable one, then the first."""
+        return max(self.valid_violations, key=lambda each: (each.headline_candidate, each.preventable), default=None)
+
 
 NOBODY = Encounter()
 

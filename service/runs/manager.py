@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 
 from risk_sac.config import CampaignSpec
@@ -15,7 +16,7 @@ from risk_sac.execution.executor import FOLDER, Cluster, Executor, Program
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import MOST_AT_ONCE, QueuedRun, Scheduler
 from risk_sac.prior.earlier import pinned_prior
-from risk_sac.prior.policy import check_priors
+from risk_sac.prior.policy import check_prior
 from risk_sac.problem import checked_campaign
 from risk_sac.records import State, Triage, TriageState
 from risk_sac.run_folder.scratch import remove_abandoned, remove_temporaries
@@ -144,7 +145,8 @@ class Manager:
             return self._settings.campaign_folder(campaign_id)
 
         spec = checked_campaign(spec)
-        check_priors(spec)
+        for family, name in product(spec.families, spec.methods):
+            check_prior(name, family, spec.prior)
         try:
             return spec.model_copy(update={"prior": pinned_prior(spec.prior, spec.families, folder_of)})
         except NotFoundError as error:

@@ -55,9 +55,11 @@ def test_a_policy_is_the_same_however_it_was_trained(tmp_path: Path) -> None:
     parts = trained(tmp_path / "parts", (6, 12), 1)
     assert whole.curve == parts.curve
     assert [point["episodes"] for point in whole.curve] == [6, 12]
-    for one, two in zip(whole.agent.networks(), parts.agent.networks(), strict=True):
-        for own, other in zip(one, two, strict=True):
+    untrained = PolicyTraining("low", 5).agent.networks()
+    for one, two, before in zip(whole.agent.networks(), parts.agent.networks(), untrained, strict=True):
+        for own, other, first in zip(one, two, before, strict=True):
             np.testing.assert_array_equal(own, other)
+            assert not np.array_equal(own, first)  # it has learnt
 
 
 def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached() -> None:

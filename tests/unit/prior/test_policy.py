@@ -2,16 +2,15 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.config import FamilyName, RunMethod, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.frozen_policy import respond
 from risk_sac.observation_layout import PER_ADVERSARY, PER_EGO
-from risk_sac.prior.policy import Folded, Layout, PretrainedPolicy, check_priors, read_policy, with_goal, write_policy
+from risk_sac.prior.policy import Folded, Layout, PretrainedPolicy, check_prior, read_policy, with_goal, write_policy
 from risk_sac.problem import Problem
 from risk_sac.types import Vector
 from tests.builders import pretrained_policy
@@ -48,11 +47,13 @@ def test_a_file_gives_back_what_was_written(tmp_path: Path, pretrained: Pretrain
         np.testing.assert_array_equal(own, other)
 
 
-@pytest.mark.parametrize("damage", ["cut", "text", "layout", "nan"])
+@pytest.mark.parametrize("damage", ["cut", "text", "layout", "nan", "temperature"])
 def test_other_files_are_refused_in_one_line(tmp_path: Path, pretrained: PretrainedPolicy, damage: str) -> None:
     path = tmp_path / "low-policy.npz"
     if damage == "layout":
         pretrained = replace(pretrained, layout=replace(pretrained.layout, requirements=("no_contact",)))
+    if damage == "temperature":
+        pretrained = replace(pretrained, temperature=0.0)
     if damage == "nan":
         pretrained.critics[0][:] = np.nan
     write_policy(path, pretrained)
@@ -113,23 +114,22 @@ def test_another_layout_is_read_by_names_and_values(pretrained: PretrainedPolicy
 
 
 @pytest.mark.parametrize(
-    ("method", "changed", "message"),
+    ("method", "family", "prior", "message"),
     [
-        ("risk-sac-pretrained", {"families": ("low", "dense")}, "methods[1]: got risk-sac-pretrained at dense"),
-        ("risk-sac-pretrained", {"prior": "none"}, "methods[1]: got risk-sac-pretrained with `prior: none`"),
-        ("archive-replay", {"prior": "none"}, "methods[1]: got archive-replay with `prior: none`"),
-        ("risk-sac-pretrained", {}, ""),
-        ("archive-replay", {"families": ("low", "dense")}, ""),
-        ("risk-sac-diverse", {"prior": "none"}, ""),
+        ("risk-sac-pretrained", "dense", "shipped", "method: got risk-sac-pretrained at dense, which has no pretrained"),
+        ("risk-sac-pretrained", "low", "none", "prior: got none, and the method risk-sac-pretrained"),
+        ("archive-replay", "low", "none", "prior: got none, and the method archive-replay"),
+        ("risk-sac-pretrained", "low", "shipped", ""),
+        ("archive-replay", "dense", "shipped", ""),
+        ("risk-sac-diverse", "dense", "none", ""),
     ],
 )
-def test_methods_without_their_prior_are_refused_before_they_run(
-    method: str, changed: dict[str, Any], message: str
+def test_methods_without_their_prior_are_refused(
+    method: RunMethod, family: FamilyName, prior: str, message: str
 ) -> None:
-    spec = CampaignSpec.model_validate({"families": ("low",), "methods": ("random", method), **changed})
     if not message:
-        check_priors(spec)
+        check_prior(method, family, prior)
         return
     with pytest.raises(ConfigError) as raised:
-        check_priors(spec)
+        check_prior(method, family, prior)
     assert str(raised.value).startswith(message)
