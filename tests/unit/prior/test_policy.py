@@ -116,7 +116,12 @@ def test_another_layout_is_read_by_names_and_values(pretrained: PretrainedPolicy
 @pytest.mark.parametrize(
     ("method", "family", "prior", "message"),
     [
-        ("risk-sac-pretrained", "dense", "shipped", "method: got risk-sac-pretrained at dense, which has no pretrained"),
+        (
+            "risk-sac-pretrained",
+            "dense",
+            "shipped",
+            "method: got risk-sac-pretrained at dense, which has no pretrained",
+        ),
         ("risk-sac-pretrained", "low", "none", "prior: got none, and the method risk-sac-pretrained"),
         ("archive-replay", "low", "none", "prior: got none, and the method archive-replay"),
         ("risk-sac-pretrained", "low", "shipped", ""),

@@ -6,10 +6,9 @@ import pytest
 
 from risk_sac.config import RunSpec, SceneOptimizerConfig
 from risk_sac.errors import ConfigError
+from risk_sac.prior.files import DATA, MOST_BYTES
 from risk_sac.prior.sampler import Arm, PriorOptimizer, ReplayOptimizer, Yields
 from risk_sac.prior.shipped import (
-    DATA,
-    MOST_BYTES,
     Prior,
     inputs_of,
     read_prior,
