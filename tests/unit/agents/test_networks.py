@@ -92,9 +92,10 @@ def test_initial_weights_fill_the_range_of_a_linear_layer() -> None:
     assert weight.std().item() == pytest.approx(0.1 / math.sqrt(3.0), rel=0.02)
 
 
-def test_one_input_gives_what_a_batch_gives_even_after_a_copy_or_a_change() -> None:
+@pytest.mark.parametrize("normalised", [False, True])
+def test_one_input_gives_what_a_batch_gives_even_after_a_copy_or_a_change(normalised: bool) -> None:
     generator = torch.Generator().manual_seed(0)
-    network = Mlp((5, 16, 16, 6), generator)
+    network = Mlp((5, 16, 16, 6), generator, normalised=normalised)
     twin = copy.deepcopy(network)
     for parameter in twin.parameters():
         parameter.data.mul_(2.0)
