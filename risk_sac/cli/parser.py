@@ -19,11 +19,18 @@ Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
 """Where a group of commands adds its parsers."""
 
 
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """Help whose lines break at spaces only, so that names with hyphens stay whole."""
+
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        return textwrap.wrap(" ".join(text.split()), width, break_on_hyphens=False)
+
+
 class Parser(argparse.ArgumentParser):
     """Parser with titled groups of flags, whose errors name the closest known name."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
-        options["formatter_class"] = argparse.RawDescriptionHelpFormatter
+        options["formatter_class"] = _Help
         super().__init__(*args, **options)
         self._titled: dict[str, argparse._ArgumentGroup] = {}
 

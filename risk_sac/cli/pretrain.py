@@ -26,17 +26,21 @@ def add(commands: Commands) -> None:
         " script model and library, and DIR/<family>-policy.npz with the curve of its training beside it.",
         example="pretrain --families low --streams 2 --chunks 4 --policy-episodes 0 --out results/prior",
     )
-    parser.add_argument("--families", nargs="+", choices=SHIPPED, default=list(SHIPPED), metavar="NAME")
+    titles = ("scene", "script model", "policy", "execution", "output")
+    scene, scripts, policy, execution, output = map(parser.group, titles)
+    scene.add_argument(
+        "--families", nargs="+", choices=SHIPPED, default=list(SHIPPED), metavar="NAME", help="(default: all)"
+    )
     streams = "independent sequences of script episodes for each family; 0: no script model (default: %(default)s)"
-    parser.add_argument("--streams", type=number(int, 0, 100), default=4, metavar="N", help=streams)
+    scripts.add_argument("--streams", type=number(int, 0, 100), default=4, metavar="N", help=streams)
     chunks = "chunks of 250 episodes in each stream (default: %(default)s)"
-    parser.add_argument("--chunks", type=number(int, 1, 10_000), default=50, metavar="N", help=chunks)
+    scripts.add_argument("--chunks", type=number(int, 1, 10_000), default=50, metavar="N", help=chunks)
     episodes = "episodes of the policy for each family; 0: no policy (default: %(default)s)"
-    parser.add_argument("--policy-episodes", type=number(int, 0, 1_000_000), default=10_000, metavar="N", help=episodes)
-    parser.add_argument("--seed", type=number(int, 0), default=0, metavar="S", help="(default: %(default)s)")
+    policy.add_argument("--policy-episodes", type=number(int, 0, 1_000_000), default=10_000, metavar="N", help=episodes)
+    execution.add_argument("--seed", type=number(int, 0), default=0, metavar="S", help="(default: %(default)s)")
     jobs = "processes that play at a time (default: one per core)"
-    parser.add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help=jobs)
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="for episodes and priors")
+    execution.add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help=jobs)
+    output.add_argument("--out", type=Path, required=True, metavar="DIR", help="for episodes and priors")
 
 
 def _pretrain(options: argparse.Namespace) -> int:

@@ -8,13 +8,13 @@ from pathlib import Path
 from risk_sac.adjustments import adjustments
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
+from risk_sac.loop import Observer
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import set_aside
 from risk_sac.run_folder.results import EPISODES, RESULTS, RecordedFailure, Results, read_results, write_results
 from risk_sac.run_folder.verified import read_verified, with_headline
-from risk_sac.train import Observer
 
 logger = logging.getLogger(__name__)
 
@@ -126,5 +126,5 @@ def _read(spec: RunSpec, folder: Path) -> Results:
             raise
         checkpoint.load_newest(folder / CHECKPOINT, spec.digest)
         aside = set_aside(folder / RESULTS)
-        logger.warning("%s. It is kept as %s and written anew; the time spent so far is lost", error, aside.name)
+        logger.warning("%s. It is kept as %s and written again; the time spent so far is lost", error, aside.name)
         return _claim(spec, folder)

@@ -40,43 +40,46 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="risk-sac keys", description="API keys of the service; it heeds changes at once."
+        prog="risk-sac keys",
+        description="Create, list and revoke API keys of the service.\nA running service applies changes at once.",
+        epilog="example:\n  risk-sac keys create --project maps --scope run",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     folder = argparse.ArgumentParser(add_help=False)
     folder.add_argument(
-        "--data-dir", type=Path, metavar="DIR", help="of the service (default: RISK_SAC_DATA_DIR or data)"
+        "--data-dir", type=Path, metavar="DIR", help="folder of the service (default: RISK_SAC_DATA_DIR or data)"
     )
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    create = commands.add_parser("create", help="make a key and print it, this once", parents=[folder])
+    create = commands.add_parser("create", help="make a key and print it once", parents=[folder])
     create.set_defaults(command=_create)
-    create.add_argument("--project", type=_project, required=True, help="who owns what is posted with it")
+    create.add_argument("--project", type=_project, required=True, help="owner of what is posted with it")
     create.add_argument("--name", type=_name, default="", help="a note, such as the holder's name")
     create.add_argument(
         "--scope",
         type=Scope,
         default=Scope.RUN,
         metavar="read|run|admin",
-        help="look; also post, cancel and delete; also all of that in every project, and the metrics (default: run)",
+        help="read; also post, cancel and delete; also all of that in every project, and the metrics (default: run)",
     )
     create.add_argument(
-        "--anew", action="store_true", help="in place of a lost or damaged file of keys, which are worthless then"
+        "--replace-file", action="store_true", help="replace a lost or damaged file of keys; its keys become invalid"
     )
-    list_ = commands.add_parser("list", help="all keys, without their secrets", parents=[folder])
+    list_ = commands.add_parser("list", help="list all keys, without their secrets", parents=[folder])
     list_.set_defaults(command=_list)
-    revoke = commands.add_parser("revoke", help="make a key worthless", parents=[folder])
+    revoke = commands.add_parser("revoke", help="make a key invalid", parents=[folder])
     revoke.set_defaults(command=_revoke)
     revoke.add_argument("id", help="as `list` shows it")
     open_ = commands.add_parser(
-        "open", help="forget all keys; on a loopback address everybody may do everything then", parents=[folder]
+        "open", help="delete all keys; on a loopback address, every process then has all rights", parents=[folder]
     )
     open_.set_defaults(command=_open)
-    open_.add_argument("--yes", action="store_true", required=True, help="to say that this is meant")
+    open_.add_argument("--yes", action="store_true", required=True, help="confirm it")
     return parser
 
 
 def _create(settings: ServiceSettings, options: argparse.Namespace) -> None:
-    file = KeyFile(settings.keys_file) if options.anew else _file(settings)
-    make = file.create_anew if options.anew else file.create
+    file = KeyFile(settings.keys_file) if options.replace_file else _file(settings)
+    make = file.replace if options.replace_file else file.create
     with noting(settings):
         key, token = make(options.project, options.name, options.scope)
     console.print(token, markup=False)  # alone on standard output, for scripts
@@ -99,7 +102,7 @@ def _revoke(settings: ServiceSettings, options: argparse.Namespace) -> None:
 
 def _open(settings: ServiceSettings, options: argparse.Namespace) -> None:
     KeyFile(settings.keys_file).open_all()
-    console.print("All keys are forgotten. On a loopback address nobody needs one until the next is created.")
+    console.print("All keys are deleted. On a loopback address no key is needed until the next one is created.")
 
 
 def _file(settings: ServiceSettings) -> KeyFile:

@@ -23,7 +23,7 @@ from service.errors import KeysError
 from service.host.data_folder import FILE_MODE, FOLDER_MODE
 
 PROJECT = "[a-z0-9][a-z0-9-]{0,39}"
-REMEDY = "restore their file from a copy, or make a new one by `risk-sac keys create --anew`"
+REMEDY = "restore their file from a copy, or make a new one by `risk-sac keys create --replace-file`"
 _TOKEN = re.compile(r"rsk_([0-9a-f]{8})_([A-Za-z0-9_-]{43})")
 
 
@@ -107,7 +107,7 @@ class KeyFile:
             self._write(Document(keys=(*keys, key)))
         return key, token
 
-    def create_anew(self, project: str, name: str, scope: Scope) -> tuple[Key, str]:
+    def replace(self, project: str, name: str, scope: Scope) -> tuple[Key, str]:
         """Makes the first key of a new file; refuses to replace an intact one."""
         with self._turn():
             try:
@@ -115,18 +115,20 @@ class KeyFile:
             except DamagedKeysError:
                 whole = False
             if whole:
-                raise KeysError(f"keys file {str(self.path)!r} is whole; wanted a lost or damaged one: `revoke` keys")
+                raise KeysError(
+                    f"keys file {str(self.path)!r} is intact; wanted a lost or damaged one: `revoke` its keys"
+                )
             key, token = _mint(project, name, scope, set())
             self._write(Document(keys=(key,)))
         return key, token
 
     def open_all(self) -> None:
-        """Forgets all keys; every local process may then call without a key."""
+        """Deletes all keys; every local process may then call without a key."""
         with self._turn():
             self._write(Document(keys=(), open=True))
 
     def revoke(self, key_id: str) -> Key:
-        """Makes a key worthless; does nothing to one that is already."""
+        """Makes a key invalid; has no effect on an invalid one."""
         with self._turn():
             keys = {key.id: key for key in self.read()}
             if key_id not in keys:
@@ -176,4 +178,4 @@ def missing(path: Path) -> KeysError:
 
 
 def _unusable(path: Path, how: str) -> str:
-    return f"keys file {str(path)!r} is {how}; {REMEDY}, after which all earlier ones are worthless"
+    return f"keys file {str(path)!r} is {how}; {REMEDY}, which makes all earlier keys invalid"

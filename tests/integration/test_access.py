@@ -375,7 +375,7 @@ def test_with_its_keys_missing_a_service_lets_nobody_in_and_says_what_to_do(worl
                 assert answer.status == status
             else:
                 assert_refused(answer, 503, "keys_unavailable")
-                assert "make a new one by `risk-sac keys create --anew`" in answer.text
+                assert "make a new one by `risk-sac keys create --replace-file`" in answer.text
     assert ask(world, "GET", CAMPAIGN, "own").status == 200
 
 

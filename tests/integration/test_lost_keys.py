@@ -50,7 +50,7 @@ def test_lost_keys_open_nothing(serve, monkeypatch, capsys):
             assert service.client.get("/openapi.json").status_code == 200
         assert "is missing, although keys were made; restore their file from a copy" in service.log.read_text()
         assert main(["create", "--project", "maps"]) == 1
-        with create(service, capsys, "--anew") as new:
+        with create(service, capsys, "--replace-file") as new:
             assert new.get("/v1/campaigns").status_code == 200
             assert holder.get("/v1/campaigns").status_code == 401
             assert service.client.get("/v1/campaigns").status_code == 401

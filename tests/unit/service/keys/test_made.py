@@ -77,12 +77,12 @@ def test_the_command_takes_lost_keys_for_lost(
         capsys.readouterr()
         for command in (["list"], CREATE, ["revoke", old.id]):
             assert main(command) == 1
-            assert "make a new one by `risk-sac keys create --anew`" in capsys.readouterr().err
-        assert main([*CREATE, "--anew"]) == 0
+            assert "make a new one by `risk-sac keys create --replace-file`" in capsys.readouterr().err
+        assert main([*CREATE, "--replace-file"]) == 0
         (new,) = file.read()
         assert new.id != old.id
-    assert main([*CREATE, "--anew"]) == 1
-    assert "is whole" in capsys.readouterr().err
+    assert main([*CREATE, "--replace-file"]) == 1
+    assert "is intact" in capsys.readouterr().err
     assert file.read() == (new,)
 
 
@@ -97,11 +97,11 @@ def test_a_server_notes_keys_that_it_sees_and_heeds_what_is_noted(
     made.settle(store.engine, file)
     ring = KeyRing(file.path, made)
     for _ in range(3):
-        with pytest.raises(KeysError, match=r"is missing, although keys were made; restore .* create --anew`"):
+        with pytest.raises(KeysError, match=r"is missing, although keys were made; restore .* create --replace-file`"):
             ring.find(token)
         with pytest.raises(KeysError, match="missing"):
             _ = ring.open
-    _, new = file.create_anew("maps", "", Scope.RUN)
+    _, new = file.replace("maps", "", Scope.RUN)
     assert ring.find(new) is not None
     assert ring.find(token) is None
     assert not ring.open
