@@ -87,7 +87,40 @@ def power_of(spec: CampaignSpec, played: Collection[Played], runs: Sequence[Run]
         if lacking := [family for family in spec.families if family not in known]:
             sentences.append(f"Nothing was measured of {method} in {', '.join(lacking)}.")
         methods.append(found.model_copy(update={"budgets": budgets, "sentences": tuple(sentences)}))
-    return Power(note=NOTE, methods=tuple(methods))
+    return Power(note=NOTE, comparison=_comparison(methods, runs), methods=tuple(methods))
+
+
+def _comparison(methods: Sequence[MethodPower], runs: Sequence[Run]) -> str:
+    """Compares methods on equal terms: the defects and environment steps that all of them were measured with."""
+    found = [each for each in methods if each.budgets]
+    if len(found) < 2:
+        return ""
+    shared = set.intersection(*({(each.defect, each.family) for each in method.defects} for method in found))
+    if not shared:
+        return "No known defect was measured with all of these methods: do not compare the counts below."
+    names = {each.method for each in found}
+    runs = [run for run in runs if run.method in names and (run.defect, run.family) in shared]
+    limits = {family: _shared_steps(family, found, runs) for family in sorted({family for _, family in shared})}
+    expected = {}
+    for method in found:
+        budgets = {each.family: (limits[each.family], each.runs) for each in method.budgets if each.family in limits}
+        expected[method.method] = method_power(method.method, budgets, runs).expected
+    spent = " and ".join(f"{steps:,} environment steps in {family}" for family, steps in limits.items())
+    return (
+        f"All of these methods were measured with {len(shared)} known defects, within {spent}. "
+        f"Of these they detect on average: {', '.join(f'{name} {value:.3g}' for name, value in expected.items())}. "
+        "The counts below are out of all defects that each method was measured with: do not compare them."
+    )
+
+
+def _shared_steps(family: str, found: Sequence[MethodPower], runs: Sequence[Run]) -> int:
+    """Returns the most steps of a run that all methods may spend and were measured for."""
+    measured_for: dict[tuple[str, str], int] = {}
+    for run in runs:
+        if run.family == family:
+            cell = run.defect, run.method
+            measured_for[cell] = max(measured_for.get(cell, 0), run.budget_steps)
+    return min(*measured_for.values(), *(each.steps for one in found for each in one.budgets if each.family == family))
 
 
 def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequence[Run]) -> MethodPower:
@@ -111,10 +144,11 @@ def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequ
     once = tuple(each.defect for each in found if each.detected)
     most = tuple(each.defect for each in found if 2 * each.detected > each.runs)
     never = tuple(each.defect for each in found if not each.detected)
+    families = ", ".join(family for family in budgets if any(each.family == family for each in found))
     about = f"{'at least ' if at_least else ''}{expected:.3g} on average"
     sentence = (
-        f"Of {len(found)} known defects this budget detects {about}: {len(most)} in most seeds, "
-        f"{len(once)} at least once; never found: {', '.join(never) or 'none'}."
+        f"Of {len(found)} known defects that it was measured with in {families}, this budget detects {about}: "
+        f"{len(most)} in most seeds, {len(once)} at least once; never found: {', '.join(never) or 'none'}."
     )
     return MethodPower(
         method=method,

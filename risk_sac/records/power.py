@@ -64,9 +64,12 @@ class Power(Record):
 
     note: str
     """What the figures rest on."""
+    comparison: str
+    """Methods on the defects and steps that all were measured with; empty unless two or more were measured."""
     methods: tuple[MethodPower, ...]
 
     @property
     def lines(self) -> list[str]:
-        """One for each method, in words."""
-        return [f"{each.method}: {' '.join(each.sentences)}" for each in self.methods]
+        """The comparison if there is one, and a line for each method."""
+        lines = [f"{each.method}: {' '.join(each.sentences)}" for each in self.methods]
+        return [self.comparison, *lines] if self.comparison else lines

@@ -41,7 +41,9 @@ def test_the_power_of_a_campaign_goes_by_its_own_episodes(service):
     spent = sum(run["metrics"]["environment_steps"] for run in service.get(campaign_id)["runs"])
     (budget,) = archive.budgets
     assert (budget.family, budget.runs, budget.episodes, budget.steps) == ("low", 2, 5, round(spent / 2))
-    assert archive.sentences[0].startswith(f"Of {len(archive.defects)} known defects this budget detects ")
+    assert archive.sentences[0].startswith(
+        f"Of {len(archive.defects)} known defects that it was measured with in low, "
+    )
     assert "whichever ego this campaign has, remote ones included" in power.note
     assert service.get(campaign_id, "/power") == power.model_dump(mode="json")
 

@@ -22,7 +22,8 @@ def test_the_power_of_a_budget_is_what_was_detected_within_it() -> None:
         DefectPower(defect="speeds", family="mixed", detected=1, runs=1),
     )
     assert found.sentences == (
-        "Of 2 known defects this budget detects 1.5 on average: 1 in most seeds, 2 at least once; never found: none.",
+        "Of 2 known defects that it was measured with in low, mixed, this budget detects 1.5 on average: "
+        "1 in most seeds, 2 at least once; never found: none.",
         "Seeds that were measured: 1 to 2 of each defect.",
     )
     found = method_power("archive", {"low": (9000, 1), "mixed": (8999, 1)}, RUNS)
@@ -37,7 +38,9 @@ def test_several_seeds_detect_what_one_of_them_does() -> None:
 def test_beyond_what_was_measured_a_budget_detects_at_least_as_much() -> None:
     found = method_power("archive", {"low": (20_001, 1)}, RUNS)
     assert found.at_least
-    assert found.sentences[0].startswith("Of 1 known defects this budget detects at least 0.5 on average")
+    assert found.sentences[0].startswith(
+        "Of 1 known defects that it was measured with in low, this budget detects at least 0.5 on"
+    )
 
 
 def test_steps_of_a_campaign_are_those_of_its_own_episodes_once_there_are_some() -> None:
@@ -60,9 +63,26 @@ def test_what_was_not_measured_is_said_in_a_line() -> None:
     place = "crossing_0123456789ab"
     spec = CampaignSpec(families=("low", place), methods=("random", "sac"), ego=EgoConfig(driver="idm-aeb"))
     random, sac = power_of(spec, [], RUNS).lines
-    assert random.startswith("random: Of 1 known defects this budget detects at least 0 on average: ")
+    assert random.startswith(
+        "random: Of 1 known defects that it was measured with in low, this budget detects at least 0 on average: "
+    )
     assert random.endswith(f" Nothing was measured of random in {place}.")
     assert sac == f"sac: Nothing was measured of sac in low, {place}."
+
+
+def test_methods_are_compared_by_what_all_of_them_were_measured_with() -> None:
+    runs = RUNS + runs_of(TEXT.replace(",random,0,5000,5000,50,,", ",random,1,5000,200,2,200,"))[4:]
+    spec = CampaignSpec(families=("low", "mixed"), methods=("archive", "random"), budget=Budget(episodes=300))
+    found = power_of(spec, [], runs)
+    assert [len(each.defects) for each in found.methods] == [2, 1], "with different defects"
+    assert found.comparison.startswith(
+        "All of these methods were measured with 1 known defects, within 5,000 environment steps in low. "
+        "Of these they detect on average: archive 0.5, random 0.5. "
+    )
+    assert found.lines[0] == found.comparison
+    assert power_of(spec.model_copy(update={"methods": ("archive", "sac")}), [], runs).comparison == ""
+    apart = [run for run in runs if (run.family == "mixed") is (run.method == "archive")]
+    assert power_of(spec, [], apart).comparison.startswith("No known defect was measured with all of these methods")
 
 
 def test_what_is_shipped_is_of_the_catalogue() -> None:
@@ -75,7 +95,9 @@ def test_the_command_tells_the_power_of_flags_and_of_the_folder_of_a_run(tmp_pat
     file = tmp_path / "detections.csv"
     file.write_text(TEXT)
     assert cli.main(["power", "--families", "low", "--steps", "20000", "--measured", str(file)]) == 0
-    assert "Of 1 known defects this budget detects 0.5 on average" in " ".join(capsys.readouterr().out.split())
+    assert "Of 1 known defects that it was measured with in low, this budget detects 0.5 on average" in " ".join(
+        capsys.readouterr().out.split()
+    )
     assert cli.main(["power", "--method", "ddpg", "--measured", str(file)]) == 2
     problem = capsys.readouterr().err
     assert "--method: got 'ddpg', of which nothing was measured in low, mixed, dense; wanted archive, random" in problem

@@ -15,6 +15,7 @@ export function Worth({ campaign }: { campaign: Body<"Campaign"> }) {
       <h2 id="worth-title" title={value.note}>
         What finding nothing is worth
       </h2>
+      {value.comparison && <p>{value.comparison}</p>}
       {value.methods.map(({ method, sentences }) => (
         <p key={method} title={sentences.slice(1).join(" ")}>
           <b>{method}</b>: {sentences[0]}
