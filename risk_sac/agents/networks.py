@@ -20,7 +20,7 @@ LOG_STD_MIDDLE, LOG_STD_HALF = 0.5 * (LOG_STD_MAX + LOG_STD_MIN), 0.5 * (LOG_STD
 
 
 class Mlp(nn.Module):
-    """Perceptrons of equal shape with ReLU between their layers, stacked so that one product serves them all."""
+    """Stacked perceptrons of equal shape with ReLU between layers; one product evaluates all."""
 
     def __init__(
         self, sizes: Sequence[int], generator: torch.Generator, *, count: int = 1, normalised: bool = False
@@ -78,7 +78,7 @@ class Mlp(nn.Module):
 
     @torch.no_grad()
     def copy_from(self, layers: Layers) -> None:
-        """Takes over what `arrays` returns."""
+        """Copies values, as `arrays` returns them, into the parameters."""
         for parameter, layer in zip(chain.from_iterable(self._layers), layers, strict=True):
             parameter.copy_(torch.from_numpy(layer))
 

@@ -1,4 +1,4 @@
-"""`risk-sac export`: a failure, or the episodes of runs, in a format of other tools."""
+"""`risk-sac export`: writes a failure, or the episodes of runs, for other tools."""
 
 import argparse
 import textwrap
@@ -27,7 +27,7 @@ def add(commands: Commands) -> None:
         example="export failure.npz --format openscenario --out failure.xosc",
         epilog=f"formats:\n{formats}",
     )
-    source = "the bundle of a failure; of parquet: folders of runs, or folders that hold such"
+    source = "the bundle of a failure; for parquet: folders of runs, or folders that contain some"
     parser.add_argument("source", type=Path, nargs="+", metavar="BUNDLE", help=source)
     output = parser.group("output")
     output.add_argument("--format", required=True, choices=[*map(str, FormatName)], metavar="FORMAT", help="see below")
@@ -63,9 +63,11 @@ def _failure(name: FormatName, bundle: Path) -> Files:
 
 
 def _runs(folders: list[Path]) -> Iterator[Path]:
-    """The folders of runs among some, and right below them."""
+    """Finds the folders of runs among the given ones and directly below them."""
     for folder in folders:
         found = [folder] if (folder / RESULTS).exists() else sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
         if not found:
-            raise ConfigError("BUNDLE", f"{folder}, which holds no run", "the folder of a run, or one with such in it")
+            raise ConfigError(
+                "BUNDLE", f"{folder}, which holds no run", "the folder of a run, or one that contains some"
+            )
         yield from found

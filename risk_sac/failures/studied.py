@@ -19,28 +19,28 @@ class Extent(Record):
     """Amount of the adversaries' actions."""
 
     adversaries: int
-    """That do anything but drive on as SUMO's drivers would, or walk on."""
+    """Adversaries that act: they do not only drive on as SUMO's drivers do, or walk on."""
     segments: int
-    """Segments of 0.5 s of an adversary in which it does."""
+    """Segments of 0.5 s in which an adversary acts."""
     channels: int
-    """Of these, drive and steering counted apart."""
+    """The same, with drive and steering counted apart."""
     strongest: float
-    """Greatest action, of 1."""
+    """Greatest action; at most 1."""
 
 
 class Core(Record):
-    """Minimised failure, and how surely it fails."""
+    """Minimised failure, and how often its perturbed copies fail."""
 
     before: Extent
     after: Extent
     plain_parameters: int
-    """Of the scene, in the middle of their ranges."""
+    """Parameters of the scene in the middle of their ranges."""
     parameters: int
-    """Without those that stand for one of two categories."""
+    """Parameters of the scene, without those that choose one of two categories."""
     episodes: int
-    """That were played to find it."""
+    """Episodes that were played to find it."""
     held: int
-    """Copies, perturbed by up to 1 %, that still fail; other ones than those that the reductions were chosen by."""
+    """Copies, perturbed by up to 1 %, that still fail; no reduction was chosen by these copies."""
     copies: int
     sentence: str
     """What happens, in words."""
@@ -60,10 +60,10 @@ NEEDLE = 0.5
 
 
 class Share(Record):
-    """Of the copies that differ from a failure in one way, those that fail as it does."""
+    """Share of copies that differ from a failure in one way and still fail."""
 
     what: str
-    """In which way they differ."""
+    """The difference."""
     failed: int
     played: int
     low: float
@@ -72,20 +72,20 @@ class Share(Record):
 
     @classmethod
     def of(cls, what: str, failed: int, played: int) -> "Share":
-        """With its interval."""
+        """Computes the interval of a share."""
         low, high = wilson_interval(failed, played)
         return cls(what=what, failed=failed, played=played, low=low, high=high)
 
 
 class Region(Record):
-    """Surroundings of a failure; the shares in the order of `region`."""
+    """Surroundings of a failure: shares of copies that still fail, the nearest copies first."""
 
     shares: tuple[Share, ...]
 
     @computed_field  # type: ignore[prop-decorator]
     @property
     def needle(self) -> bool:
-        """Whether fewer than half of the nearest scenes fail: a failure that one would hardly meet again."""
+        """Whether fewer than half of the nearest scenes fail, so that the failure is unlikely to recur."""
         nearest = self.shares[0]
         return nearest.failed < NEEDLE * nearest.played
 
@@ -102,24 +102,21 @@ class Studied(Record):
 
 
 class _Note(Studied):
-    """A file."""
+    """File of studies."""
 
     digest: str
-    """Of the results."""
+    """Of the run's results."""
 
 
 def note(folder: Path, digest: str, index: int, studied: Studied) -> None:
-    """Writes the core or the region of a failure into a run's folder.
-
-    The digest of the run's results goes with it.
-    """
+    """Writes the core or the region of a failure, with the results' digest, into a run's folder."""
     file = folder / STUDIES / f"{index:06d}-{'region' if studied.core is None else 'core'}.json"
     file.parent.mkdir(exist_ok=True)
     replace_file(file, _Note(digest=digest, **dict(studied)).model_dump_json(indent=2).encode())
 
 
 def edition(folder: Path) -> str:
-    """Returns a text that changes whenever something is noted."""
+    """Returns a text that changes with every write of a study."""
     try:
         return " ".join(sorted(f"{file.name}:{file.stat().st_mtime_ns}" for file in (folder / STUDIES).glob("*.json")))
     except OSError:

@@ -22,7 +22,7 @@ def effective_collision_rate(counts: Counts) -> float:
 
 
 def preventable_collision_rate(counts: Counts) -> float:
-    """PCR: the preventable ones per episode."""
+    """PCR: preventable contacts per episode."""
     return _share(counts.preventable_collisions, counts.rated)
 
 

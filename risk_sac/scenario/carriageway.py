@@ -39,10 +39,10 @@ class Surroundings(NamedTuple):
 
 
 class Carriageway:
-    """The carriageway of one net; surroundings are computed when an ego first comes there."""
+    """Carriageway of one net; surroundings are computed when an ego first reaches them."""
 
     def __init__(self, net: Net | None = None) -> None:
-        """Takes lanes and junctions of a net; without one there is no ground at all."""
+        """Reads the lanes and junctions of a net; without a net, the carriageway is empty."""
         pieces, ways, segments = [], [], []
         for lane, limit_mps in () if net is None else _lanes(net):
             for i, (a, b) in enumerate(pairwise(lane.line)):
@@ -60,7 +60,7 @@ class Carriageway:
         self._known: dict[tuple[int, int, int], Surroundings] = {}
 
     def around(self, x_m: float, y_m: float, sector: int) -> Surroundings:
-        """The surroundings of a point for a sector of headings, see `sector_of`, or for `ANY_WAY`."""
+        """Returns the surroundings of a point for a sector of headings, see `sector_of`, or `ANY_WAY`."""
         key = int(x_m // SQUARE_M), int(y_m // SQUARE_M), sector
         if (known := self._known.get(key)) is None:
             known = self._known[key] = self._surroundings(*key)
@@ -81,12 +81,12 @@ class Carriageway:
 
 @lru_cache(maxsize=8)
 def carriageway_of(net: str) -> Carriageway:
-    """The carriageway of a net, a file below `sumo_nets/` or anywhere."""
+    """Returns the carriageway of a net, a file below `sumo_nets/` or an absolute path."""
     return Carriageway(parse_net(read_tree(Path(str(files("sumo_nets"))) / net)))
 
 
 def sector_of(heading_rad: float) -> int:
-    """The sector that a heading is in."""
+    """Returns the sector of a heading."""
     return round(heading_rad / SECTOR_RAD) % SECTORS
 
 
@@ -103,7 +103,7 @@ def _lanes(net: Net) -> Iterator[tuple[Lane, float]]:
 
 
 def _crossed_junctions(net: Net) -> Iterator[shapely.Geometry]:
-    """The areas of junctions where links from different roads cross or meet, without walkways."""
+    """Yields areas of junctions where links from different roads cross or meet, without walkways."""
     links: dict[str, list[Link]] = {}
     for leading in net.onward.values():
         for link in leading:
@@ -119,11 +119,11 @@ def _polygon(outline: Sequence[Point]) -> shapely.Geometry:
 
 
 def _outline(ground: shapely.Geometry, bounds: tuple[float, float, float, float]) -> Floats:
-    """The rings of polygons, as the rows of `Surroundings.edges`; what lies on the bounds is a cut."""
+    """Returns the rings of polygons as rows of `Surroundings.edges`; an edge on the bounds is a cut."""
     rows = []
     for polygon in shapely.get_parts(ground):
         for ring in (polygon.exterior, *polygon.interiors) if polygon.geom_type == "Polygon" else ():
-            points = shapely.get_coordinates(ring).round(3)  # so that no digit of GEOS's own is left
+            points = shapely.get_coordinates(ring).round(3)  # removes rounding errors of GEOS
             for a, b in pairwise(points):
                 on = [abs(a[k % 2] - bounds[k]) < 1e-6 and abs(b[k % 2] - bounds[k]) < 1e-6 for k in range(4)]
                 length2 = ((b - a) ** 2).sum()

@@ -1,4 +1,4 @@
-"""The families by name: those that are shipped, and those at places that the library keeps."""
+"""Scenario families by name: those shipped, and those at places that the library keeps."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -13,7 +13,7 @@ from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Place,
 
 
 def family_at(name: str, place: Place) -> Family:
-    """A place's pattern, as a family with this name."""
+    """Returns the family of a place's pattern under this name."""
     match place:
         case Stretch():
             return car_following.family(name, place)
@@ -39,7 +39,7 @@ def shipped_alike(name: str) -> str:
 
 
 def family_named(name: str) -> Family:
-    """A shipped family, or one of the library; raises `ConfigError` if there is none of this name."""
+    """Returns a family, shipped or of the library; raises `ConfigError` if none has this name."""
     return FAMILIES[name] if name in FAMILIES else _kept(name)
 
 

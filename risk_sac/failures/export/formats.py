@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 REMEDY = "pip install 'risk-sac[export]' brings it"
 ZIP = "application/zip"
 Files = Mapping[str, bytes]
-"""What an export is made of: name → content."""
+"""Files of an export: name → content."""
 
 
 class FormatName(StrEnum):
@@ -39,7 +39,7 @@ class Format:
 
     title: str  # in a menu
     what: str  # in one sentence
-    packages: tuple[str, ...] = ()  # that it imports, beyond those that are always there
+    packages: tuple[str, ...] = ()  # that it imports besides those of risk-sac
     suffix: str = ".zip"  # of what is downloaded: several files, or the one that it is
     media_type: str = ZIP
     of: Literal["failure", "episodes"] = "failure"  # one failure, or all episodes of runs

@@ -23,11 +23,11 @@ from risk_sac.failures.export.written import BESIDE, beside, document
 from risk_sac.failures.play import repeated
 from risk_sac.types import STEP_S
 
-DOMAINS = ("route", "trafficlight", "vehicle", "vehicletype")  # in which `risk_sac.sim` gives commands
+DOMAINS = ("route", "trafficlight", "vehicle", "vehicletype")  # that `risk_sac.sim` commands
 QUESTIONS = ("get", "is", "subscribe")  # beginnings of functions that change nothing
 LACKS = ("pedestrians as persons of SUMO: they are points of their own dynamics", "what the ego sees", "requirements")
 NET, TYPES, CONFIGURATION, FCD = "net.net.xml", "vtypes.add.xml", "failure.sumocfg", "fcd.xml"
-ZOOM = 2500.0  # of sumo-gui, in which some 30 m are seen
+ZOOM = 2500.0  # of sumo-gui: shows about 30 m
 LONG = {"-n": "net-file", "-a": "additional-files"}
 HERE = {"net-file": NET, "additional-files": TYPES}  # where they lie in the export
 Call = tuple[str, str, list[Any], dict[str, Any]]
@@ -39,7 +39,7 @@ VehicleState = dict[str, Any]
 
 
 @dataclass(slots=True)
-class Heard:
+class SumoLog:
     """Options that SUMO was started with, the commands before each step, and the vehicles after it."""
 
     options: list[str] = field(default_factory=list)
@@ -48,24 +48,24 @@ class Heard:
 
 
 @contextmanager
-def _tapped() -> Iterator[Heard]:
-    """Records what this process tells libsumo; `risk_sac.sim` calls it as a module, so that no command is missed."""
-    heard = Heard()
+def _tapped() -> Iterator[SumoLog]:
+    """Records the calls of this process to libsumo; `risk_sac.sim` calls it as a module, so none is missed."""
+    log = SumoLog()
 
     def start(command: list[str], own: Any = libsumo.start) -> None:
         own(command)
-        heard.options += command[1:]
+        log.options += command[1:]
 
     def step(time: float = 0.0, own: Any = libsumo.simulationStep) -> None:
         own(time)
-        heard.states.append([_state(id_) for id_ in libsumo.vehicle.getIDList()])
-        heard.calls.append([])
+        log.states.append([_state(id_) for id_ in libsumo.vehicle.getIDList()])
+        log.calls.append([])
 
     with ExitStack() as taps:
 
-        def tap(owner: Any, name: str, told: Any) -> None:
+        def tap(owner: Any, name: str, function: Any) -> None:
             taps.callback(setattr, owner, name, vars(owner)[name])
-            setattr(owner, name, told)
+            setattr(owner, name, function)
 
         tap(libsumo, "start", start)
         tap(libsumo, "simulationStep", step)
@@ -73,16 +73,16 @@ def _tapped() -> Iterator[Heard]:
             owner = getattr(libsumo, domain)
             for name, function in vars(owner).copy().items():
                 if not name.startswith(("_", *QUESTIONS)) and isinstance(function, staticmethod):
-                    tap(owner, name, staticmethod(_told(heard, domain, name, function.__func__)))
-        yield heard
+                    tap(owner, name, staticmethod(_logged(log, domain, name, function.__func__)))
+        yield log
 
 
-def _told(heard: Heard, domain: str, name: str, function: Any) -> Any:
-    def told(*arguments: Any, **named: Any) -> Any:
-        heard.calls[-1].append((domain, name, list(arguments), named))
+def _logged(log: SumoLog, domain: str, name: str, function: Any) -> Any:
+    def logged(*arguments: Any, **named: Any) -> Any:
+        log.calls[-1].append((domain, name, list(arguments), named))
         return function(*arguments, **named)
 
-    return told
+    return logged
 
 
 def _state(id_: str) -> VehicleState:
@@ -105,29 +105,29 @@ def _state(id_: str) -> VehicleState:
 def files(failure: Recorded) -> Files:
     """Plays the failure again, and returns its files; a SimulationError if it does not repeat here."""
     manifest = failure.manifest
-    with _tapped() as heard, closing(RiskSacEnv.of(manifest.spec)) as env:
+    with _tapped() as log, closing(RiskSacEnv.of(manifest.spec)) as env:
         repeated(env, manifest.spec, manifest.episode, failure.series)
-    heard = Heard(heard.options, heard.calls[: failure.frames], heard.states[: failure.frames])
-    if len(heard.states) != failure.frames:
-        raise SimulationError(f"{failure.name} took {len(heard.states)} steps; wanted {failure.frames}")
+    log = SumoLog(log.options, log.calls[: failure.frames], log.states[: failure.frames])
+    if len(log.states) != failure.frames:
+        raise SimulationError(f"{failure.name} took {len(log.states)} steps; wanted {failure.frames}")
     types = Path(str(resources("sumo_nets") / TYPES))
     return {
         "replay.py": Path(__file__).with_name("sumo_replay.py").read_bytes(),
-        CONFIGURATION: _configuration(failure, heard),
+        CONFIGURATION: _configuration(failure, log),
         NET: failure.net_file.read_bytes(),
         TYPES: types.read_bytes(),
-        "commands.json": _commands(failure, heard),
-        FCD: _fcd(failure, heard),
+        "commands.json": _commands(failure, log),
+        FCD: _fcd(failure, log),
         BESIDE: beside(failure, LACKS),
     }
 
 
-def _configuration(failure: Recorded, heard: Heard) -> bytes:
-    """Returns the options that it was played with; sumo-gui opens them too."""
+def _configuration(failure: Recorded, log: SumoLog) -> bytes:
+    """Returns the options of the replay as a configuration, which sumo-gui opens too."""
     root = ET.Element("configuration")
-    root.append(ET.Comment(f" {failure.name}; {BESIDE} has what SUMO cannot say of it, replay.py plays it "))
+    root.append(ET.Comment(f" {failure.name}; {BESIDE} has what SUMO cannot express, replay.py plays it "))
     options = ET.SubElement(root, "options")
-    for name, value in _pairs(heard.options):
+    for name, value in _pairs(log.options):
         ET.SubElement(options, name, value=HERE.get(name, value))
     return document(root)
 
@@ -143,19 +143,19 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str]]:
     return pairs
 
 
-def _commands(failure: Recorded, heard: Heard) -> bytes:
+def _commands(failure: Recorded, log: SumoLog) -> bytes:
     """Returns the commands before each step, a line each."""
     head = {"failure": failure.name, "ego": failure.ego.id, "striker": failure.violation.other_id, "zoom": ZOOM}
-    told = ",\n".join(json.dumps(calls) for calls in heard.calls)
+    told = ",\n".join(json.dumps(calls) for calls in log.calls)
     return f'{json.dumps(head)[:-1]}, "commands": [\n{told}\n]}}\n'.encode()
 
 
-def _fcd(failure: Recorded, heard: Heard) -> bytes:
+def _fcd(failure: Recorded, log: SumoLog) -> bytes:
     """Returns floating car data as SUMO's own output has it, but in full precision."""
     root = ET.Element("fcd-export")
-    root.append(ET.Comment(f" {failure.name}; {BESIDE} has what SUMO cannot say of it "))
+    root.append(ET.Comment(f" {failure.name}; {BESIDE} has what SUMO cannot express "))
     walkers = [actor for actor in failure.actors if actor.pedestrian]
-    for frame, states in enumerate(heard.states):
+    for frame, states in enumerate(log.states):
         step = ET.SubElement(root, "timestep", time=f"{(frame + 1) * STEP_S:.2f}")
         for state in states:
             ET.SubElement(step, "vehicle", {name: str(value) for name, value in state.items()})

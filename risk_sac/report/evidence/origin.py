@@ -35,19 +35,19 @@ class Origin:
 
 
 def again(comparison: Comparison, run: FinishedRun) -> str:
-    """The command that gives a run's digest again; the last section says where its spec is from."""
+    """Returns the command that reproduces a run's digest; the last section says where its spec is from."""
     return run_command(run.spec, comparison.spec_file, "repeated")
 
 
 def show_command(folder: Path, failure: str) -> str:
-    """Draws a failure of a run whose folder lies here."""
+    """Returns the command that draws a failure of the run in a folder."""
     return shlex.join(["risk-sac", "show", str(folder), failure, "--out", "failure.png"])
 
 
 def draw(run: FinishedRun, folder: Path | None, index: int) -> Drawing:
-    """Draw the failure of an episode from above, or say what is missing; `folder`: of its run."""
+    """Draws the failure of an episode from above, or says what is missing; `folder` is that of its run."""
     if folder is None:
-        return Drawing(None, "the folder of its run is not there")
+        return Drawing(None, "the folder of its run is missing")
     record = next(each for each in run.records if each.index == index)
     try:
         with (folder / FAILURES / series_name(index)).open("rb") as file, np.load(file, allow_pickle=False) as archive:

@@ -181,7 +181,7 @@ def test_a_picture_that_cannot_be_had_is_said_to_be_missing(told, tmp_path):
     series.parent.mkdir()
     series.write_bytes(b"PK\x03\x04 damaged")
     assert "is damaged" in both(told, folders={run.spec.digest: tmp_path for run in told.runs})[0]
-    assert "the folder of its run is not there" in both(told)[0]
+    assert "the folder of its run is missing" in both(told)[0]
 
 
 def test_a_regression_is_told_with_what_a_baseline_knows(told):
