@@ -195,7 +195,7 @@ def episode_record(index: int = 0, outcome: Outcome = Outcome.SAFE, **changes: A
     """Of the search; none before it was longer or shorter, and one that was refused has no step."""
     steps = changes.get("steps", 0 if outcome is Outcome.REJECTED else 100)
     values: dict[str, Any] = {
-        "phase": "train",
+        "phase": "search",
         "seed": index,
         "scene": {"lead_gap_m": 12.5},
         "reason": "",

@@ -7,11 +7,11 @@ from typing import Self
 
 from risk_sac.config import Budget, RunMethod, RunSpec
 from risk_sac.failures.detected import candidates, detected
+from risk_sac.loop import execute_run
 from risk_sac.records import EpisodeRecord, Record, RunMetrics, SeriesFile
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import FAILURES
 from risk_sac.run_folder.series import read_series
-from risk_sac.train import train
 
 ANSWER = "detection.json"
 MOST_EPISODES = 20_000  # scenes that are refused cost no steps
@@ -117,7 +117,7 @@ def _play(spec: RunSpec, folder: Path, budget_steps: int, before: Detection | No
     seen = _Candidates(budget_steps, judged=before.episodes if before else 0)
     found, refuted, failure = None, before.refuted if before else 0, None
     while found is None:
-        train(spec, folder, seen)  # goes on where it stopped; libsumo is free in between
+        execute_run(spec, folder, seen)  # goes on where it stopped; libsumo is free in between
         if not seen.waiting:
             break
         while seen.waiting and found is None:

@@ -122,12 +122,12 @@ def _plain(failure: RecordedFailure) -> dict[str, Any]:
 
 
 def _table(run: str, failures: Sequence[RecordedFailure]) -> Table:
-    """Returns a table of failures, under the id of the run, with which their own ids begin.
+    """Returns a table of failures by number, under the id of their run.
 
     Fits 80 columns; only the last one wraps.
     """
     table = narrow_table(
-        "id",
+        "number,\nphase",
         OUTCOME,
         "other",
         "speed\nof ego,\nother,\nm/s",
@@ -137,17 +137,16 @@ def _table(run: str, failures: Sequence[RecordedFailure]) -> Table:
         title=run,
     )
     for failure in failures:
-        violation = failure.episode.worst_violation
+        episode, violation = failure.episode, failure.episode.worst_violation
         if violation is None:
             continue
         cells = _of_contact(violation) if isinstance(violation, Collision) else _without_contact(violation)
-        reason = failure.episode.reason
         table.add_row(
-            failure.id.removeprefix(f"{run}-"),
-            outcome(failure.episode, violation),
+            f"{episode.index}\n{episode.phase}",
+            outcome(episode, violation),
             violation.other_id or "",
             *cells,
-            in_words([reason]) if reason else "\n".join(offences(violation)),
+            in_words([episode.reason]) if episode.reason else "\n".join(offences(violation)),
         )
     return table
 

@@ -12,12 +12,12 @@ from types import FrameType
 
 from risk_sac.config import RunSpec
 from risk_sac.execution.recorder import Recorder
+from risk_sac.loop import execute_run
 from risk_sac.prior.earlier import pinned_prior
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.durable import held
 from risk_sac.run_folder.results import Results
-from risk_sac.train import train
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
 Progress = Callable[[int, RunMetrics | None], None]
@@ -42,7 +42,7 @@ def run(spec: RunSpec, folder: Path, progress: Progress) -> Results:
         stop_signal() as stopping,
         closing(Recorder(spec, folder, Watcher(progress, stopping))) as recorder,
     ):
-        return recorder.finish(train(spec, folder, recorder))
+        return recorder.finish(execute_run(spec, folder, recorder))
 
 
 @dataclass(frozen=True, slots=True)

@@ -164,14 +164,14 @@ def _run(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int, rep
 def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int, replays: int) -> Finished:
     from risk_sac.execution.recorder import Recorder  # here, so that the slow import happens with a heartbeat
     from risk_sac.execution.verify import verify
+    from risk_sac.loop import execute_run
     from risk_sac.report.runs import read_run
     from risk_sac.run_folder.verified import Verified, with_headline
-    from risk_sac.train import train
 
     if memory_bytes:
         limit_memory(memory_bytes)  # from here on: where it ends while libsumo is loaded, the process crashes
     with closing(Recorder(spec, folder, reporter)) as recorder:
-        summary = train(spec, folder, recorder)
+        summary = execute_run(spec, folder, recorder)
         results = recorder.finish(summary)
     found, finished = dict[Path, Verified](), summary.finished
     if finished and replays:

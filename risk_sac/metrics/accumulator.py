@@ -10,7 +10,7 @@ from typing import Any
 
 from risk_sac.metrics.rows import METRICS, steps_per_distinct_failure
 from risk_sac.metrics.tally import Tally
-from risk_sac.records import Counts, EpisodeRecord, Record, RunMetrics
+from risk_sac.records import FORMER_PHASES, Counts, EpisodeRecord, Record, RunMetrics
 
 HISTOGRAMS = (
     "episodes_driven_by",
@@ -92,11 +92,13 @@ def _figures(tally: Tally) -> dict[str, Any]:
 def results_digest(records: Sequence[EpisodeRecord]) -> str:
     """SHA-256 over one line of canonical JSON per record; equal digests mean equal results.
 
-    Keys are sorted and floats written so that they read back exactly. Records hold no wall-clock values.
+    Keys are sorted, floats written so that they read back exactly, and phases by their former names, so that older
+    digests hold. Records hold no wall-clock values.
     """
     digest = hashlib.sha256()
     for record in records:
-        line = json.dumps(record, default=_plain, sort_keys=True, separators=(",", ":"))
+        former = record.model_copy(update={"phase": FORMER_PHASES.get(record.phase, record.phase)})
+        line = json.dumps(former, default=_plain, sort_keys=True, separators=(",", ":"))
         digest.update(line.encode() + b"\n")
     return digest.hexdigest()
 

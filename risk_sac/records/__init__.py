@@ -16,9 +16,11 @@ from risk_sac.records.campaign import (
     Total,
 )
 from risk_sac.records.episode import (
-    RECORDED,
+    FORMER_PHASES,
+    PHASES,
     Ending,
     Episode,
+    EpisodeId,
     EpisodePage,
     EpisodeRecord,
     Failure,

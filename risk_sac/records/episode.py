@@ -1,10 +1,13 @@
 """One episode: how it ended, which requirements it violated, and how people triaged it."""
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
-from typing import Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, get_args
+
+from pydantic import BeforeValidator
 
 from risk_sac.records.base import Least, Page, Real, Record
 from risk_sac.records.run import DrivenBy, Funnel
@@ -23,8 +26,25 @@ class Outcome(StrEnum):
 
 
 Phase = Literal["search", "evaluation", "iid"]
-# As records and ids name a phase. Of `iid` alone a bound on how often the ego fails may be drawn; nothing pools it.
-RECORDED: Mapping[Phase, str] = {"search": "train", "evaluation": "evaluate", "iid": "iid"}
+PHASES: tuple[Phase, ...] = get_args(Phase)  # `iid` alone bounds how often the ego fails; nothing pools it
+FORMER_PHASES: Mapping[Phase, str] = {"search": "train", "evaluation": "evaluate"}  # in older records, and in digests
+_NAMED: Mapping[str, Phase] = {each: each for each in PHASES} | {old: new for new, old in FORMER_PHASES.items()}
+_ID = re.compile(r"(?:([^\0]*)-)?([a-z]+)-([0-9]{1,9})")
+
+
+class EpisodeId(NamedTuple):
+    """The parts of an episode's id."""
+
+    run_id: str  # empty if the text names none
+    phase: Phase
+    index: int
+
+    @classmethod
+    def parse(cls, text: str) -> "EpisodeId | None":
+        """Splits an id, whose phase may have its former name; None if it is malformed."""
+        parts = _ID.fullmatch(text)
+        phase = _NAMED.get(parts[2]) if parts else None
+        return cls(parts[1] or "", phase, int(parts[3])) if parts and phase else None
 
 
 class EpisodeRecord(Record):
@@ -32,8 +52,7 @@ class EpisodeRecord(Record):
 
     index: int
     """0-based within the run, rejected scenes included."""
-    phase: str
-    """train (the search) | evaluate (the evaluation) | iid (the i.i.d. phase)"""
+    phase: Annotated[Phase, BeforeValidator(lambda name: _NAMED.get(str(name), name))]
     seed: int
     scene: Mapping[str, Real]
     outcome: Outcome
@@ -99,7 +118,7 @@ class EpisodeRecord(Record):
     @property
     def searching(self) -> bool:
         """Whether it belongs to the search, and not to the evaluation of the frozen policy."""
-        return self.phase == RECORDED["search"]
+        return self.phase == "search"
 
     @property
     def evaluating(self) -> bool:
@@ -107,7 +126,7 @@ class EpisodeRecord(Record):
 
         That is the second phase of a run that has one.
         """
-        return self.phase == RECORDED["evaluation"]
+        return self.phase == "evaluation"
 
     def refused(self, rule: str, requirements: Collection[str]) -> "EpisodeRecord":
         """The same episode, whose valid violations of these requirements fail one more rule."""

@@ -8,7 +8,7 @@ from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunMethod, Run
 from risk_sac.failures.clusters import Overview, overview
 from risk_sac.failures.studied import Studied
 from risk_sac.metrics import MetricName, pooled_headline
-from risk_sac.records import RECORDED, EpisodeRecord, Phase
+from risk_sac.records import PHASES, EpisodeRecord, Phase
 from risk_sac.report.cells import Cell, cell_of, metrics_of
 from risk_sac.report.paired import PairedTest, corrected, paired_tests
 from risk_sac.report.runs import PAID_FOR, TESTED, FinishedRun, found_within
@@ -66,7 +66,7 @@ class Comparison:
     @property
     def phases(self) -> tuple[Phase, ...]:
         """The phases that runs have."""
-        return tuple(phase for phase in RECORDED if any(cell.phase == phase for cell in self.cells))
+        return tuple(phase for phase in PHASES if any(cell.phase == phase for cell in self.cells))
 
     def group(self, family: FamilyName, phase: Phase) -> tuple[Cell, ...]:
         """The cells of one table, the reference first."""
@@ -147,7 +147,7 @@ def _failures(family: FamilyName, runs: Sequence[FinishedRun]) -> Iterator[tuple
 def _cells(runs: Sequence[FinishedRun]) -> Iterator[Cell]:
     for _, of_family in groupby(runs, key=lambda run: run.spec.family):
         cells = [list(group) for _, group in groupby(of_family, key=lambda run: run.cell)]
-        for phase in RECORDED:
+        for phase in PHASES:
             yield from (cell_of(group, phase) for group in cells if phase in group[0].metrics)
 
 

@@ -12,7 +12,7 @@ from risk_sac.config import FamilyName, RunMethod, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Studied, read_studies
 from risk_sac.metrics import MetricsAccumulator, Tally, results_digest
-from risk_sac.records import RECORDED, EpisodeRecord, Phase, RunMetrics
+from risk_sac.records import PHASES, EpisodeRecord, Phase, RunMetrics
 from risk_sac.run_folder.results import EPISODES, read_results, records_from_lines
 from risk_sac.run_folder.verified import Verified, read_verified
 from risk_sac.scenario.families import family_named
@@ -48,13 +48,13 @@ class FinishedRun:
 
     def phase(self, phase: Phase) -> tuple[EpisodeRecord, ...]:
         """Its episodes of one phase."""
-        return tuple(record for record in self.records if record.phase == RECORDED[phase])
+        return tuple(record for record in self.records if record.phase == phase)
 
     @cached_property
     def metrics(self) -> Mapping[Phase, RunMetrics]:
         """The metrics of each phase that has episodes."""
         found: dict[Phase, RunMetrics] = {}
-        for phase in RECORDED:
+        for phase in PHASES:
             accumulator = MetricsAccumulator(family_named(self.spec.family).horizon_steps)
             records = self.phase(phase)
             for record in records:

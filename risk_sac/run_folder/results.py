@@ -17,7 +17,7 @@ from pydantic import AliasChoices, Field, TypeAdapter
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
-from risk_sac.records import Adjustment, EpisodeRecord, RunMetrics
+from risk_sac.records import Adjustment, EpisodeId, EpisodeRecord, RunMetrics
 from risk_sac.run_folder.durable import read_sealed, write_sealed
 
 RESULTS = "results.json"
@@ -68,10 +68,11 @@ class Results:
 
         The id may stand with or without the run's id in front.
         """
+        wanted = EpisodeId.parse(id_)
         for failure in self.failures:
             episode = failure.episode
-            known = (failure.id, episode.id_in(self.spec.id), f"{episode.phase}-{episode.index}")
-            if id_ in known or (id_.isdecimal() and int(id_) == episode.index):
+            known = [EpisodeId(run_id, episode.phase, episode.index) for run_id in (self.spec.id, "")]
+            if wanted in known or (id_.isdecimal() and int(id_) == episode.index):
                 return failure
         if not self.failures:
             raise ConfigError("FAILURE", f"{id_!r}", remedy="the run has no failures")

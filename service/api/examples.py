@@ -22,7 +22,7 @@ TITLES = {
 """Of operations whose name would say too little; see `title`."""
 PARAMETERS: Mapping[str, str] = {
     "campaign_id": "c197f3a52d8e06b4c",
-    "failure_id": "low-archive-0-train-17",
+    "failure_id": "low-archive-0-search-17",
     "run_id": "low-archive-0",
     "network_id": "n0ca7d1f36b2e8450",
     "regression_id": "c197f3a52d8e06b4c-3f9a1c5b7d2e4068",

@@ -13,7 +13,7 @@ from async_lru import alru_cache
 from sse_starlette import ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.records import RECORDED, Episode, Outcome, StateChange, wire
+from risk_sac.records import Episode, Outcome, StateChange, wire
 from service.errors import NotFoundError, StorageError
 from service.store.reading import Store
 
@@ -110,7 +110,7 @@ def decode_position(store: Store, campaign_id: str, event_id: str) -> int | None
 def _event(campaign_id: str, position: int, event: Episode | StateChange) -> bytes:
     name = "state"
     if isinstance(event, Episode):
-        found = event.outcome is Outcome.FAILURE and event.phase != RECORDED["iid"]
+        found = event.outcome is Outcome.FAILURE and event.phase != "iid"
         name = "failure" if found else "episode"
     id_ = base64.urlsafe_b64encode(f"{campaign_id}-{position}".encode()).decode()  # opaque to clients
     return ServerSentEvent(wire(event).decode(), event=name, id=id_, sep="\n").encode()

@@ -9,7 +9,7 @@ from operator import attrgetter
 from sqlalchemy import ColumnElement, Select, select
 from sqlalchemy.orm import Session
 
-from risk_sac.records import RECORDED, DrivenBy, Episode, Fault, Grade, Outcome, Severity
+from risk_sac.records import DrivenBy, Episode, EpisodeId, Fault, Grade, Outcome, Severity
 from service.errors import NotFoundError
 from service.store.stored import StoredPage, read_episode
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow
@@ -42,7 +42,7 @@ class Judged:
         if self.broke is not None:
             yield EpisodeRow.broke.contains(f",{self.broke},", autoescape=True)
         if not self.iid:
-            yield EpisodeRow.phase != RECORDED["iid"]
+            yield EpisodeRow.phase != "iid"
 
 
 def find_campaign(session: Session, campaign_id: str, project: str | None = None) -> CampaignRow:
@@ -82,15 +82,19 @@ def episode_page(
 
 def find_failure(session: Session, campaign: CampaignRow, failure_id: str) -> EpisodeRow:
     """Returns the campaign's failure with this id."""
-    run_id, phase, index = _split(failure_id)
+    wanted = EpisodeId.parse(failure_id)
     query = (
-        select(EpisodeRow)
-        .join(EpisodeRow.run)
-        .where(RunRow.campaign_number == campaign.number, RunRow.id == run_id)
-        .where(EpisodeRow.phase == phase, EpisodeRow.index == index)
-        .where(EpisodeRow.outcome.in_([Outcome.FAILURE, Outcome.DEGENERATE]))
+        None
+        if wanted is None
+        else (
+            select(EpisodeRow)
+            .join(EpisodeRow.run)
+            .where(RunRow.campaign_number == campaign.number, RunRow.id == wanted.run_id)
+            .where(EpisodeRow.phase == wanted.phase, EpisodeRow.index == wanted.index)
+            .where(EpisodeRow.outcome.in_([Outcome.FAILURE, Outcome.DEGENERATE]))
+        )
     )
-    row = session.scalars(query).one_or_none()
+    row = None if query is None else session.scalars(query).one_or_none()
     if row is None:
         message = f"campaign {campaign.id} has no failure {failure_id!r}; GET its `failures?tier=raw` lists them all"
         raise NotFoundError(message, field="failure_id", got=failure_id)
@@ -101,12 +105,3 @@ def find_triage(session: Session, episode: EpisodeRow) -> TriageRow | None:
     """The triage of a failure; None without one."""
     place = {"campaign_number": episode.campaign_number, "episode_number": episode.number}
     return session.scalars(select(TriageRow).filter_by(**place)).one_or_none()
-
-
-def _split(failure_id: str) -> tuple[str, str, int]:
-    """Splits an id into run, phase and index; a malformed one yields an impossible run."""
-    for phase in RECORDED.values():
-        run_id, _, index = failure_id.rpartition(f"-{phase}-")  # the last: an i.i.d. run's own id has it too
-        if "\0" not in run_id and index.isascii() and index.isdigit() and len(index) < 10:
-            return run_id, phase, int(index)
-    return "", "", -1

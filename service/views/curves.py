@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.metrics import WINDOW
-from risk_sac.records import RECORDED, DrivenBy, Outcome, Real, Record, State
+from risk_sac.records import DrivenBy, Outcome, Real, Record, State
 from risk_sac.types import Floats
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
 from service.views.failure_table import Kinds, Plain, is_preventable, violations_of
 
-SEARCH = RECORDED["search"]
 Counts = NDArray[np.int64]
 
 
@@ -58,7 +57,7 @@ def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: i
     """Returns curves of all searches with at most `points` points; a run's episodes come in order."""
     searches = {run.number: _Search() for run in campaign.searches}
     for each in episodes:
-        if each.phase == SEARCH:
+        if each.phase == "search":
             searches[each.run_number].add(each.outcome, each.record)
     return Curves(runs=[_curves(run, searches[run.number], points) for run in campaign.searches])
 

@@ -17,6 +17,7 @@ from risk_sac.records import (
     Fault,
     Grade,
     Outcome,
+    Phase,
     Real,
     Record,
     Severity,
@@ -97,8 +98,7 @@ class FailureTable(Record):
     seeds: list[int]
     indices: list[int]
     """0-based within the run."""
-    phases: list[str]
-    """train | evaluate"""
+    phases: list[Phase]
     driven_by: list[DrivenBy | None]
     """What drove the adversaries; null in older records."""
     valid: list[bool]

@@ -23,12 +23,12 @@ from risk_sac.env import RiskSacEnv
 from risk_sac.errors import SimulationError
 from risk_sac.failures.play import repeated
 from risk_sac.failures.recording import Series
+from risk_sac.loop import execute_run
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, EpisodeRecord, RunMetrics, SeriesFile, Severity, Violation
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import EPISODES, FAILURES, records_from_lines, series_name
 from risk_sac.run_folder.series import read_series
-from risk_sac.train import train
 from risk_sac.verdicts.distinct import DistinctFailures
 from risk_sac.verdicts.judge import judge
 from tests.acceptance.verdict_shares import evidence_of
@@ -84,7 +84,7 @@ def spec_of(family: str, ego: str, seed: int, steps: int) -> RunSpec:
 def play(spec: RunSpec, folder: Path, steps: int) -> None:
     """Plays a run, or goes on with it."""
     observer = StepBudget(steps, folder / EPISODES)
-    train(spec, folder, observer)
+    execute_run(spec, folder, observer)
     observer.save()
 
 

@@ -25,7 +25,7 @@ from risk_sac.config import (
     SceneOptimizerConfig,
     WarmStartConfig,
 )
-from risk_sac.train import train
+from risk_sac.loop import execute_run
 from tests.listener import Listener
 
 RECORDED = Path(__file__).with_suffix(".json")
@@ -58,7 +58,7 @@ def digest(family: str, method: str, folder: Path) -> str:
     spec = RunSpec.model_validate(
         {"family": family, "method": method, "seed": SEEDS[family], "budget": BUDGET, "learner": LEARNER}
     )
-    return train(spec, folder, Listener()).digest
+    return execute_run(spec, folder, Listener()).digest
 
 
 def read() -> list[dict[str, Any]]:

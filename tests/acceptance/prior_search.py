@@ -20,11 +20,11 @@ from typing import NamedTuple
 from risk_sac.config import SHIPPED, Budget, EgoConfig, RunMethod, RunSpec
 from risk_sac.egos.registry import pinned
 from risk_sac.execution.recorder import Recorder
+from risk_sac.loop import execute_run
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.results import EPISODES, RESULTS, records_from_lines
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import Map
-from risk_sac.train import train
 from risk_sac.verdicts.distinct import kind_name
 from tests.acceptance.regression_prior import Until
 from tests.maps import osm_town
@@ -79,7 +79,7 @@ def play(search: Search, steps: int, out: Path) -> dict[str, object]:
             budget=Budget(episodes=MOST_EPISODES),
         )
         with closing(Recorder(spec, folder, Until(steps))) as recorder:
-            recorder.finish(train(spec, folder, recorder))
+            recorder.finish(execute_run(spec, folder, recorder))
     return search._asdict() | row(records_from_lines((folder / EPISODES).read_bytes()))
 
 

@@ -22,10 +22,10 @@ from risk_sac.benchmark.runs import ego_with
 from risk_sac.config import Budget, FamilyName, RunSpec
 from risk_sac.egos.registry import pinned
 from risk_sac.execution.recorder import Recorder
+from risk_sac.loop import execute_run
 from risk_sac.prior.earlier import pinned_prior
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import RESULTS, read_results
-from risk_sac.train import train
 
 # Family, faults of versions 1 and 2; np.random.default_rng(44) drew them from the catalogue's training part.
 PAIRS: tuple[tuple[FamilyName, str, str], ...] = (
@@ -65,7 +65,7 @@ def campaign(out: Path, family: FamilyName, fault: str, seed: int) -> Path:
     if metrics is None or metrics.environment_steps < CAMPAIGN_STEPS:
         spec = spec_of(family, fault, seed, "shipped")
         with closing(Recorder(spec, folder, Until(CAMPAIGN_STEPS))) as recorder:
-            recorder.finish(train(spec, folder, recorder))
+            recorder.finish(execute_run(spec, folder, recorder))
     return folder
 
 

@@ -21,11 +21,11 @@ from risk_sac.config import (
     SceneOptimizerConfig,
     WarmStartConfig,
 )
+from risk_sac.loop import execute_run
 from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder.checkpoint import previous
 from risk_sac.run_folder.results import FAILURES, records_to_json
 from risk_sac.scene_optimizer.archive import INITIAL
-from risk_sac.train import train
 from tests.listener import Listener
 
 EPISODES, EVALUATION = 6, 1
@@ -46,7 +46,7 @@ def spec(seed: int = 0, method: str = "risk-sac") -> RunSpec:
 
 def run(folder: Path, *, seed: int = 0, limit: int = 10**9, method: str = "risk-sac") -> tuple[RunSummary, Listener]:
     listener = Listener(limit)
-    return train(spec(seed, method), folder, listener), listener
+    return execute_run(spec(seed, method), folder, listener), listener
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,7 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_run_has_learnt_something_to_be_deterministic_about(uninterrupted: tuple[RunSummary, Listener]) -> None:
     summary, listener = uninterrupted
     assert summary.finished
-    assert [r.phase for r in listener.records] == ["train"] * EPISODES + ["evaluate"] * EVALUATION
+    assert [r.phase for r in listener.records] == ["search"] * EPISODES + ["evaluation"] * EVALUATION
     assert listener.records[-1].environment_steps > 2 * LEARNER.agent.warmup_steps
     assert len({r.temperature for r in listener.records}) > 1
     assert len({r.dual_variable for r in listener.records}) > 1
@@ -75,10 +75,10 @@ ELSEWHERE = """
 import sys
 from pathlib import Path
 from risk_sac.config import RunSpec
-from risk_sac.train import train
+from risk_sac.loop import execute_run
 from tests.listener import Listener
 
-print(train(RunSpec.model_validate_json(sys.argv[1]), Path(sys.argv[2]), Listener()).digest)
+print(execute_run(RunSpec.model_validate_json(sys.argv[1]), Path(sys.argv[2]), Listener()).digest)
 """
 
 
@@ -118,13 +118,13 @@ def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
 def test_a_resumed_i_i_d_phase_draws_on_and_no_search_meets_its_scenes(tmp_path: Path) -> None:
     drawn = CampaignSpec(families=("mixed",), iid=Iid(episodes=4), learner=LEARNER).drawn()[1]
     whole, first, rest, searched = Listener(), Listener(2), Listener(10**9), Listener(10**9)
-    expected = train(drawn, tmp_path / "whole", whole)
-    train(drawn, tmp_path / "parts", first)
-    resumed = train(drawn, tmp_path / "parts", rest)
+    expected = execute_run(drawn, tmp_path / "whole", whole)
+    execute_run(drawn, tmp_path / "parts", first)
+    resumed = execute_run(drawn, tmp_path / "parts", rest)
     assert [record.phase for record in whole.records] == ["iid"] * 4
     assert records_to_json(rest.records) == records_to_json(whole.records)
     assert resumed.digest == expected.digest
-    train(spec(method="random"), tmp_path / "searched", searched)  # of the same seed
+    execute_run(spec(method="random"), tmp_path / "searched", searched)  # of the same seed
     assert not {record.seed for record in searched.records} & {record.seed for record in whole.records}
     scenes = [record.scene["friction"] for record in (*searched.records, *whole.records)]
     assert len(set(scenes)) == len(scenes)
@@ -133,9 +133,9 @@ def test_a_resumed_i_i_d_phase_draws_on_and_no_search_meets_its_scenes(tmp_path:
 def test_a_resumed_archive_search_breeds_on_as_if_never_interrupted(tmp_path: Path) -> None:
     bred = spec(method="archive").model_copy(update={"budget": Budget(episodes=INITIAL + 6)})
     whole, first, rest = Listener(), Listener(INITIAL + 3), Listener()
-    expected = train(bred, tmp_path / "whole", whole)
-    train(bred, tmp_path / "parts", first)
-    resumed = train(bred, tmp_path / "parts", rest)
+    expected = execute_run(bred, tmp_path / "whole", whole)
+    execute_run(bred, tmp_path / "parts", first)
+    resumed = execute_run(bred, tmp_path / "parts", rest)
     assert len(first.records) == INITIAL + 3
     assert records_to_json(rest.records) == records_to_json(whole.records)
     assert resumed.digest == expected.digest
@@ -148,9 +148,9 @@ def test_a_resumed_search_by_two_takes_turns_as_if_never_interrupted(tmp_path: P
     changes = {"budget": Budget(episodes=9), "learner": at_once, "prior": prior}
     shared = spec(seed=2, method="risk-sac-diverse").model_copy(update=changes)
     whole, first, rest = Listener(), Listener(limit), Listener()
-    expected = train(shared, tmp_path / "whole", whole)
-    train(shared, tmp_path / "parts", first)
-    resumed = train(shared, tmp_path / "parts", rest)
+    expected = execute_run(shared, tmp_path / "whole", whole)
+    execute_run(shared, tmp_path / "parts", first)
+    resumed = execute_run(shared, tmp_path / "parts", rest)
     learned = [one.temperature != two.temperature for one, two in pairwise(whole.records)]
     if prior == "none":  # with a prior the policy hardly gets a turn in nine episodes
         assert {True, False} == set(learned[3:])  # past the warm-up, and it learns only where it acts
@@ -185,11 +185,11 @@ def test_a_damaged_series_is_reported_as_it_was_written(tmp_path: Path, caplog: 
         Listener(10**9),
         Listener(10**9),
     )
-    train(failing, tmp_path, told)
+    execute_run(failing, tmp_path, told)
     lost, changed, *_ = [file for file in told.series if file is not None]
     (tmp_path / FAILURES / lost.name).unlink()
     (tmp_path / FAILURES / changed.name).write_bytes(b"PK")
-    train(failing, tmp_path, again)
+    execute_run(failing, tmp_path, again)
     assert again.series == told.series
     assert {lost.name, changed.name} == {Path(record.args[0]).name for record in caplog.records if record.args}
 

@@ -113,8 +113,8 @@ def record(index: int, letter: str, phase: str) -> EpisodeRecord:
 
 
 def records(letters: str, evaluation: str = "") -> list[EpisodeRecord]:
-    search = [record(index, letter, "train") for index, letter in enumerate(letters)]
-    return search + [record(index, letter, "evaluate") for index, letter in enumerate(evaluation, len(letters))]
+    search = [record(index, letter, "search") for index, letter in enumerate(letters)]
+    return search + [record(index, letter, "evaluation") for index, letter in enumerate(evaluation, len(letters))]
 
 
 def finished(spec: RunSpec, done: Sequence[EpisodeRecord]) -> FinishedRun:
@@ -241,7 +241,7 @@ class Recorded:
             metrics = finished(spec, done[:count]).metrics
             word = EpisodeDone(
                 record=episode,
-                metrics=metrics["evaluation" if episode.phase == "evaluate" else "search"],
+                metrics=metrics["evaluation" if episode.phase == "evaluation" else "search"],
                 series=kept and kept.name,
                 series_sha256=kept and kept.sha256,
                 wall_s=0.5,

@@ -38,7 +38,7 @@ ASKED = {
     "failures": ("GET", f"{ENDED}/failures"),
     "failure_table": ("GET", f"{ENDED}/failure-table"),
     "curves": ("GET", f"{ENDED}/curves"),
-    "failure": ("GET", f"{ENDED}/failures/low-risk-sac-3-train-1"),
+    "failure": ("GET", f"{ENDED}/failures/low-risk-sac-3-search-1"),
     "events": ("GET", f"{ENDED}/events"),
     "table": ("GET", f"{ENDED}/table"),
     "report": ("GET", f"{ENDED}/report"),
@@ -111,7 +111,7 @@ def choices(document: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any], dic
 def test_every_choice_that_is_documented_is_accepted_and_no_other(client, monkeypatch):
     refused = HelperResult(status=REFUSED, answer=b"not here", log="")
     monkeypatch.setattr("service.views.on_demand.run_helper", lambda *_, **__: refused)
-    ids = {"campaign_id": ENDED_ID, "failure_id": "low-risk-sac-3-train-1", "run_id": "low-risk-sac-3"}
+    ids = {"campaign_id": ENDED_ID, "failure_id": "low-risk-sac-3-search-1", "run_id": "low-risk-sac-3"}
     ids |= {"name": "ecr_low", "format": "png", "twin": "idle"}
     seen = 0
     for path, parameter, schema in choices(client.get("/openapi.json").json()):

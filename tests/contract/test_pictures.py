@@ -99,7 +99,7 @@ def test_every_contact_has_pictures_that_need_not_be_sent_twice(client, name, me
 
 
 def test_what_is_no_contact_has_no_picture(client):
-    for path in (f"{FOLDER}/{RUN}-train-0", f"{FOLDER}/x", f"/v1/campaigns/c0/failures/{RUN}-train-1"):
+    for path in (f"{FOLDER}/{RUN}-search-0", f"{FOLDER}/x", f"/v1/campaigns/c0/failures/{RUN}-search-1"):
         answer = client.get(f"{path}/picture.png")
         assert (answer.status_code, answer.json()["reason"]) == (404, "unknown_id")
 
@@ -110,13 +110,13 @@ def test_a_contact_whose_series_is_lost_or_damaged_has_no_picture_and_says_so(fr
     for breaking, why in ((lambda: file.write_bytes(content[:-1]), "is damaged"), (file.unlink, "is gone")):
         breaking()
         for picture in ("picture.png", "thumbnail.svg"):
-            answer = fresh.get(f"{FOLDER}/{RUN}-train-1/{picture}")
+            answer = fresh.get(f"{FOLDER}/{RUN}-search-1/{picture}")
             assert (answer.status_code, answer.json()["reason"]) == (404, "series_lost")
             assert why in answer.json()["detail"]
             assert str(tmp_path) not in answer.text
     file.write_bytes(content)
     for picture in ("picture.png", "thumbnail.svg"):
-        assert fresh.get(f"{FOLDER}/{RUN}-train-1/{picture}").status_code == 200
+        assert fresh.get(f"{FOLDER}/{RUN}-search-1/{picture}").status_code == 200
 
 
 def test_a_picture_is_drawn_once_for_all_who_ask_for_it_and_holds_up_nothing_else(fresh, drawn):
@@ -153,14 +153,14 @@ def test_no_more_than_a_bounded_number_waits_and_others_are_told_when_to_come_ba
 
 def test_what_does_not_repeat_can_be_drawn_but_not_played(client, tmp_path):
     for what in ("bundle.npz", "core.npz", "region", "twins/idle.png", "twins/idle"):
-        answer = client.get(f"{FOLDER}/{RUN}-train-1/{what}")
+        answer = client.get(f"{FOLDER}/{RUN}-search-1/{what}")
         assert (answer.status_code, answer.json()["reason"]) == (409, "not_playable")
         assert "/" not in answer.json()["detail"]
-    for failure, status, reason in ((f"{RUN}-train-0", 404, "unknown_id"), ("x", 404, "unknown_id")):
+    for failure, status, reason in ((f"{RUN}-search-0", 404, "unknown_id"), ("x", 404, "unknown_id")):
         answer = client.get(f"{FOLDER}/{failure}/bundle.npz")
         assert (answer.status_code, answer.json()["reason"]) == (status, reason)
     for twin in ("nobody.png", "nobody", "idle.svg", ".png"):
-        assert client.get(f"{FOLDER}/{RUN}-train-1/twins/{twin}").status_code == 422
+        assert client.get(f"{FOLDER}/{RUN}-search-1/twins/{twin}").status_code == 422
 
 
 @pytest.mark.parametrize("what", ["core.npz", "region"])
@@ -184,32 +184,32 @@ def test_the_picture_and_the_series_of_a_twin_are_of_one_play_and_need_not_be_se
 
     monkeypatch.setattr(Studies, "_answer", answer)
     with recorded(ServiceSettings(data_dir=tmp_path, max_workers=1)) as client:
-        path = f"{FOLDER}/{RUN}-train-1/twins/idle"
+        path = f"{FOLDER}/{RUN}-search-1/twins/idle"
         told, drawn, again = (client.get(url).raise_for_status() for url in (path, f"{path}.png", path))
         assert drawn.content.startswith(b"\x89PNG")
         assert told.json() == again.json()
         assert (told.json()["twin"], told.json()["outcome"]) == ("idle", "touches nobody")
-        assert told.json()["series"] == client.get(f"{FOLDER}/{RUN}-train-1").json()["series"]
+        assert told.json()["series"] == client.get(f"{FOLDER}/{RUN}-search-1").json()["series"]
         assert len(asked) == 1
         for answered in (told, drawn):
             known = {"If-None-Match": answered.headers["etag"]}
             assert client.get(answered.url.path, headers=known).status_code == 304
-        client.get(f"{FOLDER}/{RUN}-train-1/twins/careful").raise_for_status()
+        client.get(f"{FOLDER}/{RUN}-search-1/twins/careful").raise_for_status()
         assert [study.twin for study in asked] == ["idle", "careful"]
 
 
 def test_the_client_has_the_picture_and_the_series_as_arrays_with_units(client):
     with Client(str(client.base_url)) as remote:
-        failure = remote.failure(ENDED_ID, f"{RUN}-train-1")
+        failure = remote.failure(ENDED_ID, f"{RUN}-search-1")
         assert isinstance(failure.series, Series)
         assert failure.series.ids == ["ego", "lead"]
         assert failure.series.x_m == [[0.0, 1.0], [2.0, None], [4.0, 5.0]]
         assert failure.series.visible == [[None, True], [None, None], [None, False]]
         assert failure.series.released_s == 0.0
-        assert json.loads(wire(failure)) == client.get(f"{FOLDER}/{RUN}-train-1").json()
-        assert remote.picture(ENDED_ID, failure.id) == client.get(f"{FOLDER}/{RUN}-train-1/picture.png").content
+        assert json.loads(wire(failure)) == client.get(f"{FOLDER}/{RUN}-search-1").json()
+        assert remote.picture(ENDED_ID, failure.id) == client.get(f"{FOLDER}/{RUN}-search-1/picture.png").content
         with pytest.raises(Refused) as refused:
-            remote.picture(ENDED_ID, f"{RUN}-train-0")
+            remote.picture(ENDED_ID, f"{RUN}-search-0")
         assert refused.value.reason == "unknown_id"
 
 
@@ -232,8 +232,8 @@ def test_failures_are_listed_in_a_terminal_by_kind_and_grade(call, client):
     assert "…" not in printed.out
     assert max(map(len, printed.out.splitlines())) <= 80
     for word in (
-        f"{RUN}-train-1",
-        f"{RUN}-train-2",
+        f"{RUN}-search-1",
+        f"{RUN}-search-2",
         "preventable",
         "full_braking",
         "severe",
@@ -266,11 +266,11 @@ def test_a_list_of_failures_is_filtered_and_says_that_there_are_more(call, clien
 
 def test_a_failure_is_shown_in_words_and_drawn_without_the_folder_of_the_server(call, client, tmp_path):
     file = tmp_path / "new" / "a.png"
-    status, printed = call("show", ENDED_ID, f"{RUN}-train-2", "--out", file)
+    status, printed = call("show", ENDED_ID, f"{RUN}-search-2", "--out", file)
     assert status == 0
-    assert file.read_bytes() == client.get(f"{FOLDER}/{RUN}-train-2/picture.png").content
+    assert file.read_bytes() == client.get(f"{FOLDER}/{RUN}-search-2/picture.png").content
     words = (
-        f"{RUN}-train-2: failure",
+        f"{RUN}-search-2: failure",
         "kind       leader",
         "grade      full_braking",
         "fault      shared",
@@ -279,15 +279,15 @@ def test_a_failure_is_shown_in_words_and_drawn_without_the_folder_of_the_server(
     assert all(word in printed.out for word in words)
     assert "of adversary 'lead'" in printed.out
     assert str(file) in printed.err
-    _, printed = call("show", ENDED_ID, f"{RUN}-train-2", "--out", file, "--json")
-    assert json.loads(printed.out) == client.get(f"{FOLDER}/{RUN}-train-2").json()
+    _, printed = call("show", ENDED_ID, f"{RUN}-search-2", "--out", file, "--json")
+    assert json.loads(printed.out) == client.get(f"{FOLDER}/{RUN}-search-2").json()
 
 
 def test_a_failure_whose_picture_cannot_be_had_is_exit_status_2(call, tmp_path):
     status, printed = call("show", ENDED_ID, "x", "--out", tmp_path / "a.png")
     assert status == 2
     assert "answered 404" in printed.err
-    status, printed = call("show", ENDED_ID, f"{RUN}-train-1", "--out", tmp_path / "a.svg")
+    status, printed = call("show", ENDED_ID, f"{RUN}-search-1", "--out", tmp_path / "a.svg")
     assert status == 2
     assert printed.err.startswith("--out: got ")
     assert not (tmp_path / "a.png").exists()

@@ -90,7 +90,7 @@ def test_rates_that_may_be_above_the_bound_are_exit_status_1_unless_the_rate_is_
     assert "PCR above 0.16: low random 0.167 (2 preventable contacts in 12 episodes)\n" in capsys.readouterr().err
     (failure,) = ElementTree.parse(file).getroot().iter("failure")
     assert failure.attrib["message"] == "PCR above 0.16: 0.167 (2 preventable contacts in 12 episodes)"
-    assert (failure.text or "").splitlines()[1] == "low-random-0-train-1: cut-in, straight; grade preventable"
+    assert (failure.text or "").splitlines()[1] == "low-random-0-search-1: cut-in, straight; grade preventable"
 
 
 def test_the_rate_of_a_requirement_has_a_bound_of_its_own(

@@ -39,7 +39,7 @@ def test_it_ends_with_the_defect_that_was_found_and_a_command_that_draws_the_fai
     (line,) = (line for line in printed.splitlines() if line.startswith("draw one: "))
     program, *command = shlex.split(line.removeprefix("draw one: "))
     assert Path(program).is_file()
-    assert command[2].endswith(f"-train-{int(last[1]) - 1}")
+    assert command[2].endswith(f"-search-{int(last[1]) - 1}")
     monkeypatch.chdir(tmp_path)
     assert cli.main(command) == 0
     assert (data_dir / "failure.png").read_bytes().startswith(b"\x89PNG")
@@ -54,18 +54,18 @@ def test_it_offers_to_draw_a_preventable_failure_where_there_is_one():
     def failure(index, grade):
         contact = collision(judgement=None if grade is None else judgement(grade))
         record = episode_record(index, collision=contact).model_dump()
-        return Episode.model_validate(record | {"id": f"r-train-{index}", "run_id": "r", "wall_s": 1.0})
+        return Episode.model_validate(record | {"id": f"r-search-{index}", "run_id": "r", "wall_s": 1.0})
 
     searched = campaign().model_copy(update={"runs": [Run.model_construct(id="r")]})
     failures = [failure(3, None), failure(5, Grade.FULL_BRAKING), failure(8, Grade.PREVENTABLE)]
-    assert draw_command(searched, failures, Path()).endswith(" r-train-8 --out failure.png")
-    assert draw_command(searched, failures[:2], Path()).endswith(" r-train-3 --out failure.png")
+    assert draw_command(searched, failures, Path()).endswith(" r-search-8 --out failure.png")
+    assert draw_command(searched, failures[:2], Path()).endswith(" r-search-3 --out failure.png")
 
 
 def test_it_says_which_search_needed_how_many_episodes():
     spec = CampaignSpec(families=("low",), methods=("archive", "random"), budget=Budget(episodes=200))
     found = Episode.model_validate(
-        episode_record(30).model_dump() | {"id": "low-archive-0-train-30", "run_id": "low-archive-0", "wall_s": 1.0}
+        episode_record(30).model_dump() | {"id": "low-archive-0-search-30", "run_id": "low-archive-0", "wall_s": 1.0}
     )
     searched = campaign().model_copy(update={"spec": spec})
     assert in_words("latency", searched, {"low-archive-0": found, "low-random-0": None}) == (

@@ -9,12 +9,12 @@ from risk_sac import searchers
 from risk_sac.agents.follower import ScriptFollower
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunMethod, RunSpec
 from risk_sac.errors import ConfigError
+from risk_sac.loop import execute_run
 from risk_sac.prior.learner import PretrainedLearner
 from risk_sac.prior.policy import Folded, Layout
 from risk_sac.problem import Problem
 from risk_sac.records import DrivenBy, EpisodeRecord
 from risk_sac.searchers import Searchers
-from risk_sac.train import train
 from tests.builders import pretrained_policy
 from tests.listener import Listener
 
@@ -44,7 +44,7 @@ def searchers_of(wanted: RunSpec) -> Searchers:
 
 def played(folder: Path, wanted: RunSpec) -> list[EpisodeRecord]:
     listener = Listener()
-    assert train(wanted, folder, listener).finished
+    assert execute_run(wanted, folder, listener).finished
     return listener.records
 
 
@@ -59,7 +59,7 @@ def test_an_interrupted_run_goes_on_as_if_it_had_not_been(tmp_path: Path) -> Non
     whole = played(tmp_path / "whole", spec("risk-sac-pretrained", 4))
     halves = Listener(limit=2)
     wanted = spec("risk-sac-pretrained", 4)
-    assert not train(wanted, tmp_path / "parts", halves).finished
+    assert not execute_run(wanted, tmp_path / "parts", halves).finished
     assert played(tmp_path / "parts", wanted) == whole
 
 

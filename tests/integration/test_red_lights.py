@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from risk_sac.config import METHODS, Budget, EgoConfig, RunSpec
+from risk_sac.loop import execute_run
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
-from risk_sac.train import train
 
 RED = "no_red_light_entry"
 
@@ -33,7 +33,7 @@ def test_every_method_finds_within_100_episodes_that_the_ego_enters_on_red(metho
         family="dense", method=method, seed=3, budget=Budget(episodes=100), ego=EgoConfig(driver="red-runner")
     )
     observer = UntilFound()
-    train(spec, tmp_path, observer)
+    execute_run(spec, tmp_path, observer)
     assert observer.found is not None
     violation = next(each for each in observer.found.violations if each.requirement == RED)
     assert violation.valid

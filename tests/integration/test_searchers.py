@@ -8,11 +8,11 @@ from risk_sac.agents.follower import ScriptFollower
 from risk_sac.agents.learner import Learner
 from risk_sac.config import AgentConfig, Budget, FamilyName, LearnerConfig, RunMethod, RunSpec, WarmStartConfig
 from risk_sac.errors import ConfigError
+from risk_sac.loop import execute_run
 from risk_sac.problem import Problem
 from risk_sac.records import DrivenBy, EpisodeRecord, Grade, Outcome
 from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
 from risk_sac.searchers import COLD, GUIDE, OWN, Searchers, Turns
-from risk_sac.train import train
 from tests.builders import collision, episode_record, judgement
 from tests.listener import Listener
 
@@ -29,7 +29,7 @@ def spec(
 
 def played(folder: Path, wanted: RunSpec) -> list[EpisodeRecord]:
     listener = Listener()
-    assert train(wanted, folder, listener).finished
+    assert execute_run(wanted, folder, listener).finished
     return listener.records
 
 
@@ -143,9 +143,9 @@ def test_a_search_ends_when_its_processor_time_is_spent_and_is_then_evaluated(tm
     budget = Budget(episodes=50, evaluation_episodes=2, cpu_s=0.1)  # enough for an episode or two
     records = played(tmp_path, spec("random", budget))
     phases = [record.phase for record in records]
-    assert phases[-2:] == ["evaluate", "evaluate"]
-    assert 0 < phases.count("train") < 50
-    assert len(phases) == phases.count("train") + 2
+    assert phases[-2:] == ["evaluation", "evaluation"]
+    assert 0 < phases.count("search") < 50
+    assert len(phases) == phases.count("search") + 2
     assert records == played(tmp_path, spec("random", budget))  # told again, and not gone on with
 
 

@@ -48,7 +48,7 @@ def episode(metrics: RunMetrics) -> Callable[..., EpisodeDone]:
         min_ttc_s=math.nan, min_robustness=-math.inf, verdicts={"feasible": True}, judgement=judgement()
     )
 
-    def build(index: int, outcome: Outcome = Outcome.SAFE, phase: str = "train", wall_s: float = 0.5) -> EpisodeDone:
+    def build(index: int, outcome: Outcome = Outcome.SAFE, phase: str = "search", wall_s: float = 0.5) -> EpisodeDone:
         touched = outcome in (Outcome.FAILURE, Outcome.DEGENERATE)
         record = episode_record(
             index,

@@ -55,7 +55,7 @@ ledger.start_run(campaign.runs[0].number)
 record = episode_record(0, Outcome.FAILURE, collision=collision(bonnet_temperature_c=61.5))
 said = EpisodeDone(record=record, metrics=run_metrics(1), series=None, wall_s=1.0)
 ledger.add_episodes([(campaign.runs[0].number, decode(encode(said)))])
-answer = wire(failure_body(campaign.id, store.failure(campaign.id, "low-random-0-train-0"), None, settings))
+answer = wire(failure_body(campaign.id, store.failure(campaign.id, "low-random-0-search-0"), None, settings))
 print(Failure.model_validate_json(answer).collision.bonnet_temperature_c)
 print("bonnet_temperature_c" in create_app(settings).openapi()["components"]["schemas"]["Collision"]["properties"])
 store.close()
@@ -74,7 +74,7 @@ def test_a_number_that_is_not_finite_is_a_word_where_it_is_stored_and_null_where
     assert (kept["min_ttc_s"], kept["collision"]["early_min_ttc_s"]) == ("Infinity", "Infinity")
     assert kept["collision"]["judgement"]["conflict_s"] == "-Infinity"
     assert repr(EpisodeRecord.model_validate_json(stored(record))) == repr(record)
-    episode = Episode(**dict(record), id="r-train-3", run_id="r", wall_s=0.5)
+    episode = Episode(**dict(record), id="r-search-3", run_id="r", wall_s=0.5)
     told = json.loads(wire(episode))
     assert (told["min_ttc_s"], told["collision"]["early_min_ttc_s"]) == (None, None)
     assert told["collision"]["ego_speed_mps"] is told["collision"]["judgement"]["conflict_s"] is None

@@ -37,7 +37,7 @@ def add(commands: Commands) -> None:
         "show",
         _show,
         "print one failure in words and draw it",
-        example="campaigns failures show ID low-risk-sac-0-train-39 --out failure.png",
+        example="campaigns failures show ID low-risk-sac-0-search-39 --out failure.png",
     )
     _add_failure(parser)
     twins = get_args(Twin)
@@ -51,7 +51,7 @@ def add(commands: Commands) -> None:
         "bundle",
         _bundle,
         "fetch one failure as a file that can be replayed alone",
-        example="campaigns failures bundle ID low-risk-sac-0-train-39 --out failure.npz",
+        example="campaigns failures bundle ID low-risk-sac-0-search-39 --out failure.npz",
     )
     _add_failure(parser)
     output = parser.group("output")

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from risk_sac.config import FamilyName, IidName
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import clopper_pearson, pooled_requirements, preventable
-from risk_sac.records import RECORDED, EpisodeRecord, Outcome, Record
+from risk_sac.records import EpisodeRecord, Outcome, Record
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.coverage import NOT_PLAYED, Coverage, coverage
 from risk_sac.report.runs import FinishedRun
@@ -112,7 +112,7 @@ def drawn(run: FinishedRun) -> Drawn:
     Raises:
       ConfigError: an episode of the run belongs to another phase.
     """
-    if other := {record.phase for record in run.records} - {RECORDED["iid"]}:
+    if other := {record.phase for record in run.records} - {"iid"}:
         got = f"{run.spec.id} with episodes of the phase {min(other)!r}"
         raise ConfigError("", got, "those of its own alone")
     played = [record for record in run.records if record.outcome not in NOT_PLAYED]

@@ -19,7 +19,7 @@ GRACE_S = 1.0  # for streams to end by themselves when the server stops
 EXAMPLE = {
     "id": "YzRkYThkZmRiYWQ1NDYwNDUtMTU=",
     "event": "failure",
-    "data": '{"id":"low-risk-sac-0-train-11","run_id":"low-risk-sac-0","outcome":"failure", …}',
+    "data": '{"id":"low-risk-sac-0-search-11","run_id":"low-risk-sac-0","outcome":"failure", …}',
 }
 # What each event is made of: OpenAPI before 3.2 has no other place for it.
 EVENT = {

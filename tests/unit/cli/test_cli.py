@@ -35,7 +35,7 @@ def test_results_hold_spec_metrics_versions_and_failures(folder: Path) -> None:
     assert stored["wall_s"] > 0
     assert "libsumo" in stored["versions"]
     contact = stored["failures"][0]
-    assert contact["id"] == f"{SPEC.family}-{SPEC.method}-{stored['spec']['seed']}-train-{contact['episode']['index']}"
+    assert contact["id"] == f"{SPEC.family}-{SPEC.method}-{stored['spec']['seed']}-search-{contact['episode']['index']}"
     assert contact["episode"]["collision"]["verdicts"]
     assert (folder / contact["series"]).exists()
     lines = (folder / "episodes.jsonl").read_text().splitlines()
@@ -47,7 +47,9 @@ def test_show_lists_the_failures(folder: Path, capsys: pytest.CaptureFixture[str
     printed = capsys.readouterr().out
     results = read_results(folder)
     assert results.spec.id in printed
-    assert all(f"train-{contact.episode.index} " in printed for contact in results.failures)
+    numbers = [int(number) for number in re.findall(r"^ (\d+) ", printed, re.MULTILINE)]
+    assert numbers == [failure.episode.index for failure in results.failures]
+    assert printed.count("\n search ") == len(numbers)
 
 
 @pytest.mark.parametrize("grade", [*Grade, None])
@@ -105,7 +107,9 @@ def test_the_list_shows_what_nobody_judged(capsys: pytest.CaptureFixture[str]) -
     assert "None" not in printed
 
 
-@pytest.mark.parametrize("form", ["{run}-train-{index}", "train-{index}", "{index:06d}", "{index}"])
+@pytest.mark.parametrize(
+    "form", ["{run}-search-{index}", "search-{index}", "{run}-train-{index}", "{index:06d}", "{index}"]
+)
 def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder: Path, tmp_path: Path, form: str) -> None:
     results = read_results(folder)
     index = results.failures[0].episode.index

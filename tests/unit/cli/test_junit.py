@@ -49,7 +49,7 @@ FAILURES = {
                     ),
                 )
             ),
-            id=f"low-sac-0-train-{index}",
+            id=f"low-sac-0-search-{index}",
             run_id="low-sac-0",
             wall_s=1.0,
         )
@@ -101,7 +101,7 @@ def test_a_method_with_more_preventable_failures_than_may_be_fails_and_names_the
     root = report({}, bounds=Bounds(preventable=0), totals=[{}], failures=FAILURES)
     (failure,) = root.iter("failure")
     assert failure.attrib["message"] == "1 distinct preventable failure, where 0 may be"
-    assert "low-sac-0-train-3" in (failure.text or "")
+    assert "low-sac-0-search-3" in (failure.text or "")
     assert not list(report({}, bounds=Bounds(preventable=1), totals=[{}]).iter("failure"))
 
 
@@ -120,10 +120,10 @@ def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_
 def test_failures_are_named_with_their_kind_how_to_look_at_them_and_how_to_have_them_again() -> None:
     told = [
         "low-sac-0: 10 valid failures, of which the first 2:",
-        "low-sac-0-train-3: cut-in, ahead, in a lane; ego goes straight, brakes; grade preventable",
-        "  risk-sac campaigns failures show c1 low-sac-0-train-3 --url http://host",
-        "low-sac-0-train-9: cut-in, ahead, in a lane; ego goes straight, brakes; grade preventable",
-        "  risk-sac campaigns failures show c1 low-sac-0-train-9 --url http://host",
+        "low-sac-0-search-3: cut-in, ahead, in a lane; ego goes straight, brakes; grade preventable",
+        "  risk-sac campaigns failures show c1 low-sac-0-search-3 --url http://host",
+        "low-sac-0-search-9: cut-in, ahead, in a lane; ego goes straight, brakes; grade preventable",
+        "  risk-sac campaigns failures show c1 low-sac-0-search-9 --url http://host",
         f"To have them again without the service: save {URL}/spec?format=yaml as spec.yaml, then",
         "  risk-sac run --spec spec.yaml --family low --method sac --seed 0 --out low-sac-0",
     ]
@@ -154,15 +154,15 @@ def test_every_requirement_that_counts_is_a_case_of_its_family_and_method() -> N
 def test_a_requirement_over_its_bound_fails_and_names_the_failures_that_violate_it() -> None:
     both = requirements(no_contact=(0.0, 0.06), never_fast=(0.2, 0.32))
     bounds = Bounds(requirements={"never_fast": 0.1, "no_contact": 0.1})
-    broken = FAILURES["low-sac-0"][0].model_copy(update={"id": "low-sac-0-train-5", "collision": None})
+    broken = FAILURES["low-sac-0"][0].model_copy(update={"id": "low-sac-0-search-5", "collision": None})
     broken = broken.model_copy(update={"violations": (violation(requirement="never_fast", grade=Grade.PREVENTABLE),)})
     found = {"low-sac-0": [*FAILURES["low-sac-0"], broken]}
     root = report({}, bounds=bounds, totals=[{"episodes": 60, "requirements": both}], failures=found)
     (failure,) = root.iter("failure")
     assert failure.attrib["message"].startswith("never_fast above 0.1: 0.200, 95 % interval up to 0.320")
     assert (failure.text or "").splitlines() == [
-        "low-sac-0-train-5: never_fast violated; straight; grade preventable",
-        "  risk-sac campaigns failures show c1 low-sac-0-train-5 --url http://host",
+        "low-sac-0-search-5: never_fast violated; straight; grade preventable",
+        "  risk-sac campaigns failures show c1 low-sac-0-search-5 --url http://host",
         "All: risk-sac campaigns failures list c1 --requirement never_fast --url http://host",
     ]
     assert [case.attrib["name"] for case in root.iter("testcase")] == ["seed 0", "no_contact", "never_fast"]

@@ -101,12 +101,12 @@ def test_a_failure_without_contact_is_listed_by_what_it_violates(capsys: pytest.
     told = {"violations": (violation(broke=("red_light",)),), "failed": ("never_fast",)}
     failures = [
         Episode(
-            **dict(episode_record(index, Outcome.FAILURE, **each)), id=f"low-sac-0-train-{index}", run_id="", wall_s=0
+            **dict(episode_record(index, Outcome.FAILURE, **each)), id=f"low-sac-0-search-{index}", run_id="", wall_s=0
         )
         for index, each in enumerate((struck, told))
     ]
     Console(width=80).print(failures_table(failures))
-    contact, own = capsys.readouterr().out.split("low-sac-0-train-0")[1].split("low-sac-0-train-1")
+    contact, own = capsys.readouterr().out.split("low-sac-0-search-0")[1].split("low-sac-0-search-1")
     assert "no_contact" in contact
     assert "9.0, 2.0" in contact
     assert "never_fast" in own

@@ -57,8 +57,8 @@ def test_an_id_stays_one_part_of_the_path(server: Server, client: Client) -> Non
 
 def test_a_failure_comes_in_a_format_and_has_an_address_on_the_page(server: Server, client: Client) -> None:
     server.answer(200, {"any": "bytes"})
-    assert json.loads(client.export("c1", "low-sac-0-train-7", "openscenario")) == {"any": "bytes"}
-    assert server.asked[0].path == "/v1/campaigns/c1/failures/low-sac-0-train-7/export?format=openscenario"
+    assert json.loads(client.export("c1", "low-sac-0-search-7", "openscenario")) == {"any": "bytes"}
+    assert server.asked[0].path == "/v1/campaigns/c1/failures/low-sac-0-search-7/export?format=openscenario"
     assert client.page_of("c1") == f"{server.url}/page/#/campaigns/c1"
     assert client.page_of("c1", "a/b") == f"{server.url}/page/#/campaigns/c1/failures/a%2Fb"
 

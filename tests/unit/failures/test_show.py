@@ -101,7 +101,7 @@ def lines(**judged: object) -> list[str]:
 
 def test_the_title_says_who_would_have_prevented_it_and_what_the_striker_broke() -> None:
     assert lines() == [
-        "mixed · episode low-random-0-train-7 · failure",
+        "mixed · episode low-random-0-search-7 · failure",
         "the ego's front, at 10.0 m/s, touched the left of adversary 'pedestrian', at 1.0 m/s, "
         "of which it had known for 1.0 s",
         JUDGED.signature,

@@ -75,7 +75,7 @@ def finished() -> Callable[..., FinishedRun]:
                 episode_record(
                     index,
                     outcome,
-                    phase="train" if index < len(search) else "evaluate",
+                    phase="search" if index < len(search) else "evaluation",
                     steps=0 if letter == "r" else 50,
                     environment_steps=50 * (index + 1),
                     mean_cost=0.2,

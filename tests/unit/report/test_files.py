@@ -163,7 +163,7 @@ def test_page_has_the_cores_and_the_regions_that_were_asked_for(spec, runs):
     )
     noted = [replace(run, studies={0: studied}) if run is first else run for run in runs]
     found = compare(spec, noted, "")
-    page, id_ = table_markdown(found), f"{first.spec.id}-train-0"
+    page, id_ = table_markdown(found), f"{first.spec.id}-search-0"
     assert section(page, "### Cores of failures: low")[-1] == (
         f"| `{id_}` | The left neighbour cuts in | 2 → 1 | 9 → 3 | 9 of 10 |"
     )

@@ -4,7 +4,7 @@ import pytest
 from pydantic import ValidationError
 
 from risk_sac.metrics import results_digest
-from risk_sac.records import EpisodeRecord
+from risk_sac.records import FORMER_PHASES, EpisodeId, EpisodeRecord, Phase
 from risk_sac.run_folder.results import records_from_json, records_from_lines, records_to_json
 from tests.builders import collision, episode_record
 
@@ -30,6 +30,27 @@ def test_records_read_back_as_they_were_by_either_name() -> None:
         assert records_from_lines(stored[1:-1].encode()) == [RECORD]
 
 
+@pytest.mark.parametrize(("now", "former"), FORMER_PHASES.items())
+def test_records_and_ids_read_a_phase_by_its_former_name(now: Phase, former: str) -> None:
+    record = episode_record(4, phase=now)
+    stored = record.model_dump_json()
+    assert f'"phase":"{now}"' in stored
+    (read,) = records_from_lines(stored.replace(f'"phase":"{now}"', f'"phase":"{former}"').encode())
+    assert read == record
+    assert EpisodeId.parse(f"low-random-1-{former}-4") == EpisodeId.parse(record.id_in("low-random-1"))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "-", "search", "low-search-x", "low-walk-4", "a\0-search-4", "low-search-1234567890"]
+)
+def test_a_malformed_id_has_no_parts(text: str) -> None:
+    assert EpisodeId.parse(text) is None
+
+
+def test_a_run_whose_own_id_names_a_phase_keeps_it() -> None:
+    assert EpisodeId.parse("low-iid-random-0-iid-12") == ("low-iid-random-0", "iid", 12)
+
+
 def test_a_collision_without_its_minimum_is_no_record() -> None:
     stored = RECORD.model_dump()
     del stored["collision"]["early_min_ttc_s"]
@@ -38,4 +59,4 @@ def test_a_collision_without_its_minimum_is_no_record() -> None:
 
 
 def test_an_episode_is_called_by_its_run_phase_and_index() -> None:
-    assert RECORD.id_in("mixed-risk-sac-0") == "mixed-risk-sac-0-train-4"
+    assert RECORD.id_in("mixed-risk-sac-0") == "mixed-risk-sac-0-search-4"

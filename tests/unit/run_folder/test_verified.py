@@ -10,7 +10,7 @@ from risk_sac.run_folder.verified import Verified, distinct_failures, with_headl
 from tests.builders import collision, episode_record, judgement, run_metrics, violation
 
 
-def failure(index: int, phase: str = "train", driven_by: DrivenBy | None = None, **changes: object) -> EpisodeRecord:
+def failure(index: int, phase: str = "search", driven_by: DrivenBy | None = None, **changes: object) -> EpisodeRecord:
     struck = collision(**({"judgement": judgement()} | changes))
     return episode_record(index, Outcome.FAILURE, phase=phase, driven_by=driven_by, collision=struck)
 
@@ -31,7 +31,7 @@ def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not(
         failure(1),  # like it, and not replayed
         failure(2, judgement=judgement(Grade.FULL_BRAKING)),  # like it, and the same when it was replayed
         failure(3, other_speed_mps=20.0),  # of another kind
-        failure(4, phase="evaluate"),
+        failure(4, phase="evaluation"),
         episode_record(5),
     ]
     found = verified(e0=1, e2=2, e3=2, e4=2).judged(records)
@@ -101,7 +101,7 @@ def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repe
         failure(4, judgement=judgement(signature="merge")),  # does not repeat
         failure(5, judgement=judgement(signature="crossing", severity=None)),  # of an older version
         episode_record(6, Outcome.FAILURE, violations=(violation(grade=Grade.PREVENTABLE),)),
-        failure(7, phase="evaluate"),
+        failure(7, phase="evaluation"),
     )
     found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e5=2, e6=2, e7=2)).metrics
     assert found is not None
@@ -111,7 +111,7 @@ def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repe
 
 
 def test_the_evaluation_has_a_headline_of_its_own() -> None:
-    results = replace(results_of(failure(0, judgement=MINOR), failure(1, phase="evaluate")), evaluation=run_metrics())
+    results = replace(results_of(failure(0, judgement=MINOR), failure(1, phase="evaluation")), evaluation=run_metrics())
     found = with_headline(results, verified(e0=2, e1=2))
     assert [phase and phase.headline for phase in (found.metrics, found.evaluation)] == [0, 1]
 

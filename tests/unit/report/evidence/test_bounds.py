@@ -63,5 +63,5 @@ def test_an_ego_that_failed_to_drive_may_have_failed_or_not(finished):
 
 
 def test_bounds_are_never_drawn_from_a_search(finished):
-    with pytest.raises(ConfigError, match="episodes of the phase 'train'"):
+    with pytest.raises(ConfigError, match="episodes of the phase 'search'"):
         drawn(finished(SPEC, "...."))

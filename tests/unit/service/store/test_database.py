@@ -40,9 +40,11 @@ def test_a_database_of_the_version_before_is_brought_up_to_date(tmp_path):
     assert (episodes[0].min_ttc_s, episodes[1].collision.min_ttc_s) == (math.inf, math.inf)
     assert (episodes[1].repetition.same, episodes[1].funnel.contacts) == (3, 1)
     assert [each.id for each in store.episodes(campaign.id, limit=9, judged=Judged(grade=Grade.PREVENTABLE)).items] == [
-        "low-random-0-train-1"
+        "low-random-0-search-1"
     ]
-    assert store.triage(campaign.id, "low-random-0-train-1").comment == "seen"
+    for phase in ("search", "train"):  # as ids name it now, and as links from before do
+        assert store.failure(campaign.id, f"low-random-0-{phase}-1").episode.id == "low-random-0-search-1"
+        assert store.triage(campaign.id, f"low-random-0-{phase}-1").comment == "seen"
     assert [type(each).__name__ for each in store.events(campaign.id, limit=9).items].count("StateChange") == 4
     assert Ledger(store).resume() == 1
     store.close()

@@ -59,7 +59,7 @@ def short(event):
 
 def test_all_is_told_in_the_order_in_which_it_was_written(store, campaign):
     told, positions = story(store, campaign)
-    episodes = [f"low-random-{run}-train-{index}" for index in range(5) for run in (0, 1)]
+    episodes = [f"low-random-{run}-search-{index}" for index in range(5) for run in (0, 1)]
     begins = ["low-random-0 running", "campaign running", "low-random-1 running"]
     again = ["low-random-0 queued", "low-random-0 running"]
     ends = ["low-random-0 succeeded", "low-random-1 succeeded", "campaign succeeded"]
@@ -110,8 +110,8 @@ def test_many_writers_and_readers_agree_on_one_order(store, ledger, episode, don
         heard = [reader.result() for reader in readers]
     told, positions = story(store, campaign)
     assert positions == list(range(1, len(told) + 1))
-    assert sum("train" in each for each in told) == 80
-    assert len(set(pairwise("train" in each for each in told))) > 2, "episodes and changes lie among one another"
+    assert sum("search" in each for each in told) == 80
+    assert len(set(pairwise("search" in each for each in told))) > 2, "episodes and changes lie among one another"
     for mine in heard:
         assert [short(each) for each in mine] == told
     for index, position in enumerate(positions[:-1], 1):
@@ -128,4 +128,4 @@ def test_an_episode_that_comes_out_otherwise_keeps_its_place(store, ledger, epis
     ledger.add_episodes([(number, episode(0, Outcome.FAILURE))])
     ledger.add_episodes([(number, episode(2))])
     after = store.events(campaign.id, limit=100).items
-    assert [short(each) for each in after] == [*map(short, before), "low-random-0-train-2"]
+    assert [short(each) for each in after] == [*map(short, before), "low-random-0-search-2"]

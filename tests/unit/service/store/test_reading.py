@@ -23,8 +23,8 @@ def judged(event, kind):
 def test_a_record_comes_back_with_its_numbers_that_are_not_finite(store, ledger, episode):
     campaign = ledger.create(SPEC)
     ledger.add_episodes([(start(store, ledger), episode(5, Outcome.FAILURE))])
-    found = store.failure(campaign.id, "low-risk-sac-3-train-5").episode
-    assert found.id == "low-risk-sac-3-train-5"
+    found = store.failure(campaign.id, "low-risk-sac-3-search-5").episode
+    assert found.id == "low-risk-sac-3-search-5"
     assert found.min_ttc_s == math.inf
     assert math.isnan(found.collision.min_ttc_s)
 
@@ -77,7 +77,15 @@ def test_a_list_tells_what_a_campaign_searches_and_whom(store, ledger):
 
 @pytest.mark.parametrize(
     "failure_id",
-    ["", "-", "x", "low-risk-sac-3-train-0", "low-risk-sac-3-train-9", "low-risk-sac-3-train-٣", "a-train-99999999999"],
+    [
+        "",
+        "-",
+        "x",
+        "low-risk-sac-3-search-0",
+        "low-risk-sac-3-search-9",
+        "low-risk-sac-3-search-٣",
+        "a-search-99999999999",
+    ],
 )
 def test_what_does_not_exist_is_not_found(store, ledger, episode, failure_id):
     campaign = ledger.create(SPEC)
@@ -219,7 +227,7 @@ def test_an_id_with_a_nul_is_unknown_on_every_database(store, ledger):
         with pytest.raises(NotFoundError):
             store.episodes(campaign.id, limit=1, run_id=wrong)
         with pytest.raises(NotFoundError):
-            store.failure(campaign.id, f"{wrong}-train-0")
+            store.failure(campaign.id, f"{wrong}-search-0")
 
 
 def test_plain_episodes_are_the_stored_ones_in_their_order(store, ledger, episode):

@@ -132,7 +132,7 @@ def test_what_an_i_i_d_phase_counts_is_added_to_nothing_that_searches_found(stor
     spec = CampaignSpec(families=("low",), methods=("random",), budget={"episodes": 3}, iid={"episodes": 3})
     campaign = ledger.create(spec)
     assert [campaign.run_spec(run) for run in campaign.runs] == list(spec.runs())
-    for phase in ("train", "iid", "iid"):
+    for phase in ("search", "iid", "iid"):
         number = start(store, ledger)
         outcomes = (Outcome.SAFE, Outcome.FAILURE, Outcome.REJECTED)
         ledger.add_episodes([(number, episode(index, outcome, phase)) for index, outcome in enumerate(outcomes)])
@@ -150,10 +150,10 @@ def test_what_an_i_i_d_phase_counts_is_added_to_nothing_that_searches_found(stor
     def ids(**asked):
         return [each.id for each in store.episodes(found.id, limit=9, outcomes=(Outcome.FAILURE,), **asked).items]
 
-    assert ids(judged=Judged(iid=False)) == ["low-random-0-train-1"]
+    assert ids(judged=Judged(iid=False)) == ["low-random-0-search-1"]
     assert ids(run_id="low-iid-random-0", judged=Judged()) == ["low-iid-random-0-iid-1"]
     assert store.failure(found.id, "low-iid-random-0-iid-1").episode.phase == "iid"
-    assert {each.phase for each in store.plain_episodes(found.number)} == {"train"}
+    assert {each.phase for each in store.plain_episodes(found.number)} == {"search"}
     assert [curve.run_id for curve in curves(found, store.plain_episodes(found.number), 9).runs] == ["low-random-0"]
 
 
@@ -255,7 +255,7 @@ def test_a_run_has_the_sums_of_what_its_phases_counted(store, ledger, episode, m
     ledger.add_episodes([(number, episode(0, Outcome.FAILURE))])
     assert tallies(store, campaign) == (1, 1, 1)
     counted = metrics.model_copy(update={"distinct_failures": 4, "preventable": 3, "distinct_preventable": 2})
-    evaluated = episode(0, Outcome.FAILURE, phase="evaluate").model_copy(update={"metrics": counted})
+    evaluated = episode(0, Outcome.FAILURE, phase="evaluation").model_copy(update={"metrics": counted})
     ledger.add_episodes([(number, evaluated)])
     assert tallies(store, campaign) == (5, 4, 3)
     done = Finished(finished=True, metrics=counted, evaluation=counted, digest="d", versions={}, wall_s=1.0)
@@ -266,7 +266,7 @@ def test_a_run_has_the_sums_of_what_its_phases_counted(store, ledger, episode, m
 def test_a_triage_is_kept_and_moves_the_revision(store, ledger, episode):
     campaign = ledger.create(SPEC)
     ledger.add_episodes([(start(store, ledger), episode(5, Outcome.DEGENERATE))])
-    failure = "low-risk-sac-3-train-5"
+    failure = "low-risk-sac-3-search-5"
     assert store.triage(campaign.id, failure) is None
     assert store.triages(campaign.number) == {}
     before = store.revision(campaign.id)
@@ -289,7 +289,7 @@ def test_only_a_contact_of_the_project_has_a_triage(store, ledger, episode):
     number = campaign.runs[0].number
     ledger.start_run(number)
     ledger.add_episodes([(number, episode(0)), (number, episode(1, Outcome.FAILURE))])
-    for failure, project in (("low-risk-sac-3-train-0", "maps"), ("low-risk-sac-3-train-1", "rivals"), ("x", "maps")):
+    for failure, project in (("low-risk-sac-3-search-0", "maps"), ("low-risk-sac-3-search-1", "rivals"), ("x", "maps")):
         with pytest.raises(NotFoundError):
             ledger.triage(campaign.id, failure, TriageState.NEW, "", project)
         with pytest.raises(NotFoundError):
@@ -301,6 +301,6 @@ def test_a_triage_outlives_that_its_run_reports_the_episode_again(store, ledger,
     campaign = ledger.create(SPEC)
     number = start(store, ledger)
     ledger.add_episodes([(number, episode(0, Outcome.FAILURE))])
-    noted = ledger.triage(campaign.id, "low-risk-sac-3-train-0", TriageState.DISMISSED, "artefact")
+    noted = ledger.triage(campaign.id, "low-risk-sac-3-search-0", TriageState.DISMISSED, "artefact")
     ledger.add_episodes([(number, episode(0, Outcome.DEGENERATE))])
-    assert store.triage(campaign.id, "low-risk-sac-3-train-0") == noted
+    assert store.triage(campaign.id, "low-risk-sac-3-search-0") == noted

@@ -84,7 +84,7 @@ def test_mean_cost_is_that_of_the_steps_since_the_point_before(ledger):
 
 def test_an_evaluation_is_no_part_of_the_search(ledger):
     campaign = ledger.create(SPEC)
-    records = [episode_record(0), episode_record(1, phase="evaluate")]
+    records = [episode_record(0), episode_record(1, phase="evaluation")]
     found, _ = curves(campaign, [plain(campaign.runs[0], each) for each in records], 9).runs
     assert found.episodes == [1]
 

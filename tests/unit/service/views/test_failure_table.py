@@ -15,7 +15,7 @@ SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
 FAILURE, REFUSED = Outcome.FAILURE, Outcome.DEGENERATE
 
 
-def plain(run, index, hit, outcome=FAILURE, phase="train", **changes):
+def plain(run, index, hit, outcome=FAILURE, phase="search", **changes):
     record = episode_record(index, outcome, phase=phase, collision=hit, **changes)
     return PlainEpisode(1, run.number, phase, index, outcome, from_json(stored(record)))
 
@@ -40,13 +40,13 @@ def test_a_column_has_what_the_record_has(ledger):
     )
     kinds, scenes = table.pop("kinds"), table.pop("scenes")
     assert {name: values[0] for name, values in table.items()} == {
-        "ids": "low-random-4-train-7",
+        "ids": "low-random-4-search-7",
         "run_ids": "low-random-4",
         "families": "low",
         "methods": "random",
         "seeds": 4,
         "indices": 7,
-        "phases": "train",
+        "phases": "search",
         "valid": False,
         "requirement": "no_contact",
         "failed": [],
@@ -102,8 +102,8 @@ def test_distinct_are_those_that_the_run_counted(ledger):
     contacts = [plain(first, index, hit) for index, hit in enumerate(hits)]
     contacts += [
         plain(second, 0, hits[0]),
-        plain(first, 9, hits[0], phase="evaluate"),
-        plain(first, 10, hits[0], phase="evaluate"),
+        plain(first, 9, hits[0], phase="evaluation"),
+        plain(first, 10, hits[0], phase="evaluation"),
     ]
     counted = DistinctFailures()
     table = failure_table(campaign, contacts, {})

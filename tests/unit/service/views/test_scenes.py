@@ -24,7 +24,7 @@ def found(ledger):
         campaign = ledger.create(SPEC)
         episodes = [
             PlainEpisode(
-                i, campaign.runs[0].number, "train", i, each, {"scene": LOW_SCENE | {"lead_gap_m": gap} | others}
+                i, campaign.runs[0].number, "search", i, each, {"scene": LOW_SCENE | {"lead_gap_m": gap} | others}
             )
             for i, (each, gap) in enumerate(gaps)
         ]
@@ -87,6 +87,6 @@ def test_the_odd_bounds_the_bins(ledger):
         {"families": ["low"], "methods": ["random"], "odd": {"environment": {"friction": {"low": 0.7, "high": 0.9}}}}
     )
     campaign = ledger.create(spec)
-    episode = PlainEpisode(1, campaign.runs[0].number, "train", 0, F, {"scene": LOW_SCENE})
+    episode = PlainEpisode(1, campaign.runs[0].number, "search", 0, F, {"scene": LOW_SCENE})
     friction = by_name(scene_effects(campaign, [episode]).families[0])["friction"]
     assert (friction.bins[0][:3], friction.bins[-1][-3:]) == ("0.7", "0.9")

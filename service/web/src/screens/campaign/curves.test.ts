@@ -16,7 +16,7 @@ function point(episodes: number, mean_cost: number | null = 0): Point {
 
 function told(index: number, more: object = {}) {
   const episode = {
-    run_id: "low-random-1", phase: "train", index, outcome: "no_failure", collision: null, mean_cost: 0.5, steps: 80, dual_variable: 0.4, driven_by: "policy",
+    run_id: "low-random-1", phase: "search", index, outcome: "no_failure", collision: null, mean_cost: 0.5, steps: 80, dual_variable: 0.4, driven_by: "policy",
     funnel: { contacts: 9, valid: 8, distinct: 7, preventable: 6 }, ...more,
   };
   return { id: `${index}`, event: "episode", data: JSON.stringify(episode) };
@@ -105,7 +105,7 @@ test("a trailing mean weighs points by their episodes, and forgets what lies too
 test("events go on where the snapshot ends; those before it fill the window alone", () => {
   const live = new LiveCurves([curve([1, 2], [0, 0])]);
   const failed = { outcome: "failure", collision: { verdicts: {}, judgement: { grade: "preventable" } } };
-  live.apply([told(0), told(1, failed), told(2), { id: "s", event: "state", data: "{}" }, told(3, { phase: "evaluate" })]);
+  live.apply([told(0), told(1, failed), told(2), { id: "s", event: "state", data: "{}" }, told(3, { phase: "evaluation" })]);
   expect(live.runs[0]).toMatchObject({ episodes: [1, 2, 3], distinct: [1, 2, 7], dual_variable: [0.2, 0.2, 0.4], mean_cost: [0, 0, 0.5], driven_by: { policy: [0, 0, 1] } });
   expect(live.runs[0]!.window_ecr[2]).toBeCloseTo(1 / 3);
   expect(live.runs[0]!.window_pcr[2]).toBeCloseTo(1 / 3);

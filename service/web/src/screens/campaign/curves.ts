@@ -119,7 +119,7 @@ export class LiveCurves {
     for (const { event, data } of events) {
       if (event === "state") continue;
       const episode: Body<"Episode"> = JSON.parse(data);
-      if (episode.phase === "train") this.add(episode);
+      if (episode.phase === "search") this.add(episode);
     }
   }
 

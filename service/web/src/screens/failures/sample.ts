@@ -5,13 +5,13 @@ import type { FailureTable } from "./wire";
 export function sample(size: number, changed: Partial<FailureTable> = {}): FailureTable {
   const column = <T,>(of: (i: number) => T): T[] => Array.from({ length: size }, (_, i) => of(i));
   return {
-    ids: column((i) => `low-random-1-train-${i}`),
+    ids: column((i) => `low-random-1-search-${i}`),
     run_ids: column((i) => `low-random-${i % 2}`),
     families: column((i) => (i % 2 ? "mixed" : "low")),
     methods: column(() => "random"),
     seeds: column((i) => i),
     indices: column((i) => i),
-    phases: column(() => "train"),
+    phases: column(() => "search"),
     valid: column((i) => i % 4 !== 3),
     requirement: column(() => "no_contact"),
     failed: column((i) => (i % 4 === 3 ? [] : ["no_contact"])),

@@ -5,7 +5,7 @@ const { quoted, replayCommand } = await import("./take");
 const { fileName } = await import("./exports");
 
 it("a word of a shell stays one word", () => {
-  expect(quoted("low-archive-601-train-28")).toBe("low-archive-601-train-28");
+  expect(quoted("low-archive-601-search-28")).toBe("low-archive-601-search-28");
   expect(quoted("a b;rm -rf ~")).toBe("'a b;rm -rf ~'");
   expect(quoted("it's $HOME")).toBe("'it'\\''s $HOME'");
 });
@@ -15,6 +15,6 @@ it("the command fetches the bundle and plays it", () => {
 });
 
 it("an export is called as the service calls it", () => {
-  expect(fileName("low-a-1-train-2", { name: "gif", suffix: ".gif" })).toBe("low-a-1-train-2.gif");
-  expect(fileName("low-a-1-train-2", { name: "sumo", suffix: ".zip" })).toBe("low-a-1-train-2-sumo.zip");
+  expect(fileName("low-a-1-search-2", { name: "gif", suffix: ".gif" })).toBe("low-a-1-search-2.gif");
+  expect(fileName("low-a-1-search-2", { name: "sumo", suffix: ".zip" })).toBe("low-a-1-search-2-sumo.zip");
 });

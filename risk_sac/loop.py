@@ -17,7 +17,7 @@ import torch
 from risk_sac.agents.replay import Transition
 from risk_sac.config import RunSpec
 from risk_sac.guarded_env import GuardedEnv, Unplayable
-from risk_sac.records import RECORDED, DrivenBy, Ending, EpisodeRecord, RequirementResult, RunMetrics, SeriesFile
+from risk_sac.records import DrivenBy, Ending, EpisodeRecord, RequirementResult, RunMetrics, SeriesFile
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.run import RunState, RunSummary
@@ -39,7 +39,7 @@ class Observer(Protocol):
         """Polled between episodes."""
 
 
-def train(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
+def execute_run(spec: RunSpec, folder: Path, observer: Observer) -> RunSummary:
     """Executes a run, or continues the one whose checkpoint lies in `folder`.
 
     Args:
@@ -163,7 +163,7 @@ def _record(
     begun = unplayable is None or unplayable.begun  # else the environment's trace is of the episode before
     return EpisodeRecord(
         index=len(run.records),
-        phase=RECORDED[run.phase],
+        phase=run.phase,
         seed=seed,
         scene=scene.values,
         **ending._asdict(),
