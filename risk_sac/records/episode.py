@@ -32,7 +32,8 @@ _NAMED: Mapping[str, Phase] = {each: each for each in PHASES} | {old: new for ne
 _ID = re.compile(r"(?:([^\0]*)-)?([a-z]+)-([0-9]{1,9})")
 
 
-class EpisodeId(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class EpisodeId:
     """The parts of an episode's id."""
 
     run_id: str  # empty if the text names none

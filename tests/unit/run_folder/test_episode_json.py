@@ -48,7 +48,7 @@ def test_a_malformed_id_has_no_parts(text: str) -> None:
 
 
 def test_a_run_whose_own_id_names_a_phase_keeps_it() -> None:
-    assert EpisodeId.parse("low-iid-random-0-iid-12") == ("low-iid-random-0", "iid", 12)
+    assert EpisodeId.parse("low-iid-random-0-iid-12") == EpisodeId("low-iid-random-0", "iid", 12)
 
 
 def test_a_collision_without_its_minimum_is_no_record() -> None:
