@@ -121,7 +121,7 @@ METHODS: dict[MethodName, Method] = {
         agent="scripted", scenes="botorch", summary="Control: BoTorch scenes, and adversaries that follow one script."
     ),
     "random": Method(agent="random", summary="Control: Sobol scenes and random actions, held for a second on average."),
-    "no-adversary": Method(agent="none", summary="Control: nobody attacks; what remains is the artefact rate."),
+    "no-adversary": Method(agent="none", summary="Control without an attack; what remains is the artefact rate."),
 }
 
 # What a bound may be drawn from: no search, and so none of METHODS.
@@ -129,7 +129,7 @@ IID_METHODS: dict[IidName, Method] = {
     "iid-undisturbed": Method(
         agent="none",
         scenes="iid",
-        summary="Fresh random scenes in which nobody attacks: SUMO drives all vehicles, pedestrians stand.",
+        summary="Fresh random scenes without an attack: SUMO drives all vehicles, pedestrians stand.",
     ),
     "iid-random": Method(
         agent="random",

@@ -14,7 +14,7 @@ from risk_sac.records import NO_CONTACT, Collision, EpisodeRecord, Record, Viola
 
 IDLE = "idle"
 Twin = Literal["idle", "default", "perfect", "careful", "defensive"]
-"""What may be changed in a scene's twin: nobody attacks, or the profile of another ego."""
+"""What may be changed in a scene's twin: no attack, or the profile of another ego."""
 Subject = Literal["bundle", "core", "region", "twin", "export"]
 REFUSED = 3  # exit status; the answer is why, in words
 TOLD = "twin"  # name in a twin's file, beside the arrays of the time series
@@ -29,7 +29,7 @@ class Question(Record):
     series: Path
     """File of its time series."""
     twin: EgoConfig | None = None
-    """The other ego of a twin; null: nobody attacks."""
+    """The other ego of a twin; null: no attack."""
     format: FormatName | None = None
     """Of an export, which."""
 
@@ -38,9 +38,9 @@ class TwinPlay(Record):
     """Change to a scene, and its outcome."""
 
     changed: str
-    """Such as "nobody attacks"."""
+    """Such as "no attack"."""
     outcome: str
-    """Such as "touches nobody"."""
+    """Such as "no contact"."""
     collision: Collision | None
     """The ego's first contact, if it touched something."""
 
@@ -60,8 +60,8 @@ class TwinPlay(Record):
           found: what was violated in the twin.
           name: of the other ego.
         """
-        changed = "nobody attacks" if ego is None else f"ego: {name or ego.driver or ego.profile}"
-        kept = "touches nobody" if failure.requirement == NO_CONTACT else f"keeps {failure.requirement}"
+        changed = "no attack" if ego is None else f"ego: {name or ego.driver or ego.profile}"
+        kept = "no contact" if failure.requirement == NO_CONTACT else f"keeps {failure.requirement}"
         violated = {each.requirement: each.event for each in found}
         told = dict.fromkeys([failure.requirement, *violated], kept) | violated
         collision = next((each for each in found if isinstance(each, Collision)), None)

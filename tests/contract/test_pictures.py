@@ -188,7 +188,7 @@ def test_the_picture_and_the_series_of_a_twin_are_of_one_play_and_need_not_be_se
         told, drawn, again = (client.get(url).raise_for_status() for url in (path, f"{path}.png", path))
         assert drawn.content.startswith(b"\x89PNG")
         assert told.json() == again.json()
-        assert (told.json()["twin"], told.json()["outcome"]) == ("idle", "touches nobody")
+        assert (told.json()["twin"], told.json()["outcome"]) == ("idle", "no contact")
         assert told.json()["series"] == client.get(f"{FOLDER}/{RUN}-search-1").json()["series"]
         assert len(asked) == 1
         for answered in (told, drawn):

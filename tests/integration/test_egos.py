@@ -96,7 +96,7 @@ def play(spec: RunSpec, folder: Path) -> tuple[Results, list[EpisodeRecord]]:
 
 
 def frames(family: str, driver: str | None, episode: int, *, controlled: bool = False) -> list[Frame]:
-    """Of an episode in which nobody attacks."""
+    """Of an episode without an attack."""
     spec = RunSpec(family=family, method="random", seed=0, ego=EgoConfig(driver=driver))
     with closing(RiskSacEnv.of(spec)) as env:
         env = RiskSacEnv(env.problem, spec.learner.reward, controlled=controlled)

@@ -78,7 +78,7 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
     assert default["outcome"] == f"touches {hit['other_id']} with an impact speed of {hit['ego_speed_mps']:.1f} m/s"
     assert idle["series"]["ids"] == own["series"]["ids"]
     assert idle["series"]["x_m"][0] == own["series"]["x_m"][0], "they begin alike"
-    assert (idle["collision"] is None) == (idle["outcome"] == "touches nobody")
+    assert (idle["collision"] is None) == (idle["outcome"] == "no contact")
 
     replayed = [each for each in service.get(campaign_id, "/failures", limit=100)["items"] if each["repetition"]]
     assert all(each["repetition"] == {"times": 2, "same": 2} for each in replayed)

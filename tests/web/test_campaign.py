@@ -3,10 +3,12 @@
 import json
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, Route, expect
 from pyarrow import parquet
 
 from tests.server import Service, servers
@@ -236,6 +238,33 @@ def test_events_draw_curves_that_equal_those_of_the_service(page_at: Callable[..
         area.press("ArrowRight")
     expect(area.get_by_role("status")).to_contain_text("After 60 episodes")
     expect(area.get_by_role("status").locator("span b")).to_have_text(str(curve["distinct"][-1]))
+
+
+def test_the_time_left_goes_by_the_runs_own_episodes(page_at: Callable[..., Page], service: Service) -> None:
+    running = service.post(families=["low"], methods=["random"], seeds=[7], budget={"episodes": 2000})
+    service.wait_for(running, lambda seen: seen["progress"]["episodes_done"] >= 60)
+    progress = service.get(running)["progress"]
+    played = [each["wall_s"] for each in service.get(running, "/episodes", limit=500)["items"]][
+        1:
+    ]  # the first compiles
+    left_s = (2000 - progress["episodes_done"]) * sum(played) / len(played)
+    assert 0.5 <= progress["eta_s"] / left_s <= 2
+    page = page_at(f"campaigns/{running}")
+    expect(page.locator(".advance")).to_contain_text(
+        re.compile(r"\d of 2[,\u202f ]?000 episodes · (\d+ min )?\d+ s left$")
+    )
+    service.client.post(f"/v1/campaigns/{running}/cancel")
+    known = service.wait(running) | {"state": "running"}
+    for eta_s, said in ((None, "time left not known yet"), (119.7, "2 min 0 s left"), (3599.6, "1 h 0 min left")):
+        page = page_at()
+        answer = known | {"progress": known["progress"] | {"eta_s": eta_s}}
+        page.route(re.compile(rf"/v1/campaigns/{running}$"), partial(_answer, answer))
+        page.goto(f"{service.client.base_url}/page/#/campaigns/{running}")
+        expect(page.locator(".advance")).to_contain_text(said)
+
+
+def _answer(answer: dict[str, Any], route: Route) -> None:
+    route.fulfill(json=answer)
 
 
 def test_cancelling_asks_first(page_at: Callable[..., Page], service: Service) -> None:

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 
 from tests.server import Service
-from tests.web.conftest import CAMPAIGN, count
+from tests.web.conftest import CAMPAIGN, PHONE, count
 
 HOSTILE = "<img src=x onerror=alert(1)> ‮& \"'"
 
@@ -59,6 +59,17 @@ def test_a_row_says_what_the_api_says(
     for place, name in enumerate(("headline", "distinct_failures", "distinct_preventable"), start=8):
         expect(cells.nth(place)).to_have_text(count(said["progress"][name]))
     expect(cells.nth(11)).to_contain_text("took")
+
+
+def test_a_phone_shows_all_cells_of_a_row(page_at: Callable[..., Page], campaign: str) -> None:
+    page = page_at("campaigns", viewport=PHONE)
+    found = row(page, campaign)
+    expect(found).to_be_visible()
+    for cell in found.locator("td").all():
+        box = cell.bounding_box()
+        assert box is not None
+        assert 0 <= box["x"] < box["x"] + box["width"] <= PHONE["width"]
+    assert {cell.get_attribute("data-head") for cell in found.locator("td").all()} >= {"State", "ECR", "Headline"}
 
 
 def test_the_line_of_the_ecr_comes_when_its_row_does(page_at: Callable[..., Page], campaign: str) -> None:

@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 
 from tests.server import Service
-from tests.web.conftest import count
+from tests.web.conftest import PHONE, count
 
 
 @pytest.fixture(scope="session")
@@ -87,6 +87,21 @@ def test_the_numbers_of_a_report_are_the_services(
         assert sum(episodes) == cell["episodes"]
     page.get_by_text("More measures").click()
     check_axe(page)
+
+
+def test_a_table_that_scrolls_on_a_phone_keeps_its_names(page_at: Callable[..., Page], methods: str) -> None:
+    page = page_at(f"campaigns/{methods}/compare", viewport=PHONE)
+    table = page.get_by_role("region", name="Methods compared: low")
+    name = table.get_by_role("rowheader").first
+    expect(name).to_be_visible()
+    assert table.evaluate("each => each.scrollWidth - each.clientWidth") > 0
+    table.evaluate("each => each.scrollTo(each.scrollWidth, 0)")
+    room, shown, last = table.bounding_box(), name.bounding_box(), table.locator("tbody tr").first.locator("td").last
+    assert room is not None
+    assert shown is not None
+    assert shown["x"] == pytest.approx(room["x"], abs=1)
+    assert shown["width"] < room["width"] / 2
+    expect(last).to_be_in_viewport()
 
 
 def test_error_bars_stand_where_their_numbers_say(page_at: Callable[..., Page], service: Service, methods: str) -> None:

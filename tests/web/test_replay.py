@@ -241,6 +241,41 @@ def test_a_click_in_a_plot_goes_there_and_all_plots_show_one_time(
     assert lefts == pytest.approx([box["width"] / 4] * len(lefts), abs=3)
 
 
+DISTANCE_CURVE = """canvas => {
+    const over = canvas.parentElement.querySelector('.u-over').getBoundingClientRect();
+    const [density, box] = [devicePixelRatio, canvas.getBoundingClientRect()];
+    const [left, top, width, height] = [over.left - box.left, over.top - box.top, over.width, over.height].map(
+        (length) => Math.round(length * density));
+    const { data } = canvas.getContext('2d').getImageData(left, top, width, height);
+    const drawn = [];  // of each column: rows in the colour of the curve, from the top
+    for (let x = 0; x < width; x++) {
+        const rows = [];
+        for (let y = 0; y < height; y++) {
+            const [r, g, b, a] = data.slice(4 * (y * width + x), 4 * (y * width + x) + 4);
+            if (a > 200 && Math.max(r, g, b) < 60) rows.push(1 - y / height);
+        }
+        drawn.push(rows);
+    }
+    return drawn;
+}"""
+
+
+def test_distances_of_the_conflict_fill_their_plot(failure: dict[str, Any], page_at: Callable[..., Page]) -> None:
+    page = page_at(failure["place"], color_scheme="light")
+    stage(page)
+    canvas = page.locator(".time-plot", has_text="Distance").locator("canvas")
+    canvas.wait_for()
+    time_s, contact = times(failure), failure["collision"]
+    opening_s = contact["judgement"]["conflict_s"] - contact["time_s"] - 1  # where a replay opens
+    distance_m = column(failure["series"]["distance_m"], failure["series"]["ids"].index(contact["other_id"]))
+    assert np.nanmax(distance_m) > 2 * np.nanmax(distance_m[time_s >= opening_s]), "wants an approach from far away"
+    columns = canvas.evaluate(DISTANCE_CURVE)
+    after = columns[int(len(columns) * (opening_s - time_s[0]) / (time_s[-1] - time_s[0])) + 1 :]
+    heights = [max(rows) for rows in after if rows and max(rows) - min(rows) < 0.5]  # not the mark of the contact
+    assert 0.8 < max(heights) < 1
+    assert min(heights) < 0.2
+
+
 def test_the_address_keeps_the_time_once_it_rests(failure: dict[str, Any], page_at: Callable[..., Page]) -> None:
     page = page_at(f"{failure['place']}?t=-0.5")
     expect(stage(page)).to_have_attribute("data-time", "-0.500")

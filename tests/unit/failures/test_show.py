@@ -76,10 +76,10 @@ def test_both_bodies_and_both_paths_are_drawn() -> None:
 def test_a_twin_is_drawn_beside_the_failure_on_the_same_ground_clock_and_scales() -> None:
     failure = Recording(synthetic_contact(), with_release())
     later = {name: values + 2.0 if name == "time_s" else values for name, values in with_release().items()}
-    twin = Recording(failure.failure, later, "nobody attacks")
+    twin = Recording(failure.failure, later, "no attack")
     axes = draw_recording("mixed", failure, twin).axes
     rows = list(zip(axes[::2], axes[1::2], strict=True))
-    assert [view.get_title() for view in rows[0]] == ["the failure", "nobody attacks"]
+    assert [view.get_title() for view in rows[0]] == ["the failure", "no attack"]
     for left, right in rows:
         assert left.get_xlim() == right.get_xlim()
         assert left.get_ylim() == right.get_ylim()

@@ -11,7 +11,7 @@ from tests.unit.failures.staged import synthetic_series
 def test_a_twin_is_named_by_what_was_changed_and_what_came_of_it() -> None:
     hit = collision(other_id="lead", ego_speed_mps=5.44)
     careful = EgoConfig(profile="careful")
-    assert TwinPlay.of(None, hit, []).title == "nobody attacks: touches nobody"
+    assert TwinPlay.of(None, hit, []).title == "no attack: no contact"
     assert TwinPlay.of(careful, hit, [hit]).title == "ego: careful: touches lead with an impact speed of 5.4 m/s"
     assert TwinPlay.of(careful, hit, [hit], "slow.yaml").changed == "ego: slow.yaml"
 
@@ -32,4 +32,4 @@ def test_the_twin_of_a_violation_says_whether_it_keeps_that_requirement() -> Non
     assert TwinPlay.of(None, broken, [broken]).outcome == "violates never_fast after 1.5 s, at 9.0 m/s"
     told = TwinPlay.of(None, broken, [hit])
     assert (told.outcome, told.collision) == ("keeps never_fast, touches lead with an impact speed of 5.4 m/s", hit)
-    assert TwinPlay.of(None, hit, [broken]).outcome == "touches nobody, violates never_fast after 1.5 s, at 9.0 m/s"
+    assert TwinPlay.of(None, hit, [broken]).outcome == "no contact, violates never_fast after 1.5 s, at 9.0 m/s"

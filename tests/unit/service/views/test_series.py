@@ -92,5 +92,5 @@ def test_a_twin_is_told_with_its_series_and_its_contact_and_null_where_a_number_
 def test_what_is_not_told_of_a_series_is_left_out():
     series = series_arrays() | {"least_ttc_s": series_arrays()["soft_min"]}
     body = twin_body("careful", twin_bytes(TwinPlay.of(None, collision(), []), series))
-    assert (body.outcome, body.collision) == ("touches nobody", None)
+    assert (body.outcome, body.collision) == ("no contact", None)
     assert "least_ttc_s" not in body.series.model_dump()

@@ -135,33 +135,33 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
         </a>
         {campaign.label && <code class="faint">{campaign.id}</code>}
       </td>
-      <td>
+      <td data-head="State">
         <span class={`tag ${campaign.state}`} title={campaign.reason ?? undefined}>
           {campaign.state}
         </span>
         {campaign.reason && <span class="reason small">{campaign.reason}</span>}
       </td>
-      <td class="wraps">
+      <td data-head="Families" class="wraps">
         <Several names={campaign.families} />
       </td>
-      <td class="wraps" title={campaign.methods.join(", ")}>
+      <td data-head="Methods" class="wraps" title={campaign.methods.join(", ")}>
         <Several names={campaign.methods} />
       </td>
-      <td class="wraps">
+      <td data-head="Ego" class="wraps">
         {ego.profile} <span class="faint">{ego.car_following}</span>
       </td>
-      <td>
+      <td data-head="Episodes">
         <Bar done={progress.episodes_done} total={progress.episodes_total} name={nameOf(campaign)} />
       </td>
-      <td>
+      <td data-head="ECR">
         <Sparkline campaign={campaign} learners={learners} />
         <span class="small faint">{percent(progress.window_ecr)}</span>
       </td>
-      <td class="number">{progress.headline === null ? "–" : count(progress.headline)}</td>
-      <td class="number">{count(progress.distinct_failures)}</td>
-      <td class="number">{count(progress.distinct_preventable)}</td>
-      <td class="number">{remaining(campaign)}</td>
-      <td class="number">
+      <td data-head="Headline" class="number">{progress.headline === null ? "–" : count(progress.headline)}</td>
+      <td data-head="Distinct" class="number">{count(progress.distinct_failures)}</td>
+      <td data-head="Preventable" class="number">{count(progress.distinct_preventable)}</td>
+      <td data-head="ETA" class="number">{remaining(campaign)}</td>
+      <td data-head="Created" class="number">
         <Created at={campaign.created_at} />
       </td>
     </>
