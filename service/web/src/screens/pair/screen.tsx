@@ -127,7 +127,7 @@ function Pair({ campaign, path, twin, known, series, violation, query }: PairPro
         <>
           <p class="faint small time-hint">
             Time in s from the {failure.moment}. Blue: now; dotted: release{failure.conflict_s !== null && "; dashed: the conflict begins"}
-            {hidden.length > 0 && `; grey ground: the failure's ego does not see ${failure.ids[failure.striker]}`}.
+            {hidden.length > 0 && `; shaded: the failure's ego does not see ${failure.ids[failure.striker]}`}.
           </p>
           <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
         </>

@@ -131,7 +131,7 @@ function Replay({ campaign, path, known, series, violation, query }: Played) {
         <p class="faint small time-hint">
           Time in s from the {recording.moment}. Blue: now; dotted: release
           {recording.conflict_s !== null && "; dashed: the conflict begins"}
-          {hidden.length > 0 && `; grey ground: the ego does not see ${recording.ids[recording.striker]}`}.
+          {hidden.length > 0 && `; shaded: the ego does not see ${recording.ids[recording.striker]}`}.
         </p>
         <Plots panels={panels} clock={clock} marks={marks} hidden={hidden} />
         </div>
