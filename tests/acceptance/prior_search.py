@@ -7,12 +7,10 @@ plays what OUT lacks, and rewrites OUT/searches.csv after each run.
 """
 
 import argparse
-import csv
-import multiprocessing
 import tempfile
 from collections import Counter
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import closing
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
@@ -27,6 +25,7 @@ from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import Map
 from risk_sac.verdicts.distinct import kind_name
 from tests.acceptance.regression_prior import Until
+from tests.acceptance.side_by_side import Row, rows_of
 from tests.maps import osm_town
 
 # Of each pattern a place of 50 km/h with the most adversaries, chosen before the first run.
@@ -65,7 +64,7 @@ def town() -> list[str]:
     return [next(name for name in names if name.startswith(wanted)) for wanted in TOWN]
 
 
-def play(search: Search, steps: int, out: Path) -> dict[str, object]:
+def play(steps: int, out: Path, search: Search) -> Row:
     """Plays a run up to a number of steps unless OUT has it; returns what it found."""
     folder = out / "-".join(map(str, search))
     if not (folder / RESULTS).exists():
@@ -83,7 +82,7 @@ def play(search: Search, steps: int, out: Path) -> dict[str, object]:
     return search._asdict() | row(records_from_lines((folder / EPISODES).read_bytes()))
 
 
-def row(records: list[EpisodeRecord]) -> dict[str, object]:
+def row(records: list[EpisodeRecord]) -> Row:
     """Returns the figures of a run's episodes."""
     found = [each for record in records for each in record.valid_violations]
     drove = Counter(str(record.driven_by) for record in records)
@@ -111,19 +110,10 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=5000)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
     families = town() if options.town else options.families
     seeds = range(1, options.seeds + 1)
     wanted = [Search(f, e, *arm, s) for s, e, f, arm in product(seeds, options.egos, families, ARMS)]
-    rows: dict[Search, dict[str, object]] = {}
-    with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn"), max_tasks_per_child=1) as pool:
-        tasks = {pool.submit(play, each, options.steps, options.out): each for each in wanted}
-        for task in as_completed(tasks):
-            rows[tasks[task]] = task.result()
-            with (options.out / "searches.csv").open("w", newline="") as file:
-                table = csv.DictWriter(file, next(iter(rows.values())).keys(), lineterminator="\n")
-                table.writeheader()
-                table.writerows(rows[each] for each in wanted if each in rows)
+    rows_of(partial(play, options.steps, options.out), wanted, options.jobs, options.out / "searches.csv")
 
 
 if __name__ == "__main__":
