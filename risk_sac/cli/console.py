@@ -125,8 +125,9 @@ def say_adjustments(found: Iterable[Adjustment]) -> None:
 
 
 def folded_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
-    """Returns a table whose cells wrap as far as the width of the terminal needs it."""
+    """Returns a table that folds all cells but those of the first column."""
     table = Table(*columns, box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.columns[0].no_wrap = True
     for row in rows:
         table.add_row(*map(escape, row))
     return table

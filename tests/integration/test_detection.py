@@ -101,6 +101,6 @@ def test_the_benchmark_goes_on_where_it_was(tmp_path: Path, capsys: pytest.Captu
     assert "falsification rate" in (tmp_path / "benchmark.md").read_text()
     capsys.readouterr()
     assert main([*command, "--seeds", "2", "--tables-only"]) == 0  # the second seed is not played
-    assert re.search(r"^ *random +2 ", capsys.readouterr().out, re.MULTILINE)
+    assert re.search(r"^ *random +\d of 2 ", capsys.readouterr().out, re.MULTILINE)
     assert main([*command, "--defects", "kerb-wait"]) == 2
     assert "--defects: got 'kerb-wait'" in capsys.readouterr().err
