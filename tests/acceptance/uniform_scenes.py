@@ -1,6 +1,7 @@
 """What scripts find in uniformly drawn scenes: the model's choice, random ones, and the best of many.
 
-    python -m tests.acceptance.uniform_scenes OUT --egos NAME ... [--families NAME ...] [--scenes N] [--scripts N]
+    python -m tests.acceptance.uniform_scenes OUT --egos NAME ... [--families NAME ...] [--drivers NAME ...]
+        [--scenes N] [--scripts N]
 
 plays them, and rewrites OUT/scenes.csv after each. All drivers meet the same scenes, and nothing is
 learnt. `any` plays up to N scripts in a scene until one fails, half of them random and half mutated from the library:
@@ -103,11 +104,12 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--egos", nargs="+", required=True, metavar="EGO", help="as pretrained_policy takes them")
     parser.add_argument("--families", nargs="+", choices=SHIPPED, default=list(SHIPPED))
+    parser.add_argument("--drivers", nargs="+", choices=DRIVERS, default=list(DRIVERS))
     parser.add_argument("--scenes", type=int, default=60)
     parser.add_argument("--scripts", type=int, default=500)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
-    cells = [Cell(*cell) for cell in product(options.families, options.egos, DRIVERS)]
+    cells = [Cell(*cell) for cell in product(options.families, options.egos, options.drivers)]
     rows_of(partial(row, options.scenes, options.scripts), cells, options.jobs, options.out / "scenes.csv")
     print((options.out / "scenes.csv").read_text())
 
