@@ -23,8 +23,8 @@ from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.execution.recorder import Recorder
 from risk_sac.failures.collect import policy_of
 from risk_sac.frozen_policy import FrozenPolicy
+from risk_sac.loop import execute_run
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
-from risk_sac.train import train
 from tests.acceptance.regression_prior import Until
 from tests.acceptance.side_by_side import Row, rows_of
 
@@ -48,7 +48,7 @@ def play(out: Path, episodes: int, uniform: int, spec: RunSpec) -> Row:
     folder = out / spec.id
     if not (folder / RESULTS).exists() or not read_results(folder).finished:
         with closing(Recorder(spec, folder, Until(10**9))) as recorder:
-            recorder.finish(train(spec, folder, recorder))
+            recorder.finish(execute_run(spec, folder, recorder))
     results = read_results(folder)
     frozen, policy = results.evaluation, policy_of(folder, results)
     assert frozen is not None  # because of the budget
