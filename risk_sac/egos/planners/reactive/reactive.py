@@ -106,7 +106,7 @@ class Reactive:
             planner.set_desired_lon_position(planner.x_0_cl[0][0] + stop_m, -min(stop_m, 1.0) / 2, BEFORE_LINE_M / 2)
         try:
             found = planner.plan()
-        except TypeError:  # its log formats a cost that is None, where it stands and no sample is feasible
+        except TypeError:  # its log formats a cost that is None, where no sample is feasible just after a hard stop
             found = None
         if found is None:
             return None
