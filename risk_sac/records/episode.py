@@ -40,6 +40,9 @@ class EpisodeId:
     phase: Phase
     index: int
 
+    def __str__(self) -> str:
+        return f"{self.run_id}-{self.phase}-{self.index}"
+
     @classmethod
     def parse(cls, text: str) -> "EpisodeId | None":
         """Splits an id, whose phase may have its former name; None if it is malformed."""
@@ -114,7 +117,7 @@ class EpisodeRecord(Record):
 
     def id_in(self, run_id: str) -> str:
         """Returns the episode's name, unique within a campaign."""
-        return f"{run_id}-{self.phase}-{self.index}"
+        return str(EpisodeId(run_id, self.phase, self.index))
 
     @property
     def searching(self) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AliasChoices, Field, TypeAdapter
+from pydantic import AfterValidator, AliasChoices, Field, TypeAdapter
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
@@ -34,7 +34,8 @@ def series_name(index: int) -> str:
 class RecordedFailure:
     """An episode in which a requirement that counts was violated, with or without contact, refused ones included."""
 
-    id: str  # the episode's, as the service says it too; in older folders its index in six digits
+    # The episode's, as the service says it too; in older folders its index in six digits, or a phase's former name.
+    id: Annotated[str, AfterValidator(lambda text: str(EpisodeId.parse(text) or text))]
     series: str  # file of its time series, relative to results.json
     episode: EpisodeRecord
 

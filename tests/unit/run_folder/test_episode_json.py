@@ -1,11 +1,11 @@
 import json
 
 import pytest
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from risk_sac.metrics import results_digest
 from risk_sac.records import FORMER_PHASES, EpisodeId, EpisodeRecord, Phase
-from risk_sac.run_folder.results import records_from_json, records_from_lines, records_to_json
+from risk_sac.run_folder.results import RecordedFailure, records_from_json, records_from_lines, records_to_json
 from tests.builders import collision, episode_record
 
 RECORD = episode_record(4, collision=collision(min_ttc_s=0.7), min_ttc_s=0.0)
@@ -45,6 +45,12 @@ def test_records_and_ids_read_a_phase_by_its_former_name(now: Phase, former: str
 )
 def test_a_malformed_id_has_no_parts(text: str) -> None:
     assert EpisodeId.parse(text) is None
+
+
+@pytest.mark.parametrize(("stored", "read"), [("low-random-1-train-4", "low-random-1-search-4"), ("000004", "000004")])
+def test_failures_of_older_folders_have_ids_of_today(stored: str, read: str) -> None:
+    failure = {"id": stored, "series": "failures/000004.npz", "episode": RECORD.model_dump(mode="json")}
+    assert TypeAdapter(RecordedFailure).validate_python(failure).id == read
 
 
 def test_a_run_whose_own_id_names_a_phase_keeps_it() -> None:
