@@ -20,10 +20,11 @@ from risk_sac.egos.registry import pinned
 from risk_sac.execution.recorder import Recorder
 from risk_sac.loop import execute_run
 from risk_sac.records import EpisodeRecord
-from risk_sac.run_folder.results import EPISODES, RESULTS, records_from_lines
+from risk_sac.run_folder.results import EPISODES, records_from_lines
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import Map
 from risk_sac.verdicts.distinct import kind_name
+from tests.acceptance.planner_table import spent
 from tests.acceptance.regression_prior import Until
 from tests.acceptance.side_by_side import Row, rows_of
 from tests.maps import osm_town
@@ -65,9 +66,9 @@ def town() -> list[str]:
 
 
 def play(steps: int, out: Path, search: Search) -> Row:
-    """Plays a run up to a number of steps unless OUT has it; returns what it found."""
+    """Plays a run up to a number of steps, or goes on with it; returns what it found."""
     folder = out / "-".join(map(str, search))
-    if not (folder / RESULTS).exists():
+    if not spent(folder, steps):
         ego = pinned(EgoConfig() if search.ego == "default" else EgoConfig(driver=search.ego))
         spec = RunSpec(
             family=search.family,
