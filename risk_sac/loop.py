@@ -22,7 +22,7 @@ from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.run import RunState, RunSummary
 from risk_sac.run_folder.crashes import CrashGuard
-from risk_sac.scene_optimizer import NOBODY, Encounter
+from risk_sac.scene_optimizer import NO_ENCOUNTER, Encounter
 from risk_sac.types import Floats, Scene
 
 
@@ -155,7 +155,7 @@ def _record(
     genes: Floats | None = None,
     objective: float | None = None,
     kept: Mapping[str, RequirementResult] | None = None,
-    encounter: Encounter = NOBODY,
+    encounter: Encounter = NO_ENCOUNTER,
 ) -> EpisodeRecord:
     ending = Ending.of(encounter.collision, encounter.violations)
     if unplayable is not None:

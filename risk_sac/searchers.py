@@ -19,7 +19,7 @@ from risk_sac.prior.start import start_of
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Outcome, Violation
 from risk_sac.scene_optimizer import (
-    NOBODY,
+    NO_ENCOUNTER,
     ArchiveOptimizer,
     BotorchOptimizer,
     DiscountedBandit,
@@ -143,7 +143,7 @@ class Searchers:
         if self._next is not self._own:
             self.agent.begin(genes)
 
-    def tell(self, point: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
+    def tell(self, point: Floats, mean_return: float | None, encounter: Encounter = NO_ENCOUNTER) -> float | None:
         """Scores the scene of the episode; see `SceneOptimizer.tell`. The method's sampler also gets its guide's."""
         if self._next is not self._own:
             self._own.sampler.tell(point[: self._space.dimension], mean_return, encounter)

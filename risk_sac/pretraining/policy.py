@@ -96,7 +96,7 @@ class FailureReplay(UniformReplay):
 
 @dataclass(slots=True)
 class Goals:
-    """Kinds of failures that the policy can be asked for, in the order in which they were first seen."""
+    """Kinds of failures that the policy can be asked for, as first seen."""
 
     names: list[str] = field(default_factory=list)
     recent: deque[int] = field(default_factory=lambda: deque(maxlen=RECENT))

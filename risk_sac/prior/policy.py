@@ -1,7 +1,8 @@
-"""The pretrained policy: a SAC that was trained before many egos, and is told which kind of failure to reach.
+"""The pretrained policy: a SAC conditioned on the kind of failure to reach.
 
-Its networks read the observation of a shipped family with a goal behind it. `Folded` rewrites their first layers, so
-that they read the observation of a problem whose actors, scene parameters and requirements may be others.
+It was trained before many egos. Its networks read the observation of a shipped family with a goal behind it. `Folded`
+rewrites their first layers, so that they read the observation of a problem whose actors, scene parameters and
+requirements may be others.
 
 prior/weights/<family>-policy.npz   plain arrays; README.md says how they were made
 """
@@ -34,7 +35,7 @@ Arrays = tuple[NDArray[np.float32], ...]
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """What the entries of an observation and of an action stand for."""
+    """Meaning of the entries of an observation and of an action."""
 
     adversaries: tuple[str, ...]
     scene: tuple[tuple[str, float, float], ...]  # name, least and greatest value of each parameter
@@ -60,7 +61,10 @@ class Layout:
 
 @dataclass(frozen=True, slots=True)
 class PretrainedPolicy:
-    """Networks of a SAC for one shipped family; layers are weights, `count x in x out`, and biases, in turn."""
+    """Networks of a SAC for one shipped family.
+
+    Layers are weights, `count x in x out`, and biases, in turn.
+    """
 
     family: str
     layout: Layout
@@ -231,7 +235,7 @@ def _translation(shipped: Layout, own: Layout) -> tuple[NDArray[np.float32], NDA
 
 
 def _action_columns(shipped: Layout, own: Layout) -> list[int]:
-    """Returns for each entry of the own action its place in the shipped one; -1 where there is none."""
+    """Returns the place of each own action entry in the shipped action; -1 without one."""
     places = {name: 2 * i for i, name in enumerate(shipped.adversaries)}
     return [column for name in own.adversaries for column in _pair(places.get(name))]
 

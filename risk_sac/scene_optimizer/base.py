@@ -51,7 +51,7 @@ class Encounter:
         return max(self.valid_violations, key=lambda each: (each.headline_candidate, each.preventable), default=None)
 
 
-NOBODY = Encounter()
+NO_ENCOUNTER = Encounter()
 
 
 def objective(mean_return: float | Floats, running_maximum: float) -> Floats:
@@ -123,7 +123,7 @@ class SceneOptimizer(ABC):
     def ask(self) -> Floats:
         """Returns the next point to try, `d`, in [0, 1]."""
 
-    def tell(self, u: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> float | None:
+    def tell(self, u: Floats, mean_return: float | None, encounter: Encounter = NO_ENCOUNTER) -> float | None:
         """Scores a finished episode.
 
         Args:

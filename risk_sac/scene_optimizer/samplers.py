@@ -5,7 +5,7 @@ import torch
 from torch.quasirandom import SobolEngine
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.scene_optimizer.base import NOBODY, Encounter, SceneOptimizer, State
+from risk_sac.scene_optimizer.base import NO_ENCOUNTER, Encounter, SceneOptimizer, State
 from risk_sac.types import Floats
 
 
@@ -55,7 +55,7 @@ class IidSampler(SobolOptimizer):
     def _point(self, number: int) -> Floats:
         return np.random.default_rng((self._seed, number)).random(self._dimension)
 
-    def tell(self, u: Floats, mean_return: float | None, encounter: Encounter = NOBODY) -> None:
+    def tell(self, u: Floats, mean_return: float | None, encounter: Encounter = NO_ENCOUNTER) -> None:
         """See `SceneOptimizer.tell`; always None."""
         super().tell(u, mean_return, encounter)
 

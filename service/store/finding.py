@@ -83,22 +83,22 @@ def episode_page(
 def find_failure(session: Session, campaign: CampaignRow, failure_id: str) -> EpisodeRow:
     """Returns the campaign's failure with this id."""
     wanted = EpisodeId.parse(failure_id)
-    query = (
-        None
-        if wanted is None
-        else (
-            select(EpisodeRow)
-            .join(EpisodeRow.run)
-            .where(RunRow.campaign_number == campaign.number, RunRow.id == wanted.run_id)
-            .where(EpisodeRow.phase == wanted.phase, EpisodeRow.index == wanted.index)
-            .where(EpisodeRow.outcome.in_([Outcome.FAILURE, Outcome.DEGENERATE]))
-        )
-    )
-    row = None if query is None else session.scalars(query).one_or_none()
+    row = None if wanted is None else _violation(session, campaign, wanted)
     if row is None:
         message = f"campaign {campaign.id} has no failure {failure_id!r}; GET its `failures?tier=raw` lists them all"
         raise NotFoundError(message, field="failure_id", got=failure_id)
     return row
+
+
+def _violation(session: Session, campaign: CampaignRow, wanted: EpisodeId) -> EpisodeRow | None:
+    query = (
+        select(EpisodeRow)
+        .join(EpisodeRow.run)
+        .where(RunRow.campaign_number == campaign.number, RunRow.id == wanted.run_id)
+        .where(EpisodeRow.phase == wanted.phase, EpisodeRow.index == wanted.index)
+        .where(EpisodeRow.outcome.in_([Outcome.FAILURE, Outcome.DEGENERATE]))
+    )
+    return session.scalars(query).one_or_none()
 
 
 def find_triage(session: Session, episode: EpisodeRow) -> TriageRow | None:

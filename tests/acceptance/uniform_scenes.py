@@ -3,9 +3,9 @@
     python -m tests.acceptance.uniform_scenes OUT --egos NAME ... [--families NAME ...] [--drivers NAME ...]
         [--scenes N] [--scripts N]
 
-plays them, and rewrites OUT/scenes.csv after each. All drivers meet the same scenes, and nothing is
-learnt. `any` plays up to N scripts in a scene until one fails, half of them random and half mutated from the library:
-its failures are the ceiling of what scripts can reach there.
+plays each driver before each ego, and rewrites OUT/scenes.csv after each. All meet the same scenes, and nothing is
+learnt. `any` plays up to N scripts in a scene until one fails, half of them random and half mutated from the library.
+So its failures are the ceiling of what scripts can reach there.
 """
 
 import argparse
