@@ -13,7 +13,7 @@ import fiss_planner as fp
 import numpy as np
 
 from risk_sac.egos.bicycle import track
-from risk_sac.egos.planners.route import in_pieces, lanes_ahead, stops
+from risk_sac.egos.planners.route import SignalStops, in_pieces, lanes_ahead, stops
 from risk_sac.egos.road import lane_edges
 from risk_sac.egos.seam import Control, Episode, Perceived, Trajectory, Vehicle
 from risk_sac.sim.pilot import Motion
@@ -48,6 +48,7 @@ class FrenetPlanner:
             self._map = road_map(self._road, self._numbers)
         self._step_s, self._car = episode.step_s, episode.vehicle
         self._planner: Any = None
+        self._signals = SignalStops()
         self._ids: dict[str, int] = {}
         self._heading: float | None = None
 
@@ -56,7 +57,7 @@ class FrenetPlanner:
         ego = self._ego(perceived)
         if self._planner is None:
             self._start(ego)
-        for number, active in enumerate(stops(self._road, perceived)):
+        for number, active in enumerate(stops(self._road, perceived, self._signals)):
             self._planner.set_stop_line_active(number, active)
         plan = self._planner.step(perceived.time_s, ego, self._obstacles(perceived))
         if len(plan.trajectory) < 2:

@@ -39,33 +39,49 @@ def lanes_ahead(road: Road, start: str) -> list[str]:
     return [start]
 
 
-def stops(road: Road, perceived: Perceived) -> list[bool]:
+class SignalStops:
+    """Decides at which signals the ego stops: at a red one, and at a yellow one where it can still stop.
+
+    Once it stops at a yellow one, it does until the signal changes, however hard it has to brake then.
+    """
+
+    def __init__(self) -> None:
+        self._yellow: set[int] = set()  # lines at which it stops
+
+    def at(self, line: int, signal: Signal, speed_mps: float, way_m: float) -> bool:
+        """Decides for the signal of a stop line, which is known by any number that stays its own."""
+        possible = speed_mps * speed_mps <= 2.0 * LAST_STOP_MPS2 * way_m
+        if signal is Signal.YELLOW and possible:
+            self._yellow.add(line)
+        elif signal is not Signal.YELLOW:
+            self._yellow.discard(line)
+        return signal is Signal.RED or line in self._yellow
+
+
+def stops(road: Road, perceived: Perceived, signals: SignalStops) -> list[bool]:
     """Returns for each stop line whether its signal stops the ego.
 
-    A yellow one does where the ego can still stop. Of a lane on the route, the signal for the route's direction counts.
+    Of a lane on the route, the signal for the route's direction counts.
     """
     p, lanes = perceived, {lane.id: lane for lane in road.lanes}
     x_m, y_m, heading, speed, half_m = p.state[[X, Y, HEADING, SPEED, LENGTH], 0].tolist()
     front = x_m + half_m / 2 * math.cos(heading), y_m + half_m / 2 * math.sin(heading)
     found = []
-    for line, signal in zip(road.stop_lines, p.signals, strict=True):
-        ahead_m = math.dist(front, lanes[line.lane].line[:, -1])
+    for number, (line, signal) in enumerate(zip(road.stop_lines, p.signals, strict=True)):
         holds = lanes[line.leads_to].on_route or not lanes[line.lane].on_route
-        yellow = signal is Signal.YELLOW and speed * speed <= 2.0 * LAST_STOP_MPS2 * ahead_m
-        found.append(holds and (yellow or signal is Signal.RED))
+        way_m = math.dist(front, lanes[line.lane].line[:, -1])
+        found.append(holds and signals.at(number, signal, speed, way_m))
     return found
 
 
-def way_to_stop_m(p: Perceived) -> float | None:
-    """Returns the way to where a signal stops the ego; None if none does, or none yet.
-
-    A yellow one does where the ego can still stop.
-    """
-    speed, left_m = float(p.state[SPEED, 0]), p.stop_line_m
-    late = p.signal is Signal.YELLOW and speed * speed > 2.0 * LAST_STOP_MPS2 * left_m
-    if p.signal not in (Signal.YELLOW, Signal.RED) or late:
+def way_to_stop_m(p: Perceived, signals: SignalStops) -> float | None:
+    """Returns the way to where a signal stops the ego; None if none does, or none yet."""
+    if not math.isfinite(p.stop_line_m):
         return None
-    way_m = left_m - BEFORE_LINE_M
+    speed, station_m = float(p.state[SPEED, 0]), p.station_m + p.stop_line_m
+    if not signals.at(round(station_m), p.signal, speed, p.stop_line_m):
+        return None
+    way_m = p.stop_line_m - BEFORE_LINE_M
     return way_m if way_m < speed * speed / (2.0 * BEGINS_MPS2) + speed + 5.0 else None
 
 

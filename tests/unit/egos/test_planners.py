@@ -10,7 +10,15 @@ import pytest
 from risk_sac.egos import registry
 from risk_sac.egos.bicycle import advance, track
 from risk_sac.egos.guard import Guarded
-from risk_sac.egos.planners.route import in_pieces, in_view, lanes_ahead, room_aside_m, stops, way_to_stop_m
+from risk_sac.egos.planners.route import (
+    SignalStops,
+    in_pieces,
+    in_view,
+    lanes_ahead,
+    room_aside_m,
+    stops,
+    way_to_stop_m,
+)
 from risk_sac.egos.seam import Episode, Perceived, Trajectory, Vehicle
 from risk_sac.errors import ConfigError
 from risk_sac.sim.pilot import Motion
@@ -174,14 +182,25 @@ def test_pieces_of_lanes_keep_their_neighbours_and_order() -> None:
 def test_a_yellow_light_stops_it_where_it_can_still_stop(ahead_m: float, stopped: bool) -> None:
     motion = Motion(300.0 - ahead_m - VEHICLE.length_m / 2, 0.0, 0.0, 12.0)  # from 12 m/s, 4.5 m/s² take 16 m
     view = perceived(motion, 0.0, [], Signal.YELLOW)
-    assert stops(two_lanes(stop_line=True), view)[0] is stopped
+    assert stops(two_lanes(stop_line=True), view, SignalStops())[0] is stopped
 
 
 def test_the_signal_of_another_direction_does_not_count() -> None:
     road = two_lanes(stop_line=True)
     lanes = tuple(each._replace(on_route=each.id != "b_own") for each in road.lanes)
     view = perceived(Motion(250.0, 0.0, 0.0, 12.0), 0.0, [], Signal.RED)
-    assert stops(road._replace(lanes=lanes), view) == [False, True]
+    assert stops(road._replace(lanes=lanes), view, SignalStops()) == [False, True]
+
+
+def test_it_keeps_stopping_at_a_yellow_light_until_the_light_changes() -> None:
+    signals = SignalStops()
+    near = {"speed_mps": 12.0, "way_m": 10.0}  # 4.5 m/s² no longer do
+    assert not signals.at(0, Signal.YELLOW, **near)
+    assert signals.at(0, Signal.YELLOW, speed_mps=12.0, way_m=25.0)
+    assert signals.at(0, Signal.YELLOW, **near)
+    assert not signals.at(1, Signal.YELLOW, **near)
+    assert not signals.at(0, Signal.GREEN, **near)
+    assert not signals.at(0, Signal.YELLOW, **near)
 
 
 def test_a_plan_is_followed_to_the_speed_that_it_has_a_fifth_of_a_second_on() -> None:
@@ -206,7 +225,7 @@ def test_a_planner_without_stop_lines_stops_a_metre_before_a_signal(
     signal: Signal, speed: float, line_m: float, way_m: float | None
 ) -> None:
     view = perceived(Motion(0.0, 0.0, 0.0, speed), 0.0, [], signal)._replace(stop_line_m=line_m)
-    assert way_to_stop_m(view) == (None if way_m is None else pytest.approx(way_m))
+    assert way_to_stop_m(view, SignalStops()) == (None if way_m is None else pytest.approx(way_m))
 
 
 @pytest.mark.parametrize("y_m", [0.2, -WIDTH_M])

@@ -15,7 +15,7 @@ from commonroad_rp.utility.config import ReactivePlannerConfiguration
 from commonroad_rp.utility.utils_coordinate_system import create_coordinate_system
 
 from risk_sac.egos.bicycle import track
-from risk_sac.egos.planners.route import BEFORE_LINE_M, in_view, room_aside_m, way_to_stop_m
+from risk_sac.egos.planners.route import BEFORE_LINE_M, SignalStops, in_view, room_aside_m, way_to_stop_m
 from risk_sac.egos.road import LIMIT, STATION, point_at
 from risk_sac.egos.seam import Control, Episode, Perceived, Trajectory
 from risk_sac.sim.pilot import Motion
@@ -52,6 +52,7 @@ class Reactive:
         self._path: Floats | None = None
         self._plan: Trajectory | None = None
         self._age = 0  # steps of the plan
+        self._signals = SignalStops()
         self._heading: float | None = None
 
     def act(self, perceived: Perceived) -> Control:
@@ -94,7 +95,7 @@ class Reactive:
         planner.reset(initial_state_cart=state, collision_checker=self._others(p))
         aside_m = room_aside_m(self._lanes, p, self._car)
         planner.set_d_sampling_parameters(-aside_m, aside_m)
-        stop_m = way_to_stop_m(p)
+        stop_m = way_to_stop_m(p, self._signals)
         if stop_m is None:
             self._config.sampling.longitudinal_mode = "velocity_keeping"
             limit = p.path[LIMIT, np.searchsorted(p.path[STATION], p.station_m, side="right") - 1]
