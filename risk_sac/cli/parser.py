@@ -2,6 +2,7 @@
 
 import argparse
 import re
+import sys
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -12,6 +13,7 @@ from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.terminal import complain
 
 WIDTH = 78
+FLAG = re.compile(r"--[a-z][\w-]*")
 RESULTS_HELP = "folder of a run, or its results.json"
 FAILURE_HELP = "id of a failure, or the number at its end"
 
@@ -42,7 +44,22 @@ class Parser(argparse.ArgumentParser):
 
     def flags(self) -> list[str]:
         """Returns the names of all flags."""
-        return re.findall(r"(?<![\w-])--[a-z][\w-]*", self.format_usage())
+        return re.findall(rf"(?<![\w-]){FLAG.pattern}", self.format_usage())
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Overrides argparse: a command refuses an unknown flag before it names a missing one."""
+        words = list(sys.argv[1:] if args is None else args)
+        if self.get_default("command") is not None:
+            taken = words[: words.index("--")] if "--" in words else words
+            names = (word.partition("=")[0] for word in taken)
+            known = (*self.flags(), "--help")  # argparse takes a unique beginning of a flag too
+            unknown = [
+                name for name in names if FLAG.fullmatch(name) and not any(each.startswith(name) for each in known)
+            ]
+            if unknown:
+                self.refuse(unknown)
+        parsed: tuple[Any, list[str]] = super().parse_known_args(words, namespace)
+        return parsed
 
     def refuse(self, unknown: Sequence[str]) -> NoReturn:
         """Ends the program because of words that no flag or argument takes."""

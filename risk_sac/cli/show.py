@@ -27,7 +27,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
 from risk_sac.metrics import headline_driven_by
-from risk_sac.records import Collision, Judgement, RunMetrics, Violation
+from risk_sac.records import Collision, EpisodeId, Judgement, RunMetrics, Violation
 from risk_sac.run_folder.results import RESULTS, RecordedFailure, Results, read_results
 from risk_sac.run_folder.series import read_series
 from risk_sac.terminal import notes
@@ -42,7 +42,7 @@ def add(commands: Commands) -> None:
         "show",
         _show,
         "list a run's failures, or draw one",
-        more="Without RESULTS, takes the newest run below the current folder.",
+        more="Without RESULTS, takes the newest run below the current folder; `show 99` draws its failure 99.",
         example="show runs/low --preventable --sort severity",
     )
     show.add_argument("results", type=Path, nargs="?", metavar="RESULTS", help=RESULTS_HELP)
@@ -57,12 +57,15 @@ def add(commands: Commands) -> None:
 
 
 def _show(options: argparse.Namespace) -> int:
-    path = options.results or newest_run(Path.cwd())
+    path, named = options.results, options.failure
+    if path is not None and named is None and _names_failure(path):
+        path, named = None, path.name
+    path = path or newest_run(Path.cwd())
     results = read_results(path)
-    if options.failure is None:
+    if named is None:
         _list(options, results)
         return OK
-    failure = results.failure(options.failure)
+    failure = results.failure(named)
     folder = path if path.is_dir() else path.parent
     from risk_sac.failures.show import draw  # here, because loading matplotlib takes a second
 
@@ -78,6 +81,12 @@ def _show(options: argparse.Namespace) -> int:
     draw(results.spec.family, recording, picture, twin)
     print_answer(options, _plain(failure) | {"picture": str(picture)}, f"Drawn: {picture}")
     return OK
+
+
+def _names_failure(path: Path) -> bool:
+    """Whether a word alone is a failure of the newest run: a number or an id, and no file or folder here."""
+    id_ = path.name
+    return path.parent == Path.cwd() and not path.exists() and (id_.isdecimal() or EpisodeId.parse(id_) is not None)
 
 
 def newest_run(folder: Path) -> Path:

@@ -91,6 +91,31 @@ def test_show_takes_the_newest_run_below_the_current_folder(
     assert f"Newest run: {folder}" in capsys.readouterr().err
 
 
+def test_show_with_a_number_alone_draws_that_failure_of_the_newest_run(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder.parent)
+    os.utime(folder / "results.json")
+    failure = read_results(folder).failures[0]
+    index = failure.episode.index
+    for name in (f"{index}", f"search-{index}", failure.id):
+        picture = tmp_path / f"{name}.png"
+        assert cli.main(["show", name, "--out", str(picture)]) == 0
+        assert picture.exists()
+    assert f"Newest run: {folder}" in capsys.readouterr().err
+    assert cli.main(["show", "99999"]) == 2
+    assert "FAILURE: got" in capsys.readouterr().err
+
+
+def test_show_takes_a_folder_by_its_number(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "99").symlink_to(folder)
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["show", "99", "--raw"]) == 0
+    assert "Newest run" not in capsys.readouterr().err
+
+
 def test_a_kind_is_counted_in_plain_words(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["clusters", str(folder)]) == 0
     assert re.search(r"effective number of kinds \(Vendi score\): \d+\.\d", capsys.readouterr().out)

@@ -65,6 +65,9 @@ def test_no_name_is_broken_at_a_hyphen(monkeypatch: pytest.MonkeyPatch) -> None:
         ("export x.npz --format openscenariox --out y", "did you mean openscenario?"),
         ("run --method archive --out x", "--family is missing; choose low, mixed or dense"),
         ("run --family low", "--out"),
+        ("run --methd archive", "there is no flag --methd; did you mean --method?"),
+        ("run --methd=archive", "there is no flag --methd; did you mean --method?"),
+        ("campaigns watch --ur http://x --jsno", "there is no flag --jsno"),
         ("run --family low --out x more", "'more' is one argument too many"),
         ("evaluate --families low --seeds 0 --out x", "--seeds: got 0"),
     ],
@@ -78,6 +81,12 @@ def test_a_wrong_word_is_named_as_typed_beside_what_is_close(
         status = ended.code  # type: ignore[assignment]
     assert status == 2
     assert said in capsys.readouterr().err
+
+
+def test_a_flag_may_be_shortened_and_words_after_two_dashes_are_no_flags() -> None:
+    options, unknown = cli._parser().parse_known_args(["run", "--fam", "low", "--out", "x"])
+    assert (options.family, unknown) == ("low", [])
+    assert cli._parser().parse_known_args(["show", "--", "--results"])[0].results.name == "--results"
 
 
 @pytest.mark.parametrize("name", ["run", "show", "evaluate", "verify", "clusters"])
