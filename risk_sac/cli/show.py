@@ -57,10 +57,12 @@ def add(commands: Commands) -> None:
 
 
 def _show(options: argparse.Namespace) -> int:
-    path, named = options.results, options.failure
-    if path is not None and named is None and _names_failure(path):
-        path, named = None, path.name
-    path = path or newest_run(Path.cwd())
+    given: Path | None = options.results
+    named: str | None = options.failure
+    if given is not None and named is None and _names_failure(given):
+        named = given.name
+        given = None
+    path = given or newest_run(Path.cwd())
     results = read_results(path)
     if named is None:
         _list(options, results)

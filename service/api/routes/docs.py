@@ -47,6 +47,12 @@ SCRIPT, STYLE, ICON = "swagger-ui-bundle.js", "swagger-ui.css", "favicon.png"
 DOCS_POLICY = (
     "default-src 'self'; script-src 'self' 'unsafe-inline'; style-src 'self' 'unsafe-inline'; img-src 'self' data:"
 )
+# Swagger UI has a dark theme, but nothing that chooses it: as on the page, the system does until the user has chosen.
+DOCS_THEME = """<script>
+document.documentElement.classList.toggle("dark-mode", (localStorage.getItem("risk-sac-theme") ??
+    (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark");
+</script>
+"""
 BUILT = Path(service.__file__).parent / "web" / "dist"
 # Nothing is loaded from elsewhere, and no script or style stands within a document. Pictures that need a key are
 # fetched and shown as blobs.
@@ -120,8 +126,8 @@ async def get_docs() -> HTMLResponse:
         swagger_favicon_url=f"docs/{ICON}",
         swagger_ui_parameters={"validatorUrl": None},  # it would send the description to another host
     )
-    page.headers["Content-Security-Policy"] = DOCS_POLICY
-    return page
+    themed = bytes(page.body).decode().replace("</head>", f"{DOCS_THEME}</head>")
+    return HTMLResponse(themed, headers={"Content-Security-Policy": DOCS_POLICY})
 
 
 def _asset(name: str) -> Callable[[Request], Awaitable[Response]]:
