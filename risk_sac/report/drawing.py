@@ -1,8 +1,10 @@
 """Draws the figures of a comparison with matplotlib."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -10,9 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from risk_sac.canvas import canvas, picture
-from risk_sac.config import METHODS, RunMethod
+from risk_sac.config import RunMethod
 from risk_sac.metrics import RESAMPLING_SEED
-from risk_sac.report.comparison import REFERENCE, Comparison
+from risk_sac.report.comparison import Comparison
 from risk_sac.report.figures import Bars, Curves, Format, Times, curve_values
 from risk_sac.types import Floats
 
@@ -44,22 +46,10 @@ class Look:
         return {"color": self.colour, "linestyle": self.dashes, "linewidth": self.width}
 
 
-# Paul Tol's "muted" scheme, safe for the colour-blind, one for each method that is no control; line styles tell apart
-# what a grey print does not.
-_MUTED = ("#CC6677", "#332288", "#117733", "#882255", "#88CCEE", "#44AA99", "#DDCC77", "#AA4499", "#999933")
-_DASHES = ("-", "--", "-.")
-_OWN: dict[RunMethod, Look] = {
-    REFERENCE: Look("#000000", "-", 2.0),
-    "risk-sac-pretrained": Look("#000000", "--", 2.0),
-    "archive-replay": Look("#555555", "--"),
-    "bo-only": Look("#555555", "-."),
-    "random": Look("#777777", ":"),
-    "no-adversary": Look("#BBBBBB", ":"),
-}
-# By the table of methods, so that a method looks the same whichever others are compared.
-LOOKS: dict[RunMethod, Look] = _OWN | {
-    method: Look(_MUTED[place % len(_MUTED)], _DASHES[(place + place // len(_MUTED)) % len(_DASHES)])
-    for place, method in enumerate(method for method in METHODS if method not in _OWN)
+# One for each method, so that it looks the same whichever others are compared. The page reads the same file.
+PALETTE = files("risk_sac.report") / "palette.json"
+LOOKS: dict[RunMethod, Look] = {
+    method: Look(**look) for method, look in json.loads(PALETTE.read_text(encoding="utf-8")).items()
 }
 
 

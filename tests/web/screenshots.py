@@ -44,6 +44,7 @@ PLAIN: dict[str, tuple[str, Callable[[Page], None]]] = {
 def main(wanted: list[str], data: Path) -> None:
     """Draws the named screens, or all, in both themes and at both widths."""
     FOLDER.mkdir(parents=True, exist_ok=True)
+    data.mkdir(parents=True, exist_ok=True)
     screens = {name: each for name, each in (SCREENS | PLAIN).items() if name in wanted or not wanted}
     with servers(data) as start, sync_playwright() as playwright, ExitStack() as ending:
         service = start("risk_sac.execution.worker", replays=3)

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 
+from risk_sac.report.drawing import LOOKS
 from tests.server import Service
 from tests.web.conftest import PHONE, count
 
@@ -132,6 +133,26 @@ def test_a_report_and_its_figures_can_be_taken_away(
     picture = _saved(page, figure.get_by_role("button", name="PNG"), tmp_path)
     assert picture.name == f"{name}.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_method_has_one_colour_in_tables_and_figures(
+    page_at: Callable[..., Page], service: Service, methods: str
+) -> None:
+    page = page_at(f"campaigns/{methods}/compare", color_scheme="light")
+    for method in ("archive", "random"):
+        expect(row_of(page, method).locator(".sample line")).to_have_css("stroke", _rgb(LOOKS[method].colour))
+    image = page.locator("figure img").first
+    figure = service.client.get(f"/v1/campaigns/{methods}/figures/distinct_found_low.svg").text
+    assert all(LOOKS[method].colour in figure for method in ("archive", "random"))
+    expect(image).to_have_css("filter", "none")
+    page.emulate_media(color_scheme="dark")
+    expect(image).to_have_css("filter", "invert(1) hue-rotate(180deg)")
+    # By hand from #777777, whose lightness is 119 of 255.
+    expect(row_of(page, "random").locator(".sample line")).to_have_css("stroke", "rgb(136, 136, 136)")
+
+
+def _rgb(colour: str) -> str:
+    return f"rgb({', '.join(str(int(colour[at : at + 2], 16)) for at in (1, 3, 5))})"
 
 
 def test_the_page_works_below_the_path_that_a_proxy_has_the_service_at(

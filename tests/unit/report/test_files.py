@@ -311,5 +311,14 @@ def never_close(record):
     return record.model_copy(update=least | {"collision": collision})
 
 
-def test_every_method_has_a_look_of_its_own():
-    assert len({(look.colour, look.dashes) for look in LOOKS.values()}) == len(METHODS)
+def test_every_method_has_a_colour_of_its_own_that_reads_on_white():
+    assert set(LOOKS) == set(METHODS)
+    assert len({look.colour for look in LOOKS.values()}) == len(METHODS)
+    for look in LOOKS.values():
+        assert 1.05 / (luminance(look.colour) + 0.05) >= 3, look
+
+
+def luminance(colour):
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

@@ -2,6 +2,7 @@
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import uPlot from "uplot";
+import { METHOD_COLOURS } from "../../ui/palette";
 import { useColours } from "../../ui/theme";
 import { COLOURS, type Mark } from "./look";
 import { Sample } from "./sample";
@@ -37,7 +38,7 @@ const HEIGHT = 210;
 const SHOWN = 7; // values beside the pointer
 const FAR = 0.22;
 const SHADE = 0.16;
-const PAPER = ["--faint", "--grid", "--surface", ...COLOURS] as const;
+const PAPER = ["--faint", "--grid", "--surface", ...METHOD_COLOURS, ...COLOURS] as const;
 
 export function Chart({ title, meaning, lines, written, atLeast, pointed }: Plot) {
   const room = useRef<HTMLDivElement>(null);
