@@ -14,7 +14,7 @@ from torch.optim import Adam
 
 from risk_sac.agents.networks import Mlp
 from risk_sac.agents.replay import Batch
-from risk_sac.errors import CheckpointError, NotFinite
+from risk_sac.errors import CheckpointError, ConfigError, NotFinite
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.types import Floats, Vector
 
@@ -98,6 +98,12 @@ class Agent(ABC):
             for name, part in self.parts.items():
                 part.load_state_dict(state[name])
             self._generator.set_state(state["generator"])
+
+
+def check_device(field: str, device: str) -> None:
+    """Refuses a device that is not there, with a ConfigError."""
+    if device == "cuda" and not torch.cuda.is_available():
+        raise ConfigError(field, "'cuda', and torch sees no CUDA device here", "'cpu'")
 
 
 def td_target(reward: Tensor, terminated: Tensor, next_value: Tensor, discount: float) -> Tensor:

@@ -11,10 +11,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 from torch import Tensor
 
-from risk_sac.agents.agent import Agent, UpdateResult
+from risk_sac.agents.agent import Agent, UpdateResult, check_device
 from risk_sac.agents.ddpg import DdpgAgent
 from risk_sac.agents.decisions import Decision, Held
 from risk_sac.agents.lagrangian import dual_step
@@ -22,7 +21,6 @@ from risk_sac.agents.replay import Batch, RiskPrioritizedReplay, Transition, Uni
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
-from risk_sac.errors import ConfigError
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.problem import check_installed
 from risk_sac.records import DrivenBy
@@ -62,8 +60,7 @@ class Learner:
         self._reward = TrainingReward(method, config)
         self._action_size = action_size
         self.device = "cuda" if config.agent.device == "cuda" and method.agent != "sb3" else "cpu"
-        if self.device == "cuda" and not torch.cuda.is_available():
-            raise ConfigError("learner.agent.device", "'cuda', and torch sees no CUDA device here", "'auto' or 'cpu'")
+        check_device("learner.agent.device", self.device)
         sizes = observation_size, action_size
         self._agent = self._make_agent(*sizes, seed)
         replay = RiskPrioritizedReplay if method.replay == "rper" else UniformReplay

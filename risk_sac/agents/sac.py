@@ -5,6 +5,7 @@ Source: RISK-SAC, Eq. 4; Haarnoja et al., "Soft actor-critic algorithms and appl
 
 import copy
 import math
+from functools import partial
 
 import torch
 from torch import Tensor, nn
@@ -124,13 +125,14 @@ class SacAgent(Agent):
         self._critics = Mlp(critic_sizes, self._generator, count=2, normalised=True)
         self._targets = copy.deepcopy(self._critics)
         self._temperature = Temperature(sac.initial_temperature, self._generator.device)
-        self._critic_optimizer = Adam(self._critics.parameters(), lr=config.critic_learning_rate, fused=True)
-        self._policy_optimizer = Adam(
+        graphed = self._generator.device.type == "cuda"  # an update may become a part of a CUDA graph
+        adam = partial(Adam, fused=True, capturable=graphed)
+        self._critic_optimizer = adam(self._critics.parameters(), lr=config.critic_learning_rate)
+        self._policy_optimizer = adam(
             [
                 {"params": self._policy.parameters(), "lr": config.actor_learning_rate},
                 {"params": self._temperature.parameters(), "lr": sac.temperature_learning_rate},
-            ],
-            fused=True,
+            ]
         )
         self.parts = {
             "policy": self._policy,
@@ -140,6 +142,11 @@ class SacAgent(Agent):
             "critic_optimizer": self._critic_optimizer,
             "policy_optimizer": self._policy_optimizer,
         }
+
+    @property
+    def generator(self) -> torch.Generator:
+        """Generator of all noise."""
+        return self._generator
 
     @property
     def temperature(self) -> float:
@@ -172,6 +179,10 @@ class SacAgent(Agent):
 
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """See `Agent.update`."""
+        return self.result(*self.advance(batch, reward))
+
+    def advance(self, batch: Batch, reward: Tensor) -> tuple[Tensor, Tensor]:
+        """Makes one step of all networks; returns what `result` reads, without waiting for the device."""
         td_errors = self._td_errors(batch, reward)
         loss_q = critic_loss(td_errors, batch.weight)
         minimise(loss_q, self._critic_optimizer)
@@ -184,9 +195,11 @@ class SacAgent(Agent):
         minimise(loss_pi + loss_alpha, self._policy_optimizer)
         self._temperature.clamp()
         follow(self._targets, self._critics, self._config.target_rate)
+        return td_errors.detach(), torch.stack((loss_q, loss_pi, self._temperature(), entropy)).detach()
 
-        figures = torch.stack((loss_q, loss_pi, self._temperature(), entropy)).tolist()
-        return UpdateResult(mean_magnitude(td_errors.detach()), *all_finite(figures))
+    def result(self, td_errors: Tensor, figures: Tensor) -> UpdateResult:
+        """Returns the figures of an update; raises NotFinite if one is not."""
+        return UpdateResult(mean_magnitude(td_errors), *all_finite(figures.tolist()))
 
     @torch.no_grad()
     def _target(self, batch: Batch, reward: Tensor) -> Tensor:

@@ -38,6 +38,8 @@ def add(commands: Commands) -> None:
     episodes = "episodes of the policy for each family; 0: no policy (default: %(default)s)"
     policy.add_argument("--policy-episodes", type=number(int, 0, 1_000_000), default=10_000, metavar="N", help=episodes)
     execution.add_argument("--seed", type=number(int, 0), default=0, metavar="S", help="(default: %(default)s)")
+    device = "where policies are trained; episodes are played on the CPU (default: %(default)s)"
+    execution.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help=device)
     jobs = "processes that play at a time (default: one per core)"
     execution.add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help=jobs)
     output.add_argument("--out", type=Path, required=True, metavar="DIR", help="for episodes and priors")
@@ -78,11 +80,12 @@ def _train_policy(options: argparse.Namespace, pool: Executor, family: FamilyNam
     from risk_sac.pretraining.policy import PolicyTraining
     from risk_sac.prior.policy import write_policy
 
-    training = PolicyTraining(family, options.seed)
-    for point in training.run(pool, options.policy_episodes, options.out):
+    training = PolicyTraining(family, options.seed, options.policy_episodes, options.device)
+    for point in training.run(pool, options.out):
         say(
             f"{family}: after {point['episodes']} episodes of the policy {point['failing']:.3f} of the last fail,"
             f" {point['held_out']['failing']:.2f} before egos held out"
         )
+        write_policy(options.out / f"{family}-policy.npz", training.pretrained())
+        (options.out / f"{family}-policy.json").write_text(json.dumps(training.curve, indent=1) + "\n")
     write_policy(options.out / f"{family}-policy.npz", training.pretrained())
-    (options.out / f"{family}-policy.json").write_text(json.dumps(training.curve, indent=1) + "\n")

@@ -17,6 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
+from risk_sac.agents.agent import check_device
+from risk_sac.agents.graphed import GraphedUpdate
 from risk_sac.agents.replay import Batch, Transition, UniformReplay
 from risk_sac.agents.sac import SacAgent
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
@@ -49,7 +51,7 @@ REPLAY = ReplayConfig(capacity=600_000)
 class Stage(NamedTuple):
     """A part of the training, with a memory of its own."""
 
-    begins: int  # episode
+    begins: float  # share of all episodes
     decisions: int  # before its first update; in the first stage they are random
     sound: float  # share of its episodes before egos without a defect
     reward: RewardConfig
@@ -58,8 +60,8 @@ class Stage(NamedTuple):
 # Choice: any failure is learnt first, before sound egos; then those that count for the headline, which need weak egos.
 # The second alone gave .12 failures per episode after 3,000 episodes instead of .29, and .03 instead of .04 that count.
 STAGES = (
-    Stage(0, 6000, 1.0, RewardConfig()),
-    Stage(1500, 2000, 0.3, RewardConfig(unpreventable=0.25, unavoidable=0.1, minor=0.3)),
+    Stage(0.0, 6000, 1.0, RewardConfig()),
+    Stage(0.25, 2000, 0.3, RewardConfig(unpreventable=0.25, unavoidable=0.1, minor=0.3)),
 )
 
 
@@ -123,17 +125,27 @@ class Goals:
 class PolicyTraining:
     """Training of one family's policy; see `run`."""
 
-    def __init__(self, family: FamilyName, seed: int) -> None:
-        """Draws the networks."""
+    def __init__(self, family: FamilyName, seed: int, episodes: int, device: str = "cpu") -> None:
+        """Draws the networks.
+
+        Args:
+          family: whose adversaries it drives.
+          seed: of all random numbers.
+          episodes: to play in all, rounded up to whole rounds.
+          device: where the networks are trained, `cpu` or `cuda`; episodes are played on the CPU.
+        """
+        check_device("--device", device)
         torch.set_num_threads(1)
         self.family, self.seed = family, seed
+        self._rounds = math.ceil(episodes / (TURNS * EPISODES))
         self._layout = Layout.of(Problem.from_spec(RunSpec(family=family, method="sac", seed=seed)))
         egos = {name: pinned(ego) for name, ego in training_egos(family).items()}
         self._egos = {name: ego for name, ego in egos.items() if name not in HELD_OUT}
         self._unseen = {name: ego for name, ego in egos.items() if name in HELD_OUT}
         observation_size, action_size = self._layout.observation_size + GOALS + 1, self._layout.action_size
-        self.agent = SacAgent(observation_size, action_size, AGENT, SAC, seed, normalised=True)
+        self.agent = SacAgent(observation_size, action_size, AGENT, SAC, seed, device, normalised=True)
         self.agent.spread(INITIAL_DEVIATION)
+        self._graphed = GraphedUpdate(self.agent) if device == "cuda" else None
         self.replay = FailureReplay(observation_size, action_size, REPLAY)
         self.goals = Goals()
         self._random = np.random.default_rng(seed)
@@ -142,17 +154,13 @@ class PolicyTraining:
         self._waiting: list[PolicyEpisode] = []  # of the last round
         self.curve: list[dict[str, Any]] = []
 
-    def run(self, pool: Executor, episodes: int, folder: Path) -> Iterator[dict[str, Any]]:
-        """Trains up to a number of episodes, rounded up to whole rounds.
-
-        It goes on from the checkpoint in the folder, and yields each point of the curve.
-        """
-        rounds = math.ceil(episodes / (TURNS * EPISODES))
-        path, digest = folder / f"{self.family}.checkpoint", f"{self.family}-{self.seed}"
+    def run(self, pool: Executor, folder: Path) -> Iterator[dict[str, Any]]:
+        """Trains from the checkpoint in the folder on, if there is one, and yields each point of the curve."""
+        path, digest = folder / f"{self.family}.checkpoint", f"{self.family}-{self.seed}-{self._rounds}"
         if checkpoint.exists(path) and (state := checkpoint.load_newest(path, digest)) is not None:
             self._load(state)
         played: list[PolicyEpisode] = []
-        while self._round < rounds:
+        while self._round < self._rounds:
             futures = [pool.submit(play_turn, turn) for turn in self._turns()]
             self.learn(self._waiting)
             if self._stage(self._round) is not self._stage(self._round - 1):
@@ -177,8 +185,7 @@ class PolicyTraining:
 
     def _stage(self, place: int) -> Stage:
         """Returns the stage of a round."""
-        played = max(0, place) * TURNS * EPISODES
-        return next(stage for stage in reversed(STAGES) if played >= stage.begins)
+        return next(stage for stage in reversed(STAGES) if max(0, place) >= stage.begins * self._rounds)
 
     def _turns(self) -> Iterator[Turn]:
         stage = self._stage(self._round)
@@ -201,7 +208,10 @@ class PolicyTraining:
             self._due = 0.0
         while self._due >= 1.0:
             batch = self.replay.sample(AGENT.batch_size, self._random)
-            self.agent.update(batch, batch.risk_reward)
+            if self._graphed is None:
+                self.agent.update(batch, batch.risk_reward)
+            else:
+                self._graphed(batch)
             self._due -= 1.0
 
     def _store(self, episode: PolicyEpisode) -> None:
@@ -248,6 +258,7 @@ class PolicyTraining:
 
     def _load(self, state: dict[str, Any]) -> None:
         self.agent.load(state["agent"])
+        self._graphed = self._graphed and GraphedUpdate(self.agent)
         self.replay.load(state["replay"])
         self.goals.names = list(state["goals"])
         self.goals.recent.extend(state["recent"])

@@ -1,6 +1,7 @@
 import hashlib
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -28,13 +29,13 @@ def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path: Path, mon
         assert (whole / name).read_bytes() == (parts / name).read_bytes()
 
 
-def trained(folder: Path, episodes: tuple[int, ...], jobs: int, seed: int = 5) -> PolicyTraining:
-    """A policy trained in as many pieces; each is another process's work."""
+def trained(folder: Path, episodes: int, jobs: int, *, interrupted: bool = False) -> PolicyTraining:
+    """A trained policy; an interruption comes after the first point of its curve."""
     folder.mkdir()
-    for count in episodes:
-        training = PolicyTraining("low", seed)
+    for points in (1, None) if interrupted else (None,):
+        training = PolicyTraining("low", 5, episodes)
         with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
-            list(training.run(pool, count, folder))
+            list(islice(training.run(pool, folder), points))
     return training
 
 
@@ -49,7 +50,9 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """A training with few episodes in which the policy already acts and learns."""
     monkeypatch.setattr(policy, "EPISODES", 1)
     monkeypatch.setattr(policy, "TURNS", 2)
-    stages = [stage._replace(begins=begins, decisions=40) for stage, begins in zip(policy.STAGES, (0, 6), strict=True)]
+    stages = [
+        stage._replace(begins=begins, decisions=40) for stage, begins in zip(policy.STAGES, (0.0, 0.5), strict=True)
+    ]
     monkeypatch.setattr(policy, "STAGES", tuple(stages))
     monkeypatch.setattr(policy, "EVALUATED_EVERY", 3)
     monkeypatch.setattr(policy, "EVALUATION_TURNS", 2)
@@ -58,22 +61,22 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("short")
 def test_a_policy_is_the_same_however_it_was_trained(tmp_path: Path) -> None:
     """One process or two, in one go or interrupted."""
-    whole = trained(tmp_path / "whole", (12,), 2)
-    parts = trained(tmp_path / "parts", (6, 12), 1)
+    whole = trained(tmp_path / "whole", 12, 2)
+    parts = trained(tmp_path / "parts", 12, 1, interrupted=True)
     assert whole.curve == parts.curve
     assert [point["episodes"] for point in whole.curve] == [6, 12]
-    assert digest(whole) == digest(parts) != digest(PolicyTraining("low", 5))  # and it has learnt
+    assert digest(whole) == digest(parts) != digest(PolicyTraining("low", 5, 12))  # and it has learnt
 
 
 @pytest.mark.torture
 def test_a_thousand_episodes_give_the_same_weights_again(tmp_path: Path) -> None:
-    once, again = (trained(tmp_path / name, (1000,), jobs) for name, jobs in (("once", 2), ("again", 1)))
+    once, again = (trained(tmp_path / name, 1000, jobs) for name, jobs in (("once", 2), ("again", 1)))
     assert digest(once) == digest(again)
     assert once.curve == again.curve
 
 
 def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached() -> None:
-    training = PolicyTraining("low", 5)
+    training = PolicyTraining("low", 5, 100)
     size = training.pretrained().layout
     step = Transition(
         observation=np.zeros(size.observation_size, np.float32),
