@@ -12,8 +12,8 @@ SIZES = 7, 3  # of an observation and an action
 
 def batches(count: int) -> list[Batch]:
     """Draws batches of random transitions."""
-    random, replay = np.random.default_rng(3), UniformReplay(*SIZES, ReplayConfig(capacity=500))
-    for _ in range(500):
+    random, replay = np.random.default_rng(3), UniformReplay(*SIZES, ReplayConfig(capacity=1000))
+    for _ in range(1000):
         before, after, action = (random.uniform(-1, 1, SIZES[k]).astype(np.float32) for k in (0, 0, 1))
         replay.add(
             Transition(
