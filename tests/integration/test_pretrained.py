@@ -84,5 +84,5 @@ def test_the_diverse_search_shares_its_episodes_between_scripts_and_policy() -> 
 
 
 def test_without_a_pretrained_policy_the_method_is_refused() -> None:
-    with pytest.raises(ConfigError, match=r"risk-sac-pretrained at mixed.*choose risk-sac there$"):
-        searchers_of(spec("risk-sac-pretrained").model_copy(update={"family": "mixed"}))
+    with pytest.raises(ConfigError, match=r"risk-sac-pretrained at dense.*choose risk-sac there$"):
+        searchers_of(spec("risk-sac-pretrained").model_copy(update={"family": "dense"}))
