@@ -1,6 +1,6 @@
 """Whether the places that were found on a map can be played at: a random sample of them is.
 
-At each place the same scenes are played with nobody attacking and with random actions, and a pedestrian steps into the
+At each place the same scenes are played without an attack and with random actions, and a pedestrian steps into the
 ego's way from the left and from the right.
 """
 
@@ -46,7 +46,7 @@ class Tried:
     played: int = 0
     rejected: Counter[str] = field(default_factory=Counter)  # by the rule of C_hard that refused the scene
     invalid: list[str] = field(default_factory=list)  # why episodes failed
-    touched_by_nobody: int = 0  # contacts with nobody attacking
+    touched_unattacked: int = 0  # contacts without an attack
     sides: tuple[float, float] = (math.nan, math.nan)  # least distance of a pedestrian from the left and the right
 
     @property
@@ -59,7 +59,7 @@ class Tried:
         """How pedestrians from the left and from the right come out differently; None: the ego lets both pass alike."""
         left, right = self.sides
         if math.isinf(min(left, right)):
-            return "the ego stands where nobody is in its way: no pedestrian can meet it"
+            return "the ego stands although nothing is in its way: no pedestrian can meet it"
         if min(left, right) > MET_M:
             within = f"within {MET_STEPS * STEP_S:.0f} s"
             return f"the ego meets no pedestrian {within}: it comes no nearer than {min(left, right):.1f} m"
@@ -87,7 +87,7 @@ def try_out(fit: Fit, family: str, episodes: int, seed: int) -> Tried:
     Args:
       fit: the place.
       family: its name in the library.
-      episodes: scenes, each with nobody attacking and with random actions.
+      episodes: scenes, each without an attack and with random actions.
       seed: of scenes, actions and SUMO.
     """
     tried = Tried(fit)
@@ -115,13 +115,13 @@ def _episode(env: RiskSacEnv, tried: Tried, draw: np.random.Generator, *, contro
         return
     tried.played += 1
     if not controlled:
-        tried.touched_by_nobody += touched
+        tried.touched_unattacked += touched
 
 
 def meet(sim: SumoSimulation, family: str, side: int) -> float:
     """Returns the least distance of an ego, alone on the road, to a pedestrian that would meet it; 0 if it touches it.
 
-    The pedestrian crosses where the ego drives when nobody is there, and is in the middle of its way at that moment:
+    The pedestrian crosses where the ego drives on an empty road, and is in the middle of its way at that moment:
     in bends, and where the ego changes lanes, as well as on a straight road.
 
     Args:
@@ -154,7 +154,7 @@ def meet(sim: SumoSimulation, family: str, side: int) -> float:
 
 
 def _driven_to(sim: SumoSimulation, alone: Layout) -> tuple[int, float, float, float] | None:
-    """In which step the ego drives where after AHEAD_S, if nobody is there: step, x, y, heading; None: it stands."""
+    """In which step the ego drives where after AHEAD_S, on an empty road: step, x, y, heading; None: it stands."""
     sim.reset(alone, 1)
     for step in range(1, MET_STEPS + 1):
         frame = sim.step()

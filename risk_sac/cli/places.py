@@ -110,15 +110,15 @@ def _try_places(chosen: Map, found: Survey, options: argparse.Namespace) -> int:
         for why in _wrong(tried[-1]):
             console.print(f"{fit.spot.pattern} at {fit.spot.id}: {why}", markup=False, soft_wrap=True)
     console.print(_tried(found, tried))
-    return FAILED if any(not each.runs or each.touched_by_nobody for each in tried) else OK
+    return FAILED if any(not each.runs or each.touched_unattacked for each in tried) else OK
 
 
 def _wrong(tried: "Tried") -> list[str]:
     whys = list(dict.fromkeys(tried.invalid))
     if not tried.played and not tried.invalid:
         whys.append(f"all scenes are refused: {dict(tried.rejected)}")
-    if tried.touched_by_nobody:
-        whys.append(f"{tried.touched_by_nobody} contacts without an attack")
+    if tried.touched_unattacked:
+        whys.append(f"{tried.touched_unattacked} contacts without an attack")
     if tried.unlike is not None:
         whys.append(tried.unlike)
     return whys
@@ -136,7 +136,7 @@ def _tried(found: Survey, tried: Sequence["Tried"]) -> Table:
             sum(each.played for each in own),
             sum(each.rejected.total() for each in own),
             sum(len(each.invalid) for each in own),
-            sum(each.touched_by_nobody for each in own),
+            sum(each.touched_unattacked for each in own),
             sum(each.unlike is None for each in own),
         )
         table.add_row(escape(pattern), *map(str, row))

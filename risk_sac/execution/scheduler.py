@@ -177,7 +177,7 @@ class Scheduler:
         elif self.stopping:
             self._store.requeued(run, None)
         elif isinstance(last, Finished):
-            self._replace(run, Exited("worker was told to stop by somebody else", Cause.KILLED))
+            self._replace(run, Exited("worker was stopped from outside", Cause.KILLED))
         else:
             self._replace(run, exited)
 

@@ -60,7 +60,7 @@ class FoundPlace(Spot):
 
     summary: str
     rare: bool = False
-    """Contacts are rare there: nobody can cut in."""
+    """Contacts are rare there: no vehicle can cut in."""
 
 
 class Elsewhere(Spot):

@@ -20,7 +20,7 @@ from risk_sac.tryout import ALIKE_M, LEFT, MET_M, RIGHT, Tried, meet
         (0.9, 0.0, "a pedestrian from the right is touched"),
         (0.0, 0.0, "a pedestrian from the left and from the right is touched"),
         (9.2, 18.3, "the ego meets no pedestrian within 12 s: it comes no nearer than 9.2 m"),
-        (math.inf, math.inf, "the ego stands where nobody is in its way: no pedestrian can meet it"),
+        (math.inf, math.inf, "the ego stands although nothing is in its way: no pedestrian can meet it"),
         (4.4, 18.3, "a pedestrian from the left is left 4.4 m, one from the right 18.3 m"),
     ],
 )

@@ -211,6 +211,18 @@ def test_two_campaigns_stand_beside_each_other(
     check_axe(page)
 
 
+def test_on_a_phone_no_field_breaks_within_a_word(page_at: Callable[..., Page], campaign: str, methods: str) -> None:
+    page = page_at(f"compare?ids={campaign},{methods}", viewport=PHONE)
+    field = page.get_by_role("rowheader", name="budget.episodes").locator("code")
+    expect(field).to_be_visible()
+    lines = field.evaluate("""code => [...code.childNodes].filter(each => each.nodeType === 3).map(each => {
+        const range = document.createRange();
+        range.selectNodeContents(each);
+        return range.getClientRects().length;
+    })""")
+    assert lines == [1, 1, 1]
+
+
 def test_a_campaign_that_is_gone_does_not_hide_the_others(page_at: Callable[..., Page], campaign: str) -> None:
     page = page_at(f"compare?ids={campaign},unknown", allowed=("404",))
     expect(page.get_by_role("alert")).to_contain_text("unknown")

@@ -42,7 +42,7 @@ def odd(comparison: Comparison) -> Section:
 
 def bounds(comparison: Comparison, evidence: Evidence) -> Section:
     """Writes the section on failure rates in scenes that no search chose."""
-    title = "How often it fails where nobody searched"
+    title = "How often it fails in unsearched scenes"
     if comparison.spec.iid is None:
         return Section("bounds", title, [NO_IID, Commands(["iid: {episodes: 300}", "--iid 300"])])
     blocks: list[Block] = [

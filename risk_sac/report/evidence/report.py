@@ -19,7 +19,7 @@ from risk_sac.report.page import DASH, number, platform_in_words, versions_in_wo
 
 BANNER = (
     "Search results are no crash rate. The search looks for what goes wrong, so its counts say that something can "
-    "happen, never how often. Only the section on scenes that nobody searched says how often, and only for such scenes."
+    "happen, never how often. Only the section on unsearched scenes says how often, and only for such scenes."
 )
 LIMITS = (
     "A search that finds nothing has not shown that there is nothing: another seed, method or budget may find it.",

@@ -21,7 +21,7 @@ from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net
 from risk_sac.scenario.maps.ways import AFTER_S, track, way_on
 from risk_sac.scenario.place import CrossingPlace, Site, Track
 
-OCCLUDED_S = 4.0  # of driving that the way of who hides the pedestrian goes on
+OCCLUDED_S = 4.0  # of driving that the way of the occluder goes on
 ONWARD_S = 8.0
 BESIDE_RAD = math.radians(30.0)  # by which lanes beside each other may not be parallel
 MEDIAN_M, SHIFTED_M = 2.0, 6.0  # between them, and from where one ends to where the other begins
@@ -85,7 +85,8 @@ def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[Lane, Track, Tra
                 raise NoFit(f"the lane beside can be come from for {occluder.room_m:.0f} m; wanted {least_m:.0f} m")
             if truck_reaches(net, beside, link):
                 raise NoFit(
-                    f"a truck that drives on from {right.id!r} reaches into the way of who drives on from {own.id!r}"
+                    f"a truck that drives on from {right.id!r} reaches into the way of a vehicle that drives on from "
+                    f"{own.id!r}"
                 )
             return own, ego, occluder, link
         except NoFit as why:

@@ -67,9 +67,9 @@ def place(net: Net, spot: Spot) -> JunctionPlace:
         except NoFit as why:
             whys.append(str(why))
     if not legs and at.type == UNREGULATED:
-        raise NoFit(f"the junction {at.id!r} is {UNREGULATED}: nobody lets anybody pass there; wanted one with rules")
+        raise NoFit(f"the junction {at.id!r} is {UNREGULATED}: no way has priority there; wanted one with rules")
     if not legs and all(link.index is None for link in own.links):
-        raise NoFit(f"the net has no lanes inside {at.id!r}, so who crosses whom is unknown; wanted internal links")
+        raise NoFit(f"the net has no lanes inside {at.id!r}, so which ways cross is unknown; wanted internal links")
     if not legs:
         raise NoFit("; ".join(whys) or f"no way across {at.id!r} crosses or joins one of those from {edge.id!r}")
     approaches = {name: other for name, other in others.items() if name in legs} | {"ego": own}
@@ -148,8 +148,8 @@ def _turn(net: Net, link: Link, onward_s: float) -> Track | str:
     """The track over a link, or why there is none."""
     if (lane := waits_in_the_way(net, link)) is not None:
         return (
-            f"who turns from {link.source.edge!r} to {link.target.edge!r} waits in the junction where it reaches into "
-            f"{lane.id!r}, the way of those it waits for"
+            f"a vehicle that turns from {link.source.edge!r} to {link.target.edge!r} waits in the junction where it "
+            f"reaches into {lane.id!r}, the way of those it waits for"
         )
     if (beside := too_near(net, link)) is not None:
         return (

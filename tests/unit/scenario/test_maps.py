@@ -228,7 +228,7 @@ def test_a_dead_end_is_no_missing_connection(tmp_path: Path, roads: str, says: l
     assert net_remarks(net) == ["there are no traffic lights", *says]
     fit = place_at(net, "car_following", "r")
     assert fit.rare
-    assert fit.told()["summary"].endswith("Contacts are rare here: nobody can cut in.")
+    assert fit.told()["summary"].endswith("Contacts are rare here: no vehicle can cut in.")
 
 
 @pytest.mark.parametrize("name", ["straight_two_way.xodr", "single_road.osm"])

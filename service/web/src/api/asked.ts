@@ -4,7 +4,7 @@ import { useState } from "preact/hooks";
 import { get } from "./client";
 import { usePolled } from "./polled";
 
-const LOST_MS = 2000; // nobody answers: until somebody does
+const LOST_MS = 2000; // while the service does not answer
 
 export interface Asked<T> {
   value: T | undefined;

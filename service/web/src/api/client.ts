@@ -33,7 +33,7 @@ export function hasKey(): boolean {
   return sessionStorage.getItem(KEY) !== null;
 }
 
-/** A call by its path from the API's root, such as `v1/campaigns`, or by an answer's link; throws a Problem, or a TypeError if nobody answers. */
+/** A call by its path from the API's root, such as `v1/campaigns`, or by an answer's link; throws a Problem, or a TypeError if the service does not answer. */
 export async function call(path: string, init: RequestInit = {}): Promise<Response> {
   const headers = new Headers(init.headers);
   const key = sessionStorage.getItem(KEY);

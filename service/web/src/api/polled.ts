@@ -1,4 +1,4 @@
-/** Asking again and again, but not while nobody looks. */
+/** Polls, but not while the tab is hidden. */
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { paced } from "./pace";

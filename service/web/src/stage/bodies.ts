@@ -7,7 +7,7 @@ const LEAST_PERSON_PX = 6; // a person's half width is 0.25 m: too few pixels to
 const DASH = [4, 3];
 const NO_DASH: number[] = [];
 
-/** Background first, the ego last, so that who matters is on top. */
+/** Background first, the ego last, so that what matters is on top. */
 export function drawBodies(scene: Scene): void {
   const { recording } = scene;
   for (const part of ["background", "adversary", "striker", "ego"] as const)

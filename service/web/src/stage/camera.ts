@@ -50,14 +50,14 @@ export function fitted(bounds: Bounds, view: View, margin_m: number): Camera {
   };
 }
 
-/** Who is followed: the place to look at, and which way is ahead. */
+/** What the camera follows: the place to look at, and which way is ahead. */
 export interface Followed {
   x: number;
   y: number;
   heading: number;
 }
 
-/** The camera that looks a little ahead of who is followed. */
+/** The camera that looks a little ahead of the followed road user. */
 export function following(camera: Camera, view: View, { x, y, heading }: Followed): Camera {
   const ahead = (AHEAD * Math.min(view.width, view.height)) / camera.scale;
   return { scale: camera.scale, x: x + ahead * Math.cos(heading), y: y + ahead * Math.sin(heading) };
@@ -86,7 +86,7 @@ export class Tripod {
     if (this.around !== null) this.camera.set(fitted(this.around, view, 10));
   }
 
-  /** What to draw with; who is followed keeps its place in the view. */
+  /** What to draw with; the followed road user keeps its place in the view. */
   at(view: View, followed: Followed | null): Camera {
     const camera = this.camera.get();
     if (!this.follow.get() || followed === null || Number.isNaN(followed.x)) return camera;

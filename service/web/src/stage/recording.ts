@@ -25,11 +25,11 @@ export interface Recording {
   x_m: Float64Array;
   y_m: Float64Array;
   heading_rad: Float64Array;
-  /** Column of who touched the ego, or mattered most to it; -1 if the recording lacks it, or there is none. */
+  /** Column of the road user that touched the ego, or mattered most to it; -1 if the recording lacks it, or there is none. */
   striker: number;
   /** When the adversaries were handed to the policy. */
   released_s: number;
-  /** When the conflict began; null if nobody judged it, or before the recording. */
+  /** When the conflict began; null if it was not judged, or before the recording. */
   conflict_s: number | null;
 }
 

@@ -8,7 +8,7 @@ import { pixelX, pixelY, present, type Scene } from "./scene";
 export const TTC_CAP_S = 10;
 /** RSS margins are capped at it. */
 export const RSS_CAP_M = 50;
-const HORIZON_S = 2; // how far ahead the motion is drawn where nobody would touch
+const HORIZON_S = 2; // how far ahead the motion is drawn where no bodies would touch
 const LONGEST_S = 4;
 
 /** Seconds until ego and actor touch; null where they are on no collision course. */

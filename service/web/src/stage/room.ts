@@ -62,7 +62,7 @@ export function useTimeInAddress(clock: Clock, query: URLSearchParams): void {
       const text = clock.time.get().toFixed(2);
       if (clock.playing.get() || text === written.current) return;
       const kept = placeOf(location.hash).query;
-      if (kept.get("t") !== written.current) return; // somebody has just changed it: that goes first
+      if (kept.get("t") !== written.current) return; // the user has just changed it: that goes first
       written.current = text;
       const [path] = location.hash.split("?", 1);
       kept.set("t", text);

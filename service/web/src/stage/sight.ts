@@ -51,7 +51,7 @@ function sector({ ctx, poses, sensor, ...scene }: Scene, range: number): void {
 const DOTS = [2, 5];
 const LINE: number[] = [];
 
-/** Thin and whole to who is seen; to who is hidden, whole up to what hides it, then dotted. */
+/** A thin line to a road user in sight; to a hidden one, solid as far as the occluder, then dotted. */
 export function drawSightLines(scene: Scene): void {
   const { ctx, poses, recording, ink, layers } = scene;
   if (!layers.sight || !present(scene, 0)) return;

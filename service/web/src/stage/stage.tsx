@@ -23,7 +23,7 @@ interface Props {
   tripod: Tripod;
   layers: Layers;
   label: string;
-  /** Who is followed where not the recording's own ego: stages that share a camera follow the same. */
+  /** The road user to follow, by default the recording's ego: stages that share a camera follow the same. */
   followed?: (time: number) => Followed;
 }
 

@@ -22,7 +22,7 @@ export function byWeight(requirements: Requirements): [string, Requirements[stri
 
 interface Props {
   requirements: Requirements;
-  /** Of whom they are, for people who hear the table. */
+  /** What they belong to, for screen readers. */
   of: string;
   /** Where the failures are listed; without it, no name is a link. */
   campaign?: string;

@@ -25,7 +25,7 @@ interface Plot {
   written: (value: number) => string;
   /** How high the plot is at least, so that noise about 0 does not look like mountains. */
   atLeast: number;
-  /** The run that somebody points at; the others step back. */
+  /** The run under the pointer; the others fade. */
   pointed?: string | null;
 }
 

@@ -23,7 +23,7 @@ export interface Live {
   error?: Error;
 }
 
-/** Follows a campaign until it ends; while nobody looks at the page, nothing is asked for. */
+/** Follows a campaign until it ends; while the tab is hidden, it asks for nothing. */
 export function useLive(id: string): Live & { again: () => void } {
   const [live, setLive] = useState<Live>({ found: [] });
   const restart = useRef<() => void>(() => {});

@@ -1,4 +1,4 @@
-/** A card for each run, with the tail of its worker's log for who wants to read it. */
+/** A card for each run, with the tail of its worker's log on request. */
 
 import { useEffect, useRef, useState } from "preact/hooks";
 import { call } from "../../api/client";

@@ -9,7 +9,7 @@ interface Drawn {
   from: number;
   to: number;
   mark?: Mark;
-  /** In words, for who cannot see it. */
+  /** In words, for screen readers. */
   label: string;
 }
 

@@ -123,7 +123,9 @@ function Specs({ found }: { found: Found[] }) {
               {differing.map(({ field, values }) => (
                 <tr key={field}>
                   <th scope="row">
-                    <code>{field}</code>
+                    <code>
+                      {field.split(".").map((part, at) => (at ? [".", <wbr key={at} />, part] : part))}
+                    </code>
                   </th>
                   {values.map((value, at) => (
                     <td key={found[at]!.id}>{value}</td>

@@ -32,7 +32,7 @@ export function brushed(brushes: Brushes, key: string, interval: Interval | null
   return next;
 }
 
-/** Those of the failures that lie in every brush; who has no value on a brushed axis lies in none. */
+/** Those of the failures that lie in every brush; one without a value on a brushed axis lies in none. */
 export function within(failures: readonly number[], brushes: Brushes, features: readonly Feature[]): readonly number[] {
   const tests = features.flatMap(({ key, values }) => {
     const interval = brushes.get(key);

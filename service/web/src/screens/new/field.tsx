@@ -114,7 +114,7 @@ export function Wrongs({ id, wrong }: { id: string; wrong: readonly Wrong[] }) {
   );
 }
 
-/** What a control says of itself to those who do not see what stands beside it. */
+/** What a screen reader says of a control. */
 export function described(id: string, wrong: readonly Wrong[], about: string): Record<string, string | boolean | undefined> {
   const by = [wrong.length ? `${id}-wrong` : "", about ? `${id}-help` : ""].filter(Boolean).join(" ");
   return { "aria-invalid": wrong.length ? true : undefined, "aria-describedby": by || undefined };

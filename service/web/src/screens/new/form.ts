@@ -1,4 +1,4 @@
-/** What every part of the form shares: the values, who is told of a change, and what the service says is wrong. */
+/** What every part of the form shares: the values, the listeners to a change, and what the service says is wrong. */
 
 import { createContext } from "preact";
 import { useContext } from "preact/hooks";

@@ -1,4 +1,4 @@
-/** A range with two thumbs on one track, and a number beside each for who knows the value. */
+/** A range with two thumbs on one track, and a number beside each for exact values. */
 
 import { moved, share, type Range, type Scale } from "./range";
 

@@ -171,7 +171,7 @@ function Presets({ spec, choose }: { spec: Values; choose: (spec: Values) => voi
 
 const NOTHING = { text: "", wrong: [] as readonly Wrong[], why: "" };
 
-/** Posts the text under a key of the form's own: whoever tries again after a lost answer gets the campaign that there is. */
+/** Posts the text under a key of the form's own, so that a second try after a lost answer gets the same campaign. */
 function useSubmit(text: string) {
   const [key, setKey] = useState(newKey);
   const [busy, setBusy] = useState(false);

@@ -1,4 +1,4 @@
-/** What is seen on the stage, as a table: the text for whoever does not see it, and the numbers for whoever does. */
+/** What is seen on the stage, as a table: a text alternative, and the numbers. */
 
 import { useLazyTime, type Clock } from "../../stage/clock";
 import { instantAt } from "../../stage/interpolate";

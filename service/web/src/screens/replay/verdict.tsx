@@ -1,4 +1,4 @@
-/** The verdicts in words: who would have prevented it, what happened, and whether it holds. */
+/** The verdicts in words: which drivers would have prevented it, what happened, and whether it holds. */
 
 import type { Body } from "../../api/types";
 import { capital, number } from "../../ui/text";
