@@ -44,7 +44,7 @@ def family(name: str, place: Stretch) -> Family:
 
     return Family(
         name=name,
-        summary=place.summary,
+        summary=place.plain_summary,
         space=SceneSpace(name, _parameters(place, beside, followed=followed)),
         odd=road_odd(place, ("none",) if place.signal is None else ("fixed_time",), ("none",)),
         vehicles=("lead", *beside),

@@ -49,7 +49,7 @@ def family(name: str, place: JunctionPlace) -> Family:
     signalised = place.signal is not None
     return Family(
         name=name,
-        summary=place.summary,
+        summary=place.plain_summary,
         space=SceneSpace(name, _parameters(place)),
         odd=road_odd(
             place,

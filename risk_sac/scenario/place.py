@@ -122,6 +122,11 @@ class _Somewhere(Settings):
     wary: bool = False
     """Whether drivers stop for an ego that stands askew; not so where the shipped families are, whose results stay."""
 
+    @property
+    def plain_summary(self) -> str:
+        """The summary as people read it."""
+        return self.summary
+
 
 class Stretch(_Somewhere):
     """A road where the ego follows a leader; the reference is the ego's start."""
@@ -130,6 +135,18 @@ class Stretch(_Somewhere):
     ego: Track
     left: Track | None = None
     right: Track | None = None
+
+    @property
+    def plain_summary(self) -> str:
+        """The summary as people read it; the stored words stay, since the place's name has their digest."""
+        head, found, _ = self.summary.partition(": who is ahead")
+        sides = [name for name, track in (("left", self.left), ("right", self.right)) if track]
+        if not found:
+            return self.summary
+        if not sides:
+            return f"{head}: the vehicle ahead brakes and adapts its speed."
+        beside = "those on the left and right" if len(sides) > 1 else f"the one on the {sides[0]}"
+        return f"{head}: the vehicle ahead and {beside} brake, adapt their speed and cut in."
 
 
 class CrossingPlace(_Somewhere):

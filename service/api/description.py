@@ -25,8 +25,8 @@ from service.api.routes.regressions import PostedRegression
 DESCRIPTION = """Finds scenarios in which an automated driving system fails.
 
 Post a campaign, follow it, read what it found. All errors are problem details (RFC 9457) that name the field, with a
-`reason` that does not change when messages do. Whatever answers GET answers HEAD, too. Text of 2 kB and more travels
-packed where `Accept-Encoding` names gzip."""
+`reason` that does not change when messages do. HEAD works wherever GET does. Text of 2 kB and more is
+compressed where `Accept-Encoding` names gzip."""
 
 _SECURITY = {
     "ApiKey": {

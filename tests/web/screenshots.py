@@ -120,6 +120,8 @@ def show_all(page: Page) -> None:
     page.wait_for_function("() => [...document.images].every(({ complete }) => complete)")
     page.wait_for_function("() => !document.body.innerText.includes('Loading …')")
     page.evaluate("scrollTo(0, 0)")
+    # Cards that come back into view load their pictures once they have stayed there.
+    page.wait_for_function("() => [...document.querySelectorAll('div.thumbnail')].every(({ innerText }) => innerText)")
 
 
 if __name__ == "__main__":

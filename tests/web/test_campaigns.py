@@ -84,7 +84,7 @@ def test_a_hostile_label_is_text_wherever_it_stands(page_at: Callable[..., Page]
     expect(hostile.get_by_role("link").first).to_have_text(HOSTILE)
     hostile.get_by_role("button", name="Delete").click()
     expect(page.get_by_role("dialog")).to_contain_text(HOSTILE)
-    page.get_by_role("button", name="Leave it").click()
+    page.get_by_role("button", name="Keep it").click()
     assert page.locator("img[src=x]").count() == 0
 
 
@@ -200,7 +200,7 @@ def test_a_search_is_cancelled_only_after_a_question(page_at: Callable[..., Page
     expect(row(page, posted).locator(".tag")).to_have_text("cancelled")  # the list asks until it is
     assert service.get(posted)["state"] == "cancelled"
     page.get_by_role("button", name="Delete long").click()
-    page.get_by_role("button", name="Leave it").click()
+    page.get_by_role("button", name="Keep it").click()
     assert service.client.get(f"/v1/campaigns/{posted}").status_code == 200
     page.get_by_role("button", name="Delete long").click()
     page.get_by_role("button", name="Delete for good").click()

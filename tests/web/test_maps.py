@@ -37,7 +37,10 @@ def test_from_a_file_to_a_campaign_at_one_of_its_places(
     found = service.client.get(f"/v1/networks/{network}/places").raise_for_status().json()["items"]
     places = page.get_by_role("region", name="Places")
     expect(places.get_by_role("heading")).to_have_text(f"{len(found)} places")
-    expect(page.get_by_alt_text("The map from above")).to_be_visible()
+    picture = page.get_by_alt_text("The map from above")
+    expect(picture).to_be_visible()
+    page.emulate_media(color_scheme="dark")
+    expect(picture).to_have_css("filter", "invert(1) hue-rotate(180deg)")
     page.get_by_label("Pattern").select_option("junction")
     page.get_by_label("Search").fill("from_north")
     wanted = [each for each in found if each["pattern"] == "junction" and "from_north" in json.dumps(each)]

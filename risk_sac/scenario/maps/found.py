@@ -43,7 +43,7 @@ class Fit:
     @property
     def summary(self) -> str:
         """Summarises the place and its rare contacts."""
-        return self.place.summary + (" Contacts are rare here: no vehicle can cut in." if self.rare else "")
+        return self.place.plain_summary + (" Contacts are rare here: no vehicle can cut in." if self.rare else "")
 
     def told(self) -> dict[str, object]:
         """The place as it is written as JSON."""

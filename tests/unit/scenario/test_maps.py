@@ -228,7 +228,28 @@ def test_a_dead_end_is_no_missing_connection(tmp_path: Path, roads: str, says: l
     assert net_remarks(net) == ["there are no traffic lights", *says]
     fit = place_at(net, "car_following", "r")
     assert fit.rare
-    assert fit.told()["summary"].endswith("Contacts are rare here: no vehicle can cut in.")
+    rare = "Contacts are rare here: no vehicle can cut in."
+    assert fit.told()["summary"] == f"Car following on 'r': the vehicle ahead brakes and adapts its speed. {rare}"
+
+
+@pytest.mark.parametrize(
+    ("beside", "stored", "said"),
+    [
+        (("left",), "and left brakes", "and the one on the left brake"),
+        (("left", "right"), "and left and right brakes", "and those on the left and right brake"),
+    ],
+)
+def test_people_read_plain_words_and_the_digest_of_a_place_stays(beside: tuple[str], stored: str, said: str) -> None:
+    shipped = PLACES.validate_json((Path(sumo_nets.__path__[0]) / "low" / "place.json").read_bytes())
+    assert isinstance(shipped, Stretch)
+    place = shipped.model_copy(
+        update=dict.fromkeys(("left", "right"))
+        | dict.fromkeys(beside, shipped.ego)
+        | {"summary": f"Car following on 'r': who is ahead {stored}, adapts speed and cuts in."}
+    )
+    assert place.plain_summary == f"Car following on 'r': the vehicle ahead {said}, adapt their speed and cut in."
+    assert f"who is ahead {stored}" in place.model_dump_json()
+    assert shipped.plain_summary == shipped.summary
 
 
 @pytest.mark.parametrize("name", ["straight_two_way.xodr", "single_road.osm"])

@@ -40,7 +40,7 @@ export function Confirm({ title, verb, children, act, close }: Question) {
       )}
       <div class="row confirm-choice">
         <button autofocus onClick={close}>
-          Leave it
+          Keep it
         </button>
         <button class="danger" disabled={busy} onClick={confirmed}>
           {verb}

@@ -3,6 +3,7 @@
 import { address } from "../../router";
 import { drivenWords } from "../../ui/driven";
 import { words } from "../../ui/text";
+import { GRADE_WORDS, type GradeName } from "../../ui/verdicts";
 import { isContact, signatureOf, gradeOf, worstOf } from "../../ui/violations";
 import type { Found } from "./live";
 
@@ -31,5 +32,6 @@ function described(found: Found): string {
   if (worst === null) return "failure";
   const kind = signatureOf(worst)?.split(";")[0] ?? words(worst.other_kind ?? "failure");
   const [named, mps] = isContact(worst) ? ["closing speed", worst.relative_speed_mps] : ["ego's speed", worst.ego_speed_mps];
-  return [kind, mps === null ? "" : `${named} ${Math.round(3.6 * mps)} km/h`, gradeOf(worst)].filter(Boolean).join(", ");
+  const grade = gradeOf(worst);
+  return [kind, mps === null ? "" : `${named} ${mps.toFixed(1)} m/s`, grade && GRADE_WORDS[grade as GradeName].short].filter(Boolean).join(", ");
 }

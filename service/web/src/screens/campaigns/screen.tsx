@@ -156,8 +156,8 @@ function Doubted({ verb, campaigns, close, done }: Doubt & { close: () => void; 
   ) : (
     <Confirm title={`Delete ${what}?`} verb="Delete for good" act={act} close={close}>
       <p>
-        {count(total(campaigns, "episodes_done"))} episodes and {count(total(campaigns, "failures"))} valid failures go, with their
-        files. Nothing brings them back.
+        {count(total(campaigns, "episodes_done"))} episodes and {count(total(campaigns, "failures"))} valid failures are deleted,
+        with their files. This cannot be undone.
       </p>
     </Confirm>
   );

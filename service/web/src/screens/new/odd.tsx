@@ -57,7 +57,7 @@ function RangeField({ field, path, families }: OfFamilies) {
       </div>
       {scale.low === scale.high && value === null ? (
         <p class="help">
-          {scale.low} {field.unit}, and nothing else is supported.
+          {`${scale.low} ${field.unit}`.trim()}, and nothing else is supported.
         </p>
       ) : (
         <RangeInput
