@@ -1,4 +1,4 @@
-"""Tables and figures of a benchmark; they can be made of the runs that have ended so far.
+"""Writes tables and figures of a benchmark, from all runs or those so far.
 
 OUT/detections.csv       a row for each run
 OUT/benchmark.md         tables of methods and defects, for the test set and for all defects
@@ -43,7 +43,10 @@ LEGEND = (
 
 
 def sections(detections: Sequence[Detection]) -> dict[str, list[Detection]]:
-    """Returns the runs of the test set, and those of all defects, of those tasks that every method has played."""
+    """Returns the runs of the test set and of all defects.
+
+    Only tasks that every method has played count.
+    """
     compared = balanced(detections)
     test_set = [each for each in compared if all(DEFECTS[name].test_set for name in each.defects)]
     others = len(compared) > len(test_set)
@@ -113,7 +116,7 @@ def curves(detections: Sequence[Detection]) -> Figure:
 
 
 def write(detections: Sequence[Detection], out: Path, command: str) -> None:
-    """Writes tables and figures of what has ended so far."""
+    """Writes tables and figures of the runs that have ended."""
     replace_file(out / "detections.csv", detections_csv(detections))
     text = [f"`{command}`\n", f"{platform_in_words()}. {LEGEND}"]
     for name, runs in sections(detections).items():

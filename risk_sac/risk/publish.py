@@ -1,4 +1,4 @@
-"""From a frame to the published signals."""
+"""Computes the published signals of a frame."""
 
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ from risk_sac.types import Bools, Floats, Frame, Kind, Signal
 GAP_CAP_M = 50.0
 PEDESTRIAN_GAP_CAP_M = 30.0
 RED_LIGHT_BRAKING_CAP_MPS2 = 12.0
-STOP_TOLERANCE_M = 0.5  # past the line: creeping up to it is no braking
+STOP_TOLERANCE_M = 0.5  # past the line: creeping up to it needs no braking
 CROSSED_ON_RED_M = -1.0
 PEDESTRIAN = int(Kind.PEDESTRIAN)  # compiled code knows no enums of int8
 
@@ -51,15 +51,15 @@ class Assessment(NamedTuple):
 
     @property
     def seen(self) -> Bools:
-        """Tells which of the others are in the ego's sight."""
+        """Whether each of the others is in the ego's sight."""
         seen: Bools = self.others[SEEN] != 0.0
         return seen
 
 
 def assess(frame: Frame, rss: RssParameters, seen: Bools, struck: int = 0) -> Assessment:
-    """All measures of a frame, in one compiled call.
+    """Computes all measures of a frame in one compiled call.
 
-    `struck` is the column of an actor that the ego touched in the step: they count as touching even if they parted.
+    `struck` is the column of an actor that the ego touched in the step: the two touch even if they have parted since.
     """
     others, least, touched = _assess(frame.state, frame.kind, tuple(rss), seen, struck)
     return Assessment(others, LeastMargins(*least), touched)
@@ -72,7 +72,7 @@ def _assess(
     view = frame_view(state)
     ttc_s = np.minimum(time_to_contact(view), TTC_CAP_S)
     walks = kind[1:] == PEDESTRIAN
-    rss_margins = margins(view, walks, RssParameters(*rss))  # passing one by its name costs as much as the margins
+    rss_margins = margins(view, walks, RssParameters(*rss))  # to pass a named tuple costs as much as the margins
     encounter_s = time_to_encounter(view, walks)
     charged = in_charge(view)
     n = len(charged)
@@ -95,7 +95,7 @@ def _assess(
 
 @compiled
 def in_charge(view: RelativeView) -> Bools:
-    """Tells which actors the ego answers for, `n`: those ahead or alongside.
+    """Whether the ego answers for each of `n` actors: for those ahead or alongside.
 
     Choice: an actor from behind must keep the distance (RSS, rule 1), so TTC and RSS do not count it.
     """
@@ -104,7 +104,10 @@ def in_charge(view: RelativeView) -> Bools:
 
 @compiled
 def least_margins(others: Floats, kind: NDArray[np.int8]) -> tuple[float, float, float, float, float]:
-    """`LeastMargins`; TTC and RSS over those the ego answers for, gaps and encounters over all."""
+    """Computes `LeastMargins`.
+
+    TTC and RSS are over the actors that the ego answers for, gaps and encounters over all.
+    """
     ttc, encounter, rss = TTC_CAP_S, ENCOUNTER_CAP_S, SCALED_HIGH
     pedestrian, vehicle = PEDESTRIAN_GAP_CAP_M, GAP_CAP_M
     for i in range(others.shape[1]):
@@ -120,13 +123,19 @@ def least_margins(others: Floats, kind: NDArray[np.int8]) -> tuple[float, float,
 
 
 def worst_rss_margin(assessment: Assessment) -> float:
-    """Smallest over the actors the ego answers for of the larger of the two RSS margins, m."""
+    """Finds the smallest RSS margin of the actors that the ego answers for, m.
+
+    An actor's margin is the larger of its longitudinal and its lateral one.
+    """
     margin = np.maximum(assessment.others[RSS_LONGITUDINAL], assessment.others[RSS_LATERAL])
     return float(margin.min(where=assessment.others[CHARGED] != 0.0, initial=LONGITUDINAL_CAP_M))
 
 
 def publish(frame: Frame, before: Frame | None, least: LeastMargins, own: OwnMotion) -> dict[str, float]:
-    """The value of every signal in `SIGNALS`; `before` is the previous frame, `least` and `own` are of `frame`."""
+    """Returns the value of every signal in `SIGNALS`.
+
+    `before` is the previous frame; `least` and `own` are of `frame`.
+    """
     return {
         "ttc_s": least.ttc_s,
         "encounter_s": least.encounter_s,
@@ -148,7 +157,10 @@ def publish(frame: Frame, before: Frame | None, least: LeastMargins, own: OwnMot
 
 
 def red_light_margin(frame: Frame, before: Frame | None) -> float:
-    """Distance to the stop line while the signal is red, m; `CROSSED_ON_RED_M` in the step that crosses it."""
+    """Computes the distance to the stop line while the signal is red, m.
+
+    It is `CROSSED_ON_RED_M` in the step that crosses the line.
+    """
     if _crossed_on_red(frame, before):
         return CROSSED_ON_RED_M
     if frame.signal is Signal.RED:
@@ -170,5 +182,5 @@ def red_light_braking(frame: Frame, before: Frame | None) -> float:
 
 
 def _crossed_on_red(frame: Frame, before: Frame | None) -> bool:
-    """Whether the signal ahead is suddenly a farther one, or none: the ego has passed it."""
+    """Whether the ego has just passed a red signal: the next one is suddenly farther, or there is none."""
     return before is not None and before.signal is Signal.RED and before.stop_line_m < frame.stop_line_m - 1.0

@@ -13,7 +13,7 @@ from risk_sac.errors import SimulationError
 class Holder:
     """Lock that lets one owner at a time use libsumo.
 
-    An owner that was garbage-collected, or is the parent process's, gives way.
+    An owner that was garbage-collected, or that belongs to the parent process, no longer counts.
     """
 
     def __init__(self) -> None:
@@ -30,7 +30,7 @@ class Holder:
             libsumo.load(list(options))
             return
         if self._is_taken(owner):
-            gc.collect()  # an owner that nothing refers to any more may be part of a cycle
+            gc.collect()  # an owner without references may still be part of a cycle
         if self._is_taken(owner):
             raise SimulationError(
                 "this process already runs the simulation of another environment, and libsumo can run only one; close "
@@ -54,7 +54,7 @@ class Holder:
 
     def _is_taken(self, owner: object) -> bool:
         if self._owner is None:
-            return bool(libsumo.isLoaded())  # by code that is none of ours
+            return bool(libsumo.isLoaded())  # by code outside this package
         return self._process == os.getpid() and self._owner() not in (None, owner)
 
 

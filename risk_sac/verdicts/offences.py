@@ -12,7 +12,7 @@ from risk_sac.verdicts.evidence import Evidence, Letters, inside
 EGO = 0
 JUNCTION_S = 6.0  # the longest way through a junction
 RECENT_S = 3.0
-LOOK_STEPS = 2  # frames between two looks at where the ego is
+LOOK_STEPS = 2  # frames between two checks of the ego's position
 SPEEDING_FACTOR = 1.1
 STANDING_MPS = 0.5
 KERB_M = 0.5  # a pedestrian this near to a crossing is stepping onto it
@@ -49,7 +49,7 @@ def striker_offences(evidence: Evidence, striker: int, *, crossing: bool) -> tup
 def ego_offences(evidence: Evidence, striker: int | None = None, *, crossing: bool = False) -> tuple[str, ...]:
     """Lists what the ego broke: red_light, priority, wrong_direction, speeding, off_road.
 
-    Priority is asked towards a striker; an ego on red had none anyway.
+    Priority counts against a striker only; an ego on red had none anyway.
     """
     red_light = entered_on(evidence, EGO, RED)
     priority = False
@@ -68,7 +68,7 @@ def ego_offences(evidence: Evidence, striker: int | None = None, *, crossing: bo
 
 
 def left_carriageway(evidence: Evidence) -> frozenset[str]:
-    """Names where the ego's whole body was in the last 3 s beside the carriageway of its direction.
+    """Names how the ego's whole body left its carriageway in the last 3 s.
 
     `wrong_direction`: on an oncoming lane, without overtaking; `off_road`: beside any lane.
     """
@@ -92,9 +92,9 @@ def left_carriageway(evidence: Evidence) -> frozenset[str]:
 
 
 def took_priority(evidence: Evidence, taker: int, other: int) -> bool:
-    """Whether a vehicle entered though it had to yield, and the other had not.
+    """Whether a vehicle entered although it had to yield and the other did not.
 
-    The signals from which they entered decide. None are recorded of background traffic: SUMO's drivers enter on green.
+    Their signals at entry decide. None is recorded for background traffic, whose drivers enter on green.
     """
     if not entered_on(evidence, taker, MUST_YIELD):
         return False
@@ -120,9 +120,9 @@ def speeds(evidence: Evidence, actor: int) -> bool:
 
 
 def pedestrian_on_red(evidence: Evidence, striker: int) -> bool:
-    """Whether the pedestrian stepped on red onto the crossing on which, or beside which, it was struck.
+    """Whether the pedestrian stepped on red onto the crossing where it was struck; `KERB_M` beside it counts.
 
-    One that steps on it on green and is caught by red half way has broken nothing.
+    A pedestrian that steps onto it on green and meets red half way has broken no rule.
     """
     stepped = _stepped_onto_crossing(evidence, striker)
     return stepped is not None and int(evidence.link[stepped, striker]) in RED
@@ -141,8 +141,8 @@ def took_crossing(evidence: Evidence, striker: int) -> bool:
 def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
     """Whether a vehicle entered a junction on one of these letters in the last 6 s.
 
-    Its signal then goes from them to none. To another letter it turned, unless the vehicle came into a junction in that
-    step and it is the next junction's.
+    On entry the signal goes from one of these letters to none. A change to another letter is a change of the signal,
+    unless the vehicle came into a junction in that step: the letter is then the next junction's.
     """
     e, first = evidence, evidence.since(JUNCTION_S)
     link = e.link[first:, actor]

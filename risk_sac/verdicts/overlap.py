@@ -1,4 +1,4 @@
-"""Overlapping bodies in a record: from its first frame to the contact no two may share a place."""
+"""Finds bodies that overlap in a record before the contact; none should."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ class Overlap(NamedTuple):
 
 
 def overlaps_before_contact(evidence: Evidence) -> list[Overlap]:
-    """Finds each frame's overlapping bodies; whom the ego touches in the last frame is left out."""
+    """Finds the overlapping bodies of each frame, without the ego's contact in the last."""
     e = evidence
     pairs = _overlaps(e.x_m, e.y_m, e.heading_rad, e.length_m, e.width_m)
     return [Overlap(float(e.time_s[frame]), e.ids[i], e.ids[j]) for frame, i, j in pairs]
@@ -32,7 +32,7 @@ def _overlaps(x: Floats, y: Floats, heading: Floats, length: Floats, width: Floa
     `x`, `y` and `heading` are `T x n`, NaN where an actor has left.
     """
     steps, n = x.shape
-    found = [(0, 0, 0) for _ in range(0)]  # an empty list whose type the compiler can tell
+    found = [(0, 0, 0) for _ in range(0)]  # an empty list with a type that the compiler infers
     state = np.zeros((WIDTH + 1, n))
     state[LENGTH], state[WIDTH] = length, width
     for frame in range(steps):

@@ -1,4 +1,4 @@
-"""The ego's path: where its centre is after how many metres, continued straight beyond either end."""
+"""Path of the ego's centre by distance driven, extended straight beyond both ends."""
 
 import math
 from typing import NamedTuple
@@ -13,7 +13,7 @@ STANDING_M = 1e-6  # two points nearer than this are one
 
 
 class Path(NamedTuple):
-    """Points of a path; `m` of each, at least one."""
+    """Path of `m` points, at least one."""
 
     x: Floats
     y: Floats
@@ -22,7 +22,7 @@ class Path(NamedTuple):
 
 
 def recorded_path(x: Floats, y: Floats, heading: Floats) -> Path:
-    """Through the positions of a body, with its own headings."""
+    """Builds a path through a body's positions, with its recorded headings."""
     steps = np.hypot(np.diff(x), np.diff(y))
     return Path(
         np.ascontiguousarray(x), np.ascontiguousarray(y), np.unwrap(heading), np.concatenate(([0.0], np.cumsum(steps)))
@@ -30,12 +30,12 @@ def recorded_path(x: Floats, y: Floats, heading: Floats) -> Path:
 
 
 def polyline(x: Floats, y: Floats, heading_rad: float = 0.0) -> Path:
-    """Through points, heading along them.
+    """Builds a path through points, with headings along it.
 
     Args:
       x: `m` points, the ego's centre first.
-      y: the same, north.
-      heading_rad: where the path leads if there is but one point.
+      y: the same for y.
+      heading_rad: of a path of one point.
     """
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     if len(x) < 2:
@@ -65,11 +65,10 @@ def pose_at(path: Path, s: float) -> Pose:
 
 @compiled
 def project(path: Path, first: int, x: float, y: float) -> tuple[float, float, float]:
-    """Projects a place onto the path, from its `first` point on.
+    """Projects a position onto the path, from its `first` point on.
 
-    Returns metres along, metres to the left and the heading there.
-
-    The straight continuation counts, behind the `first` point too.
+    Returns metres along, metres to the left and the heading there. The straight extensions count, also the one behind
+    the `first` point.
     """
     last = len(path.s) - 1
     h = path.heading[first]

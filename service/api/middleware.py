@@ -17,7 +17,7 @@ from service.api.observe import Observe
 from service.keys.made import AuthEnabledFlag
 from service.settings import ROOT_PATH, ServiceSettings
 
-GZIP_LEVEL = 4  # of 9; those above take several times as long for a few hundredths less
+GZIP_LEVEL = 4  # of 9; higher levels take several times as long and save a few per cent
 
 
 def add_middleware(app: FastAPI, settings: ServiceSettings, made: AuthEnabledFlag, latencies: Histogram) -> None:
@@ -43,11 +43,11 @@ def add_middleware(app: FastAPI, settings: ServiceSettings, made: AuthEnabledFla
 class Compression(GZipMiddleware):
     """Starlette's gzip middleware that also honours `gzip;q=0` and sets Vary.
 
-    It skips pictures, files and event streams. Tags are made weak, so they hold for both forms.
+    It skips pictures, files and event streams. ETags are made weak, so they hold for both forms.
     """
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on, and packs the answer."""
+        """Forwards the request and compresses the answer."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -68,10 +68,10 @@ class Compression(GZipMiddleware):
 
 
 class Cors(CORSMiddleware):
-    """Starlette's middleware, whose preflight answers have no body."""
+    """Starlette's CORS middleware, with preflight answers without a body."""
 
     def preflight_response(self, request_headers: Headers) -> Response:
-        """Answers what a browser asks before it sends the request itself."""
+        """Answers a browser's preflight request."""
         answer = super().preflight_response(request_headers)
         status = 204 if answer.status_code == 200 else 403
         named = {name: value for name, value in answer.headers.items() if not name.startswith("content-")}
@@ -85,7 +85,7 @@ class SecurityHeaders:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on, and adds to the answer."""
+        """Forwards the request and adds headers to the answer."""
 
         async def send_with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -107,7 +107,7 @@ class ForwardedPrefix:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on with the prefix as root path, unless the settings have one."""
+        """Forwards the request with the prefix as root path, unless the settings have one."""
         if scope["type"] == "http" and not scope.get("root_path") and is_loopback((scope.get("client") or [""])[0]):
             prefix = Headers(scope=scope).get("x-forwarded-prefix", "").rstrip("/")
             if prefix and ROOT_PATH.fullmatch(prefix):
@@ -125,7 +125,7 @@ class Head:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Passes on as GET and ends the answer before its body."""
+        """Forwards the request as GET and ends the answer before its body."""
         if scope["type"] != "http" or scope["method"] != "HEAD":
             await self._app(scope, receive, send)
             return
@@ -139,7 +139,7 @@ class Head:
             if answered:
                 return
             answered = message["type"] == "http.response.start"
-            scope.update(asked | {"method": "HEAD"})  # the router and the gate leave in it what the log tells
+            scope.update(asked | {"method": "HEAD"})  # the router and the gate store in it what the log needs
             await send(message)
             if answered:
                 await send({"type": "http.response.body"})

@@ -31,7 +31,7 @@ class Road:
     junction: str = ""  # of a road inside one
 
     def lane_number(self, lane: Lane) -> int:
-        """OpenDRIVE's number of one of its lanes."""
+        """Returns OpenDRIVE's number of a lane."""
         return -1 - self.lanes.index(lane)
 
 
@@ -80,13 +80,15 @@ def opendrive(net: Net, name: str) -> bytes:
 
 
 def _turns(net: Net) -> Iterator[tuple[Lane, Sequence[Lane], Lane | None]]:
-    """Yields each way across a junction: the lane before it, those inside it, and the lane behind it."""
+    """Yields each way across a junction: the lane before it, those inside it, and the lane after it."""
     for start in net.lanes.values():
         if start.use == "inside":
             continue
         for name in start.next:
             inside, lane = list[Lane](), net.lanes[name]
-            while lane.use == "inside" and lane not in inside:  # SUMO divides a turn where vehicles wait within
+            while (
+                lane.use == "inside" and lane not in inside
+            ):  # SUMO divides a turn where vehicles wait in the junction
                 inside.append(lane)
                 lane = next((net.lanes[after] for after in lane.next), lane)
             if inside:
