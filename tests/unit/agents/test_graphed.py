@@ -10,24 +10,29 @@ from risk_sac.config.learner import AgentConfig, ReplayConfig, SacConfig
 SIZES = 7, 3  # of an observation and an action
 
 
+def transition(random: np.random.Generator, observation_size: int, action_size: int) -> Transition:
+    """Draws a transition."""
+    before, after, action = (
+        random.uniform(-1, 1, size).astype(np.float32) for size in (observation_size, observation_size, action_size)
+    )
+    return Transition(
+        observation=before,
+        action=action,
+        risk_reward=float(action.sum()),
+        cost=0.0,
+        robustness=0.0,
+        next_robustness=0.0,
+        next_observation=after,
+        terminated=bool(random.random() < 0.1),
+        accumulated_reward=0.0,
+    )
+
+
 def batches(count: int) -> list[Batch]:
     """Draws batches of random transitions."""
     random, replay = np.random.default_rng(3), UniformReplay(*SIZES, ReplayConfig(capacity=1000))
     for _ in range(1000):
-        before, after, action = (random.uniform(-1, 1, SIZES[k]).astype(np.float32) for k in (0, 0, 1))
-        replay.add(
-            Transition(
-                observation=before,
-                action=action,
-                risk_reward=float(action.sum()),
-                cost=0.0,
-                robustness=0.0,
-                next_robustness=0.0,
-                next_observation=after,
-                terminated=bool(random.random() < 0.1),
-                accumulated_reward=0.0,
-            )
-        )
+        replay.add(transition(random, *SIZES))
     return [replay.sample(64, random) for _ in range(count)]
 
 

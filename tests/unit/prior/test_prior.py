@@ -33,7 +33,7 @@ def optimizer(kind: type[PriorOptimizer] = PriorOptimizer, seed: int = 1) -> Pri
 
 
 def test_a_prior_is_shipped_for_each_family_within_three_megabytes() -> None:
-    assert {path.stem for path in DATA.glob("*.npz")} == {*FAMILIES, "low-policy"}
+    assert {path.stem for path in DATA.glob("*.npz")} == {*FAMILIES, "low-policy", "mixed-policy"}
     assert sum(path.stat().st_size for path in DATA.glob("*.npz")) <= MOST_BYTES
     for family in FAMILIES:
         prior = shipped_prior(family)
