@@ -18,7 +18,6 @@ import numpy as np
 
 from risk_sac.agents.decisions import Held
 from risk_sac.config import SHIPPED, AgentConfig, Budget, LearnerConfig, RunSpec
-from risk_sac.config.learner import SacConfig
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.execution.runs import run
@@ -28,13 +27,9 @@ from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records
 from tests.acceptance.side_by_side import Row, rows_of
 
 METHODS = ("risk-sac", "risk-sac-only-rper", "risk-sac-only-rs", "sac-lag", "sac", "ddpg-lag", "ddpg")
-# Of all methods. A tuning run of `risk-sac` in low reached with it what it reached with the defaults, in half the time.
-LEARNER = LearnerConfig(
-    agent=AgentConfig(
-        hidden_sizes=(256, 256), actor_learning_rate=3e-4, critic_learning_rate=3e-4, updates_per_step=0.2
-    ),
-    sac=SacConfig(target_entropy_per_action=-0.5),
-)
+# Of all methods. With one update a step, the default, `risk-sac` reaches in low what this reaches in half the episodes;
+# two layers of 256 at a rate of 3e-4 learn later still. A tuning seed, one run each.
+LEARNER = LearnerConfig(agent=AgentConfig(updates_per_step=0.2))
 FIRST_SEED = 701
 OWN = 100  # episodes of the frozen policy in its method's own scenes
 WINDOW = 100  # episodes
