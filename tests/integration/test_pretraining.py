@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from risk_sac.agents.replay import Transition
+from risk_sac.errors import ConfigError
 from risk_sac.pretraining import episodes, policy
 from risk_sac.pretraining.episodes import Stream
 from risk_sac.pretraining.policy import PolicyTraining
@@ -98,3 +100,9 @@ def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached() -> None:
     asked = stored.observation[:, size.observation_size :].argmax(1).tolist()
     rewards = dict(zip(asked, stored.risk_reward.tolist(), strict=True))
     assert rewards == pytest.approx({goals[0]: 20.0, goals[1]: 20.0 * (1.0 - policy.MISSED)})
+
+
+@pytest.mark.skipif(torch.cuda.is_available(), reason="has the GPU that it must lack")
+def test_a_gpu_that_is_not_there_is_refused_in_one_line() -> None:
+    with pytest.raises(ConfigError, match=r"^--device: .*no CUDA device here.*'cpu'"):
+        PolicyTraining("low", 5, 100, "cuda")
