@@ -30,7 +30,7 @@ VEHICLE = int(Kind.VEHICLE)  # compiled code knows no enums of int8
 
 
 class OwnMotion(NamedTuple):
-    """The signals of the same names."""
+    """Values of the ego's motion signals in one frame."""
 
     ego_jerk_mps3: float
     ego_lateral_accel_mps2: float
@@ -42,7 +42,7 @@ class OwnMotion(NamedTuple):
 
 
 class OwnMotionGauge:
-    """Measures the ego in the frames of an episode one after the other.
+    """Measures the ego's motion frame by frame.
 
     Attributes:
       carriageway: of the net.
@@ -57,7 +57,7 @@ class OwnMotionGauge:
         self._past = deque[tuple[float, float, float]](maxlen=round(WINDOW_S / STEP_S) + 1)
 
     def remember(self, frame: Frame) -> None:
-        """Takes over the next frame without measuring it."""
+        """Stores the next frame without measuring it."""
         self._past.append((frame.time_s, frame.state.item(HEADING, 0), frame.state.item(ACCEL, 0)))
 
     def measure(self, frame: Frame) -> OwnMotion:

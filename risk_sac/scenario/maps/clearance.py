@@ -25,7 +25,7 @@ from risk_sac.types import Floats
 SAMPLED_M = 0.5
 ALONG = 9  # points on each side of it
 ROOM_M = CAR_WIDTH_M + 0.15  # between the middles of the ways of two cars
-CLEAR_M = CAR_WIDTH_M / 2 + 0.1  # of the box of who waits from the middle of a lane that others drive on
+CLEAR_M = CAR_WIDTH_M / 2 + 0.1  # of the box of a waiting vehicle from the middle of a lane that others drive on
 
 
 def outlines(link: Link, length_m: float, width_m: float) -> Floats:

@@ -82,7 +82,7 @@ def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[Lane, Track, Tra
             (ego, link), (occluder, beside) = _ego(net, own), _straight(net, right, OCCLUDED_S)
             least_m = TRUCK_LENGTH_M + LEAD_IN_S * top_speed(own.limit_mps) + 1.0
             if occluder.room_m < least_m:
-                raise NoFit(f"the lane beside can be come from for {occluder.room_m:.0f} m; wanted {least_m:.0f} m")
+                raise NoFit(f"the way in on the lane beside is {occluder.room_m:.0f} m long; wanted {least_m:.0f} m")
             if truck_reaches(net, beside, link):
                 raise NoFit(
                     f"a truck that drives on from {right.id!r} reaches into the way of a vehicle that drives on from "
@@ -101,15 +101,14 @@ def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[Lane, Trac
     beside = [lane for lane in lanes if net.edges[lane.edge].start == edge.end and _is_beside(own, lane)]
     if not beside:
         raise NoFit(
-            f"{edge.id!r} has 1 lane for cars, and none beside it for those who come the other way; wanted one of the "
-            "two, so that a vehicle can hide the pedestrian"
+            f"{edge.id!r} has 1 lane for cars, and none beside it for oncoming vehicles; wanted one of the two, "
+            "so that a vehicle can hide the pedestrian"
         )
     ego, link = _ego(net, own)
     way = way_on(net, beside[0], (TRUCK_LENGTH_M + OCCLUDER_M) / beside[0].limit_mps + OCCLUDED_S)
     occluder = track(net, way, 0.0, TRUCK_LENGTH_M + OCCLUDER_M)
     if occluder.room_m < room_beyond_m():
-        came = f"those who come the other way can be come from for {occluder.room_m:.0f} m"
-        raise NoFit(f"{came}; wanted {room_beyond_m():.0f} m")
+        raise NoFit(f"the way in of oncoming vehicles is {occluder.room_m:.0f} m long; wanted {room_beyond_m():.0f} m")
     return own, ego, occluder, link
 
 

@@ -131,7 +131,7 @@ def leg(net: Net, road: Approach, name: str, onward_s: float) -> Leg:
 def roomy(found: Track, edge: str, wanted_m: float) -> Track:
     """The track; raises `NoFit` if it begins too near to its reference."""
     if found.room_m < wanted_m:
-        raise NoFit(f"{edge!r} can be come from for {found.room_m:.0f} m; wanted {wanted_m:.0f} m")
+        raise NoFit(f"the way in on {edge!r} is {found.room_m:.0f} m long; wanted {wanted_m:.0f} m")
     return found
 
 
