@@ -86,9 +86,7 @@ def _turns(net: Net) -> Iterator[tuple[Lane, Sequence[Lane], Lane | None]]:
             continue
         for name in start.next:
             inside, lane = list[Lane](), net.lanes[name]
-            while (
-                lane.use == "inside" and lane not in inside
-            ):  # SUMO divides a turn where vehicles wait in the junction
+            while lane.use == "inside" and lane not in inside:  # SUMO divides a turn where vehicles wait
                 inside.append(lane)
                 lane = next((net.lanes[after] for after in lane.next), lane)
             if inside:
