@@ -1,26 +1,38 @@
 """What archive and random search find in a planner: equal environment steps, several seeds.
 
     python -m tests.acceptance.planner_table OUT [--ego NAME] [--families NAME ...] [--methods NAME ...] [--seeds N]
-        [--steps N]
+        [--steps N] [--finished DIR]
 
 plays what OUT lacks, seeds outermost, and rewrites OUT/table.md and OUT/table.csv after each run. A run ends with the
 episode in which it has spent its steps; with more steps it goes on. What ends after the steps does not count, so longer
 runs are cut. Counts are those of `risk-sac run`; the failures are not replayed, so the last of them are candidates of
-headline failures.
+headline failures. DIR gets each run, cut at its steps, as a finished one, for `risk-sac verify`, `show` and `report`.
 """
 
 import argparse
 import csv
+import shutil
 from collections.abc import Iterator, Sequence
+from importlib.metadata import version
 from itertools import product
 from pathlib import Path
 from statistics import median
 
+from risk_sac.adjustments import adjustments
 from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.egos.registry import pinned
-from risk_sac.metrics import MetricsAccumulator
-from risk_sac.run_folder.results import EPISODES, records_from_lines
+from risk_sac.metrics import MetricsAccumulator, results_digest
+from risk_sac.run import CHECKPOINT, PACKAGES
+from risk_sac.run_folder import checkpoint
+from risk_sac.run_folder.results import (
+    EPISODES,
+    FAILURES,
+    RecordedFailure,
+    Results,
+    records_from_lines,
+    write_results,
+)
 from risk_sac.scenario.families import family_named
 from tests.acceptance.ego_ladder import in_own_process, play
 
@@ -51,6 +63,32 @@ def counted(spec: RunSpec, folder: Path, steps: int) -> Row:
             found.add(record)
     metrics = found.metrics()
     return {name: getattr(spec, name) if hasattr(spec, name) else getattr(metrics, name) for name in COLUMNS}
+
+
+def finish(spec: RunSpec, folder: Path, steps: int, out: Path) -> None:
+    """Writes a run's episodes that end within the steps as a finished run."""
+    records = [each for each in records_from_lines((folder / EPISODES).read_bytes()) if each.environment_steps <= steps]
+    state = checkpoint.load_newest(folder / CHECKPOINT, spec.digest) or {}
+    cpu_s = tuple(state.get("episode_cpu_s", ()))[: len(records)]
+    found = MetricsAccumulator(family_named(spec.family).horizon_steps)
+    for record in records:
+        found.add(record)
+    shutil.copytree(folder / FAILURES, out / FAILURES, dirs_exist_ok=True)
+    (out / EPISODES).write_bytes(b"".join(record.model_dump_json().encode() + b"\n" for record in records))
+    results = Results(
+        spec=spec,
+        spec_digest=spec.digest,
+        adjustments=adjustments(spec),
+        finished=True,
+        metrics=found.metrics(),
+        digest=results_digest(records),
+        versions={name: version(name) for name in PACKAGES},
+        device="cpu",
+        cpu_s=cpu_s[-1] if cpu_s else 0.0,
+        episode_cpu_s=cpu_s,
+        failures=tuple(RecordedFailure.of(spec.id, record) for record in records if record.worst_violation),
+    )
+    write_results(out, results)
 
 
 def write(rows: Sequence[Row], out: Path) -> str:
@@ -98,6 +136,7 @@ def main() -> None:
     parser.add_argument("--methods", nargs="+", default=["archive", "random"], metavar="NAME")
     parser.add_argument("--seeds", type=int, default=5, metavar="N", help="(default: %(default)s)")
     parser.add_argument("--steps", type=int, default=5_000, metavar="N", help="of each run (default: %(default)s)")
+    parser.add_argument("--finished", type=Path, metavar="DIR", help="folder of the finished runs")
     given = parser.parse_args()
     rows: list[Row] = []
     seeds = range(FIRST_SEED, FIRST_SEED + given.seeds)
@@ -107,6 +146,8 @@ def main() -> None:
         if not spent(folder, given.steps):
             in_own_process(play, spec, folder, given.steps)
         rows.append(counted(spec, folder, given.steps))
+        if given.finished:
+            finish(spec, folder, given.steps, given.finished / spec.id)
         print(write(rows, given.out))
 
 

@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from risk_sac.records import Outcome
-from risk_sac.run_folder.results import EPISODES
-from tests.acceptance.planner_table import Row, counted, lines, p_value, spec_of, spent
+from risk_sac.report.runs import read_run
+from risk_sac.run_folder.results import EPISODES, FAILURES, read_results
+from tests.acceptance.planner_table import Row, counted, finish, lines, p_value, spec_of, spent
 from tests.builders import collision, episode_record
 
 
@@ -30,6 +31,13 @@ def test_a_run_goes_on_that_has_spent_fewer_steps(run: Path) -> None:
     assert spent(run, 400)
     assert not spent(run, 401)
     assert not spent(run / "none", 1)
+
+
+def test_a_finished_run_holds_what_ends_within_the_steps(run: Path, tmp_path: Path) -> None:
+    (run / FAILURES).mkdir()
+    finish(spec_of("low", "random", "default", 1), run, 300, tmp_path / "finished")
+    assert [record.index for record in read_run(tmp_path / "finished").records] == [0, 1, 2]
+    assert [failure.episode.index for failure in read_results(tmp_path / "finished").failures] == [2]
 
 
 def test_a_line_has_median_range_and_p_against_random_search() -> None:
