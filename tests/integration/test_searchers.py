@@ -72,8 +72,8 @@ def test_a_guide_has_done_its_part_after_so_many_episodes_or_failures() -> None:
 def test_a_guide_that_goes_on_anyway_has_time_until_it_has_found_enough() -> None:
     """At a family whose policy begins from nothing."""
     few = WarmStartConfig(episodes=3, failures=2)
-    assert makers(searchers("risk-sac-diverse", few, "mixed"), [Outcome.SAFE] * 20) == [ScriptFollower] * 21
-    taken = makers(searchers("risk-sac-diverse", few, "mixed"), [Outcome.FAILURE] * 2 + [Outcome.SAFE] * 60)
+    assert makers(searchers("risk-sac-diverse", few, "dense"), [Outcome.SAFE] * 20) == [ScriptFollower] * 21
+    taken = makers(searchers("risk-sac-diverse", few, "dense"), [Outcome.FAILURE] * 2 + [Outcome.SAFE] * 60)
     assert taken[:2] == [ScriptFollower] * 2
     assert set(taken[2:]) == {ScriptFollower, Learner}
 
@@ -118,7 +118,7 @@ def test_each_method_says_what_drives_the_adversaries(
 
 
 def test_the_policy_drives_in_the_scenes_of_its_own_archive_and_scripts_in_the_guides() -> None:
-    wanted = spec("risk-sac-diverse", Budget(episodes=100), WarmStartConfig(episodes=3, failures=2), "mixed")
+    wanted = spec("risk-sac-diverse", Budget(episodes=100), WarmStartConfig(episodes=3, failures=2), "dense")
     wanted = wanted.model_copy(
         update={"learner": wanted.learner.model_copy(update={"agent": AgentConfig(warmup_steps=0)})}
     )
@@ -135,7 +135,7 @@ def test_the_policy_drives_in_the_scenes_of_its_own_archive_and_scripts_in_the_g
 
 
 def test_the_frozen_policy_is_on_its_own() -> None:
-    subject = searchers("risk-sac-diverse", WarmStartConfig(), "mixed")
+    subject = searchers("risk-sac-diverse", WarmStartConfig(), "dense")
     assert type(subject.next(learning=False).actor) is Learner
 
 
