@@ -1,4 +1,4 @@
-"""Whether the places that were found on a map can be played at: a random sample of them is.
+"""Plays a random sample of the places that were found on a map.
 
 At each place the same scenes are played without an attack and with random actions, and a pedestrian steps into the
 ego's way from the left and from the right.
@@ -40,7 +40,7 @@ ALIKE_M = 1.0  # by which least distances may differ: who changes lanes, or turn
 
 @dataclass(slots=True)
 class Tried:
-    """What came of the episodes at one place."""
+    """Results of the episodes at one place."""
 
     fit: Fit
     played: int = 0
@@ -154,7 +154,7 @@ def meet(sim: SumoSimulation, family: str, side: int) -> float:
 
 
 def _driven_to(sim: SumoSimulation, alone: Layout) -> tuple[int, float, float, float] | None:
-    """In which step the ego drives where after AHEAD_S, on an empty road: step, x, y, heading; None: it stands."""
+    """Returns the first step after AHEAD_S in which the ego drives, with x, y and heading; None if it stands."""
     sim.reset(alone, 1)
     for step in range(1, MET_STEPS + 1):
         frame = sim.step()

@@ -1,4 +1,7 @@
-"""Updates of a SAC on a GPU: one CUDA graph instead of some 300 kernels that Python starts one by one."""
+"""Makes updates of a SAC on a GPU as one CUDA graph.
+
+Without it, Python starts some 300 kernels one by one.
+"""
 
 from dataclasses import fields
 
@@ -15,7 +18,7 @@ WARM_UP = 3  # updates before the recording; in them torch sets up what may not 
 class GraphedUpdate:
     """Makes an agent's updates; they are the same as those of `SacAgent.update`.
 
-    Batches must have the same size. Whatever loads the agent anew must be followed by a new object.
+    Batches must have the same size. An agent that has loaded a state needs a new object.
     """
 
     def __init__(self, agent: SacAgent) -> None:

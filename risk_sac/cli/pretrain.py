@@ -81,11 +81,15 @@ def _train_policy(options: argparse.Namespace, pool: Executor, family: FamilyNam
     from risk_sac.prior.policy import write_policy
 
     training = PolicyTraining(family, options.seed, options.policy_episodes, options.device)
+
+    def write() -> None:
+        write_policy(options.out / f"{family}-policy.npz", training.pretrained())
+        (options.out / f"{family}-policy.json").write_text(json.dumps(training.curve, indent=1) + "\n")
+
     for point in training.run(pool, options.out):
         say(
             f"{family}: after {point['episodes']} episodes of the policy {point['failing']:.3f} of the last fail,"
             f" {point['held_out']['failing']:.2f} before egos held out"
         )
-        write_policy(options.out / f"{family}-policy.npz", training.pretrained())
-        (options.out / f"{family}-policy.json").write_text(json.dumps(training.curve, indent=1) + "\n")
-    write_policy(options.out / f"{family}-policy.npz", training.pretrained())
+        write()
+    write()  # with what it has learnt since the last point

@@ -1,7 +1,7 @@
 """What a step of a planner of others costs: processor time of `act`, and within it of the package's own `step()`.
 
 Random search plays 8 episodes of each family. A step without a plan is one that the package reports as degraded,
-fallback or emergency. The aim is 3 ms.
+fallback or emergency.
 """
 
 from collections.abc import Iterator
@@ -20,6 +20,7 @@ from risk_sac.env import RiskSacEnv  # noqa: E402
 from risk_sac.errors import InfeasibleScene  # noqa: E402
 
 EPISODES = 8
+WANTED_MS = 3.0  # mean of `act`
 
 
 class Times:
@@ -92,3 +93,4 @@ def test_cost_of_a_plan(family: str, monkeypatch: pytest.MonkeyPatch) -> None:
         f"{planned.mean():.1f} ms, without {other.mean():.1f} ms in {len(other) / len(act):.0%} of {len(act)} steps; "
         f"step() is {own:.0%} of act"
     )
+    assert act.mean() <= WANTED_MS
