@@ -49,7 +49,7 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Overrides argparse: a command refuses an unknown flag before it names a missing one."""
         words = list(sys.argv[1:] if args is None else args)
-        if self.get_default("command") is not None:
+        if self.get_default("command") is not None and "-" in self.prefix_chars:  # `keys` passes its words on
             taken = words[: words.index("--")] if "--" in words else words
             names = (word.partition("=")[0] for word in taken)
             known = (*self.flags(), "--help")  # argparse takes a unique beginning of a flag too

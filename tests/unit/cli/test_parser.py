@@ -89,6 +89,11 @@ def test_a_flag_may_be_shortened_and_words_after_two_dashes_are_no_flags() -> No
     assert cli._parser().parse_known_args(["show", "--", "--results"])[0].results.name == "--results"
 
 
+def test_keys_hands_its_words_on_with_their_flags() -> None:
+    words = ["create", "--project", "default", "--scope", "run"]
+    assert cli._parser().parse_known_args(["keys", *words])[0].rest == words
+
+
 @pytest.mark.parametrize("name", ["run", "show", "evaluate", "verify", "clusters"])
 def test_json_is_a_flag_of_the_commands_with_results(name: str) -> None:
     assert "--json" in COMMANDS[f"risk-sac {name}"].flags()
