@@ -30,8 +30,8 @@ class AgentConfig(Settings):
     """Environment steps before the first update, the warm start's included; the policy's own are uniformly random."""
     decision_steps: Annotated[int, Field(ge=1, le=50)] = 5
     """Environment steps for which the policy holds an action; they make one transition of the memory."""
-    updates_per_step: Annotated[float, Field(ge=0, le=20)] = 1.0
-    """Updates in an environment step. One costs as much as two or three steps."""
+    updates_per_step: Annotated[float, Field(ge=0, le=20)] = 0.2
+    """Updates in an environment step; 0.2 is one per decision. An update costs as much as two or three steps."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """`auto` is the CPU; `cuda` has to be asked for. Results are reproducible on equal devices only."""
 

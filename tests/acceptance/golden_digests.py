@@ -35,7 +35,7 @@ PACKAGES = ("botorch", "gpytorch", "libsumo", "llvmlite", "numba", "numpy", "sci
 # Small enough for a second, and still learning and modelling before the run is over.
 BUDGET = Budget(episodes=3, evaluation_episodes=1)
 LEARNER = LearnerConfig(
-    agent=AgentConfig(hidden_sizes=(32, 32), batch_size=32, warmup_steps=100),
+    agent=AgentConfig(hidden_sizes=(32, 32), batch_size=32, warmup_steps=100, updates_per_step=1.0),
     replay=ReplayConfig(capacity=1000),
     warm_start=WarmStartConfig(episodes=1),
     scenes=SceneOptimizerConfig(initial_scenes=2, refit_every=1, candidates=32, exploration=0.0),

@@ -17,7 +17,7 @@ from statistics import mean, stdev
 import numpy as np
 
 from risk_sac.agents.decisions import Held
-from risk_sac.config import SHIPPED, AgentConfig, Budget, LearnerConfig, RunSpec
+from risk_sac.config import SHIPPED, Budget, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.execution.runs import run
@@ -27,9 +27,6 @@ from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records
 from tests.acceptance.side_by_side import Row, rows_of
 
 METHODS = ("risk-sac", "risk-sac-only-rper", "risk-sac-only-rs", "sac-lag", "sac", "ddpg-lag", "ddpg")
-# Of all methods. With one update a step, the default, `risk-sac` reaches in low what this reaches in half the episodes;
-# two layers of 256 at a rate of 3e-4 learn later still. A tuning seed, one run each.
-LEARNER = LearnerConfig(agent=AgentConfig(updates_per_step=0.2))
 FIRST_SEED = 701
 OWN = 100  # episodes of the frozen policy in its method's own scenes
 WINDOW = 100  # episodes
@@ -131,7 +128,7 @@ def main() -> None:
     budget = Budget(episodes=options.episodes, evaluation_episodes=OWN)
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     runs = [
-        RunSpec(family=family, method=method, seed=seed, budget=budget, learner=LEARNER)
+        RunSpec(family=family, method=method, seed=seed, budget=budget)
         for seed, family, method in product(seeds, options.families, options.methods)
     ]
     rows = rows_of(
