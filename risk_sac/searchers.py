@@ -54,7 +54,7 @@ class Terms(NamedTuple):
     least: float  # share of the processor time for either
 
 
-COLD = Terms(8.0, 0.05, 0.01)  # more would be lost on a policy that yields nothing
+COLD = Terms(3.0, 0.05, 0.01)  # more would be lost on a policy that yields nothing
 # Choice: between 1.5 with a planner under test and 6 with SUMO's driver. Both are credited with much: neither is to be
 # given up for the first find of the other.
 PRETRAINED = Terms(2.0, 10.0, 0.1)
