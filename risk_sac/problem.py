@@ -133,7 +133,7 @@ def _rss_parameters(odd: Odd) -> RssParameters:
 
     Choice: both are RSS_BRAKING_MPS2 or the worst grip of the road that all share. SUMO's drivers keep a headway of 1 s
     and trust the one ahead to brake no harder than they do themselves; that they stop by 4.5 m/s² behind a
-    leader who does by 8 would make all of ordinary following dangerous.
+    leader that brakes at 8 m/s² would make all of ordinary following dangerous.
     """
     friction = odd.environment.friction
     limits = limits_from_odd(odd, friction.low if friction else 1.0)

@@ -30,12 +30,12 @@ LEFT, RIGHT = 1, -1
 ASIDE_M, PACE_MPS = 6.0, 1.4  # where the pedestrian comes from, and how fast
 AHEAD_S = 6.0  # of driving to where it crosses
 WALKED_STEPS = round(ASIDE_M / PACE_MPS / STEP_S)
-DRIVING_MPS = 2.0  # who is slower is not driven past, but stops as a matter of course
+DRIVING_MPS = 2.0  # a slower ego stops for the pedestrian in any case
 MET_STEPS = 120
 STANDING_MPS = 0.5
 OFFSETS = 41  # of a cycle that are looked at
-MET_M = 5.0  # who comes no nearer to a pedestrian has not met it
-ALIKE_M = 1.0  # by which least distances may differ: who changes lanes, or turns, comes nearer to one side
+MET_M = 5.0  # an ego that stays farther from a pedestrian has not met it
+ALIKE_M = 1.0  # by which least distances may differ: lane changes and turns bring it nearer to one side
 
 
 @dataclass(slots=True)
@@ -148,7 +148,7 @@ def meet(sim: SumoSimulation, family: str, side: int) -> float:
         sim.apply({}, {"walker": Walker(x, y, towards, pace)})
         frame = sim.step()
         view = relative_view(frame)
-        if frame.ego_speed_mps >= STANDING_MPS:  # who stands is walked into, whatever it does
+        if frame.ego_speed_mps >= STANDING_MPS:  # a standing ego is walked into in any case
             least_m = min(least_m, 0.0 if view.overlap[0] else float(view.gap[0]))
     return least_m
 

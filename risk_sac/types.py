@@ -28,7 +28,7 @@ class Kind(IntEnum):
 
 
 class Role(IntEnum):
-    """Who drives an actor."""
+    """Part of an actor in a scenario."""
 
     EGO = 0
     ADVERSARY = 1

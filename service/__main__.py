@@ -26,7 +26,7 @@ def main() -> None:
         set_up_logs(settings.log_format)
         if settings.egos is not None:  # from a folder of secrets, it may be; workers read the environment
             os.environ[registry.FILE] = str(settings.egos.absolute())
-        registry.cards()  # an operator who has registered nonsense hears of it now
+        registry.cards()  # refuses invalid egos at the start
         check_exposure(settings)
         executor = executor_named(settings.executor)(worker_program(settings))  # tries a cluster, which takes seconds
     except ConfigError as error:

@@ -10,7 +10,7 @@ from risk_sac.scripts.motions import SIZE, Genes, Seen, act, adversaries_seen, c
 from risk_sac.types import STEP_S, Floats, Vector
 
 PASSIVE = 0.4  # an adversary whose gene `active` is smaller does nothing, unless it is the largest of all
-BEHIND_M, BEHIND_STEPS = 6.0, 8  # who has fallen so far behind the ego, and for so long, will not strike it any more
+BEHIND_M, BEHIND_STEPS = 6.0, 8  # so far and so long behind the ego, it no longer strikes
 STANDING_MPS, STANDING_STEPS = 0.5, 30  # an ego that stands for so long waits for a signal, or for a queue
 
 

@@ -23,7 +23,7 @@ MethodName = Literal[
     "no-adversary",
 ]
 IidName = Literal["iid-undisturbed", "iid-random"]
-"""How the runs of a campaign's i.i.d. phase are made, see `Iid`; nobody posts them as methods."""
+"""How the runs of a campaign's i.i.d. phase are made, see `Iid`; a spec cannot name them."""
 RunMethod = Literal[MethodName, IidName]
 
 

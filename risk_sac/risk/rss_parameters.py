@@ -7,7 +7,7 @@ class RssParameters(NamedTuple):
     """Assumptions of RSS about both parties; the ego responds."""
 
     response_s: float = 0.5  # ρ
-    accel_mps2: float = 1.5  # a_max,accel during the response time; who follows or brakes has no foot on the pedal
+    accel_mps2: float = 1.5  # a_max,accel during the response time; a driver that follows or brakes does not accelerate
     brake_min_mps2: float = 6.0  # b_min: what the responding vehicle can be relied on to do
     brake_max_mps2: float = 6.0  # b_max: the hardest braking of the vehicle ahead that is to be expected
     lateral_accel_mps2: float = 0.5

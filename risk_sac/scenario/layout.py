@@ -104,7 +104,7 @@ def vehicle(
         route=route,
         lane=piece.lane,
         position_m=position_m,
-        speed_mps=min(speed_mps, piece.limit_mps),  # SUMO refuses who would begin faster
+        speed_mps=min(speed_mps, piece.limit_mps),  # SUMO refuses a faster start
         body=body,
     )
 

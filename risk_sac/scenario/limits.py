@@ -37,7 +37,7 @@ class Limits:
     walk_brake_mps2: float
     walk_disc_mps2: float = 1.5  # along and across the heading together
     walk_jerk_mps3: float = 5.0  # from rest to full acceleration in 0.3 s
-    heading_rate_radps: float = 2.0  # of who stands: a right angle in 0.8 s
+    heading_rate_radps: float = 2.0  # standing: a right angle in 0.8 s
 
     @cached_property
     def cornering_mps2(self) -> float:

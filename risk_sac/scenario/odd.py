@@ -23,11 +23,11 @@ PEDESTRIAN_SCALE_M = 11.0
 STANDING_MPS = 0.5  # slower than that, an ego counts as standing,
 STANDING_M = 10.0  # which is worth as much as this gap
 EMERGENCY_BRAKING_MPS2 = 9.0  # of SUMO's default passenger car, on dry asphalt
-RED_LIGHT_SCALE = 0.8  # of the grip, and so 1.25 for who need not brake and about 0.5 for who brakes at leisure
+RED_LIGHT_SCALE = 0.8  # of the grip, and so 1.25 without braking and about 0.5 with gentle braking
 RED_LIGHT_HOLD_S = 1.0
 CARRIAGEWAY_SCALE_M = 2.0  # a car reaches 1.65 m into a road of one lane, and 2.6 m or more into a wider one
 TINY = 1e-6  # in any unit; SUMO refuses a speed of 1e-320
-LEAST_ACCEL_MPS2 = 0.1  # of who can accelerate at all: what is stopped by less is stopped for good
+LEAST_ACCEL_MPS2 = 0.1  # below it an actor that has stopped never starts again
 BRAKING_HOLD_S = 0.5  # braking shorter than that is a correction, not an emergency stop
 
 # What every value of a field must lie in; an ODD outside it describes no road on Earth.
@@ -45,7 +45,7 @@ SENSIBLE: dict[str, Interval] = {
     "dynamic.pedestrian_accel_mps2": Interval(low=-10, high=10),
 }
 
-# A family's default says what is usual; up to here every family supports what is not, for a user who asks for it.
+# Widest values that every family supports if a campaign asks for them; a family's defaults are usual values.
 EXTREME: dict[str, Interval | tuple[str, ...]] = {
     "environment.friction": Interval(low=0.4, high=1.0),  # from worn tyres in heavy rain
     "environment.visibility_m": Interval(low=40, high=2000),

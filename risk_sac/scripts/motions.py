@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from risk_sac.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
 from risk_sac.types import STEP_S
 
-EARLIEST_S = 0.5  # after the release: what comes of a motion within the first second is nobody's failure
+EARLIEST_S = 0.5  # after the release: a contact within the first second counts against neither side
 LATEST_CUE_S = 6.0  # after that
 NEAREST_CUE_S, CUES_S = 0.3, 4.0  # from meeting the ego
 LONGEST_S = 4.0  # of a strike
@@ -26,14 +26,14 @@ OVER_S = 3.0  # after which nothing more comes of a strike
 SAME_WAY_COS = 0.9
 CROSSING_SIN = 0.4
 
-IN_LANE_M = 1.2  # who is nearer to the ego's axis is its leader
+IN_LANE_M = 1.2  # an actor nearer to the ego's axis is its leader
 NEAREST_M, FARTHEST_M = 1.9, 3.1  # from the ego's axis: touching it, and hardly off the middle of the next lane
-FOREMOST_M = 12.0  # along it, from the ego's middle: who is farther back than that strikes its flank
+FOREMOST_M = 12.0  # along it, from the ego's middle: an actor farther back strikes its flank
 BEFORE_M = 5.0  # a leader's middle before the ego's, at least
 FASTER_MPS = 5.0  # than the ego, at most, to take up a place
 CATCHING_UP = 0.5  # 1/s, of the way to that place
 ANSWER = 0.5  # of full drive, for 1 m/s of difference
-LEAST_EFFORT = 0.4  # of who keeps its time
+LEAST_EFFORT = 0.4  # of an actor that is on time
 TURNING = 0.5  # of what is possible, at most
 
 
@@ -104,9 +104,10 @@ def act(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:
 
 
 def cue(genes: Genes, seen: Seen, pedestrian: bool) -> bool:
-    """Whether it is time to strike: for who drives the ego's way at a time of its own, for all others as the ego nears.
+    """Whether it is time to strike.
 
-    Near is 0.3 to 4.3 s from meeting, as both approach along the ego's axis.
+    A vehicle in the ego's direction strikes at a time of its genes, all others as the ego nears: 0.3 to 4.3 s from
+    meeting, as both approach along the ego's axis.
     """
     if not pedestrian and seen.cos > SAME_WAY_COS:
         return seen.time_s >= EARLIEST_S + LATEST_CUE_S * genes.cue

@@ -100,7 +100,7 @@ class VehicleControl:
           room: of the road on both sides of the vehicle.
           along: where it is on the path it takes if it does not steer.
           intended_mps2: acceleration that its driver would choose without a command.
-          others: whom it keeps clear of.
+          others: actors that it keeps clear of.
         """
         if along.path is not self._path:
             if self._path is not None:

@@ -9,7 +9,7 @@ from risk_sac.verdicts.ego_part import RESPONDS_S
 
 # They react to the conflict. A defensive one slows before, which the ego owes only where it could not see.
 REACTING = frozenset({"r157", "fsm", "rss"})
-YIELDS = frozenset({"red_light", "priority", "pedestrian_on_red", "wrong_direction"})  # who breaks one has to yield
+YIELDS = frozenset({"red_light", "priority", "pedestrian_on_red", "wrong_direction"})  # its breaker has to yield
 LATE_S = 0.5  # after which an answer comes later than R157's driver gives it
 HARD = 0.8  # of the braking that car and road allow
 CROSSINGS = ("crossing", "beside_crossing")

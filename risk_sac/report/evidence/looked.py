@@ -135,10 +135,10 @@ def _of_family(family: FamilyName, found: FamilyCoverage) -> Section:
     return Section(f"coverage-{family}", family, blocks)
 
 
-def _parameters(coverage: Coverage, who: str) -> Iterator[Block]:
+def _parameters(coverage: Coverage, phase: str) -> Iterator[Block]:
     numbers = [each for each in coverage.parameters if not each.categorical]
     sorts = [each for each in coverage.parameters if each.categorical]
-    yield f"By the {who}: {coverage.episodes} episodes, as failed / played in each tenth of the range."
+    yield f"By the {phase}: {coverage.episodes} episodes, as failed / played in each tenth of the range."
     heads = ["parameter", "from", "to", *(str(number + 1) for number in range(BINS))]
     rows = [
         [
@@ -150,10 +150,10 @@ def _parameters(coverage: Coverage, who: str) -> Iterator[Block]:
         ]
         for each in numbers
     ]
-    yield Table(f"bins, {who}", heads, rows)
+    yield Table(f"bins, {phase}", heads, rows)
     if sorts:
         kinds = [[each.name, bin_.name, f"{bin_.failed} / {bin_.played}"] for each in sorts for bin_ in each.bins]
-        yield Table(f"categories, {who}", ["parameter", "category", "failed / played"], kinds, left=2)
+        yield Table(f"categories, {phase}", ["parameter", "category", "failed / played"], kinds, left=2)
     failed = sum(each.failed for each in coverage.pairs)
     played = sum(each.played for each in coverage.pairs)
     cells = sum(each.cells for each in coverage.pairs)

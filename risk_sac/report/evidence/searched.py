@@ -131,7 +131,7 @@ def _verdicts(cells: Sequence[Cell]) -> Iterator[Block]:
 def clusters(comparison: Comparison, origin: Origin) -> Section:
     """Writes the section on the kinds of failures, with a picture of each."""
     text = (
-        "Contacts of one kind share who strikes, the type of conflict, from where, how the ego responds, whether it "
+        "Contacts of one kind share the striker, the type of conflict, from where, how the ego responds, whether it "
         "saw the other, and the ground; other violations share the requirement, the ego's manoeuvre and the actor that "
         "is next. Pictured is the one to look at first, from above, 3 s long: the ego is blue, "
         "what strikes it orange, others grey."

@@ -9,7 +9,7 @@ from risk_sac.scenario.odd import field, intersect, paths
 
 PROFILES = {
     "default": "SUMO's driver with a delay and a line of sight",
-    "perfect": "SUMO's driver, who reacts at once and sees everything",
+    "perfect": "SUMO's driver, which reacts at once and sees everything",
     "careful": "the default with the braking of R157's driver on top",
     "defensive": "the default held back by the defensive reference driver",
 }
@@ -56,7 +56,7 @@ def _sight(ego: EgoConfig) -> Iterator[str]:
     degrees = math.degrees(ego.sensor.field_of_view_rad)
     yield f"sees {ego.sensor.range_m:g} m far over {degrees:.0f}°"
     yield "not through vehicles" if ego.sensor.occlusion else "through vehicles too"
-    yield f"reckons for {ego.sensor.memory_s:g} s with whom it has lost from sight"
+    yield f"extrapolates an actor that is out of sight for {ego.sensor.memory_s:g} s"
 
 
 def odd_in_words(family: Family, odd: Odd) -> Iterator[tuple[str, str]]:

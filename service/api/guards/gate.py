@@ -129,14 +129,14 @@ class RateLimit:
         self._window = 0
         self._counts = Counter[tuple[str, ...]]()
 
-    def count(self, *who: str) -> None:
+    def count(self, *caller: str) -> None:
         """Counts a request; refuses it where there are too many."""
         window = int(time.monotonic())
         if window != self._window:
             self._window = window
             self._counts.clear()
-        self._counts[who] += 1
-        if self._counts[who] > self._per_second:
+        self._counts[caller] += 1
+        if self._counts[caller] > self._per_second:
             detail = f"rate is more than {self._per_second} requests per second; wanted fewer: wait 1 s"
             headers = {"Retry-After": "1", "Connection": "close"}  # and what else the connection has queued is dropped
             raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.RATE_LIMITED, detail, headers=headers)
