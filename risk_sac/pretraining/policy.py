@@ -59,7 +59,7 @@ class Stage(NamedTuple):
 
 # Choice: any failure is learnt first, before sound egos; then those that count for the headline, which need weak egos.
 # The second alone gave .12 failures per episode after 3,000 episodes instead of .29, and .03 instead of .04 that count.
-STAGES = (
+STAGES: tuple[Stage, ...] = (
     Stage(0.0, 6000, 1.0, RewardConfig()),
     Stage(0.25, 2000, 0.3, RewardConfig(unpreventable=0.25, unavoidable=0.1, minor=0.3)),
 )

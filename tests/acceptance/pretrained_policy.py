@@ -7,7 +7,7 @@ turn, and for any failure.
 """
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from risk_sac.config import SHIPPED, EgoConfig, RewardConfig
 from risk_sac.egos.registry import pinned
@@ -24,12 +24,14 @@ def ego_of(name: str) -> EgoConfig:
     return pinned(EgoConfig() if name == "default" else EgoConfig(driver=driver, defects=tuple(defects)))
 
 
-def episodes(name: str, layers: Layers | None, goals: int, options: argparse.Namespace) -> Iterator[PolicyEpisode]:
-    """Plays the episodes of an ego; None as layers stands for random actions."""
-    for turn in range(options.episodes // EPISODES):
-        asked = tuple((EPISODES * turn + k) % (goals + 1) for k in range(EPISODES))
+def episodes(
+    name: str, layers: Layers | None, asked: Sequence[int], options: argparse.Namespace
+) -> Iterator[PolicyEpisode]:
+    """Plays an episode per goal before an ego, whole turns only; None as layers stands for random actions."""
+    for turn in range(len(asked) // EPISODES):
+        goals = tuple(asked[EPISODES * turn : EPISODES * (turn + 1)])
         yield from play_turn(
-            Turn(options.family, ego_of(name), name, (options.seed, turn), asked, layers, RewardConfig())
+            Turn(options.family, ego_of(name), name, (options.seed, turn), goals, layers, RewardConfig())
         )
 
 
@@ -44,11 +46,12 @@ def main() -> None:
     pretrained = shipped_policy(options.family)
     if pretrained is None:
         parser.error(f"--family: {options.family} has no shipped policy")
+    asked = [k % (len(pretrained.goals) + 1) for k in range(options.episodes)]
     layers = [layer[0] if layer.shape[1] > 1 else layer[0, 0] for layer in pretrained.policy]
     print("| ego | driven by | failures | distinct | candidates, distinct | steps |\n|---|---|---|---|---|---|")
     for name in options.egos:
         for driver, network in (("policy", layers), ("random", None)):
-            played = list(episodes(name, network, len(pretrained.goals), options))
+            played = list(episodes(name, network, asked, options))
             failed = [each for each in played if each.kind]
             kinds, candidates = {each.kind for each in failed}, {each.kind for each in failed if each.candidate}
             steps = sum(each.steps for each in played)
