@@ -50,7 +50,7 @@ def served_by_cpp(folder: Path, **told: float) -> Iterator[str]:
 
 
 class Shadow:
-    """Keeps its lane, at the speeds that another driver drove at; it looks at nobody and hardly thinks."""
+    """Keeps its lane, at the speeds that another driver drove at; it ignores all actors and hardly computes."""
 
     version = "1"
     response_time_s = 1.0

@@ -1,4 +1,4 @@
-"""Maps of a town that does not exist, in the formats that real ones come in; and maps that nobody can drive on."""
+"""Maps of a town that does not exist, in the formats that real ones come in; and maps without a drivable road."""
 
 import math
 import re
@@ -79,7 +79,7 @@ def _way(id_: int, refs: list[int], tags: dict[str, str]) -> str:
 
 
 def turned(net: str, angle_rad: float) -> str:
-    """A net as it is, seen by somebody who has turned."""
+    """Rotates a net."""
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)
 
     def point(x: str, y: str) -> tuple[float, float]:

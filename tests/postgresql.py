@@ -43,7 +43,7 @@ class PostgreSql:
         raise TimeoutError("postgres did not answer")
 
     def stop(self) -> None:
-        """Stop it at once, whoever is connected."""
+        """Stops it at once, open connections included."""
         self._process.send_signal(signal.SIGINT)
         self._process.wait(30)
 
@@ -68,7 +68,7 @@ def binaries() -> Path | None:
 
 @contextmanager
 def running(bin_: Path) -> Iterator[PostgreSql]:
-    """Start a server; it refuses to run as root, who therefore lends it another user.
+    """Starts a server; as root under another user, since it refuses to run as root.
 
     Its folder is none of pytest's, which are closed to other users.
     """

@@ -33,7 +33,7 @@ FRUGAL = {
 }
 
 
-# Of a head: nobody looks at its cluster, or makes it larger.
+# Of a head: a cluster without dashboard and autoscaler.
 HEAD_ALONE = ("--include-dashboard=false", "--no-monitor")
 
 
@@ -48,7 +48,7 @@ class Cluster:
     """Nodes that share this machine; the first is the head.
 
     Attributes:
-      environment: what those who use it need.
+      environment: variables that its users need.
       nodes: what was started for each node, by its number.
     """
 
@@ -165,7 +165,7 @@ def free_port() -> int:
 
 @contextlib.contextmanager
 def running(folder: Path, nodes: int = 1, cpus: int = 2, **environment: str) -> Iterator[Cluster]:
-    """A cluster, and the environment of those who use it as this process's own."""
+    """Starts a cluster, with its users' environment in this process."""
     cluster = Cluster(folder, cpus, **environment)
     before = dict(os.environ)
     try:

@@ -36,7 +36,7 @@ class Service:
             "RISK_SAC_PORT": str(self.port),
             "RISK_SAC_MAX_WORKERS": "2",
             "RISK_SAC_WORKER_MODULE": worker_module,
-            "RISK_SAC_REPLAYS": "0",  # they would be most of a test's time; who tests them says otherwise
+            "RISK_SAC_REPLAYS": "0",  # they would be most of a test's time; tests of them override it
             **{f"RISK_SAC_{name.upper()}": str(value) for name, value in settings.items()},
             **environment,
         }

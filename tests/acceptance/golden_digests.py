@@ -68,7 +68,7 @@ def read() -> list[dict[str, Any]]:
 
 
 def recorded(wanted: dict[str, str]) -> dict[str, str] | None:
-    """Digests by family and method, if somebody recorded them where this fingerprint was found."""
+    """Digests by family and method that were recorded with this fingerprint; None without any."""
     return next((one["digests"] for one in read() if one["fingerprint"] == wanted), None)
 
 

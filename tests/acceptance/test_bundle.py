@@ -224,7 +224,7 @@ def test_a_failure_that_does_not_repeat_gets_no_bundle(
 
 @pytest.fixture(scope="module")
 def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A bundle of a contact on somebody's map, whose library of places is gone."""
+    """A bundle of a contact on a user's map, whose library of places is gone."""
     folder = tmp_path_factory.mktemp("placed")
     net = ["--network", str(NET), "--pattern", "junction", "--place", "from_west"]
     with pytest.MonkeyPatch.context() as patch:
@@ -251,7 +251,7 @@ def test_a_failure_on_a_map_is_played_again_where_nobody_has_the_map(placed: Pat
 
 
 def repack(arrays: Arrays, net: bytes) -> None:
-    """Another net under a name that has its digest, as somebody would who wants it to be loaded."""
+    """Another net under a name that has its digest, as an attacker would forge it."""
     text = arrays[carried.PLACE].tobytes()
     arrays[carried.NET] = np.frombuffer(net, dtype=np.uint8)
     digest = hashlib.sha256(text + b"\0" + net).hexdigest()[: library.DIGITS]

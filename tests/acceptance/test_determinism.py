@@ -106,7 +106,7 @@ def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
     assert len(before.records) == stop_after
     resumed, after = run(tmp_path)
     assert resumed.finished
-    # The checkpoint's episodes are told again, since whoever listened before may have missed the last of them.
+    # The checkpoint's episodes are told again, since a former listener may have missed the last of them.
     assert records_to_json(after.records) == records_to_json(whole.records)
     assert after.series == whole.series
     assert records_to_json(before.records) == records_to_json(whole.records[:stop_after])

@@ -180,7 +180,7 @@ def test_what_fails_is_named_and_the_others_go_on(
     (tmp_path / "spec.yaml").write_text(SPEC)
     runs = tmp_path / "out" / "runs"
     (runs / "low-no-adversary-0").mkdir(parents=True)
-    (runs / "low-no-adversary-0" / "checkpoint").write_bytes(b"of somebody else")
+    (runs / "low-no-adversary-0" / "checkpoint").write_bytes(b"of another program")
     (runs / "low-no-adversary-1").write_text("in the way")
     methods = ["--methods", "random", "no-adversary", "--seeds", "2", "--episodes", "2"]
     assert cli.main(["evaluate", *FLAGS, *methods]) == 1

@@ -120,7 +120,7 @@ def test_where_the_ego_is_gone_whatever_plays_it_says_which(
 ) -> None:
     failure, table = far
     address = next(line for line in table.splitlines() if line.startswith("address"))
-    register(monkeypatch, tmp_path, table.replace(address, 'address = "127.0.0.1:9"'))  # where nobody listens
+    register(monkeypatch, tmp_path, table.replace(address, 'address = "127.0.0.1:9"'))  # a closed port
     (failure.run / "verified.json").unlink(missing_ok=True)
     index = read_bundle(failure.bundle).manifest.episode.index
     for command in (

@@ -6,7 +6,7 @@ that. Ratios are of processor time, loopback of real time; of the example in C++
 step takes more than one with `idm-aeb` in our process.
 
 `shadow` hardly thinks, and drives as fast as SUMO's driver did in the same episode, so that both have as much going on
-around them. A step that ends in a contact is left out: to judge it takes milliseconds, and who drives badly has more.
+around them. A step that ends in a contact is left out: to judge it takes milliseconds, and a bad driver has more.
 """
 
 from collections.abc import Iterator

@@ -43,7 +43,7 @@ def uploaded(context, value):
 
 
 class Ended:
-    """The id of a campaign that has ended, as long as nobody deletes it."""
+    """The id of a campaign that has ended, until it is deleted."""
 
     def __init__(self, client):
         self._client = client

@@ -1,6 +1,6 @@
 """Whole answers of the main routes about known campaigns: status, headers and body.
 
-The recorded answers are `golden/*.json`. After a change of an answer on purpose record it anew and review the diff:
+The recorded answers are `golden/*.json`. After a change of an answer on purpose record it again and review the diff:
 
     RISK_SAC_RECORD=1 python -m pytest -n 0 tests/contract/test_golden_answers.py
 

@@ -1,4 +1,4 @@
-"""Who may do what, on real servers: every route against every way of not being allowed."""
+"""Access rights on real servers: every route against every missing right."""
 
 import base64
 import itertools
@@ -136,7 +136,7 @@ def upload(service):
 
 
 def ask(world, method, path, key=None, known=True, **headers):
-    """What a route answers whoever holds the key; of a stream, its beginning."""
+    """Returns a route's answer to the holder of a key; of a stream, its beginning."""
     ids = (world.campaign, world.network) if known else (UNKNOWN, UNKNOWN)
     parts = {"campaign_id": ids[0], "network_id": ids[1], "failure_id": world.failure}
     parts |= {"regression_id": f"{ids[0]}-{'0' * 16}", "twin": "idle", "run_id": world.run}

@@ -36,7 +36,7 @@ def live(spec):
     learner.update()
     checkpoint.save(Path(sys.argv[1]), {{"agent": learner.state()}}, "digest")
 
-def memory(name):  # not getrusage: its maximum is inherited from whoever started this process
+def memory(name):  # not getrusage: its maximum is inherited from the parent process
     (line,) = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith(name)]
     return int(line.split()[1]) * 1024
 

@@ -1,4 +1,4 @@
-"""Clients that keep connections, bodies and answers waiting keep nobody else out."""
+"""Slow connections, bodies and readers do not lock out other clients."""
 
 import contextlib
 import json

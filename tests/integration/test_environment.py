@@ -29,7 +29,7 @@ each_ego = pytest.mark.parametrize("ego", EGOS, ids=lambda ego: ego.get("driver"
 def play(
     family: str, environment: Mapping[str, Any], ego: Mapping[str, Any], **changes: float
 ) -> list[tuple[Frame, np.ndarray]]:
-    """Frames, and who is seen in each, of an episode in which all adversaries brake."""
+    """Frames, and the actors seen in each, of an episode in which all adversaries brake."""
     spec = RunSpec.model_validate(
         {"family": family, "method": "random", "seed": 0, "ego": ego, "odd": {"environment": environment}}
     )
@@ -117,7 +117,7 @@ REFUSED = ("scenery.lanes", "scenery.speed_limit_mps", "dynamic.actor_kinds")
 
 
 def episodes(odd: Mapping[str, Any]) -> bytes:
-    """Where all were and whom the ego saw, with the same seeds, actions and points of the unit cube."""
+    """Positions of all and actors that the ego saw, with the same seeds, actions and points of the unit cube."""
     ego = {"sensor": {"occlusion": False}}
     spec = RunSpec.model_validate({"family": "mixed", "method": "random", "seed": 0, "odd": odd, "ego": ego})
     played = b""

@@ -1,4 +1,4 @@
-"""How the server speaks HTTP to browsers, curl, and those who leave."""
+"""HTTP to browsers, curl, and clients that disconnect."""
 
 import gzip
 import json

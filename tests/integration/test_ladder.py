@@ -20,7 +20,7 @@ RUNGS = {
     "reaction 0.1 s, sees all": EgoConfig(profile="perfect"),
 }
 BESIDE = {"reaction 0.5 s, sees all": EgoConfig(sensor=None), "careful": EgoConfig(profile="careful")}
-PHASES = 10  # of the ego's reaction in which attacks begin: who is about to decide is lucky
+PHASES = 10  # of the ego's reaction in which attacks begin: an ego about to decide is lucky
 
 
 def scenes(family: FamilyName, space_middle: Scene) -> Iterator[Scene]:
@@ -52,7 +52,7 @@ def attack(family: FamilyName, env: RiskSacEnv, step: int) -> np.ndarray:
 
 
 def touched(family: FamilyName, ego: EgoConfig) -> tuple[int, int]:
-    """Episodes in which the ego ran into somebody, and how many there were."""
+    """Episodes in which the ego ran into an actor, and how many there were."""
     spec = RunSpec(family=family, method="random", seed=0, ego=ego)
     problem = Problem.from_spec(spec)
     hits = count = 0

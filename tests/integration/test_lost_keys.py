@@ -1,4 +1,4 @@
-"""A service whose file of keys is lost: whatever is restarted, nobody gets in until an administrator says otherwise."""
+"""A service whose file of keys is lost stays closed until an administrator opens it."""
 
 import httpx
 import pytest

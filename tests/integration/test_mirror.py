@@ -1,4 +1,4 @@
-"""The ego stops for whom it sees, whichever side they come from.
+"""The ego stops for what it sees, on either side.
 
 Each scene is driven twice, the second time mirrored about the ego's path. A test of one side is no test: SUMO's own
 drivers stop for a pedestrian from the left kerb and drive over the one from the right.
@@ -44,7 +44,7 @@ LOW, MIXED, DENSE = middle("low"), middle("mixed"), middle("dense")
 
 @dataclass(frozen=True)
 class Place:
-    """A stretch of the ego's path, and where on it somebody gets in its way."""
+    """A stretch of the ego's path, and where on it an actor gets in its way."""
 
     layout: Layout
     route: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""What those who run the service see of it: health, metrics, and its log."""
+"""What operators see of the service: health, metrics and its log."""
 
 import json
 

@@ -136,7 +136,7 @@ def avoids(sim: SumoSimulation, struck: Struck, driver: str) -> bool:
     )
     lead_m = 0.0
     for step, speed in enumerate(driven[1:], start=1):
-        # Its path is kept, not its lateral speed: who is slower moves aside later.
+        # Its path is kept, not its lateral speed: a slower actor moves aside later.
         to = np.interp((way_m, way_m + speed * STEP_S), recorded_m, aside_m)
         way_m += speed * STEP_S
         if step <= last:

@@ -1,4 +1,4 @@
-"""Who makes which episode of a run: the method's own searcher or its guide, and when a search is over."""
+"""Turns of a method's own searcher and its guide, and the end of a search."""
 
 from pathlib import Path
 
@@ -52,7 +52,7 @@ def searchers(method: RunMethod, warm_start: WarmStartConfig, family: FamilyName
 
 
 def makers(subject: Searchers, outcomes: list[Outcome]) -> list[type]:
-    """Who acts in each episode, the next one included."""
+    """The searcher of each episode, the next one included."""
     found = []
     for index, outcome in enumerate(outcomes):
         found.append(type(subject.next(learning=True).actor))

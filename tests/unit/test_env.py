@@ -164,7 +164,7 @@ def refusal(env: RiskSacEnv, scene: Scene) -> str | None:
     return None
 
 
-# In the second and a half before the release the ego brakes for whom it sees: what is left then counts.
+# In the second and a half before the release the ego brakes for actors that it sees: the conflict left then counts.
 STANDING = {"ego_speed_mps": 0.0, "lead_speed_mps": 0.0}
 TOWARDS_STANDING = {"ego_speed_mps": 16.0, "lead_speed_mps": 0.0}
 LEADERS: list[tuple[dict[str, float], str | None]] = [

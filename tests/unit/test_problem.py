@@ -143,7 +143,7 @@ def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_
     assert problem().rss.response_s == 0.5
     wanted_s = [wanted_ttc_s(each) for each in posed]
     assert wanted_s == sorted(wanted_s)
-    assert wanted_s[0] == wanted_ttc_s(problem()) == 1.5  # who says that it is quick gains nothing by it
+    assert wanted_s[0] == wanted_ttc_s(problem()) == 1.5  # claiming a shorter response time gives no advantage
     assert wanted_s[-1] == 6.0
 
 

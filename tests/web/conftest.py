@@ -99,7 +99,7 @@ def network(service: Service) -> str:
 def new_page(browser: "Browser", service: Service) -> Iterator[Callable[..., "Page"]]:
     """Opens pages, in contexts of their own, and fails where one of them said or asked for what it should not.
 
-    That is an error on the console, one that nobody caught, a violation of the content-security policy (which the
+    That is an error on the console, an uncaught one, a violation of the content-security policy (which the
     console tells), and any request that leaves the loopback. Tests that break something on purpose name what the
     console may say by `allowed`.
     """

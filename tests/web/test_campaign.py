@@ -136,7 +136,7 @@ def test_a_drag_zooms_all_curves_and_a_double_click_shows_all_again(
 ) -> None:
     page = page_at(f"campaigns/{campaign}")
     area = plot(page, "Sliding ECR").locator(".u-over")
-    page.wait_for_load_state("networkidle")  # what comes last draws the plots anew
+    page.wait_for_load_state("networkidle")  # the last answer redraws the plots
     area.scroll_into_view_if_needed()
     box = area.bounding_box()
     page.mouse.move(box["x"] + 0.25 * box["width"], box["y"] + 40)

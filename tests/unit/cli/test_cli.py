@@ -173,7 +173,7 @@ def test_folder_of_another_run_is_refused_and_kept(folder: Path, capsys: pytest.
 
 
 def test_checkpoint_without_results_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "checkpoint").write_bytes(b"of somebody else")
+    (tmp_path / "checkpoint").write_bytes(b"of another program")
     with pytest.raises(ConfigError, match="holds a checkpoint but no results"):
         run(SPEC, tmp_path, ignore)
 

@@ -258,7 +258,7 @@ def test_each_defect_composes_with_a_shipped_ego(name: str) -> None:
 
 def test_a_defect_is_reached_when_it_first_changes_a_command() -> None:
     ego = Planted(IdmAeb, planted(EgoConfig(driver="idm-aeb", defects=("short-sight",))))
-    for _ in range(2):  # and anew in each episode
+    for _ in range(2):  # and again in each episode
         ego.reset(Episode(seed=0, net="", route=(), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=0.1))
         assert ego.reached_s is None
         for k in range(5):

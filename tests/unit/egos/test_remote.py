@@ -237,7 +237,7 @@ def test_thirty_sessions_are_served_at_a_time_and_end_with_their_streams() -> No
             assert [ego.act(perceived(0.1 * step)).accel_mps2 for ego in egos] == [step + 1.0] * 30
         for ego in egos[:20]:
             ego.close()
-        for ego in egos[20:]:  # as if the process were gone: nobody closes the session
+        for ego in egos[20:]:  # as if the process were gone: the session stays open
             ego._channel.close()
         for _ in egos:
             assert closed.acquire(timeout=PATIENT_S)

@@ -20,7 +20,7 @@ JUDGED = judgement(
 
 
 def synthetic_contact(judged: Judgement | None = JUDGED) -> RecordedFailure:
-    """The ego drives east at 10 m/s into a pedestrian who walks north; the contact is 1.95 s after the release."""
+    """The ego drives east at 10 m/s into a pedestrian that walks north; the contact is 1.95 s after the release."""
     space: SceneSpace = FAMILIES["mixed"].space
     hit = collision(
         time_s=1.95,

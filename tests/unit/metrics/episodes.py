@@ -113,7 +113,7 @@ JUDGED = [
         ),
     ),
     episode(Outcome.FAILURE, 20, hit=contact(time_s=2.0, other_id="adv_3")),  # from before contacts were judged
-    # Its striker left the grip of its tyres: an artefact, which nobody judged and whose grade would not count.
+    # Its striker left the grip of its tyres: an artefact, which is not judged and whose grade would not count.
     episode(
         Outcome.DEGENERATE, 30, hit=contact(verdicts={"inside_grip": False}, judgement=judgement(unresponsive=True))
     ),

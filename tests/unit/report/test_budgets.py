@@ -13,7 +13,7 @@ from risk_sac.report.runs import Limit, cpu_s, episodes, found_within
 
 @pytest.fixture
 def run(spec: CampaignSpec, finished: Callable[..., FinishedRun]) -> FinishedRun:
-    """F is a failure that nobody would have prevented, f one that the careful driver would have, r a refused scene."""
+    """F: a failure that no driver prevents, f: one that the careful driver prevents, r: a refused scene."""
     return replace(finished(spec.runs()[0], ".FrfFf", "f"), episode_cpu_s=(2.0, 4.0, 4.5, 9.0, 10.0, 12.0, 20.0))
 
 

@@ -23,7 +23,7 @@ def gauge() -> Gauge:
 
 
 def behind(gap_m: float) -> Frame:
-    """The ego at 10 m/s, and somebody who stands ahead of it."""
+    """The ego at 10 m/s, and an actor that stands ahead of it."""
     return frame_of(x_m=[0.0, gap_m + 4.6], speed_mps=[10.0, 0.0])
 
 

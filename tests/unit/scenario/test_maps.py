@@ -352,7 +352,7 @@ def test_nobody_is_placed_before_a_signal_that_may_be_red_until_the_end(
 
 
 def test_nobody_is_led_where_a_signal_stays_red(tmp_path: Path) -> None:
-    """As where somebody is to switch between programmes, and SUMO by itself runs the last for ever."""
+    """A signal with several programmes, of which SUMO runs the last."""
     shipped_net = (NETS / "dense" / "dense.net.xml").read_text()
     stays = '<tlLogic id="centre" type="static" programID="1"><phase duration="1000" state="{}"/></tlLogic><junction'
     turned = tmp_path / "map.net.xml"
@@ -445,17 +445,17 @@ def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radiu
         chord = LineString([way.interpolate(front_m), way.interpolate(front_m - 4.6)])
         car = chord.buffer(1.85 / 2, cap_style="flat")
         assert min(car.distance(Point(point)) for point in waiting) > 0.25 + 0.1  # half a person, and a little
-    assert (walk.x_m == pytest.approx(-0.05 * side)) == (radius_m == 12.0)  # nobody is sent back without need
+    assert (walk.x_m == pytest.approx(-0.05 * side)) == (radius_m == 12.0)  # none is sent back without need
 
 
 def test_places_that_nobody_names_go_when_they_are_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     named, new, old = (library.keep(shipped(name), b"<net/>") for name in ("low", "mixed", "dense"))
-    (tmp_path / "of somebody else").mkdir()
-    for path in (named, old, "of somebody else"):
+    (tmp_path / "of another program").mkdir()
+    for path in (named, old, "of another program"):
         os.utime(tmp_path / path, (0, 0))
     assert library.prune(tmp_path, {named}, 3600.0, 0.0) == [old]
-    assert {path.name for path in tmp_path.iterdir()} == {named, new, "of somebody else"}
+    assert {path.name for path in tmp_path.iterdir()} == {named, new, "of another program"}
     os.utime(tmp_path / new, (0, 0))
     assert library.keep(shipped("mixed"), b"<net/>") == new  # wanted again
     assert library.prune(tmp_path, (), 3600.0, 0.0) == [named]

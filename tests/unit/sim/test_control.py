@@ -108,7 +108,7 @@ def test_a_vehicle_keeps_the_friction_circle_every_limit_inside_it_and_its_road(
     assert max(map(abs, offsets)) <= half_m
     begin, end = arc_m(radius)
     if start_mps**2 > limits.cornering_mps2 * radius + 2 * limits.approach_mps2 * (begin - 10):
-        return  # nobody could slow down for the bend in time
+        return  # no braking is hard enough to slow down for the bend in time
     accels = [0.0] + [(b.speed_mps - a.speed_mps) / STEP_S for a, b in pairwise(commands)]
     for step, (before, after) in enumerate(pairwise(commands)):
         across = (after.lateral_mps - before.lateral_mps) / STEP_S

@@ -1,4 +1,4 @@
-"""Whom a driver has to stop for or to follow, by hand, on a straight road along x."""
+"""Actors that a driver stops for or follows, by hand, on a straight road along x."""
 
 import math
 from typing import NamedTuple
@@ -33,14 +33,14 @@ def target(other: Actor, path: Path | None = None, speed_mps: float = SPEED_MPS,
     points, vehicle = (road() if path is None else path), frame.kind == Kind.VEHICLE
     found = targets(points, FRONT_M, offset_m, 0, ACCEL_MPS2, frame.state, vehicle, known).tolist()
     assert [actor for actor, _, _ in found] in ([], [1])
-    return Target(*found[0][1:]) if found else NOBODY
+    return Target(*found[0][1:]) if found else CLEAR
 
 
 def walker(x: float, y: float, vy: float = 0.0) -> Actor:
     return (x, y, math.pi / 2, 0.0, vy, WALKER)
 
 
-NOBODY = Target(math.inf, 0.0)
+CLEAR = Target(math.inf, 0.0)
 
 
 @sides
@@ -49,11 +49,11 @@ NOBODY = Target(math.inf, 0.0)
     [
         (50.0, 0.0, Target(29.75, 0.0)),
         (50.0, CORRIDOR_M + 0.24, Target(29.75, 0.0)),
-        (50.0, CORRIDOR_M + 0.26, NOBODY),
+        (50.0, CORRIDOR_M + 0.26, CLEAR),
         (72.0, 0.0, Target(51.75, 0.0)),
-        (73.5, 0.0, NOBODY),  # speeding up to the limit of 13.89 m/s, it comes 52.6 m far in 4 s
+        (73.5, 0.0, CLEAR),  # speeding up to the limit of 13.89 m/s, it comes 52.6 m far in 4 s
         (20.25, 0.0, Target(0.0, 0.0)),  # at its bumper
-        (19.0, CORRIDOR_M, NOBODY),  # beside it already
+        (19.0, CORRIDOR_M, CLEAR),  # beside it already
     ],
 )
 def test_who_stands_in_the_corridor_is_stopped_for(x: float, aside_m: float, expected: Target, side: int) -> None:
@@ -64,7 +64,7 @@ def test_who_stands_in_the_corridor_is_stopped_for(x: float, aside_m: float, exp
 @sides
 @pytest.mark.parametrize(
     ("enters_s", "expected"),
-    [(0.0, NOBODY), (0.3, Target(29.75, 0.0)), (2.5, Target(29.75, 0.0)), (3.3, Target(29.75, 0.0)), (3.6, NOBODY)],
+    [(0.0, CLEAR), (0.3, Target(29.75, 0.0)), (2.5, Target(29.75, 0.0)), (3.3, Target(29.75, 0.0)), (3.6, CLEAR)],
 )
 def test_who_walks_into_the_corridor_is_stopped_for_if_both_are_there_together(
     enters_s: float, expected: Target, side: int
@@ -77,14 +77,14 @@ def test_who_walks_into_the_corridor_is_stopped_for_if_both_are_there_together(
 def test_a_driver_that_has_stopped_waits_until_the_pedestrian_has_left_its_corridor(side: int) -> None:
     # From the middle it takes 1.1 s, in which the car would be 1.6 m further.
     assert target(walker(21.5, 0.0, side * 1.4), speed_mps=0.0) == pytest.approx(Target(1.25, 0.0))
-    assert target(walker(22.0, 0.0, side * 1.4), speed_mps=0.0) == NOBODY
-    assert target(walker(21.5, side * 1.3, side * 1.4), speed_mps=0.0) == NOBODY
+    assert target(walker(22.0, 0.0, side * 1.4), speed_mps=0.0) == CLEAR
+    assert target(walker(21.5, side * 1.3, side * 1.4), speed_mps=0.0) == CLEAR
 
 
 @sides
 @pytest.mark.parametrize("step_m", [0.0, 0.01, -0.01, 0.35, -0.35])
 def test_who_walks_in_where_one_lane_leads_to_another_is_seen_from_either_side(step_m: float, side: int) -> None:
-    """The second lane begins a little beside the first: a path across the road, to whoever is near it."""
+    """The second lane begins a little beside the first: a path across the road, for an actor near it."""
     before, behind = [(0.0, 0.0), (50.0, 0.0)], [(50.0, step_m), (300.0, step_m)]
     path = path_along([np.array(before), np.array(behind)], [13.9, 13.9])
     for x in np.arange(48.0, 52.0, 0.25):
@@ -96,7 +96,7 @@ def test_who_walks_in_where_one_lane_leads_to_another_is_seen_from_either_side(s
 
 @sides
 def test_who_walks_in_between_the_way_there_and_the_way_back_is_seen(side: int) -> None:
-    """Round a roundabout and back, 3.5 m beside: all who are there are nearer to the way back."""
+    """Round a roundabout and back, 3.5 m beside: all actors there are nearer to the way back."""
     angles = np.linspace(-0.5, 0.5, 21)[1:-1] * 1.9 * math.pi
     there, back = [(0.0, 0.0), (60.0, 0.0)], [(60.0, side * 3.5), (0.0, side * 3.5)]
     ring = [(75.0 + 14.0 * -math.cos(a), side * (1.75 + 14.0 * math.sin(a))) for a in angles]
@@ -108,7 +108,7 @@ def test_who_walks_in_between_the_way_there_and_the_way_back_is_seen(side: int) 
 @sides
 def test_the_corridor_is_where_the_vehicle_is_in_its_lane(side: int) -> None:
     beside = walker(50.0, side * 2.0)
-    assert target(beside) == NOBODY
+    assert target(beside) == CLEAR
     assert target(beside, offset_m=side * 0.5) == pytest.approx(Target(29.75, 0.0))
 
 
@@ -117,16 +117,16 @@ def test_a_leader_is_followed() -> None:
 
 
 def test_a_leader_that_is_not_caught_up_with_needs_no_telling() -> None:
-    assert target((52.3, 0.0, 0.0, 13.0, 0.0, CAR)) == NOBODY
+    assert target((52.3, 0.0, 0.0, 13.0, 0.0, CAR)) == CLEAR
 
 
 def test_who_comes_from_behind_keeps_the_distance_itself() -> None:
-    assert target((EGO[0] - 7.0, 0.0, 0.0, 20.0, 0.0, CAR)) == NOBODY
+    assert target((EGO[0] - 7.0, 0.0, 0.0, 20.0, 0.0, CAR)) == CLEAR
 
 
 @sides
 @pytest.mark.parametrize(
-    ("sideways_mps", "expected"), [(0.0, NOBODY), (0.5, NOBODY), (1.2, Target(5.0, 8.0))], ids=["keeps", "drifts", "in"]
+    ("sideways_mps", "expected"), [(0.0, CLEAR), (0.5, CLEAR), (1.2, Target(5.0, 8.0))], ids=["keeps", "drifts", "in"]
 )
 def test_who_cuts_in_within_two_seconds_is_followed(sideways_mps: float, expected: Target, side: int) -> None:
     # In the corridor after 0.9 s at 1.2 m/s, and not in 2 s at 0.5 m/s.
@@ -136,7 +136,7 @@ def test_who_cuts_in_within_two_seconds_is_followed(sideways_mps: float, expecte
 @sides
 @pytest.mark.parametrize(
     ("enters_s", "expected"),
-    [(1.0, Target(19.075, 0.0)), (1.1, Target(19.075, 0.0)), (1.3, NOBODY)],
+    [(1.0, Target(19.075, 0.0)), (1.1, Target(19.075, 0.0)), (1.3, CLEAR)],
 )
 def test_crossing_traffic_is_stopped_for_once_it_would_have_to_brake_hard(
     enters_s: float, expected: Target, side: int
@@ -153,7 +153,7 @@ def test_a_car_that_stands_across_or_tilted_is_stopped_for(side: int) -> None:
     reach_m = 2.3 * math.cos(tilt) + WIDTH_M / 2 * math.sin(tilt)
     assert target((40.0, side * 2.0, side * tilt, 0.0, 0.0, CAR)) == pytest.approx(Target(20.0 - reach_m, 0.0))
     aside_m = CORRIDOR_M + 2.3 * math.sin(tilt) + WIDTH_M / 2 * math.cos(tilt)
-    assert target((40.0, side * (aside_m + 0.01), side * tilt, 0.0, 0.0, CAR)) == NOBODY
+    assert target((40.0, side * (aside_m + 0.01), side * tilt, 0.0, 0.0, CAR)) == CLEAR
 
 
 def test_nobody_but_the_candidates_counts() -> None:
@@ -237,5 +237,5 @@ def test_whom_it_passes_at_its_speed_it_may_meet_at_that_of_a_bend() -> None:
         for limit in (np.full_like(x, 13.89), np.where(x < 30.0, 13.89, 4.0))
     )
     late = walker(40.0, -6.0, 1.4)  # in the corridor after 3.2 s: at 13 m/s the ego is past, at 4 m/s it is there
-    assert target(late, straight, speed_mps=13.0) == NOBODY
+    assert target(late, straight, speed_mps=13.0) == CLEAR
     assert target(late, slow, speed_mps=13.0).gap_m == pytest.approx(19.75)

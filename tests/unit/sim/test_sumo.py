@@ -194,7 +194,7 @@ def test_what_sumo_refuses_is_reported(sim: SumoSimulation) -> None:
 def test_each_frame_is_perceived_once_and_before_the_next_step(
     sim: SumoSimulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whom the ego does not know of is ignored by SUMO's models as soon as the frame is there."""
+    """SUMO's models ignore actors unknown to the ego from the same frame on."""
     perceived: list[Frame] = []
     ignored: list[list[set[str]]] = []
     tell_sumo = libsumo.vehicle.setParameter

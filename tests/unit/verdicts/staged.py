@@ -38,7 +38,7 @@ Motion = Callable[[float], tuple[float, float, float]]  # time from the release 
 def straight(
     x: float, y: float, heading: float, speed: float, *changes: tuple[float, float], start_s: float = -1.5
 ) -> Motion:
-    """Along a line, at (x, y) at `start_s`; each change is (from when, acceleration), and nobody drives backwards."""
+    """Along a line, at (x, y) at `start_s`; each change is (from when, acceleration), and speed never falls below 0."""
     pieces = [(start_s, 0.0, speed, 0.0)]  # from when, metres gone, speed, acceleration
     for since, accel in changes:
         pieces.append((since, *_gone(pieces[-1], since), accel))
@@ -51,7 +51,7 @@ def straight(
 
 
 def _gone(piece: tuple[float, float, float, float], t: float) -> tuple[float, float]:
-    """Metres gone and speed at `t`; who brakes comes to a stand."""
+    """Metres gone and speed at `t`; braking ends at a stand."""
     since, gone, speed, accel = piece
     after = t - since
     if accel < 0.0:

@@ -72,7 +72,7 @@ def test_a_signal_that_gives_it_priority_counts_as_an_empty_crossing() -> None:
 
 @SIDES
 def test_it_sees_the_whole_crossing_before_it_passes_a_vehicle_that_stops_there(side: int) -> None:
-    # Two lanes away it hides places from which nobody could come before the ego has passed.
+    # Two lanes away it hides places too far away to matter before the ego has passed.
     drives, brakes = ((84.0, -2 * LANE_M + 0.8, 0.0, 9.0, CAR) for _ in range(2))
     assert braking(drives, ego=14.0, side=side) == 0.0
     assert braking(brakes, ego=14.0, side=side, accel_mps2=[0.0, -4.0]) == pytest.approx(3.4)

@@ -123,7 +123,7 @@ def test_who_has_passed_by_then_has_not_avoided() -> None:
 
 
 def test_who_stands_before_the_ego_comes_past_has_avoided() -> None:
-    # The ego brakes with 9 m/s² down to 2 m/s and rolls on into who stands 15.5 m ahead. The bound brakes with 8 m/s²
+    # The ego brakes with 9 m/s² down to 2 m/s and rolls on into what stands 15.5 m ahead. The bound brakes with 8 m/s²
     # and stands after 1.88 s and 14.06 m, where the ego is at 13.1 m, and not yet at 15.5 m.
     ego = straight(-1.5 * 15.0, 0.0, 0.0, 15.0, (0.0, -9.0), (13.0 / 9.0, 0.0))
     walker = straight(CAR_M[0] / 2 + 15.5 + 0.25, 0.0, 0.0, 0.0)

@@ -13,7 +13,7 @@ from service.api.context import CALLER, Caller
 from service.errors import StorageError
 from service.keys.file import Scope
 
-ADMIN = "admin"  # a caller who sees all projects
+ADMIN = "admin"  # a caller that sees all projects
 
 
 class Service:

@@ -1,4 +1,4 @@
-"""Wrong settings, as whoever starts one of the service's programs sees them."""
+"""Wrong settings, as an operator of the service's programs sees them."""
 
 import os
 import subprocess

@@ -92,7 +92,7 @@ def test_many_writers_and_readers_agree_on_one_order(store, ledger, episode, don
         ledger.end_run(number, State.SUCCEEDED, result=done)
 
     def read(limit):
-        """What somebody is told who always wants to know what is new."""
+        """What a client is told that always asks for news."""
         told, ended = [], False
         while not ended and not failed.is_set():
             told += store.events(campaign.id, after=len(told), limit=limit).items
