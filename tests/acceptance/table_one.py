@@ -2,11 +2,13 @@
 
     python -m tests.acceptance.table_one OUT [--families NAME ...] [--seeds N] [--episodes N] [--uniform N] [--jobs N]
 
-plays what OUT lacks, seeds outermost, and rewrites OUT/runs.csv and OUT/table.md after each run. A frozen policy is
-played in scenes of its method's own sampler and in uniformly drawn ones, which are the same for all methods.
+plays what OUT lacks, seeds outermost, and rewrites OUT/runs.csv after each run; at the end it writes OUT/table.md and
+OUT/curves.svg. A frozen policy is played in scenes of its method's own sampler and in uniformly drawn ones, which are
+the same for all methods.
 """
 
 import argparse
+import json
 from collections.abc import Iterator, Sequence
 from contextlib import closing
 from functools import partial
@@ -15,14 +17,17 @@ from pathlib import Path
 from statistics import mean, stdev
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from risk_sac.agents.decisions import Held
+from risk_sac.canvas import canvas, picture
 from risk_sac.config import SHIPPED, Budget, RunSpec
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.execution.runs import run
 from risk_sac.failures.collect import policy_of
 from risk_sac.frozen_policy import FrozenPolicy
+from risk_sac.report.drawing import LOOKS, STYLE
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
 from tests.acceptance.side_by_side import Row, rows_of
 
@@ -30,6 +35,7 @@ METHODS = ("risk-sac", "risk-sac-only-rper", "risk-sac-only-rs", "sac-lag", "sac
 FIRST_SEED = 701
 OWN = 100  # episodes of the frozen policy in its method's own scenes
 WINDOW = 100  # episodes
+ROW = "row.json"  # in the folder of a run
 UNIFORM_SEED = 7  # of the uniformly drawn scenes
 # ECR of the paper's Table I in low, mixed and dense; it has no DDPG.
 PAPER = {
@@ -44,6 +50,9 @@ PAPER = {
 def play(out: Path, episodes: int, uniform: int, spec: RunSpec) -> Row:
     """Plays a run unless OUT has it; returns its figures."""
     folder = out / spec.id
+    if (folder / ROW).exists():
+        known: Row = json.loads((folder / ROW).read_text())
+        return known
     done = (folder / RESULTS).exists() and read_results(folder).finished
     results = read_results(folder) if done else run(spec, folder, lambda episodes, metrics: None)
     frozen, policy = results.evaluation, policy_of(folder, results)
@@ -52,7 +61,7 @@ def play(out: Path, episodes: int, uniform: int, spec: RunSpec) -> Row:
     searched = [each for each in records_from_lines((folder / EPISODES).read_bytes()) if not each.evaluating]
     valid = [each.collision is not None and each.collision.valid for each in searched]
     windows = [mean(valid[at : at + WINDOW]) for at in range(0, episodes, WINDOW)]
-    return {
+    row = {
         "family": spec.family,
         "method": spec.method,
         "seed": spec.seed,
@@ -68,6 +77,8 @@ def play(out: Path, episodes: int, uniform: int, spec: RunSpec) -> Row:
             f"ecr_{at}": round(share, 2) for at, share in zip(range(WINDOW, episodes + 1, WINDOW), windows, strict=True)
         },
     }
+    (folder / ROW).write_text(json.dumps(row) + "\n")
+    return row
 
 
 def uniform_ecr(spec: RunSpec, policy: FrozenPolicy, episodes: int) -> float:
@@ -106,6 +117,23 @@ def lines(rows: Sequence[Row]) -> Iterator[str]:
         yield f"| {family} | `{method}` | {len(of)} | {paper} | {' | '.join(cells)} |"
 
 
+def curves(rows: Sequence[Row]) -> Figure:
+    """Draws the ECR of each window of the search: mean over the seeds, a panel per family."""
+    figure = canvas((9.0, 3.2))
+    panels = figure.subplots(1, len(SHIPPED), sharey=True)
+    names = [name for name in rows[0] if name.startswith("ecr_")]
+    for axes, family in zip(panels, SHIPPED, strict=True):
+        axes.set(title=family, xlabel="search episode", ylim=(0.0, 1.0))
+        for method in METHODS:
+            of = [row for row in rows if (row["family"], row["method"]) == (family, method)]
+            if of:
+                shares = [mean(row[name] for row in of) for name in names]
+                axes.plot([WINDOW * (1 + k) for k in range(len(names))], shares, label=method, **LOOKS[method].line)
+    panels[0].set_ylabel(f"ECR of {WINDOW} episodes")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(METHODS))
+    return figure
+
+
 def _cell(values: Sequence[float | None]) -> str:
     known = [value for value in values if value is not None]
     if not known:
@@ -136,6 +164,8 @@ def main() -> None:
     )
     text = "\n".join(lines(rows))
     (options.out / "table.md").write_text(text + "\n")
+    (drawn,) = picture(partial(curves, rows), ["svg"], 200, STYLE)
+    (options.out / "curves.svg").write_bytes(drawn)
     print(text)
 
 
