@@ -3,7 +3,7 @@
     python -m tests.acceptance.goal_variants OUT [--family low] [--episodes 1500] [--seed 21] [--kinds 2] [--jobs 2]
 
 trains each as the first stage of `risk-sac pretrain` does, and plays it frozen in random scenes before EGOS. `one` is
-asked for one kind only, each of the N commonest kinds of `kinds` in turn. It goes on with what OUT lacks, and rewrites
+asked for one kind only: each of the N commonest kinds of `kinds` in turn. It goes on with what OUT lacks, and rewrites
 OUT/table.md after each policy.
 """
 
