@@ -8,7 +8,7 @@ Source: hindsight relabelling after Andrychowicz et al., "Hindsight experience r
 
 import math
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -59,7 +59,7 @@ class Stage(NamedTuple):
 
 # Choice: any failure is learnt first, before sound egos; then those that count for the headline, which need weak egos.
 # The second alone gave .12 failures per episode after 3,000 episodes instead of .29, and .03 instead of .04 that count.
-STAGES: tuple[Stage, ...] = (
+STAGES = (
     Stage(0.0, 6000, 1.0, RewardConfig()),
     Stage(0.25, 2000, 0.3, RewardConfig(unpreventable=0.25, unavoidable=0.1, minor=0.3)),
 )
@@ -125,7 +125,9 @@ class Goals:
 class PolicyTraining:
     """Training of one family's policy; see `run`."""
 
-    def __init__(self, family: FamilyName, seed: int, episodes: int, device: str = "cpu") -> None:
+    def __init__(
+        self, family: FamilyName, seed: int, episodes: int, device: str = "cpu", stages: Sequence[Stage] = STAGES
+    ) -> None:
         """Draws the networks.
 
         Args:
@@ -133,10 +135,11 @@ class PolicyTraining:
           seed: of all random numbers.
           episodes: to play in all, rounded up to whole rounds.
           device: where the networks are trained, `cpu` or `cuda`; episodes are played on the CPU.
+          stages: in order; the first begins at 0.
         """
         check_device("--device", device)
         torch.set_num_threads(1)
-        self.family, self.seed = family, seed
+        self.family, self.seed, self._stages = family, seed, stages
         self._rounds = math.ceil(episodes / (TURNS * EPISODES))
         self._layout = Layout.of(Problem.from_spec(RunSpec(family=family, method="sac", seed=seed)))
         egos = {name: pinned(ego) for name, ego in training_egos(family).items()}
@@ -185,11 +188,11 @@ class PolicyTraining:
 
     def _stage(self, place: int) -> Stage:
         """Returns the stage of a round."""
-        return next(stage for stage in reversed(STAGES) if max(0, place) >= stage.begins * self._rounds)
+        return next(stage for stage in reversed(self._stages) if max(0, place) >= stage.begins * self._rounds)
 
     def _turns(self) -> Iterator[Turn]:
         stage = self._stage(self._round)
-        warm = stage is not STAGES[0] or len(self.replay) >= stage.decisions
+        warm = stage is not self._stages[0] or len(self.replay) >= stage.decisions
         layers = list(self.agent.frozen().layers) if warm else None
         for stream in range(TURNS):
             random = np.random.default_rng((self.seed, self._round, stream))

@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 
 from risk_sac.config import SHIPPED
-from risk_sac.pretraining import policy
-from risk_sac.pretraining.policy import Goals, PolicyTraining
+from risk_sac.pretraining.policy import STAGES, Goals, PolicyTraining
 from risk_sac.pretraining.rollouts import PolicyEpisode
 from tests.acceptance.pretrained_policy import EPISODES, episodes
 
@@ -72,7 +71,7 @@ def variant(label: str, goals: Goals, options: argparse.Namespace, pool: Executo
     file = folder / "rows.json"
     if not file.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        training = PolicyTraining(options.family, options.seed, options.episodes)
+        training = PolicyTraining(options.family, options.seed, options.episodes, stages=STAGES[:1])
         training.goals = goals
         for point in training.run(pool, folder):
             print(label, point, flush=True)
@@ -96,7 +95,6 @@ def main() -> None:
     parser.add_argument("--kinds", type=int, default=2)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
-    policy.STAGES = policy.STAGES[:1]
     with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
         rows = variant("kinds", Goals(), options, pool)
         goals = sum((Counter(each["goals"]) for each in rows), Counter[str]())

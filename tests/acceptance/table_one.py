@@ -35,7 +35,6 @@ METHODS = ("risk-sac", "risk-sac-only-rper", "risk-sac-only-rs", "sac-lag", "sac
 FIRST_SEED = 701
 OWN = 100  # episodes of the frozen policy in its method's own scenes
 WINDOW = 100  # episodes
-ROW = "row.json"  # in the folder of a run
 UNIFORM_SEED = 7  # of the uniformly drawn scenes
 # ECR of the paper's Table I in low, mixed and dense; it has no DDPG.
 PAPER = {
@@ -50,8 +49,9 @@ PAPER = {
 def play(out: Path, episodes: int, uniform: int, spec: RunSpec) -> Row:
     """Plays a run unless OUT has it; returns its figures."""
     folder = out / spec.id
-    if (folder / ROW).exists():
-        known: Row = json.loads((folder / ROW).read_text())
+    file = folder / f"row-{episodes}-{uniform}.json"
+    if file.exists():
+        known: Row = json.loads(file.read_text())
         return known
     done = (folder / RESULTS).exists() and read_results(folder).finished
     results = read_results(folder) if done else run(spec, folder, lambda episodes, metrics: None)
@@ -77,7 +77,7 @@ def play(out: Path, episodes: int, uniform: int, spec: RunSpec) -> Row:
             f"ecr_{at}": round(share, 2) for at, share in zip(range(WINDOW, episodes + 1, WINDOW), windows, strict=True)
         },
     }
-    (folder / ROW).write_text(json.dumps(row) + "\n")
+    file.write_text(json.dumps(row) + "\n")
     return row
 
 

@@ -1,5 +1,6 @@
 import hashlib
 import multiprocessing
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import islice
 from pathlib import Path
@@ -31,11 +32,18 @@ def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path: Path, mon
         assert (whole / name).read_bytes() == (parts / name).read_bytes()
 
 
-def trained(folder: Path, episodes: int, jobs: int, *, interrupted: bool = False) -> PolicyTraining:
+def trained(
+    folder: Path,
+    episodes: int,
+    jobs: int,
+    *,
+    interrupted: bool = False,
+    stages: Sequence[policy.Stage] = policy.STAGES,
+) -> PolicyTraining:
     """A trained policy; an interruption comes after the first point of its curve."""
     folder.mkdir()
     for points in (1, None) if interrupted else (None,):
-        training = PolicyTraining("low", 5, episodes)
+        training = PolicyTraining("low", 5, episodes, stages=stages)
         with ProcessPoolExecutor(jobs, multiprocessing.get_context("fork")) as pool:
             list(islice(training.run(pool, folder), points))
     return training
@@ -47,15 +55,16 @@ def digest(training: PolicyTraining) -> str:
     return hashlib.sha256(b"".join(layer.tobytes() for layers in networks for layer in layers)).hexdigest()
 
 
+SHORT = tuple(
+    stage._replace(begins=begins, decisions=40) for stage, begins in zip(policy.STAGES, (0.0, 0.5), strict=True)
+)
+
+
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """A training with few episodes in which the policy already acts and learns."""
     monkeypatch.setattr(policy, "EPISODES", 1)
     monkeypatch.setattr(policy, "TURNS", 2)
-    stages = [
-        stage._replace(begins=begins, decisions=40) for stage, begins in zip(policy.STAGES, (0.0, 0.5), strict=True)
-    ]
-    monkeypatch.setattr(policy, "STAGES", tuple(stages))
     monkeypatch.setattr(policy, "EVALUATED_EVERY", 3)
     monkeypatch.setattr(policy, "EVALUATION_TURNS", 2)
 
@@ -63,8 +72,8 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("short")
 def test_a_policy_is_the_same_however_it_was_trained(tmp_path: Path) -> None:
     """One process or two, in one go or interrupted."""
-    whole = trained(tmp_path / "whole", 12, 2)
-    parts = trained(tmp_path / "parts", 12, 1, interrupted=True)
+    whole = trained(tmp_path / "whole", 12, 2, stages=SHORT)
+    parts = trained(tmp_path / "parts", 12, 1, interrupted=True, stages=SHORT)
     assert whole.curve == parts.curve
     assert [point["episodes"] for point in whole.curve] == [6, 12]
     assert digest(whole) == digest(parts) != digest(PolicyTraining("low", 5, 12))  # and it has learnt
