@@ -31,7 +31,7 @@ class AgentConfig(Settings):
     decision_steps: Annotated[int, Field(ge=1, le=50)] = 5
     """Environment steps for which the policy holds an action; they make one transition of the memory."""
     updates_per_step: Annotated[float, Field(ge=0, le=20)] = 0.2
-    """Updates in an environment step; 0.2 is one per decision. An update costs as much as two or three steps."""
+    """Updates in an environment step; 0.2 is one per decision. An update costs about as much as five steps."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """`auto` is the CPU; `cuda` has to be asked for. Results are reproducible on equal devices only."""
 
