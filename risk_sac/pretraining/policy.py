@@ -1,4 +1,4 @@
-"""Trains one policy before many egos: a SAC over random scenes, told which kind of failure to reach.
+"""Trains one policy before many egos: a SAC over random scenes, perhaps asked for kinds of failures.
 
 Rounds: several turns are played at once, each by the policy as it was after the round before last, while the learner
 trains on the last round. So the result does not depend on the number of processes.
@@ -100,6 +100,7 @@ class FailureReplay(UniformReplay):
 class Goals:
     """Kinds of failures that the policy can be asked for, as first seen."""
 
+    asked: bool = False  # the policy is asked for kinds; else always for any failure
     names: list[str] = field(default_factory=list)
     recent: deque[int] = field(default_factory=lambda: deque(maxlen=RECENT))
 
@@ -115,7 +116,7 @@ class Goals:
 
     def draw(self, random: np.random.Generator) -> int:
         """Draws a goal to ask for: any failure, or a kind, the rarer the more often."""
-        if not self.names or random.random() < ANY:
+        if not self.asked or not self.names or random.random() < ANY:
             return 0
         counts = Counter(self.recent)
         weights = 1.0 / np.sqrt([1.0 + counts[1 + i] for i in range(len(self.names))])
@@ -126,7 +127,14 @@ class PolicyTraining:
     """Training of one family's policy; see `run`."""
 
     def __init__(
-        self, family: FamilyName, seed: int, episodes: int, device: str = "cpu", stages: Sequence[Stage] = STAGES
+        self,
+        family: FamilyName,
+        seed: int,
+        episodes: int,
+        device: str = "cpu",
+        *,
+        kinds: bool = False,
+        stages: Sequence[Stage] = STAGES,
     ) -> None:
         """Draws the networks.
 
@@ -135,6 +143,7 @@ class PolicyTraining:
           seed: of all random numbers.
           episodes: to play in all, rounded up to whole rounds.
           device: where the networks are trained, `cpu` or `cuda`; episodes are played on the CPU.
+          kinds: it is asked for kinds of failures; else always for any failure.
           stages: in order; the first begins at 0.
         """
         check_device("--device", device)
@@ -150,7 +159,7 @@ class PolicyTraining:
         self.agent.spread(INITIAL_DEVIATION)
         self._graphed = GraphedUpdate(self.agent) if device == "cuda" else None
         self.replay = FailureReplay(observation_size, action_size, REPLAY)
-        self.goals = Goals()
+        self.goals = Goals(asked=kinds)
         self._random = np.random.default_rng(seed)
         self._sizes = observation_size, action_size
         self._round, self._due = 0, 0.0
@@ -159,7 +168,10 @@ class PolicyTraining:
 
     def run(self, pool: Executor, folder: Path) -> Iterator[dict[str, Any]]:
         """Trains from the checkpoint in the folder on, if there is one, and yields each point of the curve."""
-        path, digest = folder / f"{self.family}.checkpoint", f"{self.family}-{self.seed}-{self._rounds}"
+        path, digest = (
+            folder / f"{self.family}.checkpoint",
+            f"{self.family}-{self.seed}-{self._rounds}-{self.goals.asked}",
+        )
         if checkpoint.exists(path) and (state := checkpoint.load_newest(path, digest)) is not None:
             self._load(state)
         played: list[PolicyEpisode] = []
@@ -183,7 +195,7 @@ class PolicyTraining:
         """Returns the policy as it is now."""
         policy, critics = (tuple(layers) for layers in self.agent.networks())
         card = {"episodes": self._round * TURNS * EPISODES, "seed": self.seed, "egos": sorted(self._egos)}
-        goals = tuple(self.goals.names)
+        goals = tuple(self.goals.names) if self.goals.asked else ()
         return PretrainedPolicy(self.family, self._layout, policy, critics, self.agent.temperature, goals, card)
 
     def _stage(self, place: int) -> Stage:
@@ -238,7 +250,7 @@ class PolicyTraining:
         """Plays held-out egos with goals in turn; the scenes are the same each time."""
         layers = list(self.agent.frozen().layers)
         names = list(self._unseen)
-        goals = [0, *range(1, 1 + len(self.goals.names))]
+        goals = [0, *range(1, 1 + len(self.goals.names))] if self.goals.asked else [0]
         turns = []
         for i in range(EVALUATION_TURNS):
             asked = tuple(goals[(i * EPISODES + k) % len(goals)] for k in range(EPISODES))

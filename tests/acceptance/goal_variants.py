@@ -25,22 +25,15 @@ from risk_sac.pretraining.rollouts import PolicyEpisode
 from tests.acceptance.pretrained_policy import EPISODES, episodes
 
 EGOS = ("fiss-plus", "idm-aeb+slow-replanning", "default")
-HEAD = "| policy | ego | failures | distinct | kinds asked for reached | most of one kind |\n|---|---|---|---|---|---|"
-
-
-class AnyFailure(Goals):
-    """Goals of a policy that is never asked for a kind."""
-
-    def draw(self, random: np.random.Generator) -> int:
-        """See `Goals.draw`."""
-        return 0
+COLUMNS = "policy", "ego", "failures", "distinct", "candidates, distinct", "kinds asked for reached", "most of one kind"
+HEAD = f"| {' | '.join(COLUMNS)} |\n|{len(COLUMNS) * '---|'}"
 
 
 class OneKind(Goals):
     """Goals of a policy that is asked for one kind only; a failure of another one is any failure."""
 
     def __init__(self, name: str) -> None:
-        super().__init__([name])
+        super().__init__(asked=True, names=[name])
 
     def add(self, name: str) -> int:
         """See `Goals.add`."""
@@ -60,6 +53,7 @@ def row(label: str, ego: str, played: Sequence[PolicyEpisode], names: Sequence[s
         "ego": ego,
         "failures": f"{len(failed)} of {len(played)}",
         "distinct": len({each.kind for each in failed}),
+        "candidates": len({each.kind for each in failed if each.candidate}),
         "reached": sum(each.asked > 0 and each.goal == names[each.asked - 1] for each in failed),
         "goals": dict(goals.most_common()),
     }
@@ -77,7 +71,7 @@ def variant(label: str, goals: Goals, options: argparse.Namespace, pool: Executo
             print(label, point, flush=True)
         layers, names = list(training.agent.frozen().layers), training.goals.names
         drawn = np.random.default_rng(options.seed)
-        asked = [0 if isinstance(goals, AnyFailure) else goals.draw(drawn) for _ in range(options.scenes)]
+        asked = [goals.draw(drawn) for _ in range(options.scenes)]
         rows = [row(label, ego, list(episodes(ego, layers, asked, options)), names) for ego in EGOS]
         file.write_text(json.dumps(rows, indent=1) + "\n")
     found: list[dict[str, Any]] = json.loads(file.read_text())
@@ -96,14 +90,14 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     with ProcessPoolExecutor(options.jobs, multiprocessing.get_context("spawn")) as pool:
-        rows = variant("kinds", Goals(), options, pool)
+        rows = variant("kinds", Goals(asked=True), options, pool)
         goals = sum((Counter(each["goals"]) for each in rows), Counter[str]())
-        rows += variant("any", AnyFailure(), options, pool)
+        rows += variant("any", Goals(), options, pool)
         for name, _ in goals.most_common(options.kinds):
             rows += variant(f"one: {name}", OneKind(name), options, pool)
             text = [
-                f"| {each['policy']} | `{each['ego']}` | {each['failures']} | {each['distinct']} | {each['reached']} |"
-                f" {max(each['goals'].values(), default=0)} |"
+                f"| {each['policy']} | `{each['ego']}` | {each['failures']} | {each['distinct']} | {each['candidates']} |"
+                f" {each['reached']} | {max(each['goals'].values(), default=0)} |"
                 for each in rows
             ]
             (options.out / "table.md").write_text("\n".join([HEAD, *text]) + "\n")

@@ -1,19 +1,21 @@
-"""What the shipped policy of a family finds in random scenes, frozen, beside random actions.
+"""What a family's policy finds in random scenes, frozen, beside random actions.
 
-    python -m tests.acceptance.pretrained_policy [--family low] [--seed 301] [--episodes 60] EGO ...
+    python -m tests.acceptance.pretrained_policy [--family low] [--policy FILE] [--seed 301] [--episodes 60] EGO ...
 
-An ego is `default`, a driver, or a driver and a defect such as `idm-aeb+latency`. The policy is asked for each kind in
-turn, and for any failure.
+FILE is what `risk-sac pretrain` has written; without it, the shipped policy plays. An ego is `default`, a driver, or a
+driver and a defect such as `idm-aeb+latency`. The policy is asked for any failure, and for each kind that it knows in
+turn.
 """
 
 import argparse
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from risk_sac.config import SHIPPED, EgoConfig, RewardConfig
 from risk_sac.egos.registry import pinned
 from risk_sac.frozen_policy import Layers
 from risk_sac.pretraining.rollouts import PolicyEpisode, Turn, play_turn
-from risk_sac.prior.policy import shipped_policy
+from risk_sac.prior.policy import read_policy, shipped_policy
 
 EPISODES = 10  # of a turn
 
@@ -40,10 +42,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("egos", nargs="+", metavar="EGO")
     parser.add_argument("--family", choices=SHIPPED, default="low")
+    parser.add_argument("--policy", type=Path, metavar="FILE")
     parser.add_argument("--seed", type=int, default=301)
     parser.add_argument("--episodes", type=int, default=60)
     options = parser.parse_args()
-    pretrained = shipped_policy(options.family)
+    pretrained = read_policy(options.policy) if options.policy else shipped_policy(options.family)
     if pretrained is None:
         parser.error(f"--family: {options.family} has no shipped policy")
     asked = [k % (len(pretrained.goals) + 1) for k in range(options.episodes)]

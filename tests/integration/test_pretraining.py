@@ -87,7 +87,7 @@ def test_a_thousand_episodes_give_the_same_weights_again(tmp_path: Path) -> None
 
 
 def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached() -> None:
-    training = PolicyTraining("low", 5, 100)
+    training = PolicyTraining("low", 5, 100, kinds=True)
     size = training.pretrained().layout
     step = Transition(
         observation=np.zeros(size.observation_size, np.float32),
@@ -109,6 +109,16 @@ def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached() -> None:
     asked = stored.observation[:, size.observation_size :].argmax(1).tolist()
     rewards = dict(zip(asked, stored.risk_reward.tolist(), strict=True))
     assert rewards == pytest.approx({goals[0]: 20.0, goals[1]: 20.0 * (1.0 - policy.MISSED)})
+
+
+def test_kinds_are_asked_for_where_wanted_only() -> None:
+    for kinds in (False, True):
+        training = PolicyTraining("low", 5, 100, kinds=kinds)
+        for name in ("one", "other"):
+            training.goals.add(name)
+        random = np.random.default_rng(3)
+        assert {training.goals.draw(random) for _ in range(40)} == ({0, 1, 2} if kinds else {0})
+        assert training.pretrained().goals == (("one", "other") if kinds else ())
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="has the GPU that it must lack")
