@@ -134,6 +134,7 @@ class PolicyTraining:
         device: str = "cpu",
         *,
         kinds: bool = False,
+        agent: AgentConfig = AGENT,
         stages: Sequence[Stage] = STAGES,
     ) -> None:
         """Draws the networks.
@@ -144,6 +145,7 @@ class PolicyTraining:
           episodes: to play in all, rounded up to whole rounds.
           device: where the networks are trained, `cpu` or `cuda`; episodes are played on the CPU.
           kinds: it is asked for kinds of failures; else always for any failure.
+          agent: settings of the networks and of learning.
           stages: in order; the first begins at 0.
         """
         check_device("--device", device)
@@ -155,13 +157,13 @@ class PolicyTraining:
         self._egos = {name: ego for name, ego in egos.items() if name not in HELD_OUT}
         self._unseen = {name: ego for name, ego in egos.items() if name in HELD_OUT}
         observation_size, action_size = self._layout.observation_size + GOALS + 1, self._layout.action_size
-        self.agent = SacAgent(observation_size, action_size, AGENT, SAC, seed, device, normalised=True)
+        self.agent = SacAgent(observation_size, action_size, agent, SAC, seed, device, normalised=True)
         self.agent.spread(INITIAL_DEVIATION)
         self._graphed = GraphedUpdate(self.agent) if device == "cuda" else None
         self.replay = FailureReplay(observation_size, action_size, REPLAY)
         self.goals = Goals(asked=kinds)
         self._random = np.random.default_rng(seed)
-        self._sizes = observation_size, action_size
+        self._sizes, self._batch_size = (observation_size, action_size), agent.batch_size
         self._round, self._due = 0, 0.0
         self._waiting: list[PolicyEpisode] = []  # of the last round
         self.curve: list[dict[str, Any]] = []
@@ -222,7 +224,7 @@ class PolicyTraining:
         if before < self._stage(self._round - 1).decisions:
             self._due = 0.0
         while self._due >= 1.0:
-            batch = self.replay.sample(AGENT.batch_size, self._random)
+            batch = self.replay.sample(self._batch_size, self._random)
             if self._graphed is None:
                 self.agent.update(batch, batch.risk_reward)
             else:
