@@ -25,6 +25,7 @@ from risk_sac.config import FamilyName, RewardConfig, RunSpec
 from risk_sac.config.learner import AgentConfig, ReplayConfig, SacConfig
 from risk_sac.egos.registry import pinned
 from risk_sac.pretraining.egos import HELD_OUT, drawn_ego, training_egos
+from risk_sac.pretraining.mirror import Mirror
 from risk_sac.pretraining.rollouts import DECISION_STEPS, DISCOUNT, PolicyEpisode, Turn, play_turn
 from risk_sac.prior.policy import GOALS, Layout, PretrainedPolicy, with_goal
 from risk_sac.problem import Problem
@@ -153,6 +154,7 @@ class PolicyTraining:
         self.family, self.seed, self._stages = family, seed, stages
         self._rounds = math.ceil(episodes / (TURNS * EPISODES))
         self._layout = Layout.of(Problem.from_spec(RunSpec(family=family, method="sac", seed=seed)))
+        self._mirror = Mirror.of(self._layout)
         egos = {name: pinned(ego) for name, ego in training_egos(family).items()}
         self._egos = {name: ego for name, ego in egos.items() if name not in HELD_OUT}
         self._unseen = {name: ego for name, ego in egos.items() if name in HELD_OUT}
@@ -165,6 +167,7 @@ class PolicyTraining:
         self._random = np.random.default_rng(seed)
         self._sizes, self._batch_size = (observation_size, action_size), agent.batch_size
         self._round, self._due = 0, 0.0
+        self._decisions = 0  # of this stage
         self._waiting: list[PolicyEpisode] = []  # of the last round
         self.curve: list[dict[str, Any]] = []
 
@@ -181,7 +184,8 @@ class PolicyTraining:
             futures = [pool.submit(play_turn, turn) for turn in self._turns()]
             self.learn(self._waiting)
             if self._stage(self._round) is not self._stage(self._round - 1):
-                self.replay, self._due = FailureReplay(*self._sizes, REPLAY), 0.0
+                self.replay = FailureReplay(*self._sizes, REPLAY)
+                self._decisions, self._due = 0, 0.0
             self._waiting = _in_order(futures)
             played += self._waiting
             self._round += 1
@@ -206,7 +210,7 @@ class PolicyTraining:
 
     def _turns(self) -> Iterator[Turn]:
         stage = self._stage(self._round)
-        warm = stage is not self._stages[0] or len(self.replay) >= stage.decisions
+        warm = stage is not self._stages[0] or self._decisions >= stage.decisions
         layers = list(self.agent.frozen().layers) if warm else None
         for stream in range(TURNS):
             random = np.random.default_rng((self.seed, self._round, stream))
@@ -217,12 +221,12 @@ class PolicyTraining:
 
     def learn(self, episodes: list[PolicyEpisode]) -> None:
         """Stores episodes, and makes the updates that they call for."""
-        before = len(self.replay)
+        before = self._decisions
         for episode in episodes:
             self._store(episode)
-            self._due += UPDATES_PER_DECISION * len(episode.decisions)
-        if before < self._stage(self._round - 1).decisions:
-            self._due = 0.0
+            self._decisions += len(episode.decisions)
+        if before >= self._stage(self._round - 1).decisions:
+            self._due += UPDATES_PER_DECISION * (self._decisions - before)
         while self._due >= 1.0:
             batch = self.replay.sample(self._batch_size, self._random)
             if self._graphed is None:
@@ -239,10 +243,15 @@ class PolicyTraining:
             last = as_asked[-1]
             missed = replace(last, risk_reward=last.risk_reward - MISSED * episode.bonus)
             as_asked = [*as_asked[:-1], missed]
-            self.replay.extend(_asked(episode.decisions, reached), failing=True)
-        self.replay.extend(
-            _asked(as_asked, episode.asked), failing=reached is not None and episode.asked in (0, reached)
-        )
+            self._extend(episode.decisions, reached, failing=True)
+        self._extend(as_asked, episode.asked, failing=reached is not None and episode.asked in (0, reached))
+
+    def _extend(self, decisions: list[Transition], goal: int, *, failing: bool) -> None:
+        """Stores decisions, and their mirror image where the family has one."""
+        self.replay.extend(_asked(decisions, goal), failing=failing)
+        if self._mirror is not None:
+            mirrored = [self._mirror.transition(each) for each in decisions]
+            self.replay.extend(_asked(mirrored, goal), failing=failing)
 
     def _point(self, episodes: list[PolicyEpisode]) -> dict[str, Any]:
         """Returns a point of the training curve."""
@@ -269,6 +278,7 @@ class PolicyTraining:
             "random": self._random.bit_generator.state,
             "round": self._round,
             "due": self._due,
+            "decisions": self._decisions,
             "waiting": [asdict(each) for each in self._waiting],
             "curve": self.curve,
         }
@@ -281,6 +291,7 @@ class PolicyTraining:
         self.goals.recent.extend(state["recent"])
         self._random.bit_generator.state = state["random"]
         self._round, self._due, self.curve = state["round"], state["due"], state["curve"]
+        self._decisions = state["decisions"]
         self._waiting = [
             PolicyEpisode(**each | {"decisions": [Transition(**step) for step in each["decisions"]]})
             for each in state["waiting"]

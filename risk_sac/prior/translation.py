@@ -40,8 +40,8 @@ class Scripted(NamedTuple):
         if "pedestrian" in self.adversaries:
             steer = SIZE * self.adversaries.index("pedestrian") + STEER
             genes[:, steer] = 1.0 - genes[:, steer]
-        parameters = [_other_side(name) for name in self.parameters]
-        adversaries = [_other_side(name) for name in self.adversaries]
+        parameters = [other_side(name) for name in self.parameters]
+        adversaries = [other_side(name) for name in self.adversaries]
         return Scripted(parameters, values, adversaries, genes, not self.mirrored)
 
 
@@ -110,7 +110,7 @@ class Translation:
         return self._problem.placed(self._shipped.scripted(known))
 
 
-def _other_side(name: str) -> str:
+def other_side(name: str) -> str:
     """Exchanges left and right at the beginning of a name."""
     side, _, rest = name.partition("_")
     return "_".join(filter(None, (OTHER_SIDE.get(side, side), rest)))
