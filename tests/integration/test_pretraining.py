@@ -87,7 +87,7 @@ def test_a_thousand_episodes_give_the_same_weights_again(tmp_path: Path) -> None
 
 
 def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached() -> None:
-    training = PolicyTraining("low", 5, 100, kinds=True)
+    training = PolicyTraining("mixed", 5, 100, kinds=True)
     size = training.pretrained().layout
     step = Transition(
         observation=np.zeros(size.observation_size, np.float32),

@@ -11,6 +11,7 @@ from risk_sac.prior.policy import Layout
 from risk_sac.problem import Problem
 from risk_sac.types import Scene, Vector
 
+TOLERANCE = 0.03  # SUMO's cars on the right slow down a little for those on their left
 SCENE = {
     "ego_speed_mps": 12.0,
     "lead_gap_m": 20.0,
@@ -38,9 +39,9 @@ def test_the_simulator_shows_a_mirrored_scene_as_the_mirror_does() -> None:
     with closing(RiskSacEnv.of(spec)) as env:
         seen = observations(env, SCENE, actions)
         mirrored = observations(env, MIRRORED, [mirror.action(action) for action in actions])
-    assert not np.allclose(seen[-1], mirrored[-1], atol=0.05)  # the scene has two unlike sides
+    assert not np.allclose(seen[-1], mirrored[-1], atol=10 * TOLERANCE)  # the scene has two unlike sides
     for own, other in zip(seen, mirrored, strict=True):
-        np.testing.assert_allclose(mirror.observation(own), other, atol=1e-3)
+        np.testing.assert_allclose(mirror.observation(own), other, atol=TOLERANCE)
         np.testing.assert_array_equal(mirror.observation(mirror.observation(own)), own)
 
 
