@@ -5,9 +5,7 @@ In frames it is at rest, straight ahead and of a car's size. Records tell of an 
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from importlib.resources import files
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,9 +24,6 @@ from risk_sac.records import (
     Severity,
     Violation,
 )
-from risk_sac.scenario import car_following
-from risk_sac.scenario.family import Family
-from risk_sac.scenario.place import PLACES, Stretch
 from risk_sac.types import Floats, Frame, Kind, Role, Row, Signal
 
 if TYPE_CHECKING:
@@ -249,11 +244,3 @@ def pretrained_policy(layout: Layout, goals: tuple[str, ...]) -> PretrainedPolic
 
     policy, critics = layers(1, seen, hidden, hidden, 2 * acted), layers(2, seen + acted, hidden, hidden, 1)
     return PretrainedPolicy("low", layout, policy, critics, 0.03, goals, {"episodes": 12})
-
-
-def low_with(*sides: str) -> Family:
-    """The pattern of low where there is no lane on the other sides."""
-    place = PLACES.validate_json((Path(str(files("sumo_nets"))) / "low" / "place.json").read_bytes())
-    assert isinstance(place, Stretch)
-    gone = {side: None for side in ("left", "right") if side not in sides}
-    return car_following.family("car_following_000000000000", place.model_copy(update=gone))

@@ -32,7 +32,7 @@ class Mirror:
     @classmethod
     def of(cls, layout: Layout) -> "Mirror | None":
         """Returns the mirror of a family with a neighbour on either side; None for the others."""
-        return cls(layout) if layout.two_sided else None
+        return cls(layout) if {"left", "right"} <= set(layout.adversaries) else None
 
     def observation(self, seen: Vector) -> Vector:
         """Returns what is observed in the mirrored scene."""

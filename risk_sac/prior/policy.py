@@ -58,11 +58,6 @@ class Layout:
         """Entries of an action."""
         return 2 * len(self.adversaries)
 
-    @property
-    def two_sided(self) -> bool:
-        """Whether the scene in a mirror is one of the same family."""
-        return {"left", "right"} <= set(self.adversaries)
-
 
 @dataclass(frozen=True, slots=True)
 class PretrainedPolicy:
@@ -152,9 +147,8 @@ def shipped_policy(family: str) -> PretrainedPolicy | None:
 
 
 def pretrained_for(family: Family) -> PretrainedPolicy | None:
-    """Returns the pretrained policy of a family's pattern, if it has one that knows the family's side of the road."""
-    policy = shipped_policy(shipped_alike(family.name))
-    return policy if policy is None or policy.layout.two_sided or not family.mirrored else None
+    """Returns the pretrained policy of a family's pattern; None without one, and at mirrored places."""
+    return None if family.mirrored else shipped_policy(shipped_alike(family.name))
 
 
 def check_prior(name: RunMethod, family: FamilyName, prior: str) -> None:

@@ -10,20 +10,10 @@ from risk_sac.config import FamilyName, RunMethod, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.frozen_policy import respond
 from risk_sac.observation_layout import PER_ADVERSARY, PER_EGO
-from risk_sac.prior.policy import (
-    Folded,
-    Layout,
-    PretrainedPolicy,
-    check_prior,
-    pretrained_for,
-    read_policy,
-    with_goal,
-    write_policy,
-)
+from risk_sac.prior.policy import Folded, Layout, PretrainedPolicy, check_prior, read_policy, with_goal, write_policy
 from risk_sac.problem import Problem
-from risk_sac.scenario.families import FAMILIES
 from risk_sac.types import Vector
-from tests.builders import low_with, pretrained_policy
+from tests.builders import pretrained_policy
 
 GOAL_NAMES = ("no_contact: cut-in, ahead, in a lane", "no_contact: leader, ahead, in a lane")
 
@@ -121,12 +111,6 @@ def test_another_layout_is_read_by_names_and_values(pretrained: PretrainedPolicy
         assert not got[:2].any()  # the stranger does as it likes
         by_name = {a: expected[2 * i : 2 * i + 2] for i, a in enumerate(layout.adversaries)}
         np.testing.assert_allclose(got[2:], np.concatenate([by_name[a] for a in own.adversaries[1:]]), atol=1e-4)
-
-
-def test_a_policy_of_both_sides_serves_places_with_a_lane_on_the_right_only() -> None:
-    assert pretrained_for(low_with("right")) is pretrained_for(FAMILIES["low"]) is not None
-    assert pretrained_for(FAMILIES["mixed"]) is not None
-    assert pretrained_for(replace(FAMILIES["mixed"], mirrored=True)) is None
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,6 @@
 from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,10 +10,19 @@ from risk_sac.prior.shipped import inputs_of, shipped_prior
 from risk_sac.prior.start import start_of
 from risk_sac.prior.translation import Coordinates, Translation
 from risk_sac.problem import Problem
+from risk_sac.scenario import car_following
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
+from risk_sac.scenario.place import PLACES, Stretch
 from risk_sac.scripts.motions import SIZE, Genes
-from tests.builders import low_with
+
+
+def low_with(*sides: str) -> Family:
+    """The pattern of low where there is no lane on the other sides."""
+    place = PLACES.validate_json((Path(str(files("sumo_nets"))) / "low" / "place.json").read_bytes())
+    assert isinstance(place, Stretch)
+    gone = {side: None for side in ("left", "right") if side not in sides}
+    return car_following.family("car_following_000000000000", place.model_copy(update=gone))
 
 
 def problem_at(family: Family) -> Problem:
