@@ -21,8 +21,8 @@ FINE_TUNING = {
 class PretrainedLearner(Learner):
     """Learner with pretrained networks.
 
-    Choice: what it learns is to reach any failure. To explore, it is asked for one kind in each episode: a shift of the
-    policy's first bias. Its memory takes these actions like those of any other driver.
+    Choice: what it learns is to reach any failure. A policy that knows kinds explores by asking for one in each episode:
+    a shift of its first bias. Its memory takes these actions like those of any other driver.
     """
 
     def __init__(

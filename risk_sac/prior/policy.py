@@ -1,4 +1,4 @@
-"""The pretrained policy: a SAC conditioned on the kind of failure to reach.
+"""The pretrained policy: a SAC that can be asked for a kind of failure.
 
 It was trained before many egos. Its networks read the observation of a shipped family with a goal behind it. `Folded`
 rewrites their first layers, so that they read the observation of a problem whose actors, scene parameters and
