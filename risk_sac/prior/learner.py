@@ -21,8 +21,8 @@ FINE_TUNING = {
 class PretrainedLearner(Learner):
     """Learner with pretrained networks.
 
-    Choice: what it learns is to reach any failure. A policy that knows kinds explores by asking for one in each episode:
-    a shift of its first bias. Its memory takes these actions like those of any other driver.
+    Choice: what it learns is to reach any failure. If the policy knows kinds, one of them is asked for in each episode
+    to explore: a shift of its first bias. Its memory takes these actions like those of any other driver.
     """
 
     def __init__(
