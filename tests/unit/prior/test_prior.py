@@ -1,3 +1,4 @@
+import hashlib
 import io
 from pathlib import Path
 
@@ -39,6 +40,12 @@ def test_a_prior_is_shipped_for_each_family_within_three_megabytes() -> None:
         prior = shipped_prior(family)
         assert prior.library.shape == (len(prior.library_kinds), inputs_of(family))
         assert len(prior.library) <= 300
+
+
+def test_the_card_has_the_digest_of_each_file() -> None:
+    card = DATA.parents[1].joinpath("pretraining", "README.md").read_text(encoding="utf-8")
+    for path in DATA.glob("*.npz"):
+        assert f"`{path.name}` {hashlib.sha256(path.read_bytes()).hexdigest()[:12]}" in card
 
 
 def test_the_test_set_and_planners_are_not_among_the_training_egos() -> None:
