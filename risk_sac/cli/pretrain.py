@@ -37,7 +37,7 @@ def add(commands: Commands) -> None:
     scripts.add_argument("--chunks", type=number(int, 1, 10_000), default=50, metavar="N", help=chunks)
     episodes = "episodes of the policy for each family; 0: no policy (default: %(default)s)"
     policy.add_argument("--policy-episodes", type=number(int, 0, 1_000_000), default=10_000, metavar="N", help=episodes)
-    kinds = "ask the policy for one kind of failure in each episode; it fails egos less often then"
+    kinds = "ask the policy for one kind of failure in each episode"
     policy.add_argument("--kinds", action="store_true", help=kinds)
     execution.add_argument("--seed", type=number(int, 0), default=0, metavar="S", help="(default: %(default)s)")
     device = "where policies are trained; episodes are played on the CPU (default: %(default)s)"
