@@ -173,10 +173,8 @@ class PolicyTraining:
 
     def run(self, pool: Executor, folder: Path) -> Iterator[dict[str, Any]]:
         """Trains from the checkpoint in the folder on, if there is one, and yields each point of the curve."""
-        path, digest = (
-            folder / f"{self.family}.checkpoint",
-            f"{self.family}-{self.seed}-{self._rounds}-{self.goals.asked}",
-        )
+        path = folder / f"{self.family}.checkpoint"
+        digest = f"{self.family}-{self.seed}-{self._rounds}-{self.goals.asked}"
         if checkpoint.exists(path) and (state := checkpoint.load_newest(path, digest)) is not None:
             self._load(state)
         played: list[PolicyEpisode] = []
