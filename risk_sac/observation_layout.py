@@ -1,4 +1,4 @@
-"""How long an observation is, and how its entries are scaled; see `risk_sac.observation`."""
+"""Sizes and scales of an observation; see `risk_sac.observation`."""
 
 PER_ADVERSARY = 10
 PER_EGO = 8

@@ -1,4 +1,4 @@
-"""Trains one policy before many egos: a SAC over random scenes, perhaps asked for kinds of failures.
+"""Trains one policy, a SAC, over random scenes before many egos.
 
 Rounds: several turns are played at once, each by the policy as it was after the round before last, while the learner
 trains on the last round. So the result does not depend on the number of processes.
@@ -172,7 +172,7 @@ class PolicyTraining:
         self.curve: list[dict[str, Any]] = []
 
     def run(self, pool: Executor, folder: Path) -> Iterator[dict[str, Any]]:
-        """Trains from the checkpoint in the folder on, if there is one, and yields each point of the curve."""
+        """Trains, or goes on from the folder's checkpoint; yields the curve."""
         path = folder / f"{self.family}.checkpoint"
         digest = f"{self.family}-{self.seed}-{self._rounds}-{self.goals.asked}"
         if checkpoint.exists(path) and (state := checkpoint.load_newest(path, digest)) is not None:

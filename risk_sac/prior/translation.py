@@ -46,7 +46,7 @@ class Scripted(NamedTuple):
 
 
 class Coordinates(NamedTuple):
-    """What the coordinates of a point mean."""
+    """Meaning of a point's coordinates."""
 
     space: SceneSpace
     adversaries: tuple[str, ...]
