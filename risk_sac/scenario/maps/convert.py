@@ -11,11 +11,12 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from risk_sac.errors import MapError
 from risk_sac.scenario.maps.documents import FOREIGN_ROOTS, MAP_ROOTS, Document, rewritten
+from risk_sac.scenario.maps.opendrive import ready
 from risk_sac.scenario.maps.sides import side_remarks
 from risk_sac.scenario.maps.unpack import SMALLER
 
@@ -69,9 +70,14 @@ def present_net(file: Path, folder: Path, name: str = "") -> Converted:
     if found.root == "net" and _version(found.attributes) >= PRESENT:
         return Converted(found.file, tuple(left_out), others)
     net = folder / "converted.net.xml"
-    sides = side_remarks(found.file) if found.root in FOREIGN_ROOTS else []
+    if found.root in FOREIGN_ROOTS:
+        left_out += side_remarks(found.file)
+    if found.root == "OpenDRIVE":
+        readied = replace(found, file=folder / "readied.xml")
+        left_out += ready(found.file, readied.file)
+        found = readied
     said = _convert(found, net, name)
-    return Converted(net, (*left_out, *sides, *remarks(said, "Warning")), others)
+    return Converted(net, (*left_out, *remarks(said, "Warning")), others)
 
 
 def remarks(said: str, severity: str) -> list[str]:

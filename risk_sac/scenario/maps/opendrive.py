@@ -1,0 +1,197 @@
+"""Rewrites the roads of an OpenDRIVE map so that netconvert reads what it would drop or draw wrongly.
+
+netconvert reads limits in lanes alone, mixes up lanes where a limit changes within a lane section, and draws a spiral
+of constant curvature as its chord. What it does not read at all is counted.
+Source: ASAM OpenDRIVE 1.7: geometry of the reference line, road type, speed limits of lanes, lane sections
+"""
+
+import math
+import xml.etree.ElementTree as ET
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from copy import deepcopy
+from itertools import pairwise
+from operator import itemgetter
+from pathlib import Path
+
+from risk_sac.errors import MapError
+
+LARGEST_SHIFT_M = 0.01  # by which an arc may leave its spiral, and a line its arc
+LEAST_PIECE_M = 1.0  # of a road between two limits
+NO_LIMIT_MPS = 142.0 / 3.6  # what netconvert takes for "none" in OpenStreetMap
+UNITS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
+CAR_LANES = ("driving", "stop", "entry", "exit", "onRamp", "offRamp", "mwyEntry", "mwyExit", "bidirectional")
+LOST_LANES = ("connectingRamp", "slipLane", "HOV")  # for cars, too
+READ_SIGNALS = {"205", "301", "306"} | {str(i) for i in (*range(1000001, 1000014), 1000020) if i != 1000008}
+
+UNLIMITED = "roads without a limit"
+Limits = Sequence[tuple[float, float | None]]  # m at which one begins, and m/s; sorted
+
+
+def ready(file: Path, target: Path) -> list[str]:
+    """Writes a map for netconvert; returns remarks on what it lacks and what is lost.
+
+    Raises:
+      MapError: netconvert could not read it.
+    """
+    lost, depth = Counter[str](), 0
+    with target.open("wb") as output:
+        output.write(b"<OpenDRIVE>\n")
+        for event, element in ET.iterparse(file, ("start", "end")):
+            depth += 1 if event == "start" else -1
+            if depth == 1 and event == "end":
+                if element.tag == "road":
+                    _repair(element, lost)
+                elif element.tag == "junction":
+                    _check(element, lost)
+                output.write(ET.tostring(element))
+                element.clear()
+        output.write(b"</OpenDRIVE>\n")
+    unlimited = lost.pop(UNLIMITED, 0)
+    listed = ", ".join(f"{what} ({count})" for what, count in (+lost).most_common())
+    remarks = [f"without a speed limit, so that netconvert's default holds: {unlimited} roads"] if unlimited else []
+    return [*remarks, f"left out, because netconvert does not read them: {listed}"] if listed else remarks
+
+
+def _check(junction: ET.Element, lost: Counter[str]) -> None:
+    if (kind := junction.get("type")) == "direct":
+        got = f"junction {junction.get('id', '?')[:80]!r} of type direct, which netconvert does not read"
+        raise MapError("network", got, "junctions with connecting roads")
+    lost["virtual junctions"] += kind == "virtual"
+
+
+def _repair(road: ET.Element, lost: Counter[str]) -> None:
+    try:
+        for geometry in road.iterfind("planView/geometry"):
+            _draw(geometry)
+        _limit(road, lost)
+    except (KeyError, ValueError) as error:
+        got = f"road {road.get('id', '?')[:80]!r} with a missing or broken attribute: {error}"
+        raise MapError("network", got, "what OpenDRIVE requires") from error
+    lost["crosswalks"] += sum(found.get("type", "").lower() == "crosswalk" for found in road.iter("object"))
+    lost["signals and signs"] += sum(found.get("type") not in READ_SIGNALS for found in road.iter("signal"))
+    lost.update(f"lanes of type {kind}" for lane in road.iter("lane") if (kind := lane.get("type")) in LOST_LANES)
+
+
+def _draw(geometry: ET.Element) -> None:
+    """Replaces a spiral of nearly constant curvature by an arc, and an arc of nearly none by a line.
+
+    Lines that begin alike are at most ∫ |Δθ| apart, where Δθ(s) is the difference of their headings:
+    |κ₁ - κ₀| L² / 12 for a spiral and the arc of its mean curvature, |κ| L² / 2 for an arc and a line.
+    """
+    length_m = float(geometry.attrib["length"])
+    if (shape := geometry.find("spiral")) is not None:
+        start, end = float(shape.attrib["curvStart"]), float(shape.attrib["curvEnd"])
+        if abs(end - start) * length_m**2 / 12 > LARGEST_SHIFT_M:
+            return
+        curvature = (start + end) / 2
+    elif (shape := geometry.find("arc")) is not None:
+        curvature = float(shape.attrib["curvature"])
+    else:
+        return
+    is_line = abs(curvature) * length_m**2 / 2 <= LARGEST_SHIFT_M
+    shape.tag, shape.attrib = ("line", {}) if is_line else ("arc", {"curvature": repr(curvature)})
+
+
+def _limit(road: ET.Element, lost: Counter[str]) -> None:
+    """Writes limits into the lanes of a road, and begins a lane section where one changes."""
+    types = _sorted((float(kind.attrib["s"]), _mps(kind.find("speed"), lost)) for kind in road.iterfind("type"))
+    lanes = road.find("lanes")
+    sections = [] if lanes is None else lanes.findall("laneSection")
+    starts = [float(section.attrib["s"]) for section in sections]
+    unlimited = False
+    for section, (start, end) in zip(sections, pairwise([*starts, float(road.attrib["length"])]), strict=True):
+        pieces = _pieces(section, [(s - start, mps) for s, mps in types], end - start, lost)
+        copies = [section, *(deepcopy(section) for _ in pieces[1:])]
+        for i, (copy, (begin, limits)) in enumerate(zip(copies, pieces, strict=True)):
+            for lane, mps in zip(copy.iterfind("*/lane"), limits, strict=True):
+                unlimited |= mps is None and lane.get("type") in CAR_LANES
+                for speed in lane.findall("speed"):
+                    lane.remove(speed)
+                if mps is not None:
+                    ET.SubElement(lane, "speed", sOffset="0", max=repr(mps), unit="m/s")
+                if i > 0:
+                    _begin_at(begin, lane)
+                    _link(lane, "predecessor")
+                if i < len(copies) - 1:
+                    _link(lane, "successor")
+            if lanes is not None and i > 0:
+                copy.set("s", repr(start + begin))
+                lanes.insert(list(lanes).index(copies[i - 1]) + 1, copy)
+    lost[UNLIMITED] += unlimited and road.get("junction", "-1") == "-1"
+
+
+def _pieces(
+    section: ET.Element, types: Limits, length_m: float, lost: Counter[str]
+) -> list[tuple[float, list[float | None]]]:
+    """Where limits of a section change, m from its start, and each lane's from there on.
+
+    A lane's own limit is ahead of the road's.
+    """
+    lanes = section.findall("*/lane")
+    own = [_sorted((float(s.attrib["sOffset"]), _mps(s, lost)) for s in lane.iterfind("speed")) for lane in lanes]
+    begins = [0.0]
+    for change in sorted({begin for limits in (types, *own) for begin, _ in limits}):
+        if begins[-1] + LEAST_PIECE_M <= change <= length_m - LEAST_PIECE_M:
+            begins.append(change)
+    pieces: list[tuple[float, list[float | None]]] = []
+    for begin, end in pairwise([*begins, length_m]):
+        middle = (begin + end) / 2
+        here = [
+            _at(middle, limits) or (_at(middle, types) if lane.get("type") in CAR_LANES else None)
+            for lane, limits in zip(lanes, own, strict=True)
+        ]
+        if not pieces or here != pieces[-1][1]:
+            pieces.append((begin, here))
+    return pieces
+
+
+def _sorted(limits: Iterable[tuple[float, float | None]]) -> Limits:
+    return sorted(limits, key=itemgetter(0))
+
+
+def _at(s: float, limits: Limits) -> float | None:
+    i = bisect_right(limits, s, key=itemgetter(0))
+    return limits[i - 1][1] if i else None
+
+
+def _begin_at(begin: float, lane: ET.Element) -> None:
+    """Moves the widths of a lane, a + b ds + c ds² + d ds³ from each `sOffset` on, to where it begins now."""
+    before = None
+    for width in lane.findall("width"):
+        s = float(width.attrib["sOffset"]) - begin
+        width.set("sOffset", repr(max(s, 0.0)))
+        if s <= 0.0:
+            a, b, c, d = (float(width.attrib[name]) for name in "abcd")
+            moved = (a - s * (b - s * (c - s * d)), b - s * (2 * c - s * 3 * d), c - s * 3 * d, d)
+            width.attrib |= zip("abcd", map(repr, moved), strict=True)
+            if before is not None:
+                lane.remove(before)
+            before = width
+
+
+def _link(lane: ET.Element, way: str) -> None:
+    """Links a lane to itself in the piece before or after."""
+    link = lane.find("link")
+    if link is None:
+        link = ET.SubElement(lane, "link")
+    for known in link.findall(way):
+        link.remove(known)
+    ET.SubElement(link, way, id=lane.attrib["id"])
+
+
+def _mps(speed: ET.Element | None, lost: Counter[str]) -> float | None:
+    """The limit, m/s, or None where none is known."""
+    if speed is None or (largest := speed.get("max", "undefined")) == "undefined":
+        return None
+    if largest == "no limit":
+        return NO_LIMIT_MPS
+    try:
+        mps = float(largest) * UNITS[speed.get("unit") or "m/s"]
+    except (KeyError, ValueError):
+        mps = math.nan
+    if 0.0 < mps < math.inf:
+        return mps
+    lost["limits that are no speed"] += 1
+    return None

@@ -1,0 +1,152 @@
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from risk_sac.errors import MapError
+from risk_sac.scenario.maps.convert import Converted, present_net
+from risk_sac.scenario.maps.finder import Map
+from risk_sac.scenario.maps.net import Net
+
+LINE = '<geometry s="0" x="0" y="0" hdg="0" length="900"><line/></geometry>'
+
+
+def lane(id_: int, inside: str = "", kind: str = "driving", width: str = 'a="3.5" b="0" c="0" d="0"') -> str:
+    return f'<lane id="{id_}" type="{kind}"><width sOffset="0" {width}/>{inside}</lane>'
+
+
+def section(*lanes: str, s: float = 0.0) -> str:
+    center = '<center><lane id="0" type="none"/></center>'
+    return f'<laneSection s="{s}">{center}<right>{"".join(lanes)}</right></laneSection>'
+
+
+def road(*sections: str, types: str = "", plan: str = LINE, length: float = 900.0, more: str = "") -> str:
+    lanes = f"<lanes>{''.join(sections)}</lanes>"
+    return f'<road id="1" length="{length}" junction="-1">{types}<planView>{plan}</planView>{lanes}{more}</road>'
+
+
+def kind(speed: str, s: float = 0.0) -> str:
+    return f'<type s="{s}" type="motorway">{speed}</type>'
+
+
+def read(folder: Path, content: str) -> tuple[Net, Converted]:
+    (folder / "map.xodr").write_text(f'<OpenDRIVE><header revMajor="1" revMinor="7"/>{content}</OpenDRIVE>')
+    made = present_net(folder / "map.xodr", folder)
+    return Map(made.file).net, made
+
+
+def limits(net: Net) -> list[tuple[float, list[float]]]:
+    """Where the lanes of each edge begin, and their limits from left to right."""
+    found = [
+        (edge.lanes[0].line[0][0], [round(lane.limit_mps, 2) for lane in edge.lanes[::-1]])
+        for edge in net.edges.values()
+    ]
+    return sorted((round(x, -1), mps) for x, mps in found)
+
+
+@pytest.mark.parametrize(
+    ("speed", "mps"),
+    [
+        ('<speed max="130" unit="km/h"/>', 36.11),
+        ('<speed max="25" unit="mph"/>', 11.18),
+        ('<speed max="8.33" unit="m/s"/>', 8.33),
+        ('<speed max="20"/>', 20.0),
+        ('<speed max="no limit"/>', 39.44),
+        ('<speed max="undefined"/>', 13.89),
+        ("", 13.89),
+    ],
+)
+def test_the_limit_of_a_road_is_that_of_its_lanes(tmp_path: Path, speed: str, mps: float) -> None:
+    net, made = read(tmp_path, road(section(lane(-1), lane(-2)), types=kind(speed)))
+    assert limits(net) == [(0.0, [mps, mps])]
+    assert any("without a speed limit" in warning for warning in made.warnings) == (mps == 13.89)
+
+
+def test_limits_begin_where_they_are_given_and_that_of_a_lane_is_ahead(tmp_path: Path) -> None:
+    types = kind('<speed max="30"/>') + kind('<speed max="20"/>', 400.0) + kind("", 800.0)
+    own = '<speed sOffset="100" max="36" unit="km/h"/><speed sOffset="200" max="undefined"/>'
+    content = road(
+        section(lane(-1)),
+        section(lane(-1), lane(-2, own + '<link><predecessor id="-1"/></link>'), s=300.0),
+        types=types,
+    )
+    net, _ = read(tmp_path, content)
+    expected = [
+        (0.0, [30.0]),
+        (300.0, [30.0, 30.0]),
+        (400.0, [20.0, 10.0]),
+        (500.0, [20.0, 20.0]),
+        (800.0, [13.89, 13.89]),
+    ]
+    assert limits(net) == expected
+    links = [link for links in net.onward.values() for link in links if len(net.edges[link.source.edge].lanes) == 2]
+    steps = {(link.source.index, link.target.index) for link in links}
+    assert steps == {(0, 0), (1, 1)}
+
+
+@pytest.mark.parametrize("speed", ['max="fast"', 'max="50" unit="knots"', 'max="-1"', 'max="nan"'])
+def test_a_limit_that_is_no_speed_is_told(tmp_path: Path, speed: str) -> None:
+    _, made = read(tmp_path, road(section(lane(-1)), types=kind(f"<speed {speed}/>")))
+    assert "left out, because netconvert does not read them: limits that are no speed (1)" in made.warnings
+
+
+@pytest.mark.parametrize("curvature", [0.01, -0.01])
+@pytest.mark.parametrize("by", [0.0, 1e-17, 5e-7])
+def test_a_spiral_of_nearly_constant_curvature_is_the_arc(tmp_path: Path, curvature: float, by: float) -> None:
+    turn = curvature * 150.0
+    x, y = 300.0 + math.sin(turn) / curvature, (1.0 - math.cos(turn)) / curvature
+    bend = f'<spiral curvStart="{curvature}" curvEnd="{curvature + by:.20f}"/>'
+    line = _drawn(tmp_path, bend, (x, y, turn))
+    radius = 1 / abs(curvature) + math.copysign(1.75, curvature)
+    off = [abs(math.dist(point, (300.0, 1 / curvature)) - radius) for point in line if 300.0 < point[0] < x - 1.0]
+    assert len(off) > 50
+    assert max(off) < 0.05
+
+
+@pytest.mark.parametrize(
+    "shape", ['<spiral curvStart="0" curvEnd="0"/>', '<arc curvature="0"/>', '<arc curvature="1e-17"/>']
+)
+def test_a_bend_without_curvature_is_a_line(tmp_path: Path, shape: str) -> None:
+    assert {round(y, 2) for _, y in _drawn(tmp_path, shape, (450.0, 0.0, 0.0))} == {-1.75}
+
+
+def test_a_real_spiral_stays_one(tmp_path: Path) -> None:
+    heading = [0.01 * s**2 / 300.0 for s in np.arange(0.05, 150.0, 0.1)]
+    x, y = 300.0 + 0.1 * np.cos(heading).sum(), 0.1 * np.sin(heading).sum()
+    line = _drawn(tmp_path, '<spiral curvStart="0" curvEnd="0.01"/>', (x, y, 0.75))
+    end = (x + 1.75 * math.sin(0.75), y - 1.75 * math.cos(0.75))
+    assert min(math.dist(point, end) for point in line) < 0.2
+
+
+def _drawn(folder: Path, bend: str, end: tuple[float, float, float]) -> Sequence[tuple[float, float]]:
+    """The lane of a road with a bend of 150 m between two straights of 300 m."""
+    x, y, heading = end
+    plan = (
+        '<geometry s="0" x="0" y="0" hdg="0" length="300"><line/></geometry>'
+        f'<geometry s="300" x="300" y="0" hdg="0" length="150">{bend}</geometry>'
+        f'<geometry s="450" x="{x}" y="{y}" hdg="{heading}" length="300"><line/></geometry>'
+    )
+    net, _ = read(folder, road(section(lane(-1)), plan=plan, length=750.0))
+    (edge,) = net.edges.values()
+    _, left_y = edge.lanes[0].line[0]  # netconvert moves a map
+    return [(x, y - left_y - 1.75) for x, y in edge.lanes[0].line]
+
+
+def test_what_netconvert_does_not_read_is_counted(tmp_path: Path) -> None:
+    more = (
+        '<objects><object id="5" type="crosswalk" s="9" t="0"/><object id="6" type="pole" s="9" t="0"/></objects>'
+        '<signals><signal id="7" s="9" t="0" type="274" dynamic="no" orientation="+"/></signals>'
+    )
+    _, made = read(tmp_path, road(section(lane(-1), lane(-2, kind="slipLane")), more=more))
+    told = "crosswalks (1), signals and signs (1), lanes of type slipLane (1)"
+    assert f"left out, because netconvert does not read them: {told}" in made.warnings
+
+
+def test_what_cannot_be_converted_is_refused_in_plain_words(tmp_path: Path) -> None:
+    direct = '<junction id="9" type="direct"><connection id="0" incomingRoad="1" linkedRoad="1"/></junction>'
+    with pytest.raises(MapError, match=r"^network: got junction '9' of type direct, which netconvert does not read; "):
+        read(tmp_path, road(section(lane(-1))) + direct)
+    with pytest.raises(MapError, match=r"^network: got road '1' with a missing or broken attribute: .* 'x'; "):
+        read(tmp_path, road(section(lane(-1)), types='<type s="x"/>'))
