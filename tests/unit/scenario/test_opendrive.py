@@ -86,6 +86,12 @@ def test_limits_begin_where_they_are_given_and_that_of_a_lane_is_ahead(tmp_path:
     assert steps == {(0, 0), (1, 1)}
 
 
+def test_a_lane_keeps_its_width_where_a_limit_begins_within_its_section(tmp_path: Path) -> None:
+    types = kind('<speed max="30"/>') + kind('<speed max="20"/>', 450.0)
+    net, _ = read(tmp_path, road(section(lane(-1, width='a="3" b="0.002" c="0" d="0"')), types=types))
+    assert [edge.lanes[0].width_m for edge in net.edges.values()] == pytest.approx([3.0, 3.9], abs=0.01)
+
+
 @pytest.mark.parametrize("speed", ['max="fast"', 'max="50" unit="knots"', 'max="-1"', 'max="nan"'])
 def test_a_limit_that_is_no_speed_is_told(tmp_path: Path, speed: str) -> None:
     _, made = read(tmp_path, road(section(lane(-1)), types=kind(f"<speed {speed}/>")))
