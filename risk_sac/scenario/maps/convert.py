@@ -10,13 +10,15 @@ import re
 import shutil
 import signal
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from risk_sac.errors import MapError
+from risk_sac.scenario.maps.crosswalks import crossing_options, find_crosswalks, sidewalk_options
 from risk_sac.scenario.maps.documents import FOREIGN_ROOTS, MAP_ROOTS, Document, rewritten
 from risk_sac.scenario.maps.opendrive import ready
+from risk_sac.scenario.maps.read_net import parse_net, read_tree
 from risk_sac.scenario.maps.sides import side_remarks
 from risk_sac.scenario.maps.unpack import SMALLER
 
@@ -29,7 +31,7 @@ _OSM = (
     "--tls.default-type static --sidewalks.guess --crossings.guess --walkingareas --no-turnarounds "
     "--output.street-names --osm-files"
 )
-_OPENDRIVE = "--geometry.remove --tls.default-type static --no-turnarounds --opendrive-files"
+_OPENDRIVE = "--tls.default-type static --no-turnarounds --opendrive-files"
 OPTIONS: dict[str, list[str]] = {  # by the root of a map
     "net": ["--sumo-net-file"],
     "osm": _OSM.split(),
@@ -73,11 +75,25 @@ def present_net(file: Path, folder: Path, name: str = "") -> Converted:
     if found.root in FOREIGN_ROOTS:
         left_out += side_remarks(found.file)
     if found.root == "OpenDRIVE":
-        readied = replace(found, file=folder / "readied.xml")
-        left_out += ready(found.file, readied.file)
-        found = readied
+        return Converted(net, (*left_out, *_from_opendrive(found, net, name)), others)
     said = _convert(found, net, name)
     return Converted(net, (*left_out, *remarks(said, "Warning")), others)
+
+
+def _from_opendrive(found: Document, net: Path, name: str) -> list[str]:
+    """Converts roads and crosswalks of OpenDRIVE; returns remarks."""
+    folder, walks = net.parent, find_crosswalks(found.file)
+    readied = replace(found, file=folder / "readied.xml")
+    lost = ready(found.file, readied.file, walks)
+    if not walks.count:
+        return [*lost, *remarks(_convert(readied, net, name, ["--geometry.remove"]), "Warning")]
+    options = sidewalk_options(Path(netconvert()[1]["SUMO_HOME"]) / "data" / "typemap", folder)
+    _convert(readied, net, name, options)
+    options += crossing_options(walks, parse_net(read_tree(net)), folder)
+    said = _convert(readied, net, name, [*options, "--geometry.remove"])
+    if missing := walks.count - len(parse_net(read_tree(net)).crossings):
+        lost.append(f"left out, because netconvert builds no crossings there: crosswalks ({missing})")
+    return [*lost, *remarks(said, "Warning")]
 
 
 def remarks(said: str, severity: str) -> list[str]:
@@ -112,14 +128,14 @@ def _version(attributes: Mapping[str, str]) -> tuple[int, ...]:
     return (int(told[1]), int(told[2])) if told else (0,)
 
 
-def _convert(found: Document, net: Path, name: str) -> str:
+def _convert(found: Document, net: Path, name: str, options: Sequence[str] = ()) -> str:
     """Runs netconvert in the folder of its files; returns its messages.
 
     A comma in a path would make a list.
     """
     program, environment = netconvert()
     files = [found.file.name, "--output-file", net.name, "--xml-validation", "never"]
-    command = [program, *OPTIONS[found.root], *files]
+    command = [program, *options, *OPTIONS[found.root], *files]
     try:
         done = subprocess.run(
             command, cwd=net.parent, capture_output=True, timeout=WALL_S, env=environment, check=False

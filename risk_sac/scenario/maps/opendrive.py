@@ -9,13 +9,14 @@ import math
 import xml.etree.ElementTree as ET
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from copy import deepcopy
 from itertools import pairwise
 from operator import itemgetter
 from pathlib import Path
 
 from risk_sac.errors import MapError
+from risk_sac.scenario.maps.crosswalks import Crosswalks, add_sidewalks
 
 LARGEST_SHIFT_M = 0.01  # by which an arc may leave its spiral, and a line its arc
 LEAST_PIECE_M = 1.0  # of a road between two limits
@@ -29,8 +30,13 @@ UNLIMITED = "roads without a limit"
 Limits = Sequence[tuple[float, float | None]]  # m at which one begins, and m/s; sorted
 
 
-def ready(file: Path, target: Path) -> list[str]:
+def ready(file: Path, target: Path, walks: Crosswalks) -> list[str]:
     """Writes a map for netconvert; returns remarks on what it lacks and what is lost.
+
+    Args:
+      file: the map.
+      target: for netconvert.
+      walks: where roads get sidewalks, and a lane section begins.
 
     Raises:
       MapError: netconvert could not read it.
@@ -42,7 +48,7 @@ def ready(file: Path, target: Path) -> list[str]:
             depth += 1 if event == "start" else -1
             if depth == 1 and event == "end":
                 if element.tag == "road":
-                    _repair(element, lost)
+                    _repair(element, walks, lost)
                 elif element.tag == "junction":
                     _check(element, lost)
                 output.write(ET.tostring(element))
@@ -61,15 +67,17 @@ def _check(junction: ET.Element, lost: Counter[str]) -> None:
     lost["virtual junctions"] += kind == "virtual"
 
 
-def _repair(road: ET.Element, lost: Counter[str]) -> None:
+def _repair(road: ET.Element, walks: Crosswalks, lost: Counter[str]) -> None:
     try:
         for geometry in road.iterfind("planView/geometry"):
             _draw(geometry)
-        _limit(road, lost)
+        if road.get("id") in walks.roads:
+            for section in road.iterfind("lanes/laneSection"):
+                add_sidewalks(section)
+        _cut(road, walks.at.get(road.get("id", ""), set()), lost)
     except (KeyError, ValueError) as error:
         got = f"road {road.get('id', '?')[:80]!r} with a missing or broken attribute: {error}"
         raise MapError("network", got, "what OpenDRIVE requires") from error
-    lost["crosswalks"] += sum(found.get("type", "").lower() == "crosswalk" for found in road.iter("object"))
     lost["signals and signs"] += sum(found.get("type") not in READ_SIGNALS for found in road.iter("signal"))
     lost.update(f"lanes of type {kind}" for lane in road.iter("lane") if (kind := lane.get("type")) in LOST_LANES)
 
@@ -94,15 +102,16 @@ def _draw(geometry: ET.Element) -> None:
     shape.tag, shape.attrib = ("line", {}) if is_line else ("arc", {"curvature": repr(curvature)})
 
 
-def _limit(road: ET.Element, lost: Counter[str]) -> None:
-    """Writes limits into the lanes of a road, and begins a lane section where one changes."""
+def _cut(road: ET.Element, cuts: Set[float], lost: Counter[str]) -> None:
+    """Writes limits into the lanes of a road; begins a lane section where one changes, and at cuts."""
     types = _sorted((float(kind.attrib["s"]), _mps(kind.find("speed"), lost)) for kind in road.iterfind("type"))
     lanes = road.find("lanes")
     sections = [] if lanes is None else lanes.findall("laneSection")
     starts = [float(section.attrib["s"]) for section in sections]
     unlimited = False
     for section, (start, end) in zip(sections, pairwise([*starts, float(road.attrib["length"])]), strict=True):
-        pieces = _pieces(section, [(s - start, mps) for s, mps in types], end - start, lost)
+        here = [(s - start, mps) for s, mps in types], {s - start for s in cuts}, end - start
+        pieces = _pieces(section, *here, lost)
         copies = [section, *(deepcopy(section) for _ in pieces[1:])]
         for i, (copy, (begin, limits)) in enumerate(zip(copies, pieces, strict=True)):
             for lane, mps in zip(copy.iterfind("*/lane"), limits, strict=True):
@@ -123,16 +132,16 @@ def _limit(road: ET.Element, lost: Counter[str]) -> None:
 
 
 def _pieces(
-    section: ET.Element, types: Limits, length_m: float, lost: Counter[str]
+    section: ET.Element, types: Limits, cuts: Set[float], length_m: float, lost: Counter[str]
 ) -> list[tuple[float, list[float | None]]]:
-    """Where limits of a section change, m from its start, and each lane's from there on.
+    """Where a section is cut or its limits change, m from its start, and each lane's limit from there on.
 
     A lane's own limit is ahead of the road's.
     """
     lanes = section.findall("*/lane")
     own = [_sorted((float(s.attrib["sOffset"]), _mps(s, lost)) for s in lane.iterfind("speed")) for lane in lanes]
     begins = [0.0]
-    for change in sorted({begin for limits in (types, *own) for begin, _ in limits}):
+    for change in sorted({begin for limits in (types, *own) for begin, _ in limits} | cuts):
         if begins[-1] + LEAST_PIECE_M <= change <= length_m - LEAST_PIECE_M:
             begins.append(change)
     pieces: list[tuple[float, list[float | None]]] = []
@@ -142,7 +151,7 @@ def _pieces(
             _at(middle, limits) or (_at(middle, types) if lane.get("type") in CAR_LANES else None)
             for lane, limits in zip(lanes, own, strict=True)
         ]
-        if not pieces or here != pieces[-1][1]:
+        if not pieces or begin in cuts or here != pieces[-1][1]:
             pieces.append((begin, here))
     return pieces
 

@@ -7,7 +7,7 @@ import pytest
 
 from risk_sac.errors import MapError
 from risk_sac.scenario.maps.convert import Converted, present_net
-from risk_sac.scenario.maps.finder import Map
+from risk_sac.scenario.maps.finder import Map, survey
 from risk_sac.scenario.maps.net import Net
 
 LINE = '<geometry s="0" x="0" y="0" hdg="0" length="900"><line/></geometry>'
@@ -17,14 +17,28 @@ def lane(id_: int, inside: str = "", kind: str = "driving", width: str = 'a="3.5
     return f'<lane id="{id_}" type="{kind}"><width sOffset="0" {width}/>{inside}</lane>'
 
 
-def section(*lanes: str, s: float = 0.0) -> str:
+def section(*lanes: str, s: float = 0.0, left: str = "") -> str:
     center = '<center><lane id="0" type="none"/></center>'
-    return f'<laneSection s="{s}">{center}<right>{"".join(lanes)}</right></laneSection>'
+    return f'<laneSection s="{s}"><left>{left}</left>{center}<right>{"".join(lanes)}</right></laneSection>'
 
 
-def road(*sections: str, types: str = "", plan: str = LINE, length: float = 900.0, more: str = "") -> str:
+def road(
+    *sections: str,
+    types: str = "",
+    plan: str = LINE,
+    length: float = 900.0,
+    more: str = "",
+    id_: int = 1,
+    junction: int = -1,
+) -> str:
     lanes = f"<lanes>{''.join(sections)}</lanes>"
-    return f'<road id="1" length="{length}" junction="-1">{types}<planView>{plan}</planView>{lanes}{more}</road>'
+    head = f'<road id="{id_}" length="{length}" junction="{junction}">'
+    return f"{head}{types}<planView>{plan}</planView>{lanes}{more}</road>"
+
+
+def crosswalk(*places: float) -> str:
+    objects = (f'<object id="{i}" type="crosswalk" s="{s}" t="0"/>' for i, s in enumerate(places))
+    return f"<objects>{''.join(objects)}</objects>"
 
 
 def kind(speed: str, s: float = 0.0) -> str:
@@ -142,11 +156,11 @@ def _drawn(folder: Path, bend: str, end: tuple[float, float, float]) -> Sequence
 
 def test_what_netconvert_does_not_read_is_counted(tmp_path: Path) -> None:
     more = (
-        '<objects><object id="5" type="crosswalk" s="9" t="0"/><object id="6" type="pole" s="9" t="0"/></objects>'
+        '<objects><object id="6" type="pole" s="9" t="0"/></objects>'
         '<signals><signal id="7" s="9" t="0" type="274" dynamic="no" orientation="+"/></signals>'
     )
     _, made = read(tmp_path, road(section(lane(-1), lane(-2, kind="slipLane")), more=more))
-    told = "crosswalks (1), signals and signs (1), lanes of type slipLane (1)"
+    told = "signals and signs (1), lanes of type slipLane (1)"
     assert f"left out, because netconvert does not read them: {told}" in made.warnings
 
 
@@ -156,3 +170,50 @@ def test_what_cannot_be_converted_is_refused_in_plain_words(tmp_path: Path) -> N
         read(tmp_path, road(section(lane(-1))) + direct)
     with pytest.raises(MapError, match=r"^network: got road '1' with a missing or broken attribute: .* 'x'; "):
         read(tmp_path, road(section(lane(-1)), types='<type s="x"/>'))
+
+
+SIDEWALK = {"kind": "sidewalk", "width": 'a="2" b="0" c="0" d="0"'}
+
+
+@pytest.mark.parametrize("has_sidewalks", [True, False])
+def test_a_crosswalk_amid_a_road_is_a_crossing(tmp_path: Path, has_sidewalks: bool) -> None:
+    left, right = lane(1), lane(-1)
+    if has_sidewalks:
+        left, right = lane(2, **SIDEWALK) + left, right + lane(-2, **SIDEWALK)
+    types = kind('<speed max="10"/>')
+    net, made = read(tmp_path, road(section(right, left=left), types=types, more=crosswalk(400.0, 600.0)))
+    assert [(crossing.edges, round(crossing.line[0][0])) for crossing in net.crossings] == [
+        (("1.0.00", "-1.0.00"), 400),
+        (("1.400.00", "-1.400.00"), 600),
+    ]
+    assert survey(net, ("crossing",)).fits
+    assert not any("crosswalk" in warning for warning in made.warnings)
+
+
+def test_a_crosswalk_within_a_junction_is_that_of_the_road_beside(tmp_path: Path) -> None:
+    both = section(lane(-1, LINKED.format(-1)), left=lane(1, LINKED.format(1)))
+    ends = '<link><predecessor elementType="road" elementId="1" contactPoint="end"/>{}</link>'
+    into = ends.format('<successor elementType="road" elementId="2" contactPoint="start"/>')
+    meets = '<link><{} elementType="junction" elementId="9"/></link>'
+    content = (
+        road(both, types=meets.format("successor"), plan=_straight(0, 400), length=400.0)
+        + road(both, types=into, plan=_straight(400, 20), length=20.0, id_=3, junction=9, more=crosswalk(18.0))
+        + road(both, types=meets.format("predecessor"), plan=_straight(420, 400), length=400.0, id_=2)
+        + '<junction id="9"><connection id="0" incomingRoad="1" connectingRoad="3" contactPoint="start">'
+        + '<laneLink from="-1" to="-1"/></connection></junction>'
+    )
+    net, made = read(tmp_path, content)
+    assert [(crossing.junction, set(crossing.edges)) for crossing in net.crossings] == [("9", {"-2.0.00", "2.0.00"})]
+    assert not any("crosswalk" in warning for warning in made.warnings)
+
+
+LINKED = '<link><predecessor id="{0}"/><successor id="{0}"/></link>'
+
+
+def _straight(x: float, length: float) -> str:
+    return f'<geometry s="0" x="{x}" y="0" hdg="0" length="{length}"><line/></geometry>'
+
+
+def test_a_crosswalk_that_cannot_be_a_crossing_is_counted(tmp_path: Path) -> None:
+    _, made = read(tmp_path, road(section(lane(-1)), more=crosswalk(5.0, 895.0)))
+    assert "left out, because netconvert builds no crossings there: crosswalks (2)" in made.warnings
