@@ -56,7 +56,7 @@ def ready(file: Path, target: Path, walks: Crosswalks) -> list[str]:
         output.write(b"</OpenDRIVE>\n")
     unlimited = lost.pop(UNLIMITED, 0)
     listed = ", ".join(f"{what} ({count})" for what, count in (+lost).most_common())
-    remarks = [f"without a speed limit, so that netconvert's default holds: {unlimited} roads"] if unlimited else []
+    remarks = [f"roads without a speed limit, for which netconvert's default holds: {unlimited}"] if unlimited else []
     return [*remarks, f"left out, because netconvert does not read them: {listed}"] if listed else remarks
 
 
