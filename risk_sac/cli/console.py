@@ -23,6 +23,7 @@ from rich.progress import (
 )
 from rich.table import Column, Table
 
+from risk_sac.config.spec_file import EGO_FILE, EGO_NAMES
 from risk_sac.metrics import requirement_cells
 from risk_sac.records import Adjustment, Collision, DrivenBy, EpisodeRecord, RequirementCounts, Violation
 from risk_sac.run_folder.durable import replace_file
@@ -167,7 +168,7 @@ def or_dash(value: float | None, format_: str) -> str:
 
 
 # What names an ego.
-EGO = "default, perfect, careful, a registered ego, or a YAML file with the fields of a campaign's ego"
+EGO = f"{EGO_NAMES}, or {EGO_FILE}"
 
 
 def on_one_line(text: str) -> str:
