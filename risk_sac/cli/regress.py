@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from junitparser import Error, Failure, Skipped
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 from pydantic import ValidationError
+from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 
 from risk_sac.cli.campaign_flags import named_ego
 from risk_sac.cli.console import COULD_NOT_RUN, EGO, FAILED, OK, counted, narrow_table
@@ -84,7 +84,7 @@ def cases_table(found: Regression) -> Table:
     caption = f"{counted(len(found.cases), 'failure')}: {found.counts_in_words}"
     table = narrow_table("verdict", "failure, and what happens now", caption=caption, caption_justify="left")
     for case in found.cases:
-        table.add_row(case.verdict_in_words, Text(printable(f"{case.id}: {case.name}\n  {case.reason}")))
+        table.add_row(case.verdict_in_words, escape(f"{case.id}: {case.name}\n  {case.reason}"))
     return table
 
 

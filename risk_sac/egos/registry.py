@@ -1,8 +1,8 @@
 """Lists the egos that the operator has registered; a request can only name one.
 
 Python egos are entry points of the group `risk_sac.egos`, beside the shipped ones. Remote ones are tables of the TOML
-file that `RISK_SAC_EGOS` names; README.md shows one. A Python ego's card is read from its source, so that none of its
-code runs in the server.
+file that `RISK_SAC_EGOS` names; remote/README.md shows one. A Python ego's card is read from its source, so that none
+of its code runs in the server.
 """
 
 import ast
