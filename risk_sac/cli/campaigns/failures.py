@@ -75,7 +75,7 @@ def _id_of(client: Client, campaign_id: str, named: str) -> str:
     if not named.isdecimal() and (wanted is None or wanted.run_id):
         return named
     ids = [failure.id for failure in client.failures(campaign_id, tier="raw")]
-    found = [id_ for id_ in ids if id_.rpartition("-")[2] == named or id_.endswith(f"-{wanted}")]
+    found = [id_ for id_ in ids if id_.rpartition("-")[2] == named or id_.endswith(str(wanted))]
     if len(found) != 1:
         listing = f"`risk-sac campaigns failures list {campaign_id} --raw` lists them"
         got = f"{named}, which {len(found)} failures are called" if found else f"{named}, which no failure is called"
