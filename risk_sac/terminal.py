@@ -109,7 +109,7 @@ def printable(text: str) -> str:
 
 
 def _shown(character: re.Match[str]) -> str:
-    (found,) = character[0]
+    found = character[0]
     return found if found.isprintable() or category(found) == "Zs" else json.dumps(found)[1:-1]
 
 
