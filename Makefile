@@ -51,8 +51,8 @@ examples: $(STAMP) ## write tests/exports/examples: one example for each export 
 test: lint $(CHECKERS) ## check the code and run the whole suite
 	$(PYTHON) -m pytest -n 3 --dist loadscope --no-loadscope-reorder
 
-serve: $(STAMP) ## run the service; its page is at http://127.0.0.1:8000/page/
-	RISK_SAC_HOST=127.0.0.1 RISK_SAC_PORT=8000 $(PYTHON) -m service
+serve: $(STAMP) ## run the service on RISK_SAC_HOST and RISK_SAC_PORT; by default its page is at http://127.0.0.1:8000/page/
+	$(PYTHON) -m service
 
 bench: $(STAMP) ## measure speed as ratios
 	$(PYTHON) -m pytest -m bench -s tests/benchmarks/bench_*.py

@@ -43,6 +43,7 @@ class ConfigError(RiskSacError, ValueError):
         self.got = got
         self.expected = expected
         self.remedy = remedy
+        self.others: tuple[ConfigError, ...] = ()  # what else is wrong with the same input
 
     def __str__(self) -> str:
         return self._text(self.field)
@@ -120,6 +121,10 @@ class NotFinite(RiskSacError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Returns a question that names the closest known name; empty where none is close."""
-    close = get_close_matches(name, list(known), n=1)
-    return f"did you mean {close[0]}?" if close else ""
+    """Returns a question that names the closest known name; empty where none is close.
+
+    The dashes of flags make no two names alike.
+    """
+    names = {each.lstrip("-"): each for each in known}
+    close = get_close_matches(name.lstrip("-"), names, n=1)
+    return f"did you mean {names[close[0]]}?" if close else ""

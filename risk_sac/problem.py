@@ -52,7 +52,7 @@ class Problem:
         """
         ego = pinned(spec.ego)
         family = family_named(spec.family)
-        odd = intersect(family.odd, spec.odd)
+        odd = intersect(family.odd, spec.odd, family.space)
         if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
             raise OddError(
                 "odd.dynamic.actor_kinds",

@@ -3,13 +3,17 @@
 import codecs
 import contextlib
 import io
+import json
 import os
 import re
 import sys
-from collections.abc import Callable
-from typing import IO
+from collections.abc import Callable, Iterable
+from typing import IO, Any
+from unicodedata import category
 
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+from rich.text import Text
 
 # What a terminal without Unicode shows of ours; "?" for other characters.
 ASCII = {"→": "->", "–": "-", "−": "-", "…": "...", "×": "x", "·": "-", "≤": "<=", "²": "2"} | {
@@ -21,7 +25,11 @@ ASCII = {"→": "->", "–": "-", "−": "-", "…": "...", "×": "x", "·": "-"
 
 
 class Output(Console):
-    """A console that ends no command because nothing reads it, or because foreign code has closed its stream."""
+    """A console for text of any origin.
+
+    No character of it commands the terminal. No command ends because nothing reads it, or because foreign code has
+    closed its stream.
+    """
 
     @property
     def file(self) -> IO[str]:
@@ -33,17 +41,26 @@ class Output(Console):
     def file(self, stream: IO[str]) -> None:
         Console.file.fset(self, stream)  # type: ignore[attr-defined]
 
+    def render_str(self, text: str, **style: Any) -> Text:
+        """Makes text of a string, its control and direction characters escaped."""
+        return super().render_str(printable(text), **style)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Renders text that was made elsewhere with its control and direction characters escaped, too."""
+        if isinstance(renderable, Text) and (shown := printable(renderable.plain)) != renderable.plain:
+            renderable = Text(shown, style=renderable.style)
+        return super().render(renderable, options)
+
     def on_broken_pipe(self) -> None:
         """Go on without output."""
         discard(self.file)
 
 
-# What XML 1.0 forbids, the other control characters, which a terminal would obey, and unpaired surrogates.
-_UNPRINTABLE = re.compile("[^\t\n\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_DOUBTFUL = re.compile("[^\t\n\x20-\x7e]")
 
-console = Output(highlight=False)
-notes = Output(stderr=True, highlight=False)
-errors = Output(stderr=True, highlight=False, soft_wrap=True)
+console = Output(highlight=False, emoji=False)
+notes = Output(stderr=True, highlight=False, emoji=False)
+errors = Output(stderr=True, highlight=False, emoji=False, soft_wrap=True)
 
 
 def discard(stream: IO[str]) -> None:
@@ -84,14 +101,22 @@ def flush() -> bool:
 
 
 def printable(text: str) -> str:
-    """The text without control characters, tabs and line breaks apart."""
-    return _UNPRINTABLE.sub("", text)
+    r"""Escapes control, format and direction characters as `\u202e`; tabs, line feeds and spaces stay.
+
+    The escapes are those of JSON, and so a JSON document stays the same document.
+    """
+    return _DOUBTFUL.sub(_shown, text)
+
+
+def _shown(character: re.Match[str]) -> str:
+    found = character[0]
+    return found if found.isprintable() or category(found) == "Zs" else json.dumps(found)[1:-1]
 
 
 def complain(message: str) -> None:
     """Prints what went wrong."""
     with contextlib.suppress(OSError):  # stderr may be on a full disk, too
-        errors.print(printable(message), style="red", markup=False)
+        errors.print(message, style="red", markup=False)
 
 
 def run_command(command: Callable[[], int]) -> int:

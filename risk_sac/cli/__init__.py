@@ -24,7 +24,7 @@ from risk_sac.cli import (
     understand,
 )
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
-from risk_sac.cli.parser import Parser, as_typed, example_text
+from risk_sac.cli.parser import Parser, as_typed, example_text, wrong_path
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.scenario import library
@@ -52,12 +52,15 @@ def _run(arguments: Sequence[str] | None) -> int:
         _make_absolute(options)
         status: int = options.command(options)
     except ConfigError as error:
-        complain(as_typed(error, options))
+        complain("\n".join(as_typed(each, options) for each in (error, *error.others)))
         return MISUSED
     except KeyboardInterrupt:
         complain("interrupted")
         return INTERRUPTED
     except OSError as error:
+        if wrong := wrong_path(error, options):
+            complain(str(wrong))
+            return MISUSED
         where = error.filename or vars(options).get("out") or ""
         complain(f"{where}: {error.strerror or error}".removeprefix(": "))
         status = options.on_error

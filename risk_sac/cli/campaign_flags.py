@@ -1,19 +1,22 @@
 """Flags that describe a campaign or a run, and those that name places of a map."""
 
 import argparse
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from risk_sac.cli.console import EGO
 from risk_sac.cli.parser import Parser
-from risk_sac.config import METHODS
+from risk_sac.config import METHODS, EgoConfig
 from risk_sac.config.spec_file import read_ego
+from risk_sac.egos.registry import refuse_class
 from risk_sac.errors import ConfigError
 from risk_sac.run_folder.scratch import scratch_folder
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.finder import FINDERS, Map
 
+CLASS = re.compile(r"[\w.]+:\w+")  # module:Class, which `risk_sac.egos.serve` takes and no campaign
 # Field of a budget → its flag's type, metavar and help.
 BUDGET: Mapping[str, tuple[type, str, str]] = {
     "episodes": (int, "N", "search episodes of a run (default: 300)"),
@@ -54,9 +57,16 @@ def add_ego_flag(parser: Parser) -> None:
     parser.group("scene").add_argument("--ego", metavar="EGO", help=f"vehicle under test: {EGO} (default: default)")
 
 
+def named_ego(text: str) -> EgoConfig:
+    """Reads the ego that a command line names; see `read_ego`."""
+    if CLASS.fullmatch(text) and not Path(text).exists():
+        refuse_class(text)
+    return read_ego(text)
+
+
 def ego_flag(options: argparse.Namespace) -> dict[str, Any]:
     """The ego of a run or a campaign; None where the flag was not given."""
-    return {"ego": None if options.ego is None else read_ego(options.ego).model_dump(mode="json")}
+    return {"ego": None if options.ego is None else named_ego(options.ego).model_dump(mode="json")}
 
 
 def add_prior_flag(parser: Parser, earlier: str = "the folder of an earlier run or campaign") -> None:
@@ -120,6 +130,9 @@ def families_on_map(options: argparse.Namespace) -> list[str] | None:
         if given:
             raise ConfigError(given[0], "a place without a map", "--network too")
         return None
+    for name in ("family", "families"):
+        if flags.get(name) is not None:
+            raise ConfigError(name, "it beside --network", "one of them", "a place on a map is the family")
     if flags.get("pattern") is None:
         raise ConfigError("pattern", "nothing", f"one of {', '.join(FINDERS)}")
     if (flags.get("place") is None) == (flags.get("places") is None):

@@ -23,10 +23,11 @@ from rich.progress import (
 )
 from rich.table import Column, Table
 
+from risk_sac.config.spec_file import EGO_FILE, EGO_NAMES
 from risk_sac.metrics import requirement_cells
 from risk_sac.records import Adjustment, Collision, DrivenBy, EpisodeRecord, RequirementCounts, Violation
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.terminal import Output, console, notes, printable
+from risk_sac.terminal import Output, console, notes
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 ABOVE, COULD_NOT_RUN = 1, 2  # of `risk-sac campaigns`, which gates CI jobs
@@ -167,12 +168,12 @@ def or_dash(value: float | None, format_: str) -> str:
 
 
 # What names an ego.
-EGO = "default, perfect, careful, a registered ego, or a YAML file with the fields of a campaign's ego"
+EGO = f"{EGO_NAMES}, or {EGO_FILE}"
 
 
 def on_one_line(text: str) -> str:
-    """The text without control characters, every run of white space a single space."""
-    return " ".join(printable(text).split())
+    """Returns the text with every run of white space as a single space."""
+    return " ".join(text.split())
 
 
 def counted(count: int, noun: str) -> str:

@@ -5,14 +5,14 @@ import os
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
-from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags
+from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags, named_ego
 from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, folded_table, progress_bar, say
 from risk_sac.cli.parser import Commands, add_command, add_group
 from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
-from risk_sac.config.spec_file import read_campaign, read_ego
+from risk_sac.config.spec_file import PROFILES, read_campaign
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.egos.registry import SHIPPED, cards
 from risk_sac.machine import cores
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from risk_sac.report import FinishedRun
 
 SEEDS = 2
-PROFILES: Sequence[str] = get_args(EgoConfig.model_fields["profile"].annotation)
 COLUMNS = (
     *("family", "ego", "runs", "episodes", "invalid", "contacts"),
     *("valid", "ECR (95 %)", "preventable", "PCR (95 %)", "failures"),
@@ -93,7 +92,7 @@ def _defects(options: argparse.Namespace) -> int:
 def _ladder(options: argparse.Namespace) -> int:
     defaults = {"families": ["low"], "methods": ["archive"], "seeds": list(range(SEEDS))}
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS), defaults)
-    egos = {name: read_ego(name) for name in options.egos}
+    egos = {name: named_ego(name) for name in options.egos}
     # Here, because loading what checks the settings takes seconds.
     from risk_sac.execution.evaluate import evaluate
     from risk_sac.report.page import table

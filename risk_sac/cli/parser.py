@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
 from risk_sac.cli.console import MISUSED
+from risk_sac.config import CampaignSpec
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.terminal import complain
 
@@ -66,7 +67,10 @@ class Parser(argparse.ArgumentParser):
         name = unknown[0].partition("=")[0]
         if not name.startswith("--"):
             self.error(f"{name!r} is one argument too many")
-        self.error(f"there is no flag {name}" + _sentence(did_you_mean(name, self.flags())))
+        hint, field = did_you_mean(name, self.flags()), name.removeprefix("--")
+        if not hint and "--spec" in self.flags() and field in CampaignSpec.model_fields:
+            hint = f"write {field} into a file and name it with --spec"
+        self.error(f"there is no flag {name}" + _sentence(hint))
 
     def error(self, message: str) -> NoReturn:
         """Ends the program with one line on what is wrong, and where to read on."""
@@ -150,6 +154,19 @@ def as_typed(error: ConfigError, options: argparse.Namespace) -> str:
         return str(error)
     known = f"choose {error.expected}" if error.expected != "a value" else f"see `{options.parser.prog} --help`"
     return "; ".join(filter(None, [f"{error.field} is missing", known, error.remedy]))
+
+
+def wrong_path(error: OSError, options: argparse.Namespace) -> ConfigError | None:
+    """Returns the error of an argument whose file cannot be read; None for a file that no argument names."""
+    named = {action.dest: action for action in options.parser._actions}
+    for name, value in vars(options).items():
+        values = value if isinstance(value, list) else [value]
+        if name in named and error.filename is not None and str(error.filename) in map(str, values):
+            action = named[name]
+            field = next(iter(action.option_strings), str(action.metavar))
+            got = f"{error.filename}, which cannot be read ({error.strerror})"
+            return ConfigError(field, got, "an existing file or folder", "check its path")
+    return None
 
 
 def _listed(names: Sequence[str]) -> str:

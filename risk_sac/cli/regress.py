@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 from junitparser import Error, Failure, Skipped
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 from pydantic import ValidationError
+from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 
-from risk_sac.cli.console import EGO, FAILED, OK, counted, narrow_table
+from risk_sac.cli.campaign_flags import named_ego
+from risk_sac.cli.console import COULD_NOT_RUN, EGO, FAILED, OK, counted, narrow_table
 from risk_sac.cli.parser import Commands, add_command
 from risk_sac.config import EgoConfig
-from risk_sac.config.spec_file import read_ego
 from risk_sac.config.text import read_text
+from risk_sac.egos.registry import check
 from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.failures.export.formats import FORMATS, FormatName, export, names
@@ -36,9 +37,10 @@ def add(commands: Commands) -> None:
         "regress",
         _regress,
         "play old failures against another ego",
-        more="The exit status is 1 if one of them is not fixed.",
+        more="The exit status is 1 if one of them is not fixed, and 2 if they could not be played.",
         example="regress --failures failures/ --ego careful --junit regress.xml",
     )
+    regress.set_defaults(on_error=COULD_NOT_RUN)
     failures = "bundles, folders of bundles, or folders of runs; their policy acts on after the recorded actions"
     cases = regress.group("cases")
     cases.add_argument("--failures", type=Path, nargs="+", required=True, metavar="SET", help=failures)
@@ -55,7 +57,10 @@ def add(commands: Commands) -> None:
 
 
 def _regress(options: argparse.Namespace) -> int:
-    ego = read_ego(options.ego)
+    ego = named_ego(options.ego)
+    check(ego)  # else each case would be "not comparable"
+    if options.format and options.exports is None:
+        raise ConfigError("--format", "it without --exports", "both")
     for file in filter(None, (options.out, options.junit)):
         file.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
     baseline = read_baseline(options.baseline) if options.baseline else None
@@ -79,7 +84,7 @@ def cases_table(found: Regression) -> Table:
     caption = f"{counted(len(found.cases), 'failure')}: {found.counts_in_words}"
     table = narrow_table("verdict", "failure, and what happens now", caption=caption, caption_justify="left")
     for case in found.cases:
-        table.add_row(case.verdict_in_words, Text(printable(f"{case.id}: {case.name}\n  {case.reason}")))
+        table.add_row(case.verdict_in_words, escape(f"{case.id}: {case.name}\n  {case.reason}"))
     return table
 
 

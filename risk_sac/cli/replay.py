@@ -12,7 +12,7 @@ from risk_sac.machine import cores
 from risk_sac.metrics import pooled_headline
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import TIMES, distinct_failures
-from risk_sac.terminal import complain, console, printable
+from risk_sac.terminal import complain, console
 
 
 def add(commands: Commands) -> None:
@@ -88,7 +88,7 @@ def _replay(options: argparse.Namespace) -> int:
     same &= played.signal_heads.tobytes() == bundle.signal_heads.tobytes()
     events = ", ".join(each.event for each in played.found) or "keeps every requirement that counts"
     outcome = "every array is as recorded" if same else "not as recorded"
-    say(printable(f"{manifest.id}: the ego {events}; {outcome}"))
+    say(f"{manifest.id}: the ego {events}; {outcome}")
     return OK if same else FAILED
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from rich.text import Text
+from rich.markup import escape
 
 from risk_sac.cli.console import OK, counted, narrow_table, print_answer, say
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
@@ -15,7 +15,7 @@ from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import read_results
 from risk_sac.run_folder.verified import read_verified
-from risk_sac.terminal import console, printable
+from risk_sac.terminal import console
 
 if TYPE_CHECKING:
     from risk_sac.failures.bundle import Bundle
@@ -112,7 +112,7 @@ def _minimise(options: argparse.Namespace) -> int:
     ]
     if options.out is not None:
         lines.append(f"Bundle: {options.out}")
-    say(printable("\n".join(lines)))
+    say("\n".join(lines))
     _note(asked, Studied(core=core))
     return OK
 
@@ -124,7 +124,7 @@ def _region(options: argparse.Namespace) -> int:
     if options.out is not None:
         options.out.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
     found = region(asked.bundle)
-    title = Text(printable(asked.bundle.manifest.id))
+    title = escape(asked.bundle.manifest.id)
     table = narrow_table("changed", "fail", "of", "share", "95 % interval", title=title)
     for share in found.shares:
         rate, interval = f"{share.failed / share.played:.2f}", f"{share.low:.2f} - {share.high:.2f}"
@@ -153,7 +153,7 @@ def _clusters(options: argparse.Namespace) -> int:
     table = narrow_table("failures", "distinct", "preventable", "kind; look first at")
     for cluster in found.clusters:
         first = f"{cluster.name}\n  {cluster.representative} ({cluster.grade})"
-        table.add_row(str(cluster.failures), str(cluster.distinct), str(cluster.preventable), printable(first))
+        table.add_row(str(cluster.failures), str(cluster.distinct), str(cluster.preventable), escape(first))
     kinds = f"{counted(len(found.clusters), 'kind')}; effective number of kinds (Vendi score): {found.vendi:.1f}"
     covered = f"cells of the taxonomy with a contact: {found.covered} of {found.cells}"
     print_answer(options, found, table, f"{kinds}\n{covered}")

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ValidationError
 
 from risk_sac.errors import ConfigError, did_you_mean
 
@@ -34,6 +34,20 @@ _EXPECTED = {
 Location = tuple[int | str, ...]
 
 
+UNKNOWN_FIELD = "extra_forbidden"
+
+
+def field_errors(error: ValidationError, model: type[BaseModel]) -> ConfigError:
+    """Returns the first wrong field, with the others in `others`.
+
+    Unknown names come first: a misspelt one leaves another missing.
+    """
+    found = sorted(causes(error.errors()), key=lambda item: item["type"] != UNKNOWN_FIELD)
+    first, *others = (field_error(item, model) for item in found)
+    first.others = tuple(others)
+    return first
+
+
 def causes(found: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Drops errors that repeat one inside them: a list is "too short" once its bad entries are dropped."""
     locations = [item["loc"] for item in found]
@@ -52,7 +66,7 @@ def field_error(item: Mapping[str, Any], model: type[BaseModel] | None = None) -
     if isinstance(cause, ConfigError):
         return ConfigError(f"{field}.{cause.field}".strip("."), cause.got, cause.expected, cause.remedy)
     got = "nothing" if item["type"] == "missing" else shown(item.get("input"))
-    if item["type"] == "extra_forbidden" and model is not None:
+    if item["type"] == UNKNOWN_FIELD and model is not None:
         known = _fields_at(location[:-1], model)
         return ConfigError(field, got, f"one of {', '.join(known)}", did_you_mean(str(location[-1]), known))
     template = _EXPECTED.get(item["type"])

@@ -10,12 +10,15 @@ import yaml
 from pydantic import ValidationError
 
 from risk_sac.config import IID_METHODS, Budget, CampaignSpec, EgoConfig, RunSpec
-from risk_sac.config.invalid import causes, field_error
+from risk_sac.config.invalid import field_errors
 from risk_sac.config.text import read_fields
 from risk_sac.errors import ConfigError
 
 T = TypeVar("T", RunSpec, CampaignSpec, EgoConfig)
+PROFILES: tuple[str, ...] = get_args(EgoConfig.model_fields["profile"].annotation)
+EGO_NAMES, EGO_FILE = f"{', '.join(PROFILES)}, a registered ego", "a YAML file with the fields of a campaign's ego"
 DRIVER = re.compile(r"[a-z][a-z0-9_-]{0,39}")
+RUN_DEFAULTS = {"method": "risk-sac", "seed": 0}
 CAMPAIGN_ONLY = {"family": "families", "method": "methods", "seed": "seeds"}  # a run's field -> a campaign's
 
 
@@ -27,11 +30,11 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
       flags: fields of RunSpec, those of its budget under their own names; None where a flag was not given.
     """
     given = {name: value for name, value in flags.items() if value is not None}
-    data = _with_budget({"method": "risk-sac", "seed": 0} if file is None else read_fields(file, "spec"), given)
+    data = _with_budget({} if file is None else read_fields(file, "spec"), given)
     if data.keys() & {"label", "iid", *CAMPAIGN_ONLY.values()}:
         shared = {name: value for name, value in given.items() if name not in CAMPAIGN_ONLY}
         return _only_run(data | shared, {name: given[name] for name in CAMPAIGN_ONLY if name in given})
-    return _validate(RunSpec, data | given)
+    return _validate(RunSpec, RUN_DEFAULTS | data | given)
 
 
 def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping[str, Any]) -> CampaignSpec:
@@ -56,10 +59,13 @@ def read_ego(text: str) -> EgoConfig:
     Defects follow a name, such as `idm-aeb+blind-right`. Whether they and an ego of this name exist is found out later.
     """
     name, *defects = text.split("+")
-    if name in get_args(EgoConfig.model_fields["profile"].annotation):
+    if name in PROFILES:
         return _validate(EgoConfig, {"profile": name, "defects": defects})
     if DRIVER.fullmatch(name) and not Path(text).exists():
         return _validate(EgoConfig, {"driver": name, "defects": defects})
+    if not Path(text).exists():
+        remedy = "check the path, or name an ego of `risk-sac egos list`"
+        raise ConfigError("ego", f"{text!r}, which is no file", f"{EGO_NAMES}, or {EGO_FILE}", remedy)
     return _validate(EgoConfig, read_fields(Path(text), "ego"))
 
 
@@ -97,4 +103,4 @@ def _validate(model: type[T], data: dict[str, Any]) -> T:
     try:
         return model.model_validate_json(json.dumps(data, default=str), strict=True)
     except ValidationError as error:
-        raise field_error(causes(error.errors())[0], model) from error
+        raise field_errors(error, model) from error

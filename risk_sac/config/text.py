@@ -9,6 +9,7 @@ import yaml
 
 from risk_sac.errors import ConfigError
 
+FIELDS = "fields and their values, such as `family: low`"
 MARKS = {  # the longer ones first
     codecs.BOM_UTF32_LE: "UTF-32",
     codecs.BOM_UTF32_BE: "UTF-32",
@@ -29,13 +30,14 @@ def read_text(file: Path, field: str) -> str:
     try:
         content = file.read_bytes()
     except OSError as error:
-        raise ConfigError(field, f"{file} cannot be read: {error.strerror}") from error
+        got = f"{file}, which cannot be read ({error.strerror})"
+        raise ConfigError(field, got, "a text file", "check its path") from error
     encoding = next((name for mark, name in MARKS.items() if content.startswith(mark)), "UTF-8")
     try:
         text = content.decode(encoding)
     except UnicodeDecodeError as error:
-        wrong = f"{file} is no {encoding.removesuffix('-sig')} from byte {error.start} on"
-        raise ConfigError(field, wrong, remedy="save it as UTF-8") from error
+        got = f"{file}, which is no {encoding.removesuffix('-sig')} from byte {error.start} on"
+        raise ConfigError(field, got, "a text file", "save it as UTF-8") from error
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -49,10 +51,18 @@ def read_fields(file: Path, field: str) -> dict[str, Any]:
     try:
         data = _parsed(text)
     except (yaml.YAMLError, RecursionError) as error:
-        raise ConfigError(field, f"{file} is no YAML: {str(error) or 'it is nested too deep'}") from error
+        raise ConfigError(field, f"{file}, which is no YAML{_place_of(error)}", FIELDS, "mend it there") from error
     if not isinstance(data, dict):
-        raise ConfigError(field, f"{file}, which holds a {type(data).__name__}", "the fields of a run or campaign")
+        raise ConfigError(field, f"{file}, which holds a {type(data).__name__}", FIELDS)
     return data
+
+
+def _place_of(error: Exception) -> str:
+    """Returns where a text stops being YAML, and why."""
+    if not isinstance(error, yaml.MarkedYAMLError) or error.problem_mark is None:
+        return f": {error or 'it is nested too deep'}"
+    mark = error.problem_mark
+    return f" from line {mark.line + 1}, column {mark.column + 1} on: {error.problem}"
 
 
 def _parsed(text: str) -> Any:

@@ -1,8 +1,8 @@
 """Lists the egos that the operator has registered; a request can only name one.
 
 Python egos are entry points of the group `risk_sac.egos`, beside the shipped ones. Remote ones are tables of the TOML
-file that `RISK_SAC_EGOS` names; README.md shows one. A Python ego's card is read from its source, so that none of its
-code runs in the server.
+file that `RISK_SAC_EGOS` names; remote/README.md shows one. A Python ego's card is read from its source, so that none
+of its code runs in the server.
 """
 
 import ast
@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NoReturn
 
 from pydantic import Field, ValidationError
 
@@ -78,7 +78,7 @@ def python_card(point: EntryPoint) -> EgoCard:
         declared["version"] = f"{declared.get('version', '')}+{_hash(file, '.' in point.module)}"
         return EgoCard(name=point.name, kind="python", **{"deadline_s": PYTHON_DEADLINE_S} | declared)
     except (OSError, SyntaxError, UnicodeDecodeError) as error:
-        raise _wrong(point, f"{file.name} cannot be read: {error}") from error
+        raise _wrong(point, f"{file.name}: {error}") from error
     except ValidationError as error:
         raise _wrong(point, str(field_error(error.errors()[0]))) from error
 
@@ -115,7 +115,8 @@ def card_of(name: str) -> EgoCard:
         raise ConfigError("ego.driver", f"{name!r}, whose planner is not installed", "an ego that is installed", remedy)
     registered = sorted((*points, *remotes))
     expected = f"one of {', '.join(registered)}, which are registered"
-    raise ConfigError("ego.driver", f"{name!r}", expected, did_you_mean(name, registered))
+    remedy = did_you_mean(name, registered) or "risk_sac/egos/README.md says how to register another"
+    raise ConfigError("ego.driver", f"{name!r}", expected, remedy)
 
 
 def pinned(ego: EgoConfig) -> EgoConfig:
@@ -168,6 +169,20 @@ def load(ego: EgoConfig) -> Guarded | None:
         )
     except EgoFailed as failed:
         raise _wrong(point, str(failed)) from failed
+
+
+def check(ego: EgoConfig) -> None:
+    """Loads an ego and closes it again; a ConfigError if it cannot be loaded."""
+    loaded = load(ego)
+    if loaded is not None:
+        loaded.close()
+
+
+def refuse_class(source: str) -> NoReturn:
+    """Raises a ConfigError that says why `module:Class` names no registered ego."""
+    python_card(EntryPoint(name="ego", value=source, group=GROUP))
+    got, remedy = f"the class {source}, which is not registered", f"register it as an entry point of {GROUP!r}"
+    raise ConfigError("ego.driver", got, "the name of a registered ego", f"{remedy}: see risk_sac/egos/README.md")
 
 
 def make(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
@@ -245,4 +260,5 @@ def _hash(file: Path, in_package: bool) -> str:
 
 
 def _wrong(point: EntryPoint, why: str) -> ConfigError:
-    return ConfigError("ego.driver", f"the registered ego {point.name!r} ({point.value}) cannot be used: {why}")
+    got = f"{point.value}, which cannot be used: {why}"
+    return ConfigError("ego.driver", got, "a class that can be imported", "mend or install its package")

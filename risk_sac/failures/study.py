@@ -4,6 +4,7 @@ import sys
 from contextlib import closing
 from pathlib import Path
 
+from risk_sac.config import method_of
 from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.failures.bundle import bundle_bytes, make_bundle
@@ -46,10 +47,10 @@ def answer(question: Question) -> bytes:
 
 
 def _policy(question: Question) -> FrozenPolicy | None:
-    """Of the run that the failure is of; regions and exports have no use for it."""
-    if question.subject in ("region", "export"):
+    """Returns the policy of the failure's run, if it learns one; regions and exports have no use for it."""
+    if question.subject in ("region", "export") or not method_of(question.spec.method).learns:
         return None
-    from risk_sac.failures.collect import policy_of  # here, because it loads torch, which takes seconds
+    from risk_sac.failures.collect import policy_of  # imported here: torch takes half of a study's time
 
     folder = question.series.parents[len(Path(FAILURES).parts)]
     try:

@@ -60,10 +60,15 @@ SIGNAL_OF = {"zebra": "none", "signalised": "fixed_time"}
 """Kind of crossing → the kind of signal that an ego meets there."""
 
 
-def intersect(default: Odd, user: Odd) -> Odd:
+def intersect(default: Odd, user: Odd, space: SceneSpace | None = None) -> Odd:
     """The ODD that a family's default and a user's both allow, field by field.
 
     The user's narrows the default, or widens a field of `EXTREME` up to that; a field left out keeps the default's.
+
+    Args:
+      default: of the family.
+      user: as posted.
+      space: of the family; messages state the values of the scene parameters that a field bounds, as `narrow` does.
 
     Raises:
       OddError: a field of the user's is physically senseless, or leaves nothing of what the family supports.
@@ -73,7 +78,7 @@ def intersect(default: Odd, user: Odd) -> Odd:
     return Odd(
         scenery=_with_their_signals(_intersect_branch("scenery", default, user, limits)),
         environment=_rained_on(_intersect_branch("environment", default, user, limits), user.environment),
-        dynamic=_intersect_branch("dynamic", default, user, limits),
+        dynamic=_intersect_branch("dynamic", default, user, limits, space),
     )
 
 
@@ -123,13 +128,7 @@ def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
             continue
         interval = _share(parameter, allowed) if parameter.categories else allowed
         if interval is None or interval.low > parameter.high or interval.high < parameter.low:
-            supported = parameter.categories or Interval(low=parameter.low, high=parameter.high)
-            raise _error(
-                str(parameter.odd),
-                allowed,
-                f"an overlap with {text_of(supported)}, the values of scene parameter {parameter.name!r} "
-                f"in the {space.family!r} family",
-            )
+            raise _no_scene(str(parameter.odd), allowed, space)
         bounds[parameter.name] = interval
     return space.narrow(bounds)
 
@@ -229,7 +228,7 @@ def _share(parameter: Parameter, allowed: tuple[str, ...]) -> Interval | None:
     )
 
 
-def _intersect_branch(branch: str, default: Odd, user: Odd, limits: Odd) -> Any:
+def _intersect_branch(branch: str, default: Odd, user: Odd, limits: Odd, space: SceneSpace | None = None) -> Any:
     values = {}
     usual, asked, ours = (getattr(odd, branch) for odd in (default, user, limits))
     for name in type(usual).model_fields:
@@ -238,6 +237,9 @@ def _intersect_branch(branch: str, default: Odd, user: Odd, limits: Odd) -> Any:
             values[name] = getattr(usual, name) if theirs is None else theirs
             continue
         values[name] = common = _common(supported, theirs)
+        bounded = [each for each in space.parameters if each.odd == f"{branch}.{name}"] if space else []
+        if space and not all(_common(Interval(low=each.low, high=each.high), theirs) for each in bounded):
+            raise _no_scene(f"{branch}.{name}", theirs, space)
         if not common:
             raise _error(f"{branch}.{name}", theirs, f"an overlap with {text_of(supported)}, which the family supports")
     return type(usual)(**values)
@@ -284,6 +286,19 @@ def _common(ours: Any, theirs: Any) -> Any:
         low, high = max(ours.low, theirs.low), min(ours.high, theirs.high)
         return Interval(low=low, high=high) if low <= high else None
     return tuple(kind for kind in ours if kind in theirs)
+
+
+def _no_scene(path: str, got: Any, space: SceneSpace) -> OddError:
+    """Returns the error of a field that leaves no value of a scene parameter; it states those of all that it bounds."""
+    names: dict[str, list[str]] = {}
+    for parameter in space.parameters:
+        if parameter.odd == path:
+            supported = parameter.categories or Interval(low=parameter.low, high=parameter.high)
+            names.setdefault(text_of(supported), []).append(repr(parameter.name))
+    bounds = " and with ".join(
+        f"{values}, the values of scene parameter {' and '.join(of)}" for values, of in names.items()
+    )
+    return _error(path, got, f"an overlap with {bounds} in the {space.family!r} family")
 
 
 def _error(path: str, got: Any, wanted: str, remedy: str = "") -> OddError:

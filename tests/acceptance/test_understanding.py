@@ -232,8 +232,8 @@ def test_what_is_flaky_or_of_another_net_never_counts_as_fixed(failure: Path, tm
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--ego", "nobody.yaml"], "nobody.yaml cannot be read"),
-        (["--ego", "default", "--baseline", "nothing.json"], "nothing.json cannot be read"),
+        (["--ego", "nobody.yaml"], "nobody.yaml', which is no file"),
+        (["--ego", "default", "--baseline", "nothing.json"], "nothing.json, which cannot be read"),
     ],
     ids=["no ego", "no baseline"],
 )

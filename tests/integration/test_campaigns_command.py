@@ -194,19 +194,24 @@ def test_cancel_can_wait_and_delete_removes(
 
 
 def test_list_is_newest_first_filtered_and_bounded(
-    answer: Callable[..., Any], call: Callable[..., int], capsys: pytest.CaptureFixture[str]
+    answer: Callable[..., Any],
+    call: Callable[..., int],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    hostile = "one\x1b[31m [bold]two\n\u009b"
+    hostile = "one\x1b[31m \u202e[bold]two\n\u009b"
     ids = [answer(*SUBMIT, "--label", label)["id"] for label in ("x", "x", hostile)]
     assert [each["id"] for each in answer("list", "--limit", 2)] == ids[:0:-1]
     assert [each["id"] for each in answer("list", "--label", "x", "--limit", 2)] == ids[1::-1]
     assert answer("results")["campaign_id"] == ids[-1]  # of the newest, where none is named
     assert answer("list", "--state", "failed", "--family", "dense") == []
     assert answer("list", "--label", hostile)[0]["label"] == hostile
-    assert call("list") == 0
-    printed = capsys.readouterr().out
-    assert all(word in printed for word in ("one[31m", "[bold]two"))
-    assert "\x1b" not in printed
+    monkeypatch.setenv("COLUMNS", "120")
+    for words in (["list"], ["list", "--json"]):
+        assert call(*words) == 0
+        printed = capsys.readouterr().out
+        assert all(word in printed for word in (r"one\u001b[31m", r"\u202e[bold]two"))
+        assert not {"\x1b", "\u202e"} & set(printed)
 
 
 def test_a_key_makes_submissions_one(answer: Callable[..., Any], call: Callable[..., int]) -> None:
@@ -303,6 +308,26 @@ def test_the_key_in_the_environment_opens_the_service(
     complaints = capsys.readouterr().err
     assert complaints.count("answered 401") == 2
     assert key.read_text() not in complaints
+
+
+def test_a_failure_is_named_by_its_number_too(
+    answer: Callable[..., Any], call: Callable[..., int], capsys: pytest.CaptureFixture[str]
+) -> None:
+    one = answer("submit", "--families", "low", "--methods", "random", "--episodes", 6, "--watch")["campaign_id"]
+    two = answer(*SUBMIT, "--watch")["campaign_id"]
+    for named in ("5", "search-5", "low-random-0-search-5"):
+        assert call("failures", "show", one, named) == 2
+        assert "'low-random-0-search-5' cannot be shown: no time series" in capsys.readouterr().err
+    for campaign, named, complaint in (
+        (two, "5", "got 5, which 2 failures are called; wanted one of low-random-0-search-5, low-random-1-search-5;"),
+        (two, "search-5", "got search-5, which 2 failures are called"),
+        (one, "4", "got 4, which no failure is called; wanted the id of one"),
+        (one, "15", "got 15, which no failure is called"),
+    ):
+        for command in ("show", "bundle"):
+            capsys.readouterr()
+            assert call("failures", command, campaign, named) == 2
+            assert f"FAILURE: {complaint}" in capsys.readouterr().err
 
 
 def test_a_terminal_shows_a_bar_for_each_run_at_work(service: Service) -> None:

@@ -1,6 +1,8 @@
 """What is made of a failure by playing it again, over REST: a real campaign of a real server."""
 
 import signal
+import subprocess
+import sys
 from io import BytesIO
 
 import pytest
@@ -11,6 +13,8 @@ from risk_sac import cli
 from risk_sac.client import Client, Refused
 from risk_sac.failures.bundle import read_bundle
 from risk_sac.failures.export.formats import FORMATS
+from risk_sac.failures.question import Question
+from risk_sac.run_folder.results import read_results
 
 SPEC = {"families": ["low"], "methods": ["archive"], "seeds": [3], "budget": {"episodes": 16}}
 
@@ -26,11 +30,31 @@ def campaign(serve_shared):
     return service, campaign_id, failure
 
 
+def test_a_bundle_of_a_run_that_learns_nothing_loads_no_torch(campaign, tmp_path):
+    service, campaign_id, failure = campaign
+    (results,) = service.data_dir.glob(f"campaigns/{campaign_id}/*/results.json")
+    found = read_results(results)
+    recorded = found.failure(failure["id"])
+    series = results.parent / recorded.series
+    question = Question(subject="bundle", spec=found.spec, episode=recorded.episode, series=series)
+    file = tmp_path / "question.json"
+    file.write_text(question.model_dump_json())
+    code = f"""
+import sys
+from pathlib import Path
+from risk_sac.failures.study import Question, answer
+content = answer(Question.model_validate_json(Path({str(file)!r}).read_bytes()))
+print(len(content) > 1000, "torch" in sys.modules)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "True False\n"
+
+
 def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tmp_path, monkeypatch):
     service, campaign_id, failure = campaign
     url, id_ = f"http://127.0.0.1:{service.port}", failure["id"]
     monkeypatch.setenv("RISK_SAC_URL", url)
-    asked = ["campaigns", "failures", "bundle", campaign_id, id_, "--out"]
+    asked = ["campaigns", "failures", "bundle", campaign_id, str(failure["index"]), "--out"]
     assert cli.main([*asked, str(tmp_path / "failure.npz")]) == 0
     assert cli.main(["replay", str(tmp_path / "failure.npz")]) == 0
     assert cli.main([*asked, str(tmp_path / "core.npz"), "--core"]) == 0

@@ -6,18 +6,18 @@ from pathlib import Path
 from typing import Any, get_args
 
 from rich.box import SIMPLE_HEAD
+from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 
 from risk_sac.cli.campaigns.output import add_campaign_command, add_newest_command, chosen_id
 from risk_sac.cli.console import OK, OUTCOME, in_words, offences, or_dash, outcome, print_answer, write_out
 from risk_sac.cli.failure_filters import add_filter_flags, listed, wanted
-from risk_sac.cli.parser import Commands, Parser
+from risk_sac.cli.parser import FAILURE_HELP, Commands, Parser
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
-from risk_sac.records import Collision, Violation
-from risk_sac.terminal import notes, printable
+from risk_sac.records import Collision, EpisodeId, Violation
+from risk_sac.terminal import notes
 
 
 def add(commands: Commands) -> None:
@@ -62,7 +62,25 @@ def add(commands: Commands) -> None:
 
 
 def _add_failure(parser: Parser) -> None:
-    parser.add_argument("failure", metavar="FAILURE", help="its id, as in the list")
+    parser.add_argument("failure", metavar="FAILURE", help=FAILURE_HELP)
+
+
+def _id_of(client: Client, campaign_id: str, named: str) -> str:
+    """Returns the id of the failure that an id, or the end of one, names.
+
+    Raises:
+      ConfigError: no failure has this number, or those of several runs have.
+    """
+    wanted = EpisodeId.parse(named)
+    if not named.isdecimal() and (wanted is None or wanted.run_id):
+        return named
+    ids = [failure.id for failure in client.failures(campaign_id, tier="raw")]
+    found = [id_ for id_ in ids if id_.rpartition("-")[2] == named or id_.endswith(str(wanted))]
+    if len(found) != 1:
+        listing = f"`risk-sac campaigns failures list {campaign_id} --raw` lists them"
+        got = f"{named}, which {len(found)} failures are called" if found else f"{named}, which no failure is called"
+        raise ConfigError("FAILURE", got, f"one of {', '.join(found)}" if found else "the id of one", listing)
+    return found[0]
 
 
 def look_command(service_url: str, campaign_id: str, failure_id: str) -> str:
@@ -82,20 +100,21 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _bundle(options: argparse.Namespace) -> int:
-    file = options.out or Path(f"{options.failure}.npz")
     with Client.from_environment(options.url) as client:
-        content = client.bundle(options.id, options.failure, core=options.core)
+        failure_id = _id_of(client, options.id, options.failure)
+        content = client.bundle(options.id, failure_id, core=options.core)
+    file = options.out or Path(f"{failure_id}.npz")
     write_out(file, content, "Bundle", notes)
     return OK
 
 
 def _show(options: argparse.Namespace) -> int:
-    picture = options.out or Path(f"{options.failure}.png")
-    if picture.suffix != ".png":
-        raise ConfigError("--out", f"{str(picture)!r}", "a name that ends in .png")
+    if options.out is not None and options.out.suffix != ".png":
+        raise ConfigError("--out", f"{str(options.out)!r}", "a name that ends in .png")
     with Client.from_environment(options.url) as client:
-        failure = client.failure(options.id, options.failure)
-        drawn = client.picture(options.id, options.failure, options.twin)
+        failure = client.failure(options.id, _id_of(client, options.id, options.failure))
+        drawn = client.picture(options.id, failure.id, options.twin)
+    picture = options.out or Path(f"{failure.id}.png")
     print_answer(options, failure, "\n".join(_lines(failure)))
     write_out(picture, drawn, "Drawn", notes)
     return OK
@@ -114,10 +133,10 @@ def failures_table(failures: Sequence[Episode]) -> Table:
             continue
         speeds = [worst.ego_speed_mps, *([worst.other_speed_mps] if isinstance(worst, Collision) else [])]
         table.add_row(
-            Text(printable(f"{failure.id}\n{', '.join(failure.failed or [worst.requirement])}\n{worst.signature}")),
+            escape(f"{failure.id}\n{', '.join(failure.failed or [worst.requirement])}\n{worst.signature}"),
             outcome(failure, worst),
             ", ".join(or_dash(speed, ".1f") for speed in speeds),
-            Text(printable("\n".join([in_words([failure.reason])] if failure.reason else offences(worst)))),
+            escape("\n".join([in_words([failure.reason])] if failure.reason else offences(worst))),
         )
     return table
 
@@ -134,13 +153,13 @@ def _lines(failure: Episode) -> Iterator[str]:
 
 
 def _violation(violation: Violation) -> Iterator[str]:
-    actor = f"; the {violation.other_role} {printable(violation.other_id)!r} is next" if violation.other_id else ""
+    actor = f"; the {violation.other_role} {violation.other_id!r} is next" if violation.other_id else ""
     yield (
         f"  violation  of {violation.requirement} from {or_dash(violation.time_s, '.1f')} s after the adversaries' "
         f"release, at {or_dash(violation.ego_speed_mps, '.1f')} m/s; least robustness "
         f"{or_dash(violation.robustness, '.2f')} scales{actor}"
     )
-    yield f"  kind       {printable(violation.signature)}"
+    yield f"  kind       {violation.signature}"
     yield f"  grade      {_grade(violation)}"
     if violation.fault:
         yield f"  fault      {violation.fault}"
@@ -155,10 +174,10 @@ def _contact(collision: Collision) -> Iterator[str]:
     yield (
         f"  contact    {or_dash(collision.time_s, '.1f')} s after the adversaries' release: the ego's "
         f"{collision.ego_zone} at {or_dash(collision.ego_speed_mps, '.1f')} m/s, the {collision.other_zone} of "
-        f"{collision.other_role} {printable(collision.other_id)!r} at {or_dash(collision.other_speed_mps, '.1f')} m/s"
+        f"{collision.other_role} {collision.other_id!r} at {or_dash(collision.other_speed_mps, '.1f')} m/s"
     )
     if (judgement := collision.judgement) is not None:
-        yield f"  kind       {printable(judgement.signature)}"
+        yield f"  kind       {judgement.signature}"
         yield f"  grade      {_grade(collision)}"
         if collision.severity_in_words:
             yield f"  severity   {collision.severity_in_words}"

@@ -5,6 +5,7 @@ import itertools
 import time
 from pathlib import Path
 
+from risk_sac.cli.campaign_flags import named_ego
 from risk_sac.cli.campaigns.output import (
     add_campaign_command,
     add_newest_command,
@@ -19,7 +20,6 @@ from risk_sac.cli.parser import Commands, add_command
 from risk_sac.cli.regress import cases_table, junit
 from risk_sac.cli.report import OUT, format_of
 from risk_sac.client import Client
-from risk_sac.config.spec_file import read_ego
 from risk_sac.failures.cases import Regression
 from risk_sac.records import State
 from risk_sac.terminal import complain, notes
@@ -107,7 +107,7 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def _regress(options: argparse.Namespace) -> int:
-    ego = read_ego(options.ego)
+    ego = named_ego(options.ego)
     with Client.from_environment(options.url) as client:
         regression = client.regress(options.id, ego)
         while not regression.state.final:

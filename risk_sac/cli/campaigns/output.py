@@ -1,12 +1,12 @@
-"""Campaigns and results as one line, a table, or JSON. What others wrote is shown without control characters."""
+"""Campaigns and results as one line, a table, or JSON. What others wrote stays on its line."""
 
 import argparse
 from collections.abc import Callable, Sequence
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Group
+from rich.markup import escape
 from rich.table import Table
-from rich.text import Text
 
 from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons, measured
 from risk_sac.cli.console import counted, headline, on_one_line, or_dash, requirements_table
@@ -98,7 +98,7 @@ def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
             f"{progress.episodes_done}/{progress.episodes_total}",
             str(progress.failures),
             f"{campaign.created_at.astimezone():%Y-%m-%d %H:%M}",
-            Text(on_one_line(campaign.label)),
+            escape(on_one_line(campaign.label)),
         )
     return table
 

@@ -62,6 +62,31 @@ def test_no_name_is_broken_at_a_hyphen(monkeypatch: pytest.MonkeyPatch) -> None:
         ("run --family lwo --out x", "did you mean low?"),
         ("run --family low --method archve --out x", "did you mean archive?"),
         ("run --family low --ego r175 --out x", "did you mean r157?"),
+        ("run --family low --ego nobody --out x", "--ego: got 'nobody'; wanted one of broken, "),
+        (
+            "run --family low --ego my_egos:AccLka --out x",
+            "--ego: got my_egos:AccLka, which cannot be used: there is no",
+        ),
+        ("run --family low --ego risk_sac.egos.r157:Acc --out x", "r157.py: it has no class 'Acc'"),
+        ("run --family low --ego risk_sac.egos.r157:R157 --out x", "R157, which is not registered; wanted the name of"),
+        ("run --family low --ego nowhere.yaml --out x", "--ego: got 'nowhere.yaml', which is no file; wanted default,"),
+        ("regress --failures x.npz --ego nobody", "--ego: got 'nobody'; wanted one of broken, "),
+        ("regress --failures x.npz --ego idm-aeb+blnd-right", "such as blind-right"),
+        ("regress --failures x.npz --ego careful", "--failures: got /"),
+        ("regress --failures x.npz --ego careful --format gif", "--format: got it without --exports"),
+        ("replay nowhere.npz", "BUNDLE: got /"),
+        ("places nowhere.osm", "MAP: got /"),
+        (
+            "run --network nowhere.osm --pattern crossing --place x --out x",
+            "--network: got nowhere.osm, which cannot be",
+        ),
+        ("run --family low --network x.osm --out x", "--family: got it beside --network; wanted one of them"),
+        ("evaluate --families low --network x.osm --out x", "--families: got it beside --network"),
+        (
+            "run --family low --odd x.yaml --out x",
+            "there is no flag --odd; write odd into a file and name it with --spec",
+        ),
+        ("show --learner x.yaml", "there is no flag --learner\n"),
         ("export x.npz --format openscenariox --out y", "did you mean openscenario?"),
         ("run --method archive --out x", "--family is missing; choose low, mixed or dense"),
         ("run --family low", "--out"),
@@ -81,6 +106,14 @@ def test_a_wrong_word_is_named_as_typed_beside_what_is_close(
         status = ended.code  # type: ignore[assignment]
     assert status == 2
     assert said in capsys.readouterr().err
+
+
+def test_the_methods_of_the_help_are_those_of_the_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "--family", "low", "--method", "foo", "--out", "x"]) == 2
+    wanted = re.findall(r"'([\w-]+)'", capsys.readouterr().err)
+    told = re.search(r"--method NAME\s+one of (.*?) \(default", COMMANDS["risk-sac run"].format_help(), re.DOTALL)
+    assert told is not None
+    assert re.findall(r"[\w-]+", told[1]) == wanted
 
 
 def test_a_flag_may_be_shortened_and_words_after_two_dashes_are_no_flags() -> None:

@@ -70,7 +70,10 @@ def test_flags_change_what_the_runs_of_a_campaign_share(tmp_path: Path) -> None:
         ),
         ("families: [low, low]", "families", "wanted each value once"),
         ("[1, 2]", "spec", "holds a list"),
-        ("family: [", "spec", "is no YAML"),
+        ("family: [", "spec", "spec.yaml, which is no YAML from line 1, column 10 on: expected"),
+        ("family: low\nmethod: a: b", "spec", "spec.yaml, which is no YAML from line 2, column 10 on: mapping"),
+        ("family: low\nbuget: {episodes: 5}", "buget", "did you mean budget?"),
+        ("famly: low\nseed: 0", "famly", "did you mean family?"),
         ("family: 2020-01-01\nmethod: sac\nseed: 0", "family", "2020"),
     ],
 )
@@ -81,8 +84,25 @@ def test_wrong_file_names_the_field(tmp_path: Path, text: str, field: str, messa
     assert message in str(raised.value)
 
 
+def test_all_that_is_wrong_is_told_and_unknown_names_come_first(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError) as raised:
+        read_spec(yaml_file(tmp_path, "seed: x\nbuget: {episodes: 5}\nmetod: sac\n"), FLAGS)
+    assert [each.field for each in (raised.value, *raised.value.others)] == ["buget", "metod", "family", "seed"]
+    with pytest.raises(ConfigError) as raised:
+        read_campaign(yaml_file(tmp_path, "seeds: [-1]\nlabl: x\n"), CAMPAIGN_FLAGS, DEFAULTS)
+    assert [each.field for each in (raised.value, *raised.value.others)] == ["labl", "seeds[0]"]
+
+
+def test_a_run_file_needs_a_family_alone(tmp_path: Path) -> None:
+    spec = read_spec(yaml_file(tmp_path, "family: low\nbudget: {episodes: 7}\n"), FLAGS)
+    assert spec == read_spec(None, FLAGS | {"family": "low", "episodes": 7})
+
+
 def test_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"nowhere\.yaml cannot be read"):
+    with pytest.raises(
+        ConfigError,
+        match=r"got .*nowhere\.yaml, which cannot be read \(No such file.*; wanted a text file; check its path",
+    ):
         read_spec(tmp_path / "nowhere.yaml", FLAGS)
 
 

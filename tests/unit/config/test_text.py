@@ -60,11 +60,13 @@ def test_a_byte_order_mark_and_other_ends_of_lines_change_nothing(name: str, enc
 def test_another_encoding_is_one_line_that_says_what_to_do(name: str, tmp_path: Path) -> None:
     file = tmp_path / "latin.yaml"
     file.write_bytes("label: Straße\n".encode("latin-1"))
-    with pytest.raises(ConfigError, match=r"latin\.yaml is no UTF-8 from byte 11 on; save it as UTF-8"):
+    with pytest.raises(
+        ConfigError, match=r"latin\.yaml, which is no UTF-8 from byte 11 on; wanted a text file; save it as UTF-8"
+    ):
         READERS[name][1](file)
 
 
 @pytest.mark.parametrize("name", READERS)
 def test_what_cannot_be_read_is_one_line(name: str, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="cannot be read: Is a directory"):
+    with pytest.raises(ConfigError, match=r"which cannot be read \(Is a directory\)"):
         READERS[name][1](tmp_path)

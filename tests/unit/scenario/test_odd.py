@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from risk_sac.config import DynamicElements, Environment, Interval, Odd, Scenery
 from risk_sac.errors import OddError
 from risk_sac.risk.stl import Monitor
+from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS, intersect, narrow, requirements_from_odd, widest
 from risk_sac.scenario.space import Parameter, SceneSpace
 
@@ -186,6 +187,24 @@ def test_an_odd_that_empties_the_space_names_the_parameter() -> None:
     with pytest.raises(OddError, match=r"\[19, 20\]; wanted an overlap with \[5, 18\].*'lead_speed_mps'") as caught:
         narrow(SPACE, odd)
     assert caught.value.field == "odd.dynamic.vehicle_speed_mps"
+
+
+@pytest.mark.parametrize(("low", "high"), [(4, 6), (2.5, 3), (3, 3)])
+def test_one_bound_is_stated_of_a_field_that_bounds_a_scene_parameter(low: float, high: float) -> None:
+    mixed = FAMILIES["mixed"]
+    user = Odd(dynamic=DynamicElements(pedestrian_speed_mps=interval(low, high)))
+    expected = "an overlap with [0, 2], the values of scene parameter 'pedestrian_speed_mps' in the 'mixed' family"
+    with pytest.raises(OddError) as caught:
+        intersect(mixed.odd, user, mixed.space)
+    assert (caught.value.got, caught.value.expected) == (f"[{low:g}, {high:g}]", expected)
+    assert intersect(mixed.odd, Odd(dynamic=DynamicElements(pedestrian_speed_mps=interval(2, 6))), mixed.space)
+
+
+def test_the_parameters_of_one_field_are_named_together() -> None:
+    low = FAMILIES["low"]
+    user = Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(19, 60)))
+    with pytest.raises(OddError, match="'lead_speed_mps' and 'left_speed_mps' and 'right_speed_mps' in the 'low'"):
+        intersect(low.odd, user, low.space)
 
 
 def test_requirements_follow_the_odd() -> None:
