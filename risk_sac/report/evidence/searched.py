@@ -205,7 +205,7 @@ def _told(run: FinishedRun, record: EpisodeRecord) -> Iterator[str]:
 def _contact(hit: Collision) -> str:
     conflict = f"; {began(hit, hit.judgement)}" if hit.judgement else ""
     bad = f"; {hit.severity_in_words}" if hit.severity_in_words else ""
-    return f"touches {hit.other_id}, {known(hit)}{conflict}; ego's impact speed {hit.ego_speed_mps:.1f} m/s{bad}"
+    return f"touches {hit.other_id}, {known(hit)}{conflict}; ego's speed {hit.ego_speed_mps:.1f} m/s{bad}"
 
 
 def _violation(violation: Violation) -> str:
