@@ -107,9 +107,9 @@ def _comparison(methods: Sequence[MethodPower], runs: Sequence[Run]) -> str:
         expected[method.method] = method_power(method.method, budgets, runs).expected
     spent = " and ".join(f"{steps:,} environment steps in {family}" for family, steps in limits.items())
     return (
-        f"All of these methods were measured with {len(shared)} known defects, within {spent}. "
+        f"On equal terms: all of these methods were measured with {len(shared)} known defects, within {spent}. "
         f"Of these they detect on average: {', '.join(f'{name} {value:.3g}' for name, value in expected.items())}. "
-        "The counts below are out of all defects that each method was measured with: do not compare them."
+        "The counts below are of each method's own budget and all of its defects: do not compare them."
     )
 
 

@@ -76,8 +76,8 @@ def test_methods_are_compared_by_what_all_of_them_were_measured_with() -> None:
     found = power_of(spec, [], runs)
     assert [len(each.defects) for each in found.methods] == [2, 1], "with different defects"
     assert found.comparison.startswith(
-        "All of these methods were measured with 1 known defects, within 5,000 environment steps in low. "
-        "Of these they detect on average: archive 0.5, random 0.5. "
+        "On equal terms: all of these methods were measured with 1 known defects, "
+        "within 5,000 environment steps in low. Of these they detect on average: archive 0.5, random 0.5. "
     )
     assert found.lines[0] == found.comparison
     assert power_of(spec.model_copy(update={"methods": ("archive", "sac")}), [], runs).comparison == ""

@@ -2,6 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useContext, useEffect, useState } from "preact/hooks";
+import { setting } from "../../ui/text";
 import { FormContext, isWithin, useField, type Wrong } from "./form";
 import { numbersOf, numbersText } from "./numbers";
 import type { Field, Json, Shape, Values } from "./schema";
@@ -136,8 +137,8 @@ function Leaf({ field, path }: { field: Field; path: Path }) {
 function boundsOf(shape: Shape): string {
   if (shape.kind !== "number") return "";
   const { low, high } = shape;
-  if (Number.isFinite(low) && Number.isFinite(high)) return `${low} to ${high > 1e6 ? high.toExponential().replace("+", "") : high}.`;
-  return Number.isFinite(low) ? `At least ${low}.` : "";
+  if (Number.isFinite(low) && Number.isFinite(high)) return `${setting(low)} to ${high > 1e6 ? high.toExponential().replace("+", "") : setting(high)}.`;
+  return Number.isFinite(low) ? `At least ${setting(low)}.` : "";
 }
 
 interface Controlled {
@@ -168,6 +169,7 @@ type NumberShape = Extract<Shape, { kind: "number" }>;
 type Numbered = Omit<Controlled, "shape" | "value"> & { shape: NumberShape; value: number | null };
 
 export function NumberInput({ id, shape, value, change, more }: Numbered) {
+  const [typed, setTyped] = useState({ text: "", number: null as number | null }); // its digits stay as they were written
   const bounds = { min: Number.isFinite(shape.low) ? shape.low : undefined, max: Number.isFinite(shape.high) ? shape.high : undefined };
   return (
     <input
@@ -175,8 +177,12 @@ export function NumberInput({ id, shape, value, change, more }: Numbered) {
       type="number"
       {...bounds}
       step={shape.integer ? 1 : "any"}
-      value={value ?? ""}
-      onInput={({ currentTarget: { valueAsNumber: number } }) => change(Number.isFinite(number) ? number : null)}
+      value={value === null ? "" : value === typed.number ? typed.text : setting(value)}
+      onInput={({ currentTarget: { value: text, valueAsNumber } }) => {
+        const number = Number.isFinite(valueAsNumber) ? valueAsNumber : null;
+        setTyped({ text, number });
+        change(number);
+      }}
       {...more}
     />
   );
