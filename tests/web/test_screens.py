@@ -35,7 +35,7 @@ def plots(page: Page) -> None:
 
 
 def form(page: Page) -> None:
-    for title in ("Ego", "Operational design domain", "Requirements", "Learner", "Agent"):
+    for title in ("Defects", "Delay and sight", "Operational design domain", "Requirements", "Learner", "Agent"):
         group = page.locator(f"details.group:has(> summary > .group-title:text-is('{title}'))")
         group.locator("summary").first.click()
     page.get_by_role("button", name="Add a requirement").click()

@@ -1,5 +1,7 @@
 /** Numbers and times in words; what is unknown is a dash. */
 
+import type { Body } from "../api/types";
+
 export function number(value: number | null | undefined, digits = 2): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   return value.toFixed(digits).replace(/^-(?=[0.]*$)/, ""); // no minus before a zero
@@ -39,6 +41,11 @@ export function seconds(value: number | null | undefined): string {
   if (whole < 3600) return `${Math.floor(whole / 60)} min ${whole % 60} s`;
   const minutes = Math.round(whole / 60);
   return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+}
+
+/** What drives the ego: a registered driver, or a profile of SUMO's with its model. */
+export function egoWords({ profile, car_following, driver }: Body<"Driver">): string {
+  return driver ?? `${profile}, ${car_following}`;
 }
 
 /** `red_light` -> `red light`. */

@@ -3,7 +3,7 @@
 import { Fragment, type ComponentChildren } from "preact";
 import { ended } from "../../api/ended";
 import { address } from "../../router";
-import { count, headlineWords, moment, percent, seconds } from "../../ui/text";
+import { count, egoWords, headlineWords, moment, percent, seconds } from "../../ui/text";
 import type { Listed } from "./listed";
 import { clicked, type Column, type Order } from "./order";
 import { Sparkline } from "./sparkline";
@@ -148,7 +148,7 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
         <Several names={campaign.methods} />
       </td>
       <td data-head="Ego" class="wraps">
-        {ego.profile} <span class="faint">{ego.car_following}</span>
+        {egoWords(ego)}
       </td>
       <td data-head="Episodes">
         <Bar done={progress.episodes_done} total={progress.episodes_total} name={nameOf(campaign)} />

@@ -234,10 +234,12 @@ interface Offered {
   /** Those that are shown first; the others are folded away. Without it all are shown. */
   first?: readonly string[];
   help?: string;
+  /** Called when one was chosen or dropped. */
+  changed?: () => void;
 }
 
 /** Some of a few names, each with a box. */
-export function Choices({ field, path, abouts = {}, costs = {}, first, help }: Offered) {
+export function Choices({ field, path, abouts = {}, costs = {}, first, help, changed }: Offered) {
   const { id, value, change, wrong } = useField<string[]>(path, true);
   const offered = field.shape.kind === "list" && field.shape.item.kind === "choice" ? field.shape.item.options : [];
   const options = [...new Set([...offered, ...value])]; // a clone may have what a form does not offer: a place of a map
@@ -256,7 +258,10 @@ export function Choices({ field, path, abouts = {}, costs = {}, first, help }: O
         aria-label={option}
         aria-describedby={abouts[option] ? `${id}-${option}` : undefined}
         checked={value.includes(option)}
-        onChange={() => change(toggle(option))}
+        onChange={() => {
+          change(toggle(option));
+          changed?.();
+        }}
       />
       <span>
         <b>{option}</b>
