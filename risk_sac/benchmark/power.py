@@ -147,8 +147,8 @@ def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequ
     families = ", ".join(family for family in budgets if any(each.family == family for each in found))
     about = f"{'at least ' if at_least else ''}{expected:.3g} on average"
     sentence = (
-        f"Of {len(found)} known defects that it was measured with in {families}, this budget detects {about}: "
-        f"{len(most)} in most seeds, {len(once)} at least once; never found: {', '.join(never) or 'none'}."
+        f"Of {len(found)} known defects that it was measured with in {families}, this budget detects {about}; "
+        f"never found: {', '.join(never) or 'none'}."
     )
     return MethodPower(
         method=method,
