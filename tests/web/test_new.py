@@ -267,7 +267,7 @@ def test_an_ego_is_chosen_by_name_with_known_faults(page_at: Callable[..., Page]
     driver.select_option("idm-aeb")
     opened(page, "Defects")
     offered = {each["name"]: each["sentence"] for each in known["defects"] if each["kind"] != "sumo"}
-    cards = page.get_by_role("group", name="Known faults").locator(".choice-card")
+    cards = page.get_by_role("group", name="Defects").locator(".choice-card")
     expect(cards.locator("b")).to_have_text([*offered])
     expect(cards.filter(has_text="weak-brakes")).to_contain_text(offered["weak-brakes"])
     page.get_by_role("checkbox", name="weak-brakes", exact=True).check()

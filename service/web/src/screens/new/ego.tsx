@@ -104,9 +104,9 @@ function Defects({ field, egos }: { field: Field; egos: Egos }) {
   const shape: Shape = { kind: "list", item: { kind: "choice", options: fit.map(({ name }) => name) }, least: 0, most: Infinity };
   const abouts = Object.fromEntries(fit.map(({ name, sentence, families }) => [name, `${sentence} In ${families.join(", ")}.`]));
   return (
-    <Group title="Defects" about={field.about} path={["ego", "defects"]} changed={chosen > 0} open={chosen > 0}>
+    <Group title="Defects" about="Known faults to plant into the ego." path={["ego", "defects"]} changed={chosen > 0} open={chosen > 0}>
       {fit.length + chosen > 0 ? (
-        <Choices field={{ ...field, title: "Known faults", shape }} path={["ego", "defects"]} abouts={abouts} changed={() => setVersion(null)} />
+        <Choices field={{ ...field, shape }} path={["ego", "defects"]} abouts={abouts} changed={() => setVersion(null)} />
       ) : (
         <p class="help">A remote ego takes none: it runs in a process of its own.</p>
       )}
