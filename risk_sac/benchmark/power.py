@@ -107,9 +107,9 @@ def _comparison(methods: Sequence[MethodPower], runs: Sequence[Run]) -> str:
         expected[method.method] = method_power(method.method, budgets, runs).expected
     spent = " and ".join(f"{steps:,} environment steps in {family}" for family, steps in limits.items())
     return (
-        f"All of these methods were measured with {len(shared)} known defects, within {spent}. "
+        f"On equal terms: all of these methods were measured with {len(shared)} known defects, within {spent}. "
         f"Of these they detect on average: {', '.join(f'{name} {value:.3g}' for name, value in expected.items())}. "
-        "The counts below are out of all defects that each method was measured with: do not compare them."
+        "The counts below are of each method's own budget and all of its defects: do not compare them."
     )
 
 
@@ -147,8 +147,8 @@ def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequ
     families = ", ".join(family for family in budgets if any(each.family == family for each in found))
     about = f"{'at least ' if at_least else ''}{expected:.3g} on average"
     sentence = (
-        f"Of {len(found)} known defects that it was measured with in {families}, this budget detects {about}: "
-        f"{len(most)} in most seeds, {len(once)} at least once; never found: {', '.join(never) or 'none'}."
+        f"Of {len(found)} known defects that it was measured with in {families}, this budget detects {about}; "
+        f"never found: {', '.join(never) or 'none'}."
     )
     return MethodPower(
         method=method,

@@ -30,6 +30,8 @@ class Progress(Record):
     """The distinct ones among them; sum over the runs."""
     headline_candidates: int = 0
     """Those without minor contacts."""
+    headline_waiting: int = 0
+    """Candidates in runs that were not replayed yet."""
     window_ecr: Real
     """ECR over each run's newest 100 episodes: mean over the runs at work, or all once none is; without
     controls, unless there is nothing else."""

@@ -172,7 +172,7 @@ class Collision(Violated):
     other_zone: str
     """The same on the other body."""
     ego_speed_mps: Real
-    """The ego's impact speed."""
+    """The ego's own speed at the contact."""
     other_speed_mps: Real
     relative_speed_mps: Real
     """The closing speed: of either body as seen from the other."""
@@ -235,11 +235,8 @@ class Collision(Violated):
 
     @property
     def event(self) -> str:
-        """Describes the ego's contact: "touches lead with an impact speed of 9.0 m/s".
-
-        The speed is the ego's own.
-        """
-        return f"touches {self.other_id} with an impact speed of {self.ego_speed_mps:.1f} m/s"
+        """Describes the ego's contact: "touches lead at a closing speed of 9.0 m/s"."""
+        return f"touches {self.other_id} at a closing speed of {self.relative_speed_mps:.1f} m/s"
 
     @property
     def signature(self) -> str:

@@ -34,8 +34,10 @@ def progress(campaign: StoredCampaign, workers: int) -> Progress:
     sums = {name: sum(getattr(run, name) for run in runs) for name in OF_ALL}
     sums |= {name: sum(getattr(run, name) for run in searches) for name in OF_SEARCHES}
     means = {name: _mean([getattr(metrics, name) for metrics in present]) for name in AVERAGED}
+    waiting = sum(run.headline_candidates for run in searches if run.metrics is None or run.metrics.headline is None)
     eta = 0.0 if campaign.state.final else eta_s(runs, campaign.spec, workers)
-    return Progress.model_validate(sums | means | {"headline": campaign.headline, "eta_s": eta})
+    rest = {"headline": campaign.headline, "headline_waiting": waiting, "eta_s": eta}
+    return Progress.model_validate(sums | means | rest)
 
 
 def _present(runs: Sequence[StoredRun]) -> list[RunMetrics]:

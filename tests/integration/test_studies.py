@@ -99,7 +99,7 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
     assert default["series"] == own["series"], "the failure's own ego"
     assert default["collision"] == own["collision"]
     hit = own["collision"]
-    assert default["outcome"] == f"touches {hit['other_id']} with an impact speed of {hit['ego_speed_mps']:.1f} m/s"
+    assert default["outcome"] == f"touches {hit['other_id']} at a closing speed of {hit['relative_speed_mps']:.1f} m/s"
     assert idle["series"]["ids"] == own["series"]["ids"]
     assert idle["series"]["x_m"][0] == own["series"]["x_m"][0], "they begin alike"
     assert (idle["collision"] is None) == (idle["outcome"] == "no contact")

@@ -27,6 +27,11 @@ if EXECUTABLE:
     expect.set_options(timeout=LONG_MS)
 AXE = ROOT / "service" / "web" / "node_modules" / "axe-core" / "axe.min.js"
 NET = Path(sumo_nets.__path__[0]) / "dense" / "dense.net.xml"
+# Numbers with more than five decimals, in texts and in fields.
+UNROUNDED = """() => {
+    const shown = [document.body.innerText, ...[...document.querySelectorAll("input")].map(({ value }) => value)];
+    return shown.flatMap((text) => text.match(/\\d+\\.\\d{6,}/g) ?? []);
+}"""
 HOSTILE = "<img src=x onerror=alert(1)> a very long label " + "x" * 100
 CAMPAIGN = {
     "label": "night <b>7</b>",

@@ -53,7 +53,7 @@ def test_a_row_says_what_the_api_says(
     expect(cells.nth(2)).to_have_text("succeeded")
     expect(cells.nth(3)).to_have_text("low, mixed")
     expect(cells.nth(4)).to_have_text("archive")
-    expect(cells.nth(5)).to_have_text("default Krauss")
+    expect(cells.nth(5)).to_have_text("default, Krauss")
     expect(cells.nth(6)).to_have_text(str(said["progress"]["episodes_total"]))
     expect(cells.nth(7)).to_contain_text(f"{100 * said['progress']['window_ecr']:.1f} %")
     for place, name in enumerate(("headline", "distinct_failures", "distinct_preventable"), start=8):

@@ -10,7 +10,22 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from tests.server import Service
+from tests.web.conftest import PHONE
 
+DRAWN = "() => [...document.querySelectorAll('.cards li')].map(({ dataset }) => dataset.at)"
+# Text that its element cuts, and cards that reach into another.
+CUT = """() => {
+    const cards = [...document.querySelectorAll(".cards li")];
+    const cut = cards.flatMap((card) => [...card.querySelectorAll("*")]).filter((each) => {
+        const { overflowX, webkitLineClamp } = getComputedStyle(each);
+        const over = each.scrollHeight > each.clientHeight + 1 || each.scrollWidth > each.clientWidth + 1;
+        return each.clientWidth > 0 && over && (overflowX !== "visible" || webkitLineClamp !== "none");
+    });
+    const boxes = cards.map((card) => card.getBoundingClientRect());
+    const meet = (a, b) => a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 1 && b.top < a.bottom - 1;
+    const overlapping = boxes.some((a, i) => boxes.some((b, k) => i < k && meet(a, b)));
+    return [...cut.map(({ outerHTML }) => outerHTML.slice(0, 200)), ...(overlapping ? ["cards overlap"] : [])];
+}"""
 HOSTILE = '"><img src=x onerror="window.hacked=1"></script><script>window.hacked=1</script>'
 
 
@@ -321,6 +336,30 @@ def test_the_pictures_have_a_legend_and_signals(screen: Callable[..., Page], ser
     )
     assert any(lamp in picture for lamp in lamps)
     assert re.search(r"<text[^>]*>\d+ m</text>", picture)
+
+
+@pytest.mark.parametrize("width", [372, PHONE["width"], 1440])
+@pytest.mark.parametrize("long", [False, True])
+def test_no_card_cuts_what_it_says(
+    new_page: Callable[..., Page], service: Service, campaign: str, table: dict[str, Any], width: int, long: bool
+) -> None:
+    page = new_page(viewport={"width": width, "height": 900}, allowed=("404",))
+    if long:
+        size = len(table["ids"])
+        told = table | {
+            "requirement": ["mine_" + 35 * "x"] * size,
+            "striker": ["a striker with a long name " * 4] * size,
+        }
+        told["kinds"] = [{**kind, "name": f"{kind['name']}, and all that it did before"} for kind in table["kinds"]]
+        page.route("**/failure-table*", lambda route: route.fulfill(json=told))
+    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures?every=1")
+    wait_for(page, len(valid_of(table)))
+    seen: set[str] = set()
+    while f"{len(valid_of(table)) - 1}" not in seen:  # only cards near the view are in the document
+        page.wait_for_function("() => new Promise((done) => requestAnimationFrame(() => done(true)))")
+        seen |= set(page.evaluate(DRAWN))
+        assert page.evaluate(CUT) == []
+        page.evaluate("scrollBy(0, 500)")
 
 
 def test_hostile_text_is_shown_and_runs_nothing(

@@ -11,8 +11,9 @@ from playwright.sync_api import Locator, Page, Request, Route, expect
 
 from risk_sac.config import CampaignSpec
 from tests.server import Service
-from tests.web.conftest import CAMPAIGN
+from tests.web.conftest import CAMPAIGN, UNROUNDED
 
+PROFILES = ("default", "perfect", "careful", "defensive")
 HOSTILE = "</pre><script>alert('1')</script> yes: \"no\" #\\ \u2028"
 
 
@@ -245,11 +246,64 @@ def test_methods_that_most_need_come_first_with_their_cost_and_the_rest_is_folde
 
 def test_a_perfect_ego_has_neither_delay_nor_sensor(page_at: Callable[..., Page]) -> None:
     page = page_at("new")
-    ego = opened(page, "Ego")
+    opened(page, "Delay and sight")
+    ego = page.get_by_role("region", name="Ego")
     expect(ego.get_by_label("Reaction time")).to_be_visible()
-    ego.get_by_label("Profile").select_option("perfect")
+    ego.get_by_label("Driver", exact=True).select_option("perfect")
     expect(ego.get_by_label("Reaction time")).to_have_count(0)
     assert curl_body(page)["ego"] == {"profile": "perfect"}
+
+
+def test_an_ego_is_chosen_by_name_with_known_faults(page_at: Callable[..., Page], service: Service) -> None:
+    known = service.client.get("/v1/egos").json()
+    page = page_at("new")
+    small(page, "with a fault")
+    driver = page.get_by_label("Driver", exact=True)
+    names = [each["name"] for each in known["items"]]
+    expect(driver.locator("optgroup option")).to_have_text(
+        [*filter(PROFILES.__contains__, names), *(each for each in names if each not in PROFILES)]
+    )
+    expect(page.locator("#field-ego\\.profile-help")).to_have_text(known["items"][names.index("default")]["summary"])
+    driver.select_option("idm-aeb")
+    opened(page, "Defects")
+    offered = {each["name"]: each["sentence"] for each in known["defects"] if each["kind"] != "sumo"}
+    cards = page.get_by_role("group", name="Defects").locator(".choice-card")
+    expect(cards.locator("b")).to_have_text([*offered])
+    expect(cards.filter(has_text="weak-brakes")).to_contain_text(offered["weak-brakes"])
+    page.get_by_role("checkbox", name="weak-brakes", exact=True).check()
+    assert curl_body(page)["ego"] == {"driver": "idm-aeb", "defects": ["weak-brakes"]}
+    page.get_by_role("button", name="Start the campaign").click()
+    expect(page).to_have_url(re.compile("#/campaigns/c[0-9a-f]+$"))
+    expect(page.locator(".posted")).to_contain_text("idm-aeb, with weak-brakes")
+    page.get_by_role("link", name="Clone").click()
+    expect(page.get_by_label("Driver", exact=True)).to_have_value("driver idm-aeb")
+    page.get_by_label("Driver", exact=True).select_option("careful")
+    assert curl_body(page)["ego"] == {"profile": "careful"}, "nothing of the other driver is left"
+
+
+def test_an_ego_of_ones_own_is_named_and_refused_beside_the_name(page_at: Callable[..., Page]) -> None:
+    page = page_at("new", allowed=("422",))
+    page.get_by_label("Driver", exact=True).select_option("another, by its name")
+    page.get_by_label("Name of the ego").fill("my-planner")
+    assert curl_body(page)["ego"] == {"driver": "my-planner"}
+    field = page.locator(".field", has=page.get_by_label("Name of the ego"))
+    expect(field.get_by_role("alert")).to_contain_text("my-planner")
+    page.get_by_label("Name of the ego").fill("rss")
+    expect(page.get_by_text("The service would take it")).to_be_visible()
+
+
+def test_numbers_have_as_many_digits_as_help(page_at: Callable[..., Page]) -> None:
+    page = page_at("new")
+    for title in ("Delay and sight", "Operational design domain", "Requirements", "Learner"):
+        opened(page, title)
+    angle = page.get_by_label("Field of view")
+    expect(angle).to_have_value("6.283")
+    expect(page.locator(".field", has=angle)).to_contain_text("0.01 to 6.283.")
+    assert page.evaluate(UNROUNDED) == []
+    assert "ego" not in curl_body(page)
+    angle.fill("3.141592653589")
+    expect(angle).to_have_value("3.141592653589")
+    assert curl_body(page)["ego"] == {"sensor": {"field_of_view_rad": 3.141592653589}}
 
 
 def test_an_unknown_campaign_to_clone_is_told(page_at: Callable[..., Page]) -> None:

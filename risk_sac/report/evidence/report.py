@@ -43,7 +43,7 @@ def report(comparison: Comparison, evidence: Evidence, origin: Origin, power: Po
         funnel(comparison),
         clusters(comparison, origin),
         regression(origin),
-        worth(power),
+        worth(power, any(cell.failures for cell in comparison.cells)),
         bounds(comparison, evidence),
         coverage(evidence),
         _limits(comparison),

@@ -205,7 +205,7 @@ def _told(run: FinishedRun, record: EpisodeRecord) -> Iterator[str]:
 def _contact(hit: Collision) -> str:
     conflict = f"; {began(hit, hit.judgement)}" if hit.judgement else ""
     bad = f"; {hit.severity_in_words}" if hit.severity_in_words else ""
-    return f"touches {hit.other_id}, {known(hit)}{conflict}; ego's impact speed {hit.ego_speed_mps:.1f} m/s{bad}"
+    return f"touches {hit.other_id}, {known(hit)}{conflict}; ego's speed {hit.ego_speed_mps:.1f} m/s{bad}"
 
 
 def _violation(violation: Violation) -> str:
@@ -233,10 +233,11 @@ def regression(origin: Origin) -> Section:
     return Section("regression", "Regression", [text, table, Commands([origin.regress])])
 
 
-def worth(power: Power) -> Section:
-    """Writes the section on the number of known defects that the budget detects."""
+def worth(power: Power, found: bool) -> Section:
+    """Writes the section on known defects that the budget detects; `found`: a failure."""
+    title = "Known defects that this budget detects" if found else "What finding nothing is worth"
     text = "Had the ego a fault that we know, would this budget have found it? Nothing was run for the answer. "
-    return Section("worth", "What finding nothing is worth", [text + power.note, Items(power.lines)])
+    return Section("worth", title, [text + power.note, Items(power.lines)])
 
 
 def _counted(count: int, noun: str) -> str:

@@ -72,7 +72,7 @@ ARTEFACT = violation(requirement="gentle", verdicts={"no_teleport": False})
         ([], Verdict.FIXED, "never_fast is kept"),
         ([violation(other_id="another")], Verdict.STILL_FAILING, "violates never_fast after 1.5 s, at 9.0 m/s"),
         ([HIT, violation()], Verdict.STILL_FAILING, "violates never_fast after 1.5 s, at 9.0 m/s"),
-        ([HIT], Verdict.NEW_KIND, "touches lead with an impact speed of 9.0 m/s: cut-in"),
+        ([HIT], Verdict.NEW_KIND, "touches lead at a closing speed of 7.0 m/s: cut-in"),
         (
             [violation(requirement="gentle")],
             Verdict.NEW_KIND,

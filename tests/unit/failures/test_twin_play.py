@@ -9,10 +9,10 @@ from tests.unit.failures.staged import synthetic_series
 
 
 def test_a_twin_is_named_by_what_was_changed_and_what_came_of_it() -> None:
-    hit = collision(other_id="lead", ego_speed_mps=5.44)
+    hit = collision(other_id="lead", ego_speed_mps=12.3, relative_speed_mps=1.34)
     careful = EgoConfig(profile="careful")
     assert TwinPlay.of(None, hit, []).title == "no attack: no contact"
-    assert TwinPlay.of(careful, hit, [hit]).title == "ego: careful: touches lead with an impact speed of 5.4 m/s"
+    assert TwinPlay.of(careful, hit, [hit]).title == "ego: careful: touches lead at a closing speed of 1.3 m/s"
     assert TwinPlay.of(careful, hit, [hit], "slow.yaml").changed == "ego: slow.yaml"
 
 
@@ -27,9 +27,9 @@ def test_a_twin_reads_back_with_its_series_and_what_is_not_finite() -> None:
 
 
 def test_the_twin_of_a_violation_says_whether_it_keeps_that_requirement() -> None:
-    broken, hit = violation(), collision(other_id="lead", ego_speed_mps=5.44)
+    broken, hit = violation(), collision(other_id="lead", ego_speed_mps=12.3, relative_speed_mps=1.34)
     assert TwinPlay.of(None, broken, []).outcome == "keeps never_fast"
     assert TwinPlay.of(None, broken, [broken]).outcome == "violates never_fast after 1.5 s, at 9.0 m/s"
     told = TwinPlay.of(None, broken, [hit])
-    assert (told.outcome, told.collision) == ("keeps never_fast, touches lead with an impact speed of 5.4 m/s", hit)
+    assert (told.outcome, told.collision) == ("keeps never_fast, touches lead at a closing speed of 1.3 m/s", hit)
     assert TwinPlay.of(None, hit, [broken]).outcome == "no contact, violates never_fast after 1.5 s, at 9.0 m/s"

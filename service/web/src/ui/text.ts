@@ -1,12 +1,37 @@
 /** Numbers and times in words; what is unknown is a dash. */
 
+import type { Body } from "../api/types";
+
 export function number(value: number | null | undefined, digits = 2): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   return value.toFixed(digits).replace(/^-(?=[0.]*$)/, ""); // no minus before a zero
 }
 
+/** A setting as it was written; one that was computed, such as 2π, with four digits. */
+export function setting(value: number): string {
+  if (Number(value.toPrecision(8)) === value) return String(value);
+  const whole = Math.trunc(Math.abs(value)).toString().length;
+  return String(Number(value.toPrecision(Math.max(4, whole))));
+}
+
 export function count(value: number): string {
   return value.toLocaleString("en");
+}
+
+interface Headline {
+  headline: number | null;
+  headline_waiting: number;
+}
+
+/** Headline failures, and how many candidates wait for a replay. */
+export function headlineWords({ headline, headline_waiting }: Headline): string {
+  const known = `${count(headline ?? 0)} headline ${headline === 1 ? "failure" : "failures"}`;
+  if (headline_waiting === 0) return known;
+  return headline === null ? waitingWords(headline_waiting) : `${known}, ${waitingWords(headline_waiting)}`;
+}
+
+export function waitingWords(candidates: number): string {
+  return candidates === 1 ? "1 candidate waits for verification" : `${count(candidates)} candidates wait for verification`;
 }
 
 export function seconds(value: number | null | undefined): string {
@@ -16,6 +41,11 @@ export function seconds(value: number | null | undefined): string {
   if (whole < 3600) return `${Math.floor(whole / 60)} min ${whole % 60} s`;
   const minutes = Math.round(whole / 60);
   return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
+}
+
+/** What drives the ego: a registered driver, or a profile of SUMO's with its model. */
+export function egoWords({ profile, car_following, driver }: Body<"Driver">): string {
+  return driver ?? `${profile}, ${car_following}`;
 }
 
 /** `red_light` -> `red light`. */

@@ -109,6 +109,12 @@ def test_it_tells_how_many_known_defects_the_budget_detects(spec):
         assert ddpg in each
 
 
+def test_a_report_with_failures_is_silent_on_finding_nothing(told):
+    for text in both(told):
+        assert "What finding nothing is worth" not in text
+        assert "Known defects that this budget detects" in text
+
+
 def test_an_i_i_d_phase_is_in_no_other_number(told, spec, runs):
     without = compare(spec, runs, "")
     assert told.cells == without.cells

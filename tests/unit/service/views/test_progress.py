@@ -19,6 +19,10 @@ def test_progress_counts_all_runs_and_shows_those_at_work(ledger, metrics):
     assert (shown.failures, shown.raw_collisions) == (6, 9)
     assert (shown.distinct_failures, shown.preventable, shown.distinct_preventable) == (5, 3, 2)
     assert (shown.dual_variable, shown.window_ecr, shown.window_pcr) == (0.9, 0.1, 0.05)
+    replayed = changed(ended, metrics=metrics.model_copy(update={"headline": 1}), headline_candidates=2)
+    waiting = changed(at_work, headline_candidates=4)
+    partly = progress(changed(campaign, state=State.RUNNING, runs=(replayed, waiting)), workers=1)
+    assert (partly.headline_candidates, partly.headline_waiting) == (6, 4)
     final = progress(changed(campaign, state=State.SUCCEEDED, runs=(ended, ended)), workers=1)
     assert (final.dual_variable, final.eta_s) == (0.3, 0.0)
 

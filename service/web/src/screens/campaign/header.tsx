@@ -5,7 +5,7 @@ import { absolute, download, hasKey, send } from "../../api/client";
 import { ended } from "../../api/ended";
 import type { Body } from "../../api/types";
 import { address, go } from "../../router";
-import { count, moment, seconds, words } from "../../ui/text";
+import { count, egoWords, moment, seconds } from "../../ui/text";
 import { Confirm } from "../../ui/confirm";
 
 type Campaign = Body<"Campaign">;
@@ -28,7 +28,8 @@ export function Header({ campaign, again }: { campaign: Campaign; again: () => v
         <Fact name={spec.families.length > 1 ? "Families" : "Family"}>{spec.families.join(", ")}</Fact>
         <Fact name={spec.methods.length > 1 ? "Methods" : "Method"}>{spec.methods.join(", ")}</Fact>
         <Fact name="Ego">
-          {words(campaign.ego.profile)}, {campaign.ego.car_following}
+          {egoWords(campaign.ego)}
+          {spec.ego?.defects?.length ? `, with ${spec.ego.defects.join(", ")}` : ""}
         </Fact>
         <Fact name={spec.seeds.length > 1 ? "Seeds" : "Seed"}>{spec.seeds.join(", ")}</Fact>
         <Fact name="Posted">{moment(campaign.created_at)}</Fact>

@@ -5,7 +5,7 @@ import { Problem } from "../../api/client";
 import { ended } from "../../api/ended";
 import { Empty, Failed, Loading } from "../../ui/states";
 import { RequirementTable } from "../../ui/requirements";
-import { count, number } from "../../ui/text";
+import { count, number, waitingWords } from "../../ui/text";
 import { useTitle } from "../../ui/title";
 import { Charts } from "./charts";
 import { Funnel } from "./funnel";
@@ -39,6 +39,7 @@ export function CampaignScreen({ id }: { id: string }) {
   }
   if (!campaign) return error ? <Failed error={error} again={again} /> : <Loading what="the campaign" />;
   const { progress } = campaign;
+  const waiting = progress.headline_waiting;
   const drawn = curves?.some((curve) => curve.episodes.length);
   return (
     <div class="live">
@@ -54,7 +55,7 @@ export function CampaignScreen({ id }: { id: string }) {
           )}
         </section>
         <section class="card tiles" aria-label="Where the search stands">
-          <Tile name="headline failures" value={known(progress.headline)} title={HEADLINE} />
+          <Tile name={waiting ? `headline failures; ${waitingWords(waiting)}` : "headline failures"} value={known(progress.headline)} title={HEADLINE} />
           <Tile name="sliding ECR" value={percent(progress.window_ecr)} title={OVER} />
           <Tile name="sliding PCR" value={percent(progress.window_pcr)} title={OVER} />
           <Tile name="dual variable λ" value={number(progress.dual_variable)} title={OVER} />

@@ -1,4 +1,4 @@
-/** How many known defects the budget of a campaign detects: what it is worth that a search finds nothing. */
+/** How many known defects the budget of a campaign detects, each method by its own. */
 
 import { useAsked } from "../../api/asked";
 import { ended } from "../../api/ended";
@@ -13,9 +13,8 @@ export function Worth({ campaign }: { campaign: Body<"Campaign"> }) {
   return (
     <section class="card" aria-labelledby="worth-title">
       <h2 id="worth-title" title={value.note}>
-        What finding nothing is worth
+        {campaign.progress.failures ? "Known defects that this budget detects" : "What finding nothing is worth"}
       </h2>
-      {value.comparison && <p>{value.comparison}</p>}
       {value.methods.map(({ method, sentences }) => (
         <p key={method} title={sentences.slice(1).join(" ")}>
           <b>{method}</b>: {sentences[0]}

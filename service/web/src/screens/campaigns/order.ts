@@ -1,5 +1,6 @@
 /** The order of the list: by a column, either way, as the address says it: `distinct`, or `-distinct` for the largest first. */
 
+import { egoWords } from "../../ui/text";
 import type { Listed } from "./listed";
 
 type Value = number | string | null;
@@ -10,7 +11,7 @@ export const KEYS = {
   state: (campaign: Listed) => campaign.state,
   families: (campaign: Listed) => campaign.families.join(),
   methods: (campaign: Listed) => campaign.methods.join(),
-  ego: (campaign: Listed) => `${campaign.ego.profile} ${campaign.ego.car_following}`,
+  ego: (campaign: Listed) => egoWords(campaign.ego),
   progress: ({ progress }: Listed) => progress.episodes_done / Math.max(1, progress.episodes_total),
   ecr: ({ progress }: Listed) => progress.window_ecr,
   headline: ({ progress }: Listed) => progress.headline,

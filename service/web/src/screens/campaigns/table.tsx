@@ -3,7 +3,7 @@
 import { Fragment, type ComponentChildren } from "preact";
 import { ended } from "../../api/ended";
 import { address } from "../../router";
-import { count, moment, percent, seconds } from "../../ui/text";
+import { count, egoWords, headlineWords, moment, percent, seconds } from "../../ui/text";
 import type { Listed } from "./listed";
 import { clicked, type Column, type Order } from "./order";
 import { Sparkline } from "./sparkline";
@@ -148,7 +148,7 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
         <Several names={campaign.methods} />
       </td>
       <td data-head="Ego" class="wraps">
-        {ego.profile} <span class="faint">{ego.car_following}</span>
+        {egoWords(ego)}
       </td>
       <td data-head="Episodes">
         <Bar done={progress.episodes_done} total={progress.episodes_total} name={nameOf(campaign)} />
@@ -157,7 +157,7 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
         <Sparkline campaign={campaign} learners={learners} />
         <span class="small faint">{percent(progress.window_ecr)}</span>
       </td>
-      <td data-head="Headline" class="number">{progress.headline === null ? "–" : count(progress.headline)}</td>
+      <td data-head="Headline" class="number" title={headlineWords(progress)}>{progress.headline === null ? "–" : count(progress.headline)}</td>
       <td data-head="Distinct" class="number">{count(progress.distinct_failures)}</td>
       <td data-head="Preventable" class="number">{count(progress.distinct_preventable)}</td>
       <td data-head="ETA" class="number">{remaining(campaign)}</td>

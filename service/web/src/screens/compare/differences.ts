@@ -1,5 +1,7 @@
 /** In what the specifications of campaigns differ. Pure. */
 
+import { setting } from "../../ui/text";
+
 export interface Difference {
   /** Where, `budget.episodes`. */
   field: string;
@@ -18,11 +20,12 @@ export function differences(specs: object[]): Difference[] {
 }
 
 function leaves(value: unknown, path = ""): [string, string][] {
-  if (value === null || typeof value !== "object") return [[path, value === null ? "–" : String(value)]];
+  if (value === null || typeof value !== "object") return [[path, value === null ? "–" : written(value)]];
   if (Array.isArray(value)) return [[path, value.map(written).join(", ") || "none"]];
   return Object.entries(value).flatMap(([name, part]) => leaves(part, path ? `${path}.${name}` : name));
 }
 
 function written(value: unknown): string {
+  if (typeof value === "number") return setting(value);
   return value !== null && typeof value === "object" ? JSON.stringify(value) : String(value);
 }

@@ -5,7 +5,7 @@ import { useAsked } from "../../api/asked";
 import type { Body } from "../../api/types";
 import { address, go } from "../../router";
 import { Empty, Shown } from "../../ui/states";
-import { count, moment } from "../../ui/text";
+import { count, headlineWords, moment } from "../../ui/text";
 import { useTitle } from "../../ui/title";
 
 const MOST = 8; // that can still be told apart
@@ -49,7 +49,7 @@ export function Picker({ chosen: first }: { chosen: string[] }) {
                     <b class="breaking">{campaign.label || campaign.id}</b>
                     <span class={`tag ${campaign.state}`}>{campaign.state}</span>
                     <span class="faint small">
-                      {moment(campaign.created_at)} · {count(campaign.progress.episodes_done)} episodes · {campaign.progress.headline === null ? "no" : count(campaign.progress.headline)} headline failures,{" "}
+                      {moment(campaign.created_at)} · {count(campaign.progress.episodes_done)} episodes · {headlineWords(campaign.progress)},{" "}
                       {count(campaign.progress.distinct_failures)} distinct,{" "}
                       {count(campaign.progress.distinct_preventable)} preventable
                     </span>

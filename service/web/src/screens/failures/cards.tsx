@@ -4,13 +4,14 @@ import { useEffect, useLayoutEffect, useRef, useState } from "preact/hooks";
 import type { Signal } from "../../signal";
 import { useSize } from "./canvas";
 import { Card } from "./card";
-import { moved, rowsInView, type Grid } from "./rows";
+import { columnsOf, moved, rowsInView, type Grid } from "./rows";
 import type { Found } from "./found";
 import type { FailureTable } from "./wire";
 
 const LEAST_PX = 262;
-const HEIGHT_PX = 372; // as in failures.css
+const LEAST_HEIGHT_PX = 372;
 const GAP_PX = 14;
+const tallest = new Map<number, number>(); // width of a card -> height of the tallest one so far, which all get
 const left = new Map<string, number>(); // place -> how far it was scrolled, for the way back from a replay
 
 interface Props {
@@ -31,9 +32,12 @@ export function Cards({ campaign, table, found, shown, hovered, triage, place }:
   const [top, viewHeight] = useView(list);
   const [focused, setFocused] = useState<string | null>(null); // its card stays in the document when it scrolls away
   const wanted = useRef<number | null>(null);
-  const grid: Grid = { size: shown.length, width, least: LEAST_PX, height: HEIGHT_PX, gap: GAP_PX };
+  const columns = columnsOf({ width, least: LEAST_PX, gap: GAP_PX });
+  const cardWidth = (width - GAP_PX * (columns - 1)) / columns;
+  const height = tallest.get(cardWidth) ?? LEAST_HEIGHT_PX;
+  const pitch = height + GAP_PX;
+  const grid: Grid = { size: shown.length, columns, height, gap: GAP_PX };
   const rows = rowsInView(grid, top, viewHeight);
-  const cardWidth = (width - GAP_PX * (rows.columns - 1)) / rows.columns;
   useComingBack(width > 0, place);
   useEffect(() => {
     if (wanted.current === null) return;
@@ -42,13 +46,20 @@ export function Cards({ campaign, table, found, shown, hovered, triage, place }:
     link?.focus({ preventScroll: true });
   });
   const [, again] = useState(0);
+  useLayoutEffect(() => {
+    const needed = Math.max(...[...list.current!.children].map((card) => Math.ceil(card.getBoundingClientRect().height)));
+    if (needed <= height) return;
+    tallest.set(cardWidth, needed);
+    if (top > 0) scrollBy(0, Math.floor(top / pitch) * (needed - height)); // the rows above have grown too
+    again((n) => n + 1);
+  });
   const onKeyDown = (event: KeyboardEvent) => {
     const from = Number((event.target as HTMLElement).closest("li")?.dataset.at);
-    const to = moved(event.key, from, rows.columns, shown.length);
+    const to = moved(event.key, from, columns, shown.length);
     if (to === null || Number.isNaN(from) || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     wanted.current = to;
-    bringIntoView(list.current!, Math.floor(to / rows.columns) * (HEIGHT_PX + GAP_PX));
+    bringIntoView(list.current!, Math.floor(to / columns) * pitch, pitch);
     again((n) => n + 1);
   };
   const drawn = Array.from({ length: Math.max(0, rows.to - rows.from) }, (_, n) => rows.from + n);
@@ -68,16 +79,16 @@ export function Cards({ campaign, table, found, shown, hovered, triage, place }:
     >
       {width > 0 &&
         drawn.map((at) => {
-          const [row, column] = [Math.floor(at / rows.columns), at % rows.columns];
+          const [row, column] = [Math.floor(at / columns), at % columns];
           const failure = shown[at]!;
-          const shift = `translate(${column * (cardWidth + GAP_PX)}px, ${row * (HEIGHT_PX + GAP_PX)}px)`;
+          const shift = `translate(${column * (cardWidth + GAP_PX)}px, ${row * pitch}px)`;
           return (
             <li
               key={table.ids[failure]}
               data-at={at}
               aria-setsize={shown.length}
               aria-posinset={at + 1}
-              style={{ width: `${cardWidth}px`, transform: shift }}
+              style={{ width: `${cardWidth}px`, minHeight: `${height}px`, transform: shift }}
               onPointerEnter={() => hovered.set(failure)}
               onFocusIn={() => hovered.set(failure)}
             >
@@ -113,9 +124,9 @@ function useView(list: { current: HTMLElement | null }): [number, number] {
   return view;
 }
 
-function bringIntoView(list: HTMLElement, row: number): void {
+function bringIntoView(list: HTMLElement, row: number, pitch: number): void {
   const top = list.getBoundingClientRect().top + row;
-  const [least, most] = [70, innerHeight - HEIGHT_PX - GAP_PX];
+  const [least, most] = [70, innerHeight - pitch];
   if (top < least) scrollBy(0, top - least);
   else if (top > most) scrollBy(0, Math.min(top - most, top - least));
 }

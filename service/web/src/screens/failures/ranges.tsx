@@ -1,6 +1,7 @@
 /** The brushes as numbers: what the pointer does on the axes, by the keyboard. */
 
 import { brushed, type Brushes, type Interval } from "./brushes";
+import { setting } from "../../ui/text";
 import { titled, type Feature } from "./features";
 
 export function RangesByNumbers({ features, brushes, brush }: { features: readonly Feature[]; brushes: Brushes; brush: (next: Brushes) => void }) {
@@ -35,5 +36,5 @@ export function RangesByNumbers({ features, brushes, brush }: { features: readon
 }
 
 function shownEnd(end: number | undefined): string {
-  return end === undefined || !Number.isFinite(end) ? "" : String(end);
+  return end === undefined || !Number.isFinite(end) ? "" : setting(end);
 }

@@ -1,18 +1,19 @@
 import { expect, test } from "vitest";
-import { moved, rowsInView } from "./rows";
+import { columnsOf, moved, rowsInView } from "./rows";
 
-const grid = { size: 10_000, width: 850, least: 260, height: 280, gap: 20 };
+const grid = { size: 10_000, columns: 3, height: 280, gap: 20 };
 
 test("as many columns as fit, gaps between them", () => {
-  expect(rowsInView(grid, 0, 600).columns).toBe(3);
-  expect(rowsInView({ ...grid, width: 819 }, 0, 600).columns).toBe(2);
-  expect(rowsInView({ ...grid, width: 100 }, 0, 600).columns).toBe(1);
+  expect(columnsOf({ width: 850, least: 260, gap: 20 })).toBe(3);
+  expect(columnsOf({ width: 819, least: 260, gap: 20 })).toBe(2);
+  expect(columnsOf({ width: 100, least: 260, gap: 20 })).toBe(1);
 });
 
 test("only rows near the view are drawn, and every row in view is", () => {
   const [pitch, view] = [300, 720];
   for (const top of [-500, 0, 1, 299, 300, 12_345, 1_000_000]) {
-    const { columns, from, to, whole } = rowsInView(grid, top, view);
+    const { columns } = grid;
+    const { from, to, whole } = rowsInView(grid, top, view);
     expect(to - from).toBeLessThanOrEqual(columns * (Math.ceil(view / pitch) + 5));
     const rows = Math.ceil(grid.size / columns);
     for (let row = 0; row < rows; row++) {

@@ -1,16 +1,15 @@
 /** Which rows of a long grid are in view: only they are in the document. */
 
 export interface Grid {
-  /** How many cards, how wide the grid, least width of a card and height of one, gap between them: in px. */
+  /** How many cards. */
   size: number;
-  width: number;
-  least: number;
+  columns: number;
+  /** Of a card, and the gap between two, px. */
   height: number;
   gap: number;
 }
 
 export interface Rows {
-  columns: number;
   /** From the first card to be drawn to behind the last. */
   from: number;
   to: number;
@@ -18,16 +17,20 @@ export interface Rows {
   whole: number;
 }
 
+/** How many columns fit. All in px: width of the grid, least width of a card, gap between two. */
+export function columnsOf({ width, least, gap }: { width: number; least: number; gap: number }): number {
+  return Math.max(1, Math.floor((width + gap) / (least + gap)));
+}
+
 /** @param top how far the view's upper edge lies below the grid's; negative where the grid begins lower.
  *  @param spare rows drawn above and below the view, so that the keyboard finds the next one. */
 export function rowsInView(grid: Grid, top: number, viewHeight: number, spare = 2): Rows {
-  const columns = Math.max(1, Math.floor((grid.width + grid.gap) / (grid.least + grid.gap)));
+  const { columns } = grid;
   const rows = Math.ceil(grid.size / columns);
   const pitch = grid.height + grid.gap;
   const first = Math.min(rows, Math.max(0, Math.floor(top / pitch) - spare));
   const behind = Math.min(rows, Math.max(0, Math.ceil((top + viewHeight) / pitch) + spare));
   return {
-    columns,
     from: first * columns,
     to: Math.min(grid.size, behind * columns),
     whole: rows ? rows * pitch - grid.gap : 0,

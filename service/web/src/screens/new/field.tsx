@@ -2,6 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useContext, useEffect, useState } from "preact/hooks";
+import { setting } from "../../ui/text";
 import { FormContext, isWithin, useField, type Wrong } from "./form";
 import { numbersOf, numbersText } from "./numbers";
 import type { Field, Json, Shape, Values } from "./schema";
@@ -136,8 +137,8 @@ function Leaf({ field, path }: { field: Field; path: Path }) {
 function boundsOf(shape: Shape): string {
   if (shape.kind !== "number") return "";
   const { low, high } = shape;
-  if (Number.isFinite(low) && Number.isFinite(high)) return `${low} to ${high > 1e6 ? high.toExponential().replace("+", "") : high}.`;
-  return Number.isFinite(low) ? `At least ${low}.` : "";
+  if (Number.isFinite(low) && Number.isFinite(high)) return `${setting(low)} to ${high > 1e6 ? high.toExponential().replace("+", "") : setting(high)}.`;
+  return Number.isFinite(low) ? `At least ${setting(low)}.` : "";
 }
 
 interface Controlled {
@@ -168,6 +169,7 @@ type NumberShape = Extract<Shape, { kind: "number" }>;
 type Numbered = Omit<Controlled, "shape" | "value"> & { shape: NumberShape; value: number | null };
 
 export function NumberInput({ id, shape, value, change, more }: Numbered) {
+  const [typed, setTyped] = useState({ text: "", number: null as number | null }); // its digits stay as they were written
   const bounds = { min: Number.isFinite(shape.low) ? shape.low : undefined, max: Number.isFinite(shape.high) ? shape.high : undefined };
   return (
     <input
@@ -175,8 +177,12 @@ export function NumberInput({ id, shape, value, change, more }: Numbered) {
       type="number"
       {...bounds}
       step={shape.integer ? 1 : "any"}
-      value={value ?? ""}
-      onInput={({ currentTarget: { valueAsNumber: number } }) => change(Number.isFinite(number) ? number : null)}
+      value={value === null ? "" : value === typed.number ? typed.text : setting(value)}
+      onInput={({ currentTarget: { value: text, valueAsNumber } }) => {
+        const number = Number.isFinite(valueAsNumber) ? valueAsNumber : null;
+        setTyped({ text, number });
+        change(number);
+      }}
       {...more}
     />
   );
@@ -228,10 +234,12 @@ interface Offered {
   /** Those that are shown first; the others are folded away. Without it all are shown. */
   first?: readonly string[];
   help?: string;
+  /** Called when one was chosen or dropped. */
+  changed?: () => void;
 }
 
 /** Some of a few names, each with a box. */
-export function Choices({ field, path, abouts = {}, costs = {}, first, help }: Offered) {
+export function Choices({ field, path, abouts = {}, costs = {}, first, help, changed }: Offered) {
   const { id, value, change, wrong } = useField<string[]>(path, true);
   const offered = field.shape.kind === "list" && field.shape.item.kind === "choice" ? field.shape.item.options : [];
   const options = [...new Set([...offered, ...value])]; // a clone may have what a form does not offer: a place of a map
@@ -250,7 +258,10 @@ export function Choices({ field, path, abouts = {}, costs = {}, first, help }: O
         aria-label={option}
         aria-describedby={abouts[option] ? `${id}-${option}` : undefined}
         checked={value.includes(option)}
-        onChange={() => change(toggle(option))}
+        onChange={() => {
+          change(toggle(option));
+          changed?.();
+        }}
       />
       <span>
         <b>{option}</b>

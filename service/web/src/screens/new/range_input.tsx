@@ -1,5 +1,6 @@
 /** A range with two thumbs on one track, and a number beside each for exact values. */
 
+import { setting } from "../../ui/text";
 import { moved, share, type Range, type Scale } from "./range";
 
 interface Ranged {
@@ -27,7 +28,7 @@ export function RangeInput({ id, title, unit, value, scale, change }: Ranged) {
         min={scale.low}
         max={scale.high}
         step="any"
-        value={value[end]}
+        value={setting(value[end])}
         onChange={(event) => move(end, event.currentTarget.valueAsNumber)}
       />
     </span>
@@ -45,7 +46,7 @@ export function RangeInput({ id, title, unit, value, scale, change }: Ranged) {
             type="range"
             class={end === "low" && left > 50 ? "thumb above" : "thumb"}
             aria-label={`${title}, ${SAID[end]}, by a slider`}
-            aria-valuetext={`${value[end]} ${unit}`}
+            aria-valuetext={`${setting(value[end])} ${unit}`}
             min={scale.low}
             max={scale.high}
             step="any"

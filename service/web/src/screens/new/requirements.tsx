@@ -2,7 +2,7 @@
 
 import { useRef } from "preact/hooks";
 import type { Body } from "../../api/types";
-import { words } from "../../ui/text";
+import { setting, words } from "../../ui/text";
 import { NO_CONTACT } from "../../ui/violations";
 import { Labelled, NumberInput, Wrongs, described } from "./field";
 import { faultOf, inserted, pointed } from "./formula";
@@ -241,7 +241,7 @@ function Signals({ signals, insert }: { signals: readonly Signal[]; insert?: (na
                 </td>
                 <td>{unit}</td>
                 <td>
-                  {low} to {high}
+                  {setting(low)} to {setting(high)}
                 </td>
                 <td class="meaning">{meaning}</td>
               </tr>

@@ -7,8 +7,9 @@ import type { Body } from "../../api/types";
 import { address, go } from "../../router";
 import { Shown } from "../../ui/states";
 import { useTitle } from "../../ui/title";
-import { bodyOf, isPerfect, NOT_OF_PERFECT, textOf } from "./body";
+import { bodyOf, textOf } from "./body";
 import { useChecked } from "./checked";
+import { Ego } from "./ego";
 import { Choices, Fields, Group, SchemaField } from "./field";
 import { FormContext, type Wrong } from "./form";
 import { grounded, groundOf, OnMap, useExtent, type Ground } from "./ground";
@@ -123,9 +124,7 @@ function CampaignForm({ known: [description, families, methods], from, ground }:
           <section class="card">
             <SchemaField field={{ ...field("iid"), title: "I.i.d. phase", about: aboutOf(field("iid")) }} path={["iid"]} />
           </section>
-          <Group title="Ego" about={field("ego").shape.kind === "object" ? aboutOf(field("ego")) : ""} path={["ego"]} changed={tally("ego") > 0} open={tally("ego") > 0}>
-            <Fields shape={egoShape(field("ego").shape, spec)} path={["ego"]} />
-          </Group>
+          <Ego field={field("ego")} sent={(body.ego ?? {}) as Values} />
           {!ground && (
             <Group title="Operational design domain" about={aboutOf(field("odd"))} path={["odd"]} changed={tally("odd") > 0} open={tally("odd") > 0}>
               <OddFields shape={field("odd").shape} families={chosen} />
@@ -222,11 +221,6 @@ function aboutOf({ shape }: Field): string {
 
 function itemOf(shape: Shape): Shape {
   return shape.kind === "list" ? shape.item : shape;
-}
-
-function egoShape(shape: Shape, spec: Values): Shape {
-  if (shape.kind !== "object" || !isPerfect(spec)) return shape;
-  return { ...shape, fields: shape.fields.filter(({ name }) => !NOT_OF_PERFECT.includes(name)) };
 }
 
 const COST = "The cost is the measured processor time of an episode as a multiple of one of random. Learners begin with a warm start, which costs less.";

@@ -61,11 +61,12 @@ it("a campaign costs what all its runs do", () => {
   expect(costOf(spec)).toEqual({ runs: 6, episodes: 90 });
 });
 
-it("a perfect ego is sent without the delay and the sensor that it has no use for", () => {
+it("an ego is sent without what it has no use for", () => {
   const plain: Shape = { kind: "text", most: 99, pattern: "" };
   const field = (name: string, shape: Shape, preset?: string) => ({ name, shape, preset, optional: false, title: "", unit: "", about: "" });
   const ego: Shape = { kind: "object", about: "", fields: [field("profile", plain, "default"), field("reaction_time_s", plain, "0.5")] };
   const shape: Shape = { kind: "object", about: "", fields: [field("ego", ego)] };
   expect(bodyOf(shape, { ego: { profile: "perfect", reaction_time_s: "0.1" } })).toEqual({ ego: { profile: "perfect" } });
+  expect(bodyOf(shape, { ego: { profile: "careful", reaction_time_s: "0.1", driver: "rss" } })).toEqual({});
   expect(bodyOf(shape, { ego: { profile: "careful", reaction_time_s: "0.1" } })).toEqual({ ego: { profile: "careful", reaction_time_s: "0.1" } });
 });

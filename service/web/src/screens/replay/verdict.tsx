@@ -75,7 +75,7 @@ function Drivers({ violation }: { violation: Collision | Violation }) {
           <th scope="col">Would</th>
           {struck && (
             <th scope="col" class="number">
-              Its impact speed
+              Its own speed
             </th>
           )}
         </tr>

@@ -87,7 +87,7 @@ export function wouldOf(driver: string, prevents: boolean, contact: boolean): st
 function contactOf(collision: Collision): string {
   const { ego_zone, ego_speed_mps, other_zone, other_role, other_id, other_speed_mps } = collision;
   return (
-    `The ego's ${ego_zone} touched the ${other_zone} of the ${other_role} ${other_id}. The ego's impact speed was ` +
+    `The ego's ${ego_zone} touched the ${other_zone} of the ${other_role} ${other_id}. The ego's speed was ` +
     `${number(ego_speed_mps, 1)} m/s, the striker's ${number(other_speed_mps, 1)} m/s. ${severityInWords(collision)}`
   );
 }

@@ -1,0 +1,25 @@
+import { expect, it } from "vitest";
+import { headlineWords, setting } from "./text";
+
+it.each<[number, string]>([
+  [2 * Math.PI, "6.283"],
+  [1 / 3, "0.3333"],
+  [0.1 + 0.2, "0.3"],
+  [50 / 3.6, "13.89"],
+  [100_000 / 7, "14286"],
+  [-2 / 3, "-0.6667"],
+  [0.99995, "0.99995"],
+  [1e-7, "1e-7"],
+  [123456, "123456"],
+  [0, "0"],
+])("of %d as a setting a reader needs %s", (value, wanted) => expect(setting(value)).toBe(wanted));
+
+it.each<[number | null, number, string]>([
+  [null, 4, "4 candidates wait for verification"],
+  [null, 1, "1 candidate waits for verification"],
+  [null, 0, "0 headline failures"],
+  [1, 0, "1 headline failure"],
+  [0, 4, "0 headline failures, 4 candidates wait for verification"],
+])("%j headline failures and %d candidates", (headline, headline_waiting, wanted) => {
+  expect(headlineWords({ headline, headline_waiting })).toBe(wanted);
+});
