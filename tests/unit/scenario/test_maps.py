@@ -184,6 +184,9 @@ def test_what_is_no_map_is_not_converted(tmp_path: Path, content: str, says: str
         present_net(file, tmp_path)
 
 
+TOO_MUCH = "map.osm, for which netconvert has too little time or memory; wanted .* 4096 MiB; cut"
+
+
 @pytest.mark.parametrize(
     ("script", "says"),
     [
@@ -191,12 +194,18 @@ def test_what_is_no_map_is_not_converted(tmp_path: Path, content: str, says: str
             "echo 'Error: odd lane' >&2; kill -SEGV $$",
             r"SUMO's netconvert crashes on map.osm \(SIGSEGV\); .* odd lane; open",
         ),
-        ("echo 'std::bad_alloc' >&2; exit 1", "map.osm, for which netconvert has too little time or memory; cut"),
-        ("kill -KILL $$", "map.osm, for which netconvert has too little time or memory; cut"),
+        ("echo 'std::bad_alloc' >&2; exit 1", TOO_MUCH),
+        ("kill -KILL $$", TOO_MUCH),
+        ("while [ $(ulimit -f) = unlimited ]; do :; done; yes Warning >&2", TOO_MUCH),
+        (
+            "while [ $(ulimit -v) = unlimited ]; do :; done; echo Error: got $(ulimit -v) KiB >&2; exit 1",
+            f"netconvert cannot convert map.osm: got {convert.MEMORY_BYTES >> 10} KiB",
+        ),
         ("echo 'Error: no nodes' >&2; exit 1", "netconvert cannot convert map.osm: no nodes"),
     ],
 )
 def test_why_netconvert_failed_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, says: str) -> None:
+    monkeypatch.setattr(convert, "FILE_BYTES", 1 << 20)
     program, file = tmp_path / "netconvert", tmp_path / "map.osm"
     program.write_text(f"#!/bin/sh\n{script}\n")
     program.chmod(0o755)
