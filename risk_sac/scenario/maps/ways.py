@@ -165,8 +165,10 @@ def check_lengths(net: Net, tracks: Iterable[Track]) -> None:
         edges = [*(piece.edge for piece in each.pieces), *each.onward]
         for edge, following in zip(edges, [*edges[1:], ""], strict=True):
             if (lane := _off_length(net, edge, following)) is not None:
-                got = f"lane {lane.id!r} has the length {lane.length_m:.1f} m and a shape of {_drawn_m(lane):.1f} m"
-                raise NoFit(f"{got}; wanted a difference of at most {OFF_SHARE:.0%} or {OFF_M} m")
+                got = f"lane {lane.id!r} has the length {lane.length_m:.2f} m and a shape of {_drawn_m(lane):.2f} m"
+                raise NoFit(
+                    f"{got}; wanted a difference of at most {_most_off_m(lane):.2f} m ({OFF_SHARE:.0%}, or {OFF_M:g} m)"
+                )
 
 
 @once
@@ -175,12 +177,16 @@ def _off_length(net: Net, edge: str, following: str) -> Lane | None:
     lanes = net.edges[edge].drivable
     links = (link for lane in lanes for link in net.onward.get(lane.id, ()) if link.target.edge == following)
     used = (*lanes, *(lane for link in links for lane in link.inside))
-    off = (lane for lane in used if abs(_drawn_m(lane) - lane.length_m) > max(OFF_M, OFF_SHARE * lane.length_m))
+    off = (lane for lane in used if abs(_drawn_m(lane) - lane.length_m) > _most_off_m(lane))
     return next(off, None)
 
 
 def _drawn_m(lane: Lane) -> float:
-    return sum(math.dist(a, b) for a, b in pairwise(lane.line))
+    return round(sum(math.dist(a, b) for a, b in pairwise(lane.line)), 2)
+
+
+def _most_off_m(lane: Lane) -> float:
+    return round(max(OFF_M, OFF_SHARE * lane.length_m), 2)
 
 
 def _piece(lane: Lane, reach_m: float) -> Piece:
