@@ -64,7 +64,8 @@ def _places(options: argparse.Namespace) -> int:
             return _try_places(chosen, found, options)
     if options.json:
         fits, misfits = [fit.told() for fit in found.fits], [misfit.told() for misfit in found.misfits]
-        console.out(json.dumps({"places": fits, "elsewhere": misfits, "warnings": warnings}), highlight=False)
+        said = {"places": fits, "elsewhere": misfits, "nowhere": found.nowhere, "warnings": warnings}
+        console.out(json.dumps(said), highlight=False)
         return OK
     for warning in warnings:
         console.print(f"warning: {warning}", soft_wrap=True, markup=False)
@@ -81,7 +82,8 @@ def _tell(pattern: Pattern, found: Survey, most: int, *, why: bool) -> None:
     rare = sum(fit.rare for fit in fits)
     marked = f", contacts are rare at {rare} of them" if rare else ""
     counts = f"{counted(len(fits), 'place')}{marked}; does not fit at {len(misfits)}"
-    console.print(f"{TITLES[pattern]} ({pattern}): {counts}", highlight=False)
+    nowhere = f": {found.nowhere[pattern]}" if pattern in found.nowhere else ""
+    console.print(f"{TITLES[pattern]} ({pattern}): {counts}{nowhere}", highlight=False)
     if fits:
         console.print(_table("what", [(fit.spot.id, fit.summary) for fit in fits], most))
     if why and misfits:

@@ -15,12 +15,11 @@ from dataclasses import asdict
 from pathlib import Path
 
 from risk_sac.errors import MapError
-from risk_sac.scenario.maps.convert import Converted, present_net
+from risk_sac.scenario.maps.convert import MEMORY_BYTES, Converted, present_net
 from risk_sac.scenario.maps.documents import MAX_ROADS
 from risk_sac.scenario.maps.read_net import parse_net, read_tree
 from risk_sac.scenario.maps.summary import net_remarks, summary
 from service.errors import UploadError
-from service.networks import limits
 from service.networks.report import CheckReport, Kind, NetworkFile
 from service.networks.simulator import bind, bind_simulator, load
 
@@ -71,9 +70,7 @@ def main() -> None:
     except UploadError as error:
         report = CheckReport(refused=str(error))
     except MemoryError:
-        report = CheckReport(
-            refused=f"checking it needs more than {limits.MEMORY_BYTES >> 20} MiB; wanted a smaller network"
-        )
+        report = CheckReport(refused=f"checking it needs more than {MEMORY_BYTES >> 20} MiB; wanted a smaller network")
     Path(sys.argv[1]).write_text(json.dumps(asdict(report)))
     os._exit(0)  # without the simulator's own clean-up, which may crash
 

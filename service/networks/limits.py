@@ -2,7 +2,6 @@
 
 CPU_S = 150  # a net of 50,000 edges takes 45
 WALL_S = 300
-MEMORY_BYTES = 4 << 30  # of address space; Python with an idle libsumo takes 0.9 GiB
 LOG_BYTES = 64 << 10  # what the simulator may write to its log, and to any other file
 OPEN_FILES = 64
 SURVEY_S = 1800  # that a search for places may take; 50,000 edges take 150 on one core

@@ -2,7 +2,7 @@
 
 from datetime import datetime
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from risk_sac.records import Page, Record
 from risk_sac.scenario.maps.found import Pattern
@@ -74,6 +74,8 @@ class Places(Record):
 
     items: list[FoundPlace]
     elsewhere: list[Elsewhere]
+    nowhere: dict[Pattern, str] = Field(default_factory=dict)
+    """Why a pattern has no place and no misfit at all."""
     progress: float = 1.0
     """Share of the network that was searched; below 1 both lists are still empty."""
 

@@ -6,10 +6,9 @@ import signal
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from risk_sac.scenario.maps.convert import remarks
-from risk_sac.scenario.maps.unpack import MAX_BYTES
+from risk_sac.scenario.maps.convert import FILE_BYTES, MEMORY_BYTES, limit, remarks
 from service.errors import UploadError
-from service.networks.limits import CPU_S, LOG_BYTES, MEMORY_BYTES, OPEN_FILES, STEP_S, STEPS, WALL_S
+from service.networks.limits import CPU_S, LOG_BYTES, OPEN_FILES, STEP_S, STEPS, WALL_S
 from service.networks.report import Kind
 
 LOG = Path("log")  # where the file descriptors 1 and 2 lead to
@@ -43,24 +42,17 @@ def load(names: Mapping[Kind, Sequence[str]]) -> list[str]:
 def bind() -> None:
     """Bound what this process may use, for good."""
     signal.alarm(WALL_S)  # in case the server dies
-    _limit(resource.RLIMIT_CORE, 0)
-    _limit(resource.RLIMIT_CPU, CPU_S)
-    _limit(resource.RLIMIT_AS, MEMORY_BYTES)
-    _limit(resource.RLIMIT_NOFILE, OPEN_FILES)
-    _limit(resource.RLIMIT_FSIZE, 2 * MAX_BYTES)  # what is written again has more end tags
+    limit(resource.RLIMIT_CORE, 0)
+    limit(resource.RLIMIT_CPU, CPU_S)
+    limit(resource.RLIMIT_AS, MEMORY_BYTES)
+    limit(resource.RLIMIT_NOFILE, OPEN_FILES)
+    limit(resource.RLIMIT_FSIZE, FILE_BYTES)
 
 
 def bind_simulator() -> None:
     """Denies the simulator output files, and further processes or threads unless root."""
-    _limit(resource.RLIMIT_FSIZE, LOG_BYTES)
-    _limit(resource.RLIMIT_NPROC, 0)
-
-
-def _limit(resource_: int, most: int) -> None:
-    _, present = resource.getrlimit(resource_)
-    if present != resource.RLIM_INFINITY:
-        most = min(most, present)  # only root may raise it
-    resource.setrlimit(resource_, (most, most))
+    limit(resource.RLIMIT_FSIZE, LOG_BYTES)
+    limit(resource.RLIMIT_NPROC, 0)
 
 
 def _said(severity: str) -> list[str]:

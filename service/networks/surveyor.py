@@ -45,6 +45,7 @@ def _survey() -> dict[str, object]:
     places = Places(
         items=[FoundPlace.model_validate(fit.told()) for fit in found.fits],
         elsewhere=[Elsewhere.model_validate(misfit.told()) for misfit in found.misfits],
+        nowhere=dict(found.nowhere),
     )
     replace_file(Path(PICTURE), map_png(net, found))
     write_sealed(Path(PLACES), places)
@@ -70,8 +71,6 @@ def _keep(name: str, place: str | None = None) -> dict[str, object]:
     fits = chosen.fits(pattern, place)
     if len(fits) > MAX_PLACES:
         raise ConfigError("places", f"{len(fits)} places where {pattern} fits", f"at most {MAX_PLACES}", "name one")
-    if not fits:
-        raise ConfigError("places", f"{pattern} fits nowhere on this network; its places say why")
     return {"families": [chosen.keep(fit) for fit in fits]}
 
 

@@ -7,6 +7,7 @@ format can be read.
 import importlib.util
 import os
 import re
+import resource
 import shutil
 import signal
 import subprocess
@@ -20,10 +21,12 @@ from risk_sac.scenario.maps.documents import FOREIGN_ROOTS, MAP_ROOTS, Document,
 from risk_sac.scenario.maps.opendrive import ready
 from risk_sac.scenario.maps.read_net import parse_net, read_tree
 from risk_sac.scenario.maps.sides import side_remarks
-from risk_sac.scenario.maps.unpack import SMALLER
+from risk_sac.scenario.maps.unpack import MAX_BYTES, SMALLER
 
 PRESENT = (1, 16)  # nets since then say all that is read
 WALL_S = 120
+MEMORY_BYTES = 4 << 30  # of address space; Python with an idle libsumo takes 0.9 GiB
+FILE_BYTES = 2 * MAX_BYTES  # what is written again has more end tags
 MOST_REMARKS = 20
 _LONGEST = 300
 _OSM = (
@@ -102,6 +105,12 @@ def remarks(said: str, severity: str) -> list[str]:
     return ["".join(filter(str.isprintable, line))[:_LONGEST] for line in found[:MOST_REMARKS]]
 
 
+def limit(resource_: int, most: int, pid: int = 0) -> None:
+    """Lowers a limit of a process for good, by default of this one."""
+    most = min([most, *(bound for bound in resource.prlimit(pid, resource_) if bound != resource.RLIM_INFINITY)])
+    resource.prlimit(pid, resource_, (most, most))
+
+
 def netconvert() -> tuple[str, dict[str, str]]:
     """Finds the netconvert program and its environment.
 
@@ -129,31 +138,44 @@ def _version(attributes: Mapping[str, str]) -> tuple[int, ...]:
 
 
 def _convert(found: Document, net: Path, name: str, options: Sequence[str] = ()) -> str:
-    """Runs netconvert in the folder of its files; returns its messages.
+    """Runs netconvert, with limits, in the folder of its files; returns its messages.
 
     A comma in a path would make a list.
     """
     program, environment = netconvert()
     files = [found.file.name, "--output-file", net.name, "--xml-validation", "never"]
     command = [program, *options, *OPTIONS[found.root], *files]
-    try:
-        done = subprocess.run(
-            command, cwd=net.parent, capture_output=True, timeout=WALL_S, env=environment, check=False
-        )
-    except subprocess.TimeoutExpired:
-        raise MapError("network", f"{name}, which takes more than {WALL_S} s to convert", remedy=SMALLER) from None
-    said = done.stderr.decode("utf-8", "replace")
-    if done.returncode < 0 or "bad_alloc" in said:
-        raise _crash(done.returncode, said, name)
-    if done.returncode != 0:
-        why = "; ".join(remarks(said, "Error")[:5]) or f"status {done.returncode}"
+    log = net.with_suffix(".log")
+    with log.open("wb") as output:
+        process = subprocess.Popen(command, cwd=net.parent, env=environment, stdout=subprocess.DEVNULL, stderr=output)
+    with process:
+        try:
+            _bind(process.pid)
+            status = process.wait(WALL_S)
+        except subprocess.TimeoutExpired:
+            raise MapError("network", f"{name}, which takes more than {WALL_S} s to convert", remedy=SMALLER) from None
+        finally:
+            process.kill()  # whatever ended the wait
+    said = log.read_text("utf-8", "replace")
+    if status < 0 or "bad_alloc" in said:
+        raise _crash(status, said, name)
+    if status != 0:
+        why = "; ".join(remarks(said, "Error")[:5]) or f"status {status}"
         raise MapError("network", f"netconvert cannot convert {name}: {why}")
     return said
 
 
+def _bind(pid: int) -> None:
+    """Limits what a process may use; one that has ended uses nothing."""
+    limit(resource.RLIMIT_CORE, 0, pid)
+    limit(resource.RLIMIT_AS, MEMORY_BYTES, pid)
+    limit(resource.RLIMIT_FSIZE, FILE_BYTES, pid)
+
+
 def _crash(status: int, said: str, name: str) -> MapError:
-    if "bad_alloc" in said or -status in (signal.SIGXCPU, signal.SIGKILL):
-        return MapError("network", f"{name}, for which netconvert has too little time or memory", remedy=SMALLER)
+    if "bad_alloc" in said or -status in (signal.SIGXCPU, signal.SIGXFSZ, signal.SIGKILL):
+        got = f"{name}, for which netconvert has too little time or memory"
+        return MapError("network", got, f"one that takes at most {WALL_S} s and {MEMORY_BYTES >> 20} MiB", SMALLER)
     last = next(iter(remarks(said, "Error") or remarks(said, "Warning")[::-1]), "nothing")
     return MapError(
         "network",

@@ -30,9 +30,17 @@ _OF_SUMO = (
     "personFlow walk ride personTrip busStop trainStop containerStop chargingStation access parkingArea space poly poi "
     "taz tazSource tazSink"
 )
+_UNREAD = {  # by how a file begins: what it is, and the command that converts it
+    rb"BZh": ("packed by bzip2", "bunzip2 MAP.osm.bz2"),
+    rb"\xfd7zXZ": ("packed by xz", "unxz MAP.osm.xz"),
+    rb"\x28\xb5\x2f\xfd": ("packed by zstd", "unzstd MAP.osm.zst"),
+    rb"....\n\tOSMHeader": ("OpenStreetMap's PBF", "osmium cat MAP.osm.pbf -o MAP.osm"),
+    rb"\xff\xe0.o5m": ("OpenStreetMap's o5m", "osmium cat MAP.o5m -o MAP.osm"),
+}
 _COPIED = frozenset(_OF_SUMO.split())
 _LEFT_OUT = ("include", "userData", "dataQuality", "geoReference", "offset", "license")  # other files, projections
 _NAMES_FILE = re.compile("(?<!pro)file|output|^href$|^dest$", re.IGNORECASE)
+_NO_FILE = ("", "nul", "null", "/dev/null")  # SUMO's names for no output
 _SWITCHES_DEVICE = re.compile(r"^(has|device)\.")  # of a vehicle; some write files
 
 
@@ -76,6 +84,10 @@ def _copied(content: bytes, file: Path, name: str) -> Document:
         except MapError:
             raise
         except (ExpatError, LookupError, ValueError) as error:  # the latter two: an encoding that Python lacks
+            for start, (what, command) in _UNREAD.items():
+                if re.match(start, content, re.DOTALL):
+                    got, remedy = f"{name}, which is {what}", f"convert it: {command}"
+                    raise MapError("network", got, "XML, plain or in gzip or zip", remedy) from error
             raise MapError("network", f"{name} is no well-formed XML: {error}") from error
     if not copy.roads and copy.root in MAP_ROOTS:
         raise MapError("network", f"{name} without roads", "a map with one at least")
@@ -152,9 +164,13 @@ class _Copy:
     def _is_copied(self, tag: str, attributes: Mapping[str, str]) -> bool:
         if self.root in FOREIGN_ROOTS:
             return tag.isidentifier() and tag not in _LEFT_OUT
-        named = [*attributes, attributes["key"]] if tag == "param" and "key" in attributes else [*attributes]
-        if found := next((key for key in named if _NAMES_FILE.search(key) or _SWITCHES_DEVICE.search(key)), None):
-            raise self._refusal(f"<{tag[:80]}> with {found[:80]!r}", "nothing that names a file or writes output")
+        named = {**attributes, attributes.get("key", ""): attributes.get("value", "")} if tag == "param" else attributes
+        for key, value in named.items():
+            names_file = _NAMES_FILE.search(key) and value.lower() not in _NO_FILE
+            if names_file or _SWITCHES_DEVICE.search(key):
+                raise self._refusal(f"<{tag[:80]}> with {key[:80]!r}", "nothing that names a file or writes output")
+        if tag == "param" and _NAMES_FILE.search(attributes.get("key", "")):
+            return False
         if "/" in attributes.get("projParameter", ""):
             raise self._refusal("projParameter with '/'", "a projection that names no file")
         if tag not in _COPIED:
@@ -170,7 +186,7 @@ class _Copy:
 
 
 def _is_plain(key: str) -> bool:
-    return key.isidentifier() and key != "xmlns"
+    return key.isidentifier() and key != "xmlns" and not _NAMES_FILE.search(key)
 
 
 def _harmless(value: str) -> str:

@@ -16,7 +16,7 @@ from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.clearance import truck_reaches
 from risk_sac.scenario.maps.find_junction import roomy, turn
 from risk_sac.scenario.maps.find_stretch import check_limit
-from risk_sac.scenario.maps.found import NoFit, Spot
+from risk_sac.scenario.maps.found import NoFit, Spot, lacking
 from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net
 from risk_sac.scenario.maps.ways import AFTER_S, track, way_on
 from risk_sac.scenario.place import CrossingPlace, Site, Track
@@ -82,7 +82,7 @@ def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[Lane, Track, Tra
             (ego, link), (occluder, beside) = _ego(net, own), _straight(net, right, OCCLUDED_S)
             least_m = TRUCK_LENGTH_M + LEAD_IN_S * top_speed(own.limit_mps) + 1.0
             if occluder.room_m < least_m:
-                raise NoFit(f"the way in on the lane beside is {occluder.room_m:.0f} m long; wanted {least_m:.0f} m")
+                raise NoFit(f"the length of the way in on the lane beside is {lacking(occluder.room_m, 'm', least_m)}")
             if truck_reaches(net, beside, link):
                 raise NoFit(
                     f"a truck that drives on from {right.id!r} reaches into the way of a vehicle that drives on from "
@@ -105,10 +105,12 @@ def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[Lane, Trac
             "so that a vehicle can hide the pedestrian"
         )
     ego, link = _ego(net, own)
-    way = way_on(net, beside[0], (TRUCK_LENGTH_M + OCCLUDER_M) / beside[0].limit_mps + OCCLUDED_S)
-    occluder = track(net, way, 0.0, TRUCK_LENGTH_M + OCCLUDER_M)
+    parked_m = TRUCK_LENGTH_M + OCCLUDER_M
+    occluder = track(net, way_on(net, beside[0], OCCLUDED_S, from_m=parked_m), 0.0, parked_m)
     if occluder.room_m < room_beyond_m():
-        raise NoFit(f"the way in of oncoming vehicles is {occluder.room_m:.0f} m long; wanted {room_beyond_m():.0f} m")
+        raise NoFit(
+            f"the length of the way in of oncoming vehicles is {lacking(occluder.room_m, 'm', room_beyond_m())}"
+        )
     return own, ego, occluder, link
 
 

@@ -12,7 +12,7 @@ from risk_sac.scenario import junction
 from risk_sac.scenario.maps.around import signal_of, walk_over
 from risk_sac.scenario.maps.clearance import ROOM_M, too_near, waits_in_the_way
 from risk_sac.scenario.maps.find_stretch import check_limit
-from risk_sac.scenario.maps.found import NoFit, Spot
+from risk_sac.scenario.maps.found import NoFit, Spot, lacking
 from risk_sac.scenario.maps.net import Edge, Link, Net, once
 from risk_sac.scenario.maps.ways import AFTER_S, track, way_on
 from risk_sac.scenario.place import JunctionPlace, Leg, Stream, Track
@@ -131,7 +131,7 @@ def leg(net: Net, road: Approach, name: str, onward_s: float) -> Leg:
 def roomy(found: Track, edge: str, wanted_m: float) -> Track:
     """The track; raises `NoFit` if it begins too near to its reference."""
     if found.room_m < wanted_m:
-        raise NoFit(f"the way in on {edge!r} is {found.room_m:.0f} m long; wanted {wanted_m:.0f} m")
+        raise NoFit(f"the length of the way in on {edge!r} is {lacking(found.room_m, 'm', wanted_m)}")
     return found
 
 
@@ -158,7 +158,7 @@ def _turn(net: Net, link: Link, onward_s: float) -> Track | str:
         )
     length_m = link.source.length_m
     try:
-        way = way_on(net, link.source, onward_s + length_m / link.source.limit_mps, through=link)
+        way = way_on(net, link.source, onward_s, through=link, from_m=length_m)
     except NoFit as why:
         return str(why)
     return track(net, way, length_m)

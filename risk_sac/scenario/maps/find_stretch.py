@@ -8,7 +8,7 @@ from contextlib import suppress
 
 from risk_sac.scenario.car_following import LEAST_BEHIND_M
 from risk_sac.scenario.maps.around import signal_of
-from risk_sac.scenario.maps.found import NoFit, Spot
+from risk_sac.scenario.maps.found import NoFit, Spot, lacking
 from risk_sac.scenario.maps.net import Edge, Lane, Link, Net
 from risk_sac.scenario.maps.ways import DRIVEN_S, PIECES_M, Way, track, way_on
 from risk_sac.scenario.place import Stretch, Track
@@ -36,7 +36,7 @@ def place(net: Net, spot: Spot) -> Stretch:
     own, way = _lane_to_drive(net, edge, reference_m)
     ego = track(net, way, reference_m, PIECES_M)
     if ego.room_m < LEAST_BEHIND_M:
-        raise NoFit(f"there are {ego.room_m:.0f} m behind the ego; wanted {LEAST_BEHIND_M:.0f} m")
+        raise NoFit(f"the room behind the ego is {lacking(ego.room_m, 'm', LEAST_BEHIND_M)}")
     signals = [link.signal for link in _soon(way, own.length_m - reference_m)]
     sides = {lane.index - own.index: _beside(net, lane, reference_m) for lane in edge.drivable}
     beside = ["left"] * (sides.get(1) is not None) + ["right"] * (sides.get(-1) is not None)
@@ -58,7 +58,7 @@ def check_limit(lane: Lane) -> None:
     """Raises `NoFit` for a road whose speed limit is none for cars."""
     if not SLOWEST_MPS <= lane.limit_mps <= FASTEST_MPS:
         wanted = f"wanted {SLOWEST_MPS:g} to {FASTEST_MPS:g} m/s"
-        raise NoFit(f"the speed limit of {lane.edge!r} is {lane.limit_mps:g} m/s; {wanted}")
+        raise NoFit(f"the speed limit of {lane.edge!r} is {lane.limit_mps} m/s; {wanted}")
 
 
 def _lane_to_drive(net: Net, edge: Edge, reference_m: float) -> tuple[Lane, Way]:
@@ -67,7 +67,7 @@ def _lane_to_drive(net: Net, edge: Edge, reference_m: float) -> tuple[Lane, Way]
     whys = []
     for lane in sorted(edge.drivable, key=lambda lane: abs(lane.index - middle)):
         try:
-            return lane, way_on(net, lane, DRIVEN_S + reference_m / lane.limit_mps)
+            return lane, way_on(net, lane, DRIVEN_S, from_m=reference_m)
         except NoFit as why:
             whys.append(why)
     raise whys[0]
@@ -75,7 +75,7 @@ def _lane_to_drive(net: Net, edge: Edge, reference_m: float) -> tuple[Lane, Way]
 
 def _beside(net: Net, lane: Lane, reference_m: float) -> Track | None:
     with suppress(NoFit):
-        way = way_on(net, lane, BESIDE_S + reference_m / lane.limit_mps)
+        way = way_on(net, lane, BESIDE_S, from_m=reference_m)
         found = track(net, way, reference_m, PIECES_M)
         return found if found.room_m >= LEAST_BEHIND_M else None
     return None

@@ -8,16 +8,22 @@ from risk_sac.errors import MapError
 from risk_sac.scenario import library
 from risk_sac.scenario.maps import find_crossing, find_junction, find_stretch
 from risk_sac.scenario.maps.around import ground_around
-from risk_sac.scenario.maps.cut import cut
+from risk_sac.scenario.maps.cut import cut, tracks
 from risk_sac.scenario.maps.found import Fit, Misfit, NoFit, Pattern, Spot, Survey
 from risk_sac.scenario.maps.net import Net
 from risk_sac.scenario.maps.read_net import read_net, read_tree
+from risk_sac.scenario.maps.ways import check_lengths
 from risk_sac.scenario.place import CrossingPlace, JunctionPlace
 
 FINDERS: dict[Pattern, ModuleType] = {
     "car_following": find_stretch,
     "crossing": find_crossing,
     "junction": find_junction,
+}
+CANDIDATES: dict[Pattern, str] = {  # what their spots are
+    "car_following": f"road for cars of {find_stretch.SHORTEST_M:g} m or more",
+    "crossing": "road for cars that ends at a crossing",
+    "junction": "road to a junction that another one leads to as well",
 }
 
 
@@ -36,10 +42,12 @@ def survey(
     for number, spot in enumerate(spots):
         tell(number / len(spots))
         try:
-            fits.append(Fit(spot, FINDERS[spot.pattern].place(net, spot)))
+            fits.append(_fit(net, spot))
         except NoFit as error:
             misfits.append(Misfit(spot, str(error)))
-    return Survey(tuple(fits), tuple(misfits))
+    found = {spot.pattern for spot in spots}
+    nowhere = {pattern: _no_spot(net, pattern) for pattern in patterns if pattern not in found}
+    return Survey(tuple(fits), tuple(misfits), nowhere)
 
 
 def place_at(net: Net, pattern: Pattern, id_: str) -> Fit:
@@ -52,7 +60,7 @@ def place_at(net: Net, pattern: Pattern, id_: str) -> Fit:
     if spot is None:
         raise MapError("place", _nowhere(net, pattern, id_))
     try:
-        return with_ground(net, Fit(spot, FINDERS[pattern].place(net, spot)))
+        return with_ground(net, _fit(net, spot))
     except NoFit as error:
         raise MapError("place", f"{pattern} does not fit at {id_!r}: {error}") from error
 
@@ -70,15 +78,23 @@ def _spots(net: Net, patterns: Collection[Pattern]) -> Iterator[Spot]:
         yield from FINDERS[pattern].spots(net)
 
 
+def _fit(net: Net, spot: Spot) -> Fit:
+    """Makes the place of a spot; raises `NoFit` where there is none."""
+    place = FINDERS[spot.pattern].place(net, spot)
+    check_lengths(net, tracks(place))
+    return Fit(spot, place)
+
+
+def _no_spot(net: Net, pattern: Pattern) -> str:
+    if pattern == "crossing" and not net.crossings:
+        return "the net has no crossing; netconvert drops those that join no sidewalks, and warns of it"
+    return f"the net has no {CANDIDATES[pattern]}"
+
+
 def _nowhere(net: Net, pattern: Pattern, id_: str) -> str:
     if id_ not in net.edges:
         return f"the map has no edge {id_!r}; a place is named by the edge that leads to it, or on which it is"
-    what = {
-        "car_following": "a road for cars, and long enough to count",
-        "crossing": "a road for cars that ends at a crossing",
-        "junction": "a road to a junction that another one leads to as well",
-    }
-    return f"{pattern} does not fit at {id_!r}: wanted {what[pattern]}"
+    return f"{pattern} does not fit at {id_!r}: wanted a {CANDIDATES[pattern]}"
 
 
 class Map:
@@ -93,9 +109,15 @@ class Map:
         """Makes one place, or all places that a pattern fits.
 
         Raises:
-          MapError: it does not fit at the one.
+          MapError: it does not fit at the one, or nowhere.
         """
-        return [place_at(self.net, pattern, place)] if place is not None else survey(self.net, (pattern,)).fits
+        if place is not None:
+            return [place_at(self.net, pattern, place)]
+        found = survey(self.net, (pattern,))
+        if not found.fits:
+            why = found.nowhere.get(pattern) or f"at {found.misfits[0].spot.id!r}, {found.misfits[0].why}"
+            raise MapError("places", f"{pattern} fits nowhere on this map: {why}")
+        return found.fits
 
     def keep(self, fit: Fit) -> str:
         """Puts a place into the library; returns the name of its family."""

@@ -1,6 +1,8 @@
 """Results of a search for places on a map."""
 
+import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -66,12 +68,19 @@ class NoFit(Exception):
     """Why a pattern does not fit; for the finders alone."""
 
 
+def lacking(got: float, unit: str, wanted: float) -> str:
+    """Says a number and the larger one that was wanted, to one digit that tells them apart."""
+    below, above = math.floor(got * 10.0) / 10.0, math.ceil(round(wanted * 10.0, 6)) / 10.0
+    return f"{below:g} {unit}; wanted {above:g} {unit}"
+
+
 @dataclass(frozen=True, slots=True)
 class Survey:
     """All places of a map, and why elsewhere there is none; in the order of the net."""
 
     fits: tuple[Fit, ...]
     misfits: tuple[Misfit, ...]
+    nowhere: Mapping[Pattern, str]  # why a pattern has neither
 
     @property
     def counts(self) -> Counter[str]:

@@ -1,10 +1,12 @@
 """Ways through a net, lane by lane: what leads to a place, and what leads on from it."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from risk_sac.scenario.maps.clearance import too_near
-from risk_sac.scenario.maps.found import NoFit
+from risk_sac.scenario.maps.found import NoFit, lacking
 from risk_sac.scenario.maps.net import Lane, Link, Net, once
 from risk_sac.scenario.place import Piece, Track
 
@@ -12,6 +14,8 @@ DRIVEN_S = 17.0  # longer than an episode: the ego must not reach the end of the
 AFTER_S = 15.5  # the same behind a stop line: what is driven until the adversaries' release comes off
 BEFORE_M = 160.0  # of road before a reference where vehicles could start
 PIECES_M = 160.0  # of road beyond a reference where vehicles may start
+OFF_SHARE = 0.02  # of a lane's length, by which its shape may be longer or shorter
+OFF_M = 1.0  # the same of a short lane: SUMO's gaps are 2.5 m
 TRIES = 300  # lanes that are looked at for a way on
 
 
@@ -23,10 +27,17 @@ class Way:
     links: tuple[Link, ...]  # one fewer
 
 
-def way_on(net: Net, first: Lane, seconds: float, through: Link | None = None) -> Way:
+def way_on(net: Net, first: Lane, seconds: float, through: Link | None = None, from_m: float = 0.0) -> Way:
     """Finds the straightest way on that takes `seconds` at the speed limits.
 
     It uses no edge twice.
+
+    Args:
+      net: where.
+      first: lane that the way begins with.
+      seconds: of driving.
+      through: link that the way takes first.
+      from_m: along the first lane, from where the seconds count.
 
     Raises:
       NoFit: every way is too short.
@@ -51,10 +62,11 @@ def way_on(net: Net, first: Lane, seconds: float, through: Link | None = None) -
                 return way
         return None
 
-    way = extend([first], [], first.length_m / first.limit_mps, [through] if through else _onward(net, first))
+    left_s = (first.length_m - from_m) / first.limit_mps
+    way = extend([first], [], left_s, [through] if through else _onward(net, first))
     if way is None:
-        found = f"the longest way on that was found ends with edge {farthest!r} after {reached_s:.0f} s of driving"
-        raise NoFit(f"{found}; wanted {seconds:.0f} s")
+        found = f"the longest way on that was found ends with edge {farthest!r}"
+        raise NoFit(f"{found} after driving {lacking(reached_s, 's', seconds)}")
     return way
 
 
@@ -142,6 +154,39 @@ def _reach(net: Net, lane: Lane, following: Sequence[str]) -> int:
 def edges_on(*tracks: Track) -> set[str]:
     """Lists all edges that vehicles on the tracks may reach."""
     return {piece.edge for track in tracks for piece in track.pieces} | {e for track in tracks for e in track.onward}
+
+
+def check_lengths(net: Net, tracks: Iterable[Track]) -> None:
+    """Raises `NoFit` if a lane on tracks is longer or shorter than its shape.
+
+    SUMO drives a lane by its `length`, and places bodies by its shape.
+    """
+    for each in tracks:
+        edges = [*(piece.edge for piece in each.pieces), *each.onward]
+        for edge, following in zip(edges, [*edges[1:], ""], strict=True):
+            if (lane := _off_length(net, edge, following)) is not None:
+                got = f"lane {lane.id!r} has the length {lane.length_m:.2f} m and a shape of {_drawn_m(lane):.2f} m"
+                raise NoFit(
+                    f"{got}; wanted a difference of at most {_most_off_m(lane):.2f} m ({OFF_SHARE:.0%}, or {OFF_M:g} m)"
+                )
+
+
+@once
+def _off_length(net: Net, edge: str, following: str) -> Lane | None:
+    """A lane of an edge, or from there to the following one, whose shape has another length."""
+    lanes = net.edges[edge].drivable
+    links = (link for lane in lanes for link in net.onward.get(lane.id, ()) if link.target.edge == following)
+    used = (*lanes, *(lane for link in links for lane in link.inside))
+    off = (lane for lane in used if abs(_drawn_m(lane) - lane.length_m) > _most_off_m(lane))
+    return next(off, None)
+
+
+def _drawn_m(lane: Lane) -> float:
+    return round(sum(math.dist(a, b) for a, b in pairwise(lane.line)), 2)
+
+
+def _most_off_m(lane: Lane) -> float:
+    return round(max(OFF_M, OFF_SHARE * lane.length_m), 2)
 
 
 def _piece(lane: Lane, reach_m: float) -> Piece:

@@ -1,11 +1,14 @@
 import math
 import os
+import re
 from contextlib import closing, nullcontext
 from pathlib import Path
 
 import libsumo
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from shapely import LineString, Point, box
 from shapely.affinity import affine_transform
 
@@ -20,7 +23,7 @@ from risk_sac.scenario.maps.clearance import too_near, truck_reaches, waits_in_t
 from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.find_junction import turn
 from risk_sac.scenario.maps.finder import Map, place_at, survey
-from risk_sac.scenario.maps.found import NoFit
+from risk_sac.scenario.maps.found import NoFit, lacking
 from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net
 from risk_sac.scenario.maps.read_net import read_net
 from risk_sac.scenario.maps.summary import net_remarks
@@ -159,12 +162,72 @@ def test_a_map_that_nothing_fits_on_says_why(tmp_path: Path, content: str, says:
 def test_a_place_that_cannot_be_run_says_why(tmp_path: Path) -> None:
     file = tmp_path / "map.net.xml"
     file.write_text(f"<net>{road('short', 'a', 'b', 90, '0,0 90,0')}</net>")
-    with pytest.raises(MapError, match="the longest way on that was found ends with edge 'short' after 6 s"):
+    with pytest.raises(MapError, match=r"the longest way on .* edge 'short' after driving 3\.2 s; wanted 17 s"):
         place_at(read_net(file), "car_following", "short")
     with pytest.raises(MapError, match="the map has no edge 'x'"):
         place_at(read_net(file), "car_following", "x")
     with pytest.raises(MapError, match="junction does not fit at 'short': wanted a road to a junction"):
         place_at(read_net(file), "junction", "short")
+    with pytest.raises(MapError, match="crossing fits nowhere on this map: the net has no crossing; netconvert drops"):
+        Map(file).fits("crossing", None)
+    with pytest.raises(MapError, match="car_following fits nowhere on this map: at 'short', the longest way"):
+        Map(file).fits("car_following", None)
+
+
+def test_a_pattern_without_any_candidate_says_why() -> None:
+    found = survey(read_net(NETS / "low" / "low.net.xml"))
+    assert set(found.nowhere) == {"crossing", "junction"}
+    assert "has no road to a junction" in found.nowhere["junction"]
+
+
+def test_a_way_that_is_barely_too_short_contradicts_itself_nowhere(tmp_path: Path) -> None:
+    file = tmp_path / "map.net.xml"
+    for seconds, says in ((16.96, "after driving 16.9 s; wanted 17 s"), (16.999, "after driving 16.9 s; wanted 17 s")):
+        metres = 2 * seconds * 13.89
+        file.write_text(f"<net>{road('r', 'a', 'b', metres, f'0,0 {metres},0')}</net>")
+        (misfit,) = survey(read_net(file), ("car_following",)).misfits
+        assert misfit.why.endswith(says)
+
+
+@given(wanted=st.floats(0.1, 1e4), share=st.floats(0.0, 1.0, exclude_max=True))
+def test_what_is_lacking_is_less_than_what_was_wanted_as_it_is_written(wanted: float, share: float) -> None:
+    if wanted * share < wanted - 1e-6:
+        got, above = lacking(wanted * share, "m", wanted).split(" m; wanted ")
+        assert float(got) < float(above.removesuffix(" m"))
+
+
+@pytest.mark.parametrize("place", ["from_south", "from_west"])
+@pytest.mark.parametrize(
+    ("lane", "share", "fits"),
+    [
+        ("{own}_1", 1.015, True),
+        ("{own}_1", 1.03, False),
+        ("{own}_1", 0.5, False),
+        ("{own}_2", 1.03, False),  # a neighbour
+        ("{own}_0", 2.0, True),  # a sidewalk
+        ("{on}_1", 2.0, False),
+        (":centre_{straight}_0", 1.06, False),
+        (":centre_{pocket}_0", 1.2, True),  # 0.8 m
+        (":centre_{pocket}_0", 1.3, False),
+    ],
+)
+def test_a_place_whose_lanes_are_driven_longer_or_shorter_than_drawn_is_refused(
+    tmp_path: Path, place: str, lane: str, share: float, fits: bool
+) -> None:
+    south = {"own": "from_south", "on": "to_north", "straight": "9", "pocket": "20"}
+    west = {"own": "from_west", "on": "to_east", "straight": "13", "pocket": "22"}
+    changed = re.escape(lane.format(**(south if place == "from_south" else west)))
+    content, count = re.subn(
+        rf'(<lane id="{changed}" [^>]*length=")([\d.]+)',
+        lambda found: f"{found[1]}{float(found[2]) * share:.2f}",
+        (NETS / "dense" / "dense.net.xml").read_text(),
+    )
+    assert count == 1
+    file = tmp_path / "map.net.xml"
+    file.write_text(content)
+    says = r"has the length .* and a shape of .*; wanted a difference of at most .* m \(2%, or 1 m\)"
+    with nullcontext() if fits else pytest.raises(MapError, match=says):
+        place_at(read_net(file), "junction", place)
 
 
 @pytest.mark.parametrize(
@@ -184,6 +247,9 @@ def test_what_is_no_map_is_not_converted(tmp_path: Path, content: str, says: str
         present_net(file, tmp_path)
 
 
+TOO_MUCH = "map.osm, for which netconvert has too little time or memory; wanted .* 4096 MiB; cut"
+
+
 @pytest.mark.parametrize(
     ("script", "says"),
     [
@@ -191,12 +257,18 @@ def test_what_is_no_map_is_not_converted(tmp_path: Path, content: str, says: str
             "echo 'Error: odd lane' >&2; kill -SEGV $$",
             r"SUMO's netconvert crashes on map.osm \(SIGSEGV\); .* odd lane; open",
         ),
-        ("echo 'std::bad_alloc' >&2; exit 1", "map.osm, for which netconvert has too little time or memory; cut"),
-        ("kill -KILL $$", "map.osm, for which netconvert has too little time or memory; cut"),
+        ("echo 'std::bad_alloc' >&2; exit 1", TOO_MUCH),
+        ("kill -KILL $$", TOO_MUCH),
+        ("while [ $(ulimit -f) = unlimited ]; do :; done; yes Warning >&2", TOO_MUCH),
+        (
+            "while [ $(ulimit -v) = unlimited ]; do :; done; echo Error: got $(ulimit -v) KiB >&2; exit 1",
+            f"netconvert cannot convert map.osm: got {convert.MEMORY_BYTES >> 10} KiB",
+        ),
         ("echo 'Error: no nodes' >&2; exit 1", "netconvert cannot convert map.osm: no nodes"),
     ],
 )
 def test_why_netconvert_failed_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, says: str) -> None:
+    monkeypatch.setattr(convert, "FILE_BYTES", 1 << 20)
     program, file = tmp_path / "netconvert", tmp_path / "map.osm"
     program.write_text(f"#!/bin/sh\n{script}\n")
     program.chmod(0o755)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.scenario.maps.unpack import MAX_BYTES
+from risk_sac.scenario.maps.convert import FILE_BYTES
 from service.errors import StorageError, UploadError
 from service.networks import limits
 from service.networks.sandbox import inspect
@@ -84,7 +84,7 @@ def test_a_checker_that_floods_its_output_fills_no_memory(tmp_path: Path) -> Non
     code = f"{BOUND} [os.write(1, bytes(1 << 20)) for _ in range(1000)]"
     with pytest.raises(StorageError, match="cannot be checked"):
         inspect(tmp_path, checker(tmp_path, code))
-    assert (tmp_path / "log").stat().st_size <= 2 * MAX_BYTES
+    assert (tmp_path / "log").stat().st_size <= FILE_BYTES
 
 
 def test_what_the_checker_says_is_not_believed_either(tmp_path: Path) -> None:
@@ -115,9 +115,9 @@ def bounded(code: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     ("code", "says"),
     [
-        ("bytearray(limits.MEMORY_BYTES)", "MemoryError"),
+        ("bytearray(simulator.MEMORY_BYTES)", "MemoryError"),
         ("[open(os.devnull) for _ in range(limits.OPEN_FILES)]", "Too many open files"),
-        ("open('big', 'wb').truncate(2 * simulator.MAX_BYTES + 1)", "File too large"),
+        ("open('big', 'wb').truncate(simulator.FILE_BYTES + 1)", "File too large"),
     ],
 )
 def test_the_checker_binds_itself(code: str, says: str, tmp_path: Path) -> None:

@@ -49,6 +49,7 @@ def test_who_asks_too_early_is_told_of_the_progress(
         assert time.monotonic() < deadline
         time.sleep(0.05)
     assert [each.place for each in found.elsewhere] == ["road"]
+    assert set(found.nowhere) == {"crossing", "junction"}
 
 
 def test_damage_of_a_net_is_told_as_the_services_and_that_of_places_is_mended(
