@@ -20,8 +20,8 @@ from risk_sac.cli.console import headline
 from risk_sac.client import Campaign, Client, ClientError, Episode, Results, Unreachable
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.records import State
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, series_name
-from risk_sac.run_folder.series import read_series
 from risk_sac.terminal import console, run_command
 from service.settings import ServiceSettings
 

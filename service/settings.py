@@ -47,7 +47,7 @@ class ServiceSettings(RaySettings, BaseSettings):
     data_dir: Annotated[Path, AfterValidator(Path.absolute)] = Field(default=Path("data"), validate_default=True)
     """Folder of the database, checkpoints, recorded failures, API keys and uploaded networks."""
     runs: Path | None = None
-    """Folder of runs of the command line that are imported at the start, as campaigns that have ended."""
+    """Folder of runs of the command line that are imported after the start, as campaigns that have ended."""
     database_url: str | None = None
     """SQLAlchemy URL of a PostgreSQL database (`postgresql+psycopg://…`); by default SQLite in `data_dir`."""
     host: str = "127.0.0.1"

@@ -7,8 +7,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from risk_sac.errors import RiskSacError
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.series import read_series
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.overlap import Overlap, overlaps_before_contact
 

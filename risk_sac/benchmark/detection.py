@@ -9,9 +9,9 @@ from risk_sac.config import Budget, RunMethod, RunSpec
 from risk_sac.failures.detected import candidates, detected
 from risk_sac.loop import execute_run
 from risk_sac.records import EpisodeRecord, Record, RunMetrics, SeriesFile
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import FAILURES
-from risk_sac.run_folder.series import read_series
 
 ANSWER = "detection.json"
 MOST_EPISODES = 20_000  # scenes that are refused cost no steps

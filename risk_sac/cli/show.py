@@ -22,14 +22,15 @@ from risk_sac.cli.console import (
 )
 from risk_sac.cli.failure_filters import add_filter_flags, listed, matching
 from risk_sac.cli.parser import FAILURE_HELP, RESULTS_HELP, Commands, add_command, add_json_flag
+from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
 from risk_sac.metrics import headline_driven_by
 from risk_sac.records import Collision, EpisodeId, Judgement, RunMetrics, Violation
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import RESULTS, RecordedFailure, Results, read_results
-from risk_sac.run_folder.series import read_series
 from risk_sac.terminal import notes
 
 NAME_WIDTH = 20  # of a requirement's name in the list
@@ -41,17 +42,17 @@ def add(commands: Commands) -> None:
         commands,
         "show",
         _show,
-        "list a run's failures, or draw one",
+        "list a run's failures, or draw one, or the one in a bundle",
         more="Without RESULTS, takes the newest run below the current folder; `show 99` draws its failure 99.",
         example="show runs/low --preventable --sort severity",
     )
-    show.add_argument("results", type=Path, nargs="?", metavar="RESULTS", help=RESULTS_HELP)
+    show.add_argument("results", type=Path, nargs="?", metavar="RESULTS", help=f"{RESULTS_HELP}; or a bundle, an .npz")
     show.add_argument("failure", nargs="?", metavar="FAILURE", help=FAILURE_HELP)
     add_filter_flags(show)
     picture = show.group("picture of one failure")
     twin = f"draw beside it the same scene without an attack (idle), or with this ego: {EGO}"
     picture.add_argument("--twin", metavar="TWIN", help=twin)
-    out = "(default: failures/FAILURE.png beside RESULTS)"
+    out = "(default: failures/FAILURE.png beside RESULTS, or BUNDLE.png beside the bundle)"
     picture.add_argument("--out", type=Path, metavar="FILE.png", help=out)
     add_json_flag(show)
 
@@ -62,6 +63,10 @@ def _show(options: argparse.Namespace) -> int:
     if given is not None and named is None and _names_failure(given):
         named = given.name
         given = None
+    if given is not None and given.suffix == ".npz":
+        if named is not None:
+            raise ConfigError("FAILURE", f"{named!r}", "none: a bundle holds one failure")
+        return _draw(options, *_bundled(given), given)
     path = given or newest_run(Path.cwd())
     results = read_results(path)
     if named is None:
@@ -69,19 +74,35 @@ def _show(options: argparse.Namespace) -> int:
         return OK
     failure = results.failure(named)
     folder = path if path.is_dir() else path.parent
+    series = folder / failure.series
+    return _draw(options, results.spec, Recording(failure, read_series(series)), series)
+
+
+def _bundled(file: Path) -> tuple[RunSpec, Recording]:
+    """Returns the failure in a bundle, with the spec of its run."""
+    from risk_sac.failures.bundle import read_bundle  # here, because loading the simulator takes a second
+
+    bundle = read_bundle(file)
+    manifest = bundle.manifest
+    if manifest.episode.worst_violation is None:
+        raise ConfigError("RESULTS", f"{file}, in which the ego violates nothing", "the bundle of a failure")
+    return manifest.spec, Recording(RecordedFailure.of(manifest.spec.id, manifest.episode), bundle.series)
+
+
+def _draw(options: argparse.Namespace, spec: RunSpec, recording: Recording, file: Path) -> int:
+    """Draws a failure; without `--out` beside the file that its series is from."""
     from risk_sac.failures.show import draw  # here, because loading matplotlib takes a second
 
-    recording = Recording(failure, read_series(folder / failure.series))
     twin = None
     if options.twin is not None:
         from risk_sac.failures.play import twin_recording
 
         ego = None if options.twin == IDLE else read_ego(options.twin)
-        twin = twin_recording(results.spec, recording, ego, options.twin)
-    stem = Path(failure.series).stem + ("" if options.twin is None else f"-{Path(options.twin).stem}")
-    picture = options.out or (folder / failure.series).with_name(f"{stem}.png")
-    draw(results.spec.family, recording, picture, twin)
-    print_answer(options, _plain(failure) | {"picture": str(picture)}, f"Drawn: {picture}")
+        twin = twin_recording(spec, recording, ego, options.twin)
+    stem = file.stem + ("" if options.twin is None else f"-{Path(options.twin).stem}")
+    picture = options.out or file.with_name(f"{stem}.png")
+    draw(spec.family, recording, picture, twin)
+    print_answer(options, _plain(recording.failure) | {"picture": str(picture)}, f"Drawn: {picture}")
     return OK
 
 

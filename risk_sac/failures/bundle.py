@@ -7,13 +7,12 @@ trusted.
 
 import hashlib
 import io
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,14 +26,13 @@ from risk_sac.failures.studied import Core
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, Record
+from risk_sac.run_folder.arrays import MOST_BYTES, read_limited, unpack_arrays
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.scripts.motions import SIZE
 from risk_sac.types import Scene
 
 PACKAGES = ("libsumo", "numpy")  # that decide how an episode goes, its scene and its actions given
-PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 CODE, WORLD = "risk_sac", "sumo_nets"
-MOST_ARRAYS, MOST_FILE_BYTES, MOST_BYTES = 64, 2**25, 2**28  # a full series of dense has 23 arrays and some 5 MB
 MOST_POLICY_BYTES = 2**23
 MANIFEST, HEADS, LAYER = "manifest", "signal_heads", "policy_layer_"  # the layers are numbered
 NORMALISED = "policy_normalised"  # there if the policy is
@@ -171,8 +169,7 @@ def read_bundle(file: Path) -> Bundle:
       ConfigError: it is no bundle, of another version, damaged, too large, or holds no episode that can be played.
       OSError: it cannot be read, or the place that it carries cannot be kept.
     """
-    with file.open("rb") as stream:
-        content = stream.read(MOST_FILE_BYTES + 1)
+    content = read_limited(file)
     try:
         return _bundle(content)
     except OSError:
@@ -181,14 +178,12 @@ def read_bundle(file: Path) -> Bundle:
         first = error.errors()[0]
         why = f"a manifest of another version, or none: {'.'.join(map(str, first['loc']))}: {first['msg']}"
         raise ConfigError("BUNDLE", f"{file} is no bundle that can be played: {why}") from error
-    except Exception as error:  # what zipfile, zlib and numpy raise of bytes that mean nothing is an open set
+    except Exception as error:  # what is raised of a series and a policy that mean nothing is an open set
         raise ConfigError("BUNDLE", f"{file} is no bundle that can be played: {error}") from error
 
 
 def _bundle(content: bytes) -> Bundle:
-    if len(content) > MOST_FILE_BYTES:
-        raise ValueError(f"it is larger than {MOST_FILE_BYTES} bytes")
-    arrays = _arrays(content)
+    arrays = unpack_arrays(content, most_values=MOST_BYTES)  # of which a place's net has one for each letter
     if missing := {MANIFEST, HEADS} - arrays.keys():
         raise ValueError(f"it lacks {', '.join(missing)}")
     manifest = Manifest.model_validate_json(str(arrays.pop(MANIFEST)))
@@ -205,21 +200,6 @@ def _bundle(content: bytes) -> Bundle:
         policy = FrozenPolicy(layers, problem.action_size, normalised)
         policy.check(problem.observation_size)
     return Bundle(manifest=manifest, series=arrays, signal_heads=heads, policy=policy)
-
-
-def _arrays(content: bytes) -> dict[str, NDArray[Any]]:
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        entries = archive.infolist()
-    if len(entries) > MOST_ARRAYS or sum(entry.file_size for entry in entries) > MOST_BYTES:
-        raise ValueError(f"{len(entries)} arrays; wanted at most {MOST_ARRAYS}, of {MOST_BYTES} bytes in all")
-    for entry in entries:
-        if entry.compress_type not in PACKED:  # the others are unpacked whole, whatever size they say
-            raise ValueError(f"{entry.filename} is packed in another way than a bundle's arrays are")
-    with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        arrays = dict(file)
-    if not all(isinstance(array, np.ndarray) for array in arrays.values()):
-        raise ValueError("a file in it is no array")
-    return arrays
 
 
 def _check_playable(problem: Problem, manifest: Manifest, series: Series) -> None:

@@ -17,8 +17,8 @@ from risk_sac.failures.play import repeated
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.records import EpisodeRecord
 from risk_sac.run import RunState
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, Results, series_name
-from risk_sac.run_folder.series import read_series
 from risk_sac.run_folder.verified import read_verified
 
 logger = logging.getLogger(__name__)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.records import NO_CONTACT, Collision, EpisodeRecord, Record, Violation
+from risk_sac.run_folder.arrays import unpack_arrays
 
 IDLE = "idle"
 Twin = Literal["idle", "default", "perfect", "careful", "defensive"]
@@ -82,6 +83,5 @@ def twin_bytes(play: TwinPlay, series: Mapping[str, NDArray[Any]]) -> bytes:
 
 def read_twin(content: bytes) -> tuple[TwinPlay, dict[str, NDArray[Any]]]:
     """A twin and its time series from what `twin_bytes` wrote."""
-    with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-        arrays = {name: archive[name] for name in archive.files}
+    arrays = unpack_arrays(content)
     return TwinPlay.model_validate_json(str(arrays.pop(TOLD))), arrays

@@ -20,8 +20,8 @@ from risk_sac.failures.play import replay
 from risk_sac.failures.recording import trajectory_digest
 from risk_sac.records import EpisodeRecord
 from risk_sac.risk.measures import soft_min
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, Results, read_results, series_name
-from risk_sac.run_folder.series import read_series
 from risk_sac.run_folder.verified import distinct_failures
 
 ATTEMPTS = 3

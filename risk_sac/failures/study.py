@@ -17,8 +17,8 @@ from risk_sac.failures.question import REFUSED, Question, TwinPlay, twin_bytes
 from risk_sac.failures.recording import actions_of
 from risk_sac.failures.variants import region
 from risk_sac.frozen_policy import FrozenPolicy
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, read_results
-from risk_sac.run_folder.series import read_series
 
 
 def answer(question: Question) -> bytes:

@@ -3,8 +3,6 @@
 import hashlib
 import io
 import math
-import zipfile
-import zlib
 from collections.abc import Collection
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.errors import DamagedError
 from risk_sac.records import SeriesFile
 from risk_sac.risk.measures import Measures
 from risk_sac.risk.publish import AHEAD, ENCOUNTER, GAP, RSS_LATERAL, RSS_LONGITUDINAL, SEEN, TTC
@@ -129,12 +126,3 @@ def write_series(path: Path, series: dict[str, NDArray[np.generic]]) -> SeriesFi
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, content)
     return SeriesFile(path.name, hashlib.sha256(content).hexdigest())
-
-
-def read_series(path: Path) -> dict[str, NDArray[np.generic]]:
-    """Reads what `write_series` wrote; raises `DamagedError` if it is not as it was written."""
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError) as error:
-        raise DamagedError(f"{path} is damaged: {error}") from error

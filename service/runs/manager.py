@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from risk_sac.config import CampaignSpec
 from risk_sac.errors import ConfigError
@@ -28,6 +29,9 @@ from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign
 from service.store.writing import Ledger
+
+if TYPE_CHECKING:
+    from service.runs.imported import Imports
 
 logger = logging.getLogger(__name__)
 
@@ -56,6 +60,7 @@ class Manager:
         self._lock = threading.RLock()
         self._storage = StoragePause(store, self._ledger, settings.data_dir)
         self._retention = Retention(settings, store)
+        self._imports: Imports | None = None
         self._thread = threading.Thread(target=self._work, name="manager", daemon=True)
 
     @property
@@ -89,10 +94,14 @@ class Manager:
             settle(self._settings.data_dir / "campaigns", self._store.exists)
         except OSError as error:
             raise StorageError(refused("tidying the data folder", self._settings.data_dir, error)) from error
+        for campaign_id in self._store.begun_imports():
+            logger.warning("its import was interrupted; it is removed", extra={"campaign": campaign_id})
+            self._dispose(campaign_id)
         if self._settings.runs is not None:
-            from service.runs.imported import import_runs  # here, because loading the report takes a while
+            from service.runs.imported import Imports  # here, because loading the report takes a while
 
-            import_runs(self._settings.runs, self._settings, self._ledger)
+            self._imports = Imports(self._settings, self._store, self._ledger, self._lock, self._dispose)
+            self._imports.start()
         threading.Thread(target=_tidy, args=(self._settings.data_dir, time.time()), name="tidy", daemon=True).start()
         resumed = self._ledger.resume()
         if resumed:
@@ -107,6 +116,8 @@ class Manager:
         with self._lock:
             self._scheduler.stop(self._settings.stop_s)
         self._executor.wake()
+        if self._imports is not None:
+            self._imports.stop(self._settings.stop_s)
         self._thread.join(self._settings.stop_s + UNKILLABLE_S)
         if self._thread.is_alive():
             logger.error("workers of runs %s did not end", sorted(self._scheduler.active))

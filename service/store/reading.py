@@ -17,7 +17,7 @@ from service.store.finding import Judged, episode_page, find_campaign, find_fail
 from service.store.revisions import Revisions
 from service.store.sequence import event_page
 from service.store.stored import PlainEpisode, StoredCampaign, StoredFailure, StoredPage, Usage, read_episode
-from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
+from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
 
 DAY_HOURS = 24
 BATCH = 1000  # rows in memory at once
@@ -205,6 +205,14 @@ class Store:
         query = select(CampaignRow.id).where(CampaignRow.state.in_(FINAL), CampaignRow.finished_at < moment)
         with self._reading() as session:
             return list(session.scalars(query.order_by(CampaignRow.number).limit(limit)))
+
+    def begun_imports(self) -> list[str]:
+        """Returns ids of campaigns whose import is not finished."""
+        query = select(CampaignRow.id).where(
+            CampaignRow.idempotency_key.startswith(IMPORTED), CampaignRow.state.not_in(FINAL)
+        )
+        with self._reading() as session:
+            return list(session.scalars(query))
 
     def families(self) -> set[str]:
         """All that any campaign names."""

@@ -22,6 +22,8 @@ TALLIED = (
     "headline",
 )
 
+IMPORTED = "imported "  # begins the idempotency keys of imported campaigns; those that are posted have no space
+
 
 def _of_judged(name: str, *columns: str) -> Index:
     """An index without the many episodes that violated nothing that counts."""

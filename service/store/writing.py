@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
-from sqlalchemy import delete, select, tuple_
+from sqlalchemy import and_, delete, or_, select, tuple_
 from sqlalchemy.orm import Session
 
 from risk_sac.config import CampaignSpec
@@ -20,7 +20,7 @@ from service.store.reading import Store
 from service.store.sequence import hold_campaigns, next_sequence
 from service.store.states import RESUMED, advance, campaign_state
 from service.store.stored import StoredCampaign
-from service.store.tables import CampaignRow, ChangeRow, EpisodeRow, RequirementRow, RunRow, TriageRow
+from service.store.tables import IMPORTED, CampaignRow, ChangeRow, EpisodeRow, RequirementRow, RunRow, TriageRow
 
 
 class Ledger:
@@ -154,9 +154,14 @@ class Ledger:
                     _settle(session, row.campaign)
 
     def resume(self) -> int:
-        """Queues or cancels runs without a worker; returns the number of queued ones."""
+        """Queues or cancels runs without a worker; returns the number of queued ones.
+
+        Those of imports, which never have one, are left alone.
+        """
+        key = CampaignRow.idempotency_key
+        posted = RunRow.campaign.has(or_(key.is_(None), ~key.startswith(IMPORTED)))
         with self._writing("resuming") as session:
-            interrupted = RunRow.state.in_(RESUMED)
+            interrupted = and_(RunRow.state.in_(RESUMED), posted)
             hold_campaigns(session, interrupted)
             rows = list(session.scalars(select(RunRow).where(interrupted)))
             for row in rows:

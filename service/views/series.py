@@ -1,9 +1,6 @@
 """Response body of a failure, with the time series that a worker wrote."""
 
 import hashlib
-import io
-import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.errors import DamagedError
 from risk_sac.records import Failure, Triage
+from risk_sac.run_folder.arrays import read_limited, unpack_arrays
 from risk_sac.run_folder.results import FAILURES
 from risk_sac.series import Series
 from risk_sac.types import Kind, Role, Signal
@@ -41,8 +40,12 @@ def series_file(campaign_id: str, failure: StoredFailure, settings: ServiceSetti
 
 
 def load_series(path: Path, sha256: str | None) -> Series:
-    """The series as a body; raises what `load_arrays` does."""
-    return series_body(load_arrays(path, sha256))
+    """The series as a body; raises what `load_arrays` does, also for arrays that are no series."""
+    arrays = load_arrays(path, sha256)
+    try:
+        return series_body(arrays)
+    except (ValueError, TypeError, OverflowError) as error:  # pydantic's, too
+        raise SeriesLost(f"the time series {path.name!r} is damaged: {str(error).partition(chr(10))[0]}") from error
 
 
 def series_body(arrays: Mapping[str, NDArray[Any]]) -> Series:
@@ -59,17 +62,17 @@ def load_arrays(path: Path, sha256: str | None) -> dict[str, NDArray[Any]]:
       sha256: of its content, as its worker told; None: not checked.
 
     Raises:
-      SeriesLost: the file is missing, is not the one that was written, or lacks an array.
+      SeriesLost: the file is missing, too large, not the one that was written, or lacks an array.
     """
     try:
-        content = path.read_bytes()
+        content = read_limited(path)
         _verify(path, content, sha256)
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            names = (name for name, field in Series.model_fields.items() if field.is_required() or name in arrays)
-            return {name: arrays[name] for name in names}
+        arrays = unpack_arrays(content)
+        names = (name for name, field in Series.model_fields.items() if field.is_required() or name in arrays)
+        return {name: arrays[name] for name in names}
     except FileNotFoundError as error:
         raise SeriesLost(f"the time series {path.name!r} is gone") from error
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+    except (OSError, KeyError, DamagedError) as error:
         raise SeriesLost(f"the time series {path.name!r} is damaged: {error}") from error
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from risk_sac.records import EpisodeRecord, Outcome
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import EPISODES, FAILURES, RESULTS, read_results, records_from_lines, series_name
-from risk_sac.run_folder.series import read_series
 from tests.overlaps import overlaps_in
 
 FAMILIES = ("low", "mixed", "dense")

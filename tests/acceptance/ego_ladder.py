@@ -26,9 +26,9 @@ from risk_sac.failures.recording import Series
 from risk_sac.loop import execute_run
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, EpisodeRecord, RunMetrics, SeriesFile, Severity, Violation
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import EPISODES, FAILURES, records_from_lines, series_name
-from risk_sac.run_folder.series import read_series
 from risk_sac.verdicts.distinct import DistinctFailures
 from risk_sac.verdicts.judge import judge
 from tests.acceptance.verdict_shares import evidence_of

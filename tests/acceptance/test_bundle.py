@@ -21,8 +21,9 @@ import sumo_nets
 from risk_sac.cli import main
 from risk_sac.errors import ConfigError
 from risk_sac.failures import carried
-from risk_sac.failures.bundle import MANIFEST, MOST_ARRAYS, MOST_FILE_BYTES, read_bundle
+from risk_sac.failures.bundle import MANIFEST, read_bundle
 from risk_sac.failures.recording import trajectory_digest
+from risk_sac.run_folder.arrays import MOST_ARRAYS, MOST_BYTES
 from risk_sac.run_folder.results import read_results
 from risk_sac.scenario import library
 from tests.acceptance.conftest import Tell
@@ -60,6 +61,18 @@ def test_it_holds_every_signal_head_of_every_frame_since_the_release(bundle: Pat
     assert len(found.signal_heads) == frames
     assert found.signal_heads.shape[1] >= 4
     assert set(found.signal_heads.tobytes()) <= set(b"rRyYgGuoOs")
+
+
+def test_show_draws_it_without_its_run_and_takes_no_number(bundle: Path, tmp_path: Path, tell: Tell) -> None:
+    file = Path(shutil.copy(bundle, tmp_path))
+    status, out, _ = tell("show", file)
+    assert (status, "failure.png" in out) == (0, True)
+    assert (tmp_path / "failure.png").read_bytes().startswith(b"\x89PNG")
+    status, _, err = tell("show", file, "8")
+    assert (status, "a bundle holds one failure" in err) == (2, True)
+    file.write_bytes(file.read_bytes()[:-9])
+    status, _, err = tell("show", file)
+    assert (status, "is no bundle that can be played" in err) == (2, True)
 
 
 def changed(bundle: Path, file: Path, change: Callable[[Arrays], None]) -> Path:
@@ -115,7 +128,7 @@ def test_other_actions_are_noticed(bundle: Path, tmp_path: Path, tell: Tell) -> 
         (lambda arrays: series(arrays, time_s=np.zeros((2, 2))), "is no bundle that can be played: times"),
         (lambda arrays: arrays.update(policy_layer_0=np.zeros((2, 2))), "no bundle that can be played: a policy of"),
         (lambda arrays: arrays.update(policy_layer_7=np.zeros((2, 2))), "is no bundle that can be played"),
-        (lambda arrays: arrays.update({f"a{i}": np.zeros(1) for i in range(MOST_ARRAYS)}), "arrays; wanted at most"),
+        (lambda arrays: arrays.update({f"a{i}": np.zeros(1) for i in range(MOST_ARRAYS)}), "wanted at most"),
     ],
     ids=[
         *("damaged", "newer", "another spec", "another net", "no manifest"),
@@ -180,8 +193,8 @@ ONE = array((1,), bytes(8))
         (lambda: zipped(pickled()), "is no bundle"),
         (lambda: zipped(ONE, packed=zipfile.ZIP_LZMA), "x_m.npy is packed in another way"),
         (lambda: zipped(ONE, packed=zipfile.ZIP_BZIP2), "x_m.npy is packed in another way"),
-        (lambda: larger_than_it_is(2**28 + 1), "wanted at most"),
-        (lambda: bytes(MOST_FILE_BYTES + 1), "is larger than"),
+        (lambda: larger_than_it_is(MOST_BYTES + 1), "wanted at most"),
+        (lambda: bytes(MOST_BYTES + 1), "is larger than"),
     ],
     ids=[
         *("empty", "a picture", "no array", "a lying header", "an endless shape", "a header that is none", "pickled"),

@@ -25,8 +25,9 @@ from risk_sac.failures.regress import regress, regress_run
 from risk_sac.failures.variants import Stage
 from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.report import read_run
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, read_results, series_name
-from risk_sac.run_folder.series import read_series, write_series
+from risk_sac.run_folder.series import write_series
 from risk_sac.run_folder.verified import VERIFIED, distinct_failures, read_verified
 from tests.acceptance.conftest import Tell
 from tests.acceptance.test_bundle import changed, manifest, series

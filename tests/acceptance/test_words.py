@@ -14,8 +14,8 @@ from risk_sac.failures.recording import Recording
 from risk_sac.failures.sentence import story
 from risk_sac.failures.show import caption
 from risk_sac.records import Collision, Judgement, Violation
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.series import read_series
 
 EPISODES, SEED = 40, 5
 NAMES = {

@@ -20,8 +20,8 @@ from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.failures.recording import Series
 from risk_sac.problem import Problem
 from risk_sac.records import Collision, EpisodeRecord, Fault, Grade, Judgement, Severity
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.series import read_series
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import judge
 from risk_sac.verdicts.reference import DRIVERS

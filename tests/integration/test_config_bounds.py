@@ -18,8 +18,8 @@ from risk_sac.loop import episode
 from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, RunMetrics
 from risk_sac.run import RunState
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.crashes import CrashGuard
-from risk_sac.run_folder.series import read_series
 from risk_sac.scenario.odd import SENSIBLE
 
 SMALL = {  # what costs time or memory, and is bounded for that

@@ -14,8 +14,8 @@ from risk_sac.config.spec_file import read_ego
 from risk_sac.env import RiskSacEnv
 from risk_sac.failures.detected import detected, without_defects
 from risk_sac.failures.play import play
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, series_name
-from risk_sac.run_folder.series import read_series
 from risk_sac.types import Scene
 
 SPEC = RunSpec(family="mixed", method="archive", seed=501, ego=read_ego("idm-aeb+kerb-waits"))

@@ -1,13 +1,28 @@
 """Runs of the command line, opened in the service."""
 
 import hashlib
+import os
 import shutil
+import signal
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from risk_sac import cli
-from risk_sac.run_folder.results import read_results
+from risk_sac.metrics import results_digest
+from risk_sac.run_folder.results import (
+    EPISODES,
+    FAILURES,
+    RecordedFailure,
+    read_results,
+    records_from_lines,
+    series_name,
+    write_results,
+)
+from tests.server import Service
 
 
 @pytest.fixture(scope="module")
@@ -19,6 +34,31 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
+@pytest.fixture
+def root(tmp_path: Path) -> Iterator[Path]:
+    """A folder for runs, removed at the end: what looks into all of a session's runs would wait for a FIFO."""
+    yield tmp_path / "runs"
+    shutil.rmtree(tmp_path / "runs")
+
+
+def repeated(source: Path, out: Path, times: int) -> int:
+    """Writes a run whose episodes are those of another one over and over; returns how many."""
+    results = read_results(source)
+    one = records_from_lines((source / EPISODES).read_bytes())
+    records = [each.model_copy(update={"index": i}) for i, each in enumerate(one * times)]
+    (out / FAILURES).mkdir(parents=True)
+    for i, record in enumerate(records):
+        if record.worst_violation is not None:
+            os.link(source / FAILURES / series_name(one[i % len(one)].index), out / FAILURES / series_name(i))
+    budget = results.spec.budget.model_copy(update={"episodes": len(records)})
+    spec = results.spec.model_copy(update={"budget": budget})
+    failures = tuple(RecordedFailure.of(spec.id, each) for each in records if each.worst_violation is not None)
+    told = {"spec": spec, "spec_digest": spec.digest, "digest": results_digest(records), "failures": failures}
+    write_results(out, replace(results, **told))
+    (out / EPISODES).write_text("".join(f"{each.model_dump_json()}\n" for each in records))
+    return len(records)
+
+
 def digest(root: Path) -> str:
     found = hashlib.sha256()
     for file in sorted(root.rglob("*")):
@@ -26,10 +66,20 @@ def digest(root: Path) -> str:
     return found.hexdigest()
 
 
+def campaigns(service: Service) -> list[dict[str, Any]]:
+    return service.client.get("/v1/campaigns").json()["items"]
+
+
+def imported(service: Service) -> dict[str, Any]:
+    """The one campaign, once it has ended."""
+    service.wait_until(lambda: len(campaigns(service)) == 1)
+    return service.wait(campaigns(service)[0]["id"])
+
+
 def test_runs_of_the_command_line_are_campaigns_that_have_ended(serve, runs):
     before, stored = digest(runs), read_results(runs / "mine")
     service = serve("risk_sac.execution.worker", runs=runs)
-    (campaign,) = service.client.get("/v1/campaigns").json()["items"]
+    campaign = imported(service)
     assert (campaign["state"], campaign["label"]) == ("succeeded", "mine")
     (run,) = service.get(campaign["id"], "/results")["runs"]
     assert (run["digest"], run["metrics"]["ecr"]) == (stored.digest, stored.metrics.ecr)
@@ -41,7 +91,7 @@ def test_runs_of_the_command_line_are_campaigns_that_have_ended(serve, runs):
     assert f"the page is at http://127.0.0.1:{service.port}/page/" in service.log.read_text()
     service.stop()
     service.start()
-    assert len(service.client.get("/v1/campaigns").json()["items"]) == 1
+    assert [each["id"] for each in campaigns(service)] == [campaign["id"]]
     assert digest(runs) == before
 
 
@@ -50,11 +100,72 @@ def test_a_folder_without_a_run_is_named(serve, tmp_path):
         serve("risk_sac.execution.worker", runs=tmp_path / "nothing")
 
 
-def test_a_damaged_run_is_not_played_in_the_place_of_its_import(serve, runs, tmp_path):
+def test_of_a_damaged_run_nothing_is_left(serve, runs, tmp_path):
     shutil.copytree(runs / "mine", tmp_path / "damaged")
     for series in (tmp_path / "damaged").rglob("*.npz"):
         series.unlink()
     service = serve("risk_sac.execution.worker", runs=tmp_path)
-    (campaign,) = service.client.get("/v1/campaigns").json()["items"]
-    assert campaign["state"] == "cancelled"
-    assert "is not imported" in service.log.read_text()
+    service.wait_until(lambda: "damaged is not imported" in service.log.read_text())
+    assert campaigns(service) == []
+    assert list((service.data_dir / "campaigns").iterdir()) == []
+
+
+def at_work(service: Service, total: int) -> Iterator[Mapping[str, Any]]:
+    for campaign in campaigns(service):
+        if campaign["state"] == "running" and 0 < campaign["progress"]["episodes_done"] < total:
+            yield campaign
+
+
+def test_an_import_that_is_killed_is_begun_again_and_never_played(serve, runs, root):
+    total = repeated(runs / "mine", root / "long", 150)
+    service = serve("risk_sac.execution.worker", runs=root)
+    service.wait_until(lambda: any(at_work(service, total)))  # it answers while it imports
+    assert service.client.get("/readyz").status_code == 200
+    (half,) = campaigns(service)
+    service.stop(signal.SIGKILL)
+    service.start()
+    service.wait_until(lambda: [each["id"] for each in campaigns(service)] not in ([], [half["id"]]))
+    campaign = imported(service)
+    assert (campaign["state"], campaign["progress"]["episodes_done"]) == ("succeeded", total)
+    assert [each.name for each in (service.data_dir / "campaigns").iterdir()] == [campaign["id"]]
+    log = service.log.read_text()
+    assert "its import was interrupted; it is removed" in log
+    assert "interrupted runs go back to the queue" not in log
+    assert [run["attempts"] for run in campaign["runs"]] == [1], "a worker was started"
+
+
+def test_an_import_that_is_cancelled_ends(serve, runs, root):
+    total = repeated(runs / "mine", root / "long", 150)
+    service = serve("risk_sac.execution.worker", runs=root)
+    service.wait_until(lambda: any(at_work(service, total)))
+    (campaign,) = campaigns(service)
+    service.client.post(f"/v1/campaigns/{campaign['id']}/cancel")
+    assert service.wait(campaign["id"])["state"] == "cancelled"
+
+
+def test_links_and_special_files_are_refused_by_name_and_the_others_imported(serve, runs, root):
+    secret = root.with_name("secret")
+    secret.mkdir()
+    (secret / "key").write_text("TOP SECRET")
+    for name in ("a link", "a linked folder", "a pipe", "a plain one", "no results"):
+        shutil.copytree(runs / "mine", root / name)
+    (root / "a link" / "worker.log").symlink_to(secret / "key")
+    (root / "a linked folder" / "studies").symlink_to(secret)
+    (root / "a pipe" / EPISODES).unlink()
+    os.mkfifo(root / "a pipe" / EPISODES)
+    (root / "no results" / "results.json").unlink()
+    os.mkfifo(root / "no results" / "results.json")
+    (root / "linked whole").symlink_to(runs / "mine")
+    service = serve("risk_sac.execution.worker", runs=root)
+    special = {
+        "a link/worker.log": "a symbolic link",
+        "a linked folder/studies": "a symbolic link",
+        "a pipe/episodes.jsonl": "a FIFO",
+        "linked whole": "a symbolic link",
+        "no results/results.json": "a FIFO",
+    }
+    service.wait_until(lambda: service.log.read_text().count("is not imported") == len(special))
+    assert (imported(service)["state"], imported(service)["label"]) == ("succeeded", "a plain one")
+    for name, kind in special.items():
+        assert f"got {root / name}, which is {kind}; wanted folders and plain files" in service.log.read_text()
+    assert not any("SECRET" in file.read_text(errors="replace") for file in service.data_dir.rglob("*.log"))

@@ -1,15 +1,11 @@
 """Origin of a report: commands, folders, and the drawing of a failure."""
 
 import shlex
-import zipfile
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
-from risk_sac.errors import RiskSacError
+from risk_sac.errors import DamagedError, RiskSacError
 from risk_sac.failures.cases import Regression
 from risk_sac.failures.net import roads_of
 from risk_sac.failures.recording import Recording
@@ -19,7 +15,10 @@ from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence.document import Drawing
 from risk_sac.report.markdown import run_command
 from risk_sac.report.runs import FinishedRun
+from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, RecordedFailure, series_name
+
+DAMAGED = Drawing(None, "its time series or the road net is damaged")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,11 +49,12 @@ def draw(run: FinishedRun, folder: Path | None, index: int) -> Drawing:
         return Drawing(None, "the folder of its run is missing")
     record = next(each for each in run.records if each.index == index)
     try:
-        with (folder / FAILURES / series_name(index)).open("rb") as file, np.load(file, allow_pickle=False) as archive:
-            series = {name: archive[name] for name in archive.files}
+        series = read_series(folder / FAILURES / series_name(index))
         recording = Recording(RecordedFailure.of(run.spec.id, record), series)
         place = run.spec.family, record.scene
         return Drawing(thumbnail(recording, roads_of(*place), signal_heads(*place)).encode())
+    except DamagedError:
+        return DAMAGED
     except RiskSacError as error:  # of a place on a map
         return Drawing(None, str(error))
     except FileNotFoundError as error:
@@ -62,5 +62,5 @@ def draw(run: FinishedRun, folder: Path | None, index: int) -> Drawing:
         return Drawing(None, f"{lost} is gone")
     except OSError as error:
         return Drawing(None, f"it cannot be read: {error.strerror}")
-    except (zipfile.BadZipFile, zlib.error, ValueError, EOFError, KeyError, SyntaxError):  # the last: of the net's XML
-        return Drawing(None, "its time series or the road net is damaged")
+    except (ValueError, LookupError, SyntaxError):  # the last: of the net's XML
+        return DAMAGED

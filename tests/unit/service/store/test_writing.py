@@ -5,6 +5,7 @@ from risk_sac.execution.messages import Finished
 from risk_sac.records import Episode, Outcome, State, TriageState
 from service.errors import ConflictError, NotFoundError, TransitionError
 from service.store.finding import Judged
+from service.store.tables import IMPORTED
 from service.views.curves import curves
 from service.views.progress import progress
 from service.views.totals import results
@@ -197,6 +198,15 @@ def test_what_has_no_worker_any_more_waits_again_or_ends_cancelled(store, ledger
     assert store.campaign(kept.id).state is State.QUEUED
     assert store.campaign(dropped.id).state is State.CANCELLED
     assert ledger.resume() == 0
+
+
+def test_a_run_at_import_never_waits_for_a_worker(store, ledger):
+    at_import, posted = ledger.create(SPEC, key=f"{IMPORTED}1"), ledger.create(SPEC, key="imported")
+    for run in (*at_import.runs, *posted.runs):
+        ledger.start_run(run.number)
+    assert ledger.resume() == len(posted.runs)
+    assert store.campaign(at_import.id).state is State.RUNNING
+    assert store.begun_imports() == [at_import.id]
 
 
 def test_a_pause_is_written_with_its_reason_and_can_be_cancelled(store, ledger):

@@ -65,6 +65,17 @@ def test_a_lost_or_damaged_series_is_a_storage_error_not_a_crash(tmp_path):
         load_series(path, None)
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [{"time_s": np.zeros(2**25)}, {"kind": np.full(2, 99)}, {"x_m": np.zeros(3)}, {"signal": np.full(3, np.nan)}],
+    ids=["too large", "unknown kind", "another shape", "no kind"],
+)
+def test_what_no_worker_writes_is_a_storage_error_not_a_crash(wrong, tmp_path):
+    write_series(tmp_path / "a.npz", series_arrays() | wrong)
+    with pytest.raises(StorageError, match=r"'a\.npz' is damaged"):
+        load_series(tmp_path / "a.npz", None)
+
+
 def test_a_series_that_is_not_the_one_that_was_written_is_never_shown(tmp_path):
     path = tmp_path / "a.npz"
     sha256 = write_series(path, series_arrays()).sha256
