@@ -1,7 +1,10 @@
 """Cache of content that takes seconds to make: made on demand, one at a time, the newest kept."""
 
+import asyncio
 import threading
+from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 import anyio
@@ -9,7 +12,8 @@ from anyio import to_thread
 from async_lru import alru_cache
 
 from risk_sac.execution.helper import HelperResult, run_helper
-from service.errors import BusyError, StorageError
+from service.errors import BusyError, QuotaError, StorageError
+from service.keys.ring import fair_share
 from service.settings import ServiceSettings
 
 AT_ONCE = 1  # of a kind
@@ -22,8 +26,19 @@ S = TypeVar("S", bound=Hashable)
 """What the content is made of; equal subjects have the same content."""
 
 
+@dataclass
+class _Waiting(Generic[S]):
+    """Subjects that one key waits for."""
+
+    turn: asyncio.Lock = field(default_factory=asyncio.Lock)
+    requests: Counter[S] = field(default_factory=Counter)
+
+
 class OnDemandCache(Generic[S]):
-    """Makes content in its own threads, so that other requests do not wait."""
+    """Makes content in its own threads, so that other requests do not wait.
+
+    Keys take turns: at most one subject of each is made or next to be made.
+    """
 
     def __init__(self, make: Callable[[S], bytes], what: str, kept: int = KEPT) -> None:
         """Makes nothing yet.
@@ -35,27 +50,44 @@ class OnDemandCache(Generic[S]):
         """
         self._make, self._what = make, what
         self._threads = anyio.CapacityLimiter(AT_ONCE)
-        self._begun = 0  # that are being made, or wait
-        self._made = alru_cache(maxsize=kept)(self._queue)  # a second request for the same waits for the first
+        self._waiting: dict[str | None, _Waiting[S]] = {}  # by key
+        self._made = alru_cache(maxsize=kept)(self._make_in_thread)  # a second request for the same waits for the first
 
-    async def get(self, subject: S) -> bytes:
+    async def get(self, subject: S, key_id: str | None) -> bytes:
         """The content of a subject, or whatever its making raises.
 
         Raises:
           BusyError: the queue is full.
+          QuotaError: the key waits for its share of the queue.
         """
-        return await self._made(subject)
+        if self._made.cache_contains(subject):
+            return await self._made(subject)
+        self._check_room(subject, key_id)
+        waiting = self._waiting.setdefault(key_id, _Waiting())
+        waiting.requests[subject] += 1
+        try:
+            async with waiting.turn:
+                return await self._made(subject)
+        finally:
+            waiting.requests -= Counter([subject])
+            if not waiting.requests:
+                del self._waiting[key_id]
 
-    async def _queue(self, subject: S) -> bytes:
-        if self._begun >= AT_ONCE + MOST_WAITING:
+    def _check_room(self, subject: S, key_id: str | None) -> None:
+        places = AT_ONCE + MOST_WAITING
+        own = self._waiting.get(key_id, _Waiting()).requests.keys() | {subject}
+        share = fair_share(places, len(self._waiting.keys() | {key_id}))
+        if key_id is not None and len(own) > share:
+            wait = f"{share} {self._what} of this key wait to be made, its share of the queue"
+            raise QuotaError(f"{wait}; wanted fewer: ask for one after the other", RETRY_AFTER_S)
+        others = sum(len(waiting.requests) for key, waiting in self._waiting.items() if key != key_id)
+        if others + len(own) > places:
             raise BusyError(
                 f"{MOST_WAITING} {self._what} wait to be made; wanted fewer", RETRY_AFTER_S, "pictures_busy"
             )
-        self._begun += 1
-        try:
-            return await to_thread.run_sync(self._make, subject, limiter=self._threads)
-        finally:
-            self._begun -= 1
+
+    async def _make_in_thread(self, subject: S) -> bytes:
+        return await to_thread.run_sync(self._make, subject, limiter=self._threads)
 
 
 class Helper:

@@ -48,7 +48,7 @@ class Studies(OnDemandCache[Study]):
         super().__init__(self._answer, "failures")
         self._settings, self._helper = settings, helper
 
-    async def get(self, subject: Study) -> bytes:
+    async def get(self, subject: Study, key_id: str | None) -> bytes:
         """Returns the study; a failure without core or region is refused at once."""
         if subject.subject in ("core", "region"):
             episode = subject.failure.episode
@@ -56,7 +56,7 @@ class Studies(OnDemandCache[Study]):
                 valid_failure(episode.id, episode)
             except ConfigError as error:
                 raise NotPlayable(error.got) from error
-        return await super().get(subject)
+        return await super().get(subject, key_id)
 
     def _answer(self, study: Study) -> bytes:
         failure = study.failure
