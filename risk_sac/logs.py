@@ -7,7 +7,7 @@ import time
 class LogFormatter(logging.Formatter):
     """Formatter of lines that begin with their time in UTC, as ISO 8601."""
 
-    converter = time.gmtime
+    converter = staticmethod(time.gmtime)
     default_time_format = "%Y-%m-%dT%H:%M:%S"
     default_msec_format = "%s.%03d+00:00"
 
