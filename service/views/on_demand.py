@@ -16,7 +16,6 @@ from service.errors import BusyError, QuotaError, StorageError
 from service.keys.ring import fair_share
 from service.settings import ServiceSettings
 
-AT_ONCE = 1  # of a kind
 MOST_WAITING = 16
 RETRY_AFTER_S = 2  # in which some of those that wait are made
 KEPT = 64  # of pictures and bundles, each of some 150 kB
@@ -37,19 +36,20 @@ class _Waiting(Generic[S]):
 class OnDemandCache(Generic[S]):
     """Makes content in its own threads, so that other requests do not wait.
 
-    Keys take turns: at most one subject of each is made or next to be made.
+    Keys take turns: of each, one subject is made or next to be made.
     """
 
-    def __init__(self, make: Callable[[S], bytes], what: str, kept: int = KEPT) -> None:
+    def __init__(self, make: Callable[[S], bytes], what: str, kept: int = KEPT, at_once: int = 1) -> None:
         """Makes nothing yet.
 
         Args:
           make: makes the content of a subject; may take seconds.
           what: names the contents in messages, in the plural.
           kept: how many of the newest are kept.
+          at_once: how many are made at once, each for another key.
         """
         self._make, self._what = make, what
-        self._threads = anyio.CapacityLimiter(AT_ONCE)
+        self._threads, self._places = anyio.CapacityLimiter(at_once), at_once + MOST_WAITING
         self._waiting: dict[str | None, _Waiting[S]] = {}  # by key
         self._made = alru_cache(maxsize=kept)(self._make_in_thread)  # a second request for the same waits for the first
 
@@ -74,14 +74,13 @@ class OnDemandCache(Generic[S]):
                 del self._waiting[key_id]
 
     def _check_room(self, subject: S, key_id: str | None) -> None:
-        places = AT_ONCE + MOST_WAITING
         own = self._waiting.get(key_id, _Waiting()).requests.keys() | {subject}
-        share = fair_share(places, len(self._waiting.keys() | {key_id}))
+        share = fair_share(self._places, len(self._waiting.keys() | {key_id}))
         if key_id is not None and len(own) > share:
             wait = f"{share} {self._what} of this key wait to be made, its share of the queue"
             raise QuotaError(f"{wait}; wanted fewer: ask for one after the other", RETRY_AFTER_S)
         others = sum(len(waiting.requests) for key, waiting in self._waiting.items() if key != key_id)
-        if others + len(own) > places:
+        if others + len(own) > self._places:
             raise BusyError(
                 f"{MOST_WAITING} {self._what} wait to be made; wanted fewer", RETRY_AFTER_S, "pictures_busy"
             )

@@ -7,19 +7,23 @@ import pytest
 from service.errors import BusyError, QuotaError
 from service.views.on_demand import OnDemandCache
 
+QUICK = -1  # a subject whose making does not wait
 
-def play(scene: Callable[[OnDemandCache[int], threading.Event, list[int]], Awaitable[None]]) -> list[int]:
+
+def play(
+    scene: Callable[[OnDemandCache[int], threading.Event, list[int]], Awaitable[None]], at_once: int = 1
+) -> list[int]:
     """Plays a scene with a cache whose making waits for the gate; returns the order of making."""
     gate, order = threading.Event(), list[int]()
 
     def make(subject: int) -> bytes:
-        assert gate.wait(600)
+        assert subject == QUICK or gate.wait(600)
         order.append(subject)
         return b"%d" % subject
 
     async def begin() -> None:
         try:
-            await scene(OnDemandCache(make, "things"), gate, order)
+            await scene(OnDemandCache(make, "things", at_once=at_once), gate, order)
         finally:
             gate.set()
 
@@ -41,6 +45,16 @@ def test_keys_take_turns_even_where_they_wait_for_the_same() -> None:
         assert await asyncio.gather(*busy, *other) == [b"0", b"1", b"2", b"3", b"4", b"9", b"4"]
 
     assert play(scene) == [0, 9, 1, 4, 2, 3]
+
+
+def test_what_one_key_has_made_at_length_holds_up_no_other_key() -> None:
+    async def scene(cache: OnDemandCache[int], gate: threading.Event, order: list[int]) -> None:
+        long = await ask(cache, "busy", 0, 1, 2)
+        assert await cache.get(QUICK, "other") == b"-1"
+        gate.set()
+        await asyncio.gather(*long)
+
+    assert play(scene, at_once=2) == [QUICK, 0, 1, 2]
 
 
 def test_what_there_is_waits_for_no_turn() -> None:
