@@ -29,6 +29,7 @@ from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.executor import WORDS
 from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
 from risk_sac.execution.postmortem import without_folders
+from risk_sac.logs import log_to_stderr
 from risk_sac.records import REPEATS, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.durable import LOCK, lock
 from risk_sac.run_folder.scratch import remove_temporaries
@@ -134,7 +135,7 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # so a KeyboardInterrupt is always the ego's own
     reporter = Reporter(io.FileIO(int(os.environ.pop(WORDS)), "wb"))
     _lose_what_a_full_disk_refuses()
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    log_to_stderr()
     spec = RunSpec.model_validate_json(sys.stdin.buffer.readline())
     threading.Thread(target=_leave_with_scheduler, daemon=True).start()
     reporter.send(Started(pid=os.getpid()))

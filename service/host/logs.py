@@ -7,6 +7,8 @@ from typing import Literal
 from pythonjsonlogger.core import RESERVED_ATTRS
 from pythonjsonlogger.json import JsonFormatter
 
+from risk_sac.logs import LogFormatter
+
 SUBJECTS = ("campaign", "run")  # of a record's `extra`
 _OUR_ERROR = re.compile(r"\n(?:service|risk_sac)\.[\w.]+: (?P<reason>.*)\Z", re.DOTALL)
 NAMES = {"levelname": "level", "name": "logger"}
@@ -20,11 +22,8 @@ def shorten(record: logging.LogRecord) -> bool:
     return True
 
 
-class TextFormatter(logging.Formatter):
+class TextFormatter(LogFormatter):
     """A line that ends with what it is about."""
-
-    def __init__(self) -> None:
-        super().__init__("%(asctime)s %(levelname)s %(name)s: %(message)s")
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - logging's own name
         """The line before a traceback."""

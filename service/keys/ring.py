@@ -1,4 +1,4 @@
-"""Keys as a running server sees them, and the addresses that it may listen on."""
+"""Keys as a running server sees them, their shares, and the addresses that it may listen on."""
 
 import logging
 import os
@@ -91,6 +91,11 @@ def _signature(path: Path) -> _Signature:
     except OSError as error:
         return (error.errno or 0,)
     return status.st_ino, status.st_mtime_ns, status.st_ctime_ns, status.st_size
+
+
+def fair_share(places: int, keys: int) -> int:
+    """Returns how many places each of some keys may hold, with one share left for a new key."""
+    return max(1, places // (keys + 1))
 
 
 def check_exposure(settings: ServiceSettings) -> None:

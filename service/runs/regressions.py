@@ -9,8 +9,10 @@ import logging
 import queue
 import re
 import threading
+from collections import deque
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 from pydantic import ValidationError
 
@@ -23,6 +25,7 @@ from risk_sac.failures.cases import Regression as Cases
 from risk_sac.records import State
 from risk_sac.run_folder.durable import replace_file
 from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
+from service.keys.ring import fair_share
 from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign
 
@@ -38,6 +41,37 @@ class StoredRegression(CampaignRegression):
     """A regression with the runs whose failures are played."""
 
     runs: tuple[str, ...]
+    key_id: str | None = None
+    """Key that posted it; null without one."""
+
+
+class Waiting(NamedTuple):
+    """Place in the queue."""
+
+    file: Path | None
+    """Of the regression; None wakes the thread to stop."""
+    key_id: str | None = None
+
+
+class TurnQueue(queue.Queue[Waiting]):
+    """Queue that serves its keys in turn, and what one key posted in the order of posting."""
+
+    def _init(self, maxsize: int) -> None:
+        self.by_key: dict[str | None, deque[Waiting]] = {}  # the key that is next comes first
+
+    def _qsize(self) -> int:
+        return sum(map(len, self.by_key.values()))
+
+    def _put(self, item: Waiting) -> None:
+        self.by_key.setdefault(item.key_id, deque()).append(item)
+
+    def _get(self) -> Waiting:
+        key_id = next(iter(self.by_key))
+        waiting = self.by_key.pop(key_id)
+        item = waiting.popleft()
+        if waiting:
+            self.by_key[key_id] = waiting
+        return item
 
 
 def campaign_of(regression_id: str) -> str:
@@ -58,7 +92,7 @@ class Regressions:
     def __init__(self, settings: ServiceSettings) -> None:
         """Plays nothing yet; see `start`."""
         self._settings = settings
-        self._queue: queue.Queue[Path | None] = queue.Queue()
+        self._queue = TurnQueue()
         self._stopping = threading.Event()
         self._posting = threading.Lock()
         self._thread = threading.Thread(target=self._work, name="regressions", daemon=True)
@@ -75,23 +109,23 @@ class Regressions:
             except StorageError as error:
                 logger.warning("%s", error)
                 continue
-            self._queue.put(file)
+            self._queue.put(Waiting(file, found.key_id))
         self._thread.start()
 
     def stop(self) -> None:
         """Leaves what waits to the next server."""
         self._stopping.set()
-        self._queue.put(None)
+        self._queue.put(Waiting(None))
         if self._thread.is_alive():
             self._thread.join()
 
-    def post(self, campaign: StoredCampaign, ego: EgoConfig) -> StoredRegression:
+    def post(self, campaign: StoredCampaign, ego: EgoConfig, key_id: str | None = None) -> StoredRegression:
         """Queues a regression, unless there is the same already.
 
         Raises:
           ConfigError: the ego is not registered, or in another version.
           ConflictError: the campaign has not ended, or none of its runs has succeeded.
-          QuotaError: too many wait.
+          QuotaError: too many wait, or the key's share of them.
           StorageError: it cannot be written down.
         """
         ego = pinned(ego)
@@ -107,13 +141,23 @@ class Regressions:
         with self._posting:
             if file.exists() and (known := _read(file)).state is not State.FAILED:
                 return known
-            if self._queue.qsize() >= MOST_WAITING:
-                raise QuotaError(f"{MOST_WAITING} regressions wait; wanted fewer", RETRY_S)
+            self._check_room(key_id)
             now = datetime.now(UTC)
-            posted = StoredRegression(id=id_, campaign_id=campaign.id, runs=runs, ego=ego, created_at=now)
+            posted = StoredRegression(
+                id=id_, campaign_id=campaign.id, runs=runs, key_id=key_id, ego=ego, created_at=now
+            )
             _write(file, posted)
-            self._queue.put(file)
+            self._queue.put(Waiting(file, key_id))
         return posted
+
+    def _check_room(self, key_id: str | None) -> None:
+        with self._queue.mutex:
+            waiting = {key: len(items) for key, items in self._queue.by_key.items()}
+        if sum(waiting.values()) >= MOST_WAITING:
+            raise QuotaError(f"{MOST_WAITING} regressions wait; wanted fewer", RETRY_S)
+        share = fair_share(MOST_WAITING, len(waiting.keys() | {key_id}))
+        if key_id is not None and waiting.get(key_id, 0) >= share:
+            raise QuotaError(f"{share} regressions of this key wait, its share of the queue; wanted fewer", RETRY_S)
 
     def get(self, regression_id: str) -> StoredRegression:
         """Returns the regression with this id; access to its campaign is checked before.
@@ -131,7 +175,7 @@ class Regressions:
         return self._settings.campaign_folder(campaign_of(regression_id)) / FOLDER / f"{regression_id}.json"
 
     def _work(self) -> None:
-        while (file := self._queue.get()) is not None and not self._stopping.is_set():
+        while (file := self._queue.get().file) is not None and not self._stopping.is_set():
             try:
                 self._play(file)
             except (OSError, StorageError) as error:  # the campaign may have been deleted meanwhile

@@ -57,7 +57,7 @@ class StoragePause:
             self._refused_at = time.monotonic()
             self._wait_s = min(2 * self._wait_s, LONGEST_WAIT_S)
             return
-        logger.info("the disk has room again; %d runs go on", resumed)
+        logger.info("storage works again, which refused (%s); %d runs go on", self.reason, resumed)
         self._store.refusal = None
 
 

@@ -1,7 +1,10 @@
 """Cache of content that takes seconds to make: made on demand, one at a time, the newest kept."""
 
+import asyncio
 import threading
+from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 import anyio
@@ -9,10 +12,10 @@ from anyio import to_thread
 from async_lru import alru_cache
 
 from risk_sac.execution.helper import HelperResult, run_helper
-from service.errors import BusyError, StorageError
+from service.errors import BusyError, QuotaError, StorageError
+from service.keys.ring import fair_share
 from service.settings import ServiceSettings
 
-AT_ONCE = 1  # of a kind
 MOST_WAITING = 16
 RETRY_AFTER_S = 2  # in which some of those that wait are made
 KEPT = 64  # of pictures and bundles, each of some 150 kB
@@ -22,40 +25,68 @@ S = TypeVar("S", bound=Hashable)
 """What the content is made of; equal subjects have the same content."""
 
 
-class OnDemandCache(Generic[S]):
-    """Makes content in its own threads, so that other requests do not wait."""
+@dataclass
+class _Waiting(Generic[S]):
+    """Subjects that one key waits for."""
 
-    def __init__(self, make: Callable[[S], bytes], what: str, kept: int = KEPT) -> None:
+    turn: asyncio.Lock = field(default_factory=asyncio.Lock)
+    requests: Counter[S] = field(default_factory=Counter)
+
+
+class OnDemandCache(Generic[S]):
+    """Makes content in its own threads, so that other requests do not wait.
+
+    Keys take turns: of each, one subject is made or next to be made.
+    """
+
+    def __init__(self, make: Callable[[S], bytes], what: str, kept: int = KEPT, at_once: int = 1) -> None:
         """Makes nothing yet.
 
         Args:
           make: makes the content of a subject; may take seconds.
           what: names the contents in messages, in the plural.
           kept: how many of the newest are kept.
+          at_once: how many are made at once, each for another key.
         """
         self._make, self._what = make, what
-        self._threads = anyio.CapacityLimiter(AT_ONCE)
-        self._begun = 0  # that are being made, or wait
-        self._made = alru_cache(maxsize=kept)(self._queue)  # a second request for the same waits for the first
+        self._threads, self._places = anyio.CapacityLimiter(at_once), at_once + MOST_WAITING
+        self._waiting: dict[str | None, _Waiting[S]] = {}  # by key
+        self._made = alru_cache(maxsize=kept)(self._make_in_thread)  # a second request for the same waits for the first
 
-    async def get(self, subject: S) -> bytes:
+    async def get(self, subject: S, key_id: str | None) -> bytes:
         """The content of a subject, or whatever its making raises.
 
         Raises:
           BusyError: the queue is full.
+          QuotaError: the key waits for its share of the queue.
         """
-        return await self._made(subject)
+        if self._made.cache_contains(subject):
+            return await self._made(subject)
+        self._check_room(subject, key_id)
+        waiting = self._waiting.setdefault(key_id, _Waiting())
+        waiting.requests[subject] += 1
+        try:
+            async with waiting.turn:
+                return await self._made(subject)
+        finally:
+            waiting.requests -= Counter([subject])
+            if not waiting.requests:
+                del self._waiting[key_id]
 
-    async def _queue(self, subject: S) -> bytes:
-        if self._begun >= AT_ONCE + MOST_WAITING:
+    def _check_room(self, subject: S, key_id: str | None) -> None:
+        own = self._waiting.get(key_id, _Waiting()).requests.keys() | {subject}
+        share = fair_share(self._places, len(self._waiting.keys() | {key_id}))
+        if key_id is not None and len(own) > share:
+            wait = f"{share} {self._what} of this key wait to be made, its share of the queue"
+            raise QuotaError(f"{wait}; wanted fewer: ask for one after the other", RETRY_AFTER_S)
+        others = sum(len(waiting.requests) for key, waiting in self._waiting.items() if key != key_id)
+        if others + len(own) > self._places:
             raise BusyError(
                 f"{MOST_WAITING} {self._what} wait to be made; wanted fewer", RETRY_AFTER_S, "pictures_busy"
             )
-        self._begun += 1
-        try:
-            return await to_thread.run_sync(self._make, subject, limiter=self._threads)
-        finally:
-            self._begun -= 1
+
+    async def _make_in_thread(self, subject: S) -> bytes:
+        return await to_thread.run_sync(self._make, subject, limiter=self._threads)
 
 
 class Helper:

@@ -26,6 +26,7 @@ from service.views.series import load_arrays, series_file
 logger = logging.getLogger(__name__)
 
 MISUSED = 2  # exit status of `risk-sac` for what cannot be used
+STUDIES_AT_ONCE = 2  # the long ones of one key hold up no other key
 TABLES_KEPT = 1  # of some megabytes each
 
 
@@ -42,13 +43,13 @@ class Study:
 
 
 class Studies(OnDemandCache[Study]):
-    """Makes studies one at a time; raises SeriesLost or NotPlayable."""
+    """Makes studies, one of a key at a time; raises SeriesLost or NotPlayable."""
 
     def __init__(self, settings: ServiceSettings, helper: Helper) -> None:
-        super().__init__(self._answer, "failures")
+        super().__init__(self._answer, "failures", at_once=STUDIES_AT_ONCE)
         self._settings, self._helper = settings, helper
 
-    async def get(self, subject: Study) -> bytes:
+    async def get(self, subject: Study, key_id: str | None) -> bytes:
         """Returns the study; a failure without core or region is refused at once."""
         if subject.subject in ("core", "region"):
             episode = subject.failure.episode
@@ -56,7 +57,7 @@ class Studies(OnDemandCache[Study]):
                 valid_failure(episode.id, episode)
             except ConfigError as error:
                 raise NotPlayable(error.got) from error
-        return await super().get(subject)
+        return await super().get(subject, key_id)
 
     def _answer(self, study: Study) -> bytes:
         failure = study.failure

@@ -1,6 +1,7 @@
 """The picture of a contact over REST, by the client and from a terminal: a real server with known campaigns."""
 
 import json
+import secrets
 import threading
 import time
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from risk_sac.failures import show
 from risk_sac.failures.question import TwinPlay, twin_bytes
 from risk_sac.records import wire
 from risk_sac.run_folder.results import FAILURES, series_name
+from service.keys.file import KeyFile, Scope
 from service.settings import ServiceSettings
 from service.store.database import READERS
 from service.views import on_demand
@@ -149,6 +151,25 @@ def test_no_more_than_a_bounded_number_waits_and_others_are_told_when_to_come_ba
         drawn.gate.set()
         assert sorted(answer.result().status_code for answer in answers) == [200, 200, 503]
     assert client.get(refused.url.path).status_code == 200
+
+
+def test_a_key_that_waits_for_its_share_is_refused_and_another_key_is_not(fresh, drawn, monkeypatch, tmp_path):
+    monkeypatch.setattr(on_demand, "MOST_WAITING", 1)
+    first, second, third = (f"{FOLDER}/{failure}/picture.png" for failure in ids(fresh)[:3])
+    ids_of_keys = iter(("0" * 8, "1" * 8))
+    monkeypatch.setattr(secrets, "token_hex", lambda _: next(ids_of_keys))
+    file = KeyFile(tmp_path / "keys.json")
+    busy, other = ({"authorization": f"Bearer {file.create('default', '', Scope.ADMIN)[1]}"} for _ in range(2))
+    with ThreadPoolExecutor(2) as askers:
+        answers = [askers.submit(fresh.get, first, headers=busy)]
+        wait_for(drawn.begun)
+        refused = fresh.get(second, headers=busy)
+        assert (refused.status_code, refused.json()["reason"]) == (429, "quota_exceeded")
+        assert refused.headers["retry-after"] == "2"
+        answers += [askers.submit(fresh.get, third, headers=other)]
+        drawn.gate.set()
+        assert [answer.result().status_code for answer in answers] == [200, 200]
+    assert fresh.get(second, headers=busy).status_code == 200
 
 
 def test_what_does_not_repeat_can_be_drawn_but_not_played(client, tmp_path):

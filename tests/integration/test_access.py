@@ -21,6 +21,7 @@ from fastapi.routing import iter_route_contexts
 from service.app import create_app
 from service.keys.file import KeyFile, Scope
 from service.settings import ServiceSettings
+from tests.contract.serving import serving
 from tests.server import LONG_S
 
 UNKNOWN = "x0000000000000000"
@@ -456,6 +457,30 @@ def test_on_loopback_nobody_needs_a_key_until_there_is_one(strict, calm):
     assert (refused.status_code, refused.json()["reason"]) == (503, "keys_unavailable"), "nor does losing them"
     file.open_all()
     assert calm.get("/v1/campaigns").status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("trusted", "stated", "status"),
+    [
+        (["127.0.0.1"], ["203.0.113.9"], 401),
+        (["127.0.0.1"], ["127.0.0.1, 203.0.113.9"], 401),  # the client has forged the first
+        (["127.0.0.1"], ["2001:db8::7"], 401),
+        (["127.0.0.1"], ["unknown"], 401),
+        (["127.0.0.1"], ["203.0.113.9", "127.0.0.1"], 401),  # headers, not addresses of one
+        (["*"], ["127.0.0.1, 203.0.113.9"], 401),
+        ([], ["203.0.113.9"], 401),
+        (["127.0.0.1"], ["127.0.0.1"], 200),
+        (["127.0.0.1"], ["::1"], 200),
+        (["127.0.0.1"], [], 200),
+    ],
+)
+def test_without_a_key_a_proxy_lets_in_its_clients_on_loopback_alone(tmp_path, trusted, stated, status):
+    with serving(ServiceSettings(data_dir=tmp_path, trusted_proxies=trusted)) as url:
+        answer = httpx.get(f"{url}/metrics", headers=[("x-forwarded-for", each) for each in stated], timeout=LONG_S)
+        assert answer.status_code == status
+        if status == 401:
+            assert (answer.headers["content-type"], answer.json()["reason"]) == (PROBLEM, "unauthorized")
+            assert "`risk-sac keys create`" in answer.json()["detail"]
 
 
 def test_without_keys_hosts_and_origins_are_checked_too(calm):

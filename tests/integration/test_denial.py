@@ -112,12 +112,54 @@ def test_with_all_connections_at_work_one_more_is_refused(serve):
     service.wait_until(lambda: service.get(campaign)["state"] == "running")
 
 
-def test_a_connection_that_queues_requests_without_end_is_closed(serve, connect):
-    service = serve()
-    sent = b"GET /openapi.json HTTP/1.1\r\nHost: localhost\r\n\r\n" * 100
-    for _ in range(20):
-        assert ended(connect(service, sent))
-    assert service.client.get("/healthz").status_code == 200
+GET = b"GET %s HTTP/1.1\r\nHost: localhost\r\n"
+CHUNKED = b"POST /v1/campaigns HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n"
+JSON = b"Content-Type: application/json\r\n\r\n"
+
+
+def answered(connection):
+    """All that the server sends until it closes the connection."""
+    return b"".join(iter(lambda: connection.recv(1 << 16), b""))
+
+
+@pytest.mark.parametrize(
+    ("begun", "endless"),
+    [
+        (GET % b"/healthz", b"x: a\r\n"),
+        (GET % b"/healthz" + b"x: ", b"a"),
+        (GET % b"/healthz" + b"\r\n" + GET % b"/healthz", b"x: a\r\n"),
+        (b"GET /", b"a"),
+        (CHUNKED + JSON + b"1", b";a"),
+        (CHUNKED + JSON + b"0\r\n", b"x: a\r\n"),
+    ],
+    ids=["lines", "line", "second head", "address", "chunk", "trailers"],
+)
+def test_a_head_without_end_is_refused_once_it_is_larger_than_64_kb(shared, connect, begun, endless):
+    most = connections.MOST_HEAD_BYTES + connections.PIECE_BYTES
+    connection = connect(shared, begun + endless * (most // len(endless)))
+    head, _, body = answered(connection)[-1000:].rpartition(b"\r\n\r\n")
+    assert b"HTTP/1.1 431 Request Header Fields Too Large\r\n" in head
+    assert (json.loads(body)["status"], json.loads(body)["reason"]) == (431, "too_large")
+
+
+def test_a_head_of_60_kb_is_read(shared):
+    assert shared.client.get("/healthz", headers={"x": "a" * 60_000}).status_code == 200
+
+
+@pytest.mark.parametrize("second", [b"Host: evil.example\r\n\r\n", b"Host: localhost\r\n\r\n"])
+@pytest.mark.parametrize("version", [b"1.0", b"1.1"])
+def test_two_hosts_are_refused(shared, connect, second, version):
+    connection = connect(shared, (GET % b"/v1/methods").replace(b"1.1", version) + second)
+    head, _, body = answered(connection).partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 400 Bad Request\r\n")
+    assert json.loads(body)["reason"] == "malformed_http"
+
+
+def test_queued_requests_are_answered_in_their_order(shared, connect):
+    sent = [GET % b"/nothing/%d" % number + b"\r\n" for number in range(300)]
+    sent[-1] = sent[-1].replace(b"\r\n\r\n", b"\r\nConnection: close\r\n\r\n")
+    answers = answered(connect(shared, b"".join(sent))).split(b"HTTP/1.1 404")[1:]
+    assert [int(answer.partition(b"nothing is at /nothing/")[2].split(b";")[0]) for answer in answers] == [*range(300)]
 
 
 def test_a_key_leaves_connections_for_others(serve, tmp_path):

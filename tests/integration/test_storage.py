@@ -1,10 +1,13 @@
 """A disk that fills up or refuses."""
 
 import os
+import re
 import resource
 import signal
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 
 import pytest
 
@@ -45,6 +48,25 @@ def test_a_database_that_cannot_grow_pauses_the_campaign_until_it_can(serve):
     for run in campaign["runs"]:
         assert sorted(service.episodes(campaign_id, run["id"])) == list(range(60))
     assert service.client.get("/readyz").status_code == 200
+
+
+def test_a_lock_of_the_database_is_told_as_such_and_when_to_ask_again(serve):
+    service = serve()
+    campaign_id = service.post(budget={"episodes": 100_000})
+    service.wait_for(campaign_id, lambda seen: seen["progress"]["episodes_done"] > 3)
+    with closing(sqlite3.connect(service.data_dir / "risk-sac.db", isolation_level=None, timeout=LONG_S)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        service.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
+        for refused in (
+            service.client.post("/v1/campaigns", json={"families": ["low"]}),
+            service.client.get("/readyz"),
+        ):
+            assert (refused.status_code, refused.json()["reason"]) == (503, "storage_unavailable")
+            assert int(refused.headers["retry-after"]) > 0
+        other.execute("ROLLBACK")
+    service.wait_for(campaign_id, lambda seen: seen["state"] == "running")
+    (line,) = (line for line in service.log.read_text().splitlines() if "works again" in line)
+    assert re.search(r"^\d{4}-\d\d-\d\dT[\d:.]{12}\+00:00 INFO .*refused \(.*locked.*\); 1 runs? go", line)
 
 
 @EACH_DATABASE_SHARED

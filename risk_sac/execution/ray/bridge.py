@@ -26,6 +26,7 @@ from risk_sac.execution.postmortem import without_folders
 from risk_sac.execution.ray.cluster import connect, nodes
 from risk_sac.execution.ray.node import Attendant, Files, Order, read, versions, write
 from risk_sac.execution.ray.settings import RaySettings, read_settings
+from risk_sac.logs import log_to_stderr
 
 logger = logging.getLogger("risk_sac.execution.ray.bridge")
 
@@ -174,7 +175,7 @@ class Bridge:
 
 def main(descriptor: int) -> None:
     """Connects, checks the cluster, and carries orders until the server has gone."""
-    logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
+    log_to_stderr()
     os.dup2(2, 1)  # what Ray prints is not the output of a command
     server = Connection(descriptor)
     try:

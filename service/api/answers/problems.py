@@ -37,6 +37,7 @@ logger = logging.getLogger(__name__)
 class Reason(StrEnum):
     """Stable name of an error; `detail` explains it."""
 
+    MALFORMED_HTTP = "malformed_http"
     MALFORMED_JSON = "malformed_json"
     UNKNOWN_HOST = "unknown_host"
     UNAUTHORIZED = "unauthorized"
@@ -90,8 +91,15 @@ _REASONS = {
 }
 
 
+RETRY_S = 5  # before a client asks again, where an error says nothing else
+RETRIED = frozenset({HTTPStatus.TOO_MANY_REQUESTS, HTTPStatus.SERVICE_UNAVAILABLE})
+
+
 class ProblemError(Exception):
-    """Error answer; `detail` has what was got, what was expected and the remedy."""
+    """Error answer; `detail` has what was got, what was expected and the remedy.
+
+    Each 429 and 503 has a `Retry-After`: `retry_s`.
+    """
 
     def __init__(
         self,
@@ -99,13 +107,14 @@ class ProblemError(Exception):
         reason: Reason,
         detail: str,
         *errors: FieldProblem,
-        headers: dict[str, str] | None = None,
+        headers: Mapping[str, str] = {},
+        retry_s: float = RETRY_S,
     ) -> None:
         super().__init__(detail)
         self.status = status
         self.reason = reason
         self.errors = errors
-        self.headers = headers
+        self.headers = {**headers, "Retry-After": str(math.ceil(retry_s))} if status in RETRIED else dict(headers)
 
 
 def invalid_field(field: str, got: object, wanted: str) -> ProblemError:
@@ -177,11 +186,11 @@ def _problem(request: Request, error: Exception) -> ProblemError:
         case ConflictError():
             return ProblemError(HTTPStatus.CONFLICT, Reason(error.reason), said)
         case QuotaError():
-            headers = {"Retry-After": str(math.ceil(error.retry_after_s))}
-            return ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.QUOTA_EXCEEDED, said, headers=headers)
+            status = HTTPStatus.TOO_MANY_REQUESTS
+            return ProblemError(status, Reason.QUOTA_EXCEEDED, said, retry_s=error.retry_after_s)
         case BusyError():
-            headers = {"Retry-After": str(error.retry_after_s)}
-            return ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason(error.reason), said, headers=headers)
+            status = HTTPStatus.SERVICE_UNAVAILABLE
+            return ProblemError(status, Reason(error.reason), said, retry_s=error.retry_after_s)
         case SeriesLost():
             said = f"{request.path_params['failure_id']!r} cannot be shown: {said}"
             return ProblemError(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, said)

@@ -2,19 +2,22 @@
 
 from typing import Any
 
-from service.api.answers.problems import Problem
+from service.api.answers.problems import RETRIED, Problem
 
 Responses = dict[int | str, dict[str, Any]]
-
-
-def problem(status: int, description: str, headers: dict[str, Any] | None = None) -> Responses:
-    """A response that is a problem."""
-    return {status: {"model": Problem, "description": description} | ({"headers": headers} if headers else {})}
 
 
 def header(description: str, type_: str = "string", *, required: bool = True) -> dict[str, Any]:
     """A header of a response."""
     return {"description": description, "schema": {"type": type_}} | ({"required": True} if required else {})
+
+
+WAIT = {"Retry-After": header("Seconds to wait before asking again.", "integer")}
+
+
+def problem(status: int, description: str) -> Responses:
+    """A response that is a problem."""
+    return {status: {"model": Problem, "description": description} | ({"headers": WAIT} if status in RETRIED else {})}
 
 
 MALFORMED = problem(400, "The body is no JSON")
@@ -28,7 +31,6 @@ STORAGE = problem(503, "The database cannot be read or written")
 STOPPED = problem(503, "Campaigns make no progress")
 UNREADY = problem(503, "The disk or the database refuses")
 
-WAIT = {"Retry-After": header("Seconds to wait before asking again.", "integer", required=False)}
 _RETRY = {
     "Retry-After": header(
         "Seconds to wait: a twentieth of the time left; absent once the campaign has ended.", "integer", required=False

@@ -13,9 +13,11 @@ from functools import partial
 from http import HTTPStatus
 from typing import Any, cast
 
+import h11
 import uvicorn
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
-from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
+from uvicorn.protocols.http.flow_control import CLOSE_HEADER
+from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from service.api.answers.problems import ProblemError, Reason, problem_response, route_path
 from service.settings import ServiceSettings
@@ -26,7 +28,8 @@ FEWEST = 8
 BACKLOG = 2048  # connections that the kernel queues until they are accepted
 STUCK_S = 1.0  # after which a client that takes nothing of its answer may lose its place to another one
 UNREAD_S = 60.0  # for which a client may take nothing of its answer
-MOST_PIPELINED = 8  # requests that wait on one connection for the answer to an earlier one; browsers send none
+MOST_HEAD_BYTES = 1 << 16  # of a head, and of a chunk's first line and the trailers of a body
+PIECE_BYTES = 1 << 13  # that h11 reads at once
 CALM_S = 60.0  # between two log lines about a full room
 UPLOADS = "/v1/networks"
 
@@ -41,7 +44,7 @@ class Server(uvicorn.Server):
         http = cast(type[asyncio.Protocol], partial(Connection, room=room))
         options |= {"backlog": room.accepted_at_once, "root_path": settings.root_path}
         options |= {"proxy_headers": bool(settings.trusted_proxies), "forwarded_allow_ips": settings.trusted_proxies}
-        super().__init__(uvicorn.Config(app, http=http, **options))
+        super().__init__(uvicorn.Config(app, http=http, h11_max_incomplete_event_size=MOST_HEAD_BYTES, **options))
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Starts to listen, with a long queue of connections that are not accepted yet."""
@@ -86,7 +89,8 @@ class Room:
             longest = next((each for each, since in self.unread.items() if now - since > STUCK_S), connection)
         self.leave(longest)
         if longest is connection:
-            connection.refuse(f"{self._most} connections are open; wanted fewer: try again in 1 s")
+            detail = f"{self._most} connections are open; wanted fewer: try again in 1 s"
+            connection.refuse(ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.CONNECTIONS_BUSY, detail, retry_s=1))
         else:
             longest.transport.abort()
 
@@ -109,7 +113,7 @@ def _accepted_at_once() -> int:
     return max(4, min(BACKLOG, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 32))
 
 
-class Connection(HttpToolsProtocol):
+class Connection(H11Protocol):
     """Uvicorn's HTTP protocol with deadlines for the request head and for reading the answer."""
 
     def __init__(self, *args: Any, room: Room, **kwargs: Any) -> None:
@@ -131,20 +135,24 @@ class Connection(HttpToolsProtocol):
             timer.cancel()
         super().connection_lost(exc)
 
-    def on_headers_complete(self) -> None:
-        """Begins the answer."""
-        if self._head_due is not None:
+    def data_received(self, data: bytes) -> None:
+        """Reads in pieces: h11 checks a head's size only while the head is incomplete."""
+        for first in range(0, len(data), PIECE_BYTES):
+            if not self.transport.is_closing():
+                super().data_received(data[first : first + PIECE_BYTES])
+
+    def handle_events(self) -> None:
+        """Begins the answer once the head is complete."""
+        super().handle_events()
+        if self._head_due is not None and self.cycle is not None and not self.cycle.response_complete:
             self._head_due.cancel()
-        self._room.owing.pop(self, None)
-        super().on_headers_complete()
-        if len(self.pipeline) > MOST_PIPELINED:
-            self.transport.abort()
+            self._room.owing.pop(self, None)
 
     def on_response_complete(self) -> None:
-        """Expects the next request head, unless it has come already."""
-        super().on_response_complete()
-        if self.cycle.response_complete and not self.transport.is_closing():
+        """Expects the next request head, which may have come already."""
+        if not self.transport.is_closing():
             self._await_head()
+        super().on_response_complete()
 
     def pause_writing(self) -> None:
         """Sets a deadline for the client that reads more slowly than the answer is written."""
@@ -159,13 +167,25 @@ class Connection(HttpToolsProtocol):
         if self._reading_due is not None:
             self._reading_due.cancel()
 
-    def refuse(self, detail: str) -> None:
-        """Answers 503 before any request and closes."""
-        headers = {"Retry-After": "1", "Connection": "close"}
-        status = HTTPStatus.SERVICE_UNAVAILABLE
-        answer = problem_response("", ProblemError(status, Reason.CONNECTIONS_BUSY, detail, headers=headers))
-        lines = [b"%s: %s\r\n" % pair for pair in answer.raw_headers]
-        self.transport.write(b"".join([STATUS_LINE[status], *lines, b"\r\n", answer.body]))
+    def send_400_response(self, msg: str) -> None:
+        """Answers what h11 refuses to read, as uvicorn calls it."""
+        unread, _ = self.conn.trailing_data
+        if len(unread) > MOST_HEAD_BYTES:
+            status, reason = HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE, Reason.TOO_LARGE
+            detail = f"the head of the request is larger than {MOST_HEAD_BYTES} bytes; wanted fewer or shorter headers"
+        else:
+            status, reason = HTTPStatus.BAD_REQUEST, Reason.MALFORMED_HTTP
+            detail = "the request is no valid HTTP/1.1; wanted a request line and headers, exactly one Host among them"
+        self.refuse(ProblemError(status, reason, detail))
+
+    def refuse(self, problem: ProblemError) -> None:
+        """Answers with a problem, unless an answer has begun, and closes."""
+        if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
+            answer = problem_response("", problem)
+            headers = [*answer.raw_headers, CLOSE_HEADER]
+            head = h11.Response(status_code=problem.status, headers=headers, reason=problem.status.phrase.encode())
+            for event in (head, h11.Data(data=bytes(answer.body)), h11.EndOfMessage()):
+                self.transport.write(self.conn.send(event) or b"")
         self.transport.close()
 
     def _await_head(self) -> None:

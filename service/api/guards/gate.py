@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from http import HTTPStatus
 
+from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from risk_sac.loopback import is_loopback
@@ -19,9 +20,10 @@ from service.errors import KeysError
 from service.keys.file import REMEDY
 from service.keys.file import Scope as KeyScope
 from service.keys.made import AuthEnabledFlag
-from service.keys.ring import KeyRing
+from service.keys.ring import KeyRing, fair_share
 from service.settings import ServiceSettings
 
+CREATE = "which `risk-sac keys create` makes"
 SAFE = frozenset({"GET", "HEAD", "OPTIONS"})  # methods that change nothing
 HEALTH = frozenset({"/healthz", "/readyz"})
 _PAGE = {"/docs", "/docs/swagger-ui-bundle.js", "/docs/swagger-ui.css", "/docs/favicon.png"}
@@ -64,7 +66,7 @@ class Gate:
             nonlocal ended
             if ended:
                 return
-            if message.get("more_body") and caller is not None and not self._still(caller, headers):
+            if message.get("more_body") and caller is not None and not self._still(scope, caller, headers):
                 ended, message = True, {"type": "http.response.body"}  # of a stream that its key does not outlive
             await send(message)
 
@@ -80,12 +82,12 @@ class Gate:
         path, method = route_path(scope), scope["method"]
         if path in HEALTH:  # not counted, or a flood from one address would make the service look ill
             return
-        address = scope["client"][0] if scope.get("client") else ""
+        address = _address(scope)
         if path in PUBLIC or path.startswith(PAGE):
             self._rate.count("address", address)
             return
         try:
-            caller = self._caller(headers)
+            caller = self._caller(scope, headers)
         except ProblemError:
             self._rate.count("address", address)  # guesses too
             raise
@@ -96,16 +98,17 @@ class Gate:
         check_scope(caller, KeyScope.READ if method in SAFE else KeyScope.RUN)
         scope[CALLER] = caller
 
-    def _still(self, caller: Caller, headers: RequestHeaders) -> bool:
+    def _still(self, scope: Scope, caller: Caller, headers: RequestHeaders) -> bool:
         try:
-            return self._caller(headers) == caller
+            return self._caller(scope, headers) == caller
         except ProblemError:
             return False
 
-    def _caller(self, headers: RequestHeaders) -> Caller:
-        """Finds the caller by the request's key; raises 401, or 503 if the keys are unreadable."""
+    def _caller(self, scope: Scope, headers: RequestHeaders) -> Caller:
+        """Finds the caller by the request's key or addresses; raises 401, or 503 if the keys are unreadable."""
         try:
-            if self._keys.open and self._keyless:
+            keyless = self._keys.open and self._keyless
+            if keyless and not (abroad := _remote_clients(scope)):
                 return LOCAL
             scheme, _, token = headers.get(b"authorization", b"").decode("latin-1").partition(" ")
             key = self._keys.find(token.strip()) if scheme.lower() == "bearer" else None
@@ -115,10 +118,27 @@ class Gate:
         if key is None:
             given = "not one that counts" if scheme else "missing"
             detail = f"the API key is {given}; wanted the header `Authorization: Bearer KEY`"
+            if keyless:
+                detail = f"the client is at {abroad[0][:100]}; wanted a loopback address, or an API key, {CREATE}"
             raise ProblemError(
                 HTTPStatus.UNAUTHORIZED, Reason.UNAUTHORIZED, detail, headers={"WWW-Authenticate": "Bearer"}
             )
         return Caller(key.project, key.scope, key.id)
+
+
+def _remote_clients(scope: Scope) -> list[str]:
+    """Returns the addresses of a request that are not loopback: its client's, and all that proxies state.
+
+    A client may forge the first of them, and a proxy that is not trusted states the client's, too.
+    """
+    stated = ",".join(Headers(scope=scope).getlist("x-forwarded-for"))
+    addresses = [_address(scope), *filter(None, map(str.strip, stated.split(",")))]
+    return [address for address in addresses if not is_loopback(address)]
+
+
+def _address(scope: Scope) -> str:
+    """Returns the address of a request's client, as a trusted proxy states it."""
+    return scope["client"][0] if scope.get("client") else ""
 
 
 class RateLimit:
@@ -138,8 +158,8 @@ class RateLimit:
         self._counts[caller] += 1
         if self._counts[caller] > self._per_second:
             detail = f"rate is more than {self._per_second} requests per second; wanted fewer: wait 1 s"
-            headers = {"Retry-After": "1", "Connection": "close"}  # and what else the connection has queued is dropped
-            raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.RATE_LIMITED, detail, headers=headers)
+            headers = {"Connection": "close"}  # and what else the connection has queued is dropped
+            raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.RATE_LIMITED, detail, headers=headers, retry_s=1)
 
 
 class Shares:
@@ -150,15 +170,13 @@ class Shares:
         self._open = Counter[str]()
 
     def take(self, key_id: str | None) -> None:
-        """Counts a request; refuses it if its key has its share. One is reserved for a new key."""
+        """Counts a request; refuses it if its key has its share."""
         if key_id is None:
             return
-        keys = len(self._open.keys() | {key_id})
-        share = max(1, self._connections // (keys + 1))
+        share = fair_share(self._connections, len(self._open.keys() | {key_id}))
         if self._open[key_id] >= share:
             detail = f"this key has {share} requests open, its share of the connections; wanted fewer: wait 1 s"
-            headers = {"Retry-After": "1"}
-            raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.CONNECTIONS_BUSY, detail, headers=headers)
+            raise ProblemError(HTTPStatus.TOO_MANY_REQUESTS, Reason.CONNECTIONS_BUSY, detail, retry_s=1)
         self._open[key_id] += 1
 
     def give_back(self, key_id: str | None) -> None:

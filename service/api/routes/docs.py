@@ -165,7 +165,7 @@ async def _to_page(request: Request) -> Response:
 
 
 async def _missing(request: Request) -> Response:
-    return HTMLResponse(MISSING, status_code=503, headers={"Content-Security-Policy": POLICY})
+    return HTMLResponse(MISSING, status_code=501, headers={"Content-Security-Policy": POLICY})
 
 
 def page_routes() -> list[Route | Mount]:

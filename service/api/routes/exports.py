@@ -12,7 +12,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures.export.formats import FORMATS, REMEDY, ZIP, FormatName, names
 from service.api.answers.problems import ProblemError, Reason
 from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, problem
-from service.api.context import AskedCampaign, Service
+from service.api.context import AskedCampaign, CurrentCaller, Service
 from service.api.routes.pictures import CROWDED, PLAYED, Asked, Headers, made
 from service.errors import ConflictError
 from service.views.studies import Study, Table
@@ -51,9 +51,11 @@ EpisodesFormat = Annotated[
     response_class=Response,
     responses=made(*(FORMATS[name].media_type for name in names("failure"))) | PLAYED | LACKING,
 )
-async def get_export(failure: Asked, format: FailureFormat, headers: Headers, service: Service) -> Response:
+async def get_export(
+    failure: Asked, format: FailureFormat, headers: Headers, service: Service, caller: CurrentCaller
+) -> Response:
     """One failure in a format of `GET /v1/formats`; several files come as a zip."""
-    content = await service.studies.get(Study(failure, "export", format=format))
+    content = await service.studies.get(Study(failure, "export", format=format), caller.key_id)
     row = FORMATS[format]
     name = f"{failure.episode.id}-{failure.edition[:8]}{f'-{format}' if row.media_type == ZIP else ''}{row.suffix}"
     return Response(content, headers=headers | _attachment(name), media_type=row.media_type)
@@ -68,13 +70,15 @@ async def get_export(failure: Asked, format: FailureFormat, headers: Headers, se
     | LACKING
     | CROWDED,
 )
-async def get_episodes_export(campaign: AskedCampaign, format: EpisodesFormat, service: Service) -> Response:
+async def get_episodes_export(
+    campaign: AskedCampaign, format: EpisodesFormat, service: Service, caller: CurrentCaller
+) -> Response:
     """All episodes so far as a table in a format of `GET /v1/formats`."""
     folders = [service.settings.run_folder(campaign.id, run.id) for run in campaign.runs]
     table = await run_in_threadpool(Table.of, folders, format)
     if not table.folders:
         raise ConflictError(f"no run of campaign {campaign.id} has results yet", reason="not_ended")
-    content = await service.tables.get(table)
+    content = await service.tables.get(table, caller.key_id)
     row = FORMATS[format]
     return Response(content, headers=_attachment(f"{campaign.id}{row.suffix}"), media_type=row.media_type)
 

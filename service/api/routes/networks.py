@@ -32,10 +32,10 @@ REFUSALS: Responses = (
     | problem(409, "The project has as many networks as it may")
     | problem(415, "The body is declared as something else, or carries a Content-Encoding")
     | problem(422, "The upload is refused, and `detail` says why; or a query parameter is wrong")
-    | problem(503, "The disk refuses, or there are too many uploads at once", WAIT)
+    | problem(503, "The disk refuses, or there are too many uploads at once")
 )
 FINDING = problem(422, "Nothing can be found on the network, and `detail` says why") | problem(
-    503, "The disk refuses, or there are too many searches at once", WAIT
+    503, "The disk refuses, or there are too many searches at once"
 )
 SEARCHING: Responses = {
     202: {"model": Places, "description": "They are still searched for; `progress` says how far", "headers": WAIT}

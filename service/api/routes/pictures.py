@@ -9,14 +9,14 @@ from risk_sac.failures.question import Twin
 from risk_sac.failures.studied import Region
 from risk_sac.records import wire
 from service.api.answers.representations import cacheable
-from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN, WAIT, Responses, problem
+from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN, Responses, problem
 from service.api.context import CurrentCaller, Service
 from service.views.pictures import FailureOfARun, Picture, Roads, TwinPlay, roads_body, thumbnail_of, twin_body
 from service.views.studies import Study
 
 PNG, SVG, JSON, ZIP = "image/png", "image/svg+xml", "application/json", "application/zip"
 LOST = problem(404, "Nothing has this id, or its time series is lost")
-CROWDED = problem(503, "The database cannot be read, or too many wait for theirs", WAIT)
+CROWDED = problem(503, "The database cannot be read, or too many wait for theirs")
 PLAYED = problem(409, "The failure does not repeat here, or cannot be played")
 
 
@@ -61,39 +61,45 @@ def get_thumbnail(failure: Asked, headers: Headers, service: Service) -> Respons
 
 
 @router.get("/failures/{failure_id}/picture.png", response_class=Response, responses=made(PNG))
-async def get_picture(failure: Asked, headers: Headers, service: Service) -> Response:
+async def get_picture(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
     """Picture of a failure, valid or not: paths from above, and measured series."""
-    return Response(await service.pictures.get(Picture(failure)), headers=headers, media_type=PNG)
+    return Response(await service.pictures.get(Picture(failure), caller.key_id), headers=headers, media_type=PNG)
 
 
 @router.get("/failures/{failure_id}/bundle.npz", response_class=Response, responses=made(ZIP) | PLAYED)
-async def get_bundle(failure: Asked, headers: Headers, service: Service) -> Response:
+async def get_bundle(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
     """Self-contained file of a failure, made after a replay; `risk-sac replay` plays it anywhere."""
-    return Response(await service.studies.get(Study(failure, "bundle")), headers=headers, media_type=ZIP)
+    return Response(await service.studies.get(Study(failure, "bundle"), caller.key_id), headers=headers, media_type=ZIP)
 
 
 @router.get("/failures/{failure_id}/core.npz", response_class=Response, responses=made(ZIP) | PLAYED)
-async def get_core(failure: Asked, headers: Headers, service: Service) -> Response:
+async def get_core(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
     """The failure reduced to what it needs; takes up to 150 episodes, some 10 s."""
-    return Response(await service.studies.get(Study(failure, "core")), headers=headers, media_type=ZIP)
+    return Response(await service.studies.get(Study(failure, "core"), caller.key_id), headers=headers, media_type=ZIP)
 
 
 @router.get("/failures/{failure_id}/region", response_model=Region, responses=made(JSON) | PLAYED)
-async def get_region(failure: Asked, headers: Headers, service: Service) -> Response:
+async def get_region(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
     """Share of its neighbours that fail alike: nearby scenes, other traffic, other actions; takes 170 episodes."""
-    return Response(await service.studies.get(Study(failure, "region")), headers=headers, media_type=JSON)
+    return Response(
+        await service.studies.get(Study(failure, "region"), caller.key_id), headers=headers, media_type=JSON
+    )
 
 
 @router.get("/failures/{failure_id}/twins/{twin}.png", response_class=Response, responses=made(PNG) | PLAYED)
-async def get_twin(failure: Asked, twin: Twin, headers: Headers, service: Service) -> Response:
+async def get_twin(failure: Asked, twin: Twin, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
     """Picture of a failure beside the same scene without an attack (`idle`) or with another ego."""
-    played = await service.studies.get(Study(failure, "twin", twin))
-    return Response(await service.pictures.get(Picture(failure, twin, played)), headers=headers, media_type=PNG)
+    played = await service.studies.get(Study(failure, "twin", twin), caller.key_id)
+    return Response(
+        await service.pictures.get(Picture(failure, twin, played), caller.key_id), headers=headers, media_type=PNG
+    )
 
 
 @router.get("/failures/{failure_id}/twins/{twin}", response_model=TwinPlay, responses=made(JSON) | PLAYED)
-async def get_twin_play(failure: Asked, twin: Twin, headers: Headers, service: Service) -> Response:
+async def get_twin_play(
+    failure: Asked, twin: Twin, headers: Headers, service: Service, caller: CurrentCaller
+) -> Response:
     """Outcome and time series of the same scene without an attack (`idle`) or with another ego."""
-    played = await service.studies.get(Study(failure, "twin", twin))
+    played = await service.studies.get(Study(failure, "twin", twin), caller.key_id)
     body = await run_in_threadpool(lambda: wire(twin_body(twin, played)))
     return Response(body, headers=headers, media_type=JSON)

@@ -50,7 +50,7 @@ async def post_regression(
 ) -> CampaignRegression:
     """Play the distinct failures of a campaign against another ego; the same request returns the existing one."""
     campaign = await run_in_threadpool(service.store.campaign, posted.campaign_id, caller.sees)
-    regression = await run_in_threadpool(service.regressions.post, campaign, posted.ego)
+    regression = await run_in_threadpool(service.regressions.post, campaign, posted.ego, caller.key_id)
     response.headers["Location"] = link(request, f"/v1/regressions/{regression.id}")
     return regression
 
