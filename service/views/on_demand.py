@@ -69,7 +69,7 @@ class Helper:
         """Ends the processes at work."""
         self._stopping.set()
 
-    def run(self, program: str, arguments: Sequence[str], question: bytes = b"") -> HelperResult:
+    def run(self, program: str, arguments: Sequence[str], question: bytes = b"", memory_bytes: int = 0) -> HelperResult:
         """Runs a program within `WALL_S`; StorageError if it cannot be started."""
         try:
             return run_helper(
@@ -77,6 +77,7 @@ class Helper:
                 arguments,
                 question=question,
                 wall_s=WALL_S,
+                memory_bytes=memory_bytes,
                 niceness=self._niceness,
                 stopping=self.stopping,
             )
