@@ -11,7 +11,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Literal, TypedDict, cast
+from typing import Literal, cast
 
 from pydantic import TypeAdapter
 from pydantic_core import from_json, to_json
@@ -142,7 +142,8 @@ class Views(OnDemandCache[View]):
             return Content(figures.read(name), content.lasting)
 
     def _helped(self, view: View) -> bytes:
-        question = {"view": view, "data_dir": self._settings.data_dir, "database_url": self._settings.database_url}
+        settings = self._settings
+        question = _Question(view=view, data_dir=settings.data_dir, database_url=settings.database_url)
         result = self._helper.run(
             "service.views.whole", [QUESTION, ANSWER], _QUESTION.dump_json(question), memory_bytes=MEMORY_BYTES
         )
@@ -201,7 +202,10 @@ def _large(campaign: StoredCampaign) -> bool:
     return sum(run.episodes_done for run in campaign.runs) > LARGE
 
 
-class _Question(TypedDict):
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Question:
+    """A view, and where its helper finds the campaign."""
+
     view: View
     data_dir: Path
     database_url: str | None
@@ -212,8 +216,8 @@ _QUESTION = TypeAdapter(_Question)
 
 def _main(asked: Path, file: Path) -> int:
     question = _QUESTION.validate_json(asked.read_bytes())
-    view = question["view"]
-    settings = ServiceSettings(data_dir=question["data_dir"], database_url=question["database_url"])
+    view = question.view
+    settings = ServiceSettings(data_dir=question.data_dir, database_url=question.database_url)
     try:
         with closing(Store(settings.url, opened=True)) as store:
             campaign = store.campaign(view.campaign_id) if view.name != "prior" else None
