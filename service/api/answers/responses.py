@@ -29,6 +29,7 @@ STOPPED = problem(503, "Campaigns make no progress")
 UNREADY = problem(503, "The disk or the database refuses")
 
 WAIT = {"Retry-After": header("Seconds to wait before asking again.", "integer", required=False)}
+CROWDED = problem(503, "The database cannot be read, or too many wait for theirs", WAIT)
 _RETRY = {
     "Retry-After": header(
         "Seconds to wait: a twentieth of the time left; absent once the campaign has ended.", "integer", required=False

@@ -19,6 +19,7 @@ from service.api.answers.pages import TIERS, Cursor, Limit, Tier
 from service.api.answers.representations import cacheable, entity_tag, link
 from service.api.answers.responses import (
     ACCEPTED,
+    CROWDED,
     INVALID,
     LIVE,
     MALFORMED,
@@ -45,7 +46,7 @@ from service.views.whole import View, ViewName
 
 LISTED = "campaigns"
 EITHER_KIND = documented(CampaignSpec.__name__, ON_MAP)
-POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON
+POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON | CROWDED
 IdempotencyKey = Annotated[
     str | None,
     Header(
@@ -76,9 +77,9 @@ async def post_campaign(
     return await run_in_threadpool(_submit, request, spec, prior, service, caller, idempotency_key)
 
 
-@router.post("/check", responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
+@router.post("/check", responses=MALFORMED | NOT_JSON | CROWDED, openapi_extra=EITHER_KIND)
 async def check_campaign(spec: PostedCampaign, service: Service, caller: CurrentCaller) -> CampaignCheck:
-    """Validate a campaign without queuing it; `adjustments` has the values that its episodes would use instead."""
+    """Validate a campaign and change nothing; `adjustments` has the values that its episodes would use instead."""
     checked = await run_in_threadpool(service.manager.checked, spec)
     await service.priors.of(spec, caller.project)
     return CampaignCheck(adjustments=await run_in_threadpool(adjustments, checked))
@@ -156,7 +157,7 @@ def get_power(campaign_id: str, request: Request, service: Service, caller: Curr
     return _live(campaign_id, request, service, caller, lambda found: power_of(found.spec, played(found)))
 
 
-@router.get("/{campaign_id}/failure-table", response_model=FailureTable, responses=UNKNOWN | LIVE)
+@router.get("/{campaign_id}/failure-table", response_model=FailureTable, responses=UNKNOWN | LIVE | CROWDED)
 async def get_failure_table(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, tier: Tier = "valid"
 ) -> Response:
@@ -164,7 +165,7 @@ async def get_failure_table(
     return await _viewed(campaign_id, request, service, caller, name="failure_table", outcomes=TIERS[tier])
 
 
-@router.get("/{campaign_id}/curves", response_model=Curves, responses=UNKNOWN | LIVE)
+@router.get("/{campaign_id}/curves", response_model=Curves, responses=UNKNOWN | LIVE | CROWDED)
 async def get_curves(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, points: Points = 200
 ) -> Response:
@@ -172,7 +173,7 @@ async def get_curves(
     return await _viewed(campaign_id, request, service, caller, name="curves", points=points)
 
 
-@router.get("/{campaign_id}/scenes", response_model=SceneEffects, responses=UNKNOWN | LIVE)
+@router.get("/{campaign_id}/scenes", response_model=SceneEffects, responses=UNKNOWN | LIVE | CROWDED)
 async def get_scenes(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """Which scene parameters set failing episodes apart, and which parts of the ODD were played."""
     return await _viewed(campaign_id, request, service, caller, name="scenes")

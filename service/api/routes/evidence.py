@@ -8,7 +8,7 @@ from starlette.concurrency import run_in_threadpool
 from risk_sac.failures.cases import Regression
 from risk_sac.records import State
 from risk_sac.report.evidence import POLICY, Evidence
-from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses, problem
+from service.api.answers.responses import CROWDED, INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses, problem
 from service.api.context import AskedCampaign, Context, Service
 from service.api.routes.reports import BY_ACCEPT, FOR_BROWSERS, UNCHANGED, chosen, reported, text
 from service.errors import ConflictError, NotFoundError
@@ -23,7 +23,7 @@ NOT_PLAYED = problem(409, "The regression has not ended, or has failed")
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
 
 
-@router.get("/report", response_model=Evidence, responses=REPORT | UNCHANGED | UNACCEPTABLE | NOT_PLAYED)
+@router.get("/report", response_model=Evidence, responses=REPORT | UNCHANGED | UNACCEPTABLE | NOT_PLAYED | CROWDED)
 async def get_report(
     request: Request,
     service: Service,

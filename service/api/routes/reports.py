@@ -11,7 +11,7 @@ from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
 from service.api.answers.representations import accepted, cacheable, link
-from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNACCEPTABLE, UNKNOWN, Responses
+from service.api.answers.responses import CROWDED, INVALID, STORAGE, TAGGED, UNACCEPTABLE, UNKNOWN, Responses
 from service.api.context import AskedCampaign, Context, Service
 from service.store.stored import StoredCampaign
 from service.views.report_parts import MEDIA_TYPES, TABLES, Clusters, Figures
@@ -61,7 +61,7 @@ FIGURE: Responses = {200: {"headers": CACHED, "content": {MEDIA_TYPES[each]: {} 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
 
 
-@router.get("/table", response_model=Table, responses=TABLE | UNCHANGED | UNACCEPTABLE)
+@router.get("/table", response_model=Table, responses=TABLE | UNCHANGED | UNACCEPTABLE | CROWDED)
 async def get_table(
     request: Request,
     service: Service,
@@ -73,19 +73,19 @@ async def get_table(
     return await reported(request, service, campaign, "table", name, others=BY_ACCEPT, format=name, address=address)
 
 
-@router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED)
+@router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED | CROWDED)
 async def get_clusters(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """Kinds of failures that the finished runs found, in words, with an example of each."""
     return await reported(request, service, campaign, "clusters", "clusters")
 
 
-@router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED)
+@router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED | CROWDED)
 async def list_figures(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """Figures of the finished runs: search, results, λ and α."""
     return await reported(request, service, campaign, "figures", "figures", address=link(request, ""))
 
 
-@router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED)
+@router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED | CROWDED)
 async def get_figure(
     name: str, format: Format, request: Request, service: Service, campaign: AskedCampaign
 ) -> Response:
