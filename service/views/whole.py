@@ -32,14 +32,14 @@ from service.store.stored import StoredCampaign
 from service.views import report_parts
 from service.views.curves import curves
 from service.views.failure_table import failure_table
-from service.views.on_demand import WALL_S, Helper, OnDemandCache
+from service.views.on_demand import Helper, OnDemandCache
 from service.views.reports import CampaignReport, Reports, unknown_figure
 from service.views.scenes import scene_effects
 
 logger = logging.getLogger(__name__)
 
 LARGE = 4000  # episodes; reading more in the server would hold up other requests
-MEMORY_BYTES = 4 << 30  # of a helper's address space; 100,000 episodes take half of it
+MEMORY_BYTES, WALL_S = 4 << 30, 1800.0  # of a helper; 100,000 episodes take 2.4 GiB and, where many fail, minutes
 VIEWS_KEPT = 4  # of some megabytes each
 REFUSED, LOST, PASSING, TOO_LARGE = 3, 4, 5, 6  # exit statuses
 ViewName = Literal["curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "prior"]
@@ -145,7 +145,11 @@ class Views(OnDemandCache[View]):
         settings = self._settings
         question = _Question(view=view, data_dir=settings.data_dir, database_url=settings.database_url)
         result = self._helper.run(
-            "service.views.whole", [QUESTION, ANSWER], _QUESTION.dump_json(question), memory_bytes=MEMORY_BYTES
+            "service.views.whole",
+            [QUESTION, ANSWER],
+            _QUESTION.dump_json(question),
+            wall_s=WALL_S,
+            memory_bytes=MEMORY_BYTES,
         )
         if result.status == 0:
             return result.answer
@@ -161,9 +165,8 @@ class Views(OnDemandCache[View]):
             reason = f"it takes more than {MEMORY_BYTES >> 30} GiB"
         elif result.timed_out:
             reason = f"it takes more than {WALL_S:g} s"
-        raise StorageError(
-            f"the {view.name.replace('_', ' ')} of {view.campaign_id or view.prior} is not made: {reason}"
-        )
+        what = f"{view.name.replace('_', ' ')} of {view.campaign_id or view.prior}"
+        raise StorageError(f"{what} cannot be made: {reason}; lists of episodes and failures still work")
 
 
 class Priors:

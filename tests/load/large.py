@@ -41,8 +41,8 @@ MANY_RUNS = {"families": ["low", "mixed", "dense"], "methods": ANYWHERE[:12], "s
 VIEWS = (
     "",  # what the machine itself costs
     *("/scenes", "/curves", "/failure-table?tier=raw", "/failures?tier=raw&limit=500", "/results"),
-    *("/clusters", "/table?format=csv", "/table?format=json", "/report?format=json", "/report?format=html"),
-    *("/figures", "/figures/ecr_low.png", "/figures/distinct_found_low.svg"),
+    *("/clusters", "/table?format=csv", "/report?format=html"),
+    *("/figures", "/figures/ecr_low.png", "/figures/pcr_low.png"),
 )
 
 
@@ -70,7 +70,7 @@ def measure(episodes: int) -> Measured:
     """Make a campaign of so many episodes, start its service again, and ask."""
     with tempfile.TemporaryDirectory() as folder, servers(Path(folder), lease_s=60) as serve:
         service = serve("risk_sac.execution.worker")
-        service.wait(service.post(methods=["archive"], budget={"episodes": SOURCE}))
+        service.wait(service.post(methods=["archive"], budget={"episodes": SOURCE}, ego={"profile": "defensive"}))
         service.stop()
         enlarge(service.data_dir, episodes // SOURCE)
         service.start()
