@@ -45,10 +45,11 @@ from service.settings import ServiceSettings
 from service.store.database import READERS, held
 from service.store.reading import Store
 from service.store.server import cursor_secret
-from service.views.on_demand import Helper
+from service.views.on_demand import KEPT, Helper
 from service.views.pictures import pictures as pictures_of_failures
 from service.views.reports import Reports
 from service.views.studies import Studies, Tables
+from service.views.whole import VIEWS_KEPT, Priors, Views
 
 
 def create_app(settings: ServiceSettings, executor: Executor | None = None) -> FastAPI:
@@ -114,6 +115,8 @@ def opened(
         settle_keys()
         manager = Manager(settings, store, executor, settle_keys)
         regression_queue, helper = Regressions(settings), Helper(settings)
+        reports = Reports(settings)
+        views, priors = (Views(settings, store, reports, helper, kept) for kept in (VIEWS_KEPT, KEPT))
         uploaded = NetworkStore(settings.networks_dir)
         surveys = Surveys(uploaded, settings.places_dir, helper.stopping)
         manager.start()
@@ -123,10 +126,12 @@ def opened(
                 settings=settings,
                 store=store,
                 manager=manager,
-                reports=Reports(settings),
+                reports=reports,
                 pictures=pictures_of_failures(settings),
                 studies=Studies(settings, helper),
                 tables=Tables(helper),
+                views=views,
+                priors=Priors(store, priors),
                 regressions=regression_queue,
                 networks=uploaded,
                 surveys=surveys,

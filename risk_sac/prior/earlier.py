@@ -7,8 +7,10 @@ is resumed starts from what it started from at first, whatever became of its sou
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Self
 
@@ -18,7 +20,7 @@ from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.machine import UNWRITABLE
 from risk_sac.records import EpisodeRecord, Outcome
 from risk_sac.run_folder.durable import LOCK, lock, read_sealed, replace_file, seal
-from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
+from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
 from risk_sac.scenario.families import family_named, shipped_alike
 from risk_sac.scenario.library import library
 from risk_sac.verdicts.distinct import kind_name
@@ -62,7 +64,7 @@ class FamilyScripts:
     latest: tuple[PlayedScript, ...]  # whatever they ended in
 
     @classmethod
-    def of(cls, family: str, records: Sequence[EpisodeRecord]) -> Self:
+    def of(cls, family: str, records: Iterable[EpisodeRecord]) -> Self:
         """Selects from a family's episodes in the order in which they were played."""
         played = [PlayedScript.of(each) for each in records if each.script and each.outcome in PLAYED]
         rank, places = Counter[str](), []
@@ -94,33 +96,51 @@ class EarlierScripts:
         return tuple(found for name, found in self.families.items() if shipped_alike(name) == pattern)
 
 
-def pinned_prior(prior: str, families: Sequence[str], folder_of: Callable[[str], Path] = Path) -> str:
+def pinned_prior(prior: str, families: Sequence[str]) -> str:
     """Copies the scripts that a prior names; returns the copy's name, or `shipped` or `none` as it is.
 
     Args:
-      prior: as a user wrote it, or what this returned.
+      prior: the folder of a run or campaign, or what this returned.
       families: that are to be searched.
-      folder_of: returns the folder of a run or campaign.
 
     Raises:
       ConfigError: there is no such run, it followed no scripts, or it is of another pattern.
     """
     if prior in SHIPPED_OR_NONE:
         return prior
-    copied = KEPT.fullmatch(prior) is not None and _path(prior).exists()
-    scripts = kept(prior) if copied else _taken(prior, folder_of(prior))
-    for family in families:
-        if not scripts.alike(family):
-            got = f"{prior}, whose runs are of {', '.join(scripts.families)}"
-            raise ConfigError("prior", got, f"one with a run of {family}, or of the same pattern")
-    if copied:
-        _path(prior).touch()  # it is wanted again: see `prune`
-        return prior
-    return _keep(scripts, re.sub("[^a-z0-9]+", "_", Path(prior).name.lower()).strip("_"))
+    return keep(prior, PriorContent.read(prior, None if is_kept(prior) else Path(prior)).checked(prior, families))
+
+
+def is_kept(prior: str) -> bool:
+    """Whether a prior names a copy that `keep` has made."""
+    return KEPT.fullmatch(prior) is not None and _path(prior).exists()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PriorContent:
+    """Scripts as they are copied, of which a server reads the families alone."""
+
+    families: tuple[str, ...]
+    sealed: str
+
+    @classmethod
+    def read(cls, prior: str, folder: Path | None) -> Self:
+        """Reads the scripts of a run's or campaign's folder, or of the copy that the prior names."""
+        scripts = kept(prior) if folder is None else _taken(prior, folder)
+        return cls(families=tuple(scripts.families), sealed=seal(scripts).decode())
+
+    def checked(self, prior: str, families: Sequence[str]) -> Self:
+        """Raises ConfigError for a family that none of the scripts is of, nor of its pattern."""
+        patterns = {shipped_alike(found) for found in self.families}
+        for family in families:
+            if family not in self.families and shipped_alike(family) not in patterns:
+                got = f"{prior}, whose runs are of {', '.join(self.families)}"
+                raise ConfigError("prior", got, f"one with a run of {family}, or of the same pattern")
+        return self
 
 
 def kept(name: str) -> EarlierScripts:
-    """Reads scripts that `pinned_prior` has copied.
+    """Reads scripts that `keep` has copied.
 
     Raises:
       ConfigError: there is no such copy.
@@ -155,23 +175,41 @@ def file_of(name: str) -> Path:
 
 
 def _taken(prior: str, folder: Path) -> EarlierScripts:
-    """Reads the scripts of a run's folder or of all runs in a campaign's folder."""
-    runs = list(_runs(folder))
+    """Reads the scripts of a run's folder or of all runs in a campaign's folder.
+
+    Raises:
+      ConfigError: there is no run, one cannot be read, or none followed scripts.
+    """
+    runs: dict[str, list[Path]] = {}
+    for run in _runs(folder):
+        with _readable(prior, run):
+            runs.setdefault(read_results(run).spec.family, []).append(run)
     if not runs:
         raise ConfigError("prior", f"{prior!r}", "shipped, none, or an earlier run or campaign")
-    records: dict[str, list[EpisodeRecord]] = {}
-    for run in runs:
-        try:
-            found = records_from_lines((run / EPISODES).read_bytes())
-            records.setdefault(read_results(run).spec.family, []).extend(found)
-        except (OSError, ValidationError, ConfigError) as error:
-            raise ConfigError("prior", f"{prior}, whose run {run.name} cannot be read", "one that is whole") from error
-    scripts = {family: FamilyScripts.of(family, each) for family, each in records.items()}
-    scripts = {family: each for family, each in scripts.items() if each.latest}
+    scripts = {
+        family: FamilyScripts.of(family, chain.from_iterable(_records(prior, run) for run in of_family))
+        for family, of_family in runs.items()
+    }
+    scripts = {family: found for family, found in scripts.items() if found.latest}
     if not scripts:
         remedy = "name a run of risk-sac-diverse, archive or archive-replay"
         raise ConfigError("prior", f"{prior}, whose episodes followed no scripts", "one that did", remedy)
     return EarlierScripts(families=scripts)
+
+
+def _records(prior: str, run: Path) -> Iterator[EpisodeRecord]:
+    """Yields the episodes of a run; a record takes several times the memory of its script."""
+    with _readable(prior, run), (run / EPISODES).open("rb") as lines:
+        for line in lines:
+            yield EpisodeRecord.model_validate_json(line)
+
+
+@contextmanager
+def _readable(prior: str, run: Path) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValidationError, ConfigError) as error:
+        raise ConfigError("prior", f"{prior}, whose run {run.name} cannot be read", "one that is whole") from error
 
 
 def _runs(folder: Path) -> Iterator[Path]:
@@ -181,8 +219,18 @@ def _runs(folder: Path) -> Iterator[Path]:
             yield file.parent
 
 
-def _keep(scripts: EarlierScripts, label: str) -> str:
-    content = seal(scripts)
+def keep(prior: str, found: PriorContent) -> str:
+    """Copies what a prior names into the library; returns the copy's name.
+
+    Raises:
+      ConfigError: the library cannot be written.
+      OSError: its disk fails.
+    """
+    if is_kept(prior):
+        _path(prior).touch()  # it is wanted again: see `prune`
+        return prior
+    content = found.sealed.encode()
+    label = re.sub("[^a-z0-9]+", "_", Path(prior).name.lower()).strip("_")
     name = "_".join(filter(None, (label[:40].strip("_"), _digest(content))))
     path = _path(name)
     try:

@@ -22,6 +22,7 @@ from service.views.on_demand import OnDemandCache
 from service.views.pictures import Picture
 from service.views.reports import Reports
 from service.views.studies import Studies, Tables
+from service.views.whole import Priors, Views
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +36,8 @@ class Context:
     pictures: OnDemandCache[Picture]
     studies: Studies
     tables: Tables
+    views: Views
+    priors: Priors
     regressions: Regressions
     networks: NetworkStore
     surveys: Surveys

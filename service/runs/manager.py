@@ -12,16 +12,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from risk_sac.config import CampaignSpec
-from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import FOLDER, Cluster, Executor, Program
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import MOST_AT_ONCE, QueuedRun, Scheduler
-from risk_sac.prior.earlier import pinned_prior
+from risk_sac.prior.earlier import PriorContent, keep
 from risk_sac.prior.policy import check_prior
 from risk_sac.problem import checked_campaign
 from risk_sac.records import State, Triage, TriageState
 from risk_sac.run_folder.scratch import remove_abandoned, remove_temporaries
-from service.errors import ConflictError, NotFoundError, OutdatedError, StorageError
+from service.errors import ConflictError, OutdatedError, StorageError
 from service.runs.cleanup import Retention, dispose, settle
 from service.runs.quota import check_quota, exhausted
 from service.runs.storage_pause import StoragePause, refused
@@ -122,15 +121,23 @@ class Manager:
         if self._thread.is_alive():
             logger.error("workers of runs %s did not end", sorted(self._scheduler.active))
 
-    def submit(self, spec: CampaignSpec, *, project: str = "default", key: str | None = None) -> StoredCampaign:
-        """Queues a campaign, or finds the one queued with this idempotency key.
+    def submit(
+        self, spec: CampaignSpec, *, project: str = "default", key: str | None = None, prior: PriorContent | None = None
+    ) -> StoredCampaign:
+        """Queues a campaign with a copy of its prior, or finds the one queued with this idempotency key.
 
         Raises:
           ConfigError: the campaign cannot be run; the error names the field.
           ConflictError: the key has queued another campaign.
           QuotaError: the project has used up its share.
+          StorageError: the copy cannot be written.
         """
-        spec = self.checked(spec, project)
+        spec = self.checked(spec)
+        if prior is not None:
+            try:
+                spec = spec.model_copy(update={"prior": keep(spec.prior, prior)})
+            except OSError as error:
+                raise StorageError(refused("copying a prior", self._settings.places_dir, error)) from error
         with self._lock:
             found = None if key is None else self._ledger.find(project, key, spec)
             if found is not None:
@@ -141,29 +148,16 @@ class Manager:
         self._executor.wake()
         return campaign
 
-    def checked(self, spec: CampaignSpec, project: str | None = None) -> CampaignSpec:
-        """Checks a campaign; returns it with the version of its ego, and a copy of its prior.
+    def checked(self, spec: CampaignSpec) -> CampaignSpec:
+        """Checks a campaign without reading its prior; returns it with the version of its ego.
 
         Raises:
           ConfigError: the campaign cannot be run; the error names the field.
-          StorageError: the copy cannot be written.
         """
-
-        def folder_of(campaign_id: str) -> Path:
-            campaign = self._store.campaign(campaign_id, project)
-            if not campaign.state.final:
-                raise ConfigError("prior", f"{campaign_id}, which is {campaign.state}", "a campaign that has ended")
-            return self._settings.campaign_folder(campaign_id)
-
         spec = checked_campaign(spec)
         for family, name in product(spec.families, spec.methods):
             check_prior(name, family, spec.prior)
-        try:
-            return spec.model_copy(update={"prior": pinned_prior(spec.prior, spec.families, folder_of)})
-        except NotFoundError as error:
-            raise ConfigError("prior", f"{spec.prior!r}", "shipped, none, or the id of a campaign") from error
-        except OSError as error:
-            raise StorageError(refused("copying a prior", self._settings.places_dir, error)) from error
+        return spec
 
     def cancel(self, campaign_id: str, project: str | None = None) -> StoredCampaign:
         """Cancels a campaign; does nothing to one that has ended."""

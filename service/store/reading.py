@@ -12,7 +12,7 @@ from sqlalchemy.orm import Session, selectinload
 from risk_sac.records import FINAL, Episode, Outcome, State, StateChange, Triage, TriageState
 from service.errors import StorageError
 from service.store.counting import HOUR_S
-from service.store.database import open_database, storage_errors
+from service.store.database import connect, open_database, storage_errors
 from service.store.finding import Judged, episode_page, find_campaign, find_failure, find_run, find_triage
 from service.store.revisions import Revisions
 from service.store.sequence import event_page
@@ -33,9 +33,9 @@ class Store:
         them may refuse the note about it, too.
     """
 
-    def __init__(self, url: str) -> None:
-        """Opens the database, creating it where there is none."""
-        self.engine = open_database(url)
+    def __init__(self, url: str, *, opened: bool = False) -> None:
+        """Opens the database, creating it where there is none; connects to one that another process has opened."""
+        self.engine = connect(url) if opened else open_database(url)
         self.refusal: str | None = None
         self.revisions = Revisions()
 

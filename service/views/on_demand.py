@@ -100,14 +100,23 @@ class Helper:
         """Ends the processes at work."""
         self._stopping.set()
 
-    def run(self, program: str, arguments: Sequence[str], question: bytes = b"") -> HelperResult:
-        """Runs a program within `WALL_S`; StorageError if it cannot be started."""
+    def run(
+        self,
+        program: str,
+        arguments: Sequence[str],
+        question: bytes = b"",
+        *,
+        wall_s: float = WALL_S,
+        memory_bytes: int = 0,
+    ) -> HelperResult:
+        """Runs a program within its time; StorageError if it cannot be started."""
         try:
             return run_helper(
                 program,
                 arguments,
                 question=question,
-                wall_s=WALL_S,
+                wall_s=wall_s,
+                memory_bytes=memory_bytes,
                 niceness=self._niceness,
                 stopping=self.stopping,
             )

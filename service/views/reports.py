@@ -40,8 +40,7 @@ class CampaignReport:
     def figure(self, name: str, format_: Format) -> bytes:
         """Returns one figure as a file, drawn once; NotFoundError if there is no such figure."""
         if name not in self.figures:
-            message = f"campaign {self.campaign_id} has no figure {name!r}; GET its `figures` lists those there are"
-            raise NotFoundError(message, field="name", got=name)
+            raise unknown_figure(self.campaign_id, name)
         with self._lock:  # a second request for a figure waits for the first
             if (name, format_) not in self._drawn:
                 self._drawn[name, format_] = figure_bytes(self.comparison, name, format_)
@@ -93,6 +92,12 @@ class Reports:
         comparison = compare(campaign.spec, found, command="", reasons=reasons)
         folders = {run.spec_digest: self._settings.run_folder(campaign.id, run.id) for run in campaign.runs}
         return CampaignReport(campaign.id, comparison, folders, lasting)
+
+
+def unknown_figure(campaign_id: str, name: str) -> NotFoundError:
+    """The error of a figure that a report does not have."""
+    message = f"campaign {campaign_id} has no figure {name!r}; GET its `figures` lists those there are"
+    return NotFoundError(message, field="name", got=name)
 
 
 def _missing(run: StoredRun) -> str:

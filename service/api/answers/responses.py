@@ -31,6 +31,7 @@ STORAGE = problem(503, "The database cannot be read or written")
 STOPPED = problem(503, "Campaigns make no progress")
 UNREADY = problem(503, "The disk or the database refuses")
 
+CROWDED = problem(503, "The database cannot be read, or too many wait for theirs")
 _RETRY = {
     "Retry-After": header(
         "Seconds to wait: a twentieth of the time left; absent once the campaign has ended.", "integer", required=False

@@ -2,21 +2,24 @@
 
 from collections.abc import Callable
 from hashlib import blake2b
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import PlainTextResponse
+from starlette.concurrency import run_in_threadpool
 
 from risk_sac import __version__
 from risk_sac.adjustments import adjustments
 from risk_sac.benchmark.power import power_of
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
+from risk_sac.prior.earlier import PriorContent
 from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Power, Record, Results, State, wire
 from service.api.answer_cache import kept
 from service.api.answers.pages import TIERS, Cursor, Limit, Tier
 from service.api.answers.representations import cacheable, entity_tag, link
 from service.api.answers.responses import (
     ACCEPTED,
+    CROWDED,
     INVALID,
     LIVE,
     MALFORMED,
@@ -32,17 +35,18 @@ from service.api.posted import ON_MAP, PostedCampaign, documented
 from service.errors import NotFoundError
 from service.runs.manager import LOG
 from service.store.stored import StoredCampaign
-from service.views.curves import Curves, curves
-from service.views.failure_table import FailureTable, failure_table
+from service.views.curves import Curves
+from service.views.failure_table import FailureTable
 from service.views.logs import log_tail
 from service.views.progress import campaign_body, summary_body
-from service.views.scenes import SceneEffects, scene_effects
+from service.views.scenes import SceneEffects
 from service.views.time_left import retry_after_s
 from service.views.totals import played, results
+from service.views.whole import View, ViewName
 
 LISTED = "campaigns"
 EITHER_KIND = documented(CampaignSpec.__name__, ON_MAP)
-POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON
+POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON | CROWDED
 IdempotencyKey = Annotated[
     str | None,
     Header(
@@ -61,7 +65,7 @@ router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE
 
 
 @router.post("", status_code=202, response_model=Campaign, responses=POSTING, openapi_extra=EITHER_KIND)
-def post_campaign(
+async def post_campaign(
     request: Request,
     spec: PostedCampaign,
     service: Service,
@@ -69,14 +73,16 @@ def post_campaign(
     idempotency_key: IdempotencyKey = None,
 ) -> Response:
     """Queue a campaign: families × methods × seeds on one equal budget."""
-    campaign = service.manager.submit(spec, project=caller.project, key=idempotency_key)
-    return _accepted(request, campaign, service)
+    prior = await service.priors.of(spec, caller.project)
+    return await run_in_threadpool(_submit, request, spec, prior, service, caller, idempotency_key)
 
 
-@router.post("/check", responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
-def check_campaign(spec: PostedCampaign, service: Service, caller: CurrentCaller) -> CampaignCheck:
-    """Validate a campaign without queuing it; `adjustments` has the values that its episodes would use instead."""
-    return CampaignCheck(adjustments=adjustments(service.manager.checked(spec, caller.project)))
+@router.post("/check", responses=MALFORMED | NOT_JSON | CROWDED, openapi_extra=EITHER_KIND)
+async def check_campaign(spec: PostedCampaign, service: Service, caller: CurrentCaller) -> CampaignCheck:
+    """Validate a campaign and change nothing; `adjustments` has the values that its episodes would use instead."""
+    checked = await run_in_threadpool(service.manager.checked, spec)
+    await service.priors.of(spec, caller.project)
+    return CampaignCheck(adjustments=await run_in_threadpool(adjustments, checked))
 
 
 @router.get("", response_model=CampaignPage, responses=TAGGED)
@@ -151,48 +157,26 @@ def get_power(campaign_id: str, request: Request, service: Service, caller: Curr
     return _live(campaign_id, request, service, caller, lambda found: power_of(found.spec, played(found)))
 
 
-@router.get("/{campaign_id}/failure-table", response_model=FailureTable, responses=UNKNOWN | LIVE)
-def get_failure_table(
+@router.get("/{campaign_id}/failure-table", response_model=FailureTable, responses=UNKNOWN | LIVE | CROWDED)
+async def get_failure_table(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, tier: Tier = "valid"
 ) -> Response:
     """All failures at once, by columns, to sort, filter and plot them."""
-    return _live(
-        campaign_id,
-        request,
-        service,
-        caller,
-        lambda found: failure_table(
-            found,
-            service.store.plain_episodes(found.number, TIERS[tier]),
-            service.store.triages(found.number),
-        ),
-    )
+    return await _viewed(campaign_id, request, service, caller, name="failure_table", outcomes=TIERS[tier])
 
 
-@router.get("/{campaign_id}/curves", response_model=Curves, responses=UNKNOWN | LIVE)
-def get_curves(
+@router.get("/{campaign_id}/curves", response_model=Curves, responses=UNKNOWN | LIVE | CROWDED)
+async def get_curves(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, points: Points = 200
 ) -> Response:
     """Curves of each run: rates, distinct failures, λ and cost over its episodes."""
-    return _live(
-        campaign_id,
-        request,
-        service,
-        caller,
-        lambda found: curves(found, service.store.plain_episodes(found.number), points),
-    )
+    return await _viewed(campaign_id, request, service, caller, name="curves", points=points)
 
 
-@router.get("/{campaign_id}/scenes", response_model=SceneEffects, responses=UNKNOWN | LIVE)
-def get_scenes(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
+@router.get("/{campaign_id}/scenes", response_model=SceneEffects, responses=UNKNOWN | LIVE | CROWDED)
+async def get_scenes(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """Which scene parameters set failing episodes apart, and which parts of the ODD were played."""
-    return _live(
-        campaign_id,
-        request,
-        service,
-        caller,
-        lambda found: scene_effects(found, service.store.plain_episodes(found.number)),
-    )
+    return await _viewed(campaign_id, request, service, caller, name="scenes")
 
 
 @router.get("/{campaign_id}/runs/{run_id}/log", response_class=Response, responses=UNKNOWN | LOG_TEXT)
@@ -213,16 +197,45 @@ def get_log(
     return PlainTextResponse(text, headers=cacheable(request, _digest(text)))
 
 
+def _submit(
+    request: Request,
+    spec: CampaignSpec,
+    prior: PriorContent | None,
+    service: Context,
+    caller: Caller,
+    idempotency_key: str | None,
+) -> Response:
+    campaign = service.manager.submit(spec, project=caller.project, key=idempotency_key, prior=prior)
+    return _accepted(request, campaign, service)
+
+
 def _live(
     campaign_id: str, request: Request, service: Context, caller: Caller, body: Callable[[StoredCampaign], Record]
 ) -> Response:
     """An answer about one campaign, which the cache keeps."""
+    campaign, headers, revision = _current(campaign_id, request, service, caller)
+    return kept(request, wire(body(campaign)), headers, revision, campaign_id)
+
+
+async def _viewed(
+    campaign_id: str, request: Request, service: Context, caller: Caller, *, name: ViewName, **fields: Any
+) -> Response:
+    """An answer that reads all episodes of a campaign, which the cache keeps."""
+    campaign, headers, revision = await run_in_threadpool(_current, campaign_id, request, service, caller)
+    view = View(name=name, campaign_id=campaign_id, edition=campaign.revision, **fields)
+    content = await service.views.content(view, campaign)
+    return kept(request, content.body, headers, revision, campaign_id)
+
+
+def _current(
+    campaign_id: str, request: Request, service: Context, caller: Caller
+) -> tuple[StoredCampaign, dict[str, str], str]:
+    """Returns the campaign, the headers of an answer about it, and its revision before it was read."""
     revision = service.store.revision(campaign_id, caller.sees)
     campaign = service.store.campaign(campaign_id, caller.sees)
     # The revision that was read, which may be newer. A body depends on it, on the version and on how many are at work.
     parts = (campaign.revision, __version__, str(service.manager.workers))
-    headers = cacheable(request, *parts, others=_retry_after(campaign, service))
-    return kept(request, wire(body(campaign)), headers, revision, campaign_id)
+    return campaign, cacheable(request, *parts, others=_retry_after(campaign, service)), revision
 
 
 def _digest(content: bytes) -> str:

@@ -11,9 +11,9 @@ from starlette.concurrency import run_in_threadpool
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.formats import FORMATS, REMEDY, ZIP, FormatName, names
 from service.api.answers.problems import ProblemError, Reason
-from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, problem
+from service.api.answers.responses import CROWDED, INVALID, STORAGE, UNKNOWN, problem
 from service.api.context import AskedCampaign, CurrentCaller, Service
-from service.api.routes.pictures import CROWDED, PLAYED, Asked, Headers, made
+from service.api.routes.pictures import PLAYED, Asked, Headers, made
 from service.errors import ConflictError
 from service.views.studies import Study, Table
 

@@ -9,14 +9,13 @@ from risk_sac.failures.question import Twin
 from risk_sac.failures.studied import Region
 from risk_sac.records import wire
 from service.api.answers.representations import cacheable
-from service.api.answers.responses import INVALID, STORAGE, TAGGED, UNKNOWN, Responses, problem
+from service.api.answers.responses import CROWDED, INVALID, STORAGE, TAGGED, UNKNOWN, Responses, problem
 from service.api.context import CurrentCaller, Service
 from service.views.pictures import FailureOfARun, Picture, Roads, TwinPlay, roads_body, thumbnail_of, twin_body
 from service.views.studies import Study
 
 PNG, SVG, JSON, ZIP = "image/png", "image/svg+xml", "application/json", "application/zip"
 LOST = problem(404, "Nothing has this id, or its time series is lost")
-CROWDED = problem(503, "The database cannot be read, or too many wait for theirs")
 PLAYED = problem(409, "The failure does not repeat here, or cannot be played")
 
 

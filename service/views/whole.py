@@ -1,0 +1,241 @@
+"""Views that read all episodes of a campaign; those of a large campaign are made in a helper process.
+
+`python -m service.views.whole QUESTION ANSWER` answers one question. It shares the server's database and folders.
+"""
+
+import logging
+import sys
+import zipfile
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Literal, cast
+
+from pydantic import TypeAdapter
+from pydantic_core import from_json, to_json
+from starlette.concurrency import run_in_threadpool
+
+from risk_sac.config import CampaignSpec
+from risk_sac.errors import ConfigError, RiskSacError
+from risk_sac.execution.helper import ANSWER, QUESTION
+from risk_sac.execution.postmortem import without_folders
+from risk_sac.failures.cases import Regression
+from risk_sac.prior.earlier import SHIPPED_OR_NONE, PriorContent, is_kept
+from risk_sac.records import Outcome, wire
+from risk_sac.report.figures import Format
+from service.errors import NotFoundError, StorageError
+from service.settings import ServiceSettings
+from service.store.reading import Store
+from service.store.stored import StoredCampaign
+from service.views import report_parts
+from service.views.curves import curves
+from service.views.failure_table import failure_table
+from service.views.on_demand import Helper, OnDemandCache
+from service.views.reports import CampaignReport, Reports, unknown_figure
+from service.views.scenes import scene_effects
+
+logger = logging.getLogger(__name__)
+
+LARGE = 4000  # episodes; reading more in the server would hold up other requests
+MEMORY_BYTES, WALL_S = 4 << 30, 1800.0  # of a helper; 100,000 episodes take 2.4 GiB and, where many fail, minutes
+VIEWS_KEPT = 4  # of some megabytes each
+REFUSED, LOST, PASSING, TOO_LARGE = 3, 4, 5, 6  # exit statuses
+ViewName = Literal["curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "prior"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """A view of a campaign, and what it depends on."""
+
+    name: ViewName
+    campaign_id: str
+    """Of a prior: empty where it names a copy."""
+    edition: str
+    """Changes whenever the content would."""
+    format: str = ""
+    address: str = ""
+    """Base URL in commands, or the root path of figures."""
+    points: int = 0
+    outcomes: tuple[Outcome, ...] = ()
+    prior: str = ""
+    regression: Regression | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """Content of a view; one that does not last is not cached."""
+
+    body: bytes
+    lasting: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Sources:
+    """What views are made from; a prior that names a copy is of no campaign."""
+
+    settings: ServiceSettings
+    store: Store
+    reports: Reports
+    campaign: StoredCampaign | None
+
+
+def content_of(view: View, sources: Sources) -> Content:
+    """Makes the content of a view; takes seconds for a large campaign."""
+    campaign, store = sources.campaign, sources.store
+    if view.name == "prior":
+        folder = sources.settings.campaign_folder(view.campaign_id) if view.campaign_id else None
+        return Content(_PRIOR.dump_json(PriorContent.read(view.prior, folder)))
+    assert campaign is not None
+    if view.name == "failure_table":
+        failures = store.plain_episodes(campaign.number, view.outcomes)
+        return Content(wire(failure_table(campaign, failures, store.triages(campaign.number))))
+    if view.name == "curves":
+        return Content(wire(curves(campaign, store.plain_episodes(campaign.number), view.points)))
+    if view.name == "scenes":
+        return Content(wire(scene_effects(campaign, store.plain_episodes(campaign.number))))
+    made = sources.reports.report(campaign)
+    return Content(_OF_REPORT[view.name](made, view), made.lasting)
+
+
+_PRIOR = TypeAdapter(PriorContent)
+_OF_REPORT: Mapping[str, Callable[[CampaignReport, View], bytes]] = {
+    "table": lambda made, view: report_parts.table(made, view.format, view.address).encode(),
+    "clusters": lambda made, view: report_parts.clusters(made).encode(),
+    "figures": lambda made, view: report_parts.figures(made, view.address).encode(),
+    "drawn": lambda made, view: report_parts.drawn(made, cast(Format, view.format)),
+    "report": lambda made, view: report_parts.evidence(made, view.format, view.address, view.regression).encode(),
+}
+
+
+class _Passing(Exception):
+    """Content that does not last, so that no cache keeps it."""
+
+
+class Views(OnDemandCache[View]):
+    """Makes views of small campaigns at once, and of large ones in a helper process, one at a time."""
+
+    def __init__(self, settings: ServiceSettings, store: Store, reports: Reports, helper: Helper, kept: int) -> None:
+        super().__init__(self._helped, "views of large campaigns", kept)
+        self._settings, self._store, self._reports, self._helper = settings, store, reports, helper
+
+    async def content(self, view: View, campaign: StoredCampaign) -> Content:
+        """Returns the content of a view of a campaign, or raises what its making raises."""
+        if not _large(campaign):
+            sources = Sources(self._settings, self._store, self._reports, campaign)
+            return await run_in_threadpool(content_of, view, sources)
+        try:
+            return Content(await self.get(view))
+        except _Passing as content:
+            return Content(content.args[0], lasting=False)
+
+    async def figure(self, view: View, campaign: StoredCampaign, name: str) -> Content:
+        """Returns one figure of a view of them all; NotFoundError if there is no such figure."""
+        if not _large(campaign):
+            made = await run_in_threadpool(self._reports.report, campaign)
+            return Content(await run_in_threadpool(made.figure, name, cast(Format, view.format)), made.lasting)
+        content = await self.content(view, campaign)
+        with zipfile.ZipFile(BytesIO(content.body)) as figures:
+            if name not in figures.namelist():
+                raise unknown_figure(campaign.id, name)
+            return Content(figures.read(name), content.lasting)
+
+    def _helped(self, view: View) -> bytes:
+        settings = self._settings
+        question = _Question(view=view, data_dir=settings.data_dir, database_url=settings.database_url)
+        result = self._helper.run(
+            "service.views.whole",
+            [QUESTION, ANSWER],
+            _QUESTION.dump_json(question),
+            wall_s=WALL_S,
+            memory_bytes=MEMORY_BYTES,
+        )
+        if result.status == 0:
+            return result.answer
+        if result.status == PASSING:
+            raise _Passing(result.answer)
+        if result.status == REFUSED:
+            raise ConfigError(*from_json(result.answer))
+        logger.error("%s was not made (status %d): %s", view, result.status, result.log)
+        reason = "the log has the reason"
+        if result.status == LOST:
+            reason = without_folders(result.answer.decode(errors="replace"))
+        elif result.status == TOO_LARGE:
+            reason = f"it takes more than {MEMORY_BYTES >> 30} GiB"
+        elif result.timed_out:
+            reason = f"it takes more than {WALL_S:g} s"
+        what = f"{view.name.replace('_', ' ')} of {view.campaign_id or view.prior}"
+        raise StorageError(f"{what} cannot be made: {reason}; lists of episodes and failures still work")
+
+
+class Priors:
+    """Reads what campaigns go on from, once per earlier campaign, in a helper process."""
+
+    def __init__(self, store: Store, views: Views) -> None:
+        self._store, self._views = store, views
+
+    async def of(self, spec: CampaignSpec, project: str) -> PriorContent | None:
+        """Returns the scripts that a campaign's prior names; None where it names none.
+
+        Raises:
+          ConfigError: there is no such campaign, it followed no scripts, or it is of another pattern.
+        """
+        if spec.prior in SHIPPED_OR_NONE:
+            return None
+        campaign_id = await run_in_threadpool(self._campaign_id, spec.prior, project)
+        view = View(name="prior", campaign_id=campaign_id, edition="", prior=spec.prior)
+        found = _PRIOR.validate_json(await self._views.get(view))
+        return found.checked(spec.prior, spec.families)
+
+    def _campaign_id(self, prior: str, project: str) -> str:
+        """Returns the id of the ended campaign that a prior names; empty for a copy."""
+        if is_kept(prior):
+            return ""
+        try:
+            campaign = self._store.campaign(prior, project)
+        except NotFoundError as error:
+            raise ConfigError("prior", f"{prior!r}", "shipped, none, or the id of a campaign") from error
+        if not campaign.state.final:
+            raise ConfigError("prior", f"{prior}, which is {campaign.state}", "a campaign that has ended")
+        return campaign.id
+
+
+def _large(campaign: StoredCampaign) -> bool:
+    return sum(run.episodes_done for run in campaign.runs) > LARGE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Question:
+    """A view, and where its helper finds the campaign."""
+
+    view: View
+    data_dir: Path
+    database_url: str | None
+
+
+_QUESTION = TypeAdapter(_Question)
+
+
+def _main(asked: Path, file: Path) -> int:
+    question = _QUESTION.validate_json(asked.read_bytes())
+    view = question.view
+    settings = ServiceSettings(data_dir=question.data_dir, database_url=question.database_url)
+    try:
+        with closing(Store(settings.url, opened=True)) as store:
+            campaign = store.campaign(view.campaign_id) if view.name != "prior" else None
+            content = content_of(view, Sources(settings, store, Reports(settings), campaign))
+        file.write_bytes(content.body)
+    except ConfigError as error:
+        file.write_bytes(to_json(error.args))
+        return REFUSED
+    except RiskSacError as error:
+        file.write_text(str(error), encoding="utf-8")
+        return LOST
+    except MemoryError:
+        return TOO_LARGE
+    return 0 if content.lasting else PASSING
+
+
+if __name__ == "__main__":
+    sys.exit(_main(*map(Path, sys.argv[1:])))
