@@ -11,9 +11,8 @@ checkpoint      from which the run goes on; beside it the one before, `checkpoin
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
-from pydantic import AfterValidator, AliasChoices, Field, TypeAdapter
+from pydantic import TypeAdapter
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
@@ -34,8 +33,7 @@ def series_name(index: int) -> str:
 class RecordedFailure:
     """An episode in which a requirement that counts was violated, with or without contact, refused ones included."""
 
-    # The episode's, as the service says it too; in older folders its index in six digits, or a phase's former name.
-    id: Annotated[str, AfterValidator(lambda text: str(EpisodeId.parse(text) or text))]
+    id: str  # the episode's, as the service says it too
     series: str  # file of its time series, relative to results.json
     episode: EpisodeRecord
 
@@ -60,9 +58,8 @@ class Results:
     device: str | None = None  # where the networks lived; None while the run goes on
     wall_s: float = 0.0  # over all resumes
     cpu_s: float = 0.0  # the same in processor time
-    episode_cpu_s: tuple[float, ...] = ()  # to the end of each; none while it goes on, or in an older folder
-    # In the order of the episodes; `contacts` in older folders, which have no others.
-    failures: Annotated[tuple[RecordedFailure, ...], Field(validation_alias=AliasChoices("failures", "contacts"))] = ()
+    episode_cpu_s: tuple[float, ...] = ()  # to the end of each; none while it goes on
+    failures: tuple[RecordedFailure, ...] = ()  # in the order of the episodes
 
     def failure(self, id_: str) -> RecordedFailure:
         """Finds a failure by its id or its episode number.

@@ -80,7 +80,7 @@ def test_a_series_that_is_not_the_one_that_was_written_is_never_shown(tmp_path):
 
 
 def test_a_twin_is_told_with_its_series_and_its_contact_and_null_where_a_number_is_not_finite():
-    hit = collision(other_id="lead", ego_speed_mps=5.44, min_ttc_s=math.inf, judgement=judgement())
+    hit = collision(other_id="lead", ego_speed_mps=5.44, early_min_ttc_s=math.inf, judgement=judgement())
     body = json.loads(wire(twin_body("idle", twin_bytes(TwinPlay.of(None, hit, [hit]), series_arrays()))))
     assert (body["twin"], body["outcome"]) == ("idle", "touches lead with an impact speed of 5.4 m/s")
     assert body["collision"]["early_min_ttc_s"] is None
