@@ -12,8 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import TypeAdapter
-
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import Adjustment, EpisodeId, EpisodeRecord, RunMetrics
@@ -79,9 +77,6 @@ class Results:
         raise ConfigError("FAILURE", f"{id_!r}", expected, "`risk-sac show RESULTS --raw` lists them")
 
 
-_RECORDS = TypeAdapter(list[EpisodeRecord])
-
-
 def write_results(folder: Path, results: Results) -> None:
     """Replaces results.json in one step."""
     write_sealed(folder / RESULTS, results)
@@ -96,16 +91,6 @@ def read_results(path: Path) -> Results:
         raise ConfigError("RESULTS", f"there is no {file}", remedy="name the folder of a run") from error
     except DamagedError as error:
         raise ConfigError("RESULTS", str(error)) from error
-
-
-def records_to_json(records: list[EpisodeRecord]) -> str:
-    """Canonical JSON; floats keep every bit."""
-    return _RECORDS.dump_json(records).decode()
-
-
-def records_from_json(text: str) -> list[EpisodeRecord]:
-    """The inverse of `records_to_json`."""
-    return _RECORDS.validate_json(text)
 
 
 def records_from_lines(content: bytes) -> list[EpisodeRecord]:

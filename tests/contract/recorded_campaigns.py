@@ -23,6 +23,7 @@ from risk_sac.records import (
     RequirementResult,
     Severity,
     State,
+    stored,
 )
 from risk_sac.report import FinishedRun
 from risk_sac.run_folder.results import (
@@ -30,7 +31,6 @@ from risk_sac.run_folder.results import (
     FAILURES,
     RecordedFailure,
     Results,
-    records_to_json,
     series_name,
     write_results,
 )
@@ -267,7 +267,7 @@ class Recorded:
                 failures=tuple(RecordedFailure.of(spec.id, each) for each in done if each.worst_violation is not None),
             ),
         )
-        (folder / EPISODES).write_text("".join(records_to_json([each])[1:-1].strip() + "\n" for each in done))
+        (folder / EPISODES).write_text("".join(stored(each) + "\n" for each in done))
         last = Finished(
             finished=True,
             metrics=result.metrics["search"],

@@ -4,15 +4,15 @@ import pytest
 from pydantic import ValidationError
 
 from risk_sac.metrics import results_digest
-from risk_sac.records import EpisodeId, EpisodeRecord
-from risk_sac.run_folder.results import records_from_json, records_from_lines, records_to_json
+from risk_sac.records import EpisodeId, EpisodeRecord, stored
+from risk_sac.run_folder.results import records_from_lines
 from tests.builders import collision, episode_record
 
 RECORD = episode_record(4, collision=collision(early_min_ttc_s=0.7), min_ttc_s=0.0)
 
 
 def test_the_minima_of_a_collision_have_names_of_their_own_wherever_it_is_written() -> None:
-    for text in (RECORD.model_dump_json(), records_to_json([RECORD])[1:-1], json.dumps(RECORD.model_dump())):
+    for text in (RECORD.model_dump_json(), stored(RECORD), json.dumps(RECORD.model_dump())):
         written = json.loads(text)
         assert written["min_ttc_s"] == 0.0
         assert written["collision"]["early_min_ttc_s"] == 0.7
@@ -20,11 +20,9 @@ def test_the_minima_of_a_collision_have_names_of_their_own_wherever_it_is_writte
 
 
 def test_records_read_back_as_they_were() -> None:
-    stored = records_to_json([RECORD])
-    (read,) = records_from_json(stored)
+    (read,) = records_from_lines(stored(RECORD).encode())
     assert read == RECORD
     assert results_digest([read]) == results_digest([RECORD])
-    assert records_from_lines(stored[1:-1].encode()) == [RECORD]
 
 
 @pytest.mark.parametrize(
