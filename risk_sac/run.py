@@ -1,6 +1,8 @@
 """Run state between two episodes, and its checkpoint."""
 
+import hashlib
 import logging
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -12,11 +14,11 @@ from risk_sac.env import RiskSacEnv
 from risk_sac.errors import ConfigError
 from risk_sac.jit import cpu_s
 from risk_sac.metrics import MetricsAccumulator, results_digest
-from risk_sac.records import EpisodeRecord, Outcome, Phase, RunMetrics, SeriesFile
+from risk_sac.records import EpisodeRecord, Outcome, Phase, RunMetrics, SeriesFile, stored
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import sha256
-from risk_sac.run_folder.results import FAILURES, records_from_json, records_to_json, series_name
+from risk_sac.run_folder.results import EPISODES, FAILURES, records_from_lines, series_name
 from risk_sac.run_folder.series import write_series
 from risk_sac.searchers import Searchers
 
@@ -45,6 +47,8 @@ class RunSummary:
 class RunState:
     """Parts of a run, and its episodes so far.
 
+    Records are appended to the folder's `episodes.jsonl`; a checkpoint holds the length and digest of that file.
+
     Attributes:
       spec: what to run.
       problem: what to falsify.
@@ -67,6 +71,8 @@ class RunState:
         self._episode_cpu_s: list[float] = []
         self._folder = folder
         self._saved = 0  # records in the newest checkpoint
+        self._written = 0  # bytes of `episodes.jsonl` that are of these records
+        self._digest = hashlib.sha256()  # of those bytes
         self._search = MetricsAccumulator(self.problem.family.horizon_steps)
         self._evaluation = MetricsAccumulator(self.problem.family.horizon_steps)
         self._cpu_began_s = cpu_s()
@@ -98,7 +104,7 @@ class RunState:
         return self.records[-1].environment_steps if self.records else 0
 
     def add(self, record: EpisodeRecord) -> RunMetrics:
-        """Adds the episode that `env` has just played, and writes the time series of a violation.
+        """Adds the episode that `env` has just played, and writes its record and the time series of a violation.
 
         Returns:
           The metrics of its phase.
@@ -107,6 +113,7 @@ class RunState:
             file = self._folder / FAILURES / series_name(record.index)
             self.series[record.index] = write_series(file, self.env.trace.series())
         self.records.append(record)
+        self._append(record)
         self.searchers.add(record)
         self._episode_cpu_s.append(cpu_s() - self._cpu_began_s)
         return self._count(record)
@@ -133,8 +140,11 @@ class RunState:
         """Writes the checkpoint if there is a new episode; called between episodes only."""
         if self._saved == len(self.records):
             return
+        with (self._folder / EPISODES).open("rb") as file:
+            os.fsync(file.fileno())
         state = {
-            "records": records_to_json(self.records),
+            "episodes_bytes": self._written,
+            "episodes_sha256": self._digest.hexdigest(),
             "series": {index: file.sha256 for index, file in self.series.items()},
             "episode_cpu_s": self._episode_cpu_s,
             **self.searchers.state(),
@@ -153,8 +163,14 @@ class RunState:
         state = checkpoint.load_newest(self._folder / CHECKPOINT, self.spec.digest)
         if state is None:
             return []
-        self.records = records_from_json(state["records"])
-        self.series = _series(self._folder, self.records, state.get("series", {}))  # older checkpoints have none
+        content = _beginning(self._folder / EPISODES, state["episodes_bytes"])
+        digest = hashlib.sha256(content)
+        if digest.hexdigest() != state["episodes_sha256"]:
+            logger.warning("%s is damaged or gone; the run starts from the beginning", self._folder / EPISODES)
+            return []
+        self._written, self._digest = len(content), digest
+        self.records = records_from_lines(content)
+        self.series = _series(self._folder, self.records, state["series"])
         self.searchers.load(state, self.records)
         self._episode_cpu_s = list(state["episode_cpu_s"])
         self._cpu_began_s = cpu_s() - self._episode_cpu_s[-1]
@@ -180,8 +196,27 @@ class RunState:
         """Ends the simulation."""
         self.env.close()
 
+    def _append(self, record: EpisodeRecord) -> None:
+        """Writes a record behind those of this run; what an interrupted run wrote there is cut off."""
+        line = stored(record).encode() + b"\n"
+        with (self._folder / EPISODES).open("r+b" if self._written else "wb") as file:
+            file.truncate(self._written)
+            file.seek(self._written)
+            file.write(line)
+        self._written += len(line)
+        self._digest.update(line)
+
     def _count(self, record: EpisodeRecord) -> RunMetrics:
         return (self._evaluation if record.evaluating else self._search).add(record)
+
+
+def _beginning(file: Path, length: int) -> bytes:
+    """Reads so many bytes of a file; fewer where it is shorter or missing."""
+    try:
+        with file.open("rb") as opened:
+            return opened.read(length)
+    except FileNotFoundError:
+        return b""
 
 
 def _series(folder: Path, records: list[EpisodeRecord], digests: Mapping[int, str]) -> dict[int, SeriesFile]:

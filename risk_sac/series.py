@@ -42,7 +42,7 @@ class Series(BaseModel):
     accel_mps2: RealRows
     """T x n."""
     lane_offset_m: RealRows | None = None
-    """T x n; a vehicle's centre from its lane's centre, positive to the left. Null in older files."""
+    """T x n; a vehicle's centre from its lane's centre, positive to the left."""
     link: list[list[str | None]] | None = None
     """T x n; SUMO's letter of the signal ahead, such as `g`: green, but has to yield. Null without a signal, and in
     older files."""

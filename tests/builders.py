@@ -158,11 +158,11 @@ def collision(**changes: Any) -> Collision:
         "other_speed_mps": 2.0,
         "relative_speed_mps": 7.0,
         "lateral_offset_m": 0.1,
-        "min_ttc_s": 0.3,
+        "early_min_ttc_s": 0.3,
         "min_rss_margin_m": -3.0,
         "visible_for_s": 3.0,
         "ego_peak_braking_mps2": 4.5,
-        "min_robustness": -1.0,
+        "early_min_robustness": -1.0,
         "simulator_agrees": True,
         "verdicts": {"inside_limits": True, "ego_moving": True},
     }

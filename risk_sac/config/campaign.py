@@ -100,10 +100,6 @@ class Iid(Settings):
 PriorName = Annotated[str, Field(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f]+$")]
 
 
-def _shipped(prior: str) -> bool:
-    return prior == "shipped"
-
-
 class RunSpec(Settings):
     """One run: the unit of scheduling, checkpoint and retry."""
 
@@ -115,7 +111,7 @@ class RunSpec(Settings):
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     learner: LearnerConfig = LearnerConfig()
-    prior: Annotated[PriorName, Field(exclude_if=_shipped)] = "shipped"
+    prior: PriorName = "shipped"
 
     @property
     def id(self) -> str:
@@ -156,10 +152,10 @@ class CampaignSpec(Settings):
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     learner: LearnerConfig = LearnerConfig()
-    prior: Annotated[PriorName, Field(exclude_if=_shipped)] = "shipped"
+    prior: PriorName = "shipped"
     """What methods with a prior start from: `shipped`, `none`, or the scripts of an earlier campaign, by its id; on the
     command line the folder of a run or campaign. They are copied, and the copy's name takes the place of this one."""
-    iid: Annotated[Iid | None, Field(exclude_if=lambda iid: iid is None)] = None  # else old digests would change
+    iid: Iid | None = None
     """Null: none, and nothing is said of how often the ego fails."""
 
     @model_validator(mode="after")

@@ -13,10 +13,6 @@ EgoName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_-]{0,39}$")]
 MOST_DEFECTS = 10
 
 
-def _left_out(value: object) -> bool:
-    return value in (None, ())
-
-
 class SensorConfig(Settings):
     """Line-of-sight sensor, mounted at the middle of the ego's roof."""
 
@@ -44,16 +40,15 @@ class EgoConfig(Settings):
     """Time between two decisions (SUMO's actionStepLength), s; a multiple of 0.1."""
     sensor: SensorConfig | None = SensorConfig()
     """None: the ego sees everything."""
-    # Fields added later are left out of JSON where they are not set: older specs keep their digests.
-    driver: Annotated[EgoName | None, Field(exclude_if=_left_out)] = None
+    driver: EgoName | None = None
     """Name of a registered ego, as `GET /v1/egos` lists them; null: SUMO's models drive."""
-    version: Annotated[str | None, Field(exclude_if=_left_out, min_length=1, max_length=100)] = None
+    version: Annotated[str | None, Field(min_length=1, max_length=100)] = None
     """Of the registered ego and its defects. It is filled in where a campaign is posted; a run refuses to go on with
     another one."""
-    response_time_s: Annotated[float | None, Field(exclude_if=_left_out, ge=0.0, le=5.0)] = None
+    response_time_s: Annotated[float | None, Field(ge=0.0, le=5.0)] = None
     """Time within which the ego responds, s; its time-to-collision requirement follows from it. By default what a
     registered ego declares, or `reaction_time_s`."""
-    defects: Annotated[tuple[EgoName, ...], Field(exclude_if=_left_out, max_length=MOST_DEFECTS)] = ()
+    defects: Annotated[tuple[EgoName, ...], Field(max_length=MOST_DEFECTS)] = ()
     """Known faults to plant into the ego, as `GET /v1/egos` lists them."""
 
     @property

@@ -6,7 +6,7 @@ Every field may be left out: a family's default ODD fills it. What an ODD does t
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator
 
 from risk_sac.config.base import Interval, Settings
 
@@ -21,12 +21,7 @@ def _as_sorted_set(values: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(sorted(set(values)))  # a frozenset has no stable JSON, and so no stable digest
 
 
-def _left_out(value: object) -> bool:
-    return value is None
-
-
 SetOf = AfterValidator(_as_sorted_set)
-Younger = Field(exclude_if=_left_out)  # left out of JSON where it is not set: specs from before keep their digests
 
 
 class Scenery(Settings):
@@ -49,9 +44,9 @@ class Environment(Settings):
     """Tyre-road friction coefficient, in (0, 1.2]; each scene has one value of it."""
     visibility_m: Interval | None = None
     """Meteorological visibility, m; where it is stated, each scene has one value, and the ego sees no farther."""
-    precipitation: Annotated[Annotated[tuple[Precipitation, ...], SetOf] | None, Younger] = None
+    precipitation: Annotated[tuple[Precipitation, ...], SetOf] | None = None
     """Rain wets the road: it bounds the friction. `rain` is up to 7.6 mm/h, `heavy_rain` up to 50 mm/h."""
-    time_of_day: Annotated[Annotated[tuple[TimeOfDay, ...], SetOf] | None, Younger] = None
+    time_of_day: Annotated[tuple[TimeOfDay, ...], SetOf] | None = None
     """At night the ego sees a pedestrian within its low beam only; vehicles carry lights."""
 
 

@@ -1,7 +1,6 @@
 """Writes a run to its folder; `risk_sac.run_folder.results` describes the files."""
 
 import logging
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,9 +19,9 @@ logger = logging.getLogger(__name__)
 
 
 class Recorder:
-    """Observer that writes a run to its folder, then informs another observer.
+    """Observer that writes the results of a run to its folder, then informs another observer.
 
-    A resumed run repeats its checkpoint's episodes, so the file of episodes is always rewritten.
+    The run itself writes its episodes.
 
     Attributes:
       results: the content of results.json.
@@ -41,16 +40,9 @@ class Recorder:
         self.should_stop = observer.should_stop
         self.results = _results_so_far(spec, folder)
         self._failures: list[RecordedFailure] = []
-        self._episodes = (folder / EPISODES).open("wb")
-
-    def close(self) -> None:
-        """Closes the file of episodes."""
-        self._episodes.close()
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
-        """Writes an episode down."""
-        self._episodes.write(record.model_dump_json().encode() + b"\n")
-        self._episodes.flush()
+        """Counts an episode, and now and then writes the results so far."""
         if record.worst_violation is not None:
             self._failures.append(RecordedFailure.of(self.results.spec.id, record))
         told = self.results.metrics.episodes if self.results.metrics else 0
@@ -60,11 +52,7 @@ class Recorder:
         self._observer.episode(record, metrics, series)
 
     def finish(self, summary: RunSummary) -> Results:
-        """Writes the results of the run, after its episodes.
-
-        So no digest stands without its episodes.
-        """
-        os.fsync(self._episodes.fileno())
+        """Writes the results of the run, whose last checkpoint has its episodes on the disk."""
         results = replace(
             self.results,
             finished=summary.finished,

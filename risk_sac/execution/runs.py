@@ -5,7 +5,7 @@ The run is started or resumed, written to the folder as it goes, and stopped by 
 
 import signal
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -37,11 +37,8 @@ def run(spec: RunSpec, folder: Path, progress: Progress) -> Results:
     folder = folder.absolute()  # an ego may change the working directory
     ego, prior = Problem.from_spec(spec).ego, pinned_prior(spec.prior, [spec.family])  # before the folder is claimed
     spec = spec.model_copy(update={"ego": ego, "prior": prior})
-    with (
-        held(folder),
-        stop_signal() as stopping,
-        closing(Recorder(spec, folder, Watcher(progress, stopping))) as recorder,
-    ):
+    with held(folder), stop_signal() as stopping:
+        recorder = Recorder(spec, folder, Watcher(progress, stopping))
         return recorder.finish(execute_run(spec, folder, recorder))
 
 

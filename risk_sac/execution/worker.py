@@ -17,7 +17,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import IO, TYPE_CHECKING
@@ -171,9 +171,9 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int,
 
     if memory_bytes:
         limit_memory(memory_bytes)  # from here on: where it ends while libsumo is loaded, the process crashes
-    with closing(Recorder(spec, folder, reporter)) as recorder:
-        summary = execute_run(spec, folder, recorder)
-        results = recorder.finish(summary)
+    recorder = Recorder(spec, folder, reporter)
+    summary = execute_run(spec, folder, recorder)
+    results = recorder.finish(summary)
     found, finished = dict[Path, Verified](), summary.finished
     if finished and replays:
         reporter.keep_going()

@@ -5,12 +5,12 @@ The digest is what results are compared by.
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from risk_sac.metrics.rows import METRICS, steps_per_distinct_failure
 from risk_sac.metrics.tally import Tally
-from risk_sac.records import FORMER_PHASES, Counts, EpisodeRecord, Record, RunMetrics
+from risk_sac.records import Counts, EpisodeRecord, RunMetrics
 
 HISTOGRAMS = (
     "episodes_driven_by",
@@ -21,26 +21,6 @@ HISTOGRAMS = (
     "conflicts_by_second",
     "contacts_by_second",
 )
-
-# Fields that records have had since they were first digested. Those from before, which lack them, keep their digests.
-FIELDS_ADDED_LATER = frozenset(
-    {
-        "judgement",
-        "noticed_s",
-        "ego_broke",
-        "severity",
-        "injury_risk",
-        "fault",
-        "ego_part",
-        "defect_reached_s",
-        "script",
-        "driven_by",
-        "requirements",
-        "violations",
-        "failed",
-    }
-)
-EMPTY: tuple[object, ...] = (None, (), {})
 
 
 class MetricsAccumulator:
@@ -92,21 +72,10 @@ def _figures(tally: Tally) -> dict[str, Any]:
 def results_digest(records: Sequence[EpisodeRecord]) -> str:
     """SHA-256 over one line of canonical JSON per record; equal digests mean equal results.
 
-    Keys are sorted, floats written so that they read back exactly, and phases by their former names, so that older
-    digests hold. Records hold no wall-clock values.
+    Keys are sorted, and floats written so that they read back exactly. Records hold no wall-clock values.
     """
     digest = hashlib.sha256()
     for record in records:
-        former = record.model_copy(update={"phase": FORMER_PHASES.get(record.phase, record.phase)})
-        line = json.dumps(former, default=_plain, sort_keys=True, separators=(",", ":"))
+        line = json.dumps(record.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
         digest.update(line.encode() + b"\n")
     return digest.hexdigest()
-
-
-def _plain(value: object) -> dict[str, Any]:
-    """Records and mappings as dicts, shallowly; `json` comes back for what they contain."""
-    if isinstance(value, Record):
-        return {name: each for name, each in value if each not in EMPTY or name not in FIELDS_ADDED_LATER}
-    if isinstance(value, Mapping):
-        return dict(value)
-    raise TypeError(f"{value!r} of {type(value).__name__} has no canonical JSON; wanted a record of plain values")

@@ -19,10 +19,10 @@ class Feature(NamedTuple):
 
 # Choice: the paper names the features but no scale. Fixed physical ranges keep OFD comparable between runs.
 FEATURES = (
-    Feature("min_ttc_s", 0.0, 3.0),  # beyond 3 s there is no conflict
+    Feature("early_min_ttc_s", 0.0, 3.0),  # beyond 3 s there is no conflict
     Feature("relative_speed_mps", 0.0, 20.0),  # urban: 72 km/h
     Feature("lateral_offset_m", -3.5, 3.5),  # half a car's length plus half a car's width to either side
-    Feature("min_robustness", -3.0, 1.0),  # in scales: the monitor clips at -3, and 1 is a clear margin
+    Feature("early_min_robustness", -3.0, 1.0),  # in scales: the monitor clips at -3, and 1 is a clear margin
 )
 
 

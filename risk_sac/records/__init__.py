@@ -16,7 +16,6 @@ from risk_sac.records.campaign import (
     Total,
 )
 from risk_sac.records.episode import (
-    FORMER_PHASES,
     PHASES,
     Ending,
     Episode,

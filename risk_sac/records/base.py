@@ -52,7 +52,7 @@ _NULLABLE = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "null"}]})
 Real = Annotated[float, BeforeValidator(_null_is_nan), _NULLABLE]
 """A number; null on the wire where it is not finite."""
 Least = Annotated[float, BeforeValidator(_null_is_infinite), _NULLABLE]
-"""The least of some values, infinite without any; null on the wire and in old run folders."""
+"""The least of some values, infinite without any; null on the wire."""
 
 T = TypeVar("T")
 

@@ -152,7 +152,7 @@ class Total(Counts):
     by_fault: Mapping[str, int] = {}
     """Fault → failures."""
     requirements: Mapping[str, RequirementCounts] = {}
-    """Requirement → its funnel; empty for older runs."""
+    """Requirement → its funnel."""
     signatures: Mapping[str, int]
     """Signature → valid violations."""
     conflicts_by_second: list[int]

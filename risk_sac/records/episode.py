@@ -5,9 +5,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from enum import StrEnum
-from typing import Annotated, Any, Literal, NamedTuple, get_args
-
-from pydantic import BeforeValidator
+from typing import Any, Literal, NamedTuple, get_args
 
 from risk_sac.records.base import Least, Page, Real, Record
 from risk_sac.records.run import DrivenBy, Funnel
@@ -27,8 +25,6 @@ class Outcome(StrEnum):
 
 Phase = Literal["search", "evaluation", "iid"]
 PHASES: tuple[Phase, ...] = get_args(Phase)  # `iid` alone bounds how often the ego fails; nothing pools it
-FORMER_PHASES: Mapping[Phase, str] = {"search": "train", "evaluation": "evaluate"}  # in older records, and in digests
-_NAMED: Mapping[str, Phase] = {each: each for each in PHASES} | {old: new for new, old in FORMER_PHASES.items()}
 _ID = re.compile(r"(?:([^\0]*)-)?([a-z]+)-([0-9]{1,9})")
 
 
@@ -45,9 +41,9 @@ class EpisodeId:
 
     @classmethod
     def parse(cls, text: str) -> "EpisodeId | None":
-        """Splits an id, whose phase may have its former name; None if it is malformed."""
+        """Splits an id; None if it is malformed."""
         parts = _ID.fullmatch(text)
-        phase = _NAMED.get(parts[2]) if parts else None
+        phase = next((phase for phase in PHASES if parts and phase == parts[2]), None)
         return cls(parts[1] or "", phase, int(parts[3])) if parts and phase else None
 
 
@@ -56,7 +52,7 @@ class EpisodeRecord(Record):
 
     index: int
     """0-based within the run, rejected scenes included."""
-    phase: Annotated[Phase, BeforeValidator(lambda name: _NAMED.get(str(name), name))]
+    phase: Phase
     seed: int
     scene: Mapping[str, Real]
     outcome: Outcome
@@ -64,7 +60,7 @@ class EpisodeRecord(Record):
     """What rejected the scene, rules that refused its violations, sim_crash, ego_deadline, ego_malformed, ego_crash, or
     empty."""
     failed: tuple[str, ...] = ()
-    """Requirements that count and were validly violated. Empty in older records."""
+    """Requirements that count and were validly violated."""
     steps: int
     risk_return: Real
     """Σ R_risk, of the risk reward alone."""
@@ -85,11 +81,11 @@ class EpisodeRecord(Record):
     environment_steps: int
     """Of the run, up to and including this episode."""
     driven_by: DrivenBy | None = None
-    """What drove the adversaries, or would have in a rejected scene; null: nothing did, or an older record."""
+    """What drove the adversaries, or would have in a rejected scene; null: nothing did."""
     script: tuple[float, ...] | None = None
     """Genes of the adversaries' scripts; null where a policy drove."""
     requirements: Mapping[str, RequirementResult] = {}
-    """Requirement → how far it was kept; empty in older records."""
+    """Requirement → how far it was kept."""
     violations: tuple[Violation, ...] = ()
     """Violations without contact of requirements that count."""
     collision: Collision | None = None
@@ -198,7 +194,7 @@ class Episode(EpisodeRecord):
     run_id: str
     wall_s: float
     funnel: Funnel | None = None
-    """What the run's phase has found so far; null in older records."""
+    """What the run's phase has found so far."""
     repetition: Repetition | None = None
     """Of the first failure of its kind, once the run has ended."""
 

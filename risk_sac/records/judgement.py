@@ -2,9 +2,6 @@
 
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Annotated, Any
-
-from pydantic import BeforeValidator
 
 from risk_sac.records.base import Real, Record
 
@@ -49,12 +46,6 @@ class Severity(StrEnum):
     MINOR = "minor"  # between vehicles that close at less than 2 m/s
     MODERATE = "moderate"
     SEVERE = "severe"  # a risk of 1 % or more that a pedestrian dies, or an occupant is seriously injured
-
-
-def drivers_renamed(drivers: Any) -> Any:
-    """Reads what definitions 6 and older called the reference drivers."""
-    names = {"careful": "r157", "ideal": "full_braking"}
-    return {names.get(name, name): each for name, each in drivers.items()} if isinstance(drivers, Mapping) else drivers
 
 
 GAINS_MPS = 1.0  # more than SUMO's drivers dawdle
@@ -118,7 +109,7 @@ class Judgement(Record):
     """When the conflict began; negative before the release."""
     noticed_s: float | None = None
     """The same for a wary driver, for which an actor that hangs over its line or could not stop gently is in conflict;
-    `conflict_after_release` goes by it. Null in older records."""
+    `conflict_after_release` goes by it."""
     conflict_x_m: Real
     """Where the striker was then, on the map."""
     conflict_y_m: Real
@@ -136,20 +127,20 @@ class Judgement(Record):
     """What the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red, unsafe_lane_change,
     brake_check, turned_into_path."""
     ego_broke: tuple[str, ...] = ()
-    """What the ego broke: red_light, priority, wrong_direction, speeding, off_road. Empty in older records."""
+    """What the ego broke: red_light, priority, wrong_direction, speeding, off_road."""
     severity: Severity | None = None
-    """minor | moderate | severe. Null in older records."""
+    """minor | moderate | severe."""
     injury_risk: float | None = None
-    """Risk that the pedestrian dies, or an occupant is seriously injured (MAIS 3 or more). Null in older records."""
+    """Risk that the pedestrian dies, or an occupant is seriously injured (MAIS 3 or more)."""
     unresponsive: bool
     """A visible collision course of 1.5 s or more during which the ego never braked."""
     grade: Grade | None
     """preventable | full_braking (by that only) | unavoidable; null where it is not valid."""
-    drivers: Annotated[Mapping[str, ReferenceOutcome], BeforeValidator(drivers_renamed)]
+    drivers: Mapping[str, ReferenceOutcome]
     """Reference driver → how it fares; empty where the contact is not valid."""
     ego_part: EgoPart | None = None
-    """What the ego did about the striker. Null where the contact is not valid, and in older records."""
+    """What the ego did about the striker. Null where the contact is not valid."""
     fault: Fault | None = None
-    """ego | shared | other. Null where the contact is not valid, and in older records."""
+    """ego | shared | other. Null where the contact is not valid."""
     signature: str
     """The class of failures it belongs to, in words; what differs in it is distinct."""

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from datetime import datetime
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import TypeAdapter, WithJsonSchema, model_validator
+from pydantic import TypeAdapter, WithJsonSchema
 
 from risk_sac.config import FamilyName, MethodName, RunMethod
 from risk_sac.records.base import Real, Record
@@ -51,15 +51,6 @@ class Counts(Record):
     invalid: int = 0
     """Those in which the ego failed to drive; in no rate."""
     environment_steps: int = 0
-
-    @model_validator(mode="before")
-    @classmethod
-    def _of_contacts_alone(cls, values: Any) -> Any:
-        """Reads counts from before other requirements made failures."""
-        if not isinstance(values, Mapping) or "collisions" in values:
-            return values
-        contacts = {"collisions": values.get("failures", 0), "preventable_collisions": values.get("preventable", 0)}
-        return {**values, **contacts}
 
     @property
     def rated(self) -> int:
@@ -147,7 +138,7 @@ class RunMetrics(Counts):
     by_fault: Mapping[str, int] = {}
     """Fault → failures, each by its worst violation."""
     requirements: Mapping[str, RequirementCounts] = {}
-    """Requirement → its funnel; empty in older runs."""
+    """Requirement → its funnel."""
     conflicts_by_second: tuple[int, ...] = ()
     """Valid contacts by the second in which the conflict began."""
     contacts_by_second: tuple[int, ...] = ()

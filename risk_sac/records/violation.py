@@ -2,12 +2,9 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Annotated, Any
-
-from pydantic import AliasChoices, BeforeValidator, Field
 
 from risk_sac.records.base import Least, Real, Record
-from risk_sac.records.judgement import Fault, Grade, Judgement, Severity, drivers_renamed
+from risk_sac.records.judgement import Fault, Grade, Judgement, Severity
 
 REPEATS = "repeats"  # rule that a violation fails if its replay goes another way; asked of nothing else
 # Rules among a collision's verdicts that are about the simulator or the control, not about fault.
@@ -26,14 +23,6 @@ ARTEFACT_RULES = frozenset(
 
 
 NO_CONTACT = "no_contact"  # the requirement that a contact violates
-
-
-def _early(name: str) -> Any:
-    """Declares a minimum that ends 1 s before the contact.
-
-    Older records store it under its plain name.
-    """
-    return Field(validation_alias=AliasChoices(f"early_{name}", name), serialization_alias=f"early_{name}")
 
 
 class Violated(Record, ABC):
@@ -112,10 +101,10 @@ class Violation(Violated):
     """The ego's own offences up to that time."""
     grade: Grade | None
     """preventable | full_braking | unavoidable; null where it is not valid."""
-    drivers: Annotated[Mapping[str, bool], BeforeValidator(drivers_renamed)]
+    drivers: Mapping[str, bool]
     """Reference driver → whether it keeps the requirement in the same encounter; empty where it is not valid."""
     fault: Fault | None = None
-    """ego | shared | other. Null where it is not valid, and in older records."""
+    """ego | shared | other. Null where it is not valid."""
     signature: str
     """Its class of failures, in words."""
     definitions: int
@@ -178,13 +167,13 @@ class Collision(Violated):
     """The closing speed: of either body as seen from the other."""
     lateral_offset_m: Real
     """The other's centre across the ego's axis at contact."""
-    min_ttc_s: Least = _early("min_ttc_s")
+    early_min_ttc_s: Least
     """Until 1 s before the contact, at which it is 0 for every collision alike, as the episode's own minimum is."""
     min_rss_margin_m: Least
     visible_for_s: Real
     """How long the ego had known of the other without a break before contact, its memory included; 0 if unseen."""
     ego_peak_braking_mps2: Real
-    min_robustness: Least = _early("min_robustness")
+    early_min_robustness: Least
     """Soft minimum of the requirements, until 1 s before the contact too."""
     simulator_agrees: bool | None
     """Whether SUMO lists it within 0.3 s; null for pedestrians, bodies that part within the step, and an ego that SUMO
@@ -214,17 +203,17 @@ class Collision(Violated):
 
     @property
     def severity(self) -> Severity | None:
-        """Its severity; None in older records."""
+        """Its severity."""
         return None if self.judgement is None else self.judgement.severity
 
     @property
     def headline_candidate(self) -> bool:
-        """See `Violated.headline_candidate`; false where the severity is unknown, as in older records."""
+        """See `Violated.headline_candidate`."""
         return self.preventable and self.severity in (Severity.MODERATE, Severity.SEVERE)
 
     @property
     def severity_in_words(self) -> str:
-        """Such as "severe: closing speed 11.0 m/s, risk of death 3.5 %"; empty in older records."""
+        """Such as "severe: closing speed 11.0 m/s, risk of death 3.5 %"."""
         if self.judgement is None or self.judgement.severity is None:
             return ""
         risk = "death" if self.other_kind == "pedestrian" else "serious injury"

@@ -64,7 +64,7 @@ class Cell(Counts):
     by_fault: Mapping[str, int]
     """Fault → failures."""
     requirements: Mapping[str, RequirementCounts]
-    """Requirement → its funnel; empty for older runs."""
+    """Requirement → its funnel."""
     signatures: Mapping[str, int]
     """Signature → valid violations."""
     conflicts_by_second: tuple[int, ...]

@@ -11,9 +11,6 @@ checkpoint      from which the run goes on; beside it the one before, `checkpoin
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
-
-from pydantic import AfterValidator, AliasChoices, Field, TypeAdapter
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
@@ -34,8 +31,7 @@ def series_name(index: int) -> str:
 class RecordedFailure:
     """An episode in which a requirement that counts was violated, with or without contact, refused ones included."""
 
-    # The episode's, as the service says it too; in older folders its index in six digits, or a phase's former name.
-    id: Annotated[str, AfterValidator(lambda text: str(EpisodeId.parse(text) or text))]
+    id: str  # the episode's, as the service says it too
     series: str  # file of its time series, relative to results.json
     episode: EpisodeRecord
 
@@ -60,9 +56,8 @@ class Results:
     device: str | None = None  # where the networks lived; None while the run goes on
     wall_s: float = 0.0  # over all resumes
     cpu_s: float = 0.0  # the same in processor time
-    episode_cpu_s: tuple[float, ...] = ()  # to the end of each; none while it goes on, or in an older folder
-    # In the order of the episodes; `contacts` in older folders, which have no others.
-    failures: Annotated[tuple[RecordedFailure, ...], Field(validation_alias=AliasChoices("failures", "contacts"))] = ()
+    episode_cpu_s: tuple[float, ...] = ()  # to the end of each; none while it goes on
+    failures: tuple[RecordedFailure, ...] = ()  # in the order of the episodes
 
     def failure(self, id_: str) -> RecordedFailure:
         """Finds a failure by its id or its episode number.
@@ -82,9 +77,6 @@ class Results:
         raise ConfigError("FAILURE", f"{id_!r}", expected, "`risk-sac show RESULTS --raw` lists them")
 
 
-_RECORDS = TypeAdapter(list[EpisodeRecord])
-
-
 def write_results(folder: Path, results: Results) -> None:
     """Replaces results.json in one step."""
     write_sealed(folder / RESULTS, results)
@@ -99,16 +91,6 @@ def read_results(path: Path) -> Results:
         raise ConfigError("RESULTS", f"there is no {file}", remedy="name the folder of a run") from error
     except DamagedError as error:
         raise ConfigError("RESULTS", str(error)) from error
-
-
-def records_to_json(records: list[EpisodeRecord]) -> str:
-    """Canonical JSON; floats keep every bit."""
-    return _RECORDS.dump_json(records).decode()
-
-
-def records_from_json(text: str) -> list[EpisodeRecord]:
-    """The inverse of `records_to_json`."""
-    return _RECORDS.validate_json(text)
 
 
 def records_from_lines(content: bytes) -> list[EpisodeRecord]:

@@ -2,10 +2,8 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-
-from pydantic.dataclasses import dataclass
 
 from risk_sac.errors import DamagedError
 from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Repetition, RunMetrics

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
 
 Point = tuple[float, float]
 SAME_POINT_M = 1e-6
@@ -66,25 +67,16 @@ def ribbon(line: Sequence[Point], width_m: float) -> list[list[Point]]:
 
 
 def triangles(outline: Sequence[Point]) -> list[list[Point]]:
-    """A simple polygon of any shape as triangles, counter-clockwise; none if it has no area.
+    """A polygon of any shape as triangles, counter-clockwise; none if it has no area.
 
-    Source: ear clipping, after Meisters, "Polygons have ears" (1975).
+    Source: shapely's constrained Delaunay triangulation; an outline that crosses itself is made valid before.
     """
     ring = _without_repeats(outline)
-    if len(ring) > 1 and math.dist(ring[0], ring[-1]) < SAME_POINT_M:
-        ring = ring[:-1]
-    if _doubled_area(ring) < 0:
-        ring = ring[::-1]
-    found = []
-    while len(ring) > 2:
-        ear = next((i for i in range(len(ring)) if _is_ear(ring, i)), None)
-        if ear is None:  # it crosses itself, so the rest has no inside
-            break
-        corner = [ring[ear - 1], ring[ear], ring[(ear + 1) % len(ring)]]
-        if _doubled_area(corner) > ON_THE_EDGE_M2:
-            found.append(corner)
-        del ring[ear]
-    return found
+    if len(ring) < 3:
+        return []
+    parts = shapely.constrained_delaunay_triangles(shapely.make_valid(shapely.Polygon(ring)))
+    corners = (list(part.exterior.coords)[:3] for part in shapely.orient_polygons(parts).geoms)
+    return [corner for corner in corners if _doubled_area(corner) > ON_THE_EDGE_M2]
 
 
 def is_convex(corners: Sequence[Point]) -> bool:
@@ -97,15 +89,6 @@ def is_convex(corners: Sequence[Point]) -> bool:
 def areas(polygons: Iterable[Sequence[Sequence[float]]]) -> tuple[Area, ...]:
     """Of convex polygons."""
     return tuple(Area.of(polygon) for polygon in polygons)
-
-
-def _is_ear(ring: Sequence[Point], i: int) -> bool:
-    corner = [ring[i - 1], ring[i], ring[(i + 1) % len(ring)]]
-    doubled = _doubled_area(corner)
-    if doubled <= ON_THE_EDGE_M2:
-        return doubled >= -ON_THE_EDGE_M2  # a corner that lies on a line can be cut off as well
-    ear = Area.of(corner)
-    return not any(p not in corner and ear.contains(*p) for p in ring)
 
 
 def _doubled_area(ring: Sequence[Point]) -> float:

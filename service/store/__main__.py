@@ -1,4 +1,4 @@
-"""`python -m service.store`: copy the database, or undo its newest migration step."""
+"""`python -m service.store`: copies the database."""
 
 import argparse
 import sys
@@ -9,10 +9,10 @@ from pathlib import Path
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.terminal import complain, console, run_command
 from service.errors import StorageError
-from service.host.data_folder import create_private, hold_data_folder
+from service.host.data_folder import create_private
 from service.host.environment import MISUSED, read_settings
 from service.settings import ServiceSettings
-from service.store.database import connected, held, present_step, sqlite_file, step_back
+from service.store.database import connected, sqlite_file
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -33,8 +33,6 @@ def _parser() -> argparse.ArgumentParser:
     copy = commands.add_parser("copy", help="write a whole copy of a SQLite database, also while the service runs")
     copy.set_defaults(command=_copy)
     copy.add_argument("file", type=Path, help="that there is not yet")
-    back = commands.add_parser("back", help="take the newest step back, while the service does not run")
-    back.set_defaults(command=_back)
     return parser
 
 
@@ -49,18 +47,6 @@ def _copy(settings: ServiceSettings, options: argparse.Namespace) -> str:
     with connected(settings.url, doing) as engine, closing(engine.raw_connection()) as connection:
         connection.cursor().execute("VACUUM INTO ?", [str(options.file)])  # which refuses within a transaction
     return f"The database is copied to {options.file}."
-
-
-def _back(settings: ServiceSettings, options: argparse.Namespace) -> str:
-    _existing(settings)
-    with (
-        hold_data_folder(settings.data_dir),
-        connected(settings.url, "taking a step back") as engine,
-        held(engine),
-    ):
-        step_back(engine)
-        step = present_step(engine)
-    return f"The database is at step {step}. Start the version of the service before this one: this one steps forward."
 
 
 def _existing(settings: ServiceSettings) -> None:

@@ -157,14 +157,6 @@ def step_forward(engine: Engine) -> None:
         _take(engine, lambda config: command.upgrade(config, "head"))
 
 
-def step_back(engine: Engine) -> None:
-    """Takes the newest step back; StorageError if it was never taken."""
-    step, newest = present_step(engine), newest_step()
-    if step != newest:
-        raise StorageError(f"database is at step {step}; wanted {newest}, the newest: nothing else is taken back")
-    _take(engine, lambda config: command.downgrade(config, "-1"))
-
-
 def _create(config: Config) -> None:
     connection = config.attributes["connection"]
     Base.metadata.create_all(connection)

@@ -100,7 +100,7 @@ class FailureTable(Record):
     """0-based within the run."""
     phases: list[Phase]
     driven_by: list[DrivenBy | None]
-    """What drove the adversaries; null in older records."""
+    """What drove the adversaries; null: nothing did."""
     valid: list[bool]
     """Whether it has a violation that no rule refused; always, unless `tier=raw` was asked for."""
     requirement: list[str]
@@ -280,7 +280,7 @@ def _row(run: StoredRun, failure: PlainEpisode, violation: Plain) -> dict[str, A
         row |= {"broke": [], "ego_broke": violation["broke"]}
         row |= {"min_ttc_s": None, "min_robustness": violation["robustness"]}
     else:
-        row |= {name: violation.get(f"early_{name}", violation.get(name)) for name in ("min_ttc_s", "min_robustness")}
+        row |= {name: violation.get(f"early_{name}") for name in ("min_ttc_s", "min_robustness")}
     row |= {name: violation[name] for name in OF_ANY} | {name: violation.get(name) for name in OF_CONTACT}
     return row | {
         "ids": f"{run.id}-{failure.phase}-{failure.index}",

@@ -9,7 +9,6 @@ plays what OUT lacks, and rewrites OUT/searches.csv after each run.
 import argparse
 import tempfile
 from collections import Counter
-from contextlib import closing
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -78,8 +77,8 @@ def play(steps: int, out: Path, search: Search) -> Row:
             ego=ego,
             budget=Budget(episodes=MOST_EPISODES),
         )
-        with closing(Recorder(spec, folder, Until(steps))) as recorder:
-            recorder.finish(execute_run(spec, folder, recorder))
+        recorder = Recorder(spec, folder, Until(steps))
+        recorder.finish(execute_run(spec, folder, recorder))
     return search._asdict() | row(records_from_lines((folder / EPISODES).read_bytes()))
 
 

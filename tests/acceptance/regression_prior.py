@@ -12,7 +12,6 @@ import csv
 import multiprocessing
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, wait
-from contextlib import closing
 from functools import partial
 from pathlib import Path
 from statistics import mean
@@ -64,8 +63,8 @@ def campaign(out: Path, family: FamilyName, fault: str, seed: int) -> Path:
     metrics = read_results(folder).metrics if (folder / RESULTS).exists() else None
     if metrics is None or metrics.environment_steps < CAMPAIGN_STEPS:
         spec = spec_of(family, fault, seed, "shipped")
-        with closing(Recorder(spec, folder, Until(CAMPAIGN_STEPS))) as recorder:
-            recorder.finish(execute_run(spec, folder, recorder))
+        recorder = Recorder(spec, folder, Until(CAMPAIGN_STEPS))
+        recorder.finish(execute_run(spec, folder, recorder))
     return folder
 
 

@@ -22,9 +22,10 @@ from risk_sac.config import (
     WarmStartConfig,
 )
 from risk_sac.loop import execute_run
+from risk_sac.records import stored
 from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder.checkpoint import previous
-from risk_sac.run_folder.results import FAILURES, records_to_json
+from risk_sac.run_folder.results import FAILURES
 from risk_sac.scene_optimizer.archive import INITIAL
 from tests.listener import Listener
 
@@ -107,9 +108,9 @@ def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
     resumed, after = run(tmp_path)
     assert resumed.finished
     # The checkpoint's episodes are told again, since a former listener may have missed the last of them.
-    assert records_to_json(after.records) == records_to_json(whole.records)
+    assert list(map(stored, after.records)) == list(map(stored, whole.records))
     assert after.series == whole.series
-    assert records_to_json(before.records) == records_to_json(whole.records[:stop_after])
+    assert list(map(stored, before.records)) == list(map(stored, whole.records[:stop_after]))
     assert resumed.digest == expected.digest
     assert resumed.metrics == expected.metrics
     assert resumed.evaluation == expected.evaluation
@@ -122,7 +123,7 @@ def test_a_resumed_i_i_d_phase_draws_on_and_no_search_meets_its_scenes(tmp_path:
     execute_run(drawn, tmp_path / "parts", first)
     resumed = execute_run(drawn, tmp_path / "parts", rest)
     assert [record.phase for record in whole.records] == ["iid"] * 4
-    assert records_to_json(rest.records) == records_to_json(whole.records)
+    assert list(map(stored, rest.records)) == list(map(stored, whole.records))
     assert resumed.digest == expected.digest
     execute_run(spec(method="random"), tmp_path / "searched", searched)  # of the same seed
     assert not {record.seed for record in searched.records} & {record.seed for record in whole.records}
@@ -137,7 +138,7 @@ def test_a_resumed_archive_search_breeds_on_as_if_never_interrupted(tmp_path: Pa
     execute_run(bred, tmp_path / "parts", first)
     resumed = execute_run(bred, tmp_path / "parts", rest)
     assert len(first.records) == INITIAL + 3
-    assert records_to_json(rest.records) == records_to_json(whole.records)
+    assert list(map(stored, rest.records)) == list(map(stored, whole.records))
     assert resumed.digest == expected.digest
 
 
@@ -155,7 +156,7 @@ def test_a_resumed_search_by_two_takes_turns_as_if_never_interrupted(tmp_path: P
     if prior == "none":  # with a prior the policy hardly gets a turn in nine episodes
         assert {True, False} == set(learned[3:])  # past the warm-up, and it learns only where it acts
     assert len(first.records) == limit
-    assert records_to_json(rest.records) == records_to_json(whole.records)
+    assert list(map(stored, rest.records)) == list(map(stored, whole.records))
     assert resumed.digest == expected.digest
 
 
@@ -174,7 +175,7 @@ def test_a_run_with_damaged_checkpoints_equals_one_never_interrupted(
         file.unlink()  # what is played again is also recorded again
     resumed, after = run(tmp_path)
     assert resumed.digest == expected.digest
-    assert records_to_json(after.records) == records_to_json(whole.records)
+    assert list(map(stored, after.records)) == list(map(stored, whole.records))
     assert after.series == whole.series
 
 

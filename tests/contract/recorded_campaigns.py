@@ -23,6 +23,7 @@ from risk_sac.records import (
     RequirementResult,
     Severity,
     State,
+    stored,
 )
 from risk_sac.report import FinishedRun
 from risk_sac.run_folder.results import (
@@ -30,7 +31,6 @@ from risk_sac.run_folder.results import (
     FAILURES,
     RecordedFailure,
     Results,
-    records_to_json,
     series_name,
     write_results,
 )
@@ -49,7 +49,7 @@ FOUND, NOTHING = ".fF.drv", ".a.r.."  # a letter for each episode, see `OUTCOMES
 
 def hit(judged: Judgement | None = None, broken: str = "", least_ttc_s: float = 0.3) -> Collision:
     verdicts = {rule: rule != broken for rule in ("inside_limits", "ego_moving")}
-    return collision(min_ttc_s=least_ttc_s, verdicts=verdicts, judgement=judged)
+    return collision(early_min_ttc_s=least_ttc_s, verdicts=verdicts, judgement=judged)
 
 
 OWN = {"name": "never_fast", "formula": "ego_speed_mps <= 5", "scale": 10.0}
@@ -100,7 +100,7 @@ def record(index: int, letter: str, phase: str) -> EpisodeRecord:
         steps=0 if letter == "r" else 50,
         environment_steps=50 * (index + 1),
         mean_cost=0.25,
-        min_ttc_s=9.5 if contact is None else contact.min_ttc_s,
+        min_ttc_s=9.5 if contact is None else contact.early_min_ttc_s,
         min_robustness=0.2 if contact is None else -1.0,
         objective=None if index == 0 else 0.75,
         dual_variable=0.5 * index,
@@ -267,7 +267,7 @@ class Recorded:
                 failures=tuple(RecordedFailure.of(spec.id, each) for each in done if each.worst_violation is not None),
             ),
         )
-        (folder / EPISODES).write_text("".join(records_to_json([each])[1:-1].strip() + "\n" for each in done))
+        (folder / EPISODES).write_text("".join(stored(each) + "\n" for each in done))
         last = Finished(
             finished=True,
             metrics=result.metrics["search"],

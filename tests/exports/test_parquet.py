@@ -68,7 +68,7 @@ def test_every_episode_of_every_run_is_a_row_with_its_fields(runs: Path, tmp_pat
                 assert row["injury_risk"] == worst.judgement.injury_risk
             if record.collision is not None:
                 assert dict(row["collision"]["verdicts"]) == dict(record.collision.verdicts)
-                assert row["collision"]["early_min_ttc_s"] == record.collision.min_ttc_s
+                assert row["collision"]["early_min_ttc_s"] == record.collision.early_min_ttc_s
     assert sum("never_fast" in row for row in table["failed"].to_pylist()) > 10
     specs = json.loads(table.schema.metadata[SPECS])
     assert {spec["family"] for spec in specs.values()} == set(RUNS)

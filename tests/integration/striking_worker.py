@@ -19,7 +19,7 @@ def record(index: int) -> EpisodeRecord:
     judged = judgement(
         Grade.PREVENTABLE if preventable else Grade.FULL_BRAKING, broke=("red_light",) if preventable else ()
     )
-    hit = collision(time_s=3.9, min_ttc_s=0.4, verdicts={"inside_grip": True}, judgement=judged)
+    hit = collision(time_s=3.9, early_min_ttc_s=0.4, verdicts={"inside_grip": True}, judgement=judged)
     drove = DrivenBy.SCRIPT if preventable else DrivenBy.RANDOM
     return episode_record(
         index, Outcome.FAILURE, scene=LOW_SCENE, min_ttc_s=float("inf"), collision=hit, driven_by=drove

@@ -14,6 +14,7 @@ def metrics() -> RunMetrics:
         4,
         rejected=1,
         raw_collisions=2,
+        collisions=1,
         failures=1,
         environment_steps=400,
         ecr=0.25,
@@ -28,6 +29,7 @@ def metrics() -> RunMetrics:
         distinct_failures=1,
         steps_per_distinct_failure=400.0,
         preventable=1,
+        preventable_collisions=1,
         pcr=0.25,
         pcr_low=0.05,
         pcr_high=0.7,
@@ -45,7 +47,7 @@ def metrics() -> RunMetrics:
 def episode(metrics: RunMetrics) -> Callable[..., EpisodeDone]:
     """Builds the report of an episode; a contact has a minimum TTC of NaN, all have one of infinity."""
     contact = collision(
-        min_ttc_s=math.nan, min_robustness=-math.inf, verdicts={"feasible": True}, judgement=judgement()
+        early_min_ttc_s=math.nan, early_min_robustness=-math.inf, verdicts={"feasible": True}, judgement=judgement()
     )
 
     def build(index: int, outcome: Outcome = Outcome.SAFE, phase: str = "search", wall_s: float = 0.5) -> EpisodeDone:

@@ -68,7 +68,7 @@ def test_a_new_field_of_a_failure_is_stored_answered_described_and_read_by_the_c
 
 
 def test_a_number_that_is_not_finite_is_a_word_where_it_is_stored_and_null_where_it_is_answered():
-    hit = collision(min_ttc_s=math.inf, ego_speed_mps=math.nan, judgement=judgement(conflict_s=-math.inf))
+    hit = collision(early_min_ttc_s=math.inf, ego_speed_mps=math.nan, judgement=judgement(conflict_s=-math.inf))
     record = episode_record(3, collision=hit, min_ttc_s=math.inf)
     kept = json.loads(stored(record))
     assert (kept["min_ttc_s"], kept["collision"]["early_min_ttc_s"]) == ("Infinity", "Infinity")
@@ -79,17 +79,9 @@ def test_a_number_that_is_not_finite_is_a_word_where_it_is_stored_and_null_where
     assert (told["min_ttc_s"], told["collision"]["early_min_ttc_s"]) == (None, None)
     assert told["collision"]["ego_speed_mps"] is told["collision"]["judgement"]["conflict_s"] is None
     read = Episode.model_validate_json(wire(episode))
-    assert (read.min_ttc_s, read.collision.min_ttc_s) == (math.inf, math.inf)
+    assert (read.min_ttc_s, read.collision.early_min_ttc_s) == (math.inf, math.inf)
     assert math.isnan(read.collision.ego_speed_mps)
     assert wire(read) == wire(episode)
-
-
-def test_a_contact_from_before_there_were_judgements_is_read():
-    old = json.loads(stored(episode_record(0, collision=collision(min_ttc_s=0.75))))
-    old["collision"] |= {"min_ttc_s": old["collision"].pop("early_min_ttc_s")}
-    del old["collision"]["judgement"]
-    found = EpisodeRecord.model_validate(old).collision
-    assert (found.judgement, found.min_ttc_s) == (None, 0.75)
 
 
 def test_an_episode_from_before_it_said_what_drove_it_is_read():

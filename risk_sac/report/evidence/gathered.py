@@ -58,7 +58,7 @@ class Drawn(Record):
     preventable: Bound
     """By a reference driver."""
     requirements: Mapping[str, RequirementBound]
-    """Empty for older runs."""
+    """Requirement → its funnel."""
 
 
 class FamilyCoverage(Record):

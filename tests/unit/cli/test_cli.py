@@ -107,9 +107,7 @@ def test_the_list_shows_what_nobody_judged(capsys: pytest.CaptureFixture[str]) -
     assert "None" not in printed
 
 
-@pytest.mark.parametrize(
-    "form", ["{run}-search-{index}", "search-{index}", "{run}-train-{index}", "{index:06d}", "{index}"]
-)
+@pytest.mark.parametrize("form", ["{run}-search-{index}", "search-{index}", "{index:06d}", "{index}"])
 def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder: Path, tmp_path: Path, form: str) -> None:
     results = read_results(folder)
     index = results.failures[0].episode.index

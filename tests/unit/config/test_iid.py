@@ -10,14 +10,6 @@ from risk_sac.errors import ConfigError
 ENDS = {"families": ["low", "dense"], "methods": ["random", "archive"], "seeds": [0, 7], "iid": {"seed": 7}}
 
 
-def test_a_campaign_without_one_is_what_it_was_before_there_were_any():
-    spec = CampaignSpec(families=("low",))
-    assert spec.digest == "5fc5b3293f815d24a5cd747644dde22f2d24b9253d40d25653aadc072c1b5851"
-    assert spec.runs()[0].digest == "4985c20f945745b9cbc0cf29b04cd7b68760d3a181c5683c9b454ac0437cd0cf"
-    assert "iid" not in spec.model_dump()
-    assert spec.drawn() == ()
-
-
 def test_its_runs_come_last_one_for_each_family_and_kind_of_traffic():
     spec = CampaignSpec.model_validate(ENDS)
     ids = [run.id for run in spec.runs()]

@@ -17,7 +17,7 @@ def test_a_twin_is_named_by_what_was_changed_and_what_came_of_it() -> None:
 
 
 def test_a_twin_reads_back_with_its_series_and_what_is_not_finite() -> None:
-    hit = collision(min_ttc_s=math.inf)
+    hit = collision(early_min_ttc_s=math.inf)
     play = TwinPlay.of(None, hit, [hit])
     read, series = read_twin(twin_bytes(play, synthetic_series()))
     assert read == play

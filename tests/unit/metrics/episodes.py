@@ -15,7 +15,12 @@ HORIZON = 150
 
 def contact(ttc=0.3, speed=10.0, offset=0.0, robustness=-1.0, **changes):
     """One with these outcome features."""
-    features = {"min_ttc_s": ttc, "relative_speed_mps": speed, "lateral_offset_m": offset, "min_robustness": robustness}
+    features = {
+        "early_min_ttc_s": ttc,
+        "relative_speed_mps": speed,
+        "lateral_offset_m": offset,
+        "early_min_robustness": robustness,
+    }
     return collision(**({"time_s": 3.0} | features | changes))
 
 

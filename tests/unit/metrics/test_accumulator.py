@@ -219,13 +219,3 @@ def test_the_dispersion_of_many_failures():
     ]
     metrics = feed(records)  # about 1 s; all pairs at every add would be minutes
     assert metrics.dispersion == pytest.approx(0.7777 / 2, abs=0.01)  # mean distance in the unit 4-cube
-
-
-def test_metrics_from_before_contacts_were_judged_can_still_be_read():
-    stored = feed(RUN).model_dump()
-    new = ("preventable", "pcr", "pcr_low", "pcr_high", "window_pcr", "distinct_preventable", "artefacts", "avoidable")
-    for name in (*new, "covered", "unresponsive", "signatures", "conflicts_by_second", "contacts_by_second"):
-        del stored[name]
-    metrics = RunMetrics.model_validate(stored)
-    assert (metrics.failures, metrics.preventable, metrics.pcr_low, metrics.pcr_high) == (2, 0, 0, 1)
-    assert Funnel.of(metrics) == Funnel(contacts=3, valid=2, distinct=1, preventable=0)

@@ -17,8 +17,10 @@ def test_formula_literals():
     tally = Tally(
         horizon_steps=150,
         episodes=8,
+        collisions=4,
         failures=4,
         preventable=2,
+        preventable_collisions=2,
         avoidable=3,
         distinct_failures=3,
         environment_steps=600,
@@ -59,6 +61,7 @@ def test_ratio_literals():
         episodes=20,
         rejected=1,
         raw_collisions=9,
+        collisions=5,
         failures=5,
         distinct_failures=2,
         artefacts=3,

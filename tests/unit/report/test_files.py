@@ -306,7 +306,7 @@ def test_a_run_in_which_nothing_was_ever_close_can_be_read(runs, tmp_path):
 
 
 def never_close(record):
-    least = {"min_ttc_s": math.inf, "min_robustness": math.inf}
+    least = {"early_min_ttc_s": math.inf, "early_min_robustness": math.inf}
     collision = record.collision and record.collision.model_copy(update=least | {"min_rss_margin_m": math.inf})
     return record.model_copy(update=least | {"collision": collision})
 

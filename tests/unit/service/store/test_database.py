@@ -1,62 +1,16 @@
-import math
 import sqlite3
-from pathlib import Path
 
 import pytest
-from alembic.autogenerate import compare_metadata
-from alembic.migration import MigrationContext
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Grade, Outcome, State
+from risk_sac.records import Outcome
 from service.errors import StorageError
 from service.store import database
-from service.store.finding import Judged
 from service.store.reading import Store
-from service.store.tables import Base
 from service.store.writing import Ledger
 from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
-
-STEP_0007 = Path(__file__).with_name("step_0007.sql")
-
-
-def opened_from_step_0007(file):
-    """The store of a database that the version before wrote: two runs, the first of which ended with two contacts."""
-    old = sqlite3.connect(file)
-    old.executescript(STEP_0007.read_text(encoding="utf-8"))
-    old.close()
-    return Store(f"sqlite:///{file}")
-
-
-def test_a_database_of_the_version_before_is_brought_up_to_date(tmp_path):
-    store = opened_from_step_0007(tmp_path / "test.db")
-    (campaign,) = store.campaigns(limit=2, label="of today").items
-    ended, running = campaign.runs
-    assert (ended.state, ended.failures, ended.distinct_failures, ended.verified) == (State.SUCCEEDED, 1, 1, 1)
-    assert (running.state, running.metrics, ended.metrics.episodes) == (State.RUNNING, None, 3)
-    episodes = store.episodes(campaign.id, limit=9).items
-    assert [each.collision is not None for each in episodes] == [False, True, True]
-    assert (episodes[0].min_ttc_s, episodes[1].collision.min_ttc_s) == (math.inf, math.inf)
-    assert (episodes[1].repetition.same, episodes[1].funnel.contacts) == (3, 1)
-    assert [each.id for each in store.episodes(campaign.id, limit=9, judged=Judged(grade=Grade.PREVENTABLE)).items] == [
-        "low-random-0-search-1"
-    ]
-    for phase in ("search", "train"):  # as ids name it now, and as links from before do
-        assert store.failure(campaign.id, f"low-random-0-{phase}-1").episode.id == "low-random-0-search-1"
-        assert store.triage(campaign.id, f"low-random-0-{phase}-1").comment == "seen"
-    assert [type(each).__name__ for each in store.events(campaign.id, limit=9).items].count("StateChange") == 4
-    assert Ledger(store).resume() == 1
-    store.close()
-
-
-def test_the_migrations_lead_to_the_tables_of_a_new_database(tmp_path, store):
-    upgraded = opened_from_step_0007(tmp_path / "old.db")
-    for engine in (upgraded.engine, store.engine):
-        with engine.connect() as connection:
-            context = MigrationContext.configure(connection, opts={"compare_type": False})  # SQLite forgets them
-            assert compare_metadata(context, Base.metadata) == []
-    upgraded.close()
 
 
 def test_a_file_that_is_no_database_is_a_storage_error(tmp_path):

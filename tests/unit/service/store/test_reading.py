@@ -26,7 +26,7 @@ def test_a_record_comes_back_with_its_numbers_that_are_not_finite(store, ledger,
     found = store.failure(campaign.id, "low-risk-sac-3-search-5").episode
     assert found.id == "low-risk-sac-3-search-5"
     assert found.min_ttc_s == math.inf
-    assert math.isnan(found.collision.min_ttc_s)
+    assert math.isnan(found.collision.early_min_ttc_s)
 
 
 def test_pages_continue_where_they_ended_while_more_arrives(store, ledger, episode):

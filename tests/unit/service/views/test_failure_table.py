@@ -29,8 +29,8 @@ def test_a_column_has_what_the_record_has(ledger):
     run = campaign.runs[1]
     hit = collision(
         time_s=3.21987654,
-        min_ttc_s=math.inf,
-        min_robustness=-0.123456,
+        early_min_ttc_s=math.inf,
+        early_min_robustness=-0.123456,
         ego_speed_mps=math.nan,
         verdicts={"inside_limits": True, "ego_moving": False},
         judgement=judgement(None, conflict_s=-math.inf, severity=Severity.SEVERE, injury_risk=0.0123456, drivers={}),
@@ -164,15 +164,6 @@ def test_what_people_made_of_a_contact_stands_beside_it(ledger):
         TriageState.FIXED,
         TriageState.NEW,
     ]
-
-
-def test_a_record_from_before_minima_were_called_early_is_read(ledger):
-    campaign = ledger.create(SPEC)
-    contact = plain(campaign.runs[0], 0, collision(min_ttc_s=0.75))
-    hit = dict(contact.record["collision"])
-    hit["min_ttc_s"] = hit.pop("early_min_ttc_s")
-    older = replace(contact, record={**contact.record, "collision": hit})
-    assert failure_table(campaign, [older], {}).min_ttc_s == [0.75]
 
 
 def test_without_a_failure_the_table_is_empty(ledger):

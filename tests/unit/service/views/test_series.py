@@ -92,7 +92,7 @@ def test_a_series_that_is_not_the_one_that_was_written_is_never_shown(tmp_path):
 
 def test_a_twin_is_told_with_its_series_and_its_contact_and_null_where_a_number_is_not_finite():
     speeds = {"ego_speed_mps": 12.3, "relative_speed_mps": 1.34}
-    hit = collision(other_id="lead", **speeds, min_ttc_s=math.inf, judgement=judgement())
+    hit = collision(other_id="lead", **speeds, early_min_ttc_s=math.inf, judgement=judgement())
     body = json.loads(wire(twin_body("idle", twin_bytes(TwinPlay.of(None, hit, [hit]), series_arrays()))))
     assert (body["twin"], body["outcome"]) == ("idle", "touches lead at a closing speed of 1.3 m/s")
     assert body["collision"]["early_min_ttc_s"] is None
