@@ -49,7 +49,7 @@ class OnDemandCache(Generic[S]):
           at_once: how many are made at once, each for another key.
         """
         self._make, self._what = make, what
-        self._threads, self._places = anyio.CapacityLimiter(at_once), at_once + MOST_WAITING
+        self._at_once, self._threads = at_once, anyio.CapacityLimiter(at_once)
         self._waiting: dict[str | None, _Waiting[S]] = {}  # by key
         self._made = alru_cache(maxsize=kept)(self._make_in_thread)  # a second request for the same waits for the first
 
@@ -74,13 +74,14 @@ class OnDemandCache(Generic[S]):
                 del self._waiting[key_id]
 
     def _check_room(self, subject: S, key_id: str | None) -> None:
+        places = self._at_once + MOST_WAITING
         own = self._waiting.get(key_id, _Waiting()).requests.keys() | {subject}
-        share = fair_share(self._places, len(self._waiting.keys() | {key_id}))
+        share = fair_share(places, len(self._waiting.keys() | {key_id}))
         if key_id is not None and len(own) > share:
             wait = f"{share} {self._what} of this key wait to be made, its share of the queue"
             raise QuotaError(f"{wait}; wanted fewer: ask for one after the other", RETRY_AFTER_S)
         others = sum(len(waiting.requests) for key, waiting in self._waiting.items() if key != key_id)
-        if others + len(own) > self._places:
+        if others + len(own) > places:
             raise BusyError(
                 f"{MOST_WAITING} {self._what} wait to be made; wanted fewer", RETRY_AFTER_S, "pictures_busy"
             )
