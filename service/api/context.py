@@ -80,12 +80,13 @@ def check_scope(caller: Caller, scope: Scope) -> None:
         raise ProblemError(HTTPStatus.FORBIDDEN, Reason.FORBIDDEN, detail)
 
 
-async def _caller(request: Request) -> Caller:
+async def caller_of(request: Request) -> Caller:
+    """Returns the caller that the gate authorised."""
     # No default: without the gate every call is refused.
     return cast(Caller, request.scope[CALLER])
 
 
-CurrentCaller = Annotated[Caller, Depends(_caller)]
+CurrentCaller = Annotated[Caller, Depends(caller_of)]
 
 
 def _campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> StoredCampaign:

@@ -120,22 +120,22 @@ class Views(OnDemandCache[View]):
         super().__init__(self._helped, "views of large campaigns", kept)
         self._settings, self._store, self._reports, self._helper = settings, store, reports, helper
 
-    async def content(self, view: View, campaign: StoredCampaign) -> Content:
+    async def content(self, view: View, campaign: StoredCampaign, key_id: str | None) -> Content:
         """Returns the content of a view of a campaign, or raises what its making raises."""
         if not _large(campaign):
             sources = Sources(self._settings, self._store, self._reports, campaign)
             return await run_in_threadpool(content_of, view, sources)
         try:
-            return Content(await self.get(view))
+            return Content(await self.get(view, key_id))
         except _Passing as content:
             return Content(content.args[0], lasting=False)
 
-    async def figure(self, view: View, campaign: StoredCampaign, name: str) -> Content:
+    async def figure(self, view: View, campaign: StoredCampaign, name: str, key_id: str | None) -> Content:
         """Returns one figure of a view of them all; NotFoundError if there is no such figure."""
         if not _large(campaign):
             made = await run_in_threadpool(self._reports.report, campaign)
             return Content(await run_in_threadpool(made.figure, name, cast(Format, view.format)), made.lasting)
-        content = await self.content(view, campaign)
+        content = await self.content(view, campaign, key_id)
         with zipfile.ZipFile(BytesIO(content.body)) as figures:
             if name not in figures.namelist():
                 raise unknown_figure(campaign.id, name)
@@ -175,7 +175,7 @@ class Priors:
     def __init__(self, store: Store, views: Views) -> None:
         self._store, self._views = store, views
 
-    async def of(self, spec: CampaignSpec, project: str) -> PriorContent | None:
+    async def of(self, spec: CampaignSpec, project: str, key_id: str | None) -> PriorContent | None:
         """Returns the scripts that a campaign's prior names; None where it names none.
 
         Raises:
@@ -185,7 +185,7 @@ class Priors:
             return None
         campaign_id = await run_in_threadpool(self._campaign_id, spec.prior, project)
         view = View(name="prior", campaign_id=campaign_id, edition="", prior=spec.prior)
-        found = _PRIOR.validate_json(await self._views.get(view))
+        found = _PRIOR.validate_json(await self._views.get(view, key_id))
         return found.checked(spec.prior, spec.families)
 
     def _campaign_id(self, prior: str, project: str) -> str:

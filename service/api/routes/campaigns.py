@@ -73,7 +73,7 @@ async def post_campaign(
     idempotency_key: IdempotencyKey = None,
 ) -> Response:
     """Queue a campaign: families × methods × seeds on one equal budget."""
-    prior = await service.priors.of(spec, caller.project)
+    prior = await service.priors.of(spec, caller.project, caller.key_id)
     return await run_in_threadpool(_submit, request, spec, prior, service, caller, idempotency_key)
 
 
@@ -81,7 +81,7 @@ async def post_campaign(
 async def check_campaign(spec: PostedCampaign, service: Service, caller: CurrentCaller) -> CampaignCheck:
     """Validate a campaign and change nothing; `adjustments` has the values that its episodes would use instead."""
     checked = await run_in_threadpool(service.manager.checked, spec)
-    await service.priors.of(spec, caller.project)
+    await service.priors.of(spec, caller.project, caller.key_id)
     return CampaignCheck(adjustments=await run_in_threadpool(adjustments, checked))
 
 
@@ -223,7 +223,7 @@ async def _viewed(
     """An answer that reads all episodes of a campaign, which the cache keeps."""
     campaign, headers, revision = await run_in_threadpool(_current, campaign_id, request, service, caller)
     view = View(name=name, campaign_id=campaign_id, edition=campaign.revision, **fields)
-    content = await service.views.content(view, campaign)
+    content = await service.views.content(view, campaign, caller.key_id)
     return kept(request, content.body, headers, revision, campaign_id)
 
 

@@ -12,7 +12,7 @@ from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
 from service.api.answers.representations import accepted, cacheable, link
 from service.api.answers.responses import CROWDED, INVALID, STORAGE, TAGGED, UNACCEPTABLE, UNKNOWN, Responses
-from service.api.context import AskedCampaign, Context, Service
+from service.api.context import AskedCampaign, Context, Service, caller_of
 from service.store.stored import StoredCampaign
 from service.views.report_parts import MEDIA_TYPES, TABLES, Clusters, Figures
 from service.views.whole import View, ViewName
@@ -123,10 +123,11 @@ async def reported(
     edition = await run_in_threadpool(service.reports.edition, campaign)
     headers = cacheable(request, edition, *parts, others=others)
     asked = View(name=view, campaign_id=campaign.id, edition=edition, format=format, **fields)
+    key_id = (await caller_of(request)).key_id
     if figure is None:
-        content = await service.views.content(asked, campaign)
+        content = await service.views.content(asked, campaign, key_id)
     else:
-        content = await service.views.figure(asked, campaign, figure)
+        content = await service.views.figure(asked, campaign, figure, key_id)
     if not content.lasting:
         del headers["ETag"]
     return Response(content.body, headers=headers, media_type=MEDIA_TYPES[format])
