@@ -13,7 +13,9 @@ from risk_sac.benchmark.power import played_by, power_of
 from risk_sac.failures.cases import Regression
 from risk_sac.records import State
 from risk_sac.report import FinishedRun
-from risk_sac.report.evidence import POLICY, Evidence, Origin, gathered, html, markdown, report
+from risk_sac.report.document import Origin, report_page
+from risk_sac.report.evidence import Evidence, gathered
+from risk_sac.report.rendering import POLICY
 from service.api.answers.responses import INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses, problem
 from service.api.context import AskedCampaign, Context, Service
 from service.api.routes.reports import BY_ACCEPT, FOR_BROWSERS, MEDIA_TYPES, UNCHANGED, chosen, commands, reported, text
@@ -89,5 +91,4 @@ def _content(
         regression=Regression(ego=played.ego, cases=played.cases) if played else None,
     )
     power = power_of(comparison.spec, played_by(comparison.runs))
-    document = report(comparison, evidence, origin, power)
-    return html(document) if name == "html" else markdown(document)
+    return report_page(comparison, evidence, origin, power, "html" if name == "html" else "markdown")
