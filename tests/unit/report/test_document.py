@@ -196,6 +196,15 @@ def test_a_regression_is_told_with_what_a_baseline_knows(told):
         assert "still failing, known" in each
 
 
+def test_an_ego_is_told_with_its_driver_sight_and_defects(spec):
+    ego = {"driver": "idm", "defects": ("latency", "speeds"), "sensor": {"range_m": 30, "field_of_view_rad": 3.1416}}
+    told = compare(CampaignSpec.model_validate(spec.model_dump() | {"ego": ego}), [], "")
+    _, text = both(told, regression=Regression(ego=EgoConfig(profile="perfect"), cases=()))
+    assert "registered driver idm, responds within 0.5 s, sees 30 m far over 180°" in text
+    assert "with the planted defects latency and speeds" in text
+    assert "decides every 0.1 s, sees everything" in text
+
+
 def test_folders_without_runs_and_runs_of_different_campaigns_are_refused(tmp_path, capsys):
     out = tmp_path / "out" / "report.html"
     assert cli.main(["report", str(tmp_path), "--out", str(out)]) == 2
