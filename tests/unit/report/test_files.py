@@ -49,10 +49,10 @@ def test_page_has_command_digest_tables_and_the_paper(comparison, spec):
     assert spec.digest in page
     first, second, _ = rows_of(page, "## search")
     assert first[:5] == ["low", "risk-sac", "2", "0.500 [0.215, 0.785]", "0.375 [0.137, 0.694]"]
-    assert first[-6:] == ["1.000 [1.000, 1.000]", "117", "40.0", "0.0 %", "0.0 %", "12.5 %"]
+    assert first[-7:] == ["1.000 [1.000, 1.000]", "117", "40.0", "0.0 %", "0.0 %", "12.5 %", "25.0 %"]
     assert "0.167 (1 of 2 seeds)" in first
     assert second[1:4] == ["sac", "2", "0.125 [0.000, 0.471]"]
-    assert second[-8:-3] == ["–", "2.500 [0.000, 5.000]", "0.500 [0.000, 1.000]", "400", "120.0"]
+    assert second[-9:-4] == ["–", "2.500 [0.000, 5.000]", "0.500 [0.000, 1.000]", "400", "120.0"]
     assert ["low", "search", "ECR", "0.50", "0.97"] in rows_of(page, "Table I was measured")
     assert ["low", "search", "8", "12.5 %"] in rows_of(page, "### The simulator's own artefacts")
     assert "risk-sac run --spec d/spec.yaml --family low --method risk-sac --seed 0 --out repeated" in page
@@ -62,9 +62,9 @@ def test_page_has_command_digest_tables_and_the_paper(comparison, spec):
 
 def test_page_has_the_funnel_of_every_method(comparison):
     assert rows_of(table_markdown(comparison), "### The funnel: search\n") == [
-        ["low", "risk-sac", "2", "–", "8", "1", "4", "4", "4", "3", "2", "2", "–", "25.0 %"],
-        ["low", "sac", "2", "–", "8", "0", "3", "1", "1", "1", "1", "1", "–", "0.0 %"],
-        ["low", "no-adversary", "2", "–", "8", "0", "1", "0", "0", "0", "0", "0", "–", "–"],
+        ["low", "risk-sac", "2", "–", "8", "1", "4", "4", "4", "3", "2", "2", "–"],
+        ["low", "sac", "2", "–", "8", "0", "3", "1", "1", "1", "1", "1", "–"],
+        ["low", "no-adversary", "2", "–", "8", "0", "1", "0", "0", "0", "0", "0", "–"],
     ]
 
 
