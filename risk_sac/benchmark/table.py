@@ -23,7 +23,7 @@ from risk_sac.canvas import canvas, picture
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.metrics.intervals import wilson_interval
 from risk_sac.report.drawing import CURVE_IN, DPI, LOOKS, STYLE
-from risk_sac.report.page import interval, number, platform_in_words, table
+from risk_sac.report.rendering import interval, number, platform_in_words, table
 from risk_sac.run_folder.durable import replace_file
 
 COLUMNS = (

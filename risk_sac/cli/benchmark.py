@@ -123,7 +123,7 @@ def _power(options: argparse.Namespace) -> int:
 
 
 def _power_of_folders(options: argparse.Namespace, runs: Sequence[Run]) -> int:
-    from risk_sac.report.evidence.folders import campaign_in  # here, because loading numpy takes a while
+    from risk_sac.report.inputs import campaign_in  # here, because loading numpy takes a while
 
     if given := [name for name in ("families", "method", "steps") if getattr(options, name) is not None]:
         raise ConfigError(f"--{given[0]}", "RUNS are given beside it", remedy="leave one of the two out")

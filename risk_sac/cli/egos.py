@@ -95,7 +95,7 @@ def _ladder(options: argparse.Namespace) -> int:
     egos = {name: named_ego(name) for name in options.egos}
     # Here, because loading what checks the settings takes seconds.
     from risk_sac.execution.evaluate import evaluate
-    from risk_sac.report.page import table
+    from risk_sac.report.rendering import table
 
     found: dict[str, Sequence[FinishedRun]] = {}
     jobs, executor = options.jobs or cores(), os.environ.get("RISK_SAC_EXECUTOR", "local")

@@ -11,7 +11,7 @@ from risk_sac.cli.regress import read_baseline
 from risk_sac.errors import ConfigError
 
 if TYPE_CHECKING:
-    from risk_sac.report.evidence.folders import Found
+    from risk_sac.report.inputs import Inputs
 
 Format = Literal["html", "md", "json"]
 OUT = "report.html, report.md, or its data as report.json"
@@ -39,27 +39,27 @@ def add(commands: Commands) -> None:
 def _report(options: argparse.Namespace) -> int:
     # Here, because loading numpy takes a while.
     from risk_sac.benchmark.power import played_by, power_of
-    from risk_sac.report.evidence import Origin, gathered, html, markdown, report, show_command
-    from risk_sac.report.evidence.folders import read_folders
+    from risk_sac.report.document import Origin, report_page, show_command
+    from risk_sac.report.evidence import gathered
+    from risk_sac.report.inputs import read_folders
 
     format_ = format_of(options.out)
     regression = read_baseline(options.regression, "--regression") if options.regression else None
-    found = read_folders(options.runs)
-    evidence = gathered(found.comparison)
+    inputs = read_folders(options.runs)
+    evidence = gathered(inputs.comparison)
     origin = Origin(
         report=options.typed,
         data=shlex.join(["risk-sac", "report", *map(str, options.runs), "--out", "report.json"]),
-        show=lambda run, failure: show_command(found.folders[run.spec.digest], failure),
-        regress=_regress(found),
-        folders=found.folders,
+        show=lambda run, failure: show_command(inputs.folders[run.spec.digest], failure),
+        regress=_regress(inputs),
+        folders=inputs.folders,
         regression=regression,
     )
     if format_ == "json":
         content = evidence.model_dump_json(indent=2) + "\n"
     else:
-        power = power_of(found.comparison.spec, played_by(found.comparison.runs))
-        document = report(found.comparison, evidence, origin, power)
-        content = html(document) if format_ == "html" else markdown(document)
+        power = power_of(inputs.comparison.spec, played_by(inputs.comparison.runs))
+        content = report_page(inputs.comparison, evidence, origin, power, "html" if format_ == "html" else "markdown")
     write_out(options.out, content.encode(), "Report")
     return OK
 
@@ -71,7 +71,7 @@ def format_of(file: Path) -> Format:
     return FORMATS[file.suffix]
 
 
-def _regress(found: "Found") -> str:
+def _regress(inputs: "Inputs") -> str:
     """Returns the command that plays the failures of all finished searches."""
-    runs = [str(found.folders[run.spec.digest]) for run in found.comparison.runs]
+    runs = [str(inputs.folders[run.spec.digest]) for run in inputs.comparison.runs]
     return shlex.join(["risk-sac", "regress", "--failures", *runs, "--ego", "EGO", "--out", "cases.json"])

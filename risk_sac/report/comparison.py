@@ -3,13 +3,29 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunMethod, RunSpec
 from risk_sac.failures.clusters import Overview, overview
 from risk_sac.failures.studied import Studied
-from risk_sac.metrics import MetricName, pooled_headline
-from risk_sac.records import PHASES, EpisodeRecord, Phase
-from risk_sac.report.cells import Cell, cell_of, metrics_of
+from risk_sac.metrics import (
+    METRICS,
+    RATIOS,
+    Estimate,
+    Metric,
+    MetricName,
+    estimate,
+    headline_driven_by,
+    pcr_by_driver,
+    pooled_bins,
+    pooled_counts,
+    pooled_headline,
+    pooled_names,
+    pooled_requirements,
+)
+from risk_sac.records import PHASES, Counts, DriverPcr, EpisodeRecord, Phase, Record, RequirementCounts
 from risk_sac.report.paired import PairedTest, corrected, paired_tests
 from risk_sac.report.runs import PAID_FOR, TESTED, FinishedRun, found_within
 
@@ -20,12 +36,93 @@ DECLARED: tuple[MetricName, ...] = ("ecr", "pcr")
 """What the reference is to have more of than its rivals."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MissingRun:
-    """A run of the campaign that the tables lack."""
+def metrics_of(phase: Phase) -> tuple[Metric, ...]:
+    """The metrics that a phase has."""
+    return tuple(metric for metric in METRICS if phase == "search" or not metric.search_only)
 
-    spec: RunSpec
-    reason: str
+
+class Cell(Counts):
+    """Results of a method in a family and phase, over its finished runs."""
+
+    family: FamilyName
+    method: RunMethod
+    phase: Phase
+    seeds: tuple[int, ...]
+    """Of the runs that are counted."""
+    headline: int | None
+    """Each kind once."""
+    estimates: Mapping[MetricName, Estimate]
+    """By the name of the metric."""
+    steps_per_distinct_failure: float | None
+    cpu_s_per_distinct_failure: float | None
+    """Processor seconds of the whole runs; of the search only."""
+    raw_rate: float
+    """Contacts / episodes."""
+    artefact_rate: float
+    """Contacts that the simulator or the control made / episodes."""
+    degenerate_rate: float
+    """Contacts that are not valid / episodes."""
+    rejected_rate: float
+    """Infeasible scenes / episodes."""
+    unresponsive_share: float | None
+    """`unresponsive` / valid contacts."""
+    pcr_by_driver: Mapping[str, DriverPcr]
+    """Reference driver → its own PCR."""
+    episodes_driven_by: Mapping[str, int]
+    """What drove the adversaries → episodes."""
+    headline_driven_by: Mapping[str, int]
+    """What drove the first episode of a kind → headline failures."""
+    by_severity: Mapping[str, int]
+    """Severity → valid contacts."""
+    by_fault: Mapping[str, int]
+    """Fault → failures."""
+    requirements: Mapping[str, RequirementCounts]
+    """Requirement → its funnel."""
+    signatures: Mapping[str, int]
+    """Signature → valid violations."""
+    conflicts_by_second: tuple[int, ...]
+    """Valid contacts by the second in which the conflict began."""
+    contacts_by_second: tuple[int, ...]
+    """The same by the second of the contact."""
+
+
+def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
+    """Sums up the runs of one cell, at least one of them, all with episodes in the phase."""
+    (family, method) = runs[0].cell
+    metrics = [run.metrics[phase] for run in runs]
+    counts = pooled_counts(metrics)
+    ratios: dict[str, Any] = {ratio.name: ratio.formula(counts) for ratio in RATIOS}
+    distinct, cpu_s = counts.distinct_failures, sum(run.cpu_s for run in runs)
+    return Cell(
+        family=family,
+        method=method,
+        phase=phase,
+        seeds=tuple(run.spec.seed for run in runs),
+        headline=pooled_headline(metrics),
+        **dict(counts),
+        **ratios,
+        estimates={metric.name: estimate(metric, metrics) for metric in metrics_of(phase)},
+        cpu_s_per_distinct_failure=cpu_s / distinct if distinct and phase == "search" else None,
+        pcr_by_driver=pcr_by_driver(metrics),
+        episodes_driven_by=pooled_names([each.episodes_driven_by for each in metrics]),
+        headline_driven_by=headline_driven_by(metrics),
+        by_severity=pooled_names([each.by_severity for each in metrics]),
+        by_fault=pooled_names([each.by_fault for each in metrics]),
+        requirements=pooled_requirements(metrics),
+        signatures=pooled_names([each.signatures for each in metrics]),
+        conflicts_by_second=pooled_bins([each.conflicts_by_second for each in metrics]),
+        contacts_by_second=pooled_bins([each.contacts_by_second for each in metrics]),
+    )
+
+
+class MissingRun(Record):
+    """A run that the tables lack."""
+
+    family: FamilyName
+    method: RunMethod
+    seed: int
+    reason: Annotated[str, Field(examples=["queued", "failed: worker was killed by SIGKILL"])]
+    """Its state, and why it failed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +179,16 @@ class Comparison:
             if record.index in run.studies
         }
 
+    def verified(self, cell: Cell) -> tuple[int, int] | None:
+        """Counts a cell's failures that replay to the bit, and those replayed; None where a run was not replayed."""
+        same = []
+        for run in self.of_cell(cell.family, cell.method):
+            if run.verified is None:
+                return None
+            repeated = run.verified.episodes
+            same += [repeated[record.index].verified for record in run.phase(cell.phase) if record.index in repeated]
+        return sum(same), len(same)
+
     def of_cell(self, family: FamilyName, method: RunMethod) -> tuple[FinishedRun, ...]:
         """The runs of a method in a family."""
         return tuple(run for run in self.runs if run.cell == (family, method))
@@ -114,8 +221,16 @@ def compare(
     found = {run.spec.digest: run for run in runs}
 
     def missing(wanted: Sequence[RunSpec]) -> tuple[MissingRun, ...]:
-        lacking = (run for run in wanted if run.digest not in found)
-        return tuple(MissingRun(spec=run, reason=(reasons or {}).get(run.digest, "not finished")) for run in lacking)
+        return tuple(
+            MissingRun(
+                family=run.family,
+                method=run.method,
+                seed=run.seed,
+                reason=(reasons or {}).get(run.digest, "not finished"),
+            )
+            for run in wanted
+            if run.digest not in found
+        )
 
     searches = spec.searches()
     wanted = sorted(searches, key=lambda run: (spec.families.index(run.family), methods.index(run.method), run.seed))
@@ -141,7 +256,7 @@ def compare(
 def _failures(family: FamilyName, runs: Sequence[FinishedRun]) -> Iterator[tuple[str, EpisodeRecord]]:
     for run in runs:
         if run.spec.family == family:
-            yield from ((each.id_in(run.spec.id), each) for each in run.records)
+            yield from ((record.id_in(run.spec.id), record) for record in run.records)
 
 
 def _cells(runs: Sequence[FinishedRun]) -> Iterator[Cell]:

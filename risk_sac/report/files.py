@@ -14,12 +14,10 @@ from risk_sac.failures.clusters import Overview
 from risk_sac.failures.studied import Studied
 from risk_sac.metrics import METRICS
 from risk_sac.records import DrivenBy, Fault, Phase, Record, RunMetrics, Severity
-from risk_sac.report.cells import Cell
-from risk_sac.report.comparison import Comparison
+from risk_sac.report.comparison import Cell, Comparison, MissingRun
 from risk_sac.report.figures import FORMATS, figure_files, figure_names
-from risk_sac.report.markdown import table_markdown
-from risk_sac.report.page import this_platform
 from risk_sac.report.paired import PairedTest
+from risk_sac.report.rendering import table_markdown, this_platform
 from risk_sac.run_folder.durable import replace_file
 
 FIGURES = "figures"
@@ -27,16 +25,6 @@ FORMAT_VERSION = 1
 _PLAIN = tuple(
     name for name, each in Cell.model_fields.items() if each.annotation in (int, int | None, float, float | None)
 )  # a column each
-
-
-class MissingRun(Record):
-    """A run that the tables lack."""
-
-    family: FamilyName
-    method: MethodName
-    seed: int
-    reason: Annotated[str, Field(examples=["queued", "failed: worker was killed by SIGKILL"])]
-    """Its state, and why it failed."""
 
 
 class ReportedRun(Record):
@@ -117,10 +105,7 @@ def table_of(comparison: Comparison) -> Table:
         versions=comparison.versions,
         platform=this_platform(),
         complete=not comparison.missing,
-        missing=[
-            MissingRun(family=run.spec.family, method=run.spec.method, seed=run.spec.seed, reason=run.reason)
-            for run in comparison.missing
-        ],
+        missing=list(comparison.missing),
         reference=comparison.reference,
         cells=list(comparison.cells),
         tests=list(comparison.tests),
@@ -130,15 +115,9 @@ def table_of(comparison: Comparison) -> Table:
         studies={family: comparison.studies(family) for family in comparison.overviews},
         runs=[
             ReportedRun(
-                family=run.spec.family,
-                method=run.spec.method,
-                seed=run.spec.seed,
-                digest=run.digest,
+                **{name: getattr(run.spec, name) for name in ("family", "method", "seed")},
+                **{name: getattr(run, name) for name in ("digest", "metrics", "wall_s", "cpu_s", "versions")},
                 spec_digest=run.spec.digest,
-                metrics=run.metrics,
-                wall_s=run.wall_s,
-                cpu_s=run.cpu_s,
-                versions=run.versions,
             )
             for run in comparison.runs
         ],

@@ -134,7 +134,7 @@ def pairs_needed(hypotheses: int, level: float) -> int:
     return 1 + math.ceil(math.log2(hypotheses / level))
 
 
-class Power(NamedTuple):
+class PairPower(NamedTuple):
     """Statistical power of tests with this number of pairs."""
 
     hypotheses: int  # that have a p
@@ -144,12 +144,12 @@ class Power(NamedTuple):
     needed: int | None  # pairs, where these are too few for any test to pass
 
 
-def power_of(tests: Sequence[PairedTest]) -> Power:
+def pair_power(tests: Sequence[PairedTest]) -> PairPower:
     """Computes what tests with so many pairs can show."""
     hypotheses, pairs = sum(test.p is not None for test in tests), max(test.pairs for test in tests)
     corrected = hypotheses * smallest_p(pairs)
     needed = pairs_needed(hypotheses, LEVEL) if corrected > LEVEL else None
-    return Power(hypotheses, pairs, smallest_p(pairs), min(1.0, corrected), needed)
+    return PairPower(hypotheses, pairs, smallest_p(pairs), min(1.0, corrected), needed)
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

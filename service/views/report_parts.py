@@ -15,7 +15,8 @@ from risk_sac.failures.cases import Regression
 from risk_sac.failures.clusters import Overview
 from risk_sac.records import Record
 from risk_sac.report import Comparison, FinishedRun, table_csv, table_json, table_markdown
-from risk_sac.report.evidence import Origin, gathered, html, markdown, report
+from risk_sac.report.document import Origin, report_page
+from risk_sac.report.evidence import gathered
 from risk_sac.report.figures import FORMATS, Format
 from service.views.reports import CampaignReport
 
@@ -116,8 +117,8 @@ def evidence(made: CampaignReport, format_: str, base_url: str, regression: Regr
         folders=made.folders,
         regression=regression,
     )
-    document = report(comparison, found, origin, power_of(comparison.spec, played_by(comparison.runs)))
-    return html(document) if format_ == "html" else markdown(document)
+    power = power_of(comparison.spec, played_by(comparison.runs))
+    return report_page(comparison, found, origin, power, "html" if format_ == "html" else "markdown")
 
 
 def _files(path: str) -> list[FigureFile]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, Odd
 from risk_sac.records import Outcome, Real, Record
-from risk_sac.report.evidence.coverage import NOT_PLAYED, Axis, axes_of
+from risk_sac.report.coverage import NOT_PLAYED, Axis, axes_of
 from risk_sac.scenario.families import family_named
 from risk_sac.types import Bools, Floats
 from service.store.stored import PlainEpisode, StoredCampaign

@@ -7,7 +7,8 @@ from starlette.concurrency import run_in_threadpool
 
 from risk_sac.failures.cases import Regression
 from risk_sac.records import State
-from risk_sac.report.evidence import POLICY, Evidence
+from risk_sac.report.evidence import Evidence
+from risk_sac.report.rendering import POLICY
 from service.api.answers.responses import CROWDED, INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses, problem
 from service.api.context import AskedCampaign, Context, Service
 from service.api.routes.reports import BY_ACCEPT, FOR_BROWSERS, UNCHANGED, chosen, reported, text

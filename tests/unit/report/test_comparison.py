@@ -120,7 +120,7 @@ def test_a_missing_seed_costs_its_pair(spec, runs):
     without = [run for run in runs if (run.spec.method, run.spec.seed) != ("sac", 1)]
     comparison = compare(spec, without, "", reasons={run.spec.digest: "crashed" for run in runs})
     (missing,) = comparison.missing
-    assert (missing.spec.method, missing.spec.seed, missing.reason) == ("sac", 1, "crashed")
+    assert (missing.method, missing.seed, missing.reason) == ("sac", 1, "crashed")
     assert cell(comparison, "sac").seeds == (0,)
     tests = [test for test in comparison.tests if test.method == "sac" and test.metric == "ecr"]
     assert [(test.pairs, test.p) for test in tests] == [(1, None), (1, None)]

@@ -6,7 +6,7 @@ from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import clopper_pearson
 from risk_sac.records import Outcome
-from risk_sac.report.evidence.gathered import drawn
+from risk_sac.report.evidence import drawn
 
 SPEC = RunSpec.model_validate({"family": "low", "method": "iid-random", "seed": 3})
 

@@ -4,7 +4,7 @@ import pytest
 
 from risk_sac.config import Interval, Odd
 from risk_sac.records import Outcome
-from risk_sac.report.evidence.coverage import VALUES, axis_of, coverage, kinds
+from risk_sac.report.coverage import VALUES, axis_of, coverage, kinds
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import narrow
 from risk_sac.scenario.space import Parameter

@@ -3,14 +3,14 @@
 Coverage of the search and of that phase are kept apart.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from risk_sac.config import FamilyName, IidName
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import clopper_pearson, pooled_requirements, preventable
 from risk_sac.records import EpisodeRecord, Outcome, Record
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.evidence.coverage import NOT_PLAYED, Coverage, coverage
+from risk_sac.report.coverage import NOT_PLAYED, Coverage, coverage
 from risk_sac.report.runs import FinishedRun
 from risk_sac.scenario.families import family_named
 
@@ -68,6 +68,27 @@ class FamilyCoverage(Record):
     """By all searches together, the evaluation of frozen policies among them."""
     iid: Coverage | None
     """By the i.i.d. phase; null without one."""
+
+    @property
+    def phases(self) -> Mapping[str, Coverage]:
+        """Coverage by name of its phase."""
+        return {"search": self.search} | ({"i.i.d. phase": self.iid} if self.iid else {})
+
+    @property
+    def never_bins(self) -> Mapping[str, Sequence[str]]:
+        """Parameter → its bins without an episode of either phase; parameters without such a bin are left out."""
+        both = zip(*(phase.parameters for phase in self.phases.values()), strict=True)
+        never = {one.name: [name for name in one.never if all(name in of.never for of in more)] for one, *more in both}
+        return {name: bins for name, bins in never.items() if bins}
+
+    @property
+    def never_cells(self) -> Mapping[tuple[str, str], Sequence[str]]:
+        """Pair of parameters → its cells without an episode of either phase, the most first."""
+        both = zip(*(phase.pairs for phase in self.phases.values()), strict=True)
+        never = {
+            one.parameters: [cell for cell in one.never if all(cell in of.never for of in more)] for one, *more in both
+        }
+        return {pair: never[pair] for pair in sorted(never, key=lambda pair: -len(never[pair])) if never[pair]}
 
 
 class Evidence(Record):

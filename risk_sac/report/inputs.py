@@ -19,14 +19,14 @@ AGAIN = "risk-sac evaluate --spec spec.yaml --out campaign"  # with the spec tha
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
-    """Runs found in some folders."""
+class Inputs:
+    """Runs of one campaign, and their folders."""
 
     comparison: Comparison
     folders: Mapping[str, Path]  # by digest of the run's spec
 
 
-def read_folders(paths: Sequence[Path]) -> Found:
+def read_folders(paths: Sequence[Path]) -> Inputs:
     """Reads runs, and says why those are missing that are not finished, not there, or damaged.
 
     Args:
@@ -45,7 +45,7 @@ def read_folders(paths: Sequence[Path]) -> Found:
             runs.append(read_run(path))
         except (ConfigError, OSError) as error:
             reasons[spec.digest] = str(error)
-    return Found(
+    return Inputs(
         comparison=compare(campaign, runs, AGAIN, reasons=reasons),
         folders={spec.digest: path for path, spec in specs.items()},
     )

@@ -12,8 +12,9 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.records import Grade
 from risk_sac.report import compare
-from risk_sac.report.evidence import Origin, gathered, html, markdown, report
-from risk_sac.report.evidence.folders import read_folders
+from risk_sac.report.document import Origin, report_page
+from risk_sac.report.evidence import gathered
+from risk_sac.report.inputs import read_folders
 from risk_sac.run_folder.results import Results, write_results
 from risk_sac.scenario.families import FAMILIES
 
@@ -38,8 +39,8 @@ def power(comparison):
 
 
 def both(comparison, **more):
-    document = report(comparison, gathered(comparison), origin(**more), power(comparison))
-    return html(document), markdown(document)
+    content = comparison, gathered(comparison), origin(**more), power(comparison)
+    return report_page(*content, "html"), report_page(*content, "markdown")
 
 
 def drawn(finished, run, letters):
@@ -90,10 +91,9 @@ def test_it_tells_of_each_requirement_what_was_found_and_how_often(spec, finishe
     some = spec.model_copy(update={"methods": ("sac",), "seeds": (0,), "iid": Iid(episodes=8)})
     fresh = [drawn(finished, run, letters) for run, letters in zip(some.drawn(), ("kkkkkkkk", "kkvkkkkk"), strict=True)]
     told = compare(some, [*(finished(run, "kvvk", "k") for run in some.searches()), *fresh], "")
-    document = report(told, gathered(told), origin(), power(told))
-    text = markdown(document)
-    assert "| low | sac | never_fast | failure | 2 | 2 | 1 | 1 | 0.500 \\[0.150, 0.850\\] |" in text
-    assert "| low | sac | safe_ttc | report | 2 | – | – | – | 0.500 \\[0.150, 0.850\\] |" in text
+    _, text = both(told)
+    assert "| low | sac | never_fast | failure | 2 | 2 | 1 | 1 | 0.500 [0.150, 0.850] |" in text
+    assert "| low | sac | safe_ttc | report | 2 | – | – | – | 0.500 [0.150, 0.850] |" in text
     assert "| low | random adversaries | never_fast | failure | 1 of 8 | 1 of 8 | 47.07 % | 0.64 % |" in text
     assert "| low | undisturbed | never_fast | failure | 0 of 8 | 0 of 8 | 31.23 % | 0.00 % |" in text
 
@@ -139,7 +139,7 @@ def test_runs_that_are_missing_are_named_with_the_reason(told, spec):
     for each in (Tags(page).text, text):
         assert "5 of 6 searches; 1 of 2 of the i.i.d. phase" in each
         assert "its disk died" in each
-        assert "low-iid-random-0: not finished" in each
+    assert "| low | iid-random | 0 | not finished |" in text
     nothing = compare(told.spec, [], "")
     for each in both(nothing):
         assert "0 of 6 searches" in each
@@ -159,8 +159,8 @@ def test_what_users_write_is_shown_and_is_no_markup(told):
     assert tags.text.count("<script>alert(1)</script>") >= 8
     prose = re.sub(r"(?ms)^(`{3,})$.*?^\1$", "", text)  # without the commands
     assert "<script" not in prose
-    assert "[link](" not in prose.replace("\\[link\\](", "")
-    assert len([line for line in prose.splitlines() if line.startswith("| low ") and "\\|cell\\|" in line]) == 6
+    assert "](" not in prose.replace("\\](", "")
+    assert len([line for line in prose.splitlines() if line.startswith("| low ") and "\\|cell\\|" in line]) == 8
     for each in (page, text):
         assert "\u202e" not in each
         assert "\x07" not in each
@@ -202,6 +202,15 @@ def test_a_regression_is_told_with_what_a_baseline_knows(told):
         assert "still failing, known" in each
 
 
+def test_an_ego_is_told_with_its_driver_sight_and_defects(spec):
+    ego = {"driver": "idm", "defects": ("latency", "speeds"), "sensor": {"range_m": 30, "field_of_view_rad": 3.1416}}
+    told = compare(CampaignSpec.model_validate(spec.model_dump() | {"ego": ego}), [], "")
+    _, text = both(told, regression=Regression(ego=EgoConfig(profile="perfect"), cases=()))
+    assert "registered driver idm, responds within 0.5 s, sees 30 m far over 180°" in text
+    assert "with the planted defects latency and speeds" in text
+    assert "decides every 0.1 s, sees everything" in text
+
+
 def test_folders_without_runs_and_runs_of_different_campaigns_are_refused(tmp_path, capsys):
     out = tmp_path / "out" / "report.html"
     assert cli.main(["report", str(tmp_path), "--out", str(out)]) == 2
@@ -230,12 +239,12 @@ def test_a_campaigns_folder_is_told_with_what_is_unfinished_or_damaged_in_it(tmp
     damaged = tmp_path / "runs" / spec.runs()[1].id / "results.json"
     damaged.write_bytes(damaged.read_bytes()[:-9])
     found = read_folders([tmp_path]).comparison
-    assert [(run.spec.id, run.reason.partition(" in ")[0]) for run in found.missing] == [
-        ("low-random-0", "the run"),
-        ("low-random-1", "not finished"),
+    assert [(run.seed, run.reason.partition(" in ")[0]) for run in found.missing] == [
+        (0, "the run"),
+        (1, "not finished"),
     ]
     assert "is not finished" in found.missing[0].reason
-    assert [run.spec.id for run in found.undrawn] == ["low-iid-undisturbed-0", "low-iid-random-0"]
+    assert [run.method for run in found.undrawn] == ["iid-undisturbed", "iid-random"]
 
 
 def test_a_family_whose_place_on_a_map_is_gone_is_named_and_the_others_are_told(spec, monkeypatch, tmp_path):
@@ -243,4 +252,4 @@ def test_a_family_whose_place_on_a_map_is_gone_is_named_and_the_others_are_told(
     gone = CampaignSpec.model_validate(spec.model_dump() | {"families": ("low", "junction_0123456789ab")})
     for text in both(compare(gone, [], "")):
         assert "junction_0123456789ab: family: there is no" in text
-        assert "posted limit" in text
+        assert "scenery.speed_limit_mps" in text
