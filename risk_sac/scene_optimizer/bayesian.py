@@ -102,7 +102,7 @@ class BotorchOptimizer(SceneOptimizer):
         if self._arm == NEAR:
             return surrogate.best_by_mean(model, near).numpy()
         anywhere = sobol_points(self._dimension, seed, count=self._config.candidates)
-        return surrogate.best_by_expected_improvement(model, torch.cat((anywhere, near))).numpy()
+        return surrogate.maximise_expected_improvement(model, torch.cat((anywhere, near))).numpy()
 
     def _steps_from_one_of_the_best(self, values: Floats, random: np.random.Generator) -> Floats:
         """Takes Gaussian steps in some coordinates from one of the best scenes, `NEAR_CANDIDATES x d`."""

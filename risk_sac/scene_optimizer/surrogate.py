@@ -9,7 +9,9 @@ References:
 
 import warnings
 
+import torch
 from torch import Tensor
+from torch.nn.functional import normalize
 
 with warnings.catch_warnings():
     # linear_operator compiles its helpers with torch.jit while it is imported.
@@ -26,6 +28,7 @@ Hyperparameters = dict[str, Tensor]
 """Raw kernel, mean and noise parameters by their name in the model."""
 
 FIT_ITERATIONS = 20  # a warm start continues from here at the next fit
+STEP_LENGTHS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # the cube's diagonal is √d
 
 
 def condition(points: Tensor, values: Tensor, hyperparameters: Hyperparameters | None) -> SingleTaskGP:
@@ -58,10 +61,11 @@ def fit(points: Tensor, values: Tensor, start: Hyperparameters | None, seed: int
     return {name: parameter.detach().clone() for name, parameter in model.named_parameters()}
 
 
-def best_by_expected_improvement(model: SingleTaskGP, choices: Tensor) -> Tensor:
-    """Returns the choice of largest LogEI, `d`, of `k x d`.
+def maximise_expected_improvement(model: SingleTaskGP, choices: Tensor) -> Tensor:
+    """Returns the point of largest LogEI, `d`, among the choices, `k x d`, and on a line from the best of them.
 
-    Choice: no gradient ascent follows. It took half of an ask, and searches with it found no more.
+    Choice: the line follows the gradient and is clipped to the cube. Its steps are evaluated in one batch, which costs
+    a third of three iterations of L-BFGS-B and gains most of what they do.
 
     Choice: the incumbent is the best posterior mean at the observed points. It is not fooled by one lucky noisy value
     as the best observation would be, and costs one pass, where (q)LogNEI integrates over the incumbent by sampling.
@@ -69,8 +73,14 @@ def best_by_expected_improvement(model: SingleTaskGP, choices: Tensor) -> Tensor
     point: Tensor
     with skip_posterior_variances():
         incumbent = model.posterior(model.train_inputs[0]).mean.max()
+    acquisition = LogExpectedImprovement(model, incumbent)
     with fast_pred_var():
-        point, _ = optimize_acqf_discrete(LogExpectedImprovement(model, incumbent), q=1, choices=choices)
+        best, _ = optimize_acqf_discrete(acquisition, q=1, choices=choices)
+        best.requires_grad_()
+        (gradient,) = torch.autograd.grad(acquisition(best), best)
+        lengths = torch.tensor(STEP_LENGTHS, dtype=best.dtype).unsqueeze(-1)
+        line = (best.detach() + lengths * normalize(gradient)).clamp(0.0, 1.0)  # steps x d
+        point, _ = optimize_acqf_discrete(acquisition, q=1, choices=line)
     return point[0]
 
 
