@@ -1,3 +1,4 @@
+import gc
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,6 +11,15 @@ from tests.postgresql import PostgreSql, binaries, running
 # The first example pays for torch's lazy imports and for compilation, whichever it is.
 settings.register_profile("first call may compile", deadline=None)
 settings.load_profile("first call may compile")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[object]:  # None of the thousands of tests is garbage.
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)

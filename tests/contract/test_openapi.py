@@ -19,7 +19,11 @@ COMMITTED = Path(__file__).parents[2] / "openapi.yaml"
 
 UPLOADS = ["application/gzip", "application/x-gzip", "application/zip"]
 schemathesis.serializer.alias(UPLOADS, "application/octet-stream")
-schema = schemathesis.openapi.from_dict(openapi(create_app(ServiceSettings())))
+
+
+@pytest.fixture(scope="module")
+def schema():
+    return schemathesis.openapi.from_dict(openapi(create_app(ServiceSettings())))
 
 
 def test_committed_document_is_what_the_app_generates():
@@ -98,7 +102,7 @@ def test_wrong_method_is_a_problem_that_names_the_right_ones(base_url):
     "part",
     ["", "/results", "/episodes", "/failures", "/failure-table", "/curves", "/power", "/table", "/figures", "/spec"],
 )
-def test_answers_about_a_campaign_that_exists_are_as_documented(base_url, part):
+def test_answers_about_a_campaign_that_exists_are_as_documented(base_url, schema, part):
     campaign_id = httpx.post(f"{base_url}/v1/campaigns", json={"families": ["dense"]}).json()["id"]
     operation = schema[f"/v1/campaigns/{{campaign_id}}{part}"]["GET"]
     case = operation.Case(path_parameters={"campaign_id": campaign_id})
