@@ -80,55 +80,6 @@ def test_exactly_the_drivers_of_the_table_that_prevent_it_are_named(told: list[T
         assert (not names) == (said[1] == "unavoidable")
 
 
-def test_what_the_ego_knew_and_when_agrees_with_the_series(
-    contacts: list[tuple[Told, Collision, Judgement]],
-) -> None:
-    for each, hit, judged in contacts:
-        striker = [str(name) for name in each.series["ids"]].index(hit.other_id)
-        known = each.series["visible"][:, striker] == 1.0
-        knew = re.search(r"of which it (had known for|came to know only) ([\d.]+) s", each.title)
-        assert bool(knew) == bool(known[-1])
-        hidden = "came to know" in each.title or "nor then" in each.title
-        assert hidden == judged.hidden == ("from hiding" in each.title)
-        began = re.search(r"the conflict began (?:in hiding and came into sight )?([\d.]+) s before", each.title)
-        if knew:
-            gone_s = len(known) / 10 if known.all() else np.argmin(known[::-1]) / 10
-            assert float(knew[2]) == pytest.approx(gone_s, abs=0.15) or known.all()
-            assert began
-            if hidden:
-                assert float(began[1]) <= float(knew[2]) + 0.05
-        if began:
-            assert float(began[1]) == pytest.approx(hit.time_s - judged.conflict_s, abs=0.051)
-
-
-def test_what_the_ego_does_is_what_it_did_in_the_last_second(
-    contacts: list[tuple[Told, Collision, Judgement]],
-) -> None:
-    for each, hit, judged in contacts:
-        ego = each.sentence.rpartition("; ")[2]
-        speed, accel = (each.series[name][:, 0] for name in ("speed_mps", "accel_mps2"))
-        conflict = min(round((hit.time_s - judged.conflict_s) * 10) + 1, len(accel))
-        latest, since = accel[-min(11, conflict) :], accel[-conflict:]
-        if re.search(r" (brakes, and touches it still|brakes [\d.]+ s late|brakes late)$", ego):
-            assert latest.min() <= -BRAKES_MPS2
-            assert speed[-1] >= STANDS_MPS
-        elif ego.endswith(" speeds up"):
-            assert latest.max() >= BRAKES_MPS2
-        elif ego.endswith((" does not brake", " brakes no longer")):
-            assert accel[-min(9, conflict - 1) :].min(initial=0.0) > -BRAKES_MPS2
-            assert ego.endswith("no longer") == bool((since <= -BRAKES_MPS2).any())
-        elif ego.endswith((" stands", " has stopped")):
-            assert speed[-1] < STANDS_MPS
-        else:
-            assert ego.endswith(" starts")
-            assert speed[-31:].min() < STANDS_MPS <= speed[-1]
-        late = re.search(r"brakes ([\d.]+) s late", ego)
-        if late:
-            first = np.flatnonzero(since <= -BRAKES_MPS2)[0] / 10
-            assert float(late[1]) == pytest.approx(first - 0.4 - 0.75, abs=0.151)
-            assert ", brakes late" in each.title
-
-
 def test_the_fault_and_what_the_ego_did_agree_with_the_series(
     contacts: list[tuple[Told, Collision, Judgement]],
 ) -> None:

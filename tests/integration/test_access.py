@@ -185,6 +185,12 @@ def test_a_route_refuses_whoever_may_not_and_tells_nothing(world, unchanged, pat
             assert_refused(answer, 403, "foreign_origin")
 
 
+@some_routes
+def test_a_forged_host_gets_no_answer(world, unchanged, path, method):
+    for host in ("evil.example", "127.0.0.1.evil.example", "localhost.evil.example:80", "0.0.0.0.evil.example"):
+        assert_refused(ask(world, method, path, "own", host=host), 421, "unknown_host")
+
+
 @every_route
 def test_a_route_lets_in_whoever_may(world, path, method):
     wanted = scope_of(method, path)
@@ -201,12 +207,6 @@ def test_a_route_lets_in_whoever_may(world, path, method):
         assert "server" not in answer.headers
         if own is not world:
             ask(own, "POST", f"{CAMPAIGN}/cancel", "own")
-
-
-@some_routes
-def test_a_forged_host_gets_no_answer(world, unchanged, path, method):
-    for host in ("evil.example", "127.0.0.1.evil.example", "localhost.evil.example:80", "0.0.0.0.evil.example"):
-        assert_refused(ask(world, method, path, "own", host=host), 421, "unknown_host")
 
 
 def test_an_admin_sees_all_projects_and_others_their_own(world):

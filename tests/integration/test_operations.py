@@ -65,11 +65,6 @@ def test_requests_are_counted_by_route_and_what_was_done_outlives_a_restart(serv
         found = samples(service)
 
 
-def test_an_idle_service_is_healthy_and_ready(client):
-    assert client.get("/healthz").json() == {"status": "ok"}
-    assert client.get("/readyz").json() == {"status": "ready"}
-
-
 def test_a_request_keeps_the_id_it_came_with_and_gets_one_otherwise(client):
     assert client.get("/healthz", headers={"X-Request-ID": "trace-7"}).headers["x-request-id"] == "trace-7"
     made = {

@@ -21,17 +21,6 @@ def campaign(service):
     return campaign_id
 
 
-def test_curves_follow_the_search_of_each_run(service, campaign):
-    runs = service.get(campaign, "/curves")["runs"]
-    assert [run["run_id"] for run in runs] == ["low-random-0", "low-random-1"]
-    for run in runs:
-        assert run["episodes"] == list(range(1, EPISODES + 1))
-        assert run["preventable"][-1] == service.get(campaign)["runs"][run["seed"]]["preventable"]
-    few = service.get(campaign, "/curves", points=5)["runs"][0]
-    assert few["episodes"] == [5, 10, 15, 20, 24]
-    assert few["window_ecr"] == [runs[0]["window_ecr"][count - 1] for count in few["episodes"]]
-
-
 def test_the_power_of_a_campaign_goes_by_its_own_episodes(service):
     campaign_id = service.post(methods=["archive"], seeds=[0, 1], budget={"episodes": 5})
     assert service.wait(campaign_id)["state"] == "succeeded"

@@ -1,7 +1,5 @@
 """The report of a campaign over REST: real server, real workers, and `risk_sac.report` on the same folders."""
 
-import csv
-import io
 import json
 import re
 import shlex
@@ -15,7 +13,6 @@ from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import read_campaign
 from risk_sac.report import compare, figure_bytes, figure_names, read_run, table_csv, table_json, table_markdown
 from risk_sac.report.figures import FORMATS
-from risk_sac.report.files import Table
 
 SPEC = {
     "methods": ["random", "no-adversary"],
@@ -65,22 +62,6 @@ def test_table_is_what_the_report_makes_of_the_same_folders(get, comparison, nam
     assert by_query.status_code == by_header.status_code == 200
     assert by_query.headers["content-type"] == by_header.headers["content-type"] == TYPES[name]
     assert by_query.text == by_header.text == made(comparison)
-
-
-def test_table_has_every_run_once_complete_and_as_documented(get, campaign):
-    table = get("/table").json()
-    assert (table["complete"], table["missing"]) == (True, [])
-    digests = {run["id"]: run["digest"] for run in get("/results").json()["runs"]}
-    assert {f"{row['family']}-{row['method']}-{row['seed']}": row["digest"] for row in table["runs"]} == digests
-    assert [(cell["method"], cell["phase"], cell["seeds"]) for cell in table["cells"]] == [
-        ("random", "search", [0, 1]),
-        ("no-adversary", "search", [0, 1]),
-        ("random", "evaluation", [0, 1]),
-        ("no-adversary", "evaluation", [0, 1]),
-    ]
-    assert len(list(csv.DictReader(io.StringIO(get("/table?format=csv").text)))) == 4
-    documented = Table.model_validate(table).model_dump(mode="json")
-    assert documented == table  # neither more nor less than the schema says
 
 
 def test_results_and_table_agree_on_the_search(get):

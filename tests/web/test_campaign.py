@@ -147,48 +147,6 @@ def test_episodes_before_the_policys_first_are_shaded(
     assert shade(page) == "true,false"
 
 
-def test_older_curves_have_no_strips(page_at: Callable[..., Page], service: Service, campaign: str) -> None:
-    found = service.get(campaign, "/curves", points=200)
-    for run in found["runs"]:
-        run["driven_by"] = {}
-    page = page_at()
-    page.route("**/curves?*", lambda route: route.fulfill(json=found))
-    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}")
-    plot(page, "Sliding ECR").wait_for()
-    expect(page.get_by_role("region", name="Driven by", exact=True)).to_have_count(0)
-
-
-def test_a_drag_zooms_all_curves_and_a_double_click_shows_all_again(
-    page_at: Callable[..., Page], campaign: str
-) -> None:
-    page = page_at(f"campaigns/{campaign}")
-    area = plot(page, "Sliding ECR").locator(".u-over")
-    page.wait_for_load_state("networkidle")  # the last answer redraws the plots
-    area.scroll_into_view_if_needed()
-    box = area.bounding_box()
-    page.mouse.move(box["x"] + 0.25 * box["width"], box["y"] + 40)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.75 * box["width"], box["y"] + 40, steps=4)
-    page.mouse.up()
-    expect(page.get_by_role("button", name="Show all")).to_have_count(3)
-    area.dblclick()
-    expect(page.get_by_role("button", name="Show all")).to_have_count(0)
-
-
-def test_a_run_is_hidden_by_the_legend_and_by_its_card(page_at: Callable[..., Page], campaign: str) -> None:
-    page = page_at(f"campaigns/{campaign}")
-    entry = page.get_by_role("group", name="Runs in the curves").get_by_role("button", name="archive, low")
-    area = plot(page, "Sliding ECR")
-    entry.click()
-    expect(entry).to_have_attribute("aria-pressed", "false")
-    expect(card(page, "low-archive-601").get_by_role("button", name="Hidden")).to_be_visible()
-    area.focus()
-    area.press("ArrowLeft")
-    expect(area.get_by_role("status")).not_to_contain_text("low")
-    card(page, "low-archive-601").get_by_role("button", name="Hidden").click()
-    expect(entry).to_have_attribute("aria-pressed", "true")
-
-
 def test_importance_and_coverage_are_the_services(
     page_at: Callable[..., Page], service: Service, campaign: str
 ) -> None:
@@ -234,22 +192,6 @@ def test_a_running_campaign_is_followed_to_its_end_without_a_reload(
     expect(area.get_by_role("status")).to_contain_text("After 40 episodes")
     expect(page.get_by_role("button", name="Delete")).to_be_visible()
     assert page.evaluate("window.neverReloaded")
-
-
-def test_an_episode_has_the_number_that_its_id_ends_in(page_at: Callable[..., Page], service: Service) -> None:
-    running = service.post(families=["mixed"], methods=["risk-sac-diverse"], budget={"episodes": 5000})
-    service.wait_for(running, lambda seen: seen["progress"]["failures"] >= 2)
-    page = page_at(f"campaigns/{running}")
-    page.locator(".newest li").first.wait_for()
-    service.client.post(f"/v1/campaigns/{running}/cancel")
-    for shown in page.locator(".newest li").all():
-        failure = str(shown.get_by_role("link").get_attribute("href")).rsplit("/", 1)[1]
-        expect(shown).to_contain_text(re.compile(rf", episode {failure.rsplit('-', 1)[1]}\b"))
-    service.wait(running)
-    items = service.get(running, "/failures", limit=500)["items"]
-    assert [each["id"].rsplit("-", 1)[1] for each in items] == [str(each["index"]) for each in items]
-    page = page_at(f"campaigns/{running}/failures/{items[0]['id']}")
-    expect(page.locator(".crumbs")).to_contain_text(items[0]["id"])
 
 
 def test_events_draw_curves_that_equal_those_of_the_service(page_at: Callable[..., Page], service: Service) -> None:
@@ -367,22 +309,6 @@ def test_what_was_posted_can_be_taken_away(
     expect(page.get_by_role("link", name="Compare methods")).to_have_attribute(
         "href", f"#/campaigns/{campaign}/compare"
     )
-
-
-def test_the_log_of_a_run_is_read_on_demand(page_at: Callable[..., Page], campaign: str) -> None:
-    page = page_at(f"campaigns/{campaign}")
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
-    run = card(page, "low-archive-601")
-    run.wait_for()
-    assert not any("/log" in url for url in asked)
-    run.get_by_text("Log", exact=True).click()
-    expect(run.get_by_role("region", name="Log of archive, low")).to_be_visible()
-
-
-def test_a_campaign_that_never_was_says_so(page_at: Callable[..., Page]) -> None:
-    page = page_at("campaigns/unknown", allowed=("404",))
-    expect(page.get_by_role("alert")).to_contain_text("unknown")
 
 
 def _values(run: Locator) -> list[str]:

@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 
-from risk_sac.report.drawing import LOOKS
 from tests.server import Service
 from tests.web.conftest import PHONE, count
 
@@ -105,18 +104,6 @@ def test_a_table_that_scrolls_on_a_phone_keeps_its_names(page_at: Callable[..., 
     expect(last).to_be_in_viewport()
 
 
-def test_error_bars_stand_where_their_numbers_say(page_at: Callable[..., Page], service: Service, methods: str) -> None:
-    page = page_at(f"campaigns/{methods}/compare")
-    cells = service.get(methods, "/table", format="json")["cells"]
-    row_of(page, "archive").wait_for()
-    end = float(page.locator("th.rate .axis").first.inner_text().split("\n")[-1].removesuffix(" %")) / 100
-    for cell in cells:
-        drawn = page.get_by_role("img", name=f"ECR of {cell['method']}: ")
-        axis, dot = drawn.bounding_box(), drawn.locator("circle").bounding_box()
-        middle = dot["x"] + dot["width"] / 2
-        assert (middle - axis["x"]) / axis["width"] == pytest.approx(cell["estimates"]["ecr"]["mean"] / end, abs=0.01)
-
-
 def test_a_report_and_its_figures_can_be_taken_away(
     page_at: Callable[..., Page], service: Service, methods: str, tmp_path: Path
 ) -> None:
@@ -133,26 +120,6 @@ def test_a_report_and_its_figures_can_be_taken_away(
     picture = _saved(page, figure.get_by_role("button", name="PNG"), tmp_path)
     assert picture.name == f"{name}.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
-
-
-def test_a_method_has_one_colour_in_tables_and_figures(
-    page_at: Callable[..., Page], service: Service, methods: str
-) -> None:
-    page = page_at(f"campaigns/{methods}/compare", color_scheme="light")
-    for method in ("archive", "random"):
-        expect(row_of(page, method).locator(".sample line")).to_have_css("stroke", _rgb(LOOKS[method].colour))
-    image = page.locator("figure img").first
-    figure = service.client.get(f"/v1/campaigns/{methods}/figures/distinct_found_low.svg").text
-    assert all(LOOKS[method].colour in figure for method in ("archive", "random"))
-    expect(image).to_have_css("filter", "none")
-    page.emulate_media(color_scheme="dark")
-    expect(image).to_have_css("filter", "invert(1) hue-rotate(180deg)")
-    # By hand from #777777, whose lightness is 119 of 255.
-    expect(row_of(page, "random").locator(".sample line")).to_have_css("stroke", "rgb(136, 136, 136)")
-
-
-def _rgb(colour: str) -> str:
-    return f"rgb({', '.join(str(int(colour[at : at + 2], 16)) for at in (1, 3, 5))})"
 
 
 def test_the_page_works_below_the_path_that_a_proxy_has_the_service_at(
@@ -209,24 +176,6 @@ def test_two_campaigns_stand_beside_each_other(
     saved = _saved(page, page.get_by_role("button", name="JSON"), tmp_path)
     assert len(json.loads(saved.read_text())) == len(rows)
     check_axe(page)
-
-
-def test_on_a_phone_no_field_breaks_within_a_word(page_at: Callable[..., Page], campaign: str, methods: str) -> None:
-    page = page_at(f"compare?ids={campaign},{methods}", viewport=PHONE)
-    field = page.get_by_role("rowheader", name="budget.episodes").locator("code")
-    expect(field).to_be_visible()
-    lines = field.evaluate("""code => [...code.childNodes].filter(each => each.nodeType === 3).map(each => {
-        const range = document.createRange();
-        range.selectNodeContents(each);
-        return range.getClientRects().length;
-    })""")
-    assert lines == [1, 1, 1]
-
-
-def test_a_campaign_that_is_gone_does_not_hide_the_others(page_at: Callable[..., Page], campaign: str) -> None:
-    page = page_at(f"compare?ids={campaign},unknown", allowed=("404",))
-    expect(page.get_by_role("alert")).to_contain_text("unknown")
-    expect(row_of(page, f"{campaign} archive")).to_be_visible()
 
 
 def _check_total(row: Locator, letter: str, total: dict[str, Any]) -> None:

@@ -49,18 +49,6 @@ def test_the_choice_of_a_theme_survives_a_reload(page_at: Callable[..., Page]) -
     expect(page.locator("html")).to_have_attribute("data-theme", "dark")
 
 
-def test_the_docs_have_the_theme_of_the_page(page_at: Callable[..., Page], service: Service) -> None:
-    page = page_at("nowhere", color_scheme="dark")
-    page.goto(f"{service.client.base_url}/docs")
-    page.locator(".opblock").first.wait_for()
-    assert page.evaluate("getComputedStyle(document.documentElement).backgroundColor") == "rgb(28, 32, 34)"
-    page.goto(f"{service.client.base_url}/page/#/nowhere")
-    page.get_by_role("button", name="Light").click()
-    page.goto(f"{service.client.base_url}/docs")
-    page.locator(".opblock").first.wait_for()
-    expect(page.locator("html")).not_to_have_class("dark-mode")
-
-
 def test_a_key_is_asked_for_and_kept_in_the_tab_alone(new_page: Callable[..., Page], tmp_path: Path) -> None:
     with servers(tmp_path) as start:
         service = start()
@@ -127,13 +115,6 @@ def test_a_server_that_does_not_answer_is_told_on_every_screen(
     expect(banner).to_be_visible()
     page.unroute("**/healthz")
     expect(banner).to_have_count(0)
-
-
-def test_a_server_that_hangs_is_told_too(new_page: Callable[..., Page], service: Service) -> None:
-    page = new_page()
-    page.goto(f"{service.client.base_url}/page/#/nowhere")
-    page.route("**/healthz", lambda route: None)
-    expect(page.get_by_role("alert")).to_contain_text("The service does not answer")
 
 
 def test_nothing_is_served_outside_the_page(service: Service) -> None:
