@@ -58,7 +58,6 @@ def test_a_disk_that_is_full_for_a_worker_pauses_its_campaign_until_there_is_roo
     assert (campaign["state"], campaign["progress"]["episodes_done"]) == ("succeeded", 80)
 
 
-@EACH_DATABASE_SHARED
 def test_a_paused_campaign_can_be_cancelled(shared, scripted):
     campaign_id = shared.post(seeds=[scripted.DISK_FULL], budget={"episodes": 40})
     shared.wait_for(campaign_id, lambda seen: seen["state"] == "paused")
