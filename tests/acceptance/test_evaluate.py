@@ -190,21 +190,3 @@ def test_what_fails_is_named_and_the_others_go_on(
     assert [(row["method"], row["seed"]) for row in stored["runs"]] == [("random", 0), ("random", 1)]
     assert [run["seed"] for run in stored["missing"]] == [0, 1]
     assert all(test["p"] is None for test in stored["tests"])
-
-
-@pytest.mark.parametrize(
-    ("flags", "complaint"),
-    [
-        (["--seeds", "0"], "--seeds: got 0; wanted 1 to 100 seeds"),
-        (["--seeds", "1", "--first-seed", "-1"], "--seeds: "),
-        (["--jobs", "0"], "--jobs: got 0; wanted at least one process"),
-    ],
-)
-def test_wrong_settings_are_one_line_and_leave_no_folder(
-    flags: list[str], complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert cli.main(["evaluate", *flags, "--out", str(tmp_path / "out")]) == 2
-    printed = capsys.readouterr().err
-    assert printed.startswith(complaint)
-    assert printed.count("\n") == 1
-    assert not (tmp_path / "out").exists()

@@ -1,4 +1,4 @@
-"""Sentences about the failures of a campaign, read back and compared with their tables and time series."""
+"""Captions of the failures of a campaign, read back and compared with their tables and time series."""
 
 import re
 from collections.abc import Mapping
@@ -11,7 +11,6 @@ import pytest
 from risk_sac.cli import main
 from risk_sac.config import FamilyName
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.sentence import story
 from risk_sac.failures.show import caption
 from risk_sac.records import Collision, Judgement, Violation
 from risk_sac.run_folder.results import read_results
@@ -35,7 +34,6 @@ class Told(NamedTuple):
     violation: Collision | Violation
     series: Mapping[str, Any]
     title: str
-    sentence: str
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +50,7 @@ def _told(family: FamilyName, folder: Path) -> list[Told]:
         series = read_series(folder / "run" / failure.series)
         recording = Recording(failure, series)
         title = " ".join(caption(family, recording).split())
-        found.append(Told(recording.violation, series, title, story(series, recording.violation)))
+        found.append(Told(recording.violation, series, title))
     return found
 
 

@@ -36,19 +36,13 @@ def contents(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     return set(zipfile.ZipFile(wheel).namelist())
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_wheel_contains_the_net_and_its_sources(contents: set[str], family: str) -> None:
-    assert {f"sumo_nets/{family}/{family}.{part}.xml" for part in ("net", "nod", "edg")} <= contents
-
-
-def test_wheel_contains_actor_types_readme_and_type_markers(contents: set[str]) -> None:
+def test_wheel_contains_nets_and_page_and_no_tests(contents: set[str]) -> None:
+    assert {f"sumo_nets/{name}/{name}.{part}.xml" for name in FAMILIES for part in ("net", "nod", "edg")} <= contents
     assert {"sumo_nets/vtypes.add.xml", "sumo_nets/README.md", "risk_sac/py.typed", "service/py.typed"} <= contents
-
-
-def test_wheel_contains_the_page_which_it_has_built(contents: set[str]) -> None:
     assert "service/web/dist/index.html" in contents
     assets = [Path(name).suffix for name in contents if name.startswith("service/web/dist/assets/")]
     assert {".js", ".css"} <= set(assets)
+    assert not [name for name in contents if name.startswith("tests")]
 
 
 def test_wheel_contains_every_module(contents: set[str]) -> None:
@@ -60,10 +54,6 @@ def test_wheel_contains_every_module(contents: set[str]) -> None:
         and "node_modules" not in path.parts
     }
     assert modules <= contents
-
-
-def test_wheel_contains_no_tests(contents: set[str]) -> None:
-    assert not [name for name in contents if name.startswith("tests")]
 
 
 @pytest.fixture(scope="module")

@@ -93,8 +93,8 @@ def test_a_tag_changes_exactly_when_the_body_does(shared, part):
     assert after.status_code == 304
 
 
-def test_a_project_that_has_queued_enough_is_told_when_to_come_back(serve):
-    service = serve(quota_queued_runs=4)
+def test_a_project_that_has_queued_enough_is_told_when_to_come_back(serve_inside):
+    service = serve_inside(quota_queued_runs=4)
     for seed in (0, 10):
         service.post(seeds=[seed, seed + 1], budget={"episodes": 10_000})
     refused = service.client.post("/v1/campaigns", json=SPEC | {"seeds": [1, 2, 3, 4, 5]})

@@ -27,8 +27,8 @@ FAILS = 3  # a seed with which the scripted worker ends with an error
 
 
 @pytest.fixture(scope="module")
-def service(serve_shared: Callable[..., Service]) -> Service:
-    return serve_shared("striking_worker", attempts=2)
+def service(striking: Service) -> Service:
+    return striking
 
 
 @pytest.fixture

@@ -17,8 +17,8 @@ SPEC = CampaignSpec(label="a", families=("low",), methods=("random",), seeds=(0,
 
 
 @pytest.fixture(scope="module")
-def shared(serve_shared: Callable[..., Service]) -> Service:
-    return serve_shared("striking_worker")
+def shared(striking: Service) -> Service:
+    return striking
 
 
 @pytest.fixture

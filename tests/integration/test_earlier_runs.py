@@ -2,7 +2,6 @@
 
 import hashlib
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -75,8 +74,8 @@ def refusal(client: httpx.Client, **changes: Any) -> str:
     return str(answer.json()["detail"])
 
 
-def test_a_campaign_goes_on_from_an_earlier_one(serve_shared: Callable[..., Service]) -> None:
-    service = serve_shared()
+def test_a_campaign_goes_on_from_an_earlier_one(shared: Service) -> None:
+    service = shared
     client, budget = service.client, {"budget": {"episodes": 2}}
     first, silent = (
         client.post("/v1/campaigns", json={"families": ["low"], "methods": [method]} | budget).json()["id"]

@@ -92,8 +92,8 @@ def test_networks_that_sumos_tools_make_are_taken(client: httpx.Client, made: Pa
     assert any("keeps to the left" in said for said in response.json()["warnings"]) == (name == "left-hand")
 
 
-def test_slow_senders_of_one_key_keep_out_that_key_and_nobody_else(serve: Callable[..., Service]) -> None:
-    service = serve(body_patience_s=600)
+def test_slow_senders_of_one_key_keep_out_that_key_and_nobody_else(serve_inside: Callable[..., Service]) -> None:
+    service = serve_inside(body_patience_s=600)
     keys = KeyFile(service.data_dir / "keys.json")
     slow, other = (keys.create("maps", name, Scope.RUN)[1] for name in ("slow", "other"))
     senders = [socket.create_connection(("127.0.0.1", service.port)) for _ in range(4)]
@@ -115,8 +115,8 @@ def test_slow_senders_of_one_key_keep_out_that_key_and_nobody_else(serve: Callab
 
 
 @pytest.mark.parametrize("path", ["/v1/networks", "/v1/campaigns"])
-def test_who_sends_too_slowly_is_told_so_and_hung_up_on(serve: Callable[..., Service], path: str) -> None:
-    service = serve(body_patience_s=0.5)
+def test_who_sends_too_slowly_is_told_so_and_hung_up_on(serve_inside: Callable[..., Service], path: str) -> None:
+    service = serve_inside(body_patience_s=0.5)
     kind = b"xml" if path == "/v1/networks" else b"json"
     with socket.create_connection(("127.0.0.1", service.port), timeout=0.1) as sender:
         sender.sendall(HALF.replace(b"/v1/networks", path.encode()).replace(b"xml", kind))

@@ -10,8 +10,8 @@ EPISODES = 24
 
 
 @pytest.fixture(scope="module")
-def service(serve_shared):
-    return serve_shared("striking_worker")
+def service(striking):
+    return striking
 
 
 @pytest.fixture(scope="module")

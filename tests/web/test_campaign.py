@@ -3,12 +3,10 @@
 import json
 import re
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
-from playwright.sync_api import Locator, Page, Route, expect
+from playwright.sync_api import Locator, Page, expect
 from pyarrow import parquet
 
 from tests.server import Service, servers
@@ -70,21 +68,6 @@ def test_known_defects_are_told_by_one_number_a_method_and_under_no_failure_as_t
     assert len(re.findall(r"[\d.]+ on average", shown.inner_text())) == sum("average" in each for each in sentences)
 
 
-def test_candidates_that_were_not_replayed_are_said_to_wait(
-    page_at: Callable[..., Page], service: Service, campaign: str
-) -> None:
-    progress = service.get(campaign)["progress"]
-    assert progress["headline"] is None
-    assert progress["headline_candidates"] == progress["headline_waiting"] > 0
-    waiting = progress["headline_waiting"]
-    words = f"{waiting} candidate{'s wait' if waiting > 1 else ' waits'} for verification"
-    page = page_at(f"campaigns/{campaign}")
-    expect(page.locator(".tile", has_text="headline failures")).to_contain_text(words)
-    picker = page_at("compare").get_by_role("listitem").filter(has_text="night <b>7</b>").first
-    expect(picker).to_contain_text(words)
-    expect(picker).not_to_contain_text("headline failures")
-
-
 def test_the_pointer_reads_the_curves_of_the_service(
     page_at: Callable[..., Page], service: Service, campaign: str
 ) -> None:
@@ -119,32 +102,6 @@ def test_strips_and_cards_say_what_drove_the_episodes(
         expect(card(page, run["id"])).to_contain_text(said)
     expect(page.get_by_text("Shaded: the warm-up")).to_have_count(0)  # no policy ever drove
     check_axe(page)
-
-
-def test_episodes_before_the_policys_first_are_shaded(
-    page_at: Callable[..., Page], service: Service, campaign: str
-) -> None:
-    def shade(page: Page) -> str:
-        canvas = plot(page, "Sliding ECR").locator("canvas")
-        canvas.wait_for()
-        return str(
-            canvas.evaluate(
-                "c => [0.3, 0.8].map(x => c.getContext('2d').getImageData(c.width * x, 16, 1, 1).data[3] > 0).join()"
-            )
-        )
-
-    page = page_at(f"campaigns/{campaign}")
-    assert shade(page) == "false,false"
-    found = service.get(campaign, "/curves", points=200)
-    for run in found["runs"]:
-        half = len(run["episodes"]) // 2
-        run["driven_by"] = {"script": [min(n, half) for n in run["episodes"]]}
-        run["driven_by"]["policy"] = [max(0, n - half) for n in run["episodes"]]
-    page = page_at()
-    page.route("**/curves?*", lambda route: route.fulfill(json=found))
-    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}")
-    expect(page.get_by_text("Shaded: the warm-up")).to_be_visible()
-    assert shade(page) == "true,false"
 
 
 def test_importance_and_coverage_are_the_services(
@@ -207,33 +164,6 @@ def test_events_draw_curves_that_equal_those_of_the_service(page_at: Callable[..
         area.press("ArrowRight")
     expect(area.get_by_role("status")).to_contain_text("After 60 episodes")
     expect(area.get_by_role("status").locator("span b")).to_have_text(str(curve["distinct"][-1]))
-
-
-def test_the_time_left_goes_by_the_runs_own_episodes(page_at: Callable[..., Page], service: Service) -> None:
-    running = service.post(families=["low"], methods=["random"], seeds=[7], budget={"episodes": 2000})
-    service.wait_for(running, lambda seen: seen["progress"]["episodes_done"] >= 60)
-    progress = service.get(running)["progress"]
-    played = [each["wall_s"] for each in service.get(running, "/episodes", limit=500)["items"]][
-        1:
-    ]  # the first compiles
-    left_s = (2000 - progress["episodes_done"]) * sum(played) / len(played)
-    assert 0.5 <= progress["eta_s"] / left_s <= 2
-    page = page_at(f"campaigns/{running}")
-    expect(page.locator(".advance")).to_contain_text(
-        re.compile(r"\d of 2[,\u202f ]?000 episodes · (\d+ min )?\d+ s left$")
-    )
-    service.client.post(f"/v1/campaigns/{running}/cancel")
-    known = service.wait(running) | {"state": "running"}
-    for eta_s, said in ((None, "time left not known yet"), (119.7, "2 min 0 s left"), (3599.6, "1 h 0 min left")):
-        page = page_at()
-        answer = known | {"progress": known["progress"] | {"eta_s": eta_s}}
-        page.route(re.compile(rf"/v1/campaigns/{running}$"), partial(_answer, answer))
-        page.goto(f"{service.client.base_url}/page/#/campaigns/{running}")
-        expect(page.locator(".advance")).to_contain_text(said)
-
-
-def _answer(answer: dict[str, Any], route: Route) -> None:
-    route.fulfill(json=answer)
 
 
 def test_cancelling_asks_first(page_at: Callable[..., Page], service: Service) -> None:

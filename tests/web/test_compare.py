@@ -89,21 +89,6 @@ def test_the_numbers_of_a_report_are_the_services(
     check_axe(page)
 
 
-def test_a_table_that_scrolls_on_a_phone_keeps_its_names(page_at: Callable[..., Page], methods: str) -> None:
-    page = page_at(f"campaigns/{methods}/compare", viewport=PHONE)
-    table = page.get_by_role("region", name="Methods compared: low")
-    name = table.get_by_role("rowheader").first
-    expect(name).to_be_visible()
-    assert table.evaluate("each => each.scrollWidth - each.clientWidth") > 0
-    table.evaluate("each => each.scrollTo(each.scrollWidth, 0)")
-    room, shown, last = table.bounding_box(), name.bounding_box(), table.locator("tbody tr").first.locator("td").last
-    assert room is not None
-    assert shown is not None
-    assert shown["x"] == pytest.approx(room["x"], abs=1)
-    assert shown["width"] < room["width"] / 2
-    expect(last).to_be_in_viewport()
-
-
 def test_a_report_and_its_figures_can_be_taken_away(
     page_at: Callable[..., Page], service: Service, methods: str, tmp_path: Path
 ) -> None:

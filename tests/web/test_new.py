@@ -11,7 +11,7 @@ from playwright.sync_api import Locator, Page, Request, Route, expect
 
 from risk_sac.config import CampaignSpec
 from tests.server import Service
-from tests.web.conftest import CAMPAIGN, UNROUNDED
+from tests.web.conftest import UNROUNDED
 
 PROFILES = ("default", "perfect", "careful", "defensive")
 HOSTILE = "</pre><script>alert('1')</script> yes: \"no\" #\\ \u2028"
@@ -127,15 +127,6 @@ def test_a_formula_is_checked_while_it_is_written_and_the_fault_has_a_caret(page
     assert curl_body(page)["requirements"] == [{"name": "mine_1", "formula": "rss_margin >= 1"}]
 
 
-def test_a_campaign_is_cloned_with_all_that_it_was_given(
-    page_at: Callable[..., Page], service: Service, campaign: str
-) -> None:
-    page = page_at(f"new?from={campaign}")
-    expect(page.get_by_label("Label", exact=True)).to_have_value(CAMPAIGN["label"])
-    assert curl_body(page) == CAMPAIGN
-    assert page.locator("main b", has_text="7").filter(has_not_text="archive").count() == 0
-
-
 def test_what_an_earlier_campaign_set_deep_down_is_cloned_too(page_at: Callable[..., Page], service: Service) -> None:
     given = {
         "label": "deep",
@@ -184,27 +175,6 @@ def test_what_a_family_does_not_support_is_said_before_the_campaign_starts(page_
     expect(page.locator(".adjustments")).to_contain_text("odd.environment.time_of_day low: asked for {day, night}")
     odd.get_by_label("night", exact=True).uncheck()
     expect(page.locator(".adjustments")).to_have_count(0)
-
-
-def test_methods_that_most_need_come_first_with_their_cost_and_the_rest_is_folded(
-    page_at: Callable[..., Page], service: Service
-) -> None:
-    page = page_at("new")
-    group = page.get_by_role("group", name="Methods")
-    methods = service.client.get("/v1/methods").json()["items"]
-    usual = [each["name"] for each in methods if each["usual"]]
-    expect(group.locator(".choice-card b")).to_have_text(usual)
-    for each in methods[: len(usual)]:
-        expect(group.locator(".choice-card", has_text=each["summary"])).to_contain_text(
-            f"cost {each['episode_cost']:g}"
-        )
-    group.get_by_text("for comparisons").click()
-    expect(group.locator(".choice-card")).to_have_count(len(methods))
-    expect(group.locator(".cost")).to_have_count(len(methods))
-    group.get_by_text("for comparisons").click()
-    expect(group.locator(".choice-card")).to_have_count(len(usual))
-    page.get_by_role("button", name="Compare methods").click()  # has chosen some of them
-    expect(page.get_by_role("checkbox", name="sac-lag", exact=True)).to_be_checked()
 
 
 def test_an_ego_is_chosen_by_name_with_known_faults(page_at: Callable[..., Page], service: Service) -> None:

@@ -109,22 +109,6 @@ def test_signals_on_the_stage_show_what_the_series_recorded(
         assert series["signal"][step] in lamps
 
 
-def test_labels_cover_neither_each_other_nor_what_matters(
-    failure: dict[str, Any], page_at: Callable[..., Page]
-) -> None:
-    page = page_at(failure["place"])
-    time_s = times(failure)
-    for step in range(0, len(time_s), max(1, len(time_s) // 8)):
-        drawn = go_to(page, float(time_s[step]))
-        boxes = drawn["labels"]
-        assert boxes
-        for k, (left, top, right, bottom) in enumerate(boxes):
-            for other in boxes[:k]:
-                assert left >= other[2] or right <= other[0] or top >= other[3] or bottom <= other[1]
-            for actor in drawn["actors"]:
-                assert not (left < actor["px"] < right and top < actor["py"] < bottom)
-
-
 def test_the_legend_names_what_is_drawn_and_only_that(failure: dict[str, Any], page_at: Callable[..., Page]) -> None:
     page = page_at(failure["place"])
     stage(page)
