@@ -50,24 +50,6 @@ def test_the_numbers_on_the_screen_are_the_services(
     check_axe(page)
 
 
-def test_known_defects_are_told_by_one_number_a_method_and_under_no_failure_as_the_worth_of_finding_nothing(
-    page_at: Callable[..., Page], service: Service, campaign: str
-) -> None:
-    (archive,) = service.get(campaign, "/power")["methods"]
-    page = page_at(f"campaigns/{campaign}")
-    shown = page.get_by_role("region", name="Known defects that this budget detects")
-    expect(shown).to_contain_text(f"archive: {archive['sentences'][0]}")
-    assert page.get_by_text("What finding nothing is worth").count() == 0
-    nothing = {"methods": ["no-adversary", "archive"], "budget": {"episodes": 1}, "seeds": [1]}
-    posted = service.post(**nothing)
-    assert service.wait(posted)["progress"]["failures"] == 0
-    shown = page_at(f"campaigns/{posted}").get_by_role("region", name="What finding nothing is worth")
-    sentences = [each["sentences"][0] for each in service.get(posted, "/power")["methods"]]
-    for sentence in sentences:
-        expect(shown).to_contain_text(sentence)
-    assert len(re.findall(r"[\d.]+ on average", shown.inner_text())) == sum("average" in each for each in sentences)
-
-
 def test_the_pointer_reads_the_curves_of_the_service(
     page_at: Callable[..., Page], service: Service, campaign: str
 ) -> None:

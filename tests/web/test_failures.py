@@ -333,15 +333,3 @@ def test_hostile_text_is_shown_and_runs_nothing(
     page.get_by_role("link", name="Refused").click()
     expect(page.locator(".cards li").first).to_contain_text("<script>")
     assert page.evaluate("window.hacked") is None
-
-
-def test_what_to_see_while_nothing_was_found(
-    new_page: Callable[..., Page], service: Service, campaign: str, table: dict[str, Any]
-) -> None:
-    page = new_page()
-    about = service.client.get(f"/v1/campaigns/{campaign}").json() | {"state": "running"}
-    page.route(f"**/v1/campaigns/{campaign}", lambda route: route.fulfill(json=about))
-    page.route("**/failure-table*", lambda route: route.fulfill(json={name: [] for name in table} | {"scenes": {}}))
-    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures")
-    expect(page.get_by_role("heading", name="Nothing has been found yet")).to_be_visible()
-    expect(page.get_by_role("main")).to_contain_text("episodes are done")

@@ -109,26 +109,6 @@ def test_signals_on_the_stage_show_what_the_series_recorded(
         assert series["signal"][step] in lamps
 
 
-def test_the_legend_names_what_is_drawn_and_only_that(failure: dict[str, Any], page_at: Callable[..., Page]) -> None:
-    page = page_at(failure["place"])
-    stage(page)
-    legend = page.get_by_role("list", name="Legend")
-    by_layer = {
-        "Sight": ("out of the ego's sight", "line of sight"),
-        "TTC, RSS": ("RSS margin ahead", "motion, and body at a predicted contact"),
-        "Trails": ("last 3 s, a dot each 0.5 s", "whole path"),
-    }
-    for layer, names in by_layer.items():
-        for name in names:
-            expect(legend.get_by_text(name, exact=True)).to_be_visible()
-        page.get_by_role("button", name=layer, exact=True).click()
-        for name in names:
-            expect(legend.get_by_text(name, exact=True)).to_have_count(0)
-        page.get_by_role("button", name=layer, exact=True).click()
-    for name in ("ego", "striker", "contact", "signal: green", "red"):
-        expect(legend.get_by_text(name, exact=True)).to_be_visible()
-
-
 def test_keys_step_frame_by_frame_and_play_and_pause(failure: dict[str, Any], page_at: Callable[..., Page]) -> None:
     page = page_at(failure["place"])
     time_s = times(failure)
@@ -194,24 +174,6 @@ def test_the_camera_follows_lets_go_zooms_and_fits(failure: dict[str, Any], page
         assert 0 < py < box["height"]
     page.keyboard.press("f")
     expect(follow).to_have_attribute("aria-pressed", "true")
-
-
-def test_a_click_in_a_plot_goes_there_and_all_plots_show_one_time(
-    failure: dict[str, Any], page_at: Callable[..., Page]
-) -> None:
-    page = page_at(failure["place"])
-    time_s = times(failure)
-    over = page.locator(".time-plot .u-over")
-    box = over.nth(1).bounding_box()
-    assert box is not None
-    over.nth(1).click(position={"x": box["width"] / 4, "y": box["height"] / 2})
-    wanted = time_s[0] + (time_s[-1] - time_s[0]) / 4
-    assert stage(page).evaluate(DRAWN)["time_s"] == pytest.approx(wanted, abs=0.1)
-    lefts = page.locator(".time-now").evaluate_all(
-        "(all) => all.map((line) => line.getBoundingClientRect().x - line.parentElement.getBoundingClientRect().x)"
-    )
-    assert len(lefts) == 6
-    assert lefts == pytest.approx([box["width"] / 4] * len(lefts), abs=3)
 
 
 def test_a_table_says_what_is_seen(failure: dict[str, Any], page_at: Callable[..., Page]) -> None:

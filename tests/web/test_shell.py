@@ -1,7 +1,6 @@
 """What stands around every screen: where the page is, keys, a lost server, themes."""
 
 import gzip
-import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -79,26 +78,6 @@ def _make_key(service: Service) -> str:
     key = made.stdout.split()[-1]
     service.wait_until(lambda: service.client.get("/v1/campaigns").status_code == 401)
     return key
-
-
-def test_the_tab_names_what_is_shown(page_at: Callable[..., Page], service: Service, campaign: str) -> None:
-    label = service.get(campaign)["label"]
-    failure = service.get(campaign, "/failures", limit=1)["items"][0]["id"]
-    titles = {
-        "campaigns": "Campaigns",
-        "new": "New campaign",
-        "maps": "Maps",
-        "compare": "Compare",
-        f"campaigns/{campaign}": label,
-        f"campaigns/{campaign}/failures": f"Failures · {label}",
-        f"campaigns/{campaign}/failures/{failure}": re.compile(f"{failure} · RISK-SAC$"),
-        f"campaigns/{campaign}/compare": f"Methods · {label}",
-        "nowhere": "Nothing is here",
-    }
-    page = page_at()
-    for place, title in titles.items():
-        page.goto(f"{service.client.base_url}/page/#/{place}")
-        expect(page).to_have_title(f"{title} · RISK-SAC" if isinstance(title, str) else title)
 
 
 @pytest.mark.parametrize("place", ["campaigns", "campaigns/c/failures"])
