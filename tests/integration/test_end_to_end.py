@@ -80,9 +80,3 @@ def test_every_contact_can_be_read_with_its_full_time_series_and_drawn(real, tmp
         picture.read_bytes()
         == service.client.get(f"{url}/v1/campaigns/{campaign_id}/failures/{contacts[0]['id']}/picture.png").content
     )
-
-
-def test_a_search_ends_once_it_has_had_its_processor_time(real):
-    spent = real.wait(real.post(families=["low"], methods=["random"], budget={"episodes": 1000, "cpu_s": 0.5}))
-    assert spent["state"] == "succeeded", spent["reason"]
-    assert 0 < spent["progress"]["episodes_done"] < 1000

@@ -67,24 +67,3 @@ def test_a_triage_shows_wherever_its_failure_does(service, campaign, noted):
     assert service.client.get(table).headers["etag"] == after.headers["etag"]
     assert noted.put(state="fixed").json() | {"changed_at": ""} == {"state": "fixed", "comment": "", "changed_at": ""}
     assert "fixed" in service.client.get(table).json()["triage"]
-
-
-@pytest.mark.parametrize(
-    ("body", "field"),
-    [
-        ({"state": "confirmed", "comment": "x" * 2001}, "comment"),
-        ({"state": "confirmed", "comment": "a\x1b[2Jb"}, "comment"),
-        ({"state": "wontfix"}, "state"),
-        ({"state": "new", "by": "me"}, "by"),
-    ],
-)
-def test_a_triage_that_is_none_is_refused_and_nothing_changes(service, noted, body, field):
-    before = service.client.get(noted.path).json()["triage"]
-    answer = noted.put(**body)
-    assert answer.status_code == 422, answer.text
-    (error,) = answer.json()["errors"]
-    assert error["field"] == field
-    if field == "by":
-        assert error["wanted"] == "one of comment, state"
-    assert service.client.get(noted.path).json()["triage"] == before
-    assert noted.put(state="new", comment="x" * 2000).status_code == 200
