@@ -211,7 +211,7 @@ def test_hostile_files_are_refused_in_one_line(
     assert not out
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_a_flipped_bit_is_noticed_or_makes_no_difference(seed: int, bundle: Path, tmp_path: Path) -> None:
     content = bytearray(bundle.read_bytes())
     content[int(np.random.default_rng(seed).integers(len(content)))] ^= 1 << seed

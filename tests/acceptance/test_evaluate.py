@@ -1,6 +1,5 @@
 """`risk-sac evaluate` as a user starts it: processes of its own, crashed, interrupted and resumed."""
 
-import fcntl
 import json
 import os
 import re
@@ -191,40 +190,3 @@ def test_what_fails_is_named_and_the_others_go_on(
     assert [(row["method"], row["seed"]) for row in stored["runs"]] == [("random", 0), ("random", 1)]
     assert [run["seed"] for run in stored["missing"]] == [0, 1]
     assert all(test["p"] is None for test in stored["tests"])
-
-
-def test_two_comparisons_do_not_share_a_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / ".lock").touch()
-    with (tmp_path / ".lock").open() as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        assert cli.main(["evaluate", "--families", "low", "--out", str(tmp_path)]) == 2
-    assert "in which another process is at work" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("flags", "complaint"),
-    [
-        (["--seeds", "0"], "--seeds: got 0; wanted 1 to 100 seeds"),
-        (["--seeds", "1", "--first-seed", "-1"], "--seeds: "),
-        (["--jobs", "0"], "--jobs: got 0; wanted at least one process"),
-    ],
-)
-def test_wrong_settings_are_one_line_and_leave_no_folder(
-    flags: list[str], complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert cli.main(["evaluate", *flags, "--out", str(tmp_path / "out")]) == 2
-    printed = capsys.readouterr().err
-    assert printed.startswith(complaint)
-    assert printed.count("\n") == 1
-    assert not (tmp_path / "out").exists()
-
-
-def test_an_executor_that_does_not_exist_is_one_line_and_leaves_no_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("RISK_SAC_EXECUTOR", "cloud")
-    assert cli.main(["evaluate", *ONE, str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == "RISK_SAC_EXECUTOR: got 'cloud'; wanted one of local, ray\n"
-    assert not (tmp_path / "out").exists()

@@ -6,6 +6,8 @@ import pytest
 
 from tests.acceptance.golden_digests import METHODS, SEEDS, digest, fingerprint, recorded
 
+pytestmark = pytest.mark.torture  # they hold on one kind of processor; the suite compares a run with itself
+
 
 @pytest.fixture(scope="module")
 def digests() -> dict[str, str]:

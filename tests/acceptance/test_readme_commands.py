@@ -5,28 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.acceptance.readme import Step, agrees, check, cloned, steps
+from tests.acceptance.readme import check, cloned, steps
 from tests.server import ROOT
 
 README = ROOT / "README.md"
-
-
-def test_commands_are_read_in_their_order() -> None:
-    text = "```\nmake other\n```\n\n```console\n$ risk-sac one\n…\nDone: 3\n$ risk-sac two\n```\n"
-    assert list(steps(text)) == [Step("risk-sac one", ("…", "Done: 3")), Step("risk-sac two")]
-
-
-@pytest.mark.parametrize(
-    ("printed", "agreed"),
-    [
-        ("found 12 failures\n", True),
-        ("bar\nfound  7 failures\nDone\n", True),
-        ("found many failures\n", False),
-        ("Done\n", False),
-    ],
-)
-def test_a_line_agrees_whatever_its_numbers(printed: str, agreed: bool) -> None:
-    assert agrees(printed, ("…", "found 3 failures")) is agreed
 
 
 def test_readme_has_the_two_commands_and_those_of_a_run() -> None:

@@ -1,6 +1,5 @@
 """Real failures: replayed, bundled, minimised, their regions, their twins, and played against other egos."""
 
-import json
 import shutil
 import subprocess
 import sys
@@ -140,46 +139,6 @@ def test_a_core_does_less_and_fails_in_the_same_way_as_surely(
     assert tell("replay", tmp_path / "core.npz")[0] == 0
 
 
-def test_a_region_is_told_with_its_intervals(run: Path, failure: Path, tmp_path: Path, tell: Tell) -> None:
-    index = read_bundle(failure).manifest.episode.index
-    status, out, _ = tell("region", run, index, "--out", tmp_path / "region.json")
-    assert status == 0
-    noted = read_run(run).studies[index].region
-    assert noted is not None
-    assert noted.model_dump_json(indent=2) == (tmp_path / "region.json").read_text()
-    shares = json.loads((tmp_path / "region.json").read_bytes())["shares"]
-    assert [(share["what"], share["played"]) for share in shares] == [
-        ("scene by 1%", 40),
-        ("scene by 2%", 40),
-        ("scene by 5%", 40),
-        ("other traffic", 10),
-        ("actions by 5%", 40),
-    ]
-    assert all(share["low"] <= share["failed"] / share["played"] <= share["high"] for share in shares)
-    assert ("no needle" in out) == (shares[0]["failed"] >= 20)
-
-
-def test_clusters_name_every_distinct_failure_once(run: Path, tmp_path: Path, tell: Tell) -> None:
-    status, out, _ = tell("clusters", run, "--out", tmp_path / "clusters.json")
-    assert status == 0
-    found = json.loads((tmp_path / "clusters.json").read_bytes())
-    metrics = read_results(run).metrics
-    assert metrics is not None
-    assert sum(cluster["distinct"] for cluster in found["clusters"]) == metrics.distinct_failures
-    assert {cluster["name"]: cluster["failures"] for cluster in found["clusters"]} == metrics.signatures
-    assert found["covered"] == metrics.covered
-    assert f"{len(found['clusters'])} kind" in out
-
-
-@pytest.mark.parametrize("twin", ["idle", "careful"])
-def test_a_twin_is_drawn_beside_a_failure(twin: str, run: Path, tell: Tell) -> None:
-    status, out, _ = tell("show", run, distinct_failures(read_results(run))[0].index, "--twin", twin)
-    assert status == 0
-    (picture,) = (run / "failures").glob(f"*-{twin}.png")
-    assert str(picture) in out.replace(" ", "")
-    picture.unlink()
-
-
 def regressed(tell: Tell, tmp_path: Path, *arguments: object) -> tuple[int, list[Verdict]]:
     status, *_ = tell("regress", *arguments, "--out", tmp_path / "cases.json")
     cases = Regression.model_validate_json((tmp_path / "cases.json").read_bytes()).cases
@@ -253,17 +212,6 @@ def test_an_ego_that_sees_nothing_fixes_nothing(failures: Path, tmp_path: Path, 
     assert set(verdicts) == {Verdict.NEW_KIND}
 
 
-def test_what_is_asked_of_a_failure_names_one(run: Path, failure: Path, tell: Tell) -> None:
-    for asked, complaint in (
-        (("minimise", run, "--out", "x"), "which is a folder; wanted a bundle, or a failure of its run too"),
-        (("minimise", failure), "--out is missing; choose a file for the core of a bundle"),
-        (("region", run, "nobody"), "got 'nobody'; wanted one of"),
-    ):
-        status, out, err = tell(*asked)
-        assert (status, out) == (2, "")
-        assert complaint in err
-
-
 @pytest.mark.parametrize("verb", ["minimise", "region"])
 def test_what_does_not_happen_here_has_neither_core_nor_region(
     verb: str, failure: Path, tmp_path: Path, tell: Tell
@@ -280,12 +228,6 @@ def test_what_does_not_happen_here_has_neither_core_nor_region(
     assert status == 2
     assert "was found on another" in err
     assert not (tmp_path / "out").exists()
-
-
-def test_an_empty_set_is_refused(tmp_path: Path, tell: Tell) -> None:
-    status, _, err = tell("regress", "--failures", tmp_path, "--ego", "default")
-    assert status == 2
-    assert "there is no failure in" in err
 
 
 class Sharp:

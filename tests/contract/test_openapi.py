@@ -11,6 +11,7 @@ from pydantic import BaseModel
 
 from risk_sac.config import CampaignSpec, LearnerConfig, Odd
 from service.api.examples import CAMPAIGNS as EXAMPLES
+from service.api.routes import events
 from service.app import create_app, openapi
 from service.openapi import document
 from service.settings import ServiceSettings
@@ -115,3 +116,16 @@ def test_answers_about_a_campaign_that_exists_are_as_documented(base_url, schema
 def test_an_object_that_is_left_out_is_what_its_own_defaults_make_of_it(model):
     defaults = [field.default for field in model.model_fields.values() if isinstance(field.default, BaseModel)]
     assert defaults == [type(default)() for default in defaults] != []
+
+
+def test_a_stream_without_news_beats(base_url, monkeypatch):
+    assert events.HEARTBEAT_S == 15
+    monkeypatch.setattr(events, "HEARTBEAT_S", 0.05)
+    campaign_id = httpx.post(f"{base_url}/v1/campaigns", json={"families": ["low"]}).json()["id"]
+    beats = 0
+    with httpx.stream("GET", f"{base_url}/v1/campaigns/{campaign_id}/events") as stream:
+        for line in stream.iter_lines():
+            beats += line == ": alive"
+            if beats == 3:
+                return
+    pytest.fail("the stream ended")

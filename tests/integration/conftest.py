@@ -2,13 +2,16 @@
 
 import importlib.util
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from types import ModuleType
 
 import httpx
 import pytest
 
-from tests.server import SCRIPTED, Service, servers
+from service.settings import ServiceSettings
+from tests.contract.serving import serving
+from tests.server import LONG_S, SCRIPTED, Service, servers
 
 
 @pytest.fixture(scope="session")
@@ -22,16 +25,58 @@ def scripted() -> ModuleType:
     return module
 
 
-@pytest.fixture(scope="module")
-def shared(serve_shared: Callable[..., Service]) -> Service:
-    """One server for all tests of a module that look at nothing but what they posted themselves."""
-    return serve_shared()
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """One server for all tests that look at nothing but what they posted themselves."""
+    with servers(tmp_path_factory.mktemp("scripted")) as start:
+        yield start()
+
+
+@pytest.fixture(scope="session")
+def striking(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """The same with workers that find failures, and with little patience."""
+    with servers(tmp_path_factory.mktemp("striking")) as start:
+        yield start("striking_worker", attempts=2)
+
+
+@pytest.fixture(scope="session")
+def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
+    """The same with real workers."""
+    with servers(tmp_path_factory.mktemp("real")) as start:
+        yield start("risk_sac.execution.worker", grace_s=30)
 
 
 @pytest.fixture(scope="module")
 def client(shared: Service) -> httpx.Client:
-    """A client of it."""
+    """A client of the scripted server."""
     return shared.client
+
+
+class Inside(Service):
+    """A server within this process whose runs wait until they are cancelled."""
+
+    def __init__(self, url: str, data_dir: Path) -> None:
+        self.data_dir = data_dir
+        self.client = httpx.Client(base_url=url, timeout=120)
+        self.port = self.client.base_url.port
+
+    def wait_until(self, holds: Callable[[], bool], timeout_s: float = LONG_S, *, alive: bool = False) -> None:
+        """Waits; there is no process to watch."""
+        super().wait_until(holds, timeout_s, alive=False)
+
+
+@pytest.fixture
+def serve_inside(tmp_path: Path) -> Iterator[Callable[..., Inside]]:
+    """Starts servers within this process and stops them at the end of the test."""
+    with ExitStack() as stack:
+
+        def start(**settings: object) -> Inside:
+            given = {"data_dir": tmp_path / "data"} | settings
+            service = Inside(stack.enter_context(serving(ServiceSettings.model_validate(given))), tmp_path / "data")
+            stack.callback(service.client.close)
+            return service
+
+        yield start
 
 
 @pytest.fixture
@@ -45,7 +90,7 @@ def serve(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Callable[.
 def serve_shared(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[..., Service]]:
-    """The same, at the end of the module."""
+    """Starts servers and stops them at the end of the module."""
     with servers(tmp_path_factory.mktemp("shared"), **database(request)) as start:
         yield start
 

@@ -85,6 +85,9 @@ def test_a_body_that_is_no_json_is_refused(client, body, detail):
     assert_checked_alike(client, body, response.json())
 
 
+TRIAGE = "/v1/campaigns/c0/failures/f0/triage"
+
+
 def nested(opening, depth, closing):
     return b'{"network": "x", "a": ' + opening * depth + b"1" + closing * depth + b"}"
 
@@ -105,17 +108,14 @@ def nested(opening, depth, closing):
     ],
     ids=lambda each: str(each)[:40],
 )
-@pytest.mark.parametrize(
-    "path", ["/v1/campaigns", "/v1/campaigns/check", "/v1/regressions", "/v1/campaigns/c0/failures/f0/triage"]
-)
-def test_a_hostile_body_costs_no_more_than_its_size(shared, client, path, body, status):
+def test_a_hostile_body_costs_no_more_than_its_size(shared, client, body, status):
     server = psutil.Process(shared.process.pid)
-    before = sum(server.cpu_times()[:2])
-    method = "PUT" if path.endswith("triage") else "POST"
-    response = client.request(method, path, content=body, headers={"content-type": "application/json"})
-    assert response.status_code == status, response.text
-    assert len(response.json()["detail"]) < 20_000
-    assert sum(server.cpu_times()[:2]) - before < 0.5
+    for method, path in (("POST", "/v1/campaigns"), ("POST", "/v1/regressions"), ("PUT", TRIAGE)):
+        before = sum(server.cpu_times()[:2])
+        response = client.request(method, path, content=body, headers={"content-type": "application/json"})
+        assert response.status_code == status, response.text
+        assert len(response.json()["detail"]) < 20_000
+        assert sum(server.cpu_times()[:2]) - before < 0.5
 
 
 def assert_checked_alike(client, body, problem):
@@ -138,6 +138,7 @@ def test_a_check_keeps_nothing_and_needs_no_key(client):
     assert campaigns() == before
     posted = client.post("/v1/campaigns", json={"families": ["low"]}, headers={"idempotency-key": "nightly"})
     assert posted.status_code == 202, "the key is still free"
+    client.post(f"{posted.headers['location']}/cancel")
     assert client.get("/v1/campaigns/check").json()["reason"] == "unknown_id", "no campaign is called so"
     assert client.post("/v1/campaigns/check", content=b"{}").status_code == 415
 
@@ -157,38 +158,8 @@ def test_a_body_of_another_type_is_refused(client):
     assert "'text/plain'; wanted application/json" in response.json()["detail"]
 
 
-@pytest.mark.parametrize(
-    ("path", "status", "field"),
-    [
-        ("/v1/campaigns/none", 404, "campaign_id"),
-        ("/v1/campaigns/none/results", 404, "campaign_id"),
-        ("/v1/campaigns/none/power", 404, "campaign_id"),
-        ("/v1/campaigns/none/episodes", 404, "campaign_id"),
-        ("/v1/campaigns/none/failures", 404, "campaign_id"),
-        ("/v1/campaigns/none/failures/x", 404, "campaign_id"),
-        ("/v1/campaigns/%00%ff", 404, "campaign_id"),
-        ("/v1/campaigns?limit=0", 422, "limit"),
-        ("/v1/campaigns?limit=many", 422, "limit"),
-        ("/v1/campaigns?cursor=AAAA", 422, "cursor"),
-        ("/v1/campaigns?cursor=OTk5OTk5OTk5OTk5OTk5OTk5OTk5OTk=", 422, "cursor"),
-        ("/v1/campaigns/none/failures?tier=all", 422, "tier"),
-        ("/v1/campaigns/none/failures?grade=good", 422, "grade"),
-        ("/v1/campaigns/none/failures?driven_by=luck", 422, "driven_by"),
-        ("/v1/campaigns/none/failures?broke=red%25light", 422, "broke"),
-        ("/v1/campaigns/none/failures?broke=", 422, "broke"),
-        ("/v1/campaigns/none/failures?signature=%00", 422, "signature"),
-        ("/v1/campaigns/none/episodes?outcome=crash", 422, "outcome"),
-    ],
-)
-def test_a_bad_address_is_refused_by_field(client, path, status, field):
-    response = client.get(path)
-    assert response.status_code == status
-    assert response.json()["status"] == status
-    assert [error["field"] for error in response.json()["errors"]] == [field]
-
-
-def post(client: httpx.Client, body: str) -> httpx.Response:
-    return client.post("/v1/campaigns", content=body, headers={"content-type": "application/json"})
+def post(client: httpx.Client, body: str, path: str = "/v1/campaigns") -> httpx.Response:
+    return client.post(path, content=body, headers={"content-type": "application/json"})
 
 
 def odd(text: str) -> str:
@@ -227,17 +198,17 @@ def test_a_hostile_odd_is_refused_with_its_reason(client: httpx.Client, body: st
     assert 0 < len(response.json()["detail"]) < 5000
 
 
-def test_hostile_formulas_are_refused_or_queued(client: httpx.Client) -> None:
+def test_hostile_formulas_are_refused_or_taken(client: httpx.Client) -> None:
     every = formulas()
     outcomes = []
     for formula in every[:: len(every) // 60]:
         requirement = {"name": "mine", "formula": formula, "scale": 1}
         spec = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 1}, "requirements": [requirement]}
-        response = post(client, json.dumps(spec))
-        assert response.status_code in (202, 400, 422), f"{formula!r}: {response.text[:500]}"
+        response = post(client, json.dumps(spec), "/v1/campaigns/check")
+        assert response.status_code in (200, 400, 422), f"{formula!r}: {response.text[:500]}"
         if response.status_code == 422:
             assert response.json()["errors"][0]["field"] == "requirements[0].formula"
         outcomes.append(response.status_code)
     assert outcomes.count(422) > 25
-    assert outcomes.count(202) > 5
+    assert outcomes.count(200) > 5
     assert client.get("/healthz").status_code == 200

@@ -167,6 +167,23 @@ def test_an_ego_s_path_stays_that_of_its_first_lane(sim: SumoSimulation, pilot: 
     assert libsumo.vehicle.getPosition("ego") == pytest.approx((352.3, -away_m))
 
 
+@pytest.mark.parametrize("wary", [True, False])
+@pytest.mark.parametrize(("own_m", "beside_m"), [(-1.65, -4.95), (-4.95, -1.65)])
+@pytest.mark.parametrize("speed_mps", [6.0, 12.0])
+def test_who_comes_beside_an_ego_that_stands_askew_stops_for_it_only_if_drivers_are_wary(
+    sim: SumoSimulation, pilot: Told, own_m: float, beside_m: float, speed_mps: float, wary: bool
+) -> None:
+    """Its front is in the middle of its lane and its tail in the one beside it."""
+    towards = math.copysign(1.0, beside_m - own_m)
+    pilot.motion = lambda time_s: Motion(150.0, own_m + towards * 1.15, -towards * math.radians(30.0), 0.0)
+    own, beside = (2, 1) if own_m > beside_m else (1, 2)
+    other = car("other", ("e1", "e2"), beside, 90.0, speed_mps)
+    layout = replace(MIXED, ego=car("ego", ("e1", "e2"), own, 150.0, 0.0), vehicles=(other,), wary=wary)
+    frames = play(sim, layout, 100)
+    assert any(relative_view(frame).overlap[0] for frame in frames) != wary
+    assert frames[-1].x_m[1] > 130.0  # it came near
+
+
 CUT_IN = Genes(active=1.0, place=0.7, aside=0.3, cue=0.4, drive=0.5, steer=1.0, lasts=1.0, after=0.5)  # at 2.9 s
 
 

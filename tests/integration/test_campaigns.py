@@ -107,7 +107,7 @@ def test_a_lost_worker_is_replaced_and_no_episode_is_lost_or_told_twice(shared, 
     assert sorted(shared.episodes(campaign_id, run["id"])) == list(range(80))
 
 
-@EACH_DATABASE_SHARED
+@SQLITE_FIRST_SHARED
 def test_cancel_stops_at_an_episode_and_keeps_what_was_found(shared):
     campaign_id = shared.post(seeds=[0, 1, 2], budget={"episodes": 1000})
     shared.wait_for(campaign_id, lambda seen: seen["progress"]["episodes_done"] > 4)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from risk_sac.client import Campaign, Client, Refused
+from risk_sac.client import Campaign, Client
 from risk_sac.config import Budget, CampaignSpec
 from risk_sac.records import wire
 from tests.server import LONG_S, Service
@@ -17,8 +17,8 @@ SPEC = CampaignSpec(label="a", families=("low",), methods=("random",), seeds=(0,
 
 
 @pytest.fixture(scope="module")
-def shared(serve_shared: Callable[..., Service]) -> Service:
-    return serve_shared("striking_worker")
+def shared(striking: Service) -> Service:
+    return striking
 
 
 @pytest.fixture
@@ -42,32 +42,6 @@ def test_a_campaign_is_submitted_followed_and_read(shared: Service, client: Clie
     assert json.loads(wire(results)) == shared.get(campaign.id, "/results")
     assert [(total.method, total.failures) for total in results.totals] == [("random", 6)]
     assert client.table(campaign.id).startswith("# Comparison of methods")
-
-
-def test_the_events_tell_of_every_episode_and_of_the_end(client: Client) -> None:
-    campaign = client.submit(SPEC)
-    events = list(client.events(campaign.id))
-    episodes = [event.data for event in events if event.name in ("episode", "failure")]
-    assert sorted((each["run_id"], each["index"]) for each in episodes) == [
-        (run, index) for run in ("low-random-0", "low-random-1") for index in range(6)
-    ]
-    assert (events[-1].name, events[-1].data["run_id"], events[-1].data["state"]) == ("state", None, "succeeded")
-    assert list(client.events(campaign.id, events[3].id)) == events[4:]
-    assert list(client.events(campaign.id, events[-1].id)) == []
-
-
-def test_a_campaign_is_cancelled_and_then_deleted(client: Client) -> None:
-    campaign = client.submit(SPEC.model_copy(update={"budget": Budget(episodes=10_000)}))
-    with pytest.raises(Refused) as caught:
-        client.delete(campaign.id)
-    assert (caught.value.status, caught.value.reason) == (409, "not_ended")
-    client.cancel(campaign.id)
-    assert client.wait(campaign.id, timeout_s=LONG_S).state == "cancelled"
-    assert client.cancel(campaign.id).state == "cancelled"
-    client.delete(campaign.id)
-    with pytest.raises(Refused) as caught:
-        client.campaign(campaign.id)
-    assert (caught.value.status, caught.value.reason) == (404, "unknown_id")
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.torture)])

@@ -5,9 +5,8 @@ from pathlib import Path
 
 from risk_sac import cli
 from risk_sac.client import Campaign, Episode, Run
-from risk_sac.config import Budget, CampaignSpec
 from risk_sac.records import Grade
-from service.demo import conclude, draw_command, in_words, main
+from service.demo import draw_command, main
 from tests.builders import collision, episode_record, judgement
 from tests.unit.client.scripted_server import PROGRESS
 from tests.unit.client.scripted_server import campaign as campaign_json
@@ -45,11 +44,6 @@ def test_it_ends_with_the_defect_that_was_found_and_a_command_that_draws_the_fai
     assert (data_dir / "failure.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_its_last_line_counts_what_is_worth_a_persons_time_and_no_repeats(capsys):
-    assert conclude(campaign(headline=2, distinct_failures=14, distinct_preventable=3, headline_candidates=3)) == 0
-    assert capsys.readouterr().out == "headline failures: 2 (of 14 distinct ones, 3 preventable)\n"
-
-
 def test_it_offers_to_draw_a_preventable_failure_where_there_is_one():
     def failure(index, grade):
         contact = collision(judgement=None if grade is None else judgement(grade))
@@ -60,14 +54,3 @@ def test_it_offers_to_draw_a_preventable_failure_where_there_is_one():
     failures = [failure(3, None), failure(5, Grade.FULL_BRAKING), failure(8, Grade.PREVENTABLE)]
     assert draw_command(searched, failures, Path()).endswith(" r-search-8 --out failure.png")
     assert draw_command(searched, failures[:2], Path()).endswith(" r-search-3 --out failure.png")
-
-
-def test_it_says_which_search_needed_how_many_episodes():
-    spec = CampaignSpec(families=("low",), methods=("archive", "random"), budget=Budget(episodes=200))
-    found = Episode.model_validate(
-        episode_record(30).model_dump() | {"id": "low-archive-0-search-30", "run_id": "low-archive-0", "wall_s": 1.0}
-    )
-    searched = campaign().model_copy(update={"spec": spec})
-    assert in_words("latency", searched, {"low-archive-0": found, "low-random-0": None}) == (
-        "the defect `latency` was found after 31 episodes by archive; not within its 200 episodes by random"
-    )

@@ -174,7 +174,7 @@ def test_a_process_of_another_version_drives_nothing(tmp_path, monkeypatch):
             play(spec_of("far"), tmp_path / "run")
 
 
-@pytest.mark.parametrize("fails", ["raise ValueError('by me')", "raise SystemExit(0)", "__import__('os')._exit(0)"])
+@pytest.mark.parametrize("fails", ["raise SystemExit(0)", "__import__('os')._exit(0)"])
 def test_invalid_episodes_are_counted_by_no_rate(install, tmp_path, fails):
     install(f"if self.steps == 30 and perceived.state[0, 0] % 2 < 1: {fails}")
     results, records = play(spec_of("example", episodes=12), tmp_path)
@@ -253,12 +253,6 @@ def test_a_request_names_only_defects_that_exist_and_fit(client):
     assert listed["latency"] == "perception"
 
 
-def test_an_ego_in_another_process_has_no_defects(tmp_path, monkeypatch):
-    register(monkeypatch, tmp_path, far='address = "127.0.0.1:1"\nversion = "1"\nresponse_time_s = 1.0\n')
-    with pytest.raises(ConfigError, match=r"ego\.defects: got \['latency'\] for the ego 'far'.*wanted a Python ego"):
-        pinned(EgoConfig(driver="far", defects=("latency",)))
-
-
 @pytest.mark.parametrize("ego", [{"driver": "idm-aeb", "defects": ("latency",)}, {"defects": ("sumo-short-headway",)}])
 def test_records_say_when_a_defect_was_reached_and_runs_repeat(ego, tmp_path):
     spec = spec_of("idm-aeb", episodes=4).model_copy(update={"ego": EgoConfig.model_validate(ego)})
@@ -273,14 +267,6 @@ def test_a_planner_drives_a_run(tmp_path, family):
     results, records = play(spec_of("fiss-plus", family=family, episodes=2), tmp_path / "run")
     assert results.metrics.environment_steps > 100
     assert all(record.outcome is not Outcome.INVALID for record in records)
-
-
-def test_a_campaign_keeps_the_version_of_its_ego_and_runs_with_it(shared):
-    body = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 2}, "ego": {"driver": "idm-aeb"}}
-    posted = shared.client.post("/v1/campaigns", json=body).raise_for_status().json()
-    assert posted["spec"]["ego"]["version"] == card_of("idm-aeb").version
-    assert posted["ego"]["driver"] == "idm-aeb"
-    assert shared.wait(posted["id"])["state"] == "succeeded"
 
 
 @pytest.mark.skipif(not CPP_COMPILES, reason="needs C++ and gRPC")

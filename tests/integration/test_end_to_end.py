@@ -23,8 +23,8 @@ def run_folder(service, campaign_id, run_id):
     return service.data_dir / "campaigns" / campaign_id / run_id
 
 
-def test_a_campaign_finds_the_same_with_and_without_a_crash_of_the_server(serve):
-    service = serve("risk_sac.execution.worker", grace_s=30)
+def test_a_campaign_finds_the_same_with_and_without_a_crash_of_the_server(real):
+    service = real
     calm = service.wait(service.post(**SPEC))
     assert calm["state"] == "succeeded", calm["reason"]
     results = service.get(calm["id"], "/results")
@@ -49,8 +49,8 @@ def test_a_campaign_finds_the_same_with_and_without_a_crash_of_the_server(serve)
     assert [json.loads(line)["index"] for line in lines] == list(range(6))
 
 
-def test_every_contact_can_be_read_with_its_full_time_series_and_drawn(serve, tmp_path):
-    service = serve("risk_sac.execution.worker", grace_s=30)
+def test_every_contact_can_be_read_with_its_full_time_series_and_drawn(real, tmp_path):
+    service = real
     campaign_id = service.post(families=["mixed"], methods=["random"], budget={"episodes": 60})
     campaign = service.wait(campaign_id)
     assert campaign["state"] == "succeeded", campaign["reason"]
@@ -80,10 +80,3 @@ def test_every_contact_can_be_read_with_its_full_time_series_and_drawn(serve, tm
         picture.read_bytes()
         == service.client.get(f"{url}/v1/campaigns/{campaign_id}/failures/{contacts[0]['id']}/picture.png").content
     )
-
-
-def test_a_search_ends_once_it_has_had_its_processor_time(serve):
-    service = serve("risk_sac.execution.worker", grace_s=30)
-    spent = service.wait(service.post(families=["low"], methods=["random"], budget={"episodes": 1000, "cpu_s": 0.5}))
-    assert spent["state"] == "succeeded", spent["reason"]
-    assert 0 < spent["progress"]["episodes_done"] < 1000

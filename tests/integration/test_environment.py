@@ -1,4 +1,4 @@
-"""Each field of an ODD acts on the episodes or is refused; weather and light act on every kind of ego."""
+"""Each field of an ODD acts or is refused; weather, light and trucks hide what the ego sees."""
 
 from collections.abc import Mapping
 from contextlib import closing
@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from risk_sac.config import Odd, RunSpec
-from risk_sac.env import RiskSacEnv
+from risk_sac.env import RiskSacEnv, make_default
 from risk_sac.errors import InfeasibleScene, OddError
 from risk_sac.scenario.environment import LOW_BEAM_M
 from risk_sac.scenario.odd import paths
-from risk_sac.types import Frame, Kind, Scene
+from risk_sac.types import STEP_S, Frame, Kind, Scene
 
 BRAKE, STEPS = -1.0, 60
 FOG_M, CLEAR_M = 40.0, 2000.0
@@ -159,3 +159,34 @@ def test_each_field_of_an_odd_acts_or_is_refused(path: str, usual: bytes) -> Non
         assert refused.value.field == f"odd.{path}"
     else:
         assert episodes(odd) != usual
+
+
+SCENES, WATCHED_STEPS = 40, 80
+HIDDEN_S = 0.5
+NEAR_M, FAR_M = 3.0, 45.0  # between the ego and the pedestrian, along the road
+
+
+def test_a_pedestrian_is_hidden_in_half_of_the_mixed_scenes_though_nobody_attacks() -> None:
+    """For half a second or more while the ego comes near."""
+    draw = np.random.default_rng(5)
+    hidden = count = 0
+    with closing(make_default("mixed")) as env:
+        space, idle = env.problem.space, np.zeros(env.action_size, dtype=np.float32)
+        for seed in range(SCENES):
+            try:
+                env.reset(seed=seed, options={"scene": space.from_unit(draw.random(space.dimension))})
+            except InfeasibleScene:
+                continue
+            count += 1
+            unseen = 0
+            for _ in range(WATCHED_STEPS):
+                *_, terminated, _, _ = env.step(idle)
+                frame, seen = env.trace.frames[-1], env.trace.measures[-1].assessment.seen
+                walker = frame.ids.index("pedestrian")
+                ahead_m = frame.x_m[walker] - frame.x_m[0]
+                unseen += bool(NEAR_M < ahead_m < FAR_M and not seen[walker - 1])
+                if terminated:
+                    break
+            hidden += unseen * STEP_S >= HIDDEN_S - 1e-9
+    print(f"hidden in {hidden} of {count} scenes")
+    assert hidden >= 0.5 * count

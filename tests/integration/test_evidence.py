@@ -22,8 +22,8 @@ RUNS = ["low-archive-601", "low-iid-undisturbed-3", "low-iid-random-3"]
 
 
 @pytest.fixture(scope="module")
-def service(serve_shared):
-    return serve_shared("risk_sac.execution.worker", grace_s=30)
+def service(real):
+    return real
 
 
 @pytest.fixture(scope="module")

@@ -1,14 +1,15 @@
-"""The load of `make load`, small and short: nothing goes wrong and nothing leaks. How fast it is, is measured there."""
+"""Nothing leaks: a small and short `make load`, and episode after episode in one process."""
 
 import json
 import subprocess
 import sys
 
 import psutil
+import pytest
 
 from tests.server import ROOT
 
-POLLERS, STREAMS, SECONDS = 20, 5, 5
+POLLERS, STREAMS, SECONDS = 20, 5, 3
 
 
 def generate(service, campaigns, seconds):
@@ -38,3 +39,16 @@ def test_pollers_and_streams_see_all_without_an_error_and_leave_nothing_open(ser
     }
     service.wait_until(lambda: len(server.net_connections(kind="tcp")) <= 2)  # that it listens on, and our own
     assert server.num_fds() <= before + 2 * STREAMS
+
+
+EPISODES = 50
+
+
+@pytest.mark.parametrize(
+    "family", [*(pytest.param(name, marks=pytest.mark.torture) for name in ("low", "dense")), "mixed"]
+)
+def test_fifty_biased_episodes_do_not_take_the_process_down(family: str) -> None:
+    command = [sys.executable, "-m", "tests.soak", family, str(EPISODES)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout.startswith("grew ")

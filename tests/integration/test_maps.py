@@ -1,7 +1,6 @@
 """A map of one's own: over REST, and turned to any side."""
 
 import math
-from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -22,11 +21,6 @@ from tests.server import Service
 NETS = Path(sumo_nets.__path__[0])
 XML = {"content-type": "application/xml"}
 STEPS = 60
-
-
-@pytest.fixture(scope="module")
-def service(serve_shared: Callable[..., Service]) -> Service:
-    return serve_shared()
 
 
 def played(net: Path, pattern: Pattern, place: str, seed: int) -> list[Frame]:
@@ -65,7 +59,8 @@ def test_an_episode_is_the_same_in_whichever_direction_its_map_lies(
         assert (a.signal, a.link.tobytes()) == (b.signal, b.link.tobytes())
 
 
-def test_from_an_extract_of_a_town_to_the_results_of_a_campaign_on_it(service: Service) -> None:
+def test_from_an_extract_of_a_town_to_the_results_of_a_campaign_on_it(shared: Service) -> None:
+    service = shared
     taken = service.client.post("/v1/networks", content=osm_town(), headers=XML)
     assert taken.status_code == 201, taken.text
     assert any("angle" in warning for warning in taken.json()["warnings"])

@@ -1,14 +1,8 @@
 """What operators see of the service: health, metrics and its log."""
 
 import json
-import shutil
-import subprocess
-import sys
 
-import pytest
 from prometheus_client.parser import text_string_to_metric_families
-
-from tests.server import ROOT
 
 
 def samples(service):
@@ -23,17 +17,6 @@ def samples(service):
 
 def value(found, name, **labels):
     return found.get((name, *sorted(labels.items())), 0.0)
-
-
-@pytest.mark.skipif(shutil.which("make") is None, reason="no make")
-def test_make_serve_listens_where_the_environment_says(serve):
-    service = serve(started=False)
-    command = ["make", "-o", ".venv/.installed", f"PYTHON={sys.executable}", "serve"]
-    with service.log.open("ab") as log:
-        service.process = subprocess.Popen(command, cwd=ROOT, env=service.environment, stdout=log, stderr=log)
-    service.wait_until(service._answers)
-    service.stop()
-    service.wait_until(lambda: not service._answers(), alive=False)
 
 
 def test_requests_are_counted_by_route_and_what_was_done_outlives_a_restart(serve):
@@ -63,11 +46,6 @@ def test_requests_are_counted_by_route_and_what_was_done_outlives_a_restart(serv
         service.stop()
         service.start()
         found = samples(service)
-
-
-def test_an_idle_service_is_healthy_and_ready(client):
-    assert client.get("/healthz").json() == {"status": "ok"}
-    assert client.get("/readyz").json() == {"status": "ready"}
 
 
 def test_a_request_keeps_the_id_it_came_with_and_gets_one_otherwise(client):

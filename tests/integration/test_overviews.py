@@ -10,8 +10,8 @@ EPISODES = 24
 
 
 @pytest.fixture(scope="module")
-def service(serve_shared):
-    return serve_shared("striking_worker")
+def service(striking):
+    return striking
 
 
 @pytest.fixture(scope="module")
@@ -19,17 +19,6 @@ def campaign(service):
     campaign_id = service.post(seeds=[0, 1], budget={"episodes": EPISODES})
     assert service.wait(campaign_id)["state"] == "succeeded"
     return campaign_id
-
-
-def test_curves_follow_the_search_of_each_run(service, campaign):
-    runs = service.get(campaign, "/curves")["runs"]
-    assert [run["run_id"] for run in runs] == ["low-random-0", "low-random-1"]
-    for run in runs:
-        assert run["episodes"] == list(range(1, EPISODES + 1))
-        assert run["preventable"][-1] == service.get(campaign)["runs"][run["seed"]]["preventable"]
-    few = service.get(campaign, "/curves", points=5)["runs"][0]
-    assert few["episodes"] == [5, 10, 15, 20, 24]
-    assert few["window_ecr"] == [runs[0]["window_ecr"][count - 1] for count in few["episodes"]]
 
 
 def test_the_power_of_a_campaign_goes_by_its_own_episodes(service):
@@ -78,27 +67,3 @@ def test_a_triage_shows_wherever_its_failure_does(service, campaign, noted):
     assert service.client.get(table).headers["etag"] == after.headers["etag"]
     assert noted.put(state="fixed").json() | {"changed_at": ""} == {"state": "fixed", "comment": "", "changed_at": ""}
     assert "fixed" in service.client.get(table).json()["triage"]
-
-
-@pytest.mark.parametrize(
-    ("body", "field"),
-    [
-        ({"state": "confirmed", "comment": "x" * 2001}, "comment"),
-        ({"state": "confirmed", "comment": "a\0b"}, "comment"),
-        ({"state": "confirmed", "comment": "a\x1b[2Jb"}, "comment"),
-        ({"state": "confirmed", "comment": None}, "comment"),
-        ({"state": "wontfix"}, "state"),
-        ({"comment": "x"}, "state"),
-        ({"state": "new", "by": "me"}, "by"),
-    ],
-)
-def test_a_triage_that_is_none_is_refused_and_nothing_changes(service, noted, body, field):
-    before = service.client.get(noted.path).json()["triage"]
-    answer = noted.put(**body)
-    assert answer.status_code == 422, answer.text
-    (error,) = answer.json()["errors"]
-    assert error["field"] == field
-    if field == "by":
-        assert error["wanted"] == "one of comment, state"
-    assert service.client.get(noted.path).json()["triage"] == before
-    assert noted.put(state="new", comment="x" * 2000).status_code == 200

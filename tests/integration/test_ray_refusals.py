@@ -24,25 +24,11 @@ class Without(PathFinder):
         return None if name.partition(".")[0] == "ray" else super().find_spec(name, path, target)
 sys.meta_path[sys.meta_path.index(PathFinder)] = Without
 """
-ANOTHER_PYTHON = """
-import collections, sys
-Version = collections.namedtuple("Version", "major minor micro releaselevel serial")
-sys.version_info = Version(*sys.version_info[:2], 99, *sys.version_info[3:])
-"""
 
 
 def path_with(*folders: Path) -> dict[str, str]:
     """An environment in which these folders come before what is installed."""
     return {"PYTHONPATH": os.pathsep.join([*map(str, folders), str(ROOT), os.environ.get("PYTHONPATH", "")])}
-
-
-def distribution(folder: Path, name: str, version: str, entry_points: str = "") -> Path:
-    """What a package leaves when it is installed into a folder."""
-    info = folder / f"{name.replace('-', '_')}-{version}.dist-info"
-    info.mkdir(parents=True)
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
-    (info / "entry_points.txt").write_text(entry_points)
-    return folder
 
 
 @pytest.mark.parametrize("command", [["risk_sac", "evaluate", *TINY], ["service"]], ids=lambda command: command[0])
@@ -90,47 +76,3 @@ def test_settings_that_cannot_work_are_named(cluster, monkeypatch, environment, 
     error = refusal()
     assert error.field == field
     assert said in str(error)
-
-
-@needs_ray
-def test_a_server_with_another_ray_is_refused(cluster, monkeypatch, tmp_path):
-    import ray
-
-    # All of the installed Ray but the file that has its version.
-    overlay = tmp_path / "ray"
-    overlay.mkdir()
-    for each in Path(ray.__file__).parent.iterdir():
-        (overlay / each.name).symlink_to(each)
-    (overlay / "_version.py").unlink()
-    (overlay / "_version.py").write_text('version = "2.1.0"\ncommit = ""\n')
-    monkeypatch.setenv("PYTHONPATH", path_with(tmp_path)["PYTHONPATH"])
-    error = refusal()
-    assert error.field == "RISK_SAC_RAY_ADDRESS"
-    assert f"Ray: {ray.__version__}" in str(error)
-    assert "Ray: 2.1.0" in str(error)
-
-
-@needs_ray
-def test_an_ego_that_the_server_has_and_a_node_lacks_is_named(cluster, monkeypatch, tmp_path):
-    distribution(tmp_path, "example-ego", "1", "[risk_sac.egos]\nexample = example_ego:Example\n")
-    (tmp_path / "example_ego.py").write_text("class Example:\n    version = '7'\n    response_time_s = 0.5\n")
-    monkeypatch.setenv("PYTHONPATH", path_with(tmp_path)["PYTHONPATH"])
-    error = refusal()
-    assert error.field == "RISK_SAC_RAY_ADDRESS"
-    assert "the ego example is missing; wanted 7+" in str(error)
-
-
-@needs_ray
-def test_a_node_with_another_python_and_other_packages_is_refused_before_any_run(cluster, tmp_path):
-    distribution(tmp_path, "gpytorch", "0.0.1")  # ours may lie in the working directory, which is looked at first
-    (tmp_path / "sitecustomize.py").write_text(ANOTHER_PYTHON)
-    # Ray refuses such a Python by itself, unless it is told to look at minor versions alone.
-    cluster.add(1, RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL="minor", **path_with(tmp_path))
-    try:
-        error = refusal()
-    finally:
-        cluster.end(1)
-    assert error.field == "RISK_SAC_RAY_ADDRESS"
-    python = ".".join(map(str, sys.version_info[:3]))
-    assert f"python is {sys.version_info[0]}.{sys.version_info[1]}.99; wanted {python}" in str(error)
-    assert "gpytorch is 0.0.1; wanted" in str(error)

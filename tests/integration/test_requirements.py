@@ -22,8 +22,8 @@ from risk_sac.run_folder.series import Trace
 from risk_sac.types import STEP_S, Floats, Scene
 
 each_family = pytest.mark.parametrize("family", ["low", "mixed", "dense"])
-UNDISTURBED_SEEDS = range(9100, 9130)
-CONTACT_SEEDS = range(9100, 9140)
+UNDISTURBED_SEEDS = range(9100, 9115)
+CONTACT_SEEDS = range(9100, 9125)
 CONTACT_STEPS = round(3.0 / STEP_S)
 MOVED = 0.1  # of a scale
 
@@ -145,7 +145,7 @@ def test_undisturbed_traffic_meets_the_requirements_costs_nothing_and_touches_no
 @each_family
 def test_adversaries_that_do_nothing_are_hardly_ever_touched(family: FamilyName) -> None:
     with closing(environment(family, controlled=True)) as env:
-        _, contacts = statistics(env, UNDISTURBED_SEEDS[:10], lambda _: idle(env))
+        _, contacts = statistics(env, UNDISTURBED_SEEDS[:6], lambda _: idle(env))
     assert contacts <= 1
 
 

@@ -40,12 +40,6 @@ def search(driver: str, family: str, method: str, episodes: int, folder) -> list
     return [EpisodeRecord.model_validate_json(line) for line in lines]
 
 
-def test_an_ego_changes_to_the_next_lane_and_stays_in_its_middle():
-    frames = drive("low", "lane-changer", 0)
-    assert abs(frames[-1].y_m[0] - LANES_Y_M[2]) < 0.1
-    assert abs(frames[-1].lane_offset_m[0] - LANES_Y_M[2]) < 0.1  # from its path
-
-
 def test_an_ego_comes_back_to_its_lane():
     frames = drive("low", "overtaker", 0)
     assert max(frame.y_m[0] for frame in frames) > LANES_Y_M[2] - 0.3

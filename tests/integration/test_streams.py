@@ -16,9 +16,9 @@ from tests.server import LONG_S
 
 
 @pytest.fixture(scope="module")
-def shared(serve_shared):
+def shared(striking):
     """See `shared` of the conftest; here with failures."""
-    return serve_shared("striking_worker")
+    return striking
 
 
 def events(client, campaign_id, after=None, **asked):

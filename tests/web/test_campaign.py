@@ -3,12 +3,10 @@
 import json
 import re
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
-from playwright.sync_api import Locator, Page, Route, expect
+from playwright.sync_api import Locator, Page, expect
 from pyarrow import parquet
 
 from tests.server import Service, servers
@@ -52,39 +50,6 @@ def test_the_numbers_on_the_screen_are_the_services(
     check_axe(page)
 
 
-def test_known_defects_are_told_by_one_number_a_method_and_under_no_failure_as_the_worth_of_finding_nothing(
-    page_at: Callable[..., Page], service: Service, campaign: str
-) -> None:
-    (archive,) = service.get(campaign, "/power")["methods"]
-    page = page_at(f"campaigns/{campaign}")
-    shown = page.get_by_role("region", name="Known defects that this budget detects")
-    expect(shown).to_contain_text(f"archive: {archive['sentences'][0]}")
-    assert page.get_by_text("What finding nothing is worth").count() == 0
-    nothing = {"methods": ["no-adversary", "archive"], "budget": {"episodes": 1}, "seeds": [1]}
-    posted = service.post(**nothing)
-    assert service.wait(posted)["progress"]["failures"] == 0
-    shown = page_at(f"campaigns/{posted}").get_by_role("region", name="What finding nothing is worth")
-    sentences = [each["sentences"][0] for each in service.get(posted, "/power")["methods"]]
-    for sentence in sentences:
-        expect(shown).to_contain_text(sentence)
-    assert len(re.findall(r"[\d.]+ on average", shown.inner_text())) == sum("average" in each for each in sentences)
-
-
-def test_candidates_that_were_not_replayed_are_said_to_wait(
-    page_at: Callable[..., Page], service: Service, campaign: str
-) -> None:
-    progress = service.get(campaign)["progress"]
-    assert progress["headline"] is None
-    assert progress["headline_candidates"] == progress["headline_waiting"] > 0
-    waiting = progress["headline_waiting"]
-    words = f"{waiting} candidate{'s wait' if waiting > 1 else ' waits'} for verification"
-    page = page_at(f"campaigns/{campaign}")
-    expect(page.locator(".tile", has_text="headline failures")).to_contain_text(words)
-    picker = page_at("compare").get_by_role("listitem").filter(has_text="night <b>7</b>").first
-    expect(picker).to_contain_text(words)
-    expect(picker).not_to_contain_text("headline failures")
-
-
 def test_the_pointer_reads_the_curves_of_the_service(
     page_at: Callable[..., Page], service: Service, campaign: str
 ) -> None:
@@ -119,74 +84,6 @@ def test_strips_and_cards_say_what_drove_the_episodes(
         expect(card(page, run["id"])).to_contain_text(said)
     expect(page.get_by_text("Shaded: the warm-up")).to_have_count(0)  # no policy ever drove
     check_axe(page)
-
-
-def test_episodes_before_the_policys_first_are_shaded(
-    page_at: Callable[..., Page], service: Service, campaign: str
-) -> None:
-    def shade(page: Page) -> str:
-        canvas = plot(page, "Sliding ECR").locator("canvas")
-        canvas.wait_for()
-        return str(
-            canvas.evaluate(
-                "c => [0.3, 0.8].map(x => c.getContext('2d').getImageData(c.width * x, 16, 1, 1).data[3] > 0).join()"
-            )
-        )
-
-    page = page_at(f"campaigns/{campaign}")
-    assert shade(page) == "false,false"
-    found = service.get(campaign, "/curves", points=200)
-    for run in found["runs"]:
-        half = len(run["episodes"]) // 2
-        run["driven_by"] = {"script": [min(n, half) for n in run["episodes"]]}
-        run["driven_by"]["policy"] = [max(0, n - half) for n in run["episodes"]]
-    page = page_at()
-    page.route("**/curves?*", lambda route: route.fulfill(json=found))
-    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}")
-    expect(page.get_by_text("Shaded: the warm-up")).to_be_visible()
-    assert shade(page) == "true,false"
-
-
-def test_older_curves_have_no_strips(page_at: Callable[..., Page], service: Service, campaign: str) -> None:
-    found = service.get(campaign, "/curves", points=200)
-    for run in found["runs"]:
-        run["driven_by"] = {}
-    page = page_at()
-    page.route("**/curves?*", lambda route: route.fulfill(json=found))
-    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}")
-    plot(page, "Sliding ECR").wait_for()
-    expect(page.get_by_role("region", name="Driven by", exact=True)).to_have_count(0)
-
-
-def test_a_drag_zooms_all_curves_and_a_double_click_shows_all_again(
-    page_at: Callable[..., Page], campaign: str
-) -> None:
-    page = page_at(f"campaigns/{campaign}")
-    area = plot(page, "Sliding ECR").locator(".u-over")
-    page.wait_for_load_state("networkidle")  # the last answer redraws the plots
-    area.scroll_into_view_if_needed()
-    box = area.bounding_box()
-    page.mouse.move(box["x"] + 0.25 * box["width"], box["y"] + 40)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.75 * box["width"], box["y"] + 40, steps=4)
-    page.mouse.up()
-    expect(page.get_by_role("button", name="Show all")).to_have_count(3)
-    area.dblclick()
-    expect(page.get_by_role("button", name="Show all")).to_have_count(0)
-
-
-def test_a_run_is_hidden_by_the_legend_and_by_its_card(page_at: Callable[..., Page], campaign: str) -> None:
-    page = page_at(f"campaigns/{campaign}")
-    entry = page.get_by_role("group", name="Runs in the curves").get_by_role("button", name="archive, low")
-    area = plot(page, "Sliding ECR")
-    entry.click()
-    expect(entry).to_have_attribute("aria-pressed", "false")
-    expect(card(page, "low-archive-601").get_by_role("button", name="Hidden")).to_be_visible()
-    area.focus()
-    area.press("ArrowLeft")
-    expect(area.get_by_role("status")).not_to_contain_text("low")
-    card(page, "low-archive-601").get_by_role("button", name="Hidden").click()
-    expect(entry).to_have_attribute("aria-pressed", "true")
 
 
 def test_importance_and_coverage_are_the_services(
@@ -236,22 +133,6 @@ def test_a_running_campaign_is_followed_to_its_end_without_a_reload(
     assert page.evaluate("window.neverReloaded")
 
 
-def test_an_episode_has_the_number_that_its_id_ends_in(page_at: Callable[..., Page], service: Service) -> None:
-    running = service.post(families=["mixed"], methods=["risk-sac-diverse"], budget={"episodes": 5000})
-    service.wait_for(running, lambda seen: seen["progress"]["failures"] >= 2)
-    page = page_at(f"campaigns/{running}")
-    page.locator(".newest li").first.wait_for()
-    service.client.post(f"/v1/campaigns/{running}/cancel")
-    for shown in page.locator(".newest li").all():
-        failure = str(shown.get_by_role("link").get_attribute("href")).rsplit("/", 1)[1]
-        expect(shown).to_contain_text(re.compile(rf", episode {failure.rsplit('-', 1)[1]}\b"))
-    service.wait(running)
-    items = service.get(running, "/failures", limit=500)["items"]
-    assert [each["id"].rsplit("-", 1)[1] for each in items] == [str(each["index"]) for each in items]
-    page = page_at(f"campaigns/{running}/failures/{items[0]['id']}")
-    expect(page.locator(".crumbs")).to_contain_text(items[0]["id"])
-
-
 def test_events_draw_curves_that_equal_those_of_the_service(page_at: Callable[..., Page], service: Service) -> None:
     running = service.post(families=["low"], methods=["archive"], seeds=[601], budget={"episodes": 60})
     page = page_at(f"campaigns/{running}", allowed=("ERR_FAILED",))
@@ -265,33 +146,6 @@ def test_events_draw_curves_that_equal_those_of_the_service(page_at: Callable[..
         area.press("ArrowRight")
     expect(area.get_by_role("status")).to_contain_text("After 60 episodes")
     expect(area.get_by_role("status").locator("span b")).to_have_text(str(curve["distinct"][-1]))
-
-
-def test_the_time_left_goes_by_the_runs_own_episodes(page_at: Callable[..., Page], service: Service) -> None:
-    running = service.post(families=["low"], methods=["random"], seeds=[7], budget={"episodes": 2000})
-    service.wait_for(running, lambda seen: seen["progress"]["episodes_done"] >= 60)
-    progress = service.get(running)["progress"]
-    played = [each["wall_s"] for each in service.get(running, "/episodes", limit=500)["items"]][
-        1:
-    ]  # the first compiles
-    left_s = (2000 - progress["episodes_done"]) * sum(played) / len(played)
-    assert 0.5 <= progress["eta_s"] / left_s <= 2
-    page = page_at(f"campaigns/{running}")
-    expect(page.locator(".advance")).to_contain_text(
-        re.compile(r"\d of 2[,\u202f ]?000 episodes · (\d+ min )?\d+ s left$")
-    )
-    service.client.post(f"/v1/campaigns/{running}/cancel")
-    known = service.wait(running) | {"state": "running"}
-    for eta_s, said in ((None, "time left not known yet"), (119.7, "2 min 0 s left"), (3599.6, "1 h 0 min left")):
-        page = page_at()
-        answer = known | {"progress": known["progress"] | {"eta_s": eta_s}}
-        page.route(re.compile(rf"/v1/campaigns/{running}$"), partial(_answer, answer))
-        page.goto(f"{service.client.base_url}/page/#/campaigns/{running}")
-        expect(page.locator(".advance")).to_contain_text(said)
-
-
-def _answer(answer: dict[str, Any], route: Route) -> None:
-    route.fulfill(json=answer)
 
 
 def test_cancelling_asks_first(page_at: Callable[..., Page], service: Service) -> None:
@@ -367,22 +221,6 @@ def test_what_was_posted_can_be_taken_away(
     expect(page.get_by_role("link", name="Compare methods")).to_have_attribute(
         "href", f"#/campaigns/{campaign}/compare"
     )
-
-
-def test_the_log_of_a_run_is_read_on_demand(page_at: Callable[..., Page], campaign: str) -> None:
-    page = page_at(f"campaigns/{campaign}")
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
-    run = card(page, "low-archive-601")
-    run.wait_for()
-    assert not any("/log" in url for url in asked)
-    run.get_by_text("Log", exact=True).click()
-    expect(run.get_by_role("region", name="Log of archive, low")).to_be_visible()
-
-
-def test_a_campaign_that_never_was_says_so(page_at: Callable[..., Page]) -> None:
-    page = page_at("campaigns/unknown", allowed=("404",))
-    expect(page.get_by_role("alert")).to_contain_text("unknown")
 
 
 def _values(run: Locator) -> list[str]:

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 
 from tests.server import Service
-from tests.web.conftest import CAMPAIGN, PHONE, count
+from tests.web.conftest import CAMPAIGN, count
 
 HOSTILE = "<img src=x onerror=alert(1)> ‮& \"'"
 
@@ -61,23 +61,6 @@ def test_a_row_says_what_the_api_says(
     expect(cells.nth(11)).to_contain_text("took")
 
 
-def test_a_phone_shows_all_cells_of_a_row(page_at: Callable[..., Page], campaign: str) -> None:
-    page = page_at("campaigns", viewport=PHONE)
-    found = row(page, campaign)
-    expect(found).to_be_visible()
-    for cell in found.locator("td").all():
-        box = cell.bounding_box()
-        assert box is not None
-        assert 0 <= box["x"] < box["x"] + box["width"] <= PHONE["width"]
-    assert {cell.get_attribute("data-head") for cell in found.locator("td").all()} >= {"State", "ECR", "Headline"}
-
-
-def test_the_line_of_the_ecr_comes_when_its_row_does(page_at: Callable[..., Page], campaign: str) -> None:
-    page = page_at("campaigns")
-    line = row(page, campaign).get_by_role("img", name="ECR over the episodes")
-    expect(line.locator(".spark-line")).to_have_attribute("d", re.compile(r"^M[\d.]+ [\d.]+L"))
-
-
 def test_a_hostile_label_is_text_wherever_it_stands(page_at: Callable[..., Page], small: dict[str, str]) -> None:
     page = page_at("campaigns")
     hostile = row(page, small[HOSTILE])
@@ -125,23 +108,6 @@ def test_words_of_a_label_or_an_id_find_a_campaign_while_they_are_typed(
     expect(page.get_by_role("searchbox", name="Search")).to_have_value("100% more")
 
 
-def test_a_long_label_pushes_nothing_off(page_at: Callable[..., Page], service: Service) -> None:
-    label = "regression of the evening " * 5 + "x" * 70
-    posted = service.post(label=label, families=["low"], methods=["random"], budget={"episodes": 1})
-    page = page_at("campaigns")
-    name = row(page, posted).locator("td.campaign-name")
-    expect(name).to_contain_text("regression of the evening")
-    assert name.bounding_box()["width"] < 220
-    assert row(page, posted).bounding_box()["height"] < 90
-    row(page, posted).get_by_role("link").first.click()
-    page.get_by_role("heading", level=1).wait_for()
-    assert page.get_by_role("heading", level=1).bounding_box()["height"] < 70
-    assert page.get_by_role("link", name="Failures").bounding_box()["y"] < 220
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    service.wait(posted)
-    service.client.delete(f"/v1/campaigns/{posted}")
-
-
 def test_a_click_on_a_head_sorts_and_a_second_one_turns_it_around(
     page_at: Callable[..., Page], service: Service, campaign: str, small: dict[str, str]
 ) -> None:
@@ -158,18 +124,6 @@ def test_a_click_on_a_head_sorts_and_a_second_one_turns_it_around(
     expect(head).to_have_attribute("aria-sort", "ascending")
     expect(page).to_have_url(re.compile(r"sort=distinct$"))
     assert shown_ids(page)[-1] == campaign
-
-
-def test_several_that_are_selected_can_be_compared(
-    page_at: Callable[..., Page], campaign: str, small: dict[str, str]
-) -> None:
-    page = page_at("campaigns")
-    for each in (campaign, small["one more"]):
-        row(page, each).get_by_role("checkbox").check()
-    page.get_by_role("link", name="Compare 2").click()
-    expect(page).to_have_url(re.compile(r"#/compare\?ids="))
-    asked = page.url.rsplit("=", 1)[1]
-    assert set(asked.replace("%2C", ",").split(",")) == {campaign, small["one more"]}
 
 
 def test_older_ones_come_page_by_page(page_at: Callable[..., Page], campaign: str, small: dict[str, str]) -> None:

@@ -1,4 +1,4 @@
-"""The screen Compare: a campaign's methods against each other, and campaigns beside each other."""
+"""A campaign's methods against each other, campaigns beside each other, and the printed report."""
 
 import csv
 import json
@@ -10,9 +10,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Locator, Page, Route, expect
 
-from risk_sac.report.drawing import LOOKS
 from tests.server import Service
-from tests.web.conftest import PHONE, count
+from tests.web.conftest import CAMPAIGN, PHONE, count
 
 
 @pytest.fixture(scope="session")
@@ -90,33 +89,6 @@ def test_the_numbers_of_a_report_are_the_services(
     check_axe(page)
 
 
-def test_a_table_that_scrolls_on_a_phone_keeps_its_names(page_at: Callable[..., Page], methods: str) -> None:
-    page = page_at(f"campaigns/{methods}/compare", viewport=PHONE)
-    table = page.get_by_role("region", name="Methods compared: low")
-    name = table.get_by_role("rowheader").first
-    expect(name).to_be_visible()
-    assert table.evaluate("each => each.scrollWidth - each.clientWidth") > 0
-    table.evaluate("each => each.scrollTo(each.scrollWidth, 0)")
-    room, shown, last = table.bounding_box(), name.bounding_box(), table.locator("tbody tr").first.locator("td").last
-    assert room is not None
-    assert shown is not None
-    assert shown["x"] == pytest.approx(room["x"], abs=1)
-    assert shown["width"] < room["width"] / 2
-    expect(last).to_be_in_viewport()
-
-
-def test_error_bars_stand_where_their_numbers_say(page_at: Callable[..., Page], service: Service, methods: str) -> None:
-    page = page_at(f"campaigns/{methods}/compare")
-    cells = service.get(methods, "/table", format="json")["cells"]
-    row_of(page, "archive").wait_for()
-    end = float(page.locator("th.rate .axis").first.inner_text().split("\n")[-1].removesuffix(" %")) / 100
-    for cell in cells:
-        drawn = page.get_by_role("img", name=f"ECR of {cell['method']}: ")
-        axis, dot = drawn.bounding_box(), drawn.locator("circle").bounding_box()
-        middle = dot["x"] + dot["width"] / 2
-        assert (middle - axis["x"]) / axis["width"] == pytest.approx(cell["estimates"]["ecr"]["mean"] / end, abs=0.01)
-
-
 def test_a_report_and_its_figures_can_be_taken_away(
     page_at: Callable[..., Page], service: Service, methods: str, tmp_path: Path
 ) -> None:
@@ -133,26 +105,6 @@ def test_a_report_and_its_figures_can_be_taken_away(
     picture = _saved(page, figure.get_by_role("button", name="PNG"), tmp_path)
     assert picture.name == f"{name}.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
-
-
-def test_a_method_has_one_colour_in_tables_and_figures(
-    page_at: Callable[..., Page], service: Service, methods: str
-) -> None:
-    page = page_at(f"campaigns/{methods}/compare", color_scheme="light")
-    for method in ("archive", "random"):
-        expect(row_of(page, method).locator(".sample line")).to_have_css("stroke", _rgb(LOOKS[method].colour))
-    image = page.locator("figure img").first
-    figure = service.client.get(f"/v1/campaigns/{methods}/figures/distinct_found_low.svg").text
-    assert all(LOOKS[method].colour in figure for method in ("archive", "random"))
-    expect(image).to_have_css("filter", "none")
-    page.emulate_media(color_scheme="dark")
-    expect(image).to_have_css("filter", "invert(1) hue-rotate(180deg)")
-    # By hand from #777777, whose lightness is 119 of 255.
-    expect(row_of(page, "random").locator(".sample line")).to_have_css("stroke", "rgb(136, 136, 136)")
-
-
-def _rgb(colour: str) -> str:
-    return f"rgb({', '.join(str(int(colour[at : at + 2], 16)) for at in (1, 3, 5))})"
 
 
 def test_the_page_works_below_the_path_that_a_proxy_has_the_service_at(
@@ -211,24 +163,6 @@ def test_two_campaigns_stand_beside_each_other(
     check_axe(page)
 
 
-def test_on_a_phone_no_field_breaks_within_a_word(page_at: Callable[..., Page], campaign: str, methods: str) -> None:
-    page = page_at(f"compare?ids={campaign},{methods}", viewport=PHONE)
-    field = page.get_by_role("rowheader", name="budget.episodes").locator("code")
-    expect(field).to_be_visible()
-    lines = field.evaluate("""code => [...code.childNodes].filter(each => each.nodeType === 3).map(each => {
-        const range = document.createRange();
-        range.selectNodeContents(each);
-        return range.getClientRects().length;
-    })""")
-    assert lines == [1, 1, 1]
-
-
-def test_a_campaign_that_is_gone_does_not_hide_the_others(page_at: Callable[..., Page], campaign: str) -> None:
-    page = page_at(f"compare?ids={campaign},unknown", allowed=("404",))
-    expect(page.get_by_role("alert")).to_contain_text("unknown")
-    expect(row_of(page, f"{campaign} archive")).to_be_visible()
-
-
 def _check_total(row: Locator, letter: str, total: dict[str, Any]) -> None:
     expect(row.get_by_role("rowheader")).to_have_text(f"{letter}: {total['method']}")
     for name, text in zip(("ecr", "pcr"), row.locator("td.rate").all_inner_texts(), strict=True):
@@ -244,3 +178,53 @@ def _saved(page: Page, button: Locator, folder: Path) -> Path:
     target = folder / download.value.suggested_filename
     download.value.save_as(target)
     return target
+
+
+BANNER = "Search results are no crash rate."
+
+
+def address(service: Service, campaign: str) -> str:
+    return f"{service.client.base_url}/v1/campaigns/{campaign}/report?format=html"
+
+
+def test_the_page_leads_to_it(page_at: Callable[..., Page], campaign: str) -> None:
+    page = page_at(f"campaigns/{campaign}")
+    with page.expect_popup() as opened:
+        page.get_by_role("link", name="Report").click()
+    expect(opened.value.get_by_role("note")).to_contain_text(BANNER)
+
+
+def test_it_is_read_looked_at_and_printed(
+    new_page: Callable[..., Page], check_axe: Callable[[Page], None], service: Service, campaign: str
+) -> None:
+    page = new_page()
+    page.goto(address(service, campaign))
+    expect(page.get_by_role("heading", level=1)).to_have_text(f"Failures of an ego: {CAMPAIGN['label']}")
+    pictures = page.get_by_role("img").all()
+    assert len(pictures) >= 2
+    for picture in pictures:
+        assert picture.evaluate("image => image.complete && image.naturalWidth") == 240
+    for link in page.get_by_role("navigation").get_by_role("link").all():
+        assert page.locator(link.get_attribute("href") or "").count() == 1
+    check_axe(page)
+    page.emulate_media(color_scheme="dark")
+    check_axe(page)
+    printed = page.pdf(format="A4")
+    assert printed.startswith(b"%PDF")
+    page.emulate_media(media="print", color_scheme="dark")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    page.set_viewport_size({"width": 680, "height": 960})  # about A4 without its margins
+    assert page.evaluate("document.documentElement.scrollWidth") <= 680
+
+
+def test_it_needs_no_script_and_fits_a_phone(new_page: Callable[..., Page], service: Service, campaign: str) -> None:
+    page = new_page(PHONE, java_script_enabled=False)
+    page.goto(address(service, campaign))
+    expect(page.get_by_role("note")).to_contain_text(BANNER)
+    expect(page.get_by_role("heading", name="Coverage")).to_be_visible()
+    box = page.locator("main").bounding_box()
+    assert box is not None
+    assert box["x"] + box["width"] <= PHONE["width"]
+    for block in page.locator("main > *").all():
+        around = block.bounding_box()
+        assert around is None or around["x"] + around["width"] <= PHONE["width"]

@@ -90,11 +90,6 @@ def test_a_map_that_is_refused_says_why(page_at: Callable[..., Page], tmp_path: 
     expect(page.get_by_role("alert")).to_contain_text("edge 'a'")
 
 
-def test_a_place_that_is_gone_is_told_beside_its_field(page_at: Callable[..., Page], network: str) -> None:
-    page = page_at(f"new?network={network}&pattern=junction&place=nowhere", allowed=("422",))
-    expect(page.locator("#field-network").get_by_role("alert")).to_contain_text("no edge 'nowhere'")
-
-
 def test_the_same_map_twice_is_recognised(page_at: Callable[..., Page], service: Service, network: str) -> None:
     page = page_at("maps")
     before = len(service.client.get("/v1/networks").json()["items"])

@@ -11,7 +11,7 @@ from playwright.sync_api import Locator, Page, Request, Route, expect
 
 from risk_sac.config import CampaignSpec
 from tests.server import Service
-from tests.web.conftest import CAMPAIGN, UNROUNDED
+from tests.web.conftest import UNROUNDED
 
 PROFILES = ("default", "perfect", "careful", "defensive")
 HOSTILE = "</pre><script>alert('1')</script> yes: \"no\" #\\ \u2028"
@@ -41,13 +41,6 @@ def small(page: Page, label: str = "") -> None:
     page.get_by_label("Label", exact=True).fill(label)
     page.get_by_role("checkbox", name="archive", exact=True).uncheck()
     page.get_by_label("Episodes", exact=True).fill("3")
-
-
-def test_a_campaign_can_start_without_the_shipped_prior(page_at: Callable[..., Page]) -> None:
-    page = page_at("new")
-    small(page)
-    opened(page, "Prior").get_by_label("Start from").fill("none")
-    assert curl_body(page)["prior"] == "none"
 
 
 def test_what_is_shown_is_what_is_sent_and_what_the_api_then_has(
@@ -134,15 +127,6 @@ def test_a_formula_is_checked_while_it_is_written_and_the_fault_has_a_caret(page
     assert curl_body(page)["requirements"] == [{"name": "mine_1", "formula": "rss_margin >= 1"}]
 
 
-def test_a_campaign_is_cloned_with_all_that_it_was_given(
-    page_at: Callable[..., Page], service: Service, campaign: str
-) -> None:
-    page = page_at(f"new?from={campaign}")
-    expect(page.get_by_label("Label", exact=True)).to_have_value(CAMPAIGN["label"])
-    assert curl_body(page) == CAMPAIGN
-    assert page.locator("main b", has_text="7").filter(has_not_text="archive").count() == 0
-
-
 def test_what_an_earlier_campaign_set_deep_down_is_cloned_too(page_at: Callable[..., Page], service: Service) -> None:
     given = {
         "label": "deep",
@@ -182,23 +166,6 @@ def test_a_range_of_the_odd_is_moved_by_keys_and_by_numbers(page_at: Callable[..
     assert "odd" not in curl_body(page)
 
 
-def test_a_slider_is_dragged_by_its_thumb(page_at: Callable[..., Page]) -> None:
-    page = page_at("new")
-    odd = opened(page, "Operational design domain")
-    track = odd.get_by_role("slider", name="Visibility, highest")
-    track.scroll_into_view_if_needed()
-    box = track.bounding_box()
-    assert box is not None
-    middle = box["y"] + box["height"] / 2
-    page.mouse.move(box["x"] + box["width"] - 8, middle)
-    page.mouse.down()
-    page.mouse.move(box["x"] + box["width"] / 2, middle, steps=5)
-    page.mouse.up()
-    visibility = curl_body(page)["odd"]["environment"]["visibility_m"]
-    assert visibility["low"] == 100
-    assert 900 <= visibility["high"] <= 1200
-
-
 def test_what_a_family_does_not_support_is_said_before_the_campaign_starts(page_at: Callable[..., Page]) -> None:
     page = page_at("new")
     odd = opened(page, "Operational design domain")
@@ -208,50 +175,6 @@ def test_what_a_family_does_not_support_is_said_before_the_campaign_starts(page_
     expect(page.locator(".adjustments")).to_contain_text("odd.environment.time_of_day low: asked for {day, night}")
     odd.get_by_label("night", exact=True).uncheck()
     expect(page.locator(".adjustments")).to_have_count(0)
-
-
-def test_presets_fill_the_form_and_the_cost_follows(page_at: Callable[..., Page]) -> None:
-    page = page_at("new")
-    page.get_by_label("Label", exact=True).fill("mine")
-    page.get_by_role("button", name="Compare methods").click()
-    expect(page.get_by_role("button", name="Compare methods")).to_have_attribute("aria-pressed", "true")
-    body = curl_body(page)
-    runs = len(body["families"]) * len(body["methods"]) * len(body["seeds"])
-    expect(page.locator(".tile").first).to_contain_text(f"{runs * body['budget']['episodes']:,}")
-    assert body["label"] == "mine"
-    page.get_by_label("Seeds").fill("0-4")
-    expect(page.locator(".tile").first).to_contain_text(f"{runs // 3 * 5 * body['budget']['episodes']:,}")
-
-
-def test_methods_that_most_need_come_first_with_their_cost_and_the_rest_is_folded(
-    page_at: Callable[..., Page], service: Service
-) -> None:
-    page = page_at("new")
-    group = page.get_by_role("group", name="Methods")
-    methods = service.client.get("/v1/methods").json()["items"]
-    usual = [each["name"] for each in methods if each["usual"]]
-    expect(group.locator(".choice-card b")).to_have_text(usual)
-    for each in methods[: len(usual)]:
-        expect(group.locator(".choice-card", has_text=each["summary"])).to_contain_text(
-            f"cost {each['episode_cost']:g}"
-        )
-    group.get_by_text("for comparisons").click()
-    expect(group.locator(".choice-card")).to_have_count(len(methods))
-    expect(group.locator(".cost")).to_have_count(len(methods))
-    group.get_by_text("for comparisons").click()
-    expect(group.locator(".choice-card")).to_have_count(len(usual))
-    page.get_by_role("button", name="Compare methods").click()  # has chosen some of them
-    expect(page.get_by_role("checkbox", name="sac-lag", exact=True)).to_be_checked()
-
-
-def test_a_perfect_ego_has_neither_delay_nor_sensor(page_at: Callable[..., Page]) -> None:
-    page = page_at("new")
-    opened(page, "Delay and sight")
-    ego = page.get_by_role("region", name="Ego")
-    expect(ego.get_by_label("Reaction time")).to_be_visible()
-    ego.get_by_label("Driver", exact=True).select_option("perfect")
-    expect(ego.get_by_label("Reaction time")).to_have_count(0)
-    assert curl_body(page)["ego"] == {"profile": "perfect"}
 
 
 def test_an_ego_is_chosen_by_name_with_known_faults(page_at: Callable[..., Page], service: Service) -> None:
@@ -304,8 +227,3 @@ def test_numbers_have_as_many_digits_as_help(page_at: Callable[..., Page]) -> No
     angle.fill("3.141592653589")
     expect(angle).to_have_value("3.141592653589")
     assert curl_body(page)["ego"] == {"sensor": {"field_of_view_rad": 3.141592653589}}
-
-
-def test_an_unknown_campaign_to_clone_is_told(page_at: Callable[..., Page]) -> None:
-    page = page_at("new?from=c0", allowed=("404",))
-    expect(page.get_by_role("alert")).to_contain_text("c0")

@@ -1,12 +1,10 @@
 """Every screen keeps the rules of accessibility in both themes and fits every width."""
 
 from collections.abc import Callable
-from io import BytesIO
 from typing import Literal, get_args
 
 import pytest
-from PIL import Image
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Page, expect
 
 from tests.server import Service
 from tests.web.conftest import PHONE, UNROUNDED
@@ -14,7 +12,6 @@ from tests.web.conftest import PHONE, UNROUNDED
 Scheme = Literal["dark", "light"]
 WIDTHS = (1440, 1024, PHONE["width"])
 STATES = ("hover", "focus", "focus-visible", "active")
-VISIBLE = 8  # of 255 steps of brightness
 OUTLINE = 3.0  # contrast that WCAG 1.4.11 wants of what marks the focus
 
 
@@ -132,26 +129,6 @@ def test_a_screen_is_accessible_and_fits_every_width(
         page.set_viewport_size({"width": width, "height": 900})
         page.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=width)
         assert page.evaluate(WIDER_THAN_PARENT) == [], f"at {width} px"
-
-
-@pytest.mark.parametrize("scheme", get_args(Scheme))
-def test_a_table_shows_on_a_phone_where_it_goes_on(page_at: Callable[..., Page], campaign: str, scheme: Scheme) -> None:
-    page = page_at(f"campaigns/{campaign}", viewport=PHONE, color_scheme=scheme)
-    table = page.get_by_role("region", name="Requirements of the campaign")
-    table.scroll_into_view_if_needed()
-    least, most = table.evaluate("each => [each.clientWidth, each.scrollWidth]")
-    assert most > least + 100
-    ground, hint = edge(table)
-    assert abs(ground - hint) > VISIBLE
-    table.evaluate("each => each.scrollTo(each.scrollWidth, 0)")
-    ground, hint = edge(table)
-    assert abs(ground - hint) < VISIBLE, "at its end nothing is left to come"
-
-
-def edge(table: Locator) -> tuple[int, int]:
-    """Brightness of a table's ground away from its right edge, and at it, above the text of the heading."""
-    picture = Image.open(BytesIO(table.screenshot())).convert("L")
-    return picture.getpixel((picture.width - 60, 2)), picture.getpixel((picture.width - 2, 2))
 
 
 def show_in(page: Page, scheme: Scheme) -> None:
