@@ -303,12 +303,7 @@ def test_nobody_attacks_before_the_release(family: FamilyName) -> None:
 
 @pytest.mark.parametrize(
     "scene",
-    [
-        middle("low", lead_gap_m=7.9),
-        middle("low", lead_gap_m=math.nan),
-        middle("low", moon_phase=0.5),
-        middle("mixed"),
-    ],
+    [middle("low", lead_gap_m=7.9), middle("low", lead_gap_m=math.nan), middle("low", moon_phase=0.5), middle("mixed")],
     ids=["out of bounds", "NaN", "unknown parameter", "another family"],
 )
 def test_a_scene_outside_the_space_is_refused(low: RiskSacEnv, scene: Scene) -> None:

@@ -29,14 +29,6 @@ def test_each_adversarys_action_is_held_for_a_second_on_average_and_changes_as_a
     np.testing.assert_allclose(both, 0.01, atol=0.004)
 
 
-def test_an_action_once_given_stays_as_it_is() -> None:
-    agent = RandomAgent(2 * ADVERSARIES, seed=2)
-    first = agent.act(NOTHING)
-    kept = first.copy()
-    played(agent, 50)
-    assert np.array_equal(first, kept)
-
-
 def test_a_restored_agent_goes_on_as_the_one_that_was_saved() -> None:
     agent = RandomAgent(2 * ADVERSARIES, seed=3)
     played(agent, 7)

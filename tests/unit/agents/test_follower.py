@@ -22,10 +22,6 @@ def observed(*places: tuple[float, float] | None) -> np.ndarray:
     return np.array([*np.ravel(rows), 0.6], np.float32)
 
 
-def test_it_has_genes_for_every_adversary():
-    assert [ScriptFollower(FAMILIES[name]).genes // SIZE for name in ("low", "mixed", "dense")] == [3, 2, 4]
-
-
 def test_who_is_passive_does_nothing_and_one_at_least_acts():
     ahead = observed((6, 3.3), (12, 3.3), (14, -3.3))
     action = follower(0.1, 0.9, 0.3).act(ahead).reshape(-1, 2)

@@ -10,14 +10,7 @@ from torch import Tensor
 from risk_sac.agents.agent import UpdateResult
 from risk_sac.agents.learner import Learner
 from risk_sac.agents.replay import Batch, Transition
-from risk_sac.config import (
-    METHODS,
-    AgentConfig,
-    LagrangianConfig,
-    LearnerConfig,
-    MethodName,
-    ReplayConfig,
-)
+from risk_sac.config import METHODS, AgentConfig, LagrangianConfig, LearnerConfig, MethodName, ReplayConfig
 from risk_sac.errors import NotFinite
 
 Make = Callable[..., Transition]
@@ -154,11 +147,6 @@ def test_the_policy_decides_every_few_steps_and_its_memory_holds_decisions(rando
         assert [actions.index(each) for each in actions] == [0] * 4 + [4] * 4 + [8] * 2
     assert len(subject._replay) == 2 * 2
     assert subject._config.agent.discount == pytest.approx(0.98**4)
-
-
-def test_nothing_is_learned_from_an_empty_memory() -> None:
-    config = CONFIG.model_copy(update={"agent": CONFIG.agent.model_copy(update={"warmup_steps": 0})})
-    assert learner(config=config).update() is None
 
 
 @pytest.mark.parametrize("method", LEARNING)

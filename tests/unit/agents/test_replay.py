@@ -68,16 +68,6 @@ def test_a_transition_that_is_not_finite_is_refused(kind: type[Replay], field: s
         kind(3, 2, CONFIG).add(transition(**{field: float("nan")}))
 
 
-@pytest.mark.parametrize("changes", [{"accumulated_reward": float("inf")}, {"robustness": float("-inf")}])
-def test_a_priority_that_is_not_finite_is_refused(changes: dict[str, float], transition: Make) -> None:
-    replay = RiskPrioritizedReplay(3, 2, CONFIG)
-    with pytest.raises(NotFinite):
-        replay.add(transition(**changes))
-    assert len(replay) == 0
-    with pytest.raises(NotFinite):
-        store(replay, transition(), float("nan"))
-
-
 def test_uniform_draws_every_transition_equally_often(random_transition: Make) -> None:
     replay = filled(UniformReplay, 50, random_transition)
     counts = np.bincount(replay.sample(50_000, np.random.default_rng(1)).indices, minlength=50)
@@ -104,24 +94,6 @@ def test_rper_weights_follow_equation_10(random_transition: Make) -> None:
     batch = replay.sample(64, np.random.default_rng(2))
     weights = (40 * priorities[batch.indices] / priorities.sum()) ** -CONFIG.correction
     assert batch.weight.numpy() == pytest.approx(weights / weights.max(), rel=1e-6)
-
-
-def test_rper_prefers_risk_and_surprise(transition: Make) -> None:
-    replay = RiskPrioritizedReplay(3, 2, CONFIG)
-    for slot in range(64):
-        store(replay, transition(robustness=-2.0 if slot == 7 else 1.0), 5.0 if slot == 9 else 0.1)
-    counts = np.bincount(replay.sample(4096, np.random.default_rng(0)).indices, minlength=64)
-    assert set(np.argsort(counts)[-2:]) == {7, 9}
-    assert counts.min() > 0
-
-
-def test_rper_is_uniform_while_nothing_tells_transitions_apart(transition: Make) -> None:
-    replay = RiskPrioritizedReplay(3, 2, CONFIG)
-    for _ in range(30):
-        store(replay, transition(), 0.7)
-    batch = replay.sample(30, np.random.default_rng(0))
-    assert sorted(batch.indices) == list(range(30))
-    assert batch.weight.tolist() == [1.0] * 30
 
 
 def test_rper_leaves_equal_equation_9_after_any_mix_of_additions_and_updates(random_transition: Make) -> None:
@@ -173,17 +145,6 @@ def test_a_loaded_replay_draws_what_the_original_draws(kind: type[Replay], rando
     assert np.array_equal(first.indices, second.indices)
     assert torch.equal(first.weight, second.weight)
     assert torch.equal(first.observation, second.observation)
-
-
-@KINDS
-def test_a_state_does_not_change_with_its_owner(kind: type[Replay], random_transition: Make) -> None:
-    replay = filled(kind, 20, random_transition)
-    state, again = replay.state(), kind(3, 2, CONFIG)
-    replay.update(np.arange(20), np.full(20, 99.0))
-    again.load(state)
-    replay = filled(kind, 20, random_transition)
-    draws = [each.sample(50, np.random.default_rng(0)).indices for each in (replay, again)]
-    assert np.array_equal(*draws)
 
 
 @KINDS

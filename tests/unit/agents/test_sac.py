@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from risk_sac.agents.agent import critic_loss, follow, minimise, td_target
+from risk_sac.agents.agent import critic_loss, td_target
 from risk_sac.agents.sac import actor_loss, soft_value, temperature_loss
 
 
@@ -32,19 +32,3 @@ def test_temperature_falls_while_entropy_exceeds_its_target_and_rises_below() ->
         temperature_loss(temperature, torch.tensor(entropy), target_entropy=-2.0).backward()
         # dJ/dlog α = α (entropy - H̄)
         assert log_temperature.grad.item() == pytest.approx(temperature.item() * (entropy + 2.0))
-
-
-def test_targets_follow_by_their_rate() -> None:
-    targets, networks = torch.nn.Linear(1, 1), torch.nn.Linear(1, 1)
-    torch.nn.init.zeros_(targets.weight)
-    torch.nn.init.constant_(networks.weight, 4.0)
-    follow(targets, networks, 0.25)
-    assert (targets.weight.item(), networks.weight.item()) == (1.0, 4.0)
-
-
-def test_a_loss_moves_only_what_its_optimizer_holds() -> None:
-    moved, kept = (torch.tensor(1.0, requires_grad=True) for _ in range(2))
-    minimise((moved * kept).square(), torch.optim.Adam([moved], lr=0.1, fused=True))
-    assert moved.item() == pytest.approx(0.9)  # the first step of Adam is its rate
-    assert kept.item() == 1.0
-    assert kept.grad is None

@@ -1,7 +1,6 @@
 """The control by Stable-Baselines3: it learns, and goes on from a state bit for bit."""
 
 import numpy as np
-import torch
 
 from risk_sac.agents.sb3 import Sb3Agent
 from risk_sac.config.learner import AgentConfig, SacConfig
@@ -38,14 +37,3 @@ def test_goes_on_from_its_state_bit_for_bit() -> None:
     assert found[0] == expected[0]
     np.testing.assert_array_equal(found[1], expected[1])
     assert other.temperature == agent.temperature
-
-
-def test_it_draws_from_a_generator_of_its_own() -> None:
-    apart, disturbed = Sb3Agent(5, 2, CONFIG, SacConfig(), 0), Sb3Agent(5, 2, CONFIG, SacConfig(), 0)
-    expected = learnt(apart, 2), apart.act(np.ones(5, np.float32), explore=True)
-    torch.manual_seed(7)
-    before = torch.get_rng_state()
-    found = learnt(disturbed, 2), disturbed.act(np.ones(5, np.float32), explore=True)
-    assert torch.equal(torch.get_rng_state(), before)
-    assert found[0] == expected[0]
-    np.testing.assert_array_equal(found[1], expected[1])

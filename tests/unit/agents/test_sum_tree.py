@@ -5,8 +5,6 @@ from hypothesis.extra import numpy as hnp
 
 from risk_sac.agents.sum_tree import SumTree
 
-priorities = st.floats(0.0, 1e6, allow_subnormal=False)
-
 
 def test_find_walks_the_cumulative_sum() -> None:
     tree = SumTree(4)
@@ -52,10 +50,3 @@ def test_find_agrees_with_a_linear_scan(values: np.ndarray, data: st.DataObject)
     fractions = (np.array(prefixes) + 0.5) / values.sum()
     ends = np.cumsum(values)
     assert tree.find(fractions).tolist() == [int(np.argmax(ends > prefix)) for prefix in prefixes]
-
-
-def test_rebuild_forgets_what_was_there() -> None:
-    tree = SumTree(64)
-    tree.rebuild(np.ones(64))
-    tree.rebuild(np.ones(3))
-    assert tree.total == 3.0

@@ -1,7 +1,6 @@
 from risk_sac import cli
-from risk_sac.benchmark.power import Played, measured, method_power, power_of, runs_of
-from risk_sac.config import Budget, CampaignSpec, EgoConfig, RunSpec
-from risk_sac.egos.defects.catalogue import DEFECTS
+from risk_sac.benchmark.power import Played, method_power, power_of, runs_of
+from risk_sac.config import Budget, CampaignSpec, RunSpec
 from risk_sac.records import DefectPower
 from risk_sac.run_folder.results import Results, write_results
 
@@ -59,17 +58,6 @@ def test_steps_of_a_campaign_are_those_of_its_own_episodes_once_there_are_some()
     assert (found.budgets[0].steps, found.expected) == (75, 0.0)
 
 
-def test_what_was_not_measured_is_said_in_a_line() -> None:
-    place = "crossing_0123456789ab"
-    spec = CampaignSpec(families=("low", place), methods=("random", "sac"), ego=EgoConfig(driver="idm-aeb"))
-    random, sac = power_of(spec, [], RUNS).lines
-    assert random.startswith(
-        "random: Of 1 known defects that it was measured with in low, this budget detects at least 0 on average; "
-    )
-    assert random.endswith(f" Nothing was measured of random in {place}.")
-    assert sac == f"sac: Nothing was measured of sac in low, {place}."
-
-
 def test_methods_are_compared_by_what_all_of_them_were_measured_with() -> None:
     runs = RUNS + runs_of(TEXT.replace(",random,0,5000,5000,50,,", ",random,1,5000,200,2,200,"))[4:]
     spec = CampaignSpec(families=("low", "mixed"), methods=("archive", "random"), budget=Budget(episodes=300))
@@ -83,12 +71,6 @@ def test_methods_are_compared_by_what_all_of_them_were_measured_with() -> None:
     assert power_of(spec.model_copy(update={"methods": ("archive", "sac")}), [], runs).comparison == ""
     apart = [run for run in runs if (run.family == "mixed") is (run.method == "archive")]
     assert power_of(spec, [], apart).comparison.startswith("No known defect was measured with all of these methods")
-
-
-def test_what_is_shipped_is_of_the_catalogue() -> None:
-    assert {each.defect for each in measured()} <= DEFECTS.keys()
-    budget = dict.fromkeys(("low", "mixed", "dense"), (20_000, 1))
-    assert len(method_power("archive", budget, measured()).defects) > 25
 
 
 def test_the_command_tells_the_power_of_flags_and_of_the_folder_of_a_run(tmp_path, capsys, metrics) -> None:

@@ -3,10 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from risk_sac.benchmark import table
 from risk_sac.benchmark.detection import ANSWER, Detection, answer_of, first_detection
 from risk_sac.benchmark.statistics import balanced, friedman, log_rank, restricted_means, summaries, survival
-from risk_sac.benchmark.table import curves, defects_table, detections_csv, methods_table, write
 from risk_sac.config import RunMethod, RunSpec
 from risk_sac.config.spec_file import read_ego
 
@@ -69,23 +67,6 @@ def test_the_log_rank_test_tells_quick_from_slow() -> None:
     assert log_rank(runs("archive", "x", None), runs("random", "x", None)) == 1.0
 
 
-def test_tables_hold_every_run() -> None:
-    assert methods_table(FOUND).splitlines()[2].startswith("| archive | 6 | 4 of 6 [0.30, 0.90] | 250 | 250 | 500 [")
-    assert defects_table(FOUND).splitlines()[2:] == [
-        "| latency | low | 3 of 3, 200 | 2 of 3, 600 |",
-        "| speeds | low | 1 of 3, 400 | 0 of 3 |",
-    ]
-    assert len(detections_csv(FOUND).decode().splitlines()) == 1 + len(FOUND)
-    assert [line.get_label() for line in curves(FOUND).axes[0].get_lines()] == ["archive", "random"]
-
-
-def test_a_run_tells_what_a_smaller_budget_would_have_told() -> None:
-    (late,) = runs("archive", "latency", 400)
-    early = late.within(300)
-    assert (early.detected, early.triggered, early.signature, early.budget_steps) == (None, None, "", 300)
-    assert late.within(400).detected == 400
-
-
 def test_an_early_detection_counts_for_a_larger_budget_once_it_is_called_with_it(tmp_path: Path) -> None:
     (early,) = runs("archive", "latency", 400)
     spec = RunSpec(family="low", method="archive", seed=0, ego=read_ego("idm-aeb+latency"))
@@ -112,25 +93,3 @@ def test_ranks_that_never_differ_are_no_coincidence() -> None:
     assert p < 0.001
     assert friedman(means[:, :2]) is None
     assert friedman(np.ones((9, 3))) == 1.0
-
-
-def test_the_test_set_and_the_whole_catalogue_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    tasks = ("latency", "kerb-waits", "weak-brakes")
-    times = {"archive": (100, 300), "random": (800, None), "sac": (500, 600)}
-    write(
-        [run for method, at in times.items() for task in tasks for run in runs(method, task, *at)], tmp_path, "command"
-    )
-    text = (tmp_path / "benchmark.md").read_text()
-    assert "## Test set: 2 defects, 2 seeds, 1000 steps" in text
-    assert "## All: 3 defects, 2 seeds, 1000 steps" in text
-    assert text.count("| latency |") == 1
-    assert {file.name for file in tmp_path.glob("*.svg")} == {
-        f"{what}-{which}.svg" for what in ("curves", "difference") for which in ("test-set", "all")
-    }
-    monkeypatch.setattr(table, "PACKAGE", "no_such_package")
-    write([run for method, at in times.items() for run in runs(method, "latency", *at)], tmp_path, "command")
-    assert "Friedman" not in (tmp_path / "benchmark.md").read_text()  # one defect
-    write(
-        [run for method, at in times.items() for task in tasks for run in runs(method, task, *at)], tmp_path, "command"
-    )
-    assert "pip install 'risk-sac[benchmark]'" in (tmp_path / "benchmark.md").read_text()

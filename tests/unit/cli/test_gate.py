@@ -79,10 +79,6 @@ def by_rate(**bounds: Any) -> Bounds:
     return Bounds(judged_by="rate", **bounds)
 
 
-def test_without_a_bound_any_number_of_failures_is_fine() -> None:
-    assert verdict(results("succeeded", {"ecr": 1.0}), Bounds()) == (0, "")
-
-
 def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above() -> None:
     status, reason = verdict(results("succeeded", FEW), Bounds(ecr=0.1))
     assert status == 1
@@ -101,15 +97,6 @@ def test_the_rate_alone_is_judged_where_that_is_asked_for() -> None:
     assert verdict(results("succeeded", {"ecr": 0.11, "ecr_low": 0.0}), by_rate(ecr=0.1))[0] == 1
 
 
-def test_a_pcr_above_its_bound_is_named_whatever_the_ecr() -> None:
-    worse = {"method": "random", "pcr": 0.2, "preventable": 1, "failures": 5, "episodes": 5}
-    found = results("succeeded", {}, worse)
-    status, reason = verdict(found, by_rate(ecr=0.5, pcr=0.1))
-    assert status == 1
-    assert "PCR above 0.1: low random 0.200 (1 preventable contact in 5 episodes)" in reason
-    assert verdict(found, by_rate(ecr=0.5, pcr=0.2))[0] == 0
-
-
 def test_the_rate_of_a_requirement_is_judged_by_its_interval_or_by_itself() -> None:
     found = results("succeeded", {"episodes": 60, "requirements": requirements(never_fast=(0.2, 0.32))})
     assert verdict(found, Bounds(requirements={"never_fast": 0.25})) == (
@@ -121,16 +108,6 @@ def test_the_rate_of_a_requirement_is_judged_by_its_interval_or_by_itself() -> N
     assert verdict(found, by_rate(requirements={"never_fast": 0.2}))[0] == 0
     status, reason = verdict(found, by_rate(requirements={"never_fast": 0.1}))
     assert (status, reason) == (1, "never_fast above 0.1: low sac 0.200 (12 valid violations in 60 episodes)")
-
-
-def test_a_requirement_that_is_only_reported_can_be_bound_and_one_that_a_family_lacks_is_not_asked_of_it() -> None:
-    found = results(
-        "succeeded",
-        {"episodes": 60, "requirements": requirements(never_fast=(0.0, 0.06), safe_ttc=(0.2, 0.32))},
-        {"family": "dense", "requirements": requirements(never_fast=(0.0, 0.06))},
-    )
-    status, reason = verdict(found, by_rate(requirements={"safe_ttc": 0.1}))
-    assert (status, reason) == (1, "safe_ttc above 0.1: low sac 0.200 (12 violations in 60 episodes)")
 
 
 def test_the_rate_of_a_requirement_is_judged_in_the_i_i_d_phase_too() -> None:
@@ -203,20 +180,6 @@ def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_fou
     assert verdict(violation, Bounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file})))[0] == 0
 
 
-@pytest.mark.parametrize(
-    ("content", "complaint"), [(None, "cannot be read"), ("{}", "wanted what `risk-sac campaigns")]
-)
-def test_a_file_that_is_no_earlier_campaign_is_refused_beforehand(
-    content: str | None, complaint: str, tmp_path: Path
-) -> None:
-    file = tmp_path / "known.json"
-    if content is not None:
-        file.write_text(content)
-    with pytest.raises(ConfigError, match=complaint) as error:
-        Bounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file}))
-    assert error.value.field == "--no-new-failures"
-
-
 @pytest.mark.parametrize("bounds", [Bounds(), Bounds(ecr=0.5), Bounds(pcr=0.5)])
 @pytest.mark.parametrize("state", ["failed", "cancelled"])
 def test_a_campaign_that_was_not_measured_to_the_end_could_not_run(state: str, bounds: Bounds) -> None:
@@ -227,7 +190,3 @@ def test_a_campaign_that_goes_on_cannot_be_judged_yet() -> None:
     assert verdict(results("running", {"ecr": 0.0}), Bounds(ecr=0.5))[0] == 2
     assert verdict(results("running", {"ecr": 0.0}), Bounds(pcr=0.5))[0] == 2
     assert verdict(results("running", {"ecr": 0.0}), Bounds())[0] == 0
-
-
-def test_a_method_without_an_episode_is_not_above() -> None:
-    assert verdict(results("succeeded", {"ecr": None, "pcr": None}), by_rate(ecr=0.0, pcr=0.0))[0] == 0

@@ -80,10 +80,6 @@ def report(
     return ElementTree.fromstring(written.getvalue())
 
 
-def properties(element: ElementTree.Element) -> dict[str, str]:
-    return {each.attrib["name"]: each.attrib["value"] for each in element.findall("./properties/property")}
-
-
 def test_every_family_is_a_suite_and_every_run_a_case() -> None:
     root = report({}, {"family": "dense", "method": "random", "seed": 7, "id": "dense-random-7"}, {"seed": 1})
     assert [suite.attrib["name"] for suite in root] == ["low", "dense"]
@@ -97,14 +93,6 @@ def test_every_family_is_a_suite_and_every_run_a_case() -> None:
     }
 
 
-def test_a_method_with_more_preventable_failures_than_may_be_fails_and_names_them() -> None:
-    root = report({}, bounds=Bounds(preventable=0), totals=[{}], failures=FAILURES)
-    (failure,) = root.iter("failure")
-    assert failure.attrib["message"] == "1 distinct preventable failure, where 0 may be"
-    assert "low-sac-0-search-3" in (failure.text or "")
-    assert not list(report({}, bounds=Bounds(preventable=1), totals=[{}]).iter("failure"))
-
-
 def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_does() -> None:
     root = report(
         {}, {"seed": 1, "id": "low-sac-1"}, totals=[{"runs": 2, "ecr": 0.25, "ecr_high": 0.278, "failures": 250}]
@@ -115,40 +103,6 @@ def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_
     assert failure.attrib["message"] == (
         "ECR above 0.1: 0.250, 95 % interval up to 0.278 (250 valid contacts in 1000 episodes)"
     )
-
-
-def test_failures_are_named_with_their_kind_how_to_look_at_them_and_how_to_have_them_again() -> None:
-    told = [
-        "low-sac-0: 10 valid failures, of which the first 2:",
-        "low-sac-0-search-3: cut-in, ahead, in a lane; ego goes straight, brakes; grade preventable",
-        "  risk-sac campaigns failures show c1 low-sac-0-search-3 --url http://host",
-        "low-sac-0-search-9: cut-in, ahead, in a lane; ego goes straight, brakes; grade preventable",
-        "  risk-sac campaigns failures show c1 low-sac-0-search-9 --url http://host",
-        f"To have them again without the service: save {URL}/spec?format=yaml as spec.yaml, then",
-        "  risk-sac run --spec spec.yaml --family low --method sac --seed 0 --out low-sac-0",
-    ]
-    green = report({}, failures=FAILURES, bounds=Bounds())
-    assert (next(green.iter("system-out")).text or "").splitlines() == told
-    (failure,) = report({}, failures=FAILURES, totals=[{"ecr": 0.25}]).iter("failure")
-    assert (failure.text or "").splitlines() == told
-
-
-def test_a_method_above_the_bound_on_preventable_failures_says_so() -> None:
-    (failure,) = report({}, bounds=Bounds(ecr=0.5, pcr=0.02), totals=[{}]).iter("failure")
-    assert failure.attrib["type"] == "pcr"
-    assert failure.attrib["message"].startswith("PCR above 0.02: 0.040, 95 % interval up to 0.054 (40 preventable")
-    (both,) = report({}, bounds=Bounds(ecr=0.05, pcr=0.02), totals=[{}]).iter("failure")
-    assert both.attrib["type"] == "ecr pcr"
-
-
-def test_every_requirement_that_counts_is_a_case_of_its_family_and_method() -> None:
-    both = requirements(no_contact=(0.0, 0.06), safe_ttc=(0.3, 0.4), never_fast=(0.2, 0.32))
-    root = report({}, bounds=Bounds(), totals=[{"requirements": both}])
-    cases = [(case.attrib["classname"], case.attrib["name"]) for case in root.iter("testcase")]
-    assert cases == [("low.sac", "seed 0"), ("low.sac", "no_contact"), ("low.sac", "never_fast")]
-    assert not list(root.iter("failure"))
-    funnel = "violated 12, valid 12, distinct 2, preventable 0, rate (95 %) 0.200 [0.000, 0.320]"
-    assert properties(root[0][-1]) == {"funnel": funnel}
 
 
 def test_a_requirement_over_its_bound_fails_and_names_the_failures_that_violate_it() -> None:
@@ -180,21 +134,6 @@ def test_a_run_that_failed_or_was_cancelled_is_an_error_and_one_that_goes_on_is_
     assert [error.attrib["message"] for error in root.iter("error")] == ["failed: the policy is NaN", "cancelled"]
     assert len(list(root.iter("skipped"))) == 3  # and the judgement of the method
     assert not list(root.iter("failure"))
-
-
-def test_digests_versions_and_where_to_look_are_properties() -> None:
-    root = report({}, {"seed": 1, "versions": {"libsumo": "1.29.0"}})
-    assert properties(root[0]) == {
-        "headline failures": "2",
-        "campaign": "c1",
-        "url": URL,
-        "version.libsumo": "1.28.0, 1.29.0",
-    }
-    funnel = (
-        "headline failures: at most 1; 12 contacts, 10 valid; 10 failures; 4 distinct violations, 2 preventable, "
-        "1 of them not minor"
-    )
-    assert properties(root[0][1]) == {"run": "low-sac-0", "spec_digest": "aa", "digest": "bb", "funnel": funnel}
 
 
 def test_whatever_a_reason_holds_the_report_is_well_formed() -> None:

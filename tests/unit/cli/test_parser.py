@@ -7,7 +7,6 @@ import pytest
 
 from risk_sac import cli
 from risk_sac.cli.parser import Parser
-from risk_sac.config import METHODS
 
 
 def leaves(parser: Parser) -> Iterator[Parser]:
@@ -37,19 +36,6 @@ def test_help_has_a_paragraph_an_example_that_parses_and_fits_80_columns(
     options, unknown = cli._parser().parse_known_args(words[1:])
     assert not unknown
     assert options.parser.prog.startswith(name)
-
-
-@pytest.mark.parametrize("name", [name for name in COMMANDS if name != "risk-sac"])
-def test_flags_are_grouped(name: str) -> None:
-    text = COMMANDS[name].format_help()
-    options = text.partition("\noptions:\n")[2].partition("\n\n")[0]
-    assert options.split() == ["-h,", "--help", "show", "this", "help", "message", "and", "exit"]
-
-
-def test_no_name_is_broken_at_a_hyphen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    text = COMMANDS["risk-sac run"].format_help()
-    assert all(re.search(rf"(?<![\w-]){name}(?![\w-])", text) for name in METHODS)
 
 
 @pytest.mark.parametrize(
@@ -108,25 +94,7 @@ def test_a_wrong_word_is_named_as_typed_beside_what_is_close(
     assert said in capsys.readouterr().err
 
 
-def test_the_methods_of_the_help_are_those_of_the_error(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["run", "--family", "low", "--method", "foo", "--out", "x"]) == 2
-    wanted = re.findall(r"'([\w-]+)'", capsys.readouterr().err)
-    told = re.search(r"--method NAME\s+one of (.*?) \(default", COMMANDS["risk-sac run"].format_help(), re.DOTALL)
-    assert told is not None
-    assert re.findall(r"[\w-]+", told[1]) == wanted
-
-
 def test_a_flag_may_be_shortened_and_words_after_two_dashes_are_no_flags() -> None:
     options, unknown = cli._parser().parse_known_args(["run", "--fam", "low", "--out", "x"])
     assert (options.family, unknown) == ("low", [])
     assert cli._parser().parse_known_args(["show", "--", "--results"])[0].results.name == "--results"
-
-
-def test_keys_hands_its_words_on_with_their_flags() -> None:
-    words = ["create", "--project", "default", "--scope", "run"]
-    assert cli._parser().parse_known_args(["keys", *words])[0].rest == words
-
-
-@pytest.mark.parametrize("name", ["run", "show", "evaluate", "verify", "clusters"])
-def test_json_is_a_flag_of_the_commands_with_results(name: str) -> None:
-    assert "--json" in COMMANDS[f"risk-sac {name}"].flags()

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from risk_sac.client import Client
-from risk_sac.client.address import DEFAULT_URL, api_key
+from risk_sac.client.address import api_key
 from risk_sac.errors import ConfigError
 from tests.unit.client.scripted_server import Server, campaign
 
@@ -39,12 +39,6 @@ def test_the_key_comes_from_the_environment_or_from_a_file(tmp_path: Path) -> No
     assert api_key({"RISK_SAC_API_KEY": "direct", "RISK_SAC_API_KEY_FILE": str(file)}) == "direct"
 
 
-def test_a_key_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"nowhere, which cannot be read \(No such file") as caught:
-        api_key({"RISK_SAC_API_KEY_FILE": str(tmp_path / "nowhere")})
-    assert caught.value.field == "RISK_SAC_API_KEY_FILE"
-
-
 PROXIES = ("http_proxy", "https_proxy", "all_proxy", "no_proxy")
 
 
@@ -67,11 +61,3 @@ def test_a_proxy_that_cannot_be_used_is_named(name: str, value: str, monkeypatch
     monkeypatch.setenv(name, value)
     with pytest.raises(ConfigError, match=r"proxy: .*mend HTTP_PROXY"):
         Client("https://search.example")
-
-
-def test_the_url_comes_from_the_argument_the_environment_or_the_default(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("RISK_SAC_URL", raising=False)
-    assert Client.from_environment().url == DEFAULT_URL
-    monkeypatch.setenv("RISK_SAC_URL", "https://sac.example/")
-    assert Client.from_environment().url == "https://sac.example"
-    assert Client.from_environment("http://other:1").url == "http://other:1"

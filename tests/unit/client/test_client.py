@@ -23,15 +23,6 @@ def test_only_what_a_spec_was_given_is_sent(server: Server, client: Client) -> N
     assert server.asked[0].headers["content-type"] == "application/json"
 
 
-def test_every_submission_has_a_key_of_its_own_unless_told_otherwise(server: Server, client: Client) -> None:
-    server.answer(202, campaign("queued"))
-    for key in (None, None, "nightly-17"):
-        client.submit({}, key)
-    first, second, third = (asked.headers["idempotency-key"] for asked in server.asked)
-    assert first != second
-    assert third == "nightly-17"
-
-
 def test_lists_are_read_page_by_page_as_far_as_they_are_wanted(server: Server, client: Client) -> None:
     pages: list[dict[str, Any]] = [
         {"items": [campaign(id="c3"), campaign(id="c2")], "next": "Mg=="},
@@ -53,14 +44,6 @@ def test_an_id_stays_one_part_of_the_path(server: Server, client: Client) -> Non
     server.answer(200, campaign())
     client.campaign("../c1?x=y#z")
     assert server.asked[0].path == "/v1/campaigns/..%2Fc1%3Fx%3Dy%23z"
-
-
-def test_a_failure_comes_in_a_format_and_has_an_address_on_the_page(server: Server, client: Client) -> None:
-    server.answer(200, {"any": "bytes"})
-    assert json.loads(client.export("c1", "low-sac-0-search-7", "openscenario")) == {"any": "bytes"}
-    assert server.asked[0].path == "/v1/campaigns/c1/failures/low-sac-0-search-7/export?format=openscenario"
-    assert client.page_of("c1") == f"{server.url}/page/#/campaigns/c1"
-    assert client.page_of("c1", "a/b") == f"{server.url}/page/#/campaigns/c1/failures/a%2Fb"
 
 
 def test_the_key_is_sent_with_every_request_and_shown_nowhere(server: Server) -> None:

@@ -3,11 +3,10 @@ from collections import deque
 
 import pytest
 
-from risk_sac.client import Client, Event, Overdue, Refused, UnexpectedAnswer
+from risk_sac.client import Client, Event, Overdue, Refused
 from tests.unit.client.scripted_server import Answer, Server, campaign
 
 STATUS, EVENTS = "/v1/campaigns/c1", "/v1/campaigns/c1/events"
-NO_STREAM = Answer(404, {"detail": "nothing is here", "reason": "unknown_route"})
 RUNNING = 'id: 7\nevent: state\ndata: {"run_id": null, "state": "running", "reason": null}\n\n'
 EPISODE = 'id: 8\nevent: episode\ndata: {"run_id": "low-random-0", "index": 0}\n\n'
 ENDED = 'id: 9\nevent: state\ndata: {"run_id": null, "state": "succeeded", "reason": null}\n\n'
@@ -42,13 +41,6 @@ def test_a_campaign_deleted_meanwhile_is_an_error(server: Server, client: Client
         client.wait("c1")
 
 
-def test_wait_shows_every_change_and_returns_the_end(server: Server, client: Client) -> None:
-    script(server, [now("queued"), now("running", 2), now("succeeded", 4)])
-    seen: list[int] = []
-    assert client.wait("c1", lambda each: seen.append(each.progress.episodes_done)).state == "succeeded"
-    assert seen == [0, 2, 4]
-
-
 def test_events_come_as_they_were_sent_and_go_on_after_a_break(server: Server, client: Client) -> None:
     script(server, [now("succeeded")], Answer(200, [RUNNING, ": ping\n\n", EPISODE, None]), Answer(200, [ENDED]))
     found = list(client.events("c1"))
@@ -57,31 +49,8 @@ def test_events_come_as_they_were_sent_and_go_on_after_a_break(server: Server, c
     assert [each.headers.get("last-event-id") for each in server.asked if each.path == EVENTS] == [None, "8"]
 
 
-def test_events_can_begin_after_one_that_was_seen(server: Server, client: Client) -> None:
-    script(server, [now("succeeded")], Answer(200, [ENDED]))
-    assert [each.id for each in client.events("c1", "8")] == ["9"]
-    assert server.asked[0].headers["last-event-id"] == "8"
-
-
-def test_events_of_an_unknown_campaign_are_refused(server: Server, client: Client) -> None:
-    script(server, [now("running")], NO_STREAM)
-    with pytest.raises(Refused):
-        next(client.events("c1"))
-
-
-def test_a_stream_of_something_else_is_an_error(server: Server, client: Client) -> None:
-    script(server, [now("running")], Answer(200, {"hello": "world"}))
-    with pytest.raises(UnexpectedAnswer, match="wanted a stream of events"):
-        next(client.events("c1"))
-
-
 def test_a_stream_that_ends_before_all_is_told_is_taken_up_even_if_the_campaign_has_ended_by_then(
     server: Server, client: Client
 ) -> None:
     script(server, [now("succeeded")], Answer(200, [RUNNING]), Answer(200, [EPISODE, ENDED]))
     assert [each.id for each in client.events("c1")] == ["7", "8", "9"]
-
-
-def test_a_campaign_whose_events_were_all_told_has_no_more(server: Server, client: Client) -> None:
-    script(server, [now("succeeded")], Answer(204))
-    assert list(client.events("c1", "9")) == []

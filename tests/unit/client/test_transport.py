@@ -128,23 +128,6 @@ def test_an_answer_of_something_else_is_an_error_and_no_traceback(body: object, 
         client.campaign("c1")
 
 
-def test_a_proxys_own_page_has_no_reason(server: Server, client: Client) -> None:
-    server.answer(403, b"<html>no</html>")
-    with pytest.raises(Refused) as caught:
-        client.campaign("c1")
-    assert (caught.value.status, caught.value.reason, caught.value.detail) == (403, "", "Forbidden")
-
-
-@pytest.mark.parametrize(
-    ("value", "seconds"), [("7", 7), ("-1", 0), ("soon", None), ("nan", None), ("Thu, 01 Jan 1970 00:00:00 GMT", 0)]
-)
-def test_retry_after_may_be_anything(value: str, seconds: float | None, server: Server, client: Client) -> None:
-    server.answer(404, PROBLEM, Retry_After=value)
-    with pytest.raises(Refused) as caught:
-        client.campaign("c1")
-    assert caught.value.retry_after_s == seconds
-
-
 @pytest.mark.parametrize("key", ["schlüssel", "two\nlines", "\udcff"])
 def test_what_http_cannot_say_is_an_error_of_the_caller(key: str, server: Server, client: Client) -> None:
     server.answer(202, campaign())

@@ -3,19 +3,9 @@
 import pytest
 from pydantic import ValidationError
 
-from risk_sac.config import CampaignSpec, RunSpec
-from risk_sac.config.spec_file import campaign_yaml, read_spec
-from risk_sac.errors import ConfigError
+from risk_sac.config import CampaignSpec
 
 ENDS = {"families": ["low", "dense"], "methods": ["random", "archive"], "seeds": [0, 7], "iid": {"seed": 7}}
-
-
-def test_a_campaign_without_one_is_what_it_was_before_there_were_any():
-    spec = CampaignSpec(families=("low",))
-    assert spec.digest == "5fc5b3293f815d24a5cd747644dde22f2d24b9253d40d25653aadc072c1b5851"
-    assert spec.runs()[0].digest == "4985c20f945745b9cbc0cf29b04cd7b68760d3a181c5683c9b454ac0437cd0cf"
-    assert "iid" not in spec.model_dump()
-    assert spec.drawn() == ()
 
 
 def test_its_runs_come_last_one_for_each_family_and_kind_of_traffic():
@@ -45,17 +35,3 @@ def test_nobody_posts_its_runs_as_methods_nor_more_episodes_than_a_campaign_may_
     assert CampaignSpec.model_validate(full)
     with pytest.raises(ValidationError, match=r"and 600 of the i\.i\.d\. phase; wanted at most 2000000"):
         CampaignSpec.model_validate(full | {"iid": {}})
-
-
-def test_a_command_line_picks_one_of_its_runs_from_a_campaigns_file(tmp_path):
-    spec = CampaignSpec.model_validate(ENDS)
-    file = tmp_path / "spec.yaml"
-    file.write_text(campaign_yaml(spec))
-    picked = {"family": "dense", "method": "iid-random", "seed": 7}
-    assert read_spec(file, picked) == spec.drawn()[3]
-    assert read_spec(file, picked | {"method": "archive"}) == spec.searches()[7]
-    with pytest.raises(ConfigError, match="a campaign of no such runs"):
-        read_spec(file, picked | {"seed": 8})
-    assert read_spec(None, {"family": "low", "method": "iid-random", "episodes": 3}) == RunSpec.model_validate(
-        {"family": "low", "method": "iid-random", "seed": 0, "budget": {"episodes": 3}}
-    )

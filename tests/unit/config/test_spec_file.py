@@ -3,7 +3,6 @@ from typing import Any
 
 import pytest
 
-from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import campaign_yaml, read_campaign, read_spec
 from risk_sac.errors import ConfigError
 
@@ -14,11 +13,6 @@ def yaml_file(folder: Path, text: str) -> Path:
     file = folder / "spec.yaml"
     file.write_text(text)
     return file
-
-
-def test_flags_alone_make_a_run_with_the_defaults() -> None:
-    spec = read_spec(None, FLAGS | {"family": "low", "episodes": 7})
-    assert spec == RunSpec.model_validate({"family": "low", "method": "risk-sac", "seed": 0, "budget": {"episodes": 7}})
 
 
 def test_run_file_keeps_its_fields_and_flags_override_them(tmp_path: Path) -> None:
@@ -32,11 +26,6 @@ def test_run_file_keeps_its_fields_and_flags_override_them(tmp_path: Path) -> No
     assert (spec.budget.episodes, spec.budget.evaluation_episodes) == (3, 2)
     assert spec.ego.sensor is None
     assert spec.requirements[0].name == "slow"
-
-
-def test_campaign_with_one_run_is_that_run(tmp_path: Path) -> None:
-    file = yaml_file(tmp_path, "families: [dense]\nmethods: [random]\nseeds: [3]\n")
-    assert read_spec(file, FLAGS) == RunSpec(family="dense", method="random", seed=3)
 
 
 def test_flags_pick_one_run_of_a_campaign(tmp_path: Path) -> None:
@@ -93,25 +82,6 @@ def test_all_that_is_wrong_is_told_and_unknown_names_come_first(tmp_path: Path) 
     assert [each.field for each in (raised.value, *raised.value.others)] == ["labl", "seeds[0]"]
 
 
-def test_a_run_file_needs_a_family_alone(tmp_path: Path) -> None:
-    spec = read_spec(yaml_file(tmp_path, "family: low\nbudget: {episodes: 7}\n"), FLAGS)
-    assert spec == read_spec(None, FLAGS | {"family": "low", "episodes": 7})
-
-
-def test_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(
-        ConfigError,
-        match=r"got .*nowhere\.yaml, which cannot be read \(No such file.*; wanted a text file; check its path",
-    ):
-        read_spec(tmp_path / "nowhere.yaml", FLAGS)
-
-
-def test_wrong_flag_names_the_field() -> None:
-    with pytest.raises(ConfigError, match="got -2; wanted >= 1") as raised:
-        read_spec(None, FLAGS | {"family": "low", "episodes": -2})
-    assert raised.value.field == "budget.episodes"
-
-
 CAMPAIGN_FLAGS: dict[str, Any] = dict.fromkeys(("families", "methods", "seeds", "episodes", "evaluation_episodes"))
 DEFAULTS: dict[str, Any] = {"families": ["low"], "methods": ["sac"], "seeds": [0, 1]}
 
@@ -132,9 +102,3 @@ def test_campaign_written_as_yaml_is_the_same_campaign(tmp_path: Path) -> None:
     assert again == spec
     assert again.digest == spec.digest
     assert read_campaign(None, CAMPAIGN_FLAGS, DEFAULTS).digest != spec.digest
-
-
-def test_campaign_refuses_the_file_of_a_run(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="wanted one of budget") as raised:
-        read_campaign(yaml_file(tmp_path, "family: low\n"), CAMPAIGN_FLAGS, DEFAULTS)
-    assert raised.value.field == "family"

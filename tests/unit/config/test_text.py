@@ -64,9 +64,3 @@ def test_another_encoding_is_one_line_that_says_what_to_do(name: str, tmp_path: 
         ConfigError, match=r"latin\.yaml, which is no UTF-8 from byte 11 on; wanted a text file; save it as UTF-8"
     ):
         READERS[name][1](file)
-
-
-@pytest.mark.parametrize("name", READERS)
-def test_what_cannot_be_read_is_one_line(name: str, tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"which cannot be read \(Is a directory\)"):
-        READERS[name][1](tmp_path)

@@ -284,13 +284,6 @@ def test_a_defect_that_does_not_exist_or_fit_is_refused_in_a_line(ego: str, mess
     assert "\n" not in str(raised.value)
 
 
-def test_about_a_third_is_the_test_set_with_each_kind_in_it() -> None:
-    assert len(DEFECTS) >= 28
-    tested = [defect for defect in DEFECTS.values() if defect.test_set]
-    assert 0.28 <= len(tested) / len(DEFECTS) <= 0.36
-    assert {defect.kind for defect in tested} == {defect.kind for defect in DEFECTS.values()}
-
-
 def test_every_row_is_admitted_in_its_first_family() -> None:
     rows = {row["defect"]: row for row in csv.DictReader(ADMISSION.read_text(encoding="utf-8").splitlines())}
     assert rows.keys() == DEFECTS.keys()
@@ -302,12 +295,6 @@ def test_every_row_is_admitted_in_its_first_family() -> None:
         assert int(row["undisturbed_scenes"]) >= LEAST_SCENES, name
         assert row["undisturbed_detected"] == "0", name
         assert 0 < int(row["detected"]) <= 200_000, name
-
-
-def test_a_row_says_the_value_that_it_sets() -> None:
-    for defect in DEFECTS.values():
-        assert bool(defect.decorator) != bool(defect.settings), defect.name
-        assert not defect.settings or defect.parameter.value in defect.settings.values(), defect.name
 
 
 def test_an_ego_with_a_defect_is_of_another_version() -> None:

@@ -10,17 +10,8 @@ import pytest
 from risk_sac.egos import registry
 from risk_sac.egos.bicycle import advance, track
 from risk_sac.egos.guard import Guarded
-from risk_sac.egos.planners.route import (
-    SignalStops,
-    in_pieces,
-    in_view,
-    lanes_ahead,
-    room_aside_m,
-    stops,
-    way_to_stop_m,
-)
+from risk_sac.egos.planners.route import SignalStops, stops, way_to_stop_m
 from risk_sac.egos.seam import Episode, Perceived, Trajectory, Vehicle
-from risk_sac.errors import ConfigError
 from risk_sac.sim.pilot import Motion
 from risk_sac.types import (
     ACCEL,
@@ -152,44 +143,11 @@ def test_it_follows_its_plan_back_to_the_middle_of_its_lane(side: float) -> None
     assert max(side * motion.y_m for motion in motions) < 1.9  # as its plans, which reach 1.7 m
 
 
-def test_it_drives_the_same_again() -> None:
-    road, start = two_lanes(), Motion(20.0, 0.0, 0.0, 12.0)
-    assert drive("fiss-plus", road, (slow,), steps=60, start=start) == drive(
-        "fiss-plus", road, (slow,), steps=60, start=start
-    )
-
-
-def test_the_lanes_ahead_change_to_one_that_leads_on() -> None:
-    road = two_lanes()
-    lanes = tuple(
-        each._replace(successors=(), on_route=False) if each.id == "a_beside" else each for each in road.lanes
-    )
-    assert lanes_ahead(road._replace(lanes=lanes), "a_beside") == ["a_beside", "a_own", "b_own"]
-    assert lanes_ahead(road, "a_beside") == ["a_beside", "b_beside"]
-
-
-def test_pieces_of_lanes_keep_their_neighbours_and_order() -> None:
-    road = in_pieces(two_lanes(stop_line=True), 50.0, 2.0)
-    lanes = {each.id: each for each in road.lanes}
-    assert len(lanes) == 2 * (6 + 2)
-    assert lanes["a_own/5"].successors == ("b_own/0",)
-    assert (lanes["a_own/2"].successors, lanes["a_own/2"].right) == (("a_own/3",), "a_beside/2")
-    np.testing.assert_allclose(lanes["a_own/2"].line[0], np.arange(100.0, 151.0, 2.0))
-    assert [line.lane for line in road.stop_lines] == ["a_own/5", "a_beside/5"]
-
-
 @pytest.mark.parametrize(("ahead_m", "stopped"), [(25.0, True), (10.0, False)])
 def test_a_yellow_light_stops_it_where_it_can_still_stop(ahead_m: float, stopped: bool) -> None:
     motion = Motion(300.0 - ahead_m - VEHICLE.length_m / 2, 0.0, 0.0, 12.0)  # from 12 m/s, 4.5 m/s² take 16 m
     view = perceived(motion, 0.0, [], Signal.YELLOW)
     assert stops(two_lanes(stop_line=True), view, SignalStops())[0] is stopped
-
-
-def test_the_signal_of_another_direction_does_not_count() -> None:
-    road = two_lanes(stop_line=True)
-    lanes = tuple(each._replace(on_route=each.id != "b_own") for each in road.lanes)
-    view = perceived(Motion(250.0, 0.0, 0.0, 12.0), 0.0, [], Signal.RED)
-    assert stops(road._replace(lanes=lanes), view, SignalStops()) == [False, True]
 
 
 def test_it_keeps_stopping_at_a_yellow_light_until_the_light_changes() -> None:
@@ -226,28 +184,3 @@ def test_a_planner_without_stop_lines_stops_a_metre_before_a_signal(
 ) -> None:
     view = perceived(Motion(0.0, 0.0, 0.0, speed), 0.0, [], signal)._replace(stop_line_m=line_m)
     assert way_to_stop_m(view, SignalStops()) == (None if way_m is None else pytest.approx(way_m))
-
-
-@pytest.mark.parametrize("y_m", [0.2, -WIDTH_M])
-def test_there_is_as_much_room_aside_as_the_lane_is_wider_than_the_car(y_m: float) -> None:
-    lanes = [each._replace(width_m=4.0) if each.id == "a_beside" else each for each in two_lanes().lanes]
-    view = perceived(Motion(0.0, y_m, 0.0, 10.0), 0.0, [], Signal.NONE)
-    width_m = 4.0 if y_m < -1.0 else WIDTH_M
-    assert room_aside_m(lanes, view, VEHICLE) == pytest.approx((width_m - VEHICLE.width_m) / 2 - 0.1)
-
-
-@pytest.mark.parametrize("heading_rad", [0.0, math.pi])
-def test_vehicles_behind_in_the_lane_are_out_of_view(heading_rad: float) -> None:
-    sign = math.cos(heading_rad)
-    others = [(-20.0 * sign, 0.0, 5.0), (-20.0 * sign, WIDTH_M, 5.0), (20.0 * sign, 0.0, 5.0), (-1.0 * sign, 0.0, 5.0)]
-    view = perceived(Motion(0.0, 0.0, heading_rad, 10.0), 0.0, others, Signal.NONE)
-    assert in_view(view).tolist() == [False, False, True, True, True]
-    pedestrians = view._replace(kind=np.full_like(view.kind, Kind.PEDESTRIAN))
-    assert in_view(pedestrians).tolist() == [False, True, True, True, True]
-
-
-def test_a_planner_that_is_not_installed_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "PLANNERS_PACKAGE", "no_such_package")
-    with pytest.raises(ConfigError, match=r"ego\.driver.*fiss-plus.*pip install 'risk-sac\[planners\]'"):
-        registry.card_of("fiss-plus")
-    assert not {card.name for card in registry.cards()} & set(PLANNERS)

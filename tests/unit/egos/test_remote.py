@@ -161,14 +161,6 @@ def test_an_answer_out_of_turn_or_none_is_not_driven(acts: Acts, reason: str, sa
     assert failed.value.reason == reason
 
 
-def test_an_ego_of_the_first_version_of_the_protocol_is_told_apart() -> None:
-    with (
-        pytest.raises(EgoFailed, match="does not speak version 2 of the protocol"),
-        talking(twice, service="risk_sac.egos.v1.Ego"),
-    ):
-        pass
-
-
 class Saying:
     """Does the same in each step."""
 

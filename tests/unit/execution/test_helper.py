@@ -2,7 +2,6 @@ import os
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import psutil
 import pytest
@@ -35,13 +34,6 @@ def test_what_a_helper_prints_does_not_disturb_its_answer(run):
     code = "import sys; print('noise'); open(sys.argv[2], 'wb').write(open(sys.argv[1], 'rb').read() + b'!')"
     result = run(code, QUESTION, ANSWER, question=b"\x00asked")
     assert (result.status, result.answer, result.log) == (0, b"\x00asked!", "noise")
-
-
-def test_a_helper_that_fails_tells_the_end_of_what_it_printed(run):
-    result = run("import sys; print('x' * 10_000_000); sys.exit('the last words')")
-    assert (result.status, result.answer, result.timed_out) == (1, b"", False)
-    assert result.log.endswith("x\nthe last words")
-    assert len(result.log) <= 2000
 
 
 def test_a_helper_that_takes_too_long_is_killed_with_all_that_it_started(run):
@@ -106,8 +98,3 @@ def test_an_isolated_helper_imports_nothing_from_its_working_directory(tmp_path)
     (tmp_path / "json.py").write_text("print('mine')")
     result = run_helper("json.tool", ["--help"], wall_s=LONG_S, isolated=True, cwd=tmp_path)
     assert "mine" not in result.log
-
-
-def test_a_helper_that_cannot_be_started_raises(tmp_path):
-    with pytest.raises(OSError, match="No such file"):
-        run_helper("json.tool", [], wall_s=1, cwd=Path(tmp_path, "missing"))

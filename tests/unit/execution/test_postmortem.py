@@ -22,11 +22,6 @@ def test_a_text_keeps_the_names_of_files_and_no_folders(said: str, told: str) ->
     assert without_folders(said, Path("data/c1/run")) == told
 
 
-def test_a_text_about_no_folder_of_ours_loses_those_it_names() -> None:
-    said = 'connection to server on socket "/run/postgresql/.s.PGSQL.5432" failed'
-    assert without_folders(said) == 'connection to server on socket ".s.PGSQL.5432" failed'
-
-
 def test_the_last_lines_of_a_log_are_told_without_folders(tmp_path: Path) -> None:
     log = tmp_path / "worker.log"
     log.write_text(f'an older worker\'s\nTraceback:\n  File "{log}", line 1\nValueError: no\n')

@@ -37,12 +37,6 @@ def test_what_is_not_needed_together_costs_one_try() -> None:
     assert failure.tried == 1
 
 
-def test_nothing_at_all_is_not_tried() -> None:
-    failure = Needs((), set())
-    without((), failure.unneeded)
-    assert failure.tried == 0
-
-
 def test_where_no_action_is_left_nothing_is_weakened() -> None:
     family = SimpleNamespace(adversaries=("lead",))
     env = SimpleNamespace(problem=SimpleNamespace(family=family))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from risk_sac.failures.recording import Recording, actions_of, trajectory_digest
+from risk_sac.failures.recording import Recording, trajectory_digest
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
 
 
@@ -62,8 +62,3 @@ def test_the_digest_is_of_the_arrays_and_of_nothing_else() -> None:
 )
 def test_the_digest_changes_with_every_bit(change: dict[str, np.ndarray]) -> None:
     assert trajectory_digest(series() | change) != trajectory_digest(series())
-
-
-def test_the_actions_are_those_after_the_release() -> None:
-    actions = np.array([[np.nan], [np.nan], [0.2], [0.3]], np.float32)
-    np.testing.assert_array_equal(actions_of(series() | {"actions": actions}), actions[2:])

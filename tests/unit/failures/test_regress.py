@@ -73,11 +73,7 @@ ARTEFACT = violation(requirement="gentle", verdicts={"no_teleport": False})
         ([violation(other_id="another")], Verdict.STILL_FAILING, "violates never_fast after 1.5 s, at 9.0 m/s"),
         ([HIT, violation()], Verdict.STILL_FAILING, "violates never_fast after 1.5 s, at 9.0 m/s"),
         ([HIT], Verdict.NEW_KIND, "touches lead at a closing speed of 7.0 m/s: cut-in"),
-        (
-            [violation(requirement="gentle")],
-            Verdict.NEW_KIND,
-            "violates gentle after 1.5 s, at 9.0 m/s: ",
-        ),
+        ([violation(requirement="gentle")], Verdict.NEW_KIND, "violates gentle after 1.5 s, at 9.0 m/s: "),
         ([ARTEFACT], Verdict.NOT_COMPARABLE, "which is not its failure: no_teleport"),
     ],
 )

@@ -47,17 +47,6 @@ def test_a_neighbour_that_moves_over_while_the_ego_brakes_late() -> None:
     assert late == "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.6 s late"
 
 
-def test_offences_are_said_of_whose_they_are() -> None:
-    where = {"x_m": 15.0, "y_m": -9.0, "heading": math.pi / 2}
-    striker_only, ego_only = said(broke=("red_light",), **where), said(ego_broke=("red_light", "speeding"), **where)
-    assert striker_only == (
-        "vehicle from the right on red, 15 m ahead, goes on at 14 m/s; ego at 14 m/s does not brake"
-    )
-    assert ego_only == (
-        "vehicle from the right, 15 m ahead, goes on at 14 m/s; ego at 14 m/s on red speeding does not brake"
-    )
-
-
 def test_in_the_mirror_the_sides_are_exchanged() -> None:
     mirrored = said(y_m=-3.2, lateral_mps=during(1.0, 2.5, 1.1))
     assert mirrored == "right neighbour, 4 m ahead, moves left at 1.1 m/s for 1.5 s; ego at 14 m/s does not brake"
@@ -79,24 +68,6 @@ def test_in_the_mirror_the_sides_are_exchanged() -> None:
 )
 def test_who_strikes_is_told_from_where_it_is(who: str, where: dict[str, Any]) -> None:
     assert said(**where).startswith(f"{who}, goes on at 14 m/s; ")
-
-
-def test_what_it_does_is_told_in_the_order_in_which_it_begins() -> None:
-    both = said(accel_mps2=during(0.5, 1.5, -6.0), lateral_mps=during(1.0, 2.0, -0.8))
-    assert "brakes at 6.0 m/s² for 1.0 s, then moves right at 0.8 m/s for 1.0 s" in both
-
-
-def test_who_brakes_in_time_is_not_called_late() -> None:
-    braking = said("braking", ego_accel_mps2=during(1.5, 3.5, -6.0))
-    assert braking.endswith("ego at 14 m/s brakes, and touches it still")
-
-
-@pytest.mark.parametrize(
-    ("response", "told"),
-    [("none", "brakes no longer"), ("accelerating", "speeds up"), ("starting", "starts"), ("standing", "has stopped")],
-)
-def test_an_ego_that_braked_is_told_by_what_it_did_last(response: str, told: str) -> None:
-    assert said(response, ego_accel_mps2=during(1.0, 2.0, -6.0)).endswith(f"; ego at 14 m/s {told}")
 
 
 def test_a_violation_without_contact_tells_what_the_nearest_actor_did_until_then() -> None:

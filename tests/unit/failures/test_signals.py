@@ -35,15 +35,3 @@ def test_heads_show_what_the_program_shows_from_where_the_scene_puts_it(
             assert head.colour(time_s) == LETTERS[letters[link.index].lower()]
         compared += 1
     assert compared == len(ends)
-
-
-def test_red_closes_the_lane_and_green_leaves_its_middle_open() -> None:
-    heads = signal_heads("dense", scene("dense", 0.0))
-    head = next(each for each in heads if abs(np.sin(each.heading_rad)) > 0.9 and "yellow" in str(each.changes))
-    for colour, lines in (("red", 1), ("yellow", 1), ("green", 2)):
-        time_s = next(at for at, shown in head.changes if shown == colour) + 0.1
-        marks = head.marks(time_s)
-        assert len(marks) == lines
-        across = np.concatenate(marks)
-        np.testing.assert_allclose(across[:, 1], head.y_m, atol=1e-6)  # at the stop line
-        assert np.ptp(across[:, 0]) == pytest.approx(head.width_m)

@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-import pytest
-
-from risk_sac.failures.studied import STUDIES, Core, Extent, Region, Share, Studied, edition, note, read_studies
+from risk_sac.failures.studied import STUDIES, Core, Extent, Region, Share, Studied, note, read_studies
 
 CORE = Core(
     before=Extent(adversaries=2, segments=9, channels=12, strongest=1.0),
@@ -26,14 +24,6 @@ def test_a_core_and_a_region_come_back_together(tmp_path: Path) -> None:
     assert read_studies(tmp_path, "d") == {3: Studied(core=CORE, region=REGION), 12: Studied(region=REGION)}
 
 
-def test_what_was_noted_makes_another_edition(tmp_path: Path) -> None:
-    before = edition(tmp_path)
-    note(tmp_path, "d", 3, Studied(core=CORE))
-    first = edition(tmp_path)
-    note(tmp_path, "d", 3, Studied(region=REGION))
-    assert len({before, first, edition(tmp_path)}) == 3
-
-
 def test_of_other_results_or_damaged_nothing_is_told(tmp_path: Path) -> None:
     assert read_studies(tmp_path, "d") == {}
     note(tmp_path, "other", 3, Studied(core=CORE))
@@ -42,10 +32,3 @@ def test_of_other_results_or_damaged_nothing_is_told(tmp_path: Path) -> None:
         (tmp_path / STUDIES / name).write_text(content)
     (tmp_path / STUDIES / "000004-core.json").rename(tmp_path / STUDIES / "4-x.json")
     assert read_studies(tmp_path, "d") == {}
-
-
-@pytest.mark.parametrize("studied", [Studied(core=CORE), Studied(region=REGION)])
-def test_the_last_word_counts(tmp_path: Path, studied: Studied) -> None:
-    for _ in range(2):
-        note(tmp_path, "d", 3, studied)
-    assert read_studies(tmp_path, "d") == {3: studied}

@@ -1,7 +1,6 @@
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,7 @@ from shapely import Polygon, box
 import sumo_nets
 from risk_sac.failures.net import read_net, roads_of, surfaces
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.signals import LAMPS, signal_heads
-from risk_sac.failures.thumbnail import EGO, GREY, HEIGHT, STRIKER, WIDTH, thumbnail
+from risk_sac.failures.thumbnail import EGO, HEIGHT, STRIKER, WIDTH, thumbnail
 from risk_sac.run_folder.results import RecordedFailure
 from tests.builders import violation
 from tests.unit.failures.staged import synthetic_contact, synthetic_series
@@ -72,30 +70,6 @@ def test_north_is_up_and_an_arrow_head_points_to_where_a_car_heads() -> None:
         np.testing.assert_allclose(away / np.hypot(*away), ahead, atol=0.1)
 
 
-def test_a_path_has_the_last_seconds_alone_and_the_frames_in_which_its_actor_was_there() -> None:
-    series = synthetic_series()
-    rows = {name: array for name, array in series.items() if array.shape[:1] == (21,)}
-    long = {name: np.concatenate([array[:1]] * 80 + [array]) for name, array in rows.items()}
-    long |= {"time_s": np.arange(101) * 0.1 + 0.1 - 8.0, "released_s": np.array(0.1)}
-    absent = series | {
-        "x_m": np.where(np.arange(3) == 1, np.where(np.arange(21) < 8, np.nan, 300.0)[:, None], series["x_m"])
-    }
-    for given, colour, frames in ((series, EGO, 21), (series | long, EGO, 31), (absent, STRIKER, 13)):
-        (path,) = (shape for shape in drawn(given, roads=False) if shape.get("stroke") == colour)
-        assert len(points(path)) == pytest.approx(frames, abs=1)
-
-
-def test_who_has_left_is_not_drawn_and_who_stands_by_is_grey() -> None:
-    here = synthetic_series()
-    there = here | {name: np.nan_to_num(here[name], nan=310.0) for name in ("x_m", "y_m", "heading_rad")}
-
-    def bystanders(series: Mapping[str, Any]) -> int:
-        shapes = drawn(series, roads=False)
-        return sum(shape.get("fill") == GREY and shape.tag == f"{SVG}polygon" for shape in shapes)
-
-    assert (bystanders(here), bystanders(there)) == (0, 1)
-
-
 def test_the_roads_in_view_lie_below_everything_else_with_stripes_across_a_crossing() -> None:
     shapes = drawn(synthetic_series())
     ground = [shape for shape in shapes if float(shape.get("fill-opacity", 1)) < 0.5 or shape.get("stroke-dasharray")]
@@ -114,23 +88,3 @@ def test_a_violation_near_nothing_shows_the_ego_and_its_path_up_to_then() -> Non
     assert len(points(path)) == pytest.approx(11, abs=1)
     end, ego = points(path)[-1], points(body(shapes, EGO)).mean(axis=0)
     np.testing.assert_allclose(end, ego, atol=5.0)
-
-
-def test_signals_have_their_colour_at_the_violation_and_a_bar_tells_the_scale() -> None:
-    contact = synthetic_contact()
-    recording, scene = Recording(contact, synthetic_series()), contact.episode.scene
-    heads = [
-        replace(head, x_m=x_m, y_m=0.0) for head, x_m in zip(signal_heads("mixed", scene), (295, 305), strict=False)
-    ]
-    red, green = (
-        replace(head, changes=[(0.0, "red"), (at, "green")]) for head, at in zip(heads, (9.0, 1.0), strict=True)
-    )
-    shapes = list(ET.fromstring(thumbnail(recording, (), (red, green))))
-    for head, marks in ((red, 1), (green, 2)):
-        colour = LAMPS[head.colour(0.1 + contact.episode.collision.time_s)]
-        assert sum(shape.get("stroke") == colour for shape in shapes) == marks
-    (length,) = (shape.text for shape in shapes if shape.tag == f"{SVG}text")
-    (bar,) = (points(shape) for shape in shapes if shape.get("stroke") == GREY)
-    (ego,) = (points(shape) for shape in shapes if shape.get("fill") == EGO)
-    metres = np.ptp(bar[:, 0]) / np.ptp(ego[:, 0]) * synthetic_series()["length_m"][0]
-    assert metres == pytest.approx(float(length.removesuffix(" m")), rel=0.02)

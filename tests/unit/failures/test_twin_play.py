@@ -2,18 +2,9 @@ import math
 
 import numpy as np
 
-from risk_sac.config import EgoConfig
 from risk_sac.failures.question import TwinPlay, read_twin, twin_bytes
 from tests.builders import collision, violation
 from tests.unit.failures.staged import synthetic_series
-
-
-def test_a_twin_is_named_by_what_was_changed_and_what_came_of_it() -> None:
-    hit = collision(other_id="lead", ego_speed_mps=12.3, relative_speed_mps=1.34)
-    careful = EgoConfig(profile="careful")
-    assert TwinPlay.of(None, hit, []).title == "no attack: no contact"
-    assert TwinPlay.of(careful, hit, [hit]).title == "ego: careful: touches lead at a closing speed of 1.3 m/s"
-    assert TwinPlay.of(careful, hit, [hit], "slow.yaml").changed == "ego: slow.yaml"
 
 
 def test_a_twin_reads_back_with_its_series_and_what_is_not_finite() -> None:

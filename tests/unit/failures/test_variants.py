@@ -9,8 +9,7 @@ BY_LEAD = violation(other_id="lead", other_role="adversary")
 
 
 @pytest.mark.parametrize(
-    ("wanted", "found"),
-    [(HIT, HIT), (BY_LEAD, BY_LEAD), (BY_LEAD, violation()), (violation(), BY_LEAD)],
+    ("wanted", "found"), [(HIT, HIT), (BY_LEAD, BY_LEAD), (BY_LEAD, violation()), (violation(), BY_LEAD)]
 )
 def test_these_are_alike(wanted: Collision | Violation, found: Collision | Violation) -> None:
     assert alike([violation(requirement="gentle"), found], wanted) is found

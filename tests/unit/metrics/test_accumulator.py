@@ -1,6 +1,5 @@
 import math
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 
@@ -13,7 +12,7 @@ from risk_sac.metrics.rows import (
     outcome_dispersion,
     preventable_collision_rate,
 )
-from risk_sac.records import DrivenBy, Fault, Funnel, Grade, Outcome, RequirementResult, RunMetrics, Severity
+from risk_sac.records import Fault, Funnel, Grade, Outcome, RequirementResult, RunMetrics, Severity
 from risk_sac.verdicts.distinct import distinct_failures, kind_of
 from tests.builders import AVOIDS, TOUCHES, judgement, violation
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
@@ -67,12 +66,6 @@ def test_contacts_are_counted_by_reference_driver_and_severity_and_failures_by_f
     assert RunMetrics.model_validate(old).prevented_by == {}
 
 
-def test_episodes_are_counted_by_what_drove_them_rejected_ones_too():
-    drove = [(Outcome.SAFE, DrivenBy.SCRIPT), (Outcome.REJECTED, DrivenBy.SCRIPT), (Outcome.SAFE, DrivenBy.POLICY)]
-    metrics = feed([*(episode(outcome, driven_by=by) for outcome, by in drove), episode()])
-    assert metrics.episodes_driven_by == {"script": 2, "policy": 1}
-
-
 def test_each_requirement_has_a_funnel_and_records_from_before_have_none():
     def results(**violated_s):
         kept = {"counts": "failure", "robustness": 0.0}
@@ -104,14 +97,6 @@ def both(struck, without, results):
     return episode(Outcome.FAILURE, hit=struck, violations=(without,), requirements=results)
 
 
-def test_signatures_are_counted_in_the_order_in_which_they_were_met():
-    assert list(feed(JUDGED).signatures.items()) == [
-        ("cut-in, straight", 3),
-        ("pedestrian, straight", 1),
-        ("unjudged adversary vehicle", 1),
-    ]
-
-
 def test_histogram_literals():
     """2.5 s twice, 3.0 s, and one conflict from before the release; contacts at 3.9 s twice, at 6 and 15 s."""
     metrics = feed(JUDGED)
@@ -141,16 +126,6 @@ def test_run_without_episodes():
     assert (metrics.distinct_failures, metrics.steps_per_distinct_failure) == (0, None)
     assert (metrics.pcr, metrics.pcr_low, metrics.pcr_high, metrics.window_pcr) == (0, 0, 1, 0)
     assert preventable_collision_rate(counted([])) == 0
-
-
-def test_run_of_rejected_scenes_only_earns_no_efficiency():
-    metrics = feed([episode(Outcome.REJECTED)] * 3)
-    assert (metrics.rejected, metrics.ecr, metrics.efficiency, metrics.cost_rate) == (3, 0, 0, 0)
-    assert metrics.steps_per_distinct_failure is None
-
-
-def test_one_failure_has_no_dispersion():
-    assert feed([episode(Outcome.FAILURE, 10)]).dispersion is None
 
 
 def test_bad_records_are_refused_and_leave_the_figures_alone():
@@ -209,23 +184,3 @@ def test_incremental_equals_batch(records):
     assert metrics.cost_rate == pytest.approx(cost_rate(counted(records)), abs=1e-12)
     assert metrics.distinct_failures == len(distinct_failures(hits))
     assert metrics.dispersion == pytest.approx(outcome_dispersion(counted(records)), abs=1e-12)
-
-
-def test_the_dispersion_of_many_failures():
-    random = np.random.default_rng(0)
-    records = [
-        episode(Outcome.FAILURE, 10, hit=contact(3 * u[0], 20 * u[1], 7 * u[2] - 3.5, 4 * u[3] - 3))
-        for u in random.random((5000, 4))
-    ]
-    metrics = feed(records)  # about 1 s; all pairs at every add would be minutes
-    assert metrics.dispersion == pytest.approx(0.7777 / 2, abs=0.01)  # mean distance in the unit 4-cube
-
-
-def test_metrics_from_before_contacts_were_judged_can_still_be_read():
-    stored = feed(RUN).model_dump()
-    new = ("preventable", "pcr", "pcr_low", "pcr_high", "window_pcr", "distinct_preventable", "artefacts", "avoidable")
-    for name in (*new, "covered", "unresponsive", "signatures", "conflicts_by_second", "contacts_by_second"):
-        del stored[name]
-    metrics = RunMetrics.model_validate(stored)
-    assert (metrics.failures, metrics.preventable, metrics.pcr_low, metrics.pcr_high) == (2, 0, 0, 1)
-    assert Funnel.of(metrics) == Funnel(contacts=3, valid=2, distinct=1, preventable=0)

@@ -8,7 +8,6 @@ from risk_sac.metrics import (
     estimate,
     mean_over_runs,
     pcr_by_driver,
-    pooled_bins,
     pooled_counts,
     pooled_names,
     wilson_interval,
@@ -37,11 +36,6 @@ def test_each_drivers_pcr_is_over_the_runs_that_asked_it():
     low, high = wilson_interval(3, 8)
     assert pooled["r157"] == DriverPcr(prevented=3, pcr=3 / 8, pcr_low=low, pcr_high=high)
     assert pcr_by_driver([old]) == pcr_by_driver([clean]) == pcr_by_driver([]) == {}
-
-
-def test_histograms_of_runs_from_before_there_were_any_add_nothing():
-    assert pooled_bins([(1, 2), (), (3, 0, 1)]) == (4, 2, 1)
-    assert pooled_bins([(), ()]) == pooled_bins([]) == ()
 
 
 def test_metrics_are_pooled_by_their_mean_over_the_runs_that_have_a_value():

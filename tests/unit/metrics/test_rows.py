@@ -7,7 +7,7 @@ from risk_sac.metrics.rows import (
     preventable_collision_rate,
     steps_per_distinct_failure,
 )
-from risk_sac.records import Counts, RunMetrics
+from risk_sac.records import Counts
 from tests.unit.metrics.episodes import JUDGED, feed
 
 FORMULAS = {metric.name: metric.formula for metric in METRICS}
@@ -73,18 +73,6 @@ def test_ratio_literals():
         "rejected_rate": 0.05,
         "unresponsive_share": 0.4,
     }
-
-
-def test_rows_have_names_of_their_own():
-    rows = (*METRICS, *RATIOS)
-    assert len({row.name for row in rows}) == len({row.symbol for row in rows}) == len(rows)
-    assert all(row.meaning and not row.meaning.endswith(".") for row in rows)
-
-
-def test_what_a_metric_keeps_is_a_field_of_the_metrics_of_a_run_and_rates_have_trials():
-    kept = {metric.field: metric for metric in METRICS if metric.field}
-    assert kept.keys() <= RunMetrics.model_fields.keys()
-    assert all(metric.trials for field, metric in kept.items() if f"{field}_low" in RunMetrics.model_fields)
 
 
 def test_a_metric_is_read_from_the_metrics_of_a_run():

@@ -69,13 +69,6 @@ def test_a_damaged_copy_is_refused(tmp_path: Path) -> None:
         kept(prior)
 
 
-def test_all_runs_of_a_campaign_are_taken(tmp_path: Path) -> None:
-    for family in ("low", "mixed"):
-        run_folder(tmp_path / "compared" / "runs" / f"{family}-archive-0", family)
-    prior = pinned_prior(str(tmp_path / "compared"), ["low", "mixed"])
-    assert set(kept(prior).families) == {"low", "mixed"}
-
-
 @pytest.mark.parametrize(
     ("prior", "says"),
     [

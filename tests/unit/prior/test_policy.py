@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from risk_sac.config import FamilyName, RunMethod, RunSpec
+from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.frozen_policy import respond
 from risk_sac.observation_layout import PER_ADVERSARY, PER_EGO
-from risk_sac.prior.policy import Folded, Layout, PretrainedPolicy, check_prior, read_policy, with_goal, write_policy
+from risk_sac.prior.policy import Folded, Layout, PretrainedPolicy, read_policy, with_goal, write_policy
 from risk_sac.problem import Problem
 from risk_sac.types import Vector
 from tests.builders import pretrained_policy
@@ -111,30 +111,3 @@ def test_another_layout_is_read_by_names_and_values(pretrained: PretrainedPolicy
         assert not got[:2].any()  # the stranger does as it likes
         by_name = {a: expected[2 * i : 2 * i + 2] for i, a in enumerate(layout.adversaries)}
         np.testing.assert_allclose(got[2:], np.concatenate([by_name[a] for a in own.adversaries[1:]]), atol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("method", "family", "prior", "message"),
-    [
-        (
-            "risk-sac-pretrained",
-            "dense",
-            "shipped",
-            "method: got risk-sac-pretrained at dense, which has no pretrained",
-        ),
-        ("risk-sac-pretrained", "low", "none", "prior: got none, and the method risk-sac-pretrained"),
-        ("archive-replay", "low", "none", "prior: got none, and the method archive-replay"),
-        ("risk-sac-pretrained", "low", "shipped", ""),
-        ("archive-replay", "dense", "shipped", ""),
-        ("risk-sac-diverse", "dense", "none", ""),
-    ],
-)
-def test_methods_without_their_prior_are_refused(
-    method: RunMethod, family: FamilyName, prior: str, message: str
-) -> None:
-    if not message:
-        check_prior(method, family, prior)
-        return
-    with pytest.raises(ConfigError) as raised:
-        check_prior(method, family, prior)
-    assert str(raised.value).startswith(message)

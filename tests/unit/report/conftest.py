@@ -27,10 +27,7 @@ OUTCOMES = {
     "r": (Outcome.REJECTED, None),
     "f": (Outcome.FAILURE, hit(judged=judgement(conflict_s=1.5))),
     # Another failure than f, which only full braking at once would have prevented.
-    "F": (
-        Outcome.FAILURE,
-        hit(speed=20.0, judged=LEADER),
-    ),
+    "F": (Outcome.FAILURE, hit(speed=20.0, judged=LEADER)),
     "a": (Outcome.DEGENERATE, hit(broken="inside_limits")),
     "d": (Outcome.DEGENERATE, hit(broken="ego_moving")),
 }

@@ -23,13 +23,7 @@ from risk_sac.report import (
 )
 from risk_sac.report.drawing import LOOKS
 from risk_sac.report.figures import window_ecr, window_pcr
-from risk_sac.run_folder.results import (
-    EPISODES,
-    RecordedFailure,
-    Results,
-    read_results,
-    write_results,
-)
+from risk_sac.run_folder.results import EPISODES, RecordedFailure, Results, read_results, write_results
 
 
 @pytest.fixture

@@ -111,19 +111,11 @@ FORMULAS: dict[str, Any] = {
     "not prev ego_speed_mps <= 5": ("not", ("prev", SLOW)),
     # precedence: and over or over implies, implies to the right, temporal operators over and
     "ttc_s >= 1 or vehicle_gap_m <= 10 and ego_speed_mps <= 5": ("or", (">=", "ttc_s", 1), ("and", NEAR, SLOW)),
-    "vehicle_gap_m <= 10 -> ego_speed_mps <= 5 -> ttc_s >= 1": (
-        "implies",
-        NEAR,
-        ("implies", SLOW, (">=", "ttc_s", 1)),
-    ),
+    "vehicle_gap_m <= 10 -> ego_speed_mps <= 5 -> ttc_s >= 1": ("implies", NEAR, ("implies", SLOW, (">=", "ttc_s", 1))),
     "not vehicle_gap_m <= 10 & ego_speed_mps <= 5": ("and", ("not", NEAR), SLOW),
     "once[0,0.2] vehicle_gap_m <= 10 and ego_speed_mps <= 5": ("and", ("once", (0, 2), NEAR), SLOW),
     # arithmetic, to the left
-    "vehicle_gap_m - ego_speed_mps + ttc_s >= 3": (
-        ">=",
-        ("+", ("-", "vehicle_gap_m", "ego_speed_mps"), "ttc_s"),
-        3,
-    ),
+    "vehicle_gap_m - ego_speed_mps + ttc_s >= 3": (">=", ("+", ("-", "vehicle_gap_m", "ego_speed_mps"), "ttc_s"), 3),
     "vehicle_gap_m/2*ttc_s - 1.5*ego_speed_mps >= -3": (
         ">=",
         ("-", ("*", ("/", "vehicle_gap_m", 2), "ttc_s"), ("*", 1.5, "ego_speed_mps")),

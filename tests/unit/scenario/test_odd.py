@@ -22,10 +22,7 @@ DEFAULT = Odd(
         crossing_types=("none", "zebra"),
     ),
     environment=Environment(
-        friction=interval(0.5, 1.0),
-        visibility_m=interval(100, 2000),
-        precipitation=("none",),
-        time_of_day=("day",),
+        friction=interval(0.5, 1.0), visibility_m=interval(100, 2000), precipitation=("none",), time_of_day=("day",)
     ),
     dynamic=DynamicElements(
         actor_kinds=("pedestrian", "vehicle"),
@@ -136,11 +133,7 @@ CROSSING = Parameter("crossing", "1", 0, 1, "", "scenery.crossing_types", ("zebr
 
 @pytest.mark.parametrize(
     ("allowed", "low", "high"),
-    [
-        (("none", "zebra"), 0.0, 0.49999999999999994),
-        (("signalised",), 0.5, 1.0),
-        (("zebra", "signalised"), 0.0, 1.0),
-    ],
+    [(("none", "zebra"), 0.0, 0.49999999999999994), (("signalised",), 0.5, 1.0), (("zebra", "signalised"), 0.0, 1.0)],
 )
 def test_a_set_in_the_odd_narrows_a_category(allowed: tuple[str, ...], low: float, high: float) -> None:
     odd = Odd(scenery=Scenery(crossing_types=allowed))

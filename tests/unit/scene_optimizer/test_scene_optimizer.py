@@ -330,11 +330,7 @@ def hartmann(u: Floats) -> float:
     return float((np.array([1.0, 1.2, 3.0, 3.2]) * np.exp(-squares)).sum())
 
 
-@pytest.mark.parametrize(
-    ("dimension", "noise", "share"),
-    [(6, 0.0, 0.3), (12, 0.2, 0.6)],
-    ids=["plain", "half idle"],
-)
+@pytest.mark.parametrize(("dimension", "noise", "share"), [(6, 0.0, 0.3), (12, 0.2, 0.6)], ids=["plain", "half idle"])
 def test_simple_regret_is_a_fraction_of_sobols(dimension, noise, share):
     def regret(kind: type[SceneOptimizer], seed: int) -> float:
         noises = np.random.default_rng(seed).normal(scale=noise, size=80)

@@ -79,10 +79,7 @@ def drive(
 
 
 USUAL: dict[str, Interval] = {}
-WIDEST = {
-    "vehicle_lateral_speed_mps": Interval(low=0, high=1.8),
-    "vehicle_lateral_accel_mps2": Interval(low=0, high=3),
-}
+WIDEST = {"vehicle_lateral_speed_mps": Interval(low=0, high=1.8), "vehicle_lateral_accel_mps2": Interval(low=0, high=3)}
 odds = st.sampled_from((USUAL, WIDEST))
 frictions, radii, sides = st.floats(0.3, 1.0), st.floats(7, 40), st.booleans()
 

@@ -135,8 +135,7 @@ def test_who_cuts_in_within_two_seconds_is_followed(sideways_mps: float, expecte
 
 @sides
 @pytest.mark.parametrize(
-    ("enters_s", "expected"),
-    [(1.0, Target(19.075, 0.0)), (1.1, Target(19.075, 0.0)), (1.3, CLEAR)],
+    ("enters_s", "expected"), [(1.0, Target(19.075, 0.0)), (1.1, Target(19.075, 0.0)), (1.3, CLEAR)]
 )
 def test_crossing_traffic_is_stopped_for_once_it_would_have_to_brake_hard(
     enters_s: float, expected: Target, side: int

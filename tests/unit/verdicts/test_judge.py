@@ -30,10 +30,7 @@ def judged(evidence: Evidence) -> Judgement:
 @pytest.mark.parametrize(
     ("evidence", "signature"),
     [
-        (
-            pedestrian_crosses(),
-            "pedestrian, ahead, on a crossing; ego goes straight against priority, does not brake",
-        ),
+        (pedestrian_crosses(), "pedestrian, ahead, on a crossing; ego goes straight against priority, does not brake"),
         (
             pedestrian_crosses(seen_from_s=7.0),
             "pedestrian, ahead, from hiding, on a crossing; ego goes straight against priority, does not brake",

@@ -6,15 +6,6 @@ from tests.ray_cluster import needs_ray
 pytestmark = needs_ray
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "127.0.0.2", "localhost", "[::1]"])
-@pytest.mark.parametrize("mode", ["disabled", ""])
-def test_a_cluster_of_this_machine_alone_needs_no_token(monkeypatch, host, mode):
-    from risk_sac.execution.ray.cluster import check_token
-
-    monkeypatch.setenv("RAY_AUTH_MODE", mode)
-    check_token(host)
-
-
 @pytest.mark.parametrize("host", ["192.0.2.7", "0.0.0.0", "[2001:db8::1]", "no-such-host.invalid"])
 def test_one_that_others_reach_or_that_nobody_knows_is_refused_without(monkeypatch, host):
     from risk_sac.execution.ray.cluster import check_token

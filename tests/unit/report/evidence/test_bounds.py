@@ -1,9 +1,6 @@
 from dataclasses import replace
 
-import pytest
-
 from risk_sac.config import RunSpec
-from risk_sac.errors import ConfigError
 from risk_sac.metrics import clopper_pearson
 from risk_sac.records import Outcome
 from risk_sac.report.evidence.gathered import drawn
@@ -60,8 +57,3 @@ def test_an_ego_that_failed_to_drive_may_have_failed_or_not(finished):
     found = drawn(replace(run, records=(*run.records[:4], invalid)))
     assert (found.refused, found.unended, found.played, found.failures.count) == (0, 1, 4, 1)
     assert (found.failures.low, found.failures.high) == (clopper_pearson(1, 5)[0], clopper_pearson(2, 5)[1])
-
-
-def test_bounds_are_never_drawn_from_a_search(finished):
-    with pytest.raises(ConfigError, match="episodes of the phase 'search'"):
-        drawn(finished(SPEC, "...."))

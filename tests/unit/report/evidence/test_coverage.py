@@ -4,11 +4,10 @@ import pytest
 
 from risk_sac.config import Interval, Odd
 from risk_sac.records import Outcome
-from risk_sac.report.evidence.coverage import VALUES, axis_of, coverage, kinds
+from risk_sac.report.evidence.coverage import axis_of, coverage, kinds
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import narrow
 from risk_sac.scenario.space import Parameter
-from risk_sac.verdicts.distinct import CELLS
 from tests.builders import collision, episode_record, judgement
 
 MIXED = FAMILIES["mixed"]
@@ -82,13 +81,6 @@ def test_bins_follow_the_odd_and_what_it_allows_beyond_scenes_is_named():
     assert "environment.visibility_m" in found.fixed
     assert "environment.friction" not in found.fixed
     assert MIXED.odd.dynamic.ego_speed_mps == Interval(low=0, high=13.89)
-
-
-def test_the_words_of_the_taxonomy_are_its_grid():
-    zones = len(VALUES["conflict_type"]) - 1  # but of a pedestrian
-    others = [len(VALUES[name]) for name in ("ego_manoeuvre", "visible", "ego_braked", "closing_speed")]
-    roles = len(VALUES["striker"]) // 2
-    assert roles * (zones * len(VALUES["ego_zone"]) + 1) * math.prod(others) == CELLS
 
 
 def test_cells_that_were_hit_are_in_words_and_values_that_never_were_are_named():

@@ -98,23 +98,6 @@ def test_it_tells_of_each_requirement_what_was_found_and_how_often(spec, finishe
     assert "| low | undisturbed | never_fast | failure | 0 of 8 | 0 of 8 | 31.23 % | 0.00 % |" in text
 
 
-def test_it_tells_how_many_known_defects_the_budget_detects(spec):
-    told = compare(spec.model_copy(update={"methods": ("archive", "ddpg-lag")}), [], "")
-    archive, ddpg = power(told).lines
-    assert archive.startswith("archive: Of ")
-    page, text = both(told)
-    for each in (Tags(page).text, text):
-        assert "What finding nothing is worth" in each
-        assert archive in each
-        assert ddpg in each
-
-
-def test_a_report_with_failures_is_silent_on_finding_nothing(told):
-    for text in both(told):
-        assert "What finding nothing is worth" not in text
-        assert "Known defects that this budget detects" in text
-
-
 def test_an_i_i_d_phase_is_in_no_other_number(told, spec, runs):
     without = compare(spec, runs, "")
     assert told.cells == without.cells
@@ -124,13 +107,6 @@ def test_an_i_i_d_phase_is_in_no_other_number(told, spec, runs):
     assert evidence.coverage["low"].search == gathered(without).coverage["low"].search
     assert evidence.coverage["low"].iid.episodes == 15
     assert gathered(without).bounds == ()
-
-
-def test_without_an_i_i_d_phase_it_says_that_nothing_is_known_and_how_to_know(spec, runs):
-    for text in both(compare(spec, runs, "")):
-        assert "had no i.i.d. phase, so nothing can be said of how often the ego fails" in text
-        assert "--iid 300" in text
-        assert "at most" not in text
 
 
 def test_runs_that_are_missing_are_named_with_the_reason(told, spec):
@@ -188,18 +164,6 @@ def test_a_picture_that_cannot_be_had_is_said_to_be_missing(told, tmp_path):
     series.write_bytes(b"PK\x03\x04 damaged")
     assert "is damaged" in both(told, folders={run.spec.digest: tmp_path for run in told.runs})[0]
     assert "the folder of its run is missing" in both(told)[0]
-
-
-def test_a_regression_is_told_with_what_a_baseline_knows(told):
-    told_of = {"digest": "d", "name": "cut-in", "grade": None, "reason": "as told"}
-    cases = [
-        Case(id=f"low-x-{verdict}", verdict=verdict, known=known, **told_of)
-        for verdict, known in ((Verdict.FIXED, False), (Verdict.STILL_FAILING, True))
-    ]
-    page, text = both(told, regression=Regression(ego=EgoConfig(profile="careful"), cases=tuple(cases)))
-    for each in (page, text):
-        assert "1 fixed, 1 still failing; 1 known from a baseline. All are fixed or known." in each
-        assert "still failing, known" in each
 
 
 def test_folders_without_runs_and_runs_of_different_campaigns_are_refused(tmp_path, capsys):
