@@ -53,22 +53,6 @@ def test_what_is_clipped_is_said(families: tuple[str, ...], odd: dict[str, objec
     assert words in said(families, **odd)
 
 
-def test_visibility_beyond_the_sensor_is_said_to_change_nothing() -> None:
-    [clipped, beyond] = said(("low",), environment={"visibility_m": {"low": 20, "high": 100}})
-    assert "asked for [20, 100], used [40, 100] in low; the family supports [40, 2000]" in clipped
-    assert "asked for [40, 100], used [40, 80] in low; the ego's sensor sees 80 m: nothing changes from" in beyond
-    [all_beyond] = said(("low",), environment={"visibility_m": {"low": 150, "high": 500}})
-    assert all_beyond.endswith("nothing changes")
-
-
-def test_a_sensor_beyond_the_default_visibility_is_said_to_be_shortened() -> None:
-    [shortened] = said(("low", "mixed"), ego={"sensor": {"range_m": 150}})
-    assert shortened.startswith("ego.sensor.range_m: asked for 150, used 100 in low, mixed; ")
-    assert (
-        said(("low",), ego={"sensor": {"range_m": 150}}, environment={"visibility_m": {"low": 90, "high": 150}}) == []
-    )
-
-
 def test_a_shipped_requirement_that_a_family_lacks_is_said_and_counts_where_there_is_one() -> None:
     spec = CampaignSpec(families=("low", "mixed"), requirements=(Requirement(name="pedestrian_gap"),))
     checked_campaign(spec)

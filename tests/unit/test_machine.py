@@ -52,11 +52,6 @@ def test_as_many_cores_are_used_as_affinity_and_quotas_allow(
     assert cores(machine(folder, cgroup, mount, files)) == wanted
 
 
-def test_without_control_groups_the_affinity_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0, 3, 5})
-    assert cores(tmp_path) == 3
-
-
 def homeless() -> Path:
     raise RuntimeError("Could not determine home directory.")
 

@@ -29,12 +29,6 @@ def bounds(posed: Problem, name: str) -> tuple[float, float]:
     return parameter.low, parameter.high
 
 
-def test_the_default_odd_leaves_the_whole_scene_space() -> None:
-    for family in ("low", "mixed", "dense"):
-        posed = problem(family)
-        assert posed.space.parameters == posed.family.space.parameters
-
-
 def test_a_users_odd_narrows_the_scene_space_and_the_requirements() -> None:
     odd = Odd(
         environment=Environment(friction=Interval(low=0.6, high=0.7), visibility_m=Interval(low=40, high=500)),
@@ -50,12 +44,6 @@ def test_day_and_night_together_are_a_parameter_and_one_of_them_is_none() -> Non
     both = problem(odd=Odd(environment=Environment(time_of_day=("day", "night"))))
     assert bounds(both, "night") == (0, 1)
     assert "night" not in problem(odd=Odd(environment=Environment(time_of_day=("night",)))).space.names
-
-
-def test_an_odd_without_signals_leaves_the_zebra() -> None:
-    low, high = bounds(problem(odd=Odd(scenery=Scenery(signal_types=("none",)))), "crossing")
-    assert low == 0
-    assert high < 0.5
 
 
 @pytest.mark.parametrize(
@@ -82,24 +70,6 @@ def test_an_odd_that_leaves_no_scene_is_an_error_that_names_its_field(family: st
         problem(family, odd=odd)
     assert refused.value.field == field
     assert "wanted" in str(refused.value)
-
-
-def test_a_users_requirement_joins_the_shipped_ones() -> None:
-    mine = Requirement(name="wide_berth", formula="pedestrian_gap_m >= 2", scale=2)
-    assert problem(requirements=(mine,)).requirements[-1] == mine
-
-
-def test_a_requirement_may_not_take_a_shipped_name() -> None:
-    with pytest.raises(ConfigError, match="safe_ttc") as refused:
-        problem(requirements=(Requirement(name="safe_ttc", formula="ttc_s >= 9", scale=1),))
-    assert refused.value.field == "requirements[0].name"
-
-
-def test_a_user_says_which_shipped_requirements_count() -> None:
-    counts = {r.name: r.counts for r in problem(requirements=(Requirement(name="safe_ttc"),)).requirements}
-    assert counts == {r.name: r.counts for r in problem().requirements} | {"safe_ttc": "failure"}
-    reported = problem("dense", requirements=(Requirement(name="no_red_light_entry", counts="report"),)).requirements
-    assert [r.counts for r in reported if r.name == "no_red_light_entry"] == ["report"]
 
 
 def test_an_episode_goes_on_to_the_horizon_where_more_than_a_contact_can_make_it_fail() -> None:
@@ -145,12 +115,6 @@ def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_
     assert wanted_s == sorted(wanted_s)
     assert wanted_s[0] == wanted_ttc_s(problem()) == 1.5  # claiming a shorter response time gives no advantage
     assert wanted_s[-1] == 6.0
-
-
-def test_rss_reckons_with_the_worst_friction() -> None:
-    assert problem(
-        odd=Odd(environment=Environment(friction=Interval(low=0.6, high=1)))
-    ).rss.brake_min_mps2 == pytest.approx(0.6 * 9.81)
 
 
 def test_a_method_whose_package_is_not_installed_is_refused_before_it_runs(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,7 +5,7 @@ import math
 import subprocess
 import sys
 
-from risk_sac.records import DrivenBy, Episode, EpisodeRecord, stored, wire
+from risk_sac.records import Episode, EpisodeRecord, stored, wire
 from tests.builders import collision, episode_record, judgement
 
 # Loads `risk_sac.records.violation` with one field more, and passes a contact that has it through the service.
@@ -82,18 +82,3 @@ def test_a_number_that_is_not_finite_is_a_word_where_it_is_stored_and_null_where
     assert (read.min_ttc_s, read.collision.min_ttc_s) == (math.inf, math.inf)
     assert math.isnan(read.collision.ego_speed_mps)
     assert wire(read) == wire(episode)
-
-
-def test_a_contact_from_before_there_were_judgements_is_read():
-    old = json.loads(stored(episode_record(0, collision=collision(min_ttc_s=0.75))))
-    old["collision"] |= {"min_ttc_s": old["collision"].pop("early_min_ttc_s")}
-    del old["collision"]["judgement"]
-    found = EpisodeRecord.model_validate(old).collision
-    assert (found.judgement, found.min_ttc_s) == (None, 0.75)
-
-
-def test_an_episode_from_before_it_said_what_drove_it_is_read():
-    record = episode_record(0, driven_by=DrivenBy.SCRIPT)
-    old = json.loads(stored(record))
-    assert old.pop("driven_by") == json.loads(wire(record))["driven_by"] == "script"
-    assert EpisodeRecord.model_validate(old).driven_by is None

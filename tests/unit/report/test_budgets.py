@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.report import FinishedRun, compare, figure_bytes, table_markdown
+from risk_sac.report import FinishedRun, compare
 from risk_sac.report.figures import CURVES
 from risk_sac.report.runs import Limit, cpu_s, episodes, found_within
 
@@ -53,14 +53,6 @@ def test_a_curve_over_time_holds_what_was_found_and_ends_with_the_shortest_run(r
     assert (by_time[0.0], by_time[2.0], by_time[4.0], by_time[4.5]) == ([0, 0], [0, 1], [1, 1], [1, 2])
 
 
-def test_the_page_says_it_by_method(spec: CampaignSpec, runs: list[FinishedRun]) -> None:
-    timed = [replace(run, episode_cpu_s=(3.0, 6.0, 9.0, 12.0, 13.0)) for run in runs]
-    page = table_markdown(compare(spec, timed, "a command"))
-    assert "### What a budget finds: low" in page
-    assert "| risk-sac | 10 CPU s | 2 | 1 (1–1) | 1 (1–1) | 1.5 (1–2) | " in page
-    assert "What a budget finds: low" not in table_markdown(compare(spec, runs, "a command"))  # nothing was measured
-
-
 def test_our_own_search_is_tested_against_the_others_on_what_a_user_pays_for(
     spec: CampaignSpec, finished: Callable[..., FinishedRun]
 ) -> None:
@@ -74,14 +66,3 @@ def test_our_own_search_is_tested_against_the_others_on_what_a_user_pays_for(
     assert (against["risk-sac"].difference, against["random"].difference) == (1.0, 0.0)
     assert against["risk-sac"].p == pytest.approx(2 / 2**6)
     assert against["risk-sac"].p_holm == pytest.approx(2 * 2 / 2**6)  # of two hypotheses, whatever else is tested
-
-
-def test_runs_of_unequal_length_are_drawn_as_far_as_all_came(
-    spec: CampaignSpec, finished: Callable[..., FinishedRun]
-) -> None:
-    runs = [finished(run, "..f.f" if run.seed else "..f", ".") for run in spec.runs()]
-    comparison = compare(spec, runs, "")
-    (curve,) = [curve for curve in CURVES if curve.name == "ecr"]
-    at, values = curve.over([runs[0], next(run for run in runs if run.spec.seed)])
-    assert (at.tolist(), values.shape) == ([1.0, 2.0, 3.0], (2, 3))
-    assert figure_bytes(comparison, "ecr_low", "svg").startswith(b"<?xml")

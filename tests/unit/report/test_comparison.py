@@ -3,7 +3,6 @@ import sys
 
 import pytest
 
-from risk_sac.config import CampaignSpec
 from risk_sac.metrics import wilson_interval
 from risk_sac.report import compare
 from risk_sac.report.comparison import declared
@@ -21,13 +20,6 @@ def comparison(spec, runs):
 def cell(comparison, method, phase="search"):
     (found,) = [each for each in comparison.cells if (each.method, each.phase) == (method, phase)]
     return found
-
-
-def test_the_reference_comes_first_and_phases_are_apart(comparison):
-    assert [(each.phase, each.method) for each in comparison.cells] == [
-        (phase, method) for phase in ("search", "evaluation") for method in ("risk-sac", "sac", "no-adversary")
-    ]
-    assert comparison.phases == ("search", "evaluation")
 
 
 def test_a_cell_is_the_mean_over_seeds_and_sums_over_seeds(comparison):
@@ -54,34 +46,12 @@ def test_the_funnel_and_pcr_are_those_of_all_seeds(comparison):
     assert cell(comparison, "no-adversary").unresponsive_share is None
 
 
-def test_histograms_and_signatures_are_summed_over_the_seeds(comparison):
-    found = cell(comparison, "risk-sac")
-    assert found.signatures == {"cut-in, straight": 3, "leader, straight": 1}
-    assert (found.conflicts_by_second[:3], sum(found.conflicts_by_second)) == ((1, 3, 0), 4)  # -0.5 s and 1.5 s
-    assert (found.contacts_by_second[:4], sum(found.contacts_by_second)) == ((0, 0, 0, 4), 4)
-    assert len(found.contacts_by_second) == len(found.conflicts_by_second) == HORIZON / 10
-
-
 def test_dispersion_is_taken_over_the_seeds_that_have_one(comparison):
     ofd = cell(comparison, "risk-sac").estimates["ofd"]
     assert (ofd.mean, ofd.runs) == (pytest.approx(2 / 3 * 0.5 / 2), 1)  # two pairs of three differ by half a range
     assert (ofd.low, ofd.high) == (None, None)
     assert cell(comparison, "sac").estimates["ofd"].mean is None
     assert cell(comparison, "no-adversary").steps_per_distinct_failure is None
-
-
-def test_artefacts_are_the_contacts_nobody_is_to_blame_for(comparison):
-    sac, control = cell(comparison, "sac"), cell(comparison, "no-adversary")
-    assert (sac.raw_rate, sac.degenerate_rate, sac.artefact_rate) == (3 / 8, 2 / 8, 1 / 8)
-    assert (control.raw_rate, control.artefact_rate) == (1 / 8, 1 / 8)
-
-
-def test_evaluation_has_neither_seconds_nor_a_last_window(comparison):
-    found = cell(comparison, "risk-sac", "evaluation")
-    assert found.estimates["ecr"].mean == 0.5
-    assert not {"ecr_last", "pcr_last"} & found.estimates.keys()
-    assert found.steps_per_distinct_failure == 100
-    assert found.cpu_s_per_distinct_failure is None
 
 
 def test_one_seed_has_wilsons_interval(spec, runs):
@@ -124,28 +94,6 @@ def test_a_missing_seed_costs_its_pair(spec, runs):
     assert cell(comparison, "sac").seeds == (0,)
     tests = [test for test in comparison.tests if test.method == "sac" and test.metric == "ecr"]
     assert [(test.pairs, test.p) for test in tests] == [(1, None), (1, None)]
-
-
-def test_nothing_finished_is_a_comparison_too(spec):
-    comparison = compare(spec, [], "")
-    assert comparison.cells == ()
-    assert len(comparison.missing) == 6
-    assert all(test.pairs == 0 for test in comparison.tests)
-
-
-def test_runs_of_other_specs_are_left_out(spec, runs, finished):
-    other = CampaignSpec(families=("low",), seeds=(0, 1)).runs()
-    stray = [finished(run, "ffff") for run in other]
-    assert compare(spec, runs + stray, "") == compare(spec, runs, "")
-
-
-def test_the_order_of_the_runs_does_not_matter(spec, runs):
-    assert compare(spec, runs[::-1], "") == compare(spec, runs, "")
-
-
-def test_without_risk_sac_the_first_method_is_the_reference(spec, runs):
-    others = spec.model_copy(update={"methods": ("sac", "no-adversary")})
-    assert compare(others, runs, "").reference == "sac"
 
 
 def test_report_loads_without_torch_and_libsumo():

@@ -7,21 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.config import METHODS
-from risk_sac.errors import ConfigError
-from risk_sac.failures.studied import Core, Extent, Region, Share, Studied
 from risk_sac.metrics import results_digest, wilson_interval
-from risk_sac.report import (
-    compare,
-    figure_bytes,
-    figure_names,
-    read_run,
-    table_csv,
-    table_json,
-    table_markdown,
-    write_report,
-)
-from risk_sac.report.drawing import LOOKS
+from risk_sac.report import compare, figure_names, read_run, table_csv, table_json, table_markdown, write_report
 from risk_sac.report.figures import window_ecr, window_pcr
 from risk_sac.run_folder.results import EPISODES, RecordedFailure, Results, read_results, write_results
 
@@ -58,18 +45,6 @@ def section(page, title):
     return [each for each in page[page.index(title) :].split("\n\n")[1].splitlines() if each.startswith("| ")]
 
 
-def test_page_has_the_funnel_of_every_method(comparison):
-    assert section(table_markdown(comparison), "### The funnel: low, search\n") == [
-        "| method | headline | episodes | contacts | valid contacts | failures | distinct | preventable | not minor "
-        "| verified | unresponsive |",
-        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
-        "| risk-sac | – | 8 | 4 | 4 | 4 | 3 | 2 | 2 | – | 25.0 % |",
-        "| sac | – | 8 | 3 | 1 | 1 | 1 | 1 | 1 | – | 0.0 % |",
-        "| no-adversary | – | 8 | 1 | 0 | 0 | 0 | 0 | 0 | – | – |",
-    ]
-    assert "### Requirements" not in table_markdown(comparison)  # runs from before they were counted
-
-
 def test_page_json_and_csv_say_which_driver_prevents_how_bad_it_is_and_whose_fault(spec, finished):
     only = spec.model_copy(update={"methods": ("sac",), "seeds": (0,)})
     run = finished(only.runs()[0], "fF..", ".")
@@ -90,97 +65,6 @@ def test_page_json_and_csv_say_which_driver_prevents_how_bad_it_is_and_whose_fau
     assert (cell["by_severity"], cell["by_fault"]) == ({"moderate": 1, "severe": 1}, {"shared": 1})
     row, _ = csv.DictReader(io.StringIO(table_csv(compared)))
     assert (row["r157.prevented"], row["severity.severe"], row["fault.ego"]) == ("1", "1", "0")
-
-
-def test_page_and_csv_say_what_drove_the_episodes(spec, finished):
-    only = spec.model_copy(update={"methods": ("sac",), "seeds": (0,)})
-    compared = compare(only, [finished(only.runs()[0], "sspp.p", "p")], "risk-sac evaluate")
-    assert section(table_markdown(compared), "### Episodes driven by: low, search") == [
-        "| method | policy | script | headline: policy | headline: script |",
-        "| --- | ---: | ---: | ---: | ---: |",
-        "| sac | 3 (60 %) | 2 (40 %) | – | – |",
-    ]
-    row, _ = csv.DictReader(io.StringIO(table_csv(compared)))
-    assert (row["episodes_driven_by.policy"], row["episodes_driven_by.model"]) == ("3", "0")
-    older = compare(only, [finished(only.runs()[0], "ff..", ".")], "risk-sac evaluate")
-    assert "### Episodes driven by" not in table_markdown(older)
-
-
-def test_page_json_and_csv_have_the_funnel_of_every_requirement(spec, finished):
-    only = spec.model_copy(update={"methods": ("sac",), "seeds": (0,)})
-    newer = compare(only, [finished(run, "kvvk", "k") for run in only.runs()], "")
-    page = table_markdown(newer)
-    assert section(page, "### Requirements: low, search\n") == [
-        "| method | requirement | counts | violated | valid | distinct | preventable | rate (95 %) |",
-        "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: |",
-        "| sac | no_contact | failure | 0 | 0 | 0 | 0 | 0.000 [0.000, 0.490] |",
-        "| sac | safe_ttc | report | 2 | – | – | – | 0.500 [0.150, 0.850] |",
-        "| sac | never_fast | failure | 2 | 2 | 1 | 1 | 0.500 [0.150, 0.850] |",
-    ]
-    assert section(page, "### The funnel: low, search\n")[-1] == "| sac | – | 4 | 0 | 0 | 2 | 1 | 1 | 1 | – | – |"
-    cell = json.loads(table_json(newer))["cells"][0]
-    assert (cell["failures"], cell["collisions"], cell["requirements"]["never_fast"]["valid"]) == (2, 0, 2)
-    search, evaluation = csv.DictReader(io.StringIO(table_csv(newer)))
-    assert (search["never_fast.violated"], search["never_fast.rate"], search["ecr"]) == ("2", "0.5", "0.0")
-    assert (search["safe_ttc.counts"], evaluation["never_fast.valid"]) == ("report", "0")
-
-
-def test_page_has_histograms_and_signatures_of_those_who_found_something(comparison):
-    page = table_markdown(comparison)
-    assert section(page, "### Valid contacts by the time since the release: low, search\n") == [
-        "| method | until | 0–1 s | 1–2 s | 2–3 s | 3–4 s |",
-        "| --- | --- | ---: | ---: | ---: | ---: |",
-        "| risk-sac | conflict | 1 | 3 | 0 | 0 |",
-        "| risk-sac | contact | 0 | 0 | 0 | 4 |",
-        "| sac | conflict | 0 | 1 | 0 | 0 |",
-        "| sac | contact | 0 | 0 | 0 | 1 |",
-    ]
-    assert section(page, "### Valid violations by signature: low, search\n") == [
-        "| signature | risk-sac | sac |",
-        "| --- | ---: | ---: |",
-        "| cut-in, straight | 3 | 1 |",
-        "| leader, straight | 1 | 0 |",
-    ]
-
-
-def test_page_has_the_cores_and_the_regions_that_were_asked_for(spec, runs):
-    assert "Cores of failures" not in table_markdown(compare(spec, runs, ""))
-    first = next(run for run in runs if run.spec.method == "risk-sac")
-    extents = {
-        "before": Extent(adversaries=2, segments=9, channels=12, strongest=1.0),
-        "after": Extent(adversaries=1, segments=3, channels=4, strongest=0.5),
-    }
-    told = {"sentence": "The left neighbour cuts in", "plain_parameters": 5, "parameters": 9, "episodes": 100}
-    studied = Studied(
-        core=Core(held=9, copies=10, **extents, **told),
-        region=Region(shares=(Share.of("scene by 1%", 18, 40), Share.of("other traffic", 10, 10))),
-    )
-    noted = [replace(run, studies={0: studied}) if run is first else run for run in runs]
-    found = compare(spec, noted, "")
-    page, id_ = table_markdown(found), f"{first.spec.id}-search-0"
-    assert section(page, "### Cores of failures: low")[-1] == (
-        f"| `{id_}` | The left neighbour cuts in | 2 → 1 | 9 → 3 | 9 of 10 |"
-    )
-    assert section(page, "### How many neighbours fail: low")[-1] == (
-        f"| `{id_}` | 18 of 40 [0.31, 0.60] | 10 of 10 [0.72, 1.00] | yes |"
-    )
-    assert json.loads(table_json(found))["studies"]["low"][id_]["core"]["held"] == 9
-
-
-def test_page_says_what_cuts_a_search_short(comparison):
-    budget = comparison.spec.budget.model_copy(update={"episodes": 9, "cpu_s": 2.5, "least_episodes": 3})
-    page = table_markdown(replace(comparison, spec=comparison.spec.model_copy(update={"budget": budget})))
-    assert (
-        "budget of a run: 9 search episodes, or as many as 2.5 s of processor time last for, but at least 3, " in page
-    )
-
-
-def test_page_says_what_two_pairs_cannot_show(comparison):
-    page = table_markdown(comparison)
-    assert (
-        "The smallest p that 2 pairs can give is 0.5; corrected over 2 tests it is at best 1. So no corrected" in page
-    )
-    assert "that takes 9 seeds" in page
 
 
 def test_page_says_what_is_missing_and_why(spec, runs):
@@ -210,39 +94,6 @@ def test_json_is_strict_and_complete(comparison, spec):
     assert stored["cells"][0]["signatures"] == {"cut-in, straight": 3, "leader, straight": 1}
 
 
-def test_csv_has_a_row_per_cell_and_phase(comparison):
-    rows = list(csv.DictReader(io.StringIO(table_csv(comparison))))
-    assert len(rows) == len(comparison.cells)
-    assert (rows[0]["method"], rows[0]["phase"], rows[0]["ecr"], rows[0]["ofd_runs"]) == (
-        "risk-sac",
-        "search",
-        "0.5",
-        "1",
-    )
-    assert rows[3]["ecr_last"] == ""
-    names = ("raw_collisions", "failures", "distinct_failures", "distinct_preventable", "pcr", "unresponsive_share")
-    assert [rows[0][name] for name in names] == ["4", "4", "3", "2", "0.375", "0.25"]
-
-
-def test_versions_that_differ_are_all_named(spec, runs):
-    mixed = [replace(runs[0], versions={"numpy": "2.3"}), *runs[1:]]
-    assert compare(spec, mixed, "").versions == {"numpy": "2.3, 2.4"}
-
-
-def test_figures_are_those_that_have_something_to_show(comparison, spec, runs):
-    assert set(figure_names(comparison)) == {
-        *("ecr_low", "pcr_low", "lambda_low", "alpha_low", "times_low", "times_low_evaluation"),
-        *(
-            f"bars_{name}{phase}"
-            for name in ("ecr", "pcr", "acr", "es", "rho_c", "ofd")
-            for phase in ("", "_evaluation")
-        ),
-    }
-    control = spec.model_copy(update={"methods": ("no-adversary",)})
-    assert "lambda_low" not in figure_names(compare(control, runs, ""))
-    assert figure_names(compare(spec, [], "")) == ()
-
-
 def test_sliding_pcr_by_hand(comparison):
     run = comparison.of_cell("low", "risk-sac")[0]  # two that a careful driver prevents, one that only the bound does
     np.testing.assert_allclose(window_ecr(run), [1, 1, 1, 3 / 4])
@@ -255,11 +106,6 @@ def test_sliding_rates_are_of_contacts_and_end_where_the_metrics_do(spec, finish
     np.testing.assert_allclose(window_pcr(run), [0, 1 / 2, 1 / 3, 1 / 4, 1 / 5])
     metrics = run.metrics["search"]
     assert (metrics.window_ecr, metrics.window_pcr) == (0.4, 0.2)
-
-
-def test_unknown_figure_names_those_there_are(comparison):
-    with pytest.raises(ConfigError, match="got 'pie'; wanted one of ecr_low, "):
-        figure_bytes(comparison, "pie", "png")
 
 
 MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml"}
@@ -303,16 +149,3 @@ def never_close(record):
     least = {"min_ttc_s": math.inf, "min_robustness": math.inf}
     collision = record.collision and record.collision.model_copy(update=least | {"min_rss_margin_m": math.inf})
     return record.model_copy(update=least | {"collision": collision})
-
-
-def test_every_method_has_a_colour_of_its_own_that_reads_on_white():
-    assert set(LOOKS) == set(METHODS)
-    assert len({look.colour for look in LOOKS.values()}) == len(METHODS)
-    for look in LOOKS.values():
-        assert 1.05 / (luminance(look.colour) + 0.05) >= 3, look
-
-
-def luminance(colour):
-    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
-    red, green, blue = (part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts)
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

@@ -13,7 +13,6 @@ from risk_sac.risk.rss import (
     LATERAL_CAP_M,
     LATERAL_SCALE_M,
     LONGITUDINAL_CAP_M,
-    LONGITUDINAL_SCALE_S,
     SCALED_HIGH,
     SCALED_LOW,
     RssParameters,
@@ -199,11 +198,6 @@ def test_the_margin_falls_all_the_way_to_a_leader_that_stands() -> None:
     assert np.all(np.diff(far_to_near) < 0)
     assert far_to_near[0] > 0.5
     assert far_to_near[-1] == pytest.approx(-1, abs=0.1)
-
-
-def test_a_leader_that_leaves_more_than_the_distance_is_measured_in_time() -> None:
-    # 29 m - 20²/16 = 4 m are wanted, less than what the ego drives in 0.85 s
-    assert scaled(view_of(10.0, (12.0, 0, 0, 20, 0))) == pytest.approx([(8 - 4) / (10 * LONGITUDINAL_SCALE_S)])
 
 
 @pytest.mark.parametrize("braking_mps2", [6.0, 8.0, 9.0])

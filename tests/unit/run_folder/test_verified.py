@@ -1,7 +1,5 @@
 """Which failures are refused because one of them does not repeat."""
 
-from dataclasses import replace
-
 from risk_sac.config import RunSpec
 from risk_sac.metrics import headline_driven_by, pooled_headline
 from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, Repetition, RunMetrics, Severity
@@ -43,11 +41,6 @@ def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not(
     assert first.artefact
     assert first.judgement is not None
     assert (first.judgement.grade, first.judgement.drivers) == (None, {})
-
-
-def test_where_all_repeat_nothing_is_refused() -> None:
-    records = (failure(0), failure(1))
-    assert verified(e0=2).judged(records) == records
 
 
 def test_a_violation_is_refused_by_its_kind_and_what_else_the_episode_violates_stays() -> None:
@@ -108,12 +101,6 @@ def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repe
     assert (found.headline, found.headline_kinds) == (2, HEADLINE)
     assert results.metrics is not None
     assert results.metrics.headline is None, "before a replay"
-
-
-def test_the_evaluation_has_a_headline_of_its_own() -> None:
-    results = replace(results_of(failure(0, judgement=MINOR), failure(1, phase="evaluation")), evaluation=run_metrics())
-    found = with_headline(results, verified(e0=2, e1=2))
-    assert [phase and phase.headline for phase in (found.metrics, found.evaluation)] == [0, 1]
 
 
 def test_the_first_that_is_not_minor_is_replayed_though_another_of_its_kind_is_preventable() -> None:

@@ -18,11 +18,6 @@ def shipped(name: str) -> Carriageway:
     return carriageway_of(f"{name}/{name}.net.xml")
 
 
-def test_each_heading_is_in_a_sector() -> None:
-    assert [sector_of(math.radians(degrees)) for degrees in (0, 90, 180, -180, -90, -14, 16)] == [0, 3, 6, 6, 9, 0, 1]
-    assert sector_of(math.tau - 1e-9) == 0 < ANY_WAY == SECTORS
-
-
 @pytest.mark.parametrize(
     ("x_m", "y_m", "sector", "depth_m"),
     [

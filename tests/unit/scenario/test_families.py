@@ -11,12 +11,10 @@ from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S, TRUCK_LENGTH_M, Layout
 from risk_sac.scenario.place import PLACES, JunctionPlace
 from risk_sac.sim.sumo import NETS, SumoSimulation
-from risk_sac.types import Kind, Role, Scene
+from risk_sac.types import Kind, Scene
 
 LENGTHS_M = {"car": CAR_LENGTH_M, "truck": TRUCK_LENGTH_M}
-UNITS = {"m", "m/s", "s", "1"}
 APPROACH_M = 230.4  # length of the roads to the intersection of dense
-SUFFIXES = {"_m": "m", "_mps": "m/s", "_s": "s"}
 
 each_family = pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 
@@ -32,42 +30,6 @@ def random_layouts(family: Family, seed: int, n: int) -> list[tuple[Scene, Layou
     generator = np.random.default_rng(seed)
     scenes = [family.space.from_unit(generator.random(family.space.dimension)) for _ in range(n)]
     return [(scene, family.layout(scene.values)) for scene in scenes]
-
-
-@pytest.mark.parametrize(("name", "least"), [("low", 6), ("mixed", 8), ("dense", 10)])
-def test_a_family_has_enough_continuous_parameters(name: str, least: int) -> None:
-    parameters = FAMILIES[name].space.parameters
-    assert sum(p.low < p.high and not p.categories for p in parameters) >= least
-    assert len({p.name for p in parameters}) == len(parameters)
-
-
-@each_family
-def test_every_parameter_says_its_unit_and_meaning(family: Family) -> None:
-    for parameter in family.space.parameters:
-        assert parameter.unit in UNITS
-        assert len(parameter.meaning) > 10
-        for suffix, unit in SUFFIXES.items():
-            if parameter.name.endswith(suffix):
-                assert parameter.unit == unit
-
-
-def test_the_dense_family_searches_the_signal_offset_and_the_turning_movements() -> None:
-    names = set(FAMILIES["dense"].space.names)
-    assert {"signal_offset_s", "ego_turn", "oncoming_turn", "from_left_turn", "from_right_turn"} <= names
-
-
-@each_family
-def test_the_horizon_is_between_10_and_20_seconds(family: Family) -> None:
-    assert 100 <= family.horizon_steps <= 200
-
-
-@each_family
-def test_a_family_has_the_adversaries_it_names(family: Family) -> None:
-    _, layout = random_layouts(family, 0, 1)[0]
-    adversaries = [s.id for s in (*layout.vehicles, *layout.pedestrians) if s.role is Role.ADVERSARY]
-    assert sorted(adversaries) == sorted(family.adversaries)
-    assert len(family.adversaries) >= 2
-    assert layout.ego.role is Role.EGO
 
 
 @each_family

@@ -6,7 +6,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.scenario.ground import Area, areas, is_convex, ribbon, triangles
+from risk_sac.scenario.ground import areas, is_convex, ribbon, triangles
 
 ELL = [(0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)]
 BEND = [(0.0, 0.0), (10.0, 0.0), (17.0, 7.0), (17.0, 20.0)]
@@ -15,15 +15,6 @@ BEND = [(0.0, 0.0), (10.0, 0.0), (17.0, 7.0), (17.0, 20.0)]
 def turned(points, angle):
     cos, sin = math.cos(angle), math.sin(angle)
     return [(x * cos - y * sin, x * sin + y * cos) for x, y in points]
-
-
-def test_a_box_contains_its_edge_and_nothing_beyond() -> None:
-    box = Area.box(1.0, 2.0, -1.0, 1.0)
-    assert box.contains(1.0, -1.0)
-    assert box.contains(2.0, 1.0)
-    assert not box.contains(math.nextafter(2.0, 3.0), 0.0)
-    assert box.grown(0.5).contains(2.5, 1.5)
-    assert not box.grown(0.5).contains(2.6, 0.0)
 
 
 @given(st.floats(-3.1, 3.1), st.booleans())
@@ -44,9 +35,3 @@ def test_a_ribbon_keeps_its_width_round_bends(angle: float) -> None:
     cover = shapely.union_all([shapely.Polygon(quad) for quad in ribbon(line, 3.0)])
     expected = shapely.LineString(line).buffer(1.5, cap_style="flat", join_style="mitre")
     assert cover.symmetric_difference(expected).area < 0.01 * expected.area
-
-
-def test_lines_and_outlines_without_an_area_have_no_ground() -> None:
-    assert ribbon([(0.0, 0.0), (0.0, 0.0)], 3.0) == []
-    assert triangles([(0.0, 0.0), (1.0, 1.0)]) == []
-    assert triangles([(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)]) == []

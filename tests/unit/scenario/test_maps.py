@@ -23,7 +23,6 @@ from risk_sac.scenario.maps.finder import Map, place_at, survey
 from risk_sac.scenario.maps.found import NoFit
 from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net
 from risk_sac.scenario.maps.read_net import read_net
-from risk_sac.scenario.maps.summary import net_remarks
 from risk_sac.scenario.maps.ways import way_back, way_on
 from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch
 from risk_sac.sim.sumo import SumoSimulation
@@ -156,17 +155,6 @@ def test_a_map_that_nothing_fits_on_says_why(tmp_path: Path, content: str, says:
         read_net(file)
 
 
-def test_a_place_that_cannot_be_run_says_why(tmp_path: Path) -> None:
-    file = tmp_path / "map.net.xml"
-    file.write_text(f"<net>{road('short', 'a', 'b', 90, '0,0 90,0')}</net>")
-    with pytest.raises(MapError, match="the longest way on that was found ends with edge 'short' after 6 s"):
-        place_at(read_net(file), "car_following", "short")
-    with pytest.raises(MapError, match="the map has no edge 'x'"):
-        place_at(read_net(file), "car_following", "x")
-    with pytest.raises(MapError, match="junction does not fit at 'short': wanted a road to a junction"):
-        place_at(read_net(file), "junction", "short")
-
-
 @pytest.mark.parametrize(
     ("content", "says"),
     [
@@ -204,52 +192,6 @@ def test_why_netconvert_failed_is_told(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(convert, "netconvert", lambda: (str(program), {}))
     with pytest.raises(MapError, match=says):
         present_net(file, tmp_path)
-
-
-TWO_WAYS = road("r", "a", "b", 900, "0,0 900,0") + road("s", "b", "a", 900, "900,3 0,3")
-ONWARD = road("t", "b", "c", 90, "900,0 990,0")
-
-
-@pytest.mark.parametrize(
-    ("roads", "says"),
-    [
-        (TWO_WAYS, []),
-        (TWO_WAYS + ONWARD, ["there are no connections, although roads meet: no lane leads on to another"]),
-        (
-            TWO_WAYS + road("u", "d", "e", 90, "0,90 90,90"),
-            ["roads are disconnected: the largest part has 2 of 3 edges for cars"],
-        ),
-    ],
-)
-def test_a_dead_end_is_no_missing_connection(tmp_path: Path, roads: str, says: list[str]) -> None:
-    file = tmp_path / "map.net.xml"
-    file.write_text(f"<net>{roads}</net>")
-    net = read_net(file)
-    assert net_remarks(net) == ["there are no traffic lights", *says]
-    fit = place_at(net, "car_following", "r")
-    assert fit.rare
-    rare = "Contacts are rare here: no vehicle can cut in."
-    assert fit.told()["summary"] == f"Car following on 'r': the vehicle ahead brakes and adapts its speed. {rare}"
-
-
-@pytest.mark.parametrize(
-    ("beside", "stored", "said"),
-    [
-        (("left",), "and left brakes", "and the one on the left brake"),
-        (("left", "right"), "and left and right brakes", "and those on the left and right brake"),
-    ],
-)
-def test_people_read_plain_words_and_the_digest_of_a_place_stays(beside: tuple[str], stored: str, said: str) -> None:
-    shipped = PLACES.validate_json((Path(sumo_nets.__path__[0]) / "low" / "place.json").read_bytes())
-    assert isinstance(shipped, Stretch)
-    place = shipped.model_copy(
-        update=dict.fromkeys(("left", "right"))
-        | dict.fromkeys(beside, shipped.ego)
-        | {"summary": f"Car following on 'r': who is ahead {stored}, adapts speed and cuts in."}
-    )
-    assert place.plain_summary == f"Car following on 'r': the vehicle ahead {said}, adapt their speed and cut in."
-    assert f"who is ahead {stored}" in place.model_dump_json()
-    assert shipped.plain_summary == shipped.summary
 
 
 @pytest.mark.parametrize("name", ["straight_two_way.xodr", "single_road.osm"])

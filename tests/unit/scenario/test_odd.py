@@ -166,22 +166,6 @@ def test_crossings_keep_to_the_signals(signals: tuple[str, ...] | None, crossing
     assert intersect(default, Odd(scenery=Scenery(signal_types=signals))).scenery.crossing_types == crossings
 
 
-def test_night_is_refused_where_there_is_no_pedestrian_for_it_to_hide() -> None:
-    road = DEFAULT.model_copy(update={"dynamic": DynamicElements(actor_kinds=("vehicle",))})
-    with pytest.raises(OddError, match=r"got \{night\}; wanted an overlap with \{day\}, which the family supports"):
-        intersect(road, Odd(environment=Environment(time_of_day=("night",))))
-
-
-def test_an_odd_that_empties_the_space_names_the_parameter() -> None:
-    odd = Odd(scenery=Scenery(crossing_types=("none",)))
-    with pytest.raises(OddError, match=r"got \{none\}; wanted an overlap with \{zebra, signalised\}.*'crossing'"):
-        narrow(SceneSpace("mixed", (CROSSING,)), odd)
-    odd = intersect(DEFAULT, Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(19, 20))))
-    with pytest.raises(OddError, match=r"\[19, 20\]; wanted an overlap with \[5, 18\].*'lead_speed_mps'") as caught:
-        narrow(SPACE, odd)
-    assert caught.value.field == "odd.dynamic.vehicle_speed_mps"
-
-
 @pytest.mark.parametrize(("low", "high"), [(4, 6), (2.5, 3), (3, 3)])
 def test_one_bound_is_stated_of_a_field_that_bounds_a_scene_parameter(low: float, high: float) -> None:
     mixed = FAMILIES["mixed"]
@@ -191,13 +175,6 @@ def test_one_bound_is_stated_of_a_field_that_bounds_a_scene_parameter(low: float
         intersect(mixed.odd, user, mixed.space)
     assert (caught.value.got, caught.value.expected) == (f"[{low:g}, {high:g}]", expected)
     assert intersect(mixed.odd, Odd(dynamic=DynamicElements(pedestrian_speed_mps=interval(2, 6))), mixed.space)
-
-
-def test_the_parameters_of_one_field_are_named_together() -> None:
-    low = FAMILIES["low"]
-    user = Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(19, 60)))
-    with pytest.raises(OddError, match="'lead_speed_mps' and 'left_speed_mps' and 'right_speed_mps' in the 'low'"):
-        intersect(low.odd, user, low.space)
 
 
 def test_requirements_follow_the_odd() -> None:
@@ -229,10 +206,6 @@ def test_thresholds_follow_the_odd_and_the_reaction_time() -> None:
     quick = {r.name: r.formula for r in requirements_from_odd(dry, 0.1)}
     assert quick["safe_ttc"] == "encounter_s >= 1.5"
     assert quick["bounded_braking"].endswith(">= 8.1)")  # 0.9 · min(9.81, 9)
-
-
-def test_what_is_flat_until_it_breaks_is_monitored_and_no_part_of_the_potential() -> None:
-    assert {r.name for r in requirements_from_odd(DEFAULT, 0.5) if not r.shapes} == {"no_contact", "bounded_braking"}
 
 
 def test_an_ego_that_nobody_threatens_has_a_robustness_of_about_1_in_every_requirement() -> None:

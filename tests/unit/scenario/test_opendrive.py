@@ -106,12 +106,6 @@ def test_a_lane_keeps_its_width_where_a_limit_begins_within_its_section(tmp_path
     assert [edge.lanes[0].width_m for edge in net.edges.values()] == pytest.approx([3.0, 3.9], abs=0.01)
 
 
-@pytest.mark.parametrize("speed", ['max="fast"', 'max="50" unit="knots"', 'max="-1"', 'max="nan"'])
-def test_a_limit_that_is_no_speed_is_told(tmp_path: Path, speed: str) -> None:
-    _, made = read(tmp_path, road(section(lane(-1)), types=kind(f"<speed {speed}/>")))
-    assert "left out, because netconvert does not read them: limits that are no speed (1)" in made.warnings
-
-
 @pytest.mark.parametrize("curvature", [0.01, -0.01])
 @pytest.mark.parametrize("by", [0.0, 1e-17, 5e-7])
 def test_a_spiral_of_nearly_constant_curvature_is_the_arc(tmp_path: Path, curvature: float, by: float) -> None:
@@ -152,16 +146,6 @@ def _drawn(folder: Path, bend: str, end: tuple[float, float, float]) -> Sequence
     (edge,) = net.edges.values()
     _, left_y = edge.lanes[0].line[0]  # netconvert moves a map
     return [(x, y - left_y - 1.75) for x, y in edge.lanes[0].line]
-
-
-def test_what_netconvert_does_not_read_is_counted(tmp_path: Path) -> None:
-    more = (
-        '<objects><object id="6" type="pole" s="9" t="0"/></objects>'
-        '<signals><signal id="7" s="9" t="0" type="274" dynamic="no" orientation="+"/></signals>'
-    )
-    _, made = read(tmp_path, road(section(lane(-1), lane(-2, kind="slipLane")), more=more))
-    told = "signals and signs (1), lanes of type slipLane (1)"
-    assert f"left out, because netconvert does not read them: {told}" in made.warnings
 
 
 def test_what_cannot_be_converted_is_refused_in_plain_words(tmp_path: Path) -> None:
@@ -212,8 +196,3 @@ LINKED = '<link><predecessor id="{0}"/><successor id="{0}"/></link>'
 
 def _straight(x: float, length: float) -> str:
     return f'<geometry s="0" x="{x}" y="0" hdg="0" length="{length}"><line/></geometry>'
-
-
-def test_a_crosswalk_that_cannot_be_a_crossing_is_counted(tmp_path: Path) -> None:
-    _, made = read(tmp_path, road(section(lane(-1)), more=crosswalk(5.0, 895.0)))
-    assert "left out, because netconvert builds no crossings there: crosswalks (2)" in made.warnings

@@ -108,19 +108,6 @@ def test_roundabouts_are_read_whatever_comes_first(extract: Path) -> None:
         side_remarks(extract)
 
 
-@pytest.mark.parametrize(
-    ("content", "says"),
-    [
-        ("<osm><node", "the map is broken"),
-        ('<osm><node id="1" lat="north" lon="2"/></osm>', "the map is broken: ValueError"),
-    ],
-)
-def test_what_is_no_extract_is_refused(extract: Path, content: str, says: str) -> None:
-    extract.write_text(content)
-    with pytest.raises(MapError, match=says):
-        side_remarks(extract)
-
-
 def test_a_map_is_asked_on_which_side_people_drive_before_it_is_converted(extract: Path, tmp_path: Path) -> None:
     extract.write_text(osm_town(LEFT_STREET))
     with pytest.raises(MapError, match="left-hand traffic"):

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.records import Collision, DrivenBy, Grade, ReferenceOutcome, Severity
+from risk_sac.records import Collision, Grade, ReferenceOutcome, Severity
 from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
 from risk_sac.scene_optimizer.archive import INITIAL, NEW, NEW_CANDIDATE, Elites, mutated
 from tests.builders import collision, judgement, violation
@@ -51,17 +51,6 @@ def test_a_parent_is_credited_with_what_was_new_and_most_with_what_was_preventab
     assert parent.credit == NEW_CANDIDATE + NEW
     elites.add_failure(THERE, failure(Grade.PREVENTABLE), parent)
     assert parent.credit == NEW_CANDIDATE + NEW
-
-
-def test_what_is_drawn_is_random_and_what_is_bred_is_a_script():
-    search = ArchiveOptimizer(3, SceneOptimizerConfig(), seed=0)
-    drove = []
-    for _ in range(INITIAL + 30):
-        point = search.ask()
-        drove.append(search.driven_by)
-        search.tell(point, 0.0, Encounter(collision=failure(Grade.PREVENTABLE)))
-    assert set(drove[:INITIAL]) == {DrivenBy.RANDOM}
-    assert set(drove[INITIAL:]) == {DrivenBy.RANDOM, DrivenBy.SCRIPT}
 
 
 def test_a_minor_contact_ranks_below_what_the_headline_counts():

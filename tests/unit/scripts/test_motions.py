@@ -56,15 +56,6 @@ def test_a_neighbour_takes_up_its_place_and_then_comes_over():
     assert act(strike, beside(), 1.5, pedestrian=False) == Act(1.0, 0.0)
 
 
-def test_a_neighbour_stays_in_the_middle_of_its_lane_a_quarter_of_the_time_to_its_cue():
-    assert act(MIDDLE, beside(time_s=1.2), -0.1, pedestrian=False).steer == 0.0
-    assert act(MIDDLE, beside(time_s=1.3), -0.1, pedestrian=False).steer < 0.0
-
-
-def test_a_leader_keeps_its_lane_until_its_cue():
-    assert act(MIDDLE, beside(11.0, 0.2), -0.1, pedestrian=False) == Act(0.0, pytest.approx(-0.2))
-
-
 @pytest.mark.parametrize("side", [1, -1])
 def test_crossing_traffic_hurries_when_it_would_be_late_and_waits_when_early(side):
     late = Seen(0.0, 20.0, 40.0 * side, 0.0, -1.0 * side, 10.0, 10.0)  # 4 s from the ego's axis, the ego 2 s

@@ -25,12 +25,6 @@ def with_headings(*heading_rad: float) -> Path:
     return path_through(np.zeros(3), np.zeros(3), np.array([0.0, 10.0, 20.0]), np.array(heading_rad), np.full(3, 13.89))
 
 
-def test_a_straight_road_asks_nothing() -> None:
-    straight = bends(road(), LIMITS)
-    assert set(straight[HERE]) == {0.0}
-    assert min(straight[CAP]) > 1000
-
-
 def test_a_corner_turns_the_body_over_its_own_length_by_hand() -> None:
     got = bends(corner(0.46), LIMITS)
     assert got[HERE] == pytest.approx([0.0] * 20 + [0.1] * 10 + [0.0] * 11)  # 10 to 14.5 m: 0.46 rad / 4.6 m

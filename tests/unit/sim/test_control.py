@@ -33,7 +33,6 @@ LIMITS = Limits(
 EPS = 1e-9
 WIDE = Room(left_m=50.0, right_m=50.0)
 STRAIGHT = Along(road(), 0.0, 0.0)
-unit = st.floats(-1, 1)
 Actions = list[tuple[float, float]]
 
 
@@ -195,11 +194,6 @@ def test_braking_to_a_halt_by_hand() -> None:
     assert speeds[-1] == pytest.approx(0.0, abs=0.05)
 
 
-def test_a_standing_vehicle_does_not_slide_sideways() -> None:
-    control = VehicleControl(LIMITS, 0.0)
-    assert [control.step(-1.0, 1.0, WIDE, STRAIGHT).lateral_mps for _ in range(10)] == pytest.approx([0.0] * 10)
-
-
 def test_an_odd_may_widen_what_is_usual_up_to_the_extreme() -> None:
     usual = limits_on(1.0)
     assert (usual.lateral_mps, usual.lateral_accel_mps2) == (1.2, 1.5)
@@ -247,11 +241,6 @@ def test_a_pedestrian_turns_left_by_hand() -> None:
     for _ in range(5):
         before, walker = walker, control.step(0.0, 1.0)
     assert walker.heading_rad - before.heading_rad == pytest.approx(0.15)  # 1.5 m/s² / 1 m/s
-
-
-def test_a_pedestrian_starts_by_hand() -> None:
-    control = PedestrianControl(LIMITS, Walker(0.0, 0.0, 0.0, 0.0))
-    assert [control.step(1.0, 0.0).speed_mps for _ in range(5)] == pytest.approx([0.05, 0.15, 0.3, 0.45, 0.6])
 
 
 @pytest.mark.parametrize("turn", [-1.0, 1.0])

@@ -72,12 +72,6 @@ def test_what_is_expected_is_what_was_seen_last_and_not_what_is() -> None:
     assert expected(perception, belief)["walker"][1] == pytest.approx(-3.0 + 1.4 * 1.5)
 
 
-def test_without_memory_who_is_out_of_sight_is_hidden_at_once() -> None:
-    perception = Perception(0.0, WITHIN_100_M)
-    look(perception, 1.0, "walker", "parked")
-    assert hidden(look(perception, 1.1, "parked")) == {"walker"}
-
-
 def test_what_is_remembered_of_an_actor_stays_its_own_when_another_leaves() -> None:
     perception = Perception(3.0, WITHIN_100_M)
     look(perception, 1.0, "walker", "parked")
@@ -104,14 +98,6 @@ def test_a_flicker_is_no_break_and_more_is() -> None:
     assert perception.in_view_for("walker", 2.9) == pytest.approx(0.2)
     assert perception.ever_seen("walker")
     assert not perception.ever_seen("parked")
-
-
-def test_a_new_episode_begins_with_nobody_known() -> None:
-    perception = Perception(3.0, WITHIN_100_M)
-    look(perception, 1.0, "walker", "parked")
-    perception.reset()
-    assert not perception.ever_seen("walker")
-    assert hidden(look(perception, 1.0)) == {"walker", "parked"}
 
 
 def test_a_look_takes_note_of_whom_the_sensor_sees() -> None:

@@ -9,7 +9,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from shapely import LineString, Point
 
-from risk_sac.sim.lookout import MARGIN_M, near_pedestrians, project, targets
+from risk_sac.sim.lookout import MARGIN_M, project, targets
 from risk_sac.sim.paths import Path, path_along, path_through
 from risk_sac.types import Kind
 from tests.roads import road
@@ -155,15 +155,6 @@ def test_a_car_that_stands_across_or_tilted_is_stopped_for(side: int) -> None:
     assert target((40.0, side * (aside_m + 0.01), side * tilt, 0.0, 0.0, CAR)) == CLEAR
 
 
-def test_nobody_but_the_candidates_counts() -> None:
-    _, frame = frames(EGO, walker(50.0, 0.0), share=1.0)
-    vehicle = frame.kind == Kind.VEHICLE
-    for known in (True, False):
-        candidate = np.array([True, known])
-        found = targets(road(), FRONT_M, 0.0, 0, ACCEL_MPS2, frame.state, vehicle, candidate)
-        assert len(found) == known
-
-
 @settings(max_examples=100)
 @given(
     st.floats(10, 90),
@@ -218,15 +209,6 @@ def test_the_nearest_place_is_the_one_that_shapely_finds(x: float, y: float, rad
         nearest_m = line.distance(Point(x, y))
         assert Point(x, y).distance(line.interpolate(station)) == pytest.approx(nearest_m, abs=1e-6)
     assert abs(offset) <= line.distance(Point(x, y)) + 1e-6
-
-
-def test_who_has_a_pedestrian_within_forty_metres() -> None:
-    _, frame = frames(
-        (0.0, 39.9, 0.0, 0.0, 0.0, CAR), (40.1, 0.0, 0.0, 0.0, 0.0, CAR), (0.0, 0.0, 0.0, 0.0, 0.0, WALKER), share=1.0
-    )
-    assert near_pedestrians(frame.state, frame.kind == Kind.VEHICLE).tolist() == [True, False, True]
-    _, frame = frames(EGO, share=1.0)
-    assert near_pedestrians(frame.state, frame.kind == Kind.VEHICLE).tolist() == [False]
 
 
 def test_whom_it_passes_at_its_speed_it_may_meet_at_that_of_a_bend() -> None:

@@ -155,8 +155,3 @@ def test_a_lane_that_begins_beside_the_end_of_another_is_led_to_without_a_step(
     points = path_along(lines, [13.9, 13.9])
     np.testing.assert_allclose(points[[X, Y]].T, [(x, side * y) for x, y in expected])
     np.testing.assert_allclose(np.hypot(*np.diff(points[[X, Y]])), np.diff(points[STATION]))
-
-
-def test_of_a_lane_shorter_than_the_way_to_a_step_its_beginning_stays() -> None:
-    lines = [np.array(line) for line in ([(0.0, 0.0), (3.0, 0.0)], [(3.0, 0.3), (9.0, 0.3)], [(9.0, 0.3), (50.0, 0.3)])]
-    np.testing.assert_allclose(path_along(lines, [9.0, 8.0, 7.0])[[X, Y]].T, [(0, 0), (3, 0.3), (9, 0.3), (50, 0.3)])

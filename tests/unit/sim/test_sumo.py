@@ -16,14 +16,13 @@ from risk_sac.errors import SimulationError
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
-from risk_sac.sim.commands import VehicleCommand, Walker
+from risk_sac.sim.commands import VehicleCommand
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.sumo import NETS, SumoSimulation
 from risk_sac.types import Frame, Role
 from tests.builders import Told, belief_of
 
 LEAD_IN_STEPS = 15
-each_family = pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 
 
 @pytest.fixture(scope="module")
@@ -39,13 +38,6 @@ def middle(family: Family, **changes: float) -> Layout:
 
 def speed(frame: Frame, id_: str) -> float:
     return float(frame.speed_mps[frame.ids.index(id_)])
-
-
-@each_family
-def test_sumo_knows_no_pedestrians(sim: SumoSimulation, family: Family) -> None:
-    frame = sim.reset(middle(family), 0)
-    assert libsumo.person.getIDCount() == 0
-    assert frame.ids[len(libsumo.vehicle.getIDList()) :] == family.pedestrians
 
 
 @pytest.mark.parametrize("folder", ["Tests, 2026", "a;b", "${HOME}", "100%", "ü é"])
@@ -94,15 +86,6 @@ def test_only_after_the_release_a_command_is_driven_whatever_is_in_the_way(sim: 
     assert driven(released=False) < 11.0
 
 
-@each_family
-def test_the_release_alone_changes_nobody_s_size(sim: SumoSimulation, family: Family) -> None:
-    frame = sim.reset(middle(family), 0)
-    sim.release()
-    vehicles = [id_ for id_ in frame.ids if id_ not in family.pedestrians]
-    assert [libsumo.vehicle.getLength(v) for v in vehicles] == frame.length_m[: len(vehicles)].tolist()
-    assert [libsumo.vehicle.getWidth(v) for v in vehicles] == frame.width_m[: len(vehicles)].tolist()
-
-
 def with_walkers(*starts: PedestrianStart) -> Layout:
     return replace(middle(FAMILIES["mixed"]), pedestrians=starts)
 
@@ -128,14 +111,6 @@ def test_walkers_walk_on_and_halt_by_hand(sim: SumoSimulation) -> None:
     assert np.array_equal(halted.heading_rad[-2:], frame.heading_rad[-2:])
 
 
-def test_a_walker_is_where_it_is_told(sim: SumoSimulation) -> None:
-    sim.reset(with_walkers(pedestrian("walker", math.pi / 2, 1.5)), 0)
-    sim.apply({}, {"walker": Walker(123.0, -4.0, 0.5, 0.8, 0.3)})
-    frame = sim.step()
-    state = [float(getattr(frame, n)[-1]) for n in ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")]
-    assert state == [123.0, -4.0, 0.5, 0.8, 0.3]
-
-
 def test_room_is_what_is_left_of_the_road_on_both_sides(sim: SumoSimulation) -> None:
     frame = sim.reset(middle(FAMILIES["low"]), 0)
     width = 3.3
@@ -150,11 +125,6 @@ def test_room_is_what_is_left_of_the_road_on_both_sides(sim: SumoSimulation) -> 
         assert room.left_m == pytest.approx((2 - lanes_right) * width + spare - offset)
         assert along.station_m == pytest.approx(float(frame.x_m[row]) + 2.3)
         assert along == sim.along(id_)
-
-
-def test_who_left_the_net_has_no_place(sim: SumoSimulation) -> None:
-    sim.reset(middle(FAMILIES["low"]), 0)
-    assert sim.place("nobody") is None
 
 
 @pytest.mark.parametrize("family", ["mixed", "dense"])

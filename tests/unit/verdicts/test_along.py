@@ -66,13 +66,6 @@ def test_when_a_conflict_begins_and_when_it_goes_on(
     assert lane_conflict(other, 10.0, offset, accel, LANE_M, wary=False) == expected
 
 
-@pytest.mark.parametrize(("across", "counts"), [(2.9, False), (1.7, False), (1.6, True)])
-def test_who_is_alongside_and_stays_there_counts_from_half_way_into_the_lane_on(across: float, counts: bool) -> None:
-    other = seen(-1.0, math.inf, across)
-    assert lane_conflict(other, 10.0, math.nan, 0.0, LANE_M, wary=True) == (across < 2.95, across < 2.95)
-    assert lane_conflict(other, 10.0, math.nan, 0.0, LANE_M, wary=False) == (counts, counts)
-
-
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize(("towards_mps", "expected"), [(0.6, 2.0), (0.3, 4.0), (0.0, math.inf), (-0.6, math.inf)])
 def test_the_sides_touch_when_the_room_between_them_is_gone(side: int, towards_mps: float, expected: float) -> None:

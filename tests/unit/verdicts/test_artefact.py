@@ -130,10 +130,6 @@ def test_cornering_takes_v_squared_over_r() -> None:
     assert used.max() == pytest.approx(5.0 * math.hypot(20.0, 2.3) / 20.0, rel=0.03)
 
 
-def test_braking_takes_its_deceleration() -> None:
-    assert used_grip(leader_brakes(gap=15.0, braking=6.0), 1).max() == pytest.approx(6.0, rel=0.02)
-
-
 @pytest.mark.parametrize(("speed", "friction", "inside"), [(10.0, 1.0, True), (10.0, 0.45, False), (14.5, 1.0, False)])
 def test_a_turn_faster_than_the_road_bears_is_outside(speed: float, friction: float, inside: bool) -> None:
     assert on(friction, driving(circle(speed, 20.0))) is inside
@@ -153,10 +149,6 @@ def test_cornering_and_braking_share_the_circle() -> None:
 
 def test_kinks_of_a_lane_are_no_cornering() -> None:
     assert on(0.9, driving(circle(10.0, 20.0, jitter_s=0.1)))
-
-
-def test_a_sudden_lane_change_is_inside() -> None:
-    assert on(0.6, cut_in(rate=1.2))
 
 
 def test_pedestrians_and_short_records_pass() -> None:

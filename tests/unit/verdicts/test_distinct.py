@@ -60,13 +60,6 @@ def test_the_count_is_the_same_in_any_order_and_after_a_resume(hits: list[Collis
     assert found.count == again.count == len(distinct_failures(hits))
 
 
-def test_a_signature_holds_few_cells() -> None:
-    cells = {
-        cell_of(failure(ego=ego, other=1.4, after=after)) for ego in range(4, 14) for after in (0.5, 1.0, 1.5, 3.0)
-    }
-    assert len(cells) <= 4
-
-
 def test_infinite_features_lie_at_the_edge_and_nan_nowhere() -> None:
     assert cell_of(failure(ego=float("inf"))) == (1, 0, 0)
     with pytest.raises(NotFinite, match="wanted no NaN"):
@@ -95,8 +88,3 @@ def kind(judged: dict[str, Any] | None = None, **changes: Any) -> FailureKind:
 )
 def test_a_kind_is_told_by_its_edges(changes: dict[str, Any], field: str, value: object) -> None:
     assert getattr(kind(**changes), field) == value
-
-
-def test_what_no_axis_speaks_of_makes_no_kind() -> None:
-    assert kind() == kind(time_s=7.0, contact_y_m=0.3, judged={"conflict_s": 1.1, "signature": "another"})
-    assert kind() != kind(judged={"ego_manoeuvre": "left_turn"})

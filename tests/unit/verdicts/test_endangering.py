@@ -14,7 +14,6 @@ from tests.unit.verdicts.staged import (
     Motion,
     crossing_car,
     cut_in,
-    leader_brakes,
     merge,
     mirrored,
     pedestrian_crosses,
@@ -81,10 +80,6 @@ def test_who_brakes_gently_or_for_a_signal_checks_nobody() -> None:
     assert named(replace(hard, role=hard.role.clip(max=Role.BACKGROUND) * [1, 0] + [0, Role.BACKGROUND])) == ()
 
 
-def test_a_leader_far_ahead_checks_nobody() -> None:
-    assert named(leader_brakes(gap=70.0, speed=14.0)) == ()
-
-
 def walks(x_m: float, y_m: float, turn_rad: float, at_s: float) -> Motion:
     """Along the kerb towards the ego, and from `at_s` on to its right by `turn_rad`."""
     along = straight(x_m, y_m, math.pi, 1.4)
@@ -96,10 +91,6 @@ def test_a_pedestrian_that_turns_into_the_way() -> None:
     seen, unseen = stage(ego, walker, kinds=WALKING), stage(ego, walker, kinds=WALKING, seen_from_s=2.7)
     assert named(seen) == ("turned_into_path",)
     assert named(unseen) == ()  # it could not see the ego when it turned
-
-
-def test_a_pedestrian_that_goes_straight_on_turns_nowhere() -> None:
-    assert named(pedestrian_crosses()) == ()
 
 
 @pytest.mark.parametrize(

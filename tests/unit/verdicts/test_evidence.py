@@ -3,7 +3,7 @@ import pytest
 
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
 from risk_sac.verdicts.judge import judge
-from tests.unit.verdicts.staged import STREET, cut_in, leader_brakes, stage, straight
+from tests.unit.verdicts.staged import STREET, cut_in, leader_brakes
 
 
 def test_a_striker_that_has_left_cannot_have_struck() -> None:
@@ -24,9 +24,3 @@ def test_what_is_stored_is_judged_alike(evidence: Evidence) -> None:
     again = judge(Evidence.from_series(stored, STREET, 1.5), "actor_1", valid=True)
     assert (again.conflict_s, again.noticed_s) == pytest.approx((first.conflict_s, first.noticed_s))
     assert again.model_copy(update={"conflict_s": first.conflict_s, "noticed_s": first.noticed_s}) == first
-
-
-def test_the_last_seconds_are_counted_from_the_contact() -> None:
-    evidence = stage(straight(0.0, 0.0, 0.0, 10.0), straight(60.0, 0.0, 0.0, 0.0))
-    assert evidence.time_s[-1] - evidence.time_s[evidence.since(2.0)] == pytest.approx(2.0)
-    assert evidence.since(100.0) == 0

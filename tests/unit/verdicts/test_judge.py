@@ -5,7 +5,6 @@ import pytest
 
 from risk_sac.records import ConflictType, Grade, Judgement
 from risk_sac.scenario.ground import Area
-from risk_sac.types import Role
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import DEFINITIONS, judge
 from tests.unit.verdicts.staged import (
@@ -86,11 +85,6 @@ def test_more_time_in_sight_never_makes_the_grade_worse() -> None:
     assert grades == sorted(grades)
 
 
-def test_a_background_striker_is_named_so() -> None:
-    evidence = replace(leader_brakes(), role=np.array([Role.EGO, Role.BACKGROUND], dtype=np.int8))
-    assert judged(evidence).signature.startswith("background leader, ")
-
-
 @pytest.mark.parametrize(
     ("accel", "response"),
     [
@@ -111,19 +105,9 @@ def test_what_the_ego_did_about_it(accel: tuple[tuple[float, float], ...], respo
     assert judged(evidence).ego_response == response
 
 
-def test_an_ego_that_has_just_set_off_is_starting() -> None:
-    evidence = stage(straight(0.0, 0.0, 0.0, 0.0, (2.0, 2.0)), straight(9.0, 0.0, 0.0, 0.0))
-    assert judged(evidence).ego_response == "starting"
-
-
 def test_an_ego_that_sets_off_again_where_it_has_just_stopped_is_starting() -> None:
     ego = straight(0.0, 0.0, 0.0, 6.0, (0.5, -6.0), (1.6, 2.0))
     assert judged(stage(ego, straight(23.0, 0.0, 0.0, 0.0))).ego_response == "starting"
-
-
-def test_an_ego_that_stands_is_struck() -> None:
-    evidence = stage(straight(0.0, 0.0, 0.0, 0.0), straight(60.0, 0.0, np.pi, 10.0))
-    assert judged(evidence).ego_response == "standing"
 
 
 @pytest.mark.parametrize(("turn", "name"), [(1, "left_turn"), (-1, "right_turn")])

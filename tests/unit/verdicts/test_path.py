@@ -24,12 +24,6 @@ def test_a_path_goes_on_straight_beyond_its_ends(s: float, pose: tuple[float, fl
     assert pose_at(CORNER, s)[:2] == pytest.approx(pose)
 
 
-def test_a_single_point_is_a_straight_line() -> None:
-    path = polyline(np.array([1.0]), np.array([2.0]), math.pi / 2)
-    assert pose_at(path, 3.0) == pytest.approx((1.0, 5.0, math.pi / 2))
-    assert project(path, 0, 0.0, 6.0) == pytest.approx((4.0, 1.0, math.pi / 2))
-
-
 @pytest.mark.parametrize(
     ("x", "y", "s", "left"),
     [(5.0, 2.0, 5.0, 2.0), (12.0, 5.0, 15.0, -2.0), (9.0, 20.0, 30.0, 1.0), (-2.0, -1.0, -2.0, -1.0)],

@@ -1,5 +1,4 @@
 import os
-import sqlite3
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,16 +25,6 @@ def mode(path: Path) -> int:
 def test_a_new_data_folder_is_nobody_elses(tmp_path: Path) -> None:
     hold_data_folder(tmp_path / "new" / "data").close()
     assert mode(tmp_path / "new" / "data") == 0o700
-
-
-@pytest.mark.parametrize("known_by", [(), (".lock", "campaigns"), ("keys.lock", "keys.json"), ("lost+found",)])
-def test_a_data_folder_from_before_is_mended(tmp_path: Path, known_by: tuple[str, ...]) -> None:
-    folder = tmp_path / "data"
-    folder.mkdir(mode=0o755)
-    for name in known_by:
-        (folder / name).touch()
-    hold_data_folder(folder).close()
-    assert mode(folder) == 0o700
 
 
 def test_a_folder_that_others_need_is_refused_and_stays_as_it_is(tmp_path: Path) -> None:
@@ -75,17 +64,3 @@ def test_only_the_owner_may_read_the_database_and_its_journal(tmp_path: Path) ->
     assert [path.name for path in files] == ["risk-sac.db", "risk-sac.db-shm", "risk-sac.db-wal"]
     assert {path.name: mode(path) for path in files} == {path.name: 0o600 for path in files}
     store.close()
-
-
-def test_a_database_from_before_is_mended_with_what_a_killed_server_left(tmp_path: Path) -> None:
-    Store(f"sqlite:///{tmp_path}/risk-sac.db").close()
-    other = sqlite3.connect(tmp_path / "risk-sac.db")
-    other.execute("SELECT count(*) FROM campaigns").fetchall()
-    files = sorted(tmp_path.glob("risk-sac.db*"))
-    assert len(files) == 3
-    for path in files:
-        path.chmod(0o644)
-    store = Store(f"sqlite:///{tmp_path}/risk-sac.db")
-    assert {mode(path) for path in files} == {0o600}
-    store.close()
-    other.close()

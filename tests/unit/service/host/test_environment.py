@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.errors import ConfigError
-from service.host.environment import read_settings
 from service.settings import ServiceSettings
 
 RISK_SAC = [sys.executable, "-c", "import sys; from risk_sac.cli import main; sys.exit(main())"]
@@ -54,32 +52,6 @@ def test_a_missing_folder_of_secrets_or_a_file_in_its_place_ends_the_start_in_on
     assert "which is no folder" in ended.stderr
 
 
-def test_secrets_are_read_and_wrong_ones_named(tmp_path: Path) -> None:
-    (tmp_path / "risk_sac_port").write_text("70000\n")
-    ended = start("keys", tmp_path, secrets_dir=str(tmp_path))
-    assert (ended.returncode, ended.stderr) == (2, "RISK_SAC_PORT: got '70000'; wanted integer ≥ 1, ≤ 65535\n")
-
-
-@pytest.mark.parametrize("value", ["a.example", "{}", '"a"', "", "7"])
-def test_what_is_no_list_is_named(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
-    monkeypatch.setenv("RISK_SAC_ALLOWED_HOSTS", value)
-    with pytest.raises(ConfigError, match=r"^RISK_SAC_ALLOWED_HOSTS: got .*; wanted JSON list$"):
-        read_settings()
-
-
 @pytest.mark.parametrize(("given", "path"), [("sim", "/sim"), ("/a/b/", "/a/b"), ("/", ""), ("", "")])
 def test_a_root_path_is_taken_with_its_slashes_and_without(given: str, path: str) -> None:
     assert ServiceSettings(root_path=given).root_path == path
-
-
-def test_a_long_value_is_shortened(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("RISK_SAC_MAX_WORKERS", "9" * 5000)
-    with pytest.raises(ConfigError, match=r"^RISK_SAC_MAX_WORKERS: got '9{79}…; wanted integer"):
-        read_settings()
-
-
-def test_every_setting_has_a_default_and_one_worker_per_core(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: {0, 3, 5}, raising=False)
-    settings = ServiceSettings()
-    assert (settings.host, settings.port) == ("127.0.0.1", 8000)
-    assert settings.max_workers == 3

@@ -2,28 +2,13 @@ import json
 import logging
 import sys
 
-import pytest
-
-from service.host.logs import TextFormatter, json_formatter
+from service.host.logs import json_formatter
 
 
 def record(message, exc_info=None, **extra):
     return logging.getLogger("service.runs.manager").makeRecord(
         "service.runs.manager", logging.INFO, __file__, 1, message, (), exc_info, extra=extra
     )
-
-
-@pytest.mark.parametrize(
-    ("extra", "end"),
-    [
-        ({}, "service.runs.manager: process 7"),
-        ({"campaign": "c1"}, "process 7 [campaign c1]"),
-        ({"campaign": "c1", "run": "low-sac-0"}, "process 7 [campaign c1, run low-sac-0]"),
-        ({"campaign": None, "ms": 3}, "process 7"),
-    ],
-)
-def test_a_line_ends_with_what_it_is_about(extra, end):
-    assert TextFormatter().format(record("process 7", **extra)).endswith(end)
 
 
 def test_a_json_line_has_what_a_search_needs_and_no_colours():

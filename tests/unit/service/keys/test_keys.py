@@ -60,19 +60,6 @@ def test_what_a_killed_command_left_does_not_matter(file: KeyFile) -> None:
     assert file.read() == (key, other)
 
 
-def test_revoking_twice_keeps_the_first_time(file: KeyFile) -> None:
-    key, _ = file.create("maps", "", Scope.READ)
-    revoked = file.revoke(key.id)
-    assert revoked.revoked_at is not None
-    assert file.revoke(key.id) == revoked
-
-
-def test_revoking_an_unknown_key_is_an_error(file: KeyFile) -> None:
-    file.create("maps", "", Scope.READ)
-    with pytest.raises(KeysError, match="id is 'nobody'; wanted one that"):
-        file.revoke("nobody")
-
-
 def test_a_damaged_file_is_never_written_over(file: KeyFile) -> None:
     file.create("maps", "", Scope.READ)
     file.path.write_text("{}")
@@ -124,11 +111,6 @@ def test_ring_takes_what_is_no_file_never_for_an_empty_one(file: KeyFile, ring: 
         ring.keys()
     file.path.rmdir()
     assert ring.keys() == {}
-
-
-def test_scopes_include_those_before_them() -> None:
-    included = {scope: [other.value for other in Scope if scope.includes(other)] for scope in Scope}
-    assert included == {"read": ["read"], "run": ["read", "run"], "admin": ["read", "run", "admin"]}
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "fe80::1", "example.org", "localhost.evil.org", ""])

@@ -1,17 +1,15 @@
 """Keys that were made once, and whose file is lost."""
 
-import sqlite3
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
-from service.errors import KeysError, StorageError
-from service.host.data_folder import hold_data_folder
+from service.errors import KeysError
 from service.keys.__main__ import main
 from service.keys.file import KeyFile, Scope
-from service.keys.made import AuthEnabledFlag, ever_made, noting
+from service.keys.made import AuthEnabledFlag, ever_made
 from service.keys.ring import KeyRing
 from service.settings import ServiceSettings
 from service.store.reading import Store
@@ -58,12 +56,6 @@ def test_a_key_that_cannot_be_noted_is_not_made(
     assert main(CREATE) == 1
     assert "storage failed while opening the database" in capsys.readouterr().err
     assert not file.path.exists()
-
-
-def test_keys_that_cannot_be_written_are_not_noted(settings: ServiceSettings, store: Store) -> None:
-    with pytest.raises(KeysError), noting(settings):
-        raise KeysError("the disk is full")
-    assert not keys_were_made(store.engine)
 
 
 def test_the_command_takes_lost_keys_for_lost(
@@ -161,15 +153,3 @@ def test_the_first_key_is_never_missing(settings: ServiceSettings, file: KeyFile
         assert change.result() == 0
     assert sorted(seen, reverse=True) == seen, "open until there is a key, and never again"
     assert not ring.open
-
-
-def test_a_database_of_an_older_version_is_brought_up_to_date_only_while_no_server_uses_it(tmp_path: Path) -> None:
-    settings = ServiceSettings(data_dir=tmp_path)
-    old = sqlite3.connect(tmp_path / "risk-sac.db")
-    old.close()
-    with hold_data_folder(tmp_path), pytest.raises(StorageError, match="in use by another process"), noting(settings):
-        pass
-    assert not ever_made(settings)
-    with noting(settings):
-        pass
-    assert ever_made(settings)

@@ -1,6 +1,5 @@
 import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -9,8 +8,6 @@ from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, 
 from service.networks.network_store import INCOMING, RECORD, NetworkStore
 from service.networks.schemas import Network
 from tests.hostile_networks import NET
-
-Add = Callable[..., Network]
 
 
 @pytest.fixture
@@ -46,14 +43,6 @@ def test_lists_are_newest_first_and_stable_while_others_come(shelf: NetworkStore
     add(shelf)
     second = shelf.list(2, first.last, "default")
     assert ([network.id for network in second.items], second.last) == ([ids[0]], None)
-
-
-def test_the_same_upload_is_recognised_in_its_project_alone(shelf: NetworkStore) -> None:
-    network = add(shelf)
-    for content, project, found in ((NET, "default", network), (NET + " ", "default", None), (NET, "another", None)):
-        with shelf.receive() as incoming:
-            incoming.write(content.encode())
-            assert shelf.uploaded_before(incoming, project) == found
 
 
 def test_no_project_sees_another_ones(shelf: NetworkStore) -> None:

@@ -5,10 +5,10 @@ import time
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.execution.executor import FOLDER, Cause, Exited
+from risk_sac.execution.executor import Cause, Exited
 from risk_sac.execution.messages import Failed, Finished
 from service.errors import OutdatedError
-from service.runs.manager import Manager, worker_program
+from service.runs.manager import Manager
 from service.settings import ServiceSettings
 
 SPEC = CampaignSpec(families=("low",), methods=("random",))
@@ -81,13 +81,6 @@ def test_a_run_that_loses_its_cluster_again_and_again_has_not_failed(execute, me
     assert manager.restarts == {Cause.LOST: 6}
 
 
-@pytest.mark.parametrize(("slots", "wanted"), [(math.inf, 7), (3, 3), (0, 0)])
-def test_as_many_are_at_work_as_may_be_and_as_there_is_room_for(store, tmp_path, slots, wanted):
-    executor = Scripted()
-    executor.slots = slots
-    assert Manager(ServiceSettings(data_dir=tmp_path, max_workers=7), store, executor).workers == wanted
-
-
 def test_a_worker_that_stops_although_nobody_asked_was_told_to_by_somebody_else(execute, metrics):
     stopped = Finished(finished=False, metrics=metrics, evaluation=None, digest="", versions={}, wall_s=1.0)
     run, _, manager = execute([stopped, Exited(None, Cause.ENDED, 0)], [Failed(reason="no"), Exited(None)])
@@ -105,10 +98,3 @@ def test_what_was_queued_before_it_was_refused_fails_and_holds_nobody_up(store, 
     assert (outdated.state, "learner.checkpoint_every" in outdated.reason) == ("failed", True)
     with pytest.raises(OutdatedError, match=r"learner\.checkpoint_every, which this one refuses"):
         store.campaign(before.id).spec  # noqa: B018
-
-
-def test_the_worker_is_the_one_of_the_settings_and_hears_its_folder_and_its_limits():
-    settings = ServiceSettings(worker_module="other", worker_niceness=7, grace_s=1, lease_s=2, stall_s=3, replays=2)
-    program = worker_program(settings)
-    assert program.arguments == ("-m", "other", FOLDER, "7", str(4 << 30), "2")
-    assert (program.linger_s, program.lease_s, program.stall_s, program.log) == (1, 2, 3, "worker.log")

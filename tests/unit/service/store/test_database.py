@@ -1,4 +1,3 @@
-import math
 import sqlite3
 from pathlib import Path
 
@@ -7,10 +6,9 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Grade, Outcome, State
+from risk_sac.records import Outcome
 from service.errors import StorageError
 from service.store import database
-from service.store.finding import Judged
 from service.store.reading import Store
 from service.store.tables import Base
 from service.store.writing import Ledger
@@ -27,27 +25,6 @@ def opened_from_step_0007(file):
     old.executescript(STEP_0007.read_text(encoding="utf-8"))
     old.close()
     return Store(f"sqlite:///{file}")
-
-
-def test_a_database_of_the_version_before_is_brought_up_to_date(tmp_path):
-    store = opened_from_step_0007(tmp_path / "test.db")
-    (campaign,) = store.campaigns(limit=2, label="of today").items
-    ended, running = campaign.runs
-    assert (ended.state, ended.failures, ended.distinct_failures, ended.verified) == (State.SUCCEEDED, 1, 1, 1)
-    assert (running.state, running.metrics, ended.metrics.episodes) == (State.RUNNING, None, 3)
-    episodes = store.episodes(campaign.id, limit=9).items
-    assert [each.collision is not None for each in episodes] == [False, True, True]
-    assert (episodes[0].min_ttc_s, episodes[1].collision.min_ttc_s) == (math.inf, math.inf)
-    assert (episodes[1].repetition.same, episodes[1].funnel.contacts) == (3, 1)
-    assert [each.id for each in store.episodes(campaign.id, limit=9, judged=Judged(grade=Grade.PREVENTABLE)).items] == [
-        "low-random-0-search-1"
-    ]
-    for phase in ("search", "train"):  # as ids name it now, and as links from before do
-        assert store.failure(campaign.id, f"low-random-0-{phase}-1").episode.id == "low-random-0-search-1"
-        assert store.triage(campaign.id, f"low-random-0-{phase}-1").comment == "seen"
-    assert [type(each).__name__ for each in store.events(campaign.id, limit=9).items].count("StateChange") == 4
-    assert Ledger(store).resume() == 1
-    store.close()
 
 
 def test_the_migrations_lead_to_the_tables_of_a_new_database(tmp_path, store):
@@ -123,15 +100,3 @@ def test_a_record_that_cannot_be_read_is_a_storage_error(store, ledger, episode)
         store.episodes(campaign.id, limit=1)
     with pytest.raises(StorageError, match="a row is damaged"):
         list(store.plain_episodes(campaign.number))
-
-
-def test_a_filter_by_grade_or_signature_uses_its_index(store):
-    if store.engine.dialect.name != "sqlite":
-        pytest.skip("PostgreSQL plans by the size of its tables")
-    with store.engine.connect() as connection:
-        for column in ("grade", "signature"):
-            query = (
-                f"SELECT * FROM episodes WHERE campaign_number = 1 AND {column} = 'x' AND number > 3 ORDER BY number"
-            )
-            (plan,) = connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {query}").all()
-            assert f"USING INDEX episodes_{column}s (campaign_number=? AND {column}=? AND number>?)" in plan[-1]

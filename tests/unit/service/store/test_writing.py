@@ -3,7 +3,7 @@ import pytest
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import Finished
 from risk_sac.records import Episode, Outcome, State, TriageState
-from service.errors import ConflictError, NotFoundError, TransitionError
+from service.errors import NotFoundError, TransitionError
 from service.store.finding import Judged
 from service.views.curves import curves
 from service.views.progress import progress
@@ -11,20 +11,6 @@ from service.views.totals import results
 from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
-
-
-def tallies(store, campaign):
-    run = store.campaign(campaign.id).runs[0]
-    return run.distinct_failures, run.preventable, run.distinct_preventable
-
-
-def test_a_campaign_comes_back_as_it_was_posted(store, ledger):
-    campaign = ledger.create(SPEC)
-    assert store.campaign(campaign.id) == campaign
-    assert campaign.spec == SPEC
-    assert [run.id for run in campaign.runs] == ["low-risk-sac-3", "low-random-3", "low-risk-sac-4", "low-random-4"]
-    assert [campaign.run_spec(run) for run in campaign.runs] == list(SPEC.runs())
-    assert [run.spec_digest for run in campaign.runs] == [spec.digest for spec in SPEC.runs()]
 
 
 def test_runs_leave_the_queue_in_the_order_they_came(store, ledger):
@@ -91,21 +77,6 @@ def test_an_episode_that_comes_out_otherwise_replaces_the_first(store, ledger, e
     assert (store.campaign(campaign.id).runs[0].failures, store.campaign(campaign.id).runs[0].episodes_done) == (0, 1)
 
 
-def test_a_campaign_succeeds_with_its_last_run(store, ledger, metrics):
-    campaign = ledger.create(SPEC)
-    result = Finished(
-        finished=True, metrics=metrics, evaluation=metrics, digest="abc", versions={"sumo": "1"}, wall_s=1
-    )
-    for _ in campaign.runs:
-        assert store.campaign(campaign.id).state in (State.QUEUED, State.RUNNING)
-        ledger.end_run(start(store, ledger), State.SUCCEEDED, result=result)
-    campaign = store.campaign(campaign.id)
-    assert campaign.state is State.SUCCEEDED
-    assert campaign.created_at <= campaign.started_at <= campaign.finished_at
-    assert campaign.runs[0].evaluation == metrics
-    assert (campaign.runs[0].digest, campaign.runs[0].versions) == ("abc", {"sumo": "1"})
-
-
 def test_failures_that_did_not_repeat_are_refused_with_the_end_of_their_run(store, ledger, episode, metrics):
     campaign = ledger.create(SPEC)
     first, second = start(store, ledger), start(store, ledger)
@@ -155,17 +126,6 @@ def test_what_an_i_i_d_phase_counts_is_added_to_nothing_that_searches_found(stor
     assert store.failure(found.id, "low-iid-random-0-iid-1").episode.phase == "iid"
     assert {each.phase for each in store.plain_episodes(found.number)} == {"search"}
     assert [curve.run_id for curve in curves(found, store.plain_episodes(found.number), 9).runs] == ["low-random-0"]
-
-
-def test_one_failed_run_fails_the_campaign_once_the_others_have_ended(store, ledger):
-    campaign = ledger.create(SPEC)
-    ledger.end_run(start(store, ledger), State.FAILED, "worker was killed by SIGKILL")
-    assert store.campaign(campaign.id).state is State.RUNNING
-    for _ in range(3):
-        ledger.end_run(start(store, ledger), State.SUCCEEDED)
-    campaign = store.campaign(campaign.id)
-    assert campaign.state is State.FAILED
-    assert campaign.reason == "run low-risk-sac-3: worker was killed by SIGKILL"
 
 
 def test_cancel_stops_what_runs_and_drops_what_waits(store, ledger):
@@ -225,15 +185,6 @@ def test_every_stored_change_has_another_revision(store, ledger, episode, metric
     assert store.campaign(campaign.id).revision == seen[-1]
 
 
-def test_the_same_idempotency_key_finds_the_campaign_or_conflicts(store, ledger):
-    campaign = ledger.create(SPEC, "ours", "k1")
-    assert ledger.find("ours", "k1", SPEC).id == campaign.id
-    assert ledger.find("ours", "k2", SPEC) is None
-    assert ledger.find("theirs", "k1", SPEC) is None
-    with pytest.raises(ConflictError, match="belongs to campaign"):
-        ledger.find("ours", "k1", SPEC.model_copy(update={"label": "other"}))
-
-
 def test_a_deleted_campaign_leaves_no_row(store, ledger, episode):
     campaign, kept = ledger.create(SPEC), ledger.create(SPEC)
     for _ in range(5):
@@ -247,20 +198,6 @@ def test_a_deleted_campaign_leaves_no_row(store, ledger, episode):
             column = "number" if table == "campaigns" else "campaign_number"
             numbers = connection.exec_driver_sql(f"SELECT DISTINCT {column} FROM {table}").scalars().all()
             assert numbers == [kept.number]
-
-
-def test_a_run_has_the_sums_of_what_its_phases_counted(store, ledger, episode, metrics):
-    campaign = ledger.create(SPEC)
-    number = start(store, ledger)
-    ledger.add_episodes([(number, episode(0, Outcome.FAILURE))])
-    assert tallies(store, campaign) == (1, 1, 1)
-    counted = metrics.model_copy(update={"distinct_failures": 4, "preventable": 3, "distinct_preventable": 2})
-    evaluated = episode(0, Outcome.FAILURE, phase="evaluation").model_copy(update={"metrics": counted})
-    ledger.add_episodes([(number, evaluated)])
-    assert tallies(store, campaign) == (5, 4, 3)
-    done = Finished(finished=True, metrics=counted, evaluation=counted, digest="d", versions={}, wall_s=1.0)
-    ledger.end_run(number, State.SUCCEEDED, result=done)
-    assert tallies(store, campaign) == (8, 6, 4)
 
 
 def test_a_triage_is_kept_and_moves_the_revision(store, ledger, episode):

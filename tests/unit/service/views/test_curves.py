@@ -9,7 +9,7 @@ from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec
 from risk_sac.metrics import MetricsAccumulator
-from risk_sac.records import DrivenBy, Grade, Outcome, stored, wire
+from risk_sac.records import Grade, Outcome, stored, wire
 from service.store.stored import PlainEpisode
 from service.views.curves import curves, spread
 from tests.builders import collision, episode_record, judgement, violation
@@ -58,19 +58,6 @@ def test_curves_are_what_the_metrics_of_the_run_were_at_each_point(ledger):
     assert [value for _, value in empty if isinstance(value, list)] == [[]] * 8
 
 
-def test_what_drove_is_counted_up_to_each_point_and_is_unknown_of_older_records(ledger):
-    campaign = ledger.create(SPEC)
-    drove = [DrivenBy.RANDOM, DrivenBy.SCRIPT, DrivenBy.SCRIPT, None, DrivenBy.POLICY, DrivenBy.SCRIPT]
-    records = [episode_record(index, driven_by=each) for index, each in enumerate(drove)]
-    found, empty = curves(campaign, [plain(campaign.runs[0], each) for each in records], 3).runs
-    assert found.episodes == [2, 4, 6]
-    assert found.driven_by == {"policy": [0, 0, 1], "script": [1, 2, 3], "random": [1, 1, 1]}
-    assert empty.driven_by == {}
-    older = plain(campaign.runs[0], episode_record(0))
-    del older.record["driven_by"]
-    assert curves(campaign, [older], 3).runs[0].driven_by == {}
-
-
 def test_mean_cost_is_that_of_the_steps_since_the_point_before(ledger):
     campaign = ledger.create(SPEC)
     costs = [(0.5, 100), (0.25, 300), (0.75, 0), (math.nan, 0), (0.125, 10), (0.125, 10)]
@@ -80,19 +67,6 @@ def test_mean_cost_is_that_of_the_steps_since_the_point_before(ledger):
     ]
     body = wire(curves(campaign, [plain(campaign.runs[1], each) for each in records], 3))
     assert json.loads(body)["runs"][1]["mean_cost"] == [pytest.approx((50 + 75) / 400), None, pytest.approx(0.125)]
-
-
-def test_an_evaluation_is_no_part_of_the_search(ledger):
-    campaign = ledger.create(SPEC)
-    records = [episode_record(0), episode_record(1, phase="evaluation")]
-    found, _ = curves(campaign, [plain(campaign.runs[0], each) for each in records], 9).runs
-    assert found.episodes == [1]
-
-
-def test_lambda_that_is_not_finite_is_null(ledger):
-    campaign = ledger.create(SPEC)
-    body = wire(curves(campaign, [plain(campaign.runs[0], episode_record(0, dual_variable=math.inf))], 9))
-    assert json.loads(body)["runs"][0]["dual_variable"] == [None]
 
 
 @given(count=st.integers(1, 3000), points=st.integers(1, 1000))

@@ -12,20 +12,6 @@ def log(tmp_path: Path) -> Path:
     return tmp_path / "worker.log"
 
 
-def test_a_run_that_has_printed_nothing_has_no_lines(log: Path) -> None:
-    assert log_tail(log, 5) == ""
-    log.touch()
-    assert log_tail(log, 5) == ""
-
-
-@pytest.mark.parametrize("end", ["", "\n"])
-def test_the_last_lines_are_told_whether_or_not_the_last_one_is_complete(log: Path, end: str) -> None:
-    log.write_text("one\ntwo\n\nthree" + end)
-    assert log_tail(log, 1) == "three\n"
-    assert log_tail(log, 2) == "\nthree\n"
-    assert log_tail(log, 1000) == "one\ntwo\n\nthree\n"
-
-
 def test_folders_of_the_server_are_left_out(log: Path) -> None:
     log.write_text(f'File "{log.parent}/a.json" of {log.parent}\n  File "/opt/venv/lib/torch/nn.py", line 3\n')
     assert log_tail(log, 9) == f'File "a.json" of {log.parent.name}\n  File "nn.py", line 3\n'

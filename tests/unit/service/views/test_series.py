@@ -1,16 +1,9 @@
-import json
-import math
-
 import numpy as np
 import pytest
 
-from risk_sac.failures.question import TwinPlay, twin_bytes
-from risk_sac.records import wire
 from risk_sac.run_folder.series import write_series
 from service.errors import StorageError
-from service.views.pictures import twin_body
 from service.views.series import load_series
-from tests.builders import collision, judgement
 from tests.contract.recorded_campaigns import series_arrays
 
 
@@ -24,30 +17,6 @@ def test_a_series_is_plain_and_null_where_an_actor_is_absent(tmp_path):
     assert series.signal == ["none", "red", "green"]
     assert series.robustness == [[1.0], [None], [-1.0]]
     assert len(series.actions[0]) == 4
-
-
-def test_a_series_without_the_release_is_a_storage_error(tmp_path):
-    write_series(tmp_path / "a.npz", {name: each for name, each in series_arrays().items() if name != "released_s"})
-    with pytest.raises(StorageError, match=r"'a.npz' is damaged: .*released_s"):
-        load_series(tmp_path / "a.npz", None)
-
-
-@pytest.mark.parametrize(
-    "link",
-    [
-        np.array([[ord("G"), 0], [ord("g"), 0], [ord("r"), 0]], dtype=np.uint8),
-        np.array([[ord("G"), np.nan], [ord("g"), np.nan], [ord("r"), 0]]),
-        np.array([["G", ""], ["g", ""], ["r", ""]]),
-    ],
-)
-def test_a_series_says_when_the_release_was_and_which_signal_lies_ahead(tmp_path, link):
-    rows = np.array([[0.1, np.nan], [0.2, 0.0], [0.3, 0.0]])
-    written = series_arrays() | {"released_s": np.array(1.5), "lane_offset_m": rows, "link": link}
-    write_series(tmp_path / "a.npz", written)
-    series = load_series(tmp_path / "a.npz", None)
-    assert series.released_s == 1.5
-    assert series.lane_offset_m == [[0.1, None], [0.2, 0.0], [0.3, 0.0]]
-    assert series.link == [["G", None], ["g", None], ["r", None]]
 
 
 def test_a_lost_or_damaged_series_is_a_storage_error_not_a_crash(tmp_path):
@@ -77,21 +46,3 @@ def test_a_series_that_is_not_the_one_that_was_written_is_never_shown(tmp_path):
     write_series(path, series_arrays() | {"soft_min": np.ones(3)})  # undamaged, and another
     with pytest.raises(StorageError, match="damaged"):
         load_series(path, sha256)
-
-
-def test_a_twin_is_told_with_its_series_and_its_contact_and_null_where_a_number_is_not_finite():
-    speeds = {"ego_speed_mps": 12.3, "relative_speed_mps": 1.34}
-    hit = collision(other_id="lead", **speeds, min_ttc_s=math.inf, judgement=judgement())
-    body = json.loads(wire(twin_body("idle", twin_bytes(TwinPlay.of(None, hit, [hit]), series_arrays()))))
-    assert (body["twin"], body["outcome"]) == ("idle", "touches lead at a closing speed of 1.3 m/s")
-    assert body["collision"]["early_min_ttc_s"] is None
-    assert body["collision"]["judgement"]["signature"] == hit.judgement.signature
-    assert body["series"]["x_m"] == [[0.0, 1.0], [2.0, None], [4.0, 5.0]]
-    assert body["series"]["robustness"] == [[1.0], [None], [-1.0]]
-
-
-def test_what_is_not_told_of_a_series_is_left_out():
-    series = series_arrays() | {"least_ttc_s": series_arrays()["soft_min"]}
-    body = twin_body("careful", twin_bytes(TwinPlay.of(None, collision(), []), series))
-    assert (body.outcome, body.collision) == ("no contact", None)
-    assert "least_ttc_s" not in body.series.model_dump()

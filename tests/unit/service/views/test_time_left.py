@@ -41,12 +41,6 @@ def test_eta_is_work_left_at_each_runs_own_pace(done, workers, wanted):
     assert eta_s([after_start(*each) for each in done], SPEC, workers) == pytest.approx(wanted)
 
 
-def test_a_run_that_waits_takes_the_pace_of_the_others_and_a_start():
-    assert eta_s([after_start(19, 38.0), changed(RUN, attempts=0)], SPEC, workers=1) == pytest.approx(
-        160.0 + 200.0 + 3.0
-    )
-
-
 def test_a_slower_method_that_waits_is_expected_to_be_slower():
     spec = CampaignSpec(families=("low",), methods=("random", "risk-sac"))
     waiting = [changed(RUN, attempts=0, method=method) for method in ("random", "risk-sac")]
@@ -98,9 +92,3 @@ def test_a_look_pays_after_a_twentieth_of_the_time_left(ledger, done, busy_s, wa
     campaign = ledger.create(SPEC)
     runs = (after_start(done, busy_s),)
     assert retry_after_s(changed(campaign, state=State.RUNNING, runs=runs), workers=1) == wanted
-
-
-@pytest.mark.parametrize("state", [State.SUCCEEDED, State.FAILED, State.CANCELLED])
-def test_no_look_pays_at_what_has_ended(ledger, state):
-    campaign = ledger.create(CampaignSpec(families=("low",)))
-    assert retry_after_s(changed(campaign, state=state), workers=1) is None

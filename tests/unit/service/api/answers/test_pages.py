@@ -18,11 +18,6 @@ def test_a_cursor_leads_back_to_its_number(number: int, project: str | None) -> 
     assert CURSORS.encode(number, "campaigns", project) == cursor
 
 
-def test_no_cursor_is_none() -> None:
-    assert CURSORS.encode(None, "campaigns", "maps") is None
-    assert CURSORS.decode(None, "campaigns", "maps") is None
-
-
 def test_cursors_of_neighbours_have_nothing_in_common() -> None:
     contents = [base64.urlsafe_b64decode(CURSORS.encode(number, "campaigns", "maps") or "") for number in range(1000)]
     for at in range(len(contents[0])):
