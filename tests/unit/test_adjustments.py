@@ -3,8 +3,7 @@
 import pytest
 
 from risk_sac.adjustments import adjustments
-from risk_sac.config import CampaignSpec, Requirement
-from risk_sac.problem import checked_campaign
+from risk_sac.config import CampaignSpec
 
 
 def said(families: tuple[str, ...] = ("low", "mixed", "dense"), ego: object = None, **odd: object) -> list[str]:
@@ -51,11 +50,3 @@ def test_nothing_is_said_of_an_odd_that_is_used_as_it_is() -> None:
 )
 def test_what_is_clipped_is_said(families: tuple[str, ...], odd: dict[str, object], words: str) -> None:
     assert words in said(families, **odd)
-
-
-def test_a_shipped_requirement_that_a_family_lacks_is_said_and_counts_where_there_is_one() -> None:
-    spec = CampaignSpec(families=("low", "mixed"), requirements=(Requirement(name="pedestrian_gap"),))
-    checked_campaign(spec)
-    (adjustment,) = adjustments(spec)
-    assert (adjustment.families, adjustment.field, adjustment.used) == (("low",), "requirements[0]", "nothing")
-    assert "pedestrian_gap" in adjustment.why

@@ -97,11 +97,6 @@ def test_bodies_touch_at_contact_and_not_a_millimetre_before(heading: float) -> 
     assert not rear_end(0.001)
 
 
-def test_gap_of_aligned_bodies_is_the_hand_computed_distance() -> None:
-    view = view_of([(0, 0, 0, 4, 2), (10, 0, 0, 4, 2), (0, 5, 0, 4, 2), (7, 6, 0, 4, 2), (7, 6, math.pi / 2, 2, 4)])
-    assert view.gap.tolist() == pytest.approx([6.0, 3.0, 5.0, 5.0])  # ahead, alongside, 3-4-5 diagonal, turned
-
-
 @pytest.mark.parametrize("spread_m", [9.0, 25.0])
 def test_gap_is_the_distance_that_shapely_measures(spread_m: float) -> None:
     generator = np.random.default_rng(1)
@@ -219,15 +214,6 @@ def test_line_of_sight_agrees_with_shapely_rays() -> None:
         compared, hidden = compared + int(sure.sum()), hidden + int((~seen[sure]).sum())
     assert compared > 600
     assert hidden > 60
-
-
-def test_a_pedestrian_behind_a_car_is_hidden_until_it_steps_out() -> None:
-    car = (20.0, -3.3, 0.0, 4.6, 1.85)
-    occludes = np.array([True, False])
-    hidden = view_of([(0, 0, 0, 4.6, 1.85), car, (26.0, -4.3, 0, 0.5, 0.5)])
-    out = view_of([(0, 0, 0, 4.6, 1.85), car, (26.0, -1.5, 0, 0.5, 0.5)])
-    assert line_of_sight(hidden, occludes).tolist() == [True, False]
-    assert line_of_sight(out, occludes).tolist() == [True, True]
 
 
 def test_the_view_does_not_depend_on_where_the_world_has_its_origin() -> None:

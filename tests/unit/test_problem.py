@@ -24,28 +24,6 @@ def wanted_ttc_s(posed: Problem) -> float:
     return float(safe.formula.rpartition(" ")[2])
 
 
-def bounds(posed: Problem, name: str) -> tuple[float, float]:
-    [parameter] = [p for p in posed.space.parameters if p.name == name]
-    return parameter.low, parameter.high
-
-
-def test_a_users_odd_narrows_the_scene_space_and_the_requirements() -> None:
-    odd = Odd(
-        environment=Environment(friction=Interval(low=0.6, high=0.7), visibility_m=Interval(low=40, high=500)),
-        dynamic=DynamicElements(ego_speed_mps=Interval(low=8, high=10)),
-    )
-    posed = problem(odd=odd)
-    assert bounds(posed, "ego_speed_mps") == (8, 10)
-    assert bounds(posed, "friction") == (0.6, 0.7)
-    assert bounds(posed, "visibility_m") == (40, 500)
-
-
-def test_day_and_night_together_are_a_parameter_and_one_of_them_is_none() -> None:
-    both = problem(odd=Odd(environment=Environment(time_of_day=("day", "night"))))
-    assert bounds(both, "night") == (0, 1)
-    assert "night" not in problem(odd=Odd(environment=Environment(time_of_day=("night",)))).space.names
-
-
 @pytest.mark.parametrize(
     ("family", "odd", "field"),
     [

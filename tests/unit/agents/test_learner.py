@@ -108,11 +108,6 @@ def test_updates_keep_the_pace_that_is_asked_for(pace: float, expected: int, ran
         assert abs(sum(at <= step for at in updates) - pace * step) < 1
 
 
-def test_updates_that_the_warm_up_left_undone_are_made_up_for_one_a_step(random_transition: Make) -> None:
-    # At step 41 ten are due. One is paid in each step, until at step 53 thirteen are due and thirteen paid.
-    assert steps_of_updates(0.25, 41, 80, random_transition) == [*range(41, 54), *range(56, 81, 4)]
-
-
 def test_updates_keep_pace_with_own_steps_and_with_those_that_came_before_them(random_transition: Make) -> None:
     subject, updates = learner(), []
     subject._update_once = lambda: updates.append(1)  # type: ignore[method-assign]
@@ -147,19 +142,6 @@ def test_the_policy_decides_every_few_steps_and_its_memory_holds_decisions(rando
         assert [actions.index(each) for each in actions] == [0] * 4 + [4] * 4 + [8] * 2
     assert len(subject._replay) == 2 * 2
     assert subject._config.agent.discount == pytest.approx(0.98**4)
-
-
-@pytest.mark.parametrize("method", LEARNING)
-def test_dual_variable_rises_with_cost_only_where_the_method_constrains_it(
-    method: MethodName, transition: Make
-) -> None:
-    subject = learner(method)
-    for _ in range(CONFIG.agent.warmup_steps):
-        subject.observe(transition(cost=0.6))
-    assert subject.dual_variable == 0.0
-    subject.observe(transition(cost=0.6))
-    # λ = 0 + 0.01 (0.6 - 0.1)
-    assert subject.dual_variable == pytest.approx(0.005 if METHODS[method].lagrangian else 0.0)
 
 
 def test_a_batch_is_learnt_from_with_the_dual_variable_of_the_moment(

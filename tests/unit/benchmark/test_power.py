@@ -29,19 +29,6 @@ def test_the_power_of_a_budget_is_what_was_detected_within_it() -> None:
     assert (found.expected, found.in_most_seeds, found.never) == (0.5, (), ("speeds",))
 
 
-def test_several_seeds_detect_what_one_of_them_does() -> None:
-    assert method_power("archive", {"low": (9000, 2)}, RUNS).expected == 1.0
-    assert method_power("archive", {"low": (9000, 9)}, RUNS).expected == 1.0  # no more than was measured
-
-
-def test_beyond_what_was_measured_a_budget_detects_at_least_as_much() -> None:
-    found = method_power("archive", {"low": (20_001, 1)}, RUNS)
-    assert found.at_least
-    assert found.sentences[0].startswith(
-        "Of 1 known defects that it was measured with in low, this budget detects at least 0.5 on"
-    )
-
-
 def test_steps_of_a_campaign_are_those_of_its_own_episodes_once_there_are_some() -> None:
     spec = CampaignSpec(families=("low",), methods=("archive",), seeds=(0, 1), budget=Budget(episodes=2))
     (before,) = power_of(spec, [], RUNS).methods[0].budgets
@@ -56,21 +43,6 @@ def test_steps_of_a_campaign_are_those_of_its_own_episodes_once_there_are_some()
     ended = [Played("low", "archive", 1, 150, ended=True), Played("low", "archive", 0, 0, ended=True)]
     (found,) = power_of(spec, ended, RUNS).methods  # a campaign that was cancelled is worth what it has played
     assert (found.budgets[0].steps, found.expected) == (75, 0.0)
-
-
-def test_methods_are_compared_by_what_all_of_them_were_measured_with() -> None:
-    runs = RUNS + runs_of(TEXT.replace(",random,0,5000,5000,50,,", ",random,1,5000,200,2,200,"))[4:]
-    spec = CampaignSpec(families=("low", "mixed"), methods=("archive", "random"), budget=Budget(episodes=300))
-    found = power_of(spec, [], runs)
-    assert [len(each.defects) for each in found.methods] == [2, 1], "with different defects"
-    assert found.comparison.startswith(
-        "On equal terms: all of these methods were measured with 1 known defects, "
-        "within 5,000 environment steps in low. Of these they detect on average: archive 0.5, random 0.5. "
-    )
-    assert found.lines[0] == found.comparison
-    assert power_of(spec.model_copy(update={"methods": ("archive", "sac")}), [], runs).comparison == ""
-    apart = [run for run in runs if (run.family == "mixed") is (run.method == "archive")]
-    assert power_of(spec, [], apart).comparison.startswith("No known defect was measured with all of these methods")
 
 
 def test_the_command_tells_the_power_of_flags_and_of_the_folder_of_a_run(tmp_path, capsys, metrics) -> None:

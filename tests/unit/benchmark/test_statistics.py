@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from risk_sac.benchmark.detection import ANSWER, Detection, answer_of, first_detection
-from risk_sac.benchmark.statistics import balanced, friedman, log_rank, restricted_means, summaries, survival
+from risk_sac.benchmark.statistics import friedman, log_rank, summaries, survival
 from risk_sac.config import RunMethod, RunSpec
 from risk_sac.config.spec_file import read_ego
 
@@ -76,14 +76,6 @@ def test_an_early_detection_counts_for_a_larger_budget_once_it_is_called_with_it
     assert first_detection(spec, tmp_path, 2 * BUDGET) == early.within(2 * BUDGET)  # plays nothing
     assert answer_of(tmp_path, 2 * BUDGET) == early.within(2 * BUDGET)
     assert answer_of(tmp_path, BUDGET) == early
-
-
-def test_methods_are_compared_on_what_each_has_played() -> None:
-    more = [*FOUND, *runs("archive", "short-gap", 1, 2)]
-    assert balanced(more) == FOUND
-    methods, means = restricted_means(FOUND)
-    assert methods == ["archive", "random"]
-    assert means.tolist() == [[200.0, (500 + 1000 + 700) / 3], [800.0, 1000.0]]
 
 
 def test_ranks_that_never_differ_are_no_coincidence() -> None:

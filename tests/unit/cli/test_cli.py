@@ -1,8 +1,4 @@
-import argparse
-import os
 import re
-import signal
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +8,7 @@ from rich.console import Console
 from risk_sac import cli
 from risk_sac.cli.show import _table
 from risk_sac.execution.runs import run
-from risk_sac.records import ConflictType, Fault, Grade, RunMetrics, Severity
+from risk_sac.records import ConflictType, Fault, Grade, Severity
 from risk_sac.run_folder.results import RecordedFailure, Results, read_results, write_results
 from tests.builders import judgement
 from tests.unit.cli.conftest import SPEC, ignore
@@ -97,23 +93,6 @@ def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path, capsys: pyt
     assert re.fullmatch(r"--out: got .*/file/out, which cannot be written \(Not a directory\); wanted .*\n", complaint)
 
 
-def test_interrupt_ends_the_run_after_its_episode_and_it_goes_on(tmp_path: Path) -> None:
-    whole = run(SPEC, tmp_path / "whole", ignore)
-
-    def interrupt(done: int, metrics: RunMetrics | None) -> None:
-        if done == 2:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    stopped = run(SPEC, tmp_path / "parts", interrupt)
-    assert (stopped.finished, stopped.metrics and stopped.metrics.episodes) == (False, 2)
-    resumed = run(SPEC, tmp_path / "parts", ignore)
-    assert untimed(resumed) == untimed(whole)
-    assert resumed.cpu_s > stopped.cpu_s > 0
-    assert resumed.wall_s > stopped.wall_s
-    parts, at_once = ((tmp_path / name / "episodes.jsonl").read_bytes() for name in ("parts", "whole"))
-    assert parts == at_once
-
-
 def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path: Path) -> None:
     whole = run(SPEC, tmp_path, ignore)
     (tmp_path / "checkpoint").unlink()  # as if killed before the first one
@@ -124,28 +103,3 @@ def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path: Path) -> None:
     again = run(SPEC, tmp_path, ignore)
     assert untimed(again) == untimed(whole)
     assert len((tmp_path / "episodes.jsonl").read_text().splitlines()) == 3
-
-
-def test_serve_becomes_the_service_with_its_settings(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls: list[tuple[str, list[str], dict[str, str]]] = []
-    monkeypatch.setattr(os, "execve", lambda *call: calls.append(call))
-    monkeypatch.setenv("RISK_SAC_GRACE_S", "5")
-    cli.main(["serve", "--host", "0.0.0.0", "--port", "8001", "--runs", "/runs"])
-    ((program, arguments, environment),) = calls
-    assert (program, arguments) == (sys.executable, [sys.executable, "-m", "service"])
-    assert (environment["RISK_SAC_HOST"], environment["RISK_SAC_PORT"]) == ("0.0.0.0", "8001")
-    assert environment["RISK_SAC_GRACE_S"] == "5"
-    assert environment["MALLOC_ARENA_MAX"] == "2"
-    assert environment["RISK_SAC_RUNS"] == "/runs"
-    assert "RISK_SAC_DATA_DIR" not in environment
-
-
-def test_a_command_takes_all_paths_from_where_it_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("RISK_SAC_PLACES", "places")
-    monkeypatch.delenv("RISK_SAC_EGOS", raising=False)
-    options = argparse.Namespace(out=Path("run"), runs=[Path("a"), Path("/b")], name="run", seed=3)
-    cli._make_absolute(options)
-    assert vars(options) == {"out": tmp_path / "run", "runs": [tmp_path / "a", Path("/b")], "name": "run", "seed": 3}
-    assert os.environ["RISK_SAC_PLACES"] == str(tmp_path / "places")
-    assert "RISK_SAC_EGOS" not in os.environ

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from risk_sac.cli.campaigns.gate import Bounds, named_rate, verdict
+from risk_sac.cli.campaigns.gate import Bounds, verdict
 from risk_sac.client import Results, RunResult
 from risk_sac.errors import ConfigError
 from tests.builders import run_metrics
@@ -88,28 +88,6 @@ def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above() ->
     assert verdict(results("succeeded", FEW), Bounds(ecr=0.14))[0] == 0
 
 
-def test_the_rate_alone_is_judged_where_that_is_asked_for() -> None:
-    assert verdict(results("succeeded", FEW), by_rate(ecr=0.1)) == (
-        0,
-        "ECR within 0.1: low sac 0.050 (3 valid contacts in 60 episodes)",
-    )
-    assert verdict(results("succeeded", {"ecr": 0.1, "ecr_high": 0.9}), by_rate(ecr=0.1))[0] == 0
-    assert verdict(results("succeeded", {"ecr": 0.11, "ecr_low": 0.0}), by_rate(ecr=0.1))[0] == 1
-
-
-def test_the_rate_of_a_requirement_is_judged_by_its_interval_or_by_itself() -> None:
-    found = results("succeeded", {"episodes": 60, "requirements": requirements(never_fast=(0.2, 0.32))})
-    assert verdict(found, Bounds(requirements={"never_fast": 0.25})) == (
-        1,
-        "never_fast may be above 0.25: low sac 0.200, 95 % interval up to 0.320 (12 valid violations in 60 episodes)"
-        + HINT,
-    )
-    assert verdict(found, Bounds(requirements={"never_fast": 0.32}))[0] == 0
-    assert verdict(found, by_rate(requirements={"never_fast": 0.2}))[0] == 0
-    status, reason = verdict(found, by_rate(requirements={"never_fast": 0.1}))
-    assert (status, reason) == (1, "never_fast above 0.1: low sac 0.200 (12 valid violations in 60 episodes)")
-
-
 def test_the_rate_of_a_requirement_is_judged_in_the_i_i_d_phase_too() -> None:
     metrics = run_metrics(40, requirements=requirements(never_fast=(0.3, 0.45)))
     drawn = RunResult(
@@ -122,22 +100,6 @@ def test_the_rate_of_a_requirement_is_judged_in_the_i_i_d_phase_too() -> None:
     status, reason = verdict(found, by_rate(requirements={"never_fast": 0.1}))
     assert status == 1
     assert "never_fast above 0.1: low iid-random 0.300 (12 valid violations in 40 episodes)" in reason
-
-
-def test_a_bound_of_no_requirement_names_those_there_are() -> None:
-    found = results("succeeded", {"requirements": requirements(no_contact=(0.1, 0.2), never_fast=(0.0, 0.1))})
-    with pytest.raises(ConfigError) as error:
-        verdict(found, Bounds(requirements={"never_slow": 0.5}))
-    assert str(error.value) == "--max-rate: got the requirement 'never_slow'; wanted one of no_contact, never_fast"
-    with pytest.raises(ConfigError, match="wanted one of those of a campaign whose requirements were counted"):
-        verdict(results("succeeded", {}), Bounds(requirements={"no_contact": 0.5}))
-
-
-@pytest.mark.parametrize("text", ["0.1", "no_contact", "no_contact=", "no_contact=x", "no_contact=2", "=0.1", "a=nan"])
-def test_a_rate_is_a_name_and_a_number_from_0_to_1(text: str) -> None:
-    assert named_rate("no_contact=0.1") == ("no_contact", 0.1)
-    with pytest.raises(argparse.ArgumentTypeError, match="wanted a requirement's name and a rate from 0 to 1"):
-        named_rate(text)
 
 
 @pytest.mark.parametrize(
@@ -184,9 +146,3 @@ def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_fou
 @pytest.mark.parametrize("state", ["failed", "cancelled"])
 def test_a_campaign_that_was_not_measured_to_the_end_could_not_run(state: str, bounds: Bounds) -> None:
     assert verdict(results(state, {"ecr": 0.9}), bounds)[0] == 2
-
-
-def test_a_campaign_that_goes_on_cannot_be_judged_yet() -> None:
-    assert verdict(results("running", {"ecr": 0.0}), Bounds(ecr=0.5))[0] == 2
-    assert verdict(results("running", {"ecr": 0.0}), Bounds(pcr=0.5))[0] == 2
-    assert verdict(results("running", {"ecr": 0.0}), Bounds())[0] == 0

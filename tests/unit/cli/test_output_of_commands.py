@@ -1,7 +1,6 @@
 """What the commands print: it fits 80 columns, and with --json it is one document."""
 
 import json
-import os
 from pathlib import Path
 
 import pytest
@@ -62,19 +61,3 @@ def test_filters_leave_what_they_say(folder: Path, capsys: pytest.CaptureFixture
     assert speeds == sorted(speeds, reverse=True)
     assert len(shown("--raw", "--limit", "1")) == 1
     assert len(shown("--distinct")) <= len(valid)
-
-
-def test_show_with_a_number_alone_draws_that_failure_of_the_newest_run(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(folder.parent)
-    os.utime(folder / "results.json")
-    failure = read_results(folder).failures[0]
-    index = failure.episode.index
-    for name in (f"{index}", f"search-{index}", failure.id):
-        picture = tmp_path / f"{name}.png"
-        assert cli.main(["show", name, "--out", str(picture)]) == 0
-        assert picture.exists()
-    assert f"Newest run: {folder}" in capsys.readouterr().err
-    assert cli.main(["show", "99999"]) == 2
-    assert "FAILURE: got" in capsys.readouterr().err

@@ -92,9 +92,3 @@ def test_a_wrong_word_is_named_as_typed_beside_what_is_close(
         status = ended.code  # type: ignore[assignment]
     assert status == 2
     assert said in capsys.readouterr().err
-
-
-def test_a_flag_may_be_shortened_and_words_after_two_dashes_are_no_flags() -> None:
-    options, unknown = cli._parser().parse_known_args(["run", "--fam", "low", "--out", "x"])
-    assert (options.family, unknown) == ("low", [])
-    assert cli._parser().parse_known_args(["show", "--", "--results"])[0].results.name == "--results"

@@ -62,12 +62,6 @@ def test_letters_that_a_terminal_lacks_are_written_in_ascii(monkeypatch: pytest.
     assert written.getvalue() == b"contacts 3 -> valid 2 ... lambda <= 1, Stra?e ?"
 
 
-def test_a_stream_that_foreign_code_has_closed_costs_the_output_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO()))
-    sys.stdout.close()
-    assert cli.main(["egos", "list"]) == 1
-
-
 @pytest.mark.parametrize(
     ("end", "status", "said"),
     [

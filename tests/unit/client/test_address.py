@@ -1,9 +1,6 @@
-from pathlib import Path
-
 import pytest
 
 from risk_sac.client import Client
-from risk_sac.client.address import api_key
 from risk_sac.errors import ConfigError
 from tests.unit.client.scripted_server import Server, campaign
 
@@ -28,15 +25,6 @@ def test_a_key_that_no_header_can_hold_is_refused_and_not_shown(key: str) -> Non
     with pytest.raises(ConfigError) as caught:
         Client(key=key)
     assert not key or key not in str(caught.value)
-
-
-def test_the_key_comes_from_the_environment_or_from_a_file(tmp_path: Path) -> None:
-    file = tmp_path / "key"
-    file.write_text("from-file\n")
-    assert api_key({}) is None
-    assert api_key({"RISK_SAC_API_KEY": "", "RISK_SAC_API_KEY_FILE": ""}) is None
-    assert api_key({"RISK_SAC_API_KEY_FILE": str(file)}) == "from-file"
-    assert api_key({"RISK_SAC_API_KEY": "direct", "RISK_SAC_API_KEY_FILE": str(file)}) == "direct"
 
 
 PROXIES = ("http_proxy", "https_proxy", "all_proxy", "no_proxy")

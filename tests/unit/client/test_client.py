@@ -1,26 +1,10 @@
 import itertools
-import json
 import subprocess
 import sys
 from typing import Any
 
 from risk_sac.client import Client
-from risk_sac.config import Budget, CampaignSpec
 from tests.unit.client.scripted_server import Server, campaign
-
-
-def test_fields_that_the_client_does_not_know_do_no_harm(server: Server, client: Client) -> None:
-    server.answer(200, campaign(invented={"later": 1}, spec={"families": ["low"], "invented": 2}))
-    found = client.campaign("c1")
-    assert found.model_extra == {"invented": {"later": 1}}
-    assert found.spec.families == ("low",)
-
-
-def test_only_what_a_spec_was_given_is_sent(server: Server, client: Client) -> None:
-    server.answer(202, campaign("queued"))
-    client.submit(CampaignSpec(families=("low",), budget=Budget(episodes=3)))
-    assert json.loads(server.asked[0].body) == {"families": ["low"], "budget": {"episodes": 3}}
-    assert server.asked[0].headers["content-type"] == "application/json"
 
 
 def test_lists_are_read_page_by_page_as_far_as_they_are_wanted(server: Server, client: Client) -> None:
@@ -52,14 +36,6 @@ def test_the_key_is_sent_with_every_request_and_shown_nowhere(server: Server) ->
         client.campaign("c1")
         assert "rs_secret" not in repr(client) + str(vars(client))
     assert server.asked[0].headers["authorization"] == "Bearer rs_secret"
-
-
-def test_a_service_below_a_path_is_reached_there(server: Server) -> None:
-    server.answer(200, campaign())
-    with Client(f"{server.url}/risk-sac/") as client:
-        client.campaign("c1")
-        assert client.url_of("c1") == f"{server.url}/risk-sac/v1/campaigns/c1"
-    assert server.asked[0].path == "/risk-sac/v1/campaigns/c1"
 
 
 def test_a_client_needs_neither_the_method_nor_the_service() -> None:

@@ -1,5 +1,4 @@
 import socket
-import threading
 import time
 
 import pytest
@@ -38,14 +37,6 @@ def test_what_may_pass_is_asked_again(status: int, server: Server, client: Clien
     assert len(server.asked) == 2
 
 
-def test_retry_after_is_waited_for(server: Server, client: Client) -> None:
-    server.answer(503, PROBLEM | {"status": 503}, Retry_After="1")
-    server.answer(200, campaign())
-    client.campaign("c1")
-    first, second = server.asked
-    assert second.at - first.at >= 1
-
-
 def test_retry_after_beyond_all_patience_is_an_error_at_once(server: Server, client: Client) -> None:
     server.answer(429, PROBLEM | {"status": 429, "reason": "quota_exceeded"}, Retry_After="3600")
     with pytest.raises(Refused) as caught:
@@ -71,24 +62,6 @@ def test_nobody_there_is_an_error_that_names_the_url() -> None:
         pytest.raises(Unreachable, match=f"^http://127.0.0.1:{port} does not answer: .*refused"),
     ):
         client.campaign("c1")
-
-
-def test_a_service_that_comes_up_late_is_waited_for() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as probe:
-        port = probe.getsockname()[1]
-    servers: list[Server] = []
-
-    def start() -> None:
-        servers.append(Server(port))
-        servers[0].answer(200, campaign())
-
-    timer = threading.Timer(0.5, start)
-    timer.start()
-    with Client(f"http://127.0.0.1:{port}") as client:
-        assert client.campaign("c1").id == "c1"
-    timer.join()
-    servers[0].shutdown()
-    servers[0].server_close()
 
 
 def test_a_lost_answer_is_asked_for_again_under_the_same_key(server: Server, client: Client) -> None:

@@ -37,12 +37,6 @@ def test_flags_pick_one_run_of_a_campaign(tmp_path: Path) -> None:
     assert (picked.family, picked.method, picked.seed) == ("mixed", "sac", 2)
 
 
-def test_flags_change_what_the_runs_of_a_campaign_share(tmp_path: Path) -> None:
-    file = yaml_file(tmp_path, "families: [low]\nmethods: [random]\nseeds: [1]\n")
-    spec = read_spec(file, FLAGS | {"prior": "none", "ego": {"profile": "careful"}})
-    assert (spec.prior, spec.ego.profile) == ("none", "careful")
-
-
 @pytest.mark.parametrize(
     ("text", "field", "message"),
     [
@@ -73,24 +67,8 @@ def test_wrong_file_names_the_field(tmp_path: Path, text: str, field: str, messa
     assert message in str(raised.value)
 
 
-def test_all_that_is_wrong_is_told_and_unknown_names_come_first(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError) as raised:
-        read_spec(yaml_file(tmp_path, "seed: x\nbuget: {episodes: 5}\nmetod: sac\n"), FLAGS)
-    assert [each.field for each in (raised.value, *raised.value.others)] == ["buget", "metod", "family", "seed"]
-    with pytest.raises(ConfigError) as raised:
-        read_campaign(yaml_file(tmp_path, "seeds: [-1]\nlabl: x\n"), CAMPAIGN_FLAGS, DEFAULTS)
-    assert [each.field for each in (raised.value, *raised.value.others)] == ["labl", "seeds[0]"]
-
-
 CAMPAIGN_FLAGS: dict[str, Any] = dict.fromkeys(("families", "methods", "seeds", "episodes", "evaluation_episodes"))
 DEFAULTS: dict[str, Any] = {"families": ["low"], "methods": ["sac"], "seeds": [0, 1]}
-
-
-def test_campaign_takes_flags_before_file_before_defaults(tmp_path: Path) -> None:
-    file = yaml_file(tmp_path, "methods: [random]\nseeds: [7]\nbudget: {episodes: 9, evaluation_episodes: 2}\n")
-    spec = read_campaign(file, CAMPAIGN_FLAGS | {"seeds": [3], "episodes": 4}, DEFAULTS)
-    assert (spec.families, spec.methods, spec.seeds) == (("low",), ("random",), (3,))
-    assert (spec.budget.episodes, spec.budget.evaluation_episodes) == (4, 2)
 
 
 def test_campaign_written_as_yaml_is_the_same_campaign(tmp_path: Path) -> None:

@@ -19,11 +19,6 @@ def drive(motion: Motion, accel: float, steering: float, steps: int, vehicle: Ve
     return found
 
 
-def test_straight_on_it_gains_speed_and_way_by_the_textbook():
-    (*_, end) = drive(Motion(0.0, 0.0, 0.0, 10.0), 2.0, 0.0, 10)
-    assert (end.x_m, end.y_m, end.speed_mps) == pytest.approx((11.0, 0.0, 12.0))
-
-
 @pytest.mark.parametrize("steering", [0.1, -0.1])
 def test_it_comes_back_to_where_it_began_on_a_circle_of_the_steering_s_radius(steering):
     curvature = 2 * math.sin(math.atan(math.tan(steering) / 2)) / CAR.wheelbase_m

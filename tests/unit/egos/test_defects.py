@@ -16,8 +16,7 @@ from risk_sac.egos.defects.catalogue import DEFECTS, planted, version_of
 from risk_sac.egos.defects.planted import Planted
 from risk_sac.egos.idm_aeb import IdmAeb
 from risk_sac.egos.registry import pinned
-from risk_sac.egos.seam import Command, Control, Episode, Perceived, Trajectory, Vehicle
-from risk_sac.errors import ConfigError
+from risk_sac.egos.seam import Command, Control, Episode, Perceived, Vehicle
 from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Signal, X, Y
 
 CAR, TRUCK, WALKER = (Kind.VEHICLE, 4.6, 1.85), (Kind.VEHICLE, 8.0, 2.4), (Kind.PEDESTRIAN, 0.5, 0.5)
@@ -237,12 +236,6 @@ def test_actuators_do_less_and_later() -> None:
     assert begun("steers-aside", Listener(Control(1.0, 0.1))).act(seen()) == Control(1.0, pytest.approx(0.07))
 
 
-def test_a_planner_s_trajectory_is_tracked_before_its_command_is_changed() -> None:
-    braking = Trajectory(*(np.array(row) for row in ([0.0, 0.5, 1.0], [0.0, 4.0, 8.0], [0.0] * 3, [10.0, 5.0, 1.0])))
-    command = begun("weak-brakes", Listener(braking)).act(seen())
-    assert command == Control(pytest.approx(-4.0), pytest.approx(0.0, abs=1e-6))
-
-
 @pytest.mark.parametrize("name", PYTHON)
 def test_each_defect_composes_with_a_shipped_ego(name: str) -> None:
     ego = Planted(
@@ -264,24 +257,6 @@ def test_a_defect_is_reached_when_it_first_changes_a_command() -> None:
         for k in range(5):
             ego.act(seen(car(24.0 if k < 3 else 26.0, along=5.0), time_s=1.5 + k / 10))
             assert ego.reached_s == (None if k < 3 else 0.3)
-
-
-@pytest.mark.parametrize(
-    ("ego", "message"),
-    [
-        (
-            "idm-aeb+blind-rihgt",
-            r"ego.defects: got 'blind-rihgt'; wanted defects of the catalogue, such as blind-right",
-        ),
-        ("default+blind-right", r"ego.defects: 'blind-right', which SUMO's driver cannot have; name a driver"),
-        ("idm-aeb+sumo-distracted", r"ego.defects: 'sumo-distracted', a setting of SUMO's driver"),
-        ("idm-aeb+latency+latency", r"defects: got \['latency', 'latency'\]; wanted each defect once"),
-    ],
-)
-def test_a_defect_that_does_not_exist_or_fit_is_refused_in_a_line(ego: str, message: str) -> None:
-    with pytest.raises(ConfigError, match=message) as raised:
-        pinned(read_ego(ego))
-    assert "\n" not in str(raised.value)
 
 
 def test_every_row_is_admitted_in_its_first_family() -> None:

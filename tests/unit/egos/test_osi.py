@@ -39,10 +39,6 @@ REQUEST = (
     "00000000000000000a320a08080210808c8d9e02121b0900000000008030401100000000000000401900000000000000001a0919"
     "0000000000000000"
 )
-STATE = (
-    "1800223d0a08080210808c8d9e0212120900000000000032401100000000000000401a0919182d4454fb21f93f22120900000000"
-    "00000840110000000000001040"
-)
 
 
 def perceived() -> Perceived:
@@ -125,29 +121,12 @@ def test_the_road_is_told_as_osi_lanes() -> None:
     assert len(truth.moving_object) == 3
 
 
-def test_actors_keep_their_numbers() -> None:
-    numbers: dict[str, int] = {}
-    ground_truth(perceived(), numbers, Road())
-    later = perceived()._replace(ids=("ego", "walker", "new"))
-    told = GroundTruth.FromString(ground_truth(later, numbers, Road()))
-    assert [each.id.value for each in told.moving_object] == [1, 3, 4]
-    assert told.host_vehicle_id.value == 1
-
-
 def test_an_osi_motion_request_is_a_trajectory_of_the_middle_of_the_body() -> None:
     found = trajectory_of(bytes.fromhex(REQUEST), perceived(), 1.5)
     np.testing.assert_allclose(found.time_s, [0.0, 0.5, 1.0])
     np.testing.assert_allclose(found.x_m, [10.0, 14.0, 18.0])
     np.testing.assert_allclose(found.y_m, [2.0, 2.0, 2.0])
     np.testing.assert_allclose(found.speed_mps, [8.0, 8.0, 8.0])
-
-
-def test_a_desired_state_is_where_to_be_then() -> None:
-    found = trajectory_of(bytes.fromhex(STATE), perceived(), 1.5)
-    np.testing.assert_allclose(found.time_s, [0.0, 1.0])
-    np.testing.assert_allclose(found.x_m, [10.0, 18.0])
-    np.testing.assert_allclose(found.y_m, [2.0, 3.5])
-    np.testing.assert_allclose(found.speed_mps, [8.25, 5.0])
 
 
 @pytest.mark.parametrize("nothing", ["", "0a00", "1801", "2200", "18012a020a00", "ff", "22"])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from risk_sac.egos import registry
-from risk_sac.egos.bicycle import advance, track
+from risk_sac.egos.bicycle import advance
 from risk_sac.egos.guard import Guarded
-from risk_sac.egos.planners.route import SignalStops, stops, way_to_stop_m
+from risk_sac.egos.planners.route import SignalStops, stops
 from risk_sac.egos.seam import Episode, Perceived, Trajectory, Vehicle
 from risk_sac.sim.pilot import Motion
 from risk_sac.types import (
@@ -159,28 +159,3 @@ def test_it_keeps_stopping_at_a_yellow_light_until_the_light_changes() -> None:
     assert not signals.at(1, Signal.YELLOW, **near)
     assert not signals.at(0, Signal.GREEN, **near)
     assert not signals.at(0, Signal.YELLOW, **near)
-
-
-def test_a_plan_is_followed_to_the_speed_that_it_has_a_fifth_of_a_second_on() -> None:
-    time_s = np.array([0.0, 0.2, 0.5, 3.0])
-    plan = Trajectory(time_s, 10.0 * time_s, 0.0 * time_s, np.array([10.0, 9.6, 5.0, 0.0]))
-    command = track(plan, Motion(0.0, 0.0, 0.0, 10.0), VEHICLE)
-    assert command == (pytest.approx(-2.0), pytest.approx(0.0))
-
-
-@pytest.mark.parametrize(
-    ("signal", "speed", "line_m", "way_m"),
-    [
-        (Signal.RED, 10.0, 30.0, 29.0),
-        (Signal.RED, 10.0, 60.0, None),  # braking by 2.5 m/s² begins later
-        (Signal.YELLOW, 10.0, 15.0, 14.0),
-        (Signal.YELLOW, 10.0, 10.0, None),  # would take more than 4.5 m/s²
-        (Signal.GREEN, 10.0, 30.0, None),
-        (Signal.RED, 0.0, 0.5, -0.5),
-    ],
-)
-def test_a_planner_without_stop_lines_stops_a_metre_before_a_signal(
-    signal: Signal, speed: float, line_m: float, way_m: float | None
-) -> None:
-    view = perceived(Motion(0.0, 0.0, 0.0, speed), 0.0, [], signal)._replace(stop_line_m=line_m)
-    assert way_to_stop_m(view, SignalStops()) == (None if way_m is None else pytest.approx(way_m))

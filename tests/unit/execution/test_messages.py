@@ -4,7 +4,7 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from risk_sac.execution.messages import Failed, Finished, Heard, Heartbeat, Started, decode, encode, hear
+from risk_sac.execution.messages import Failed, Finished, Heartbeat, Started, decode, encode
 from risk_sac.records import Outcome
 
 
@@ -41,13 +41,3 @@ def test_a_series_is_a_plain_file_name(episode, name):
     line = json.loads(encode(episode(0)))
     with pytest.raises(ValidationError, match="series"):
         decode(json.dumps(line | {"series": name}).encode())
-
-
-def test_what_a_worker_says_is_told_by_what_it_means(episode, metrics):
-    stopped = Finished(finished=False, metrics=metrics, evaluation=None, digest="", versions={}, wall_s=1.0)
-    assert hear(encode(Heartbeat())) == Heard(None)
-    assert hear(encode(Started(pid=3))) == Heard(Started(pid=3))
-    assert hear(encode(stopped)) == Heard(stopped, last=True)
-    assert hear(encode(Failed(reason="no"))) == Heard(Failed(reason="no"), last=True)
-    heard = hear(encode(episode(0)))
-    assert (heard.progress, heard.last) == (True, False)

@@ -2,7 +2,7 @@ import pytest
 
 from risk_sac.failures.clusters import overview, vendi
 from risk_sac.records import Collision, EpisodeRecord, Grade, Outcome
-from tests.builders import collision, episode_record, judgement, violation
+from tests.builders import collision, episode_record, judgement
 
 
 def failure(signature: str, grade: Grade, **changes: float) -> Collision:
@@ -29,13 +29,6 @@ def test_failures_of_a_signature_are_a_cluster_with_the_most_preventable_and_sho
     assert overviewed.cells == 1872
 
 
-def test_contacts_that_are_no_failures_are_left_out() -> None:
-    invalid = collision(verdicts={"ego_moving": False}, judgement=judgement(None))
-    unjudged = collision(verdicts={"ego_moving": True})
-    nothing = overview([*found(invalid, unjudged), ("e9", episode_record(9, Outcome.SAFE))])
-    assert (nothing.clusters, nothing.vendi, nothing.covered) == ((), 0.0, 0)
-
-
 def test_the_vendi_score_counts_what_has_nothing_in_common() -> None:
     one = failure("cut-in", Grade.PREVENTABLE)
     assert vendi([]) == 0.0
@@ -43,15 +36,3 @@ def test_the_vendi_score_counts_what_has_nothing_in_common() -> None:
     assert vendi([[one], [one], [one]]) == pytest.approx(3.0)
     near, far = (failure("cut-in", Grade.PREVENTABLE, relative_speed_mps=speed) for speed in (7.5, 20.0))
     assert 1.0 < vendi([[one, near]]) < vendi([[one, far]]) < 2.0
-
-
-def test_violations_without_contact_are_clusters_of_their_own() -> None:
-    hit, slow, fast = failure("cut-in", Grade.PREVENTABLE), violation(ego_speed_mps=5.0), violation(ego_speed_mps=20.0)
-    both = episode_record(0, Outcome.FAILURE, collision=hit, violations=(slow,))
-    overviewed = overview([("e0", both), ("e1", episode_record(1, Outcome.FAILURE, violations=(fast,)))])
-    assert [(each.name, each.failures, each.distinct) for each in overviewed.clusters] == [
-        ("cut-in", 1, 1),
-        ("never_fast violated; straight", 2, 2),
-    ]
-    assert 2.0 < overviewed.vendi < 3.0
-    assert overviewed.covered == 1  # of contacts

@@ -1,10 +1,8 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.show import CAPTION_WIDTH, caption, draw_recording
+from risk_sac.failures.show import caption, draw_recording
 from risk_sac.records import Grade, Outcome
 from risk_sac.run_folder.results import RecordedFailure
 from tests.builders import episode_record, violation
@@ -33,34 +31,9 @@ def test_what_happens_is_marked_in_every_panel_and_the_conflict_from_above(confl
     assert low < 280 + 10 * conflict_s < high
 
 
-def test_a_twin_is_drawn_beside_the_failure_on_the_same_ground_clock_and_scales() -> None:
-    failure = Recording(synthetic_contact(), with_release())
-    later = {name: values + 2.0 if name == "time_s" else values for name, values in with_release().items()}
-    twin = Recording(failure.failure, later, "no attack")
-    axes = draw_recording("mixed", failure, twin).axes
-    rows = list(zip(axes[::2], axes[1::2], strict=True))
-    assert [view.get_title() for view in rows[0]] == ["the failure", "no attack"]
-    for left, right in rows:
-        assert left.get_xlim() == right.get_xlim()
-        assert left.get_ylim() == right.get_ylim()
-    assert rows[1][0].get_xlim()[1] >= twin.time_s[-1] > 0.0
-    of_the_twin = [text.get_text() for text in rows[1][1].texts]
-    assert of_the_twin == ["contact in the failure", "adversaries released"]
-    assert "touched here" not in [text.get_text() for text in rows[0][1].get_legend().get_texts()]
-
-
 def lines(**judged: object) -> list[str]:
     contact = synthetic_contact(JUDGED.model_copy(update=judged))
     return caption("mixed", Recording(contact, with_release())).splitlines()
-
-
-def test_rules_that_the_contact_failed_are_named_in_full_on_lines_that_the_page_holds() -> None:
-    contact = synthetic_contact()
-    rules = "conflict_after_release, inside_limits, inside_grip, solid_bodies, ego_model_saw, ego_moving, no_sideswipe"
-    failed = contact.episode.model_copy(update={"outcome": Outcome.DEGENERATE, "reason": rules})
-    title = caption("mixed", Recording(replace(contact, episode=failed), with_release()))
-    assert max(map(len, title.splitlines())) <= CAPTION_WIDTH
-    assert rules.replace("_", " ") in title.replace("\n", " ")
 
 
 @pytest.mark.parametrize("other_id", ["pedestrian", None])

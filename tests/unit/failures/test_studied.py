@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from risk_sac.failures.studied import STUDIES, Core, Extent, Region, Share, Studied, note, read_studies
+from risk_sac.failures.studied import STUDIES, Core, Extent, Studied, note, read_studies
 
 CORE = Core(
     before=Extent(adversaries=2, segments=9, channels=12, strongest=1.0),
@@ -14,14 +14,6 @@ CORE = Core(
     copies=10,
     sentence="A walker steps out",
 )
-REGION = Region(shares=(Share.of("scene by 1%", 18, 40),))
-
-
-def test_a_core_and_a_region_come_back_together(tmp_path: Path) -> None:
-    note(tmp_path, "d", 3, Studied(core=CORE))
-    note(tmp_path, "d", 3, Studied(region=REGION))
-    note(tmp_path, "d", 12, Studied(region=REGION))
-    assert read_studies(tmp_path, "d") == {3: Studied(core=CORE, region=REGION), 12: Studied(region=REGION)}
 
 
 def test_of_other_results_or_damaged_nothing_is_told(tmp_path: Path) -> None:

@@ -104,12 +104,6 @@ def test_histogram_literals():
     assert metrics.contacts_by_second == (0, 0, 0, 2, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1)
 
 
-@pytest.mark.parametrize(("horizon_steps", "bins"), [(150, 15), (151, 16), (10, 1), (1, 1), (29, 3), (30, 3)])
-def test_histograms_have_a_bin_for_every_second_that_is_begun(horizon_steps, bins):
-    metrics = MetricsAccumulator(horizon_steps).metrics()
-    assert metrics.conflicts_by_second == metrics.contacts_by_second == (0,) * bins
-
-
 def test_windows_forget_all_but_the_newest_100_episodes():
     failure = episode(Outcome.FAILURE, 10, hit=contact(judgement=judgement()))
     records = [failure] * 50 + [episode()] * 80 + [failure, episode(Outcome.FAILURE, 10)] * 5
@@ -117,15 +111,6 @@ def test_windows_forget_all_but_the_newest_100_episodes():
     assert (metrics.window_ecr, metrics.window_pcr) == (0.2, 0.15)
     assert metrics.ecr == pytest.approx(60 / 140)
     assert metrics.window_pcr == preventable_collision_rate(counted(records[-WINDOW:]))
-
-
-def test_run_without_episodes():
-    metrics = feed([])
-    assert (metrics.ecr, metrics.ecr_low, metrics.ecr_high, metrics.window_ecr) == (0, 0, 1, 0)
-    assert (metrics.efficiency, metrics.cost_rate, metrics.dispersion) == (0, 0, None)
-    assert (metrics.distinct_failures, metrics.steps_per_distinct_failure) == (0, None)
-    assert (metrics.pcr, metrics.pcr_low, metrics.pcr_high, metrics.window_pcr) == (0, 0, 1, 0)
-    assert preventable_collision_rate(counted([])) == 0
 
 
 def test_bad_records_are_refused_and_leave_the_figures_alone():

@@ -1,4 +1,4 @@
-from risk_sac.metrics import METRICS, RATIOS, Tally, wilson_interval
+from risk_sac.metrics import METRICS, RATIOS, Tally
 from risk_sac.metrics.rows import (
     cost_rate,
     effective_collision_rate,
@@ -8,7 +8,6 @@ from risk_sac.metrics.rows import (
     steps_per_distinct_failure,
 )
 from risk_sac.records import Counts
-from tests.unit.metrics.episodes import JUDGED, feed
 
 FORMULAS = {metric.name: metric.formula for metric in METRICS}
 
@@ -38,22 +37,6 @@ def test_formula_literals():
     assert (FORMULAS["distinct_per_1000_steps"](tally), steps_per_distinct_failure(tally)) == (5, 200)
 
 
-def test_formulas_of_a_run_without_episodes():
-    tally = Tally(horizon_steps=150)
-    without = ("ofd", "distinct_per_1000_steps", "preventable_per_1000_steps")
-    assert {name: formula(tally) for name, formula in FORMULAS.items()} == {
-        name: None if name in without else 0 for name in FORMULAS
-    }
-    assert {ratio.name: ratio.formula(Counts()) for ratio in RATIOS} == {
-        "steps_per_distinct_failure": None,
-        "raw_rate": 0,
-        "artefact_rate": 0,
-        "degenerate_rate": 0,
-        "rejected_rate": 0,
-        "unresponsive_share": None,
-    }
-
-
 def test_ratio_literals():
     counts = Counts(
         episodes=20,
@@ -73,13 +56,3 @@ def test_ratio_literals():
         "rejected_rate": 0.05,
         "unresponsive_share": 0.4,
     }
-
-
-def test_a_metric_is_read_from_the_metrics_of_a_run():
-    metrics = feed(JUDGED)
-    rows = {metric.name: metric for metric in METRICS}
-    ecr, distinct = rows["ecr"], rows["distinct_per_1000_steps"]
-    assert ecr.value(metrics) == metrics.ecr
-    assert distinct.value(metrics) == 1000 * 4 / 518
-    assert ecr.interval(metrics.ecr, Counts(episodes=8)) == wilson_interval(5, 8)
-    assert distinct.interval(1.0, Counts(episodes=8)) is None

@@ -1,8 +1,6 @@
 """A search that goes on from an earlier run, or is told why it cannot."""
 
-import os
 import shutil
-import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -11,7 +9,7 @@ import pytest
 
 from risk_sac.config import RunSpec, SceneOptimizerConfig
 from risk_sac.errors import ConfigError, DamagedError
-from risk_sac.prior.earlier import EarlierScripts, FamilyScripts, kept, pinned_prior, prune
+from risk_sac.prior.earlier import EarlierScripts, FamilyScripts, kept, pinned_prior
 from risk_sac.prior.sampler import PriorOptimizer
 from risk_sac.prior.shipped import inputs_of, shipped_prior
 from risk_sac.prior.start import start_of
@@ -100,12 +98,3 @@ def test_places_of_one_pattern_share_scripts_and_a_places_own_come_first() -> No
     assert len(subject.alike(here)) == 1
     assert len(subject.alike("low")) == 2
     assert subject.alike("dense") == ()
-
-
-def test_old_copies_that_no_campaign_names_are_removed(tmp_path: Path) -> None:
-    named, old, new = (pinned_prior(str(run_folder(tmp_path / name)), ["low"]) for name in ("named", "old", "new"))
-    files = {path.stem: path for path in (tmp_path / "library").rglob("*.json")}
-    for name in (named, old):
-        os.utime(files[name], (0, 0))
-    prune(tmp_path / "library", lambda: {named}, time.time() - 3600.0)
-    assert {path.stem for path in (tmp_path / "library").rglob("*.json")} == {named, new}

@@ -11,7 +11,6 @@ from risk_sac.prior.sampler import Arm, PriorOptimizer, Yields
 from risk_sac.prior.shipped import Prior, inputs_of, read_prior, shipped_prior, write_prior
 from risk_sac.prior.start import start_of
 from risk_sac.problem import Problem
-from risk_sac.records import DrivenBy
 from risk_sac.scenario.families import FAMILIES
 
 FAMILY = "low"
@@ -81,18 +80,6 @@ def test_a_belief_moves_to_egos_that_would_have_failed_too() -> None:
     assert failed.sum() == pytest.approx(1.0)
     assert failed[each.argmax()] > 1.0 / len(model.egos) > failed[each.argmin()]
     assert safe[each.argmin()] > 1.0 / len(model.egos) > safe[each.argmax()]
-
-
-def test_it_proposes_from_all_its_arms_points_of_the_cube() -> None:
-    subject = optimizer()
-    drivers = set()
-    for _ in range(60):
-        point = subject.ask()
-        assert point.shape == (inputs_of(FAMILY),)
-        assert 0.0 <= point.min() <= point.max() <= 1.0
-        drivers.add(subject.driven_by)
-        subject.tell(point, 0.0)
-    assert drivers == {DrivenBy.MODEL, DrivenBy.SCRIPT, DrivenBy.RANDOM}
 
 
 def test_it_goes_on_from_its_state_exactly() -> None:

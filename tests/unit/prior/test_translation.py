@@ -51,12 +51,6 @@ def test_points_of_a_narrower_problem_keep_their_values() -> None:
     np.testing.assert_allclose(subject.own(known), point)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_at_its_own_family_the_prior_stays_as_it_is(family: str) -> None:
-    library = shipped_prior(family).library
-    np.testing.assert_allclose(translation(FAMILIES[family], family).own(library), library, atol=1e-12)
-
-
 def test_an_adversary_that_the_place_lacks_is_passive_to_the_model() -> None:
     place = low_with("left")
     subject = translation(place, "low")

@@ -7,7 +7,6 @@ import pytest
 
 from risk_sac.config import CampaignSpec
 from risk_sac.report import FinishedRun, compare
-from risk_sac.report.figures import CURVES
 from risk_sac.report.runs import Limit, cpu_s, episodes, found_within
 
 
@@ -36,21 +35,6 @@ def test_what_ended_within_the_limit_counts(run: FinishedRun, limit: Limit, expe
     found = found_within(run, limit)
     assert found is not None
     assert (found.preventable, found.distinct) == expected
-
-
-def test_a_run_that_never_got_so_far_says_nothing(run: FinishedRun) -> None:
-    assert found_within(run, Limit("", cpu_s, 12.1)) is None  # its evaluation took longer, but its search did not
-    assert found_within(run, Limit("", episodes, 7)) is None
-    assert found_within(replace(run, episode_cpu_s=()), Limit("", cpu_s, 1.0)) is None
-
-
-def test_a_curve_over_time_holds_what_was_found_and_ends_with_the_shortest_run(run: FinishedRun) -> None:
-    curve = next(curve for curve in CURVES if curve.name == "distinct_found")
-    shorter = replace(run, episode_cpu_s=tuple(each / 2 for each in run.episode_cpu_s))
-    at, values = curve.over([run, shorter])
-    assert at[-1] == 6.0
-    by_time = dict(zip(at.tolist(), values.T.tolist(), strict=True))
-    assert (by_time[0.0], by_time[2.0], by_time[4.0], by_time[4.5]) == ([0, 0], [0, 1], [1, 1], [1, 2])
 
 
 def test_our_own_search_is_tested_against_the_others_on_what_a_user_pays_for(

@@ -46,14 +46,6 @@ def test_the_funnel_and_pcr_are_those_of_all_seeds(comparison):
     assert cell(comparison, "no-adversary").unresponsive_share is None
 
 
-def test_dispersion_is_taken_over_the_seeds_that_have_one(comparison):
-    ofd = cell(comparison, "risk-sac").estimates["ofd"]
-    assert (ofd.mean, ofd.runs) == (pytest.approx(2 / 3 * 0.5 / 2), 1)  # two pairs of three differ by half a range
-    assert (ofd.low, ofd.high) == (None, None)
-    assert cell(comparison, "sac").estimates["ofd"].mean is None
-    assert cell(comparison, "no-adversary").steps_per_distinct_failure is None
-
-
 def test_one_seed_has_wilsons_interval(spec, runs):
     alone = spec.model_copy(update={"seeds": (0,)})
     ecr = cell(compare(alone, runs, ""), "risk-sac").estimates["ecr"]

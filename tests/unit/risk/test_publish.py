@@ -9,7 +9,6 @@ from risk_sac.risk.publish import (
     CROSSED_ON_RED_M,
     ENCOUNTER,
     GAP_CAP_M,
-    PEDESTRIAN_GAP_CAP_M,
     RED_LIGHT_BRAKING_CAP_MPS2,
     RSS_SCALED,
     TTC,
@@ -21,9 +20,7 @@ from risk_sac.risk.publish import (
     red_light_braking,
     red_light_margin,
 )
-from risk_sac.risk.rss import SCALED_HIGH
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.risk.ttc import ENCOUNTER_CAP_S, TTC_CAP_S
 from risk_sac.types import Frame, Kind, Signal
 from tests import builders
 
@@ -71,21 +68,6 @@ def signals_of(
 )
 def test_the_ego_answers_for_whoever_is_not_behind_its_rear_bumper(x_m: float, y_m: float, charged: bool) -> None:
     assert in_charge(relative_view(frame_of((x_m, y_m, VEHICLE)))).tolist() == [charged]
-
-
-def test_nothing_to_measure_takes_the_caps() -> None:
-    assert signals_of(frame_of(), [], []) == {
-        "ttc_s": TTC_CAP_S,
-        "encounter_s": ENCOUNTER_CAP_S,
-        "rss_margin": SCALED_HIGH,
-        "pedestrian_gap_m": PEDESTRIAN_GAP_CAP_M,
-        "vehicle_gap_m": GAP_CAP_M,
-        "red_light_m": GAP_CAP_M,
-        "red_light_braking_mps2": 0.0,
-        "ego_speed_mps": 10.0,
-        "ego_braking_mps2": 0.0,
-        **OWN._asdict(),
-    }
 
 
 def test_the_least_value_among_those_in_charge_is_published() -> None:

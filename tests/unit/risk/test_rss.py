@@ -141,11 +141,6 @@ def test_lateral_margin_is_the_same_on_both_sides(side: int) -> None:
     assert leaving.tolist() == pytest.approx([2.9])
 
 
-def test_alongside_the_longitudinal_distance_is_how_far_the_bodies_overlap() -> None:
-    longitudinal, _ = margins(view_of(10.0, (1.0, 3.0, 0, 10, 0)), P)
-    assert longitudinal.tolist() == pytest.approx([-3 - (11 + 18 - 100 / 16)])
-
-
 def test_the_scaled_margin_is_the_larger_of_both_each_in_its_scale() -> None:
     leader, beside = (34.0, 0, 0, 8, 0), (1.0, 3.0, 0, 10, 0)
     assert scaled(view_of(10.0, leader)) == pytest.approx(
@@ -191,13 +186,6 @@ def test_undisturbed_traffic_is_not_dangerous(
 ) -> None:
     x, y, heading, vx, vy = other
     assert scaled(view_of(ego_mps, (x, side * y, side * heading, vx, side * vy)), RssParameters())[0] > 0
-
-
-def test_the_margin_falls_all_the_way_to_a_leader_that_stands() -> None:
-    far_to_near = [scaled(view_of(12.0, (x, 0.2, 0, 0, 0)), RssParameters())[0] for x in np.arange(40.0, 4.0, -0.5)]
-    assert np.all(np.diff(far_to_near) < 0)
-    assert far_to_near[0] > 0.5
-    assert far_to_near[-1] == pytest.approx(-1, abs=0.1)
 
 
 @pytest.mark.parametrize("braking_mps2", [6.0, 8.0, 9.0])

@@ -1,10 +1,10 @@
 """Which failures are refused because one of them does not repeat."""
 
 from risk_sac.config import RunSpec
-from risk_sac.metrics import headline_driven_by, pooled_headline
+from risk_sac.metrics import headline_driven_by
 from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, Repetition, RunMetrics, Severity
 from risk_sac.run_folder.results import RecordedFailure, Results
-from risk_sac.run_folder.verified import Verified, distinct_failures, with_headline
+from risk_sac.run_folder.verified import Verified, with_headline
 from tests.builders import collision, episode_record, judgement, run_metrics, violation
 
 
@@ -59,22 +59,6 @@ def test_a_violation_is_refused_by_its_kind_and_what_else_the_episode_violates_s
     assert found[1].collision == contact
 
 
-def test_an_episode_is_distinct_by_any_of_its_violations() -> None:
-    hit = collision(judgement=judgement())
-    episodes = [
-        episode_record(0, Outcome.FAILURE, violations=(violation(),)),
-        episode_record(1, Outcome.FAILURE, violations=(violation(),)),
-        episode_record(2, Outcome.FAILURE, violations=(violation(),), collision=hit),
-        episode_record(
-            3, Outcome.DEGENERATE, violations=(violation(requirement="a", verdicts={"no_teleport": False}),)
-        ),
-    ]
-    spec = RunSpec(family="low", method="random", seed=0)
-    failures = tuple(RecordedFailure.of(spec.id, each) for each in episodes)
-    results = Results(spec=spec, spec_digest="", finished=True, failures=failures)
-    assert [episode.index for episode in distinct_failures(results)] == [0, 2]
-
-
 def results_of(*episodes: EpisodeRecord) -> Results:
     spec = RunSpec(family="low", method="random", seed=0)
     failures = tuple(RecordedFailure.of(spec.id, each) for each in episodes)
@@ -103,11 +87,6 @@ def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repe
     assert results.metrics.headline is None, "before a replay"
 
 
-def test_the_first_that_is_not_minor_is_replayed_though_another_of_its_kind_is_preventable() -> None:
-    results = results_of(failure(0, judgement=MINOR), failure(1, judgement=MINOR), failure(2), failure(3))
-    assert [episode.index for episode in distinct_failures(results)] == [0, 2]
-
-
 def test_a_headline_failure_counts_for_what_drove_the_first_of_its_kind() -> None:
     results = results_of(
         failure(0, judgement=MINOR, driven_by=DrivenBy.RANDOM),
@@ -124,11 +103,3 @@ def test_a_headline_failure_counts_for_what_drove_the_first_of_its_kind() -> Non
     assert headline_driven_by([found, later]) == {"script": 1, "policy": 1}, "what an earlier run found counts for it"
     older = found.model_dump(exclude={"headline_kinds_driven_by", "episodes_driven_by"})
     assert headline_driven_by([RunMetrics.model_validate(older)]) == {}
-
-
-def test_runs_have_the_union_of_their_headlines() -> None:
-    one = run_metrics(headline=2, headline_kinds=HEADLINE)
-    other = run_metrics(headline=2, headline_kinds=("no_contact: merge [0-0-0]", HEADLINE[0]))
-    assert pooled_headline([one, other, run_metrics()]) == 3
-    assert pooled_headline([one, one]) == 2
-    assert pooled_headline([run_metrics()]) is None

@@ -67,12 +67,6 @@ def test_comments_text_and_schemas_are_left_out_and_unknown_elements_are_told(tm
     assert document.remarks == ("left out, because they are no part of a map: <viewsettings> (1)",)
 
 
-def test_a_refusal_names_the_line_the_element_and_what_was_wanted(tmp_path: Path) -> None:
-    says = "^network: got <edge> with 'file' in line 3 of the map; wanted nothing that names a file or writes output$"
-    with pytest.raises(MapError, match=says):
-        written(NET.replace("<edge", '\n\n<edge file="/etc/passwd"'), tmp_path)
-
-
 @pytest.mark.parametrize("packing", PACKED)
 def test_documents_come_out_of_a_package_as_they_went_in(packing: str, tmp_path: Path) -> None:
     files = [NET, ROUTES][: 2 if packing == "zip" else 1]

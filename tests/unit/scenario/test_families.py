@@ -86,22 +86,6 @@ def test_mixed_scenes_place_everybody_before_the_chosen_crossing(sim: SumoSimula
         assert any(a.contains(walker.x_m, -1.0) for a in layout.crossings)
 
 
-def test_dense_approaches_meet_at_the_intersection(sim: SumoSimulation) -> None:
-    family = FAMILIES["dense"]
-    scene, layout = random_layouts(family, 4, 1)[0]
-    frame = sim.reset(layout, 0)
-    for id_ in ("ego", "oncoming", "from_left", "from_right"):
-        i = frame.ids.index(id_)
-        front_m = max(abs(frame.x_m[i]), abs(frame.y_m[i])) - frame.length_m[i] / 2  # along its leg
-        before = scene.values[f"{id_}_distance_m"] + 1.5 * scene.values[f"{id_}_speed_mps"]
-        assert front_m == pytest.approx(before + 250.0 - APPROACH_M, abs=0.1)
-    expected = scene.values["ego_distance_m"] + 1.5 * scene.values["ego_speed_mps"]
-    assert frame.stop_line_m == pytest.approx(expected, abs=0.1)
-    walker = layout.pedestrians[0]
-    speed, setback = scene.values["pedestrian_speed_mps"], scene.values["pedestrian_setback_m"]
-    assert walker.x_m == pytest.approx(8.05 + setback + 1.5 * speed)
-
-
 @each_family
 def test_vehicles_on_one_lane_start_and_are_released_apart(family: Family) -> None:
     for scene, layout in random_layouts(family, 5, 500):
@@ -150,14 +134,3 @@ def test_background_traffic_without_room_behind_others_is_left_out() -> None:
     layouts = [family.layout(dict(values) | crowded | {"from_right_distance_m": m}) for m in (30.0, 90.0)]
     names = [{start.id for start in layout.vehicles} for layout in layouts]
     assert names[0] - names[1] == {"east_1"}
-
-
-def test_the_signal_offset_moves_the_cycle(sim: SumoSimulation) -> None:
-    family = FAMILIES["dense"]
-    middle = np.full(family.space.dimension, 0.4)
-    axis = family.space.names.index("signal_offset_s")
-    seen = set()
-    for share in np.linspace(0.0, 1.0, 29):
-        middle[axis] = share
-        seen.add(sim.reset(family.layout(family.space.from_unit(middle).values), 0).signal.name)
-    assert seen == {"GREEN", "YELLOW", "RED"}

@@ -24,16 +24,13 @@ from risk_sac.scenario.maps.found import NoFit
 from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net
 from risk_sac.scenario.maps.read_net import read_net
 from risk_sac.scenario.maps.ways import way_back, way_on
-from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch
+from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace
 from risk_sac.sim.sumo import SumoSimulation
 from tests.maps import osm_town
 
 NETS = Path(sumo_nets.__path__[0])
 LANE = '<lane id="{id}_0" index="0" speed="13.89" length="{m}" shape="{line}"/>'
 ROAD = '<edge id="{id}" from="{a}" to="{b}">' + LANE + "</edge>"
-RAILS = (
-    '<edge id="r" from="a" to="b"><lane id="r_0" index="0" allow="rail" speed="9" length="9" shape="0,0 9,0"/></edge>'
-)
 
 
 def shipped(name: str):
@@ -77,13 +74,6 @@ def test_the_finder_finds_the_crossings_that_are_shipped(edge: str, site: int) -
         track.pieces[-1].edge for track in ours.oncoming
     }
     assert (found.sites[0].walk.x_m, found.sites[0].walk.y_m) == pytest.approx((ours.walk.x_m, ours.walk.y_m))
-
-
-def test_the_finder_finds_the_road_that_is_shipped() -> None:
-    found = place_at(read_net(NETS / "low" / "low.net.xml"), "car_following", "road").place
-    assert isinstance(found, Stretch)
-    assert family_at("low", found).space == FAMILIES["low"].space
-    assert family_at("low", found).odd == FAMILIES["low"].odd
 
 
 def test_ground_that_is_found_is_the_ground_that_was_drawn_by_hand() -> None:
@@ -141,23 +131,6 @@ def road(id_: str, a: str, b: str, metres: float, line: str) -> str:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        ("<net><edge", "is no XML"),
-        ("<routes/>", "with the root <routes>"),
-        (f'<net lefthand="true">{road("r", "a", "b", 900, "0,0 900,0")}</net>', "left-hand traffic"),
-        (f"<net>{RAILS}</net>", "none of the 1 edges of the map has a lane for passenger cars"),
-        ('<net><edge id="r" from="a" to="b"><lane id="r_0"/></edge></net>', "the net lacks 'shape'"),
-    ],
-)
-def test_a_map_that_nothing_fits_on_says_why(tmp_path: Path, content: str, says: str) -> None:
-    file = tmp_path / "map.net.xml"
-    file.write_text(content)
-    with pytest.raises(MapError, match=says):
-        read_net(file)
-
-
-@pytest.mark.parametrize(
-    ("content", "says"),
-    [
         ("<html/>", "map, whose root is <html>"),
         ("nothing", "map is no well-formed XML"),
         ("<osm/>", "map without roads"),
@@ -192,12 +165,6 @@ def test_why_netconvert_failed_is_told(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(convert, "netconvert", lambda: (str(program), {}))
     with pytest.raises(MapError, match=says):
         present_net(file, tmp_path)
-
-
-@pytest.mark.parametrize("name", ["straight_two_way.xodr", "single_road.osm"])
-def test_a_map_of_one_road_has_places(tmp_path: Path, name: str) -> None:
-    found = survey(Map(present_net(Path(__file__).parents[2] / "cases" / name, tmp_path).file).net)
-    assert found.counts["car_following"] >= 1
 
 
 def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_the_left(

@@ -5,9 +5,7 @@ from hypothesis import strategies as st
 from risk_sac.config import DynamicElements, Environment, Interval, Odd, Scenery
 from risk_sac.errors import OddError
 from risk_sac.risk.stl import Monitor
-from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS, intersect, narrow, requirements_from_odd, widest
-from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS, intersect, requirements_from_odd
 
 
 def interval(low: float, high: float) -> Interval:
@@ -31,13 +29,6 @@ DEFAULT = Odd(
         vehicle_accel_mps2=interval(-8, 3),
         pedestrian_speed_mps=interval(0, 4),
         pedestrian_accel_mps2=interval(-4, 3),
-    ),
-)
-SPACE = SceneSpace(
-    "low",
-    (
-        Parameter("lead_speed_mps", "m/s", 5, 18, "speed of the leader", "dynamic.vehicle_speed_mps"),
-        Parameter("gap_m", "m", 5, 40, "gap to the leader"),
     ),
 )
 
@@ -121,26 +112,6 @@ def test_a_bad_odd_is_refused_by_field_with_got_and_wanted(user: Odd, field: str
     assert caught.value.field == field
 
 
-def test_the_odd_narrows_the_parameters_that_name_one_of_its_fields() -> None:
-    odd = intersect(DEFAULT, Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(10, 12))))
-    speed, gap = narrow(SPACE, odd).parameters
-    assert (speed.low, speed.high) == (10, 12)
-    assert (gap.low, gap.high) == (5, 40)
-
-
-CROSSING = Parameter("crossing", "1", 0, 1, "", "scenery.crossing_types", ("zebra", "signalised"))
-
-
-@pytest.mark.parametrize(
-    ("allowed", "low", "high"),
-    [(("none", "zebra"), 0.0, 0.49999999999999994), (("signalised",), 0.5, 1.0), (("zebra", "signalised"), 0.0, 1.0)],
-)
-def test_a_set_in_the_odd_narrows_a_category(allowed: tuple[str, ...], low: float, high: float) -> None:
-    odd = Odd(scenery=Scenery(crossing_types=allowed))
-    [crossing] = narrow(SceneSpace("mixed", (CROSSING,)), odd).parameters
-    assert (crossing.low, crossing.high) == (low, high)
-
-
 @pytest.mark.parametrize(
     ("environment", "friction"),
     [
@@ -164,17 +135,6 @@ def test_crossings_keep_to_the_signals(signals: tuple[str, ...] | None, crossing
     both = Scenery(signal_types=("fixed_time", "none"), crossing_types=("signalised", "zebra"))
     default = DEFAULT.model_copy(update={"scenery": both})
     assert intersect(default, Odd(scenery=Scenery(signal_types=signals))).scenery.crossing_types == crossings
-
-
-@pytest.mark.parametrize(("low", "high"), [(4, 6), (2.5, 3), (3, 3)])
-def test_one_bound_is_stated_of_a_field_that_bounds_a_scene_parameter(low: float, high: float) -> None:
-    mixed = FAMILIES["mixed"]
-    user = Odd(dynamic=DynamicElements(pedestrian_speed_mps=interval(low, high)))
-    expected = "an overlap with [0, 2], the values of scene parameter 'pedestrian_speed_mps' in the 'mixed' family"
-    with pytest.raises(OddError) as caught:
-        intersect(mixed.odd, user, mixed.space)
-    assert (caught.value.got, caught.value.expected) == (f"[{low:g}, {high:g}]", expected)
-    assert intersect(mixed.odd, Odd(dynamic=DynamicElements(pedestrian_speed_mps=interval(2, 6))), mixed.space)
 
 
 def test_requirements_follow_the_odd() -> None:
@@ -227,16 +187,3 @@ def test_passing_a_pedestrian_on_the_sidewalk_or_standing_beside_one_violates_no
     monitor = Monitor([requirement], 0.1, 150)
     assert monitor.update({"pedestrian_gap_m": gap_m, "ego_speed_mps": speed_mps})[0] > 0
     assert monitor.update({"pedestrian_gap_m": 0.4, "ego_speed_mps": max(speed_mps, 1.0)})[0] < 0
-
-
-def test_the_widest_odd_is_what_intersect_keeps_of_any_other():
-    limits = widest(DEFAULT)
-    assert limits.dynamic.pedestrian_speed_mps == interval(0, 3)  # running, where the default has its own
-    assert limits.dynamic.vehicle_lateral_speed_mps == interval(0, 1.8)
-    assert limits.scenery == DEFAULT.scenery
-    assert limits.environment.visibility_m == interval(40, 2000)
-    assert limits.environment.time_of_day == ("day", "night")
-    assert intersect(DEFAULT, limits) == limits
-    assert intersect(DEFAULT, Odd(dynamic=DynamicElements(pedestrian_speed_mps=interval(0, 9)))).dynamic == (
-        DEFAULT.dynamic.model_copy(update={"pedestrian_speed_mps": interval(0, 3)})
-    )

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from risk_sac.errors import MapError
 from risk_sac.scenario.maps.convert import Converted, present_net
 from risk_sac.scenario.maps.finder import Map, survey
 from risk_sac.scenario.maps.net import Net
@@ -100,12 +99,6 @@ def test_limits_begin_where_they_are_given_and_that_of_a_lane_is_ahead(tmp_path:
     assert steps == {(0, 0), (1, 1)}
 
 
-def test_a_lane_keeps_its_width_where_a_limit_begins_within_its_section(tmp_path: Path) -> None:
-    types = kind('<speed max="30"/>') + kind('<speed max="20"/>', 450.0)
-    net, _ = read(tmp_path, road(section(lane(-1, width='a="3" b="0.002" c="0" d="0"')), types=types))
-    assert [edge.lanes[0].width_m for edge in net.edges.values()] == pytest.approx([3.0, 3.9], abs=0.01)
-
-
 @pytest.mark.parametrize("curvature", [0.01, -0.01])
 @pytest.mark.parametrize("by", [0.0, 1e-17, 5e-7])
 def test_a_spiral_of_nearly_constant_curvature_is_the_arc(tmp_path: Path, curvature: float, by: float) -> None:
@@ -117,13 +110,6 @@ def test_a_spiral_of_nearly_constant_curvature_is_the_arc(tmp_path: Path, curvat
     off = [abs(math.dist(point, (300.0, 1 / curvature)) - radius) for point in line if 300.0 < point[0] < x - 1.0]
     assert len(off) > 50
     assert max(off) < 0.05
-
-
-@pytest.mark.parametrize(
-    "shape", ['<spiral curvStart="0" curvEnd="0"/>', '<arc curvature="0"/>', '<arc curvature="1e-17"/>']
-)
-def test_a_bend_without_curvature_is_a_line(tmp_path: Path, shape: str) -> None:
-    assert {round(y, 2) for _, y in _drawn(tmp_path, shape, (450.0, 0.0, 0.0))} == {-1.75}
 
 
 def test_a_real_spiral_stays_one(tmp_path: Path) -> None:
@@ -146,14 +132,6 @@ def _drawn(folder: Path, bend: str, end: tuple[float, float, float]) -> Sequence
     (edge,) = net.edges.values()
     _, left_y = edge.lanes[0].line[0]  # netconvert moves a map
     return [(x, y - left_y - 1.75) for x, y in edge.lanes[0].line]
-
-
-def test_what_cannot_be_converted_is_refused_in_plain_words(tmp_path: Path) -> None:
-    direct = '<junction id="9" type="direct"><connection id="0" incomingRoad="1" linkedRoad="1"/></junction>'
-    with pytest.raises(MapError, match=r"^network: got junction '9' of type direct, which netconvert does not read; "):
-        read(tmp_path, road(section(lane(-1))) + direct)
-    with pytest.raises(MapError, match=r"^network: got road '1' with a missing or broken attribute: .* 'x'; "):
-        read(tmp_path, road(section(lane(-1)), types='<type s="x"/>'))
 
 
 SIDEWALK = {"kind": "sidewalk", "width": 'a="2" b="0" c="0" d="0"'}

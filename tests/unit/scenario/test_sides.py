@@ -3,7 +3,6 @@ from pathlib import Path
 import pytest
 
 from risk_sac.errors import MapError
-from risk_sac.scenario.maps.convert import present_net
 from risk_sac.scenario.maps.sides import UNKNOWN, side_remarks
 from tests.maps import osm_roundabout, osm_town
 
@@ -12,7 +11,6 @@ STREET = (
 )
 LEFT_STREET, RIGHT_STREET = STREET.format(id=7, side="left"), STREET.format(id=8, side="right")
 RELATION = '<relation id="5"><member type="way" ref="1" role="outer"/><tag k="driving_side" v="left"/></relation>'
-UNFINISHED = osm_roundabout(clockwise=True).replace('<nd ref="903"/>', '<nd ref="404"/>')  # beyond the extract's edge
 
 MINI = '<node id="71" lat="48.7" lon="11.4"><tag k="highway" v="mini_roundabout"/><tag k="direction" v="{}"/></node>'
 
@@ -78,12 +76,6 @@ def test_an_extract_with_right_hand_traffic_says_by_what(extract: Path, more: st
     assert side_remarks(extract) == [f"right-hand traffic: {where}"]
 
 
-@pytest.mark.parametrize("more", ["", osm_roundabout(clockwise=True, oneway="no"), UNFINISHED])
-def test_an_extract_that_says_nothing_is_read_as_right_hand_traffic_and_that_is_told(extract: Path, more: str) -> None:
-    extract.write_text(osm_town(more))
-    assert side_remarks(extract) == [UNKNOWN]
-
-
 @pytest.mark.parametrize(
     ("rules", "keeps_left"),
     [((), None), (('rule="LHT"',), True), (('rule="RHT"',), False), (("",), False), (('rule="LHT"', "", ""), False)],
@@ -106,11 +98,3 @@ def test_roundabouts_are_read_whatever_comes_first(extract: Path) -> None:
     extract.write_text(f"<osm>{mark}{ways}{nodes}</osm>")
     with pytest.raises(MapError, match="runs clockwise"):
         side_remarks(extract)
-
-
-def test_a_map_is_asked_on_which_side_people_drive_before_it_is_converted(extract: Path, tmp_path: Path) -> None:
-    extract.write_text(osm_town(LEFT_STREET))
-    with pytest.raises(MapError, match="left-hand traffic"):
-        present_net(extract, tmp_path)
-    extract.write_text(osm_town())
-    assert UNKNOWN in present_net(extract, tmp_path).warnings

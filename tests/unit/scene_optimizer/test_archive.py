@@ -4,13 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import Collision, Grade, ReferenceOutcome, Severity
 from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
-from risk_sac.scene_optimizer.archive import INITIAL, NEW, NEW_CANDIDATE, Elites, mutated
+from risk_sac.scene_optimizer.archive import INITIAL, NEW, NEW_CANDIDATE, Elites
 from tests.builders import collision, judgement, violation
 
 HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)
@@ -84,22 +82,6 @@ def test_a_requirement_is_aimed_at_once_it_is_nearly_violated_and_until_it_is():
     elites.add_failure(THERE, violation(requirement="on_carriageway", signature="off", robustness=-1.0), None)
     assert [e.kind for e in elites.pool()] == ["never_fast violated; straight", "off"]
     assert elites.pool()[0].worth < elites.pool()[1].worth
-
-
-def test_preventable_failures_are_built_on_most_often():
-    elites, random = Elites(), np.random.default_rng(0)
-    for kind, grade in (("a", Grade.PREVENTABLE), ("b", Grade.FULL_BRAKING), ("c", Grade.UNAVOIDABLE)):
-        elites.add_failure(HERE, failure(grade, kind, impact_mps=10.0), None)
-    drawn = [elites.draw(elites.pool(), random).kind for _ in range(60)]
-    assert drawn.count("a") > drawn.count("b") + drawn.count("c")
-
-
-@settings(deadline=None)
-@given(st.lists(st.floats(0, 1), min_size=2, max_size=2), st.integers(0, 2**31))
-def test_mutants_stay_in_the_unit_cube(corner, seed):
-    mutant = mutated(np.full(5, corner[0]), np.full(5, corner[1]), np.random.default_rng(seed))
-    assert mutant.min() >= 0
-    assert mutant.max() <= 1
 
 
 def found(seed: int, episodes: int, *, told: bool) -> int:

@@ -13,10 +13,6 @@ def bandit(*unit_costs: float) -> DiscountedBandit:
     )
 
 
-def test_untried_arms_are_as_likely() -> None:
-    assert bandit(1.0, 4.0).probability == 0.5
-
-
 def test_the_chance_follows_the_square_of_what_each_yielded_for_its_cost() -> None:
     subject = bandit(1.0, 4.0)
     subject.tell(0, 1.0, 10)

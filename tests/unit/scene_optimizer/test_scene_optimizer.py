@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.errors import CheckpointError, NotFinite
 from risk_sac.scene_optimizer import (
     ArchiveOptimizer,
     BotorchOptimizer,
@@ -76,16 +75,6 @@ def test_running_maximum_literals():
     assert scores == pytest.approx([0.0, 0.0, 1.38 / 1.381])
 
 
-@settings(deadline=None)
-@given(st.lists(returns, min_size=1, max_size=30), st.floats(0.01, 1))
-def test_running_maximum_rises_towards_the_largest_return_and_never_past_it(values, rate):
-    maximum, before = RunningMaximum(rate), -math.inf
-    for count, value in enumerate(values, start=1):
-        maximum.score(value)
-        assert before <= maximum.smoothed <= maximum.largest == max(values[:count])
-        before = maximum.smoothed
-
-
 # What all optimisers promise
 
 
@@ -130,27 +119,6 @@ def test_global_generators_and_dtype_are_neither_moved_nor_read(kind):
     assert torch.get_default_dtype() == torch.float32
     torch.manual_seed(1)
     np.testing.assert_array_equal(drive(kind(3, QUICK, 2), 20, bowl), asked)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_numbers_that_are_not_finite_are_refused(kind, bad):
-    optimizer = kind(2, QUICK, 0)
-    with pytest.raises(NotFinite, match="mean_return"):
-        optimizer.tell(np.array([0.5, 0.5]), bad)
-    with pytest.raises(NotFinite, match="u is"):
-        optimizer.tell(np.array([0.5, bad]), 1.0)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_state_of_another_optimiser_is_refused(kind):
-    state = kind(2, QUICK, 0).state()
-    with pytest.raises(CheckpointError, match="dimension"):
-        kind(3, QUICK, 0).load(state)
-    with pytest.raises(CheckpointError, match="seed"):
-        kind(2, QUICK, 1).load(state)
-    with pytest.raises(CheckpointError, match="kind"):
-        KINDS[kind is SobolOptimizer](2, QUICK, 0).load(state)
 
 
 def test_independent_scenes_are_uniform_have_no_score_and_do_not_depend_on_returns():

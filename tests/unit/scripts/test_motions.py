@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
-from risk_sac.scripts.motions import SIZE, Act, Genes, Seen, act, adversaries_seen, cue, is_over
+from risk_sac.scripts.motions import SIZE, Act, Genes, Seen, act, adversaries_seen, cue
 
 MIDDLE = Genes(*[0.5] * SIZE)
 unit = st.floats(0, 1)
@@ -67,12 +67,6 @@ def test_crossing_traffic_hurries_when_it_would_be_late_and_waits_when_early(sid
     assert act(keen._replace(aside=0.0), late, -0.1, pedestrian=False).drive == 0.4
 
 
-def test_crossing_traffic_has_its_cue_when_the_ego_is_near():
-    oncoming = Seen(0.0, 50.0, 3.0, -1.0, 0.0, 10.0, 10.0)  # 2.5 s from meeting
-    assert cue(MIDDLE._replace(cue=0.6), oncoming, pedestrian=False)
-    assert not cue(MIDDLE, oncoming, pedestrian=False)
-
-
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_pedestrian_waits_for_the_ego_and_then_steps_out(side):
     far = Seen(3.0, 60.0, -5.0 * side, 0.0, 1.0 * side, 1.0, 10.0)
@@ -83,13 +77,6 @@ def test_a_pedestrian_waits_for_the_ego_and_then_steps_out(side):
     assert not cue(keen, far._replace(x_m=11.5), pedestrian=True)
     assert cue(keen, far._replace(x_m=10.5), pedestrian=True)
     assert act(keen, near, 0.0, pedestrian=True).drive == pytest.approx(0.4)
-
-
-def test_a_vehicle_has_its_cue_at_a_time_of_its_own():
-    assert not cue(MIDDLE, beside(time_s=3.4), pedestrian=False)
-    assert cue(MIDDLE, beside(time_s=3.5), pedestrian=False)
-    assert not is_over(MIDDLE, 5.0)
-    assert is_over(MIDDLE, 5.1)
 
 
 def test_the_observation_is_read_back_in_metres():

@@ -194,17 +194,6 @@ def test_braking_to_a_halt_by_hand() -> None:
     assert speeds[-1] == pytest.approx(0.0, abs=0.05)
 
 
-def test_an_odd_may_widen_what_is_usual_up_to_the_extreme() -> None:
-    usual = limits_on(1.0)
-    assert (usual.lateral_mps, usual.lateral_accel_mps2) == (1.2, 1.5)
-    wide = limits_on(1.0, vehicle_lateral_speed_mps=Interval(low=0, high=1.8))
-    assert (wide.lateral_mps, wide.lateral_accel_mps2) == (1.8, 1.5)
-    narrow = limits_on(1.0, vehicle_lateral_speed_mps=Interval(low=0, high=0))
-    assert drive([(0.0, 1.0)] * 20, narrow, 10.0, road(), 3.0)[3][-1] == 0.0
-    runs = limits_on(1.0, pedestrian_speed_mps=Interval(low=0, high=3))
-    assert runs.walk_speed_mps == 3.0
-
-
 @settings(max_examples=50)
 @given(sequences, st.floats(0, 2), st.floats(-math.pi, math.pi), st.sampled_from((2.0, 3.0)))
 def test_pedestrians_keep_their_limits(actions: Actions, speed_mps: float, heading: float, top_mps: float) -> None:
@@ -230,24 +219,3 @@ def test_a_pedestrian_that_turns_the_other_way_is_mirrored(actions: Actions, spe
     for drive_, turn in actions:
         a, b = one.step(drive_, turn), other.step(drive_, -turn)
         assert (a.x_m, a.y_m, a.speed_mps) == pytest.approx((b.x_m, -b.y_m, b.speed_mps))
-
-
-def test_a_pedestrian_turns_left_by_hand() -> None:
-    control = PedestrianControl(LIMITS, Walker(1.0, 2.0, 0.0, 1.0))
-    walker = control.step(0.0, 1.0)
-    assert walker.speed_mps == 1.0
-    assert walker.heading_rad == pytest.approx(0.05)  # 5 m/s³ for 0.1 s across, at 1 m/s
-    assert (walker.x_m, walker.y_m) == pytest.approx((1.0 + 0.1 * math.cos(0.025), 2.0 + 0.1 * math.sin(0.025)))
-    for _ in range(5):
-        before, walker = walker, control.step(0.0, 1.0)
-    assert walker.heading_rad - before.heading_rad == pytest.approx(0.15)  # 1.5 m/s² / 1 m/s
-
-
-@pytest.mark.parametrize("turn", [-1.0, 1.0])
-def test_a_runner_turns_more_slowly_than_who_stands(turn: float) -> None:
-    rates = []
-    for speed in (0.0, 1.0, 2.0, 3.0):
-        control = PedestrianControl(replace(LIMITS, walk_speed_mps=3.0), Walker(0.0, 0.0, 0.0, speed))
-        states = [control.step(0.0, turn) for _ in range(10)]
-        rates.append((states[-1].heading_rad - states[-2].heading_rad) / STEP_S)
-    assert rates == pytest.approx([2.0 * turn, 1.5 * turn, 0.75 * turn, 0.5 * turn])

@@ -42,13 +42,6 @@ def expected(perception: Perception, belief: Belief) -> dict[str, list[float]]:
     return {id_: column[list(MOTION)].tolist() for id_, known, sees, column in columns if known and not sees}
 
 
-def test_who_was_never_seen_is_hidden() -> None:
-    perception = Perception(3.0, WITHIN_100_M)
-    belief = look(perception, 1.0, "parked")
-    assert hidden(belief) == {"walker"}
-    assert expected(perception, belief) == {}
-
-
 def test_who_goes_out_of_sight_is_expected_to_go_on_until_memory_ends() -> None:
     perception = Perception(2.0, WITHIN_100_M)
     belief = look(perception, 1.0, "walker", "parked")

@@ -48,21 +48,6 @@ def lane(road: Road, id_: str) -> Lane:
     return next(each for each in road.lanes if each.id == id_)
 
 
-def test_a_straight_road_has_its_lanes_side_by_side(sim: SumoSimulation) -> None:
-    road = loaded(sim, "low", ("road",))
-    right, middle, left = road.lanes
-    assert (right.left, middle.left, left.left) == ("road_1", "road_2", "")
-    assert (right.right, middle.right, left.right) == ("", "road_0", "road_1")
-    assert middle.may_change_left
-    assert middle.may_change_right
-    assert not left.may_change_left
-    assert [each.width_m for each in road.lanes] == [3.3] * 3
-    assert [each.limit_mps for each in road.lanes] == pytest.approx([16.67] * 3)
-    np.testing.assert_allclose(right.line, [[0.0, 1200.0], [-3.3, -3.3]], atol=0.01)
-    assert all(each.on_route for each in road.lanes)
-    assert road.stop_lines == ()
-
-
 def test_the_route_through_a_junction_is_marked_and_its_signals_are_told(sim: SumoSimulation) -> None:
     road = loaded(sim, "dense", ("from_south", "to_west"))
     on_route = {each.id for each in road.lanes if each.on_route}

@@ -112,18 +112,6 @@ def test_the_corridor_is_where_the_vehicle_is_in_its_lane(side: int) -> None:
     assert target(beside, offset_m=side * 0.5) == pytest.approx(Target(29.75, 0.0))
 
 
-def test_a_leader_is_followed() -> None:
-    assert target((32.3, 0.0, 0.0, 8.0, 0.0, CAR), speed_mps=13.0) == pytest.approx(Target(10.0, 8.0))
-
-
-def test_a_leader_that_is_not_caught_up_with_needs_no_telling() -> None:
-    assert target((52.3, 0.0, 0.0, 13.0, 0.0, CAR)) == CLEAR
-
-
-def test_who_comes_from_behind_keeps_the_distance_itself() -> None:
-    assert target((EGO[0] - 7.0, 0.0, 0.0, 20.0, 0.0, CAR)) == CLEAR
-
-
 @sides
 @pytest.mark.parametrize(
     ("sideways_mps", "expected"), [(0.0, CLEAR), (0.5, CLEAR), (1.2, Target(5.0, 8.0))], ids=["keeps", "drifts", "in"]
@@ -143,16 +131,6 @@ def test_crossing_traffic_is_stopped_for_once_it_would_have_to_brake_hard(
     # From 6 m/s it stops by 2.5 m/s² in 7.2 m, which it covers in 1.2 s.
     y = side * (CORRIDOR_M + 2.3 + 6.0 * enters_s - 1e-6)
     assert target((40.0, y, -side * math.pi / 2, 0.0, -side * 6.0, CAR)) == pytest.approx(expected)
-
-
-@sides
-def test_a_car_that_stands_across_or_tilted_is_stopped_for(side: int) -> None:
-    assert target((40.0, side * 1.0, math.pi / 2, 0.0, 0.0, CAR)) == pytest.approx(Target(19.075, 0.0))
-    tilt = math.radians(15)
-    reach_m = 2.3 * math.cos(tilt) + WIDTH_M / 2 * math.sin(tilt)
-    assert target((40.0, side * 2.0, side * tilt, 0.0, 0.0, CAR)) == pytest.approx(Target(20.0 - reach_m, 0.0))
-    aside_m = CORRIDOR_M + 2.3 * math.sin(tilt) + WIDTH_M / 2 * math.cos(tilt)
-    assert target((40.0, side * (aside_m + 0.01), side * tilt, 0.0, 0.0, CAR)) == CLEAR
 
 
 @settings(max_examples=100)

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.errors import SimulationError
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
@@ -86,29 +85,8 @@ def test_only_after_the_release_a_command_is_driven_whatever_is_in_the_way(sim: 
     assert driven(released=False) < 11.0
 
 
-def with_walkers(*starts: PedestrianStart) -> Layout:
-    return replace(middle(FAMILIES["mixed"]), pedestrians=starts)
-
-
 def pedestrian(id_: str, heading: float, speed_mps: float) -> PedestrianStart:
     return PedestrianStart(id=id_, role=Role.ADVERSARY, x_m=500.0, y_m=-9.0, heading_rad=heading, speed_mps=speed_mps)
-
-
-def test_walkers_walk_on_and_halt_by_hand(sim: SumoSimulation) -> None:
-    sim.reset(with_walkers(pedestrian("up", math.pi / 2, 1.5), pedestrian("back", math.pi, 1.0)), 0)
-    for _ in range(2):
-        sim.walk_on()
-    frame = sim.step()
-    assert frame.x_m[-2:] == pytest.approx([500.0, 499.8])
-    assert frame.y_m[-2:] == pytest.approx([-8.7, -9.0])
-    assert frame.speed_mps[-2:].tolist() == [1.5, 1.0]
-    assert frame.vy_mps[-2:] == pytest.approx([1.5, 0.0], abs=1e-9)
-    sim.halt_walkers()
-    sim.walk_on()
-    halted = sim.step()
-    assert halted.speed_mps[-2:].tolist() == [0.0, 0.0]
-    assert np.array_equal(halted.x_m[-2:], frame.x_m[-2:])
-    assert np.array_equal(halted.heading_rad[-2:], frame.heading_rad[-2:])
 
 
 def test_room_is_what_is_left_of_the_road_on_both_sides(sim: SumoSimulation) -> None:
@@ -152,13 +130,6 @@ def test_a_released_driver_intends_to_stop_for_a_pedestrian_in_its_way(sim: Sumo
     assert intended(12.0) < -4.0
     assert intended(39.0) > -0.5
     assert intended(-12.0) > -0.5
-
-
-def test_what_sumo_refuses_is_reported(sim: SumoSimulation) -> None:
-    layout = middle(FAMILIES["low"])
-    with pytest.raises(SimulationError, match=r"low/low\.net\.xml"):
-        sim.reset(replace(layout, ego=replace(layout.ego, route=("nowhere",))), 0)
-    assert sim.reset(layout, 0).ids[0] == "ego"
 
 
 def test_each_frame_is_perceived_once_and_before_the_next_step(

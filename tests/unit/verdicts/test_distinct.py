@@ -5,9 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.errors import NotFinite
 from risk_sac.records import Collision
-from risk_sac.verdicts.distinct import DistinctFailures, FailureKind, cell_of, distinct_failures, kind_of
+from risk_sac.verdicts.distinct import DistinctFailures, FailureKind, distinct_failures, kind_of
 from tests.builders import collision, judgement
 
 
@@ -58,12 +57,6 @@ def test_the_count_is_the_same_in_any_order_and_after_a_resume(hits: list[Collis
     for hit in shuffled + hits[:3]:
         again.add(hit)
     assert found.count == again.count == len(distinct_failures(hits))
-
-
-def test_infinite_features_lie_at_the_edge_and_nan_nowhere() -> None:
-    assert cell_of(failure(ego=float("inf"))) == (1, 0, 0)
-    with pytest.raises(NotFinite, match="wanted no NaN"):
-        cell_of(failure(other=float("nan")))
 
 
 def kind(judged: dict[str, Any] | None = None, **changes: Any) -> FailureKind:

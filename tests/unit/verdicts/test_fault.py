@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.records import ConflictType, Fault, Grade, Severity
+from risk_sac.records import ConflictType, Fault, Grade
 from risk_sac.scenario.ground import Area
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.fault import Parts, fault, has_to_yield, parts_of_violation
@@ -17,11 +17,9 @@ from tests.unit.verdicts.staged import (
     STREET,
     WALKING,
     Motion,
-    crossing_car,
     cut_in,
     judged,
     leader_brakes,
-    merge,
     pedestrian_crosses,
     sideways,
     stage,
@@ -100,11 +98,6 @@ def test_an_ego_that_speeds_up_past_a_pedestrian_it_sees_at_its_way() -> None:
     assert (found.fault, found.ego_response) == (Fault.EGO, "accelerating")
 
 
-def test_an_ego_that_keeps_its_speed_there_shares_the_fault_of_a_pedestrian_that_has_to_yield() -> None:
-    found = judged(past_a_pedestrian(0.0))
-    assert (found.grade, found.fault) == (Grade.PREVENTABLE, Fault.SHARED)
-
-
 def starts_into(entered_s: float) -> Evidence:
     """The ego stands at 50, a car comes from the right on red, waits at its way from 1 s on, and both start."""
     ego = straight(45.0, 0.0, 0.0, 0.0, (3.0, 2.3))
@@ -140,11 +133,6 @@ def test_an_ego_that_passes_a_vehicle_at_a_crossing_from_behind_which_a_pedestri
     assert (found.fault, found.grade) == (Fault.EGO, Grade.UNAVOIDABLE)
 
 
-def test_flanks_that_touch_at_a_crawl_are_minor() -> None:
-    found = judged(cut_in(gap=-3.0, ego=2.0, other=2.0, rate=0.4))
-    assert found.severity is Severity.MINOR
-
-
 def test_an_unsafe_cut_in_before_an_ego_that_brakes_at_once() -> None:
     ego = straight(0.0, 0.0, 0.0, 14.0, (2.6, -7.5))
     beside = straight(14.0 * 3.5 + CAR_M[0] - 1.0 - 9.0 * 3.5, LANE_M, 0.0, 9.0)
@@ -160,30 +148,8 @@ def test_an_unsafe_cut_in_that_the_ego_had_the_time_to_answer() -> None:
     assert (found.grade, found.fault) == (Grade.PREVENTABLE, Fault.SHARED)
 
 
-def test_a_brake_check_before_an_ego_that_brakes_at_once() -> None:
-    ego, leader = straight(0.0, 0.0, 0.0, 14.0, (2.5, -8.0)), straight(CAR_M[0] + 2.0, 0.0, 0.0, 14.0, (2.0, -8.0))
-    found = judged(stage(ego, leader))
-    assert (found.broke, found.fault) == (("brake_check",), Fault.OTHER)
-
-
 def test_a_follower_that_does_not_brake_shares_the_fault_of_a_brake_check() -> None:
     assert judged(leader_brakes()).fault is Fault.SHARED
-
-
-def test_an_ego_that_drives_into_a_standing_leader() -> None:
-    found = judged(stage(straight(0.0, 0.0, 0.0, 12.0), straight(75.0, 0.0, 0.0, 0.0)))
-    assert (found.broke, found.fault) == ((), Fault.EGO)
-
-
-def test_an_ego_that_comes_over_to_its_neighbour() -> None:
-    assert judged(merge()).fault is Fault.EGO
-
-
-def test_a_crossing_car_without_rules_is_judged_by_the_proper_response() -> None:
-    found = judged(crossing_car(ego=12.0, other=12.0))
-    assert found.broke == found.ego_broke == ()
-    assert found.grade is Grade.PREVENTABLE
-    assert found.fault is Fault.EGO
 
 
 def test_what_is_not_valid_has_no_fault() -> None:

@@ -8,7 +8,6 @@ from risk_sac.scenario.ground import Area
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import DEFINITIONS, judge
 from tests.unit.verdicts.staged import (
-    LANE_M,
     STREET,
     WALKING,
     crossing_car,
@@ -16,7 +15,6 @@ from tests.unit.verdicts.staged import (
     leader_brakes,
     mirrored,
     pedestrian_crosses,
-    sideways,
     stage,
     straight,
 )
@@ -105,11 +103,6 @@ def test_what_the_ego_did_about_it(accel: tuple[tuple[float, float], ...], respo
     assert judged(evidence).ego_response == response
 
 
-def test_an_ego_that_sets_off_again_where_it_has_just_stopped_is_starting() -> None:
-    ego = straight(0.0, 0.0, 0.0, 6.0, (0.5, -6.0), (1.6, 2.0))
-    assert judged(stage(ego, straight(23.0, 0.0, 0.0, 0.0))).ego_response == "starting"
-
-
 @pytest.mark.parametrize(("turn", "name"), [(1, "left_turn"), (-1, "right_turn")])
 @pytest.mark.parametrize("speed_mps", [6.0, 1.2])  # the slower one has turned by 17 degrees in the last 3 s
 def test_an_ego_in_a_turn(turn: int, name: str, speed_mps: float) -> None:
@@ -124,11 +117,6 @@ def test_an_ego_in_a_turn(turn: int, name: str, speed_mps: float) -> None:
         assert found.conflict_s < 1.0  # foreseen round the bend
 
 
-def test_an_ego_that_changes_lanes() -> None:
-    ego = sideways(straight(0.0, 0.0, 0.0, 12.0), 1.5, 1.2, LANE_M)
-    assert judged(stage(ego, straight(70.0, LANE_M, 0.0, 0.0))).ego_manoeuvre == "lane_change"
-
-
 @pytest.mark.parametrize(
     ("x", "where"), [(100.0, "crossing"), (104.0, "beside_crossing"), (106.0, "lane"), (120.0, "junction")]
 )
@@ -136,8 +124,3 @@ def test_grounds(x: float, where: str) -> None:
     evidence = stage(straight(20.0, 0.0, 0.0, 12.0), straight(x, 0.0, 0.0, 0.0), kinds=WALKING)
     junctions = (Area.box(115.0, 130.0, -10.0, 10.0),)
     assert judged(replace(evidence, ground=replace(evidence.ground, junctions=junctions))).ground == where
-
-
-def test_contact_in_the_only_frame() -> None:
-    found = judged(stage(straight(0.0, 0.0, 0.0, 10.0), straight(3.0, 0.0, 0.0, 0.0)))
-    assert (found.conflict_s, found.grade, found.unresponsive) == (-1.5, Grade.UNAVOIDABLE, False)

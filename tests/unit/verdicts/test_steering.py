@@ -170,12 +170,6 @@ def test_a_pedestrian_beside_the_road_is_struck_by_an_ego_that_left_it() -> None
     assert (found.hidden, found.grade) == (False, Grade.PREVENTABLE)
 
 
-def test_an_unseen_pedestrian_beside_the_road_would_not_have_been_struck_from_the_lane() -> None:
-    evidence = leaves_the_road()
-    unseen = replace(evidence, known=evidence.known & (np.arange(2) == 0))
-    assert judged(unseen).grade is Grade.PREVENTABLE
-
-
 @pytest.mark.parametrize("speed", [8.0, 12.0])
 def test_an_ego_that_drifts_into_oncoming_traffic_is_avoided_by_keeping_the_lane(speed: float) -> None:
     ego = sideways(straight(0.0, 0.0, 0.0, speed), 3.0, 1.5, LANE_M)

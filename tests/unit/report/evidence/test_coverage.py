@@ -62,17 +62,6 @@ def test_what_was_played_failed_and_refused_in_each_bin_and_what_never_was():
     assert [(each.name, each.played, each.failed) for each in crossing.bins] == [("zebra", 2, 0), ("signalised", 1, 1)]
 
 
-def test_pairs_are_counted_together_and_their_empty_cells_named():
-    found = coverage(MIXED, Odd(), [scene(), scene(crossing=1.0, friction=1.0)])
-    pair = next(each for each in found.pairs if each.parameters == ("crossing", "friction"))
-    assert (pair.cells, pair.played, pair.failed) == (8, 2, 0)
-    assert len(pair.never) == 6
-    assert "zebra × 0.9 to 1" in pair.never
-    assert "signalised × 0.9 to 1" not in pair.never
-    parameters = len(MIXED.space.parameters)
-    assert len(found.pairs) == parameters * (parameters - 1) // 2
-
-
 def test_bins_follow_the_odd_and_what_it_allows_beyond_scenes_is_named():
     odd = Odd.model_validate({"environment": {"friction": {"low": 0.8, "high": 0.9}}})
     found = coverage(MIXED, odd, [])

@@ -86,18 +86,6 @@ def test_it_says_what_was_found_how_often_and_where_nobody_looked(told):
         assert told.runs[0].digest in each
 
 
-def test_it_tells_of_each_requirement_what_was_found_and_how_often(spec, finished):
-    some = spec.model_copy(update={"methods": ("sac",), "seeds": (0,), "iid": Iid(episodes=8)})
-    fresh = [drawn(finished, run, letters) for run, letters in zip(some.drawn(), ("kkkkkkkk", "kkvkkkkk"), strict=True)]
-    told = compare(some, [*(finished(run, "kvvk", "k") for run in some.searches()), *fresh], "")
-    document = report(told, gathered(told), origin(), power(told))
-    text = markdown(document)
-    assert "| low | sac | never_fast | failure | 2 | 2 | 1 | 1 | 0.500 \\[0.150, 0.850\\] |" in text
-    assert "| low | sac | safe_ttc | report | 2 | – | – | – | 0.500 \\[0.150, 0.850\\] |" in text
-    assert "| low | random adversaries | never_fast | failure | 1 of 8 | 1 of 8 | 47.07 % | 0.64 % |" in text
-    assert "| low | undisturbed | never_fast | failure | 0 of 8 | 0 of 8 | 31.23 % | 0.00 % |" in text
-
-
 def test_an_i_i_d_phase_is_in_no_other_number(told, spec, runs):
     without = compare(spec, runs, "")
     assert told.cells == without.cells
@@ -200,11 +188,3 @@ def test_a_campaigns_folder_is_told_with_what_is_unfinished_or_damaged_in_it(tmp
     ]
     assert "is not finished" in found.missing[0].reason
     assert [run.spec.id for run in found.undrawn] == ["low-iid-undisturbed-0", "low-iid-random-0"]
-
-
-def test_a_family_whose_place_on_a_map_is_gone_is_named_and_the_others_are_told(spec, monkeypatch, tmp_path):
-    monkeypatch.setenv("RISK_SAC_PLACES", str(tmp_path))
-    gone = CampaignSpec.model_validate(spec.model_dump() | {"families": ("low", "junction_0123456789ab")})
-    for text in both(compare(gone, [], "")):
-        assert "junction_0123456789ab: family: there is no" in text
-        assert "posted limit" in text

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from service.settings import ServiceSettings
-
 RISK_SAC = [sys.executable, "-c", "import sys; from risk_sac.cli import main; sys.exit(main())"]
 PROGRAMS = {
     "service": [sys.executable, "-m", "service"],
@@ -50,8 +48,3 @@ def test_a_missing_folder_of_secrets_or_a_file_in_its_place_ends_the_start_in_on
     ended = start("keys", tmp_path / "data", secrets_dir=str(tmp_path / "secrets"))
     assert (ended.returncode, ended.stderr.count("\n")) == (2, 1)
     assert "which is no folder" in ended.stderr
-
-
-@pytest.mark.parametrize(("given", "path"), [("sim", "/sim"), ("/a/b/", "/a/b"), ("/", ""), ("", "")])
-def test_a_root_path_is_taken_with_its_slashes_and_without(given: str, path: str) -> None:
-    assert ServiceSettings(root_path=given).root_path == path

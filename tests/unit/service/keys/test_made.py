@@ -49,15 +49,6 @@ def test_the_command_notes_in_the_database_that_there_are_keys(settings: Service
     store.close()
 
 
-def test_a_key_that_cannot_be_noted_is_not_made(
-    file: KeyFile, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("RISK_SAC_DATABASE_URL", "postgresql+psycopg://nobody@127.0.0.1:1/nothing")
-    assert main(CREATE) == 1
-    assert "storage failed while opening the database" in capsys.readouterr().err
-    assert not file.path.exists()
-
-
 def test_the_command_takes_lost_keys_for_lost(
     settings: ServiceSettings, file: KeyFile, capsys: pytest.CaptureFixture[str]
 ) -> None:

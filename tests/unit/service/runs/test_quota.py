@@ -12,11 +12,6 @@ def usage(queued_runs: int = 0, hours: float = 0.0) -> Usage:
     return Usage(queued_runs=queued_runs, cpu_s=3600.0 * hours)
 
 
-@pytest.mark.parametrize(("waiting", "new"), [(0, 10), (9, 1), (5, 5)])
-def test_a_project_may_fill_its_queue(waiting: int, new: int) -> None:
-    check_quota(usage(waiting), new, SETTINGS)
-
-
 @pytest.mark.parametrize(("waiting", "new"), [(0, 11), (9, 2), (10, 1)])
 def test_one_run_more_is_refused_with_the_figures(waiting: int, new: int) -> None:
     with pytest.raises(

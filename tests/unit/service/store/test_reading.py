@@ -1,10 +1,9 @@
 import math
 
 import pytest
-from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Fault, Grade, Outcome, RequirementResult, Severity, State, stored
+from risk_sac.records import Fault, Grade, Outcome, RequirementResult, Severity, State
 from service.errors import NotFoundError
 from service.store.finding import Judged
 from tests.begun import start
@@ -41,16 +40,6 @@ def test_pages_continue_where_they_ended_while_more_arrives(store, ledger, episo
     assert second.last is None
     failures = store.episodes(campaign.id, limit=10, run_id="low-risk-sac-3", outcomes=[Outcome.FAILURE])
     assert [item.index for item in failures.items] == [1, 3]
-
-
-@pytest.mark.parametrize(
-    ("search", "found"),
-    [("night", ["Nightly 100%", "late night"]), ("LATE night", ["late night"]), ("0%", ["Nightly 100%"]), ("_", [])],
-)
-def test_a_search_finds_words_of_a_label_in_any_case(store, ledger, search, found):
-    for label in ("late night", "Nightly 100%", "other"):
-        ledger.create(SPEC.model_copy(update={"label": label}))
-    assert [item.label for item in store.campaigns(limit=9, search=search).items] == found
 
 
 @pytest.mark.parametrize(
@@ -91,21 +80,6 @@ def test_a_pause_that_the_disk_refuses_to_note_is_shown_all_the_same(store, ledg
     store.refusal = None
     assert store.campaign(campaign.id).state is State.RUNNING
     assert store.revision(campaign.id) == before
-
-
-def test_lists_are_filtered_by_state_family_method_and_label(store, ledger):
-    low = ledger.create(SPEC)
-    mixed = ledger.create(CampaignSpec(label="night", families=("low", "mixed"), methods=("sac",)))
-    ledger.cancel(low.id)
-
-    def found(**wanted):
-        return [item.id for item in store.campaigns(limit=5, **wanted).items]
-
-    assert found() == found(family="low") == [mixed.id, low.id]
-    assert found(state=State.CANCELLED) == found(method="random") == [low.id]
-    assert found(label="night") == found(family="mixed", method="sac") == [mixed.id]
-    assert found(label="") == [low.id]
-    assert found(family="mixed", method="random") == found(state=State.FAILED) == []
 
 
 def test_contacts_are_found_by_grade_severity_fault_what_was_broken_and_signature(store, ledger, episode):
@@ -191,23 +165,3 @@ def test_an_id_with_a_nul_is_unknown_on_every_database(store, ledger):
             store.episodes(campaign.id, limit=1, run_id=wrong)
         with pytest.raises(NotFoundError):
             store.failure(campaign.id, f"{wrong}-search-0")
-
-
-def test_plain_episodes_are_the_stored_ones_in_their_order(store, ledger, episode):
-    campaign, other = ledger.create(SPEC), ledger.create(SPEC)
-    number = start(store, ledger)
-    outcomes = [Outcome.FAILURE, Outcome.SAFE, Outcome.DEGENERATE, Outcome.FAILURE]
-    for index, outcome in enumerate(outcomes):
-        ledger.add_episodes([(number, episode(index, outcome))])
-    assert list(store.plain_episodes(other.number)) == []
-    found = list(store.plain_episodes(campaign.number))
-    assert [(each.run_number, each.index, each.outcome) for each in found] == [
-        (number, index, outcome) for index, outcome in enumerate(outcomes)
-    ]
-    shown = store.episodes(campaign.id, limit=9).items
-    assert [
-        each.record.items() <= from_json(stored(each_shown)).items()
-        for each_shown, each in zip(shown, found, strict=True)
-    ] == [True] * 4
-    some = store.plain_episodes(campaign.number, (Outcome.FAILURE, Outcome.DEGENERATE))
-    assert [each.index for each in some] == [0, 2, 3]

@@ -11,11 +11,10 @@ from sqlalchemy import create_engine, inspect
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import EpisodeDone
 from risk_sac.records import DrivenBy, Outcome, TriageState
-from service.errors import StorageError
 from service.host.data_folder import hold_data_folder
 from service.settings import ServiceSettings
 from service.store.__main__ import main
-from service.store.database import held, newest_step, present_step, step_back
+from service.store.database import held, newest_step, present_step
 from service.store.finding import Judged
 from service.store.reading import Store
 from service.store.stored import StoredCampaign
@@ -98,15 +97,6 @@ def test_no_step_is_taken_beneath_a_server(settings, capsys):
             assert main(["back"]) == 1
         assert "is in use by another server" in capsys.readouterr().err
     assert present_step(store.engine) == newest_step()
-    store.close()
-
-
-def test_a_database_of_a_newer_version_is_not_taken_back(settings):
-    store = Store(settings.url)
-    with store.engine.begin() as connection:
-        connection.exec_driver_sql("UPDATE alembic_version SET version_num = '9999'")
-    with pytest.raises(StorageError, match="database is at step 9999"):
-        step_back(store.engine)
     store.close()
 
 

@@ -13,13 +13,6 @@ from tests.begun import start
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
 
 
-def test_runs_leave_the_queue_in_the_order_they_came(store, ledger):
-    first, second = ledger.create(SPEC), ledger.create(SPEC)
-    left = [start(store, ledger) for _ in range(8)]
-    assert left == [run.number for run in first.runs + second.runs]
-    assert store.waiting() == {}
-
-
 def test_episodes_told_together_are_each_stored_and_one_change(store, ledger, episode):
     campaign = ledger.create(SPEC)
     first, second = start(store, ledger), start(store, ledger)
@@ -159,17 +152,6 @@ def test_what_has_no_worker_any_more_waits_again_or_ends_cancelled(store, ledger
     assert ledger.resume() == 0
 
 
-def test_a_pause_is_written_with_its_reason_and_can_be_cancelled(store, ledger):
-    campaign = ledger.create(SPEC)
-    number = start(store, ledger)
-    ledger.pause([number], "no room")
-    paused = store.campaign(campaign.id)
-    assert (paused.state, paused.reason) == (State.PAUSED, "run low-risk-sac-3: no room")
-    assert (paused.runs[0].state, paused.runs[0].reason) == (State.PAUSED, "no room")
-    assert ledger.cancel(campaign.id) == []
-    assert store.campaign(campaign.id).state is State.CANCELLED
-
-
 def test_every_stored_change_has_another_revision(store, ledger, episode, metrics):
     campaign = ledger.create(SPEC)
     seen = [store.revision(campaign.id)]
@@ -198,40 +180,6 @@ def test_a_deleted_campaign_leaves_no_row(store, ledger, episode):
             column = "number" if table == "campaigns" else "campaign_number"
             numbers = connection.exec_driver_sql(f"SELECT DISTINCT {column} FROM {table}").scalars().all()
             assert numbers == [kept.number]
-
-
-def test_a_triage_is_kept_and_moves_the_revision(store, ledger, episode):
-    campaign = ledger.create(SPEC)
-    ledger.add_episodes([(start(store, ledger), episode(5, Outcome.DEGENERATE))])
-    failure = "low-risk-sac-3-search-5"
-    assert store.triage(campaign.id, failure) is None
-    assert store.triages(campaign.number) == {}
-    before = store.revision(campaign.id)
-    noted = ledger.triage(campaign.id, failure, TriageState.CONFIRMED, "late, ünd\nof two lines")
-    assert store.triage(campaign.id, failure) == noted
-    assert (noted.state, noted.comment) == (TriageState.CONFIRMED, "late, ünd\nof two lines")
-    revision = store.revision(campaign.id)
-    assert revision != before
-    assert ledger.triage(campaign.id, failure, noted.state, noted.comment) == noted, "the same again changes nothing"
-    assert store.revision(campaign.id) == revision
-    changed = ledger.triage(campaign.id, failure, TriageState.FIXED, "")
-    assert (changed.state, changed.comment) == (TriageState.FIXED, "")
-    assert store.revision(campaign.id) != revision
-    (stored,) = store.plain_episodes(campaign.number)
-    assert store.triages(campaign.number) == {stored.number: TriageState.FIXED}
-
-
-def test_only_a_contact_of_the_project_has_a_triage(store, ledger, episode):
-    campaign = ledger.create(SPEC, project="maps")
-    number = campaign.runs[0].number
-    ledger.start_run(number)
-    ledger.add_episodes([(number, episode(0)), (number, episode(1, Outcome.FAILURE))])
-    for failure, project in (("low-risk-sac-3-search-0", "maps"), ("low-risk-sac-3-search-1", "rivals"), ("x", "maps")):
-        with pytest.raises(NotFoundError):
-            ledger.triage(campaign.id, failure, TriageState.NEW, "", project)
-        with pytest.raises(NotFoundError):
-            store.triage(campaign.id, failure, project)
-    assert store.triages(campaign.number) == {}
 
 
 def test_a_triage_outlives_that_its_run_reports_the_episode_again(store, ledger, episode):

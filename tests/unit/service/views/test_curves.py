@@ -1,5 +1,3 @@
-import json
-import math
 import random
 
 import pytest
@@ -9,7 +7,7 @@ from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec
 from risk_sac.metrics import MetricsAccumulator
-from risk_sac.records import Grade, Outcome, stored, wire
+from risk_sac.records import Grade, Outcome, stored
 from service.store.stored import PlainEpisode
 from service.views.curves import curves, spread
 from tests.builders import collision, episode_record, judgement, violation
@@ -56,17 +54,6 @@ def test_curves_are_what_the_metrics_of_the_run_were_at_each_point(ledger):
     assert found.distinct[-1] > found.distinct_preventable[-1] > 3
     assert (found.run_id, found.family, found.method, found.seed) == ("low-random-3", "low", "random", 3)
     assert [value for _, value in empty if isinstance(value, list)] == [[]] * 8
-
-
-def test_mean_cost_is_that_of_the_steps_since_the_point_before(ledger):
-    campaign = ledger.create(SPEC)
-    costs = [(0.5, 100), (0.25, 300), (0.75, 0), (math.nan, 0), (0.125, 10), (0.125, 10)]
-    records = [
-        episode_record(index, Outcome.SAFE if steps else Outcome.REJECTED, mean_cost=cost, steps=steps)
-        for index, (cost, steps) in enumerate(costs)
-    ]
-    body = wire(curves(campaign, [plain(campaign.runs[1], each) for each in records], 3))
-    assert json.loads(body)["runs"][1]["mean_cost"] == [pytest.approx((50 + 75) / 400), None, pytest.approx(0.125)]
 
 
 @given(count=st.integers(1, 3000), points=st.integers(1, 1000))

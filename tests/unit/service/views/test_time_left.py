@@ -23,12 +23,6 @@ def after_start(done, worked_s, start_s=5.0):
     return changed(RUN, episodes_done=done + 1, pace_s=pace_s, busy_s=start_s + worked_s)
 
 
-def test_there_is_no_eta_before_the_second_episode_or_without_anybody_to_work():
-    assert eta_s([RUN, RUN], SPEC, workers=2) is None
-    assert eta_s([after_start(0, 0.0)], SPEC, workers=2) is None
-    assert eta_s([after_start(19, 38.0)], SPEC, workers=0) is None
-
-
 @pytest.mark.parametrize(
     ("done", "workers", "wanted"),
     [
@@ -39,18 +33,6 @@ def test_there_is_no_eta_before_the_second_episode_or_without_anybody_to_work():
 )
 def test_eta_is_work_left_at_each_runs_own_pace(done, workers, wanted):
     assert eta_s([after_start(*each) for each in done], SPEC, workers) == pytest.approx(wanted)
-
-
-def test_a_slower_method_that_waits_is_expected_to_be_slower():
-    spec = CampaignSpec(families=("low",), methods=("random", "risk-sac"))
-    waiting = [changed(RUN, attempts=0, method=method) for method in ("random", "risk-sac")]
-    faster, slower = (eta_s([after_start(19, 38.0), each], spec, workers=1) for each in waiting)
-    assert slower > faster + 100
-
-
-def test_a_limit_of_processor_time_ends_a_search_sooner():
-    spec = CampaignSpec.model_validate({"families": ["low"], "budget": {"episodes": 100, "cpu_s": 50}})
-    assert eta_s([after_start(19, 38.0)], spec, workers=1) == pytest.approx(7.0)
 
 
 @given(st.lists(st.tuples(st.integers(1, 99), st.floats(0.1, 100)), min_size=1, max_size=6), st.integers(1, 8))
