@@ -1,3 +1,5 @@
+"""Losses and targets of SAC and DDPG by hand."""
+
 import copy
 import math
 
@@ -9,7 +11,11 @@ from hypothesis import strategies as st
 from torch.distributions import Independent, Normal, TanhTransform, TransformedDistribution
 from torch.nn.functional import layer_norm
 
+from risk_sac.agents.agent import critic_loss, td_target
+from risk_sac.agents.lagrangian import dual_step
 from risk_sac.agents.networks import Mlp, tanh_gaussian
+from risk_sac.agents.sac import actor_loss, soft_value, temperature_loss
+from risk_sac.config import LagrangianConfig
 
 
 def test_log_prob_of_a_hand_computed_case() -> None:
@@ -84,3 +90,49 @@ def test_one_input_gives_what_a_batch_gives_even_after_a_copy_or_a_change(normal
         alone = np.stack([each.respond(row.numpy()).numpy() for row in inputs])
         np.testing.assert_allclose(alone, batch, atol=1e-5)
     assert not torch.allclose(network(inputs), twin(inputs))
+
+
+def test_target_and_soft_value_of_a_hand_computed_case() -> None:
+    next_values, log_prob = torch.tensor([[3.0, 3.0], [5.0, 2.0]]), torch.tensor([-2.0, 1.0])
+    value = soft_value(next_values, log_prob, torch.tensor(0.5))
+    assert value.tolist() == [3.0 + 1.0, 2.0 - 0.5]
+    target = td_target(torch.tensor([1.0, 1.0]), torch.tensor([0.0, 1.0]), value, 0.9)
+    assert target.tolist() == pytest.approx([1.0 + 0.9 * 4.0, 1.0])
+
+
+def test_critic_loss_of_a_hand_computed_case() -> None:
+    # First critic: ½ mean(1·4, ½·0) = 1; second: ½ mean(1·1, ½·16) = 2.25.
+    assert critic_loss(torch.tensor([[2.0, 0.0], [1.0, 4.0]]), torch.tensor([1.0, 0.5])).item() == 3.25
+
+
+def test_actor_loss_of_a_hand_computed_case() -> None:
+    loss = actor_loss(torch.tensor([1.5, -0.5]), torch.tensor([1.5, 0.5]))
+    assert loss.item() == pytest.approx((1.5 * -1.5 + 0.5 * 0.5) / 2)
+
+
+def test_temperature_falls_while_entropy_exceeds_its_target_and_rises_below() -> None:
+    for entropy in (3.0, -3.0):
+        log_temperature = torch.tensor(-1.3, requires_grad=True)
+        temperature = log_temperature.exp()
+        temperature_loss(temperature, torch.tensor(entropy), target_entropy=-2.0).backward()
+        # dJ/dlog α = α (entropy - H̄)
+        assert log_temperature.grad.item() == pytest.approx(temperature.item() * (entropy + 2.0))
+
+
+CONFIG = LagrangianConfig(initial=0.5, learning_rate=0.1, cost_limit=0.2, maximum=2.0)
+
+
+def test_dual_step_of_hand_computed_cases() -> None:
+    assert dual_step(1.0, 0.7, CONFIG) == pytest.approx(1.05)
+    assert dual_step(1.0, 0.1, CONFIG) == pytest.approx(0.99)
+    assert dual_step(1.0, 0.2, CONFIG) == 1.0
+    assert dual_step(1.0, 1e9, CONFIG) == 2.0
+    assert dual_step(2.0, 0.0, CONFIG) == pytest.approx(1.98)  # it comes back from the cap
+
+
+@given(st.lists(st.floats(0.0, 1e6), max_size=30))
+def test_dual_variable_never_goes_negative_nor_above_its_cap(costs: list[float]) -> None:
+    dual_variable = CONFIG.initial
+    for cost in costs:
+        dual_variable = dual_step(dual_variable, cost, CONFIG)
+        assert 0.0 <= dual_variable <= CONFIG.maximum

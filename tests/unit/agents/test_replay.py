@@ -3,9 +3,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
-from risk_sac.agents.priority import priority
+from risk_sac.agents.priority import TERM_CAP, TermScales, importance_weights, priority
 from risk_sac.agents.replay import RiskPrioritizedReplay, Transition, UniformReplay
+from risk_sac.agents.sum_tree import SumTree
 from risk_sac.config import ReplayConfig
 
 Make = Callable[..., Transition]
@@ -141,3 +145,91 @@ def test_a_loaded_replay_draws_what_the_original_draws(kind: type[Replay], rando
 
 def expected_priorities(replay: RiskPrioritizedReplay) -> np.ndarray:
     return priority(replay._terms[:, : len(replay)], replay._scales, CONFIG)
+
+
+PRIORITY_CONFIG = ReplayConfig(
+    td_weight=1.0, return_weight=0.5, robustness_weight=0.5, priority_floor=0.05, correction=0.6
+)
+terms = hnp.arrays(np.float64, st.tuples(st.just(3), st.integers(1, 30)), elements=st.floats(-1e3, 1e3))
+
+
+def test_priority_of_a_hand_computed_case() -> None:
+    #              |δ|: min 0, mean 2      R̂: min -1, mean 1     -ρ: constant
+    stored = np.array([[0.0, 1.0, 5.0], [-1.0, 0.0, 4.0], [0.3, 0.3, 0.3]])
+    # On the common scale: 0, 1/2, 5/2 and 0, 1/2, 5/2 and nothing.
+    assert priority(stored, TermScales.of(stored), PRIORITY_CONFIG) == pytest.approx([0.05, 0.75, 3.75])
+
+
+@given(terms)
+def test_priority_is_floored_and_bounded(stored: np.ndarray) -> None:
+    values = priority(stored, TermScales.of(stored), PRIORITY_CONFIG)
+    assert (values >= PRIORITY_CONFIG.priority_floor).all()
+    assert (values <= 2.0 * TERM_CAP).all()
+
+
+@given(terms, st.floats(0.1, 10.0), st.floats(-100.0, 100.0))
+def test_priority_ignores_the_unit_and_the_zero_of_a_term(stored: np.ndarray, factor: float, offset: float) -> None:
+    spread = stored.mean(axis=1) - stored.min(axis=1)
+    stored[spread < 1e-3] = 0.0  # either side of the threshold below which a term counts as constant
+    moved = stored * factor + offset
+    before = priority(stored, TermScales.of(stored), PRIORITY_CONFIG)
+    assert priority(moved, TermScales.of(moved), PRIORITY_CONFIG) == pytest.approx(before, rel=1e-6, abs=1e-6)
+
+
+def test_one_outlier_counts_for_at_most_ten_average_terms() -> None:
+    stored = np.zeros((3, 1000))
+    stored[0] = 1.0
+    stored[0, :2] = 0.0, 1e6
+    assert priority(stored, TermScales.of(stored), PRIORITY_CONFIG).max() == TERM_CAP
+
+
+def test_importance_weights_of_a_hand_computed_case() -> None:
+    # N P = 4, 1, 1/4; ^-0.5 = 1/2, 1, 2; over the largest.
+    weights = importance_weights(np.array([1.0, 0.25, 0.0625]), size=4, correction=0.5)
+    assert weights == pytest.approx([0.25, 0.5, 1.0])
+
+
+def test_find_walks_the_cumulative_sum() -> None:
+    tree = SumTree(4)
+    tree.rebuild(np.array([1.0, 0.0, 2.0, 1.0]))  # ends at 1, 1, 3, 4
+    assert tree.total == 4.0
+    assert tree.find(np.array([0.0, 0.2, 0.25, 0.7, 0.75, 0.999])).tolist() == [0, 0, 2, 2, 3, 3]
+
+
+@given(hnp.arrays(np.float64, st.integers(1, 200), elements=st.integers(0, 2**20).map(float)), st.data())
+def test_total_is_exactly_the_sum_after_any_writes(values: np.ndarray, data: st.DataObject) -> None:
+    # Whole numbers add without rounding, so nothing but the exact sum passes.
+    tree = SumTree(len(values))
+    tree.rebuild(values)
+    for _ in range(3):
+        indices = np.array(data.draw(st.lists(st.integers(0, len(values) - 1), min_size=1, max_size=20)))
+        written = np.array(data.draw(st.lists(st.integers(0, 2**20), min_size=len(indices), max_size=len(indices))))
+        tree.set(indices, written.astype(float))
+        values[indices] = written
+    assert tree.total == values.sum()
+    assert (tree[np.arange(len(values))] == values).all()
+
+
+@given(
+    hnp.arrays(np.float64, st.integers(1, 100), elements=st.sampled_from([0.0, 1e-12, 0.1, 0.3, 1.0, 7.0, 1e9])).filter(
+        lambda values: values.sum() > 0
+    ),
+    st.lists(st.floats(0.0, 1.0), min_size=1, max_size=50),
+)
+def test_find_never_returns_a_leaf_of_priority_zero(values: np.ndarray, fractions: list[float]) -> None:
+    tree = SumTree(128)
+    tree.rebuild(values)
+    found = tree.find(np.array(fractions))
+    assert (found < len(values)).all()
+    assert (values[found] > 0).all()
+
+
+@given(hnp.arrays(np.float64, st.integers(1, 300), elements=st.integers(0, 1000).map(float)), st.data())
+def test_find_agrees_with_a_linear_scan(values: np.ndarray, data: st.DataObject) -> None:
+    values[data.draw(st.integers(0, len(values) - 1))] += 1.0
+    tree = SumTree(300)
+    tree.rebuild(values)
+    prefixes = data.draw(st.lists(st.integers(0, int(values.sum()) - 1), min_size=1, max_size=20))
+    fractions = (np.array(prefixes) + 0.5) / values.sum()
+    ends = np.cumsum(values)
+    assert tree.find(fractions).tolist() == [int(np.argmax(ends > prefix)) for prefix in prefixes]

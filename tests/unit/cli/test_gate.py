@@ -1,11 +1,18 @@
 import argparse
+import io
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 from risk_sac.cli.campaigns.gate import Bounds, verdict
-from risk_sac.client import Results, RunResult
+from risk_sac.cli.campaigns.junit import junit
+from risk_sac.cli.campaigns.output import results_table, results_tables
+from risk_sac.client import Episode, Results, RunResult
+from risk_sac.config import METHODS
 from risk_sac.errors import ConfigError
 from tests.builders import run_metrics
 
@@ -146,3 +153,125 @@ def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_fou
 @pytest.mark.parametrize("state", ["failed", "cancelled"])
 def test_a_campaign_that_was_not_measured_to_the_end_could_not_run(state: str, bounds: Bounds) -> None:
     assert verdict(results(state, {"ecr": 0.9}), bounds)[0] == 2
+
+
+METRICS = run_metrics(
+    40, failures=10, ecr=0.25, ecr_low=0.1, ecr_high=0.4, distinct_failures=4, raw_collisions=12, preventable=6
+).model_copy(
+    update={"distinct_preventable": 2, "headline_candidates": 1, "pcr": 0.15, "pcr_low": 0.05, "pcr_high": 0.3}
+)
+RUN = {
+    "id": "low-sac-0",
+    "family": "low",
+    "method": "sac",
+    "seed": 0,
+    "state": "succeeded",
+    "reason": None,
+    "metrics": METRICS,
+    "evaluation": None,
+    "spec_digest": "aa",
+    "digest": "bb",
+    "versions": {"libsumo": "1.28.0"},
+    "busy_s": 12.5,
+}
+BOUNDS = Bounds(ecr=0.1)
+SERVICE = "http://host"
+URL = "http://host/v1/campaigns/c1"
+
+
+def report(
+    *runs: dict[str, Any],
+    bounds: Bounds = BOUNDS,
+    failures: Mapping[str, Sequence[Episode]] | None = None,
+    totals: Sequence[dict[str, Any]] = (),
+    state: str = "succeeded",
+) -> ElementTree.Element:
+    results = Results.model_validate(
+        {
+            "campaign_id": "c1",
+            "state": state,
+            "complete": state == "succeeded",
+            "headline": 2,
+            "totals": [TOTAL | total for total in totals],
+            "runs": [RUN | run for run in runs],
+        }
+    )
+    written = io.BytesIO()
+    junit(results, SERVICE, URL, bounds, failures or {}).write(written, pretty=True)
+    return ElementTree.fromstring(written.getvalue())
+
+
+def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_does() -> None:
+    root = report(
+        {}, {"seed": 1, "id": "low-sac-1"}, totals=[{"runs": 2, "ecr": 0.25, "ecr_high": 0.278, "failures": 250}]
+    )
+    cases = [(case.attrib["classname"], case.attrib["name"]) for case in root.iter("testcase")]
+    assert cases == [("low.sac", "seed 0"), ("low.sac", "seed 1"), ("low.sac", "all seeds")]
+    (failure,) = root.iter("failure")
+    assert failure.attrib["message"] == (
+        "ECR above 0.1: 0.250, 95 % interval up to 0.278 (250 valid contacts in 1000 episodes)"
+    )
+
+
+def test_whatever_a_reason_holds_the_report_is_well_formed() -> None:
+    reason = "".join(map(chr, range(0x180))) + "\ud800\ufffe\uffff\U0001f697 <![CDATA[ ]]> &amp; \"'"
+    (error,) = report({"state": "failed", "reason": reason}).iter("error")
+    assert "\x1b" not in error.attrib["message"]
+    assert error.attrib["message"].endswith("\U0001f697 <![CDATA[ ]]> &amp; \"'")
+
+
+WIDE_TOTAL = TOTAL | {
+    "family": "dense",
+    "runs": 100,
+    "episodes": 100_000,
+    "raw_collisions": 99_999,
+    "failures": 99_999,
+    "ecr": 0.999,
+    "ecr_low": 0.99,
+    "ecr_high": 1.0,
+    "distinct_failures": 9_999,
+    "preventable": 9_999,
+    "distinct_preventable": 9_999,
+    "headline": 9_999,
+    "pcr": 0.999,
+    "pcr_low": 0.99,
+    "pcr_high": 1.0,
+}
+
+
+def test_results_of_every_method_fit_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
+    place = "car_following_" + "a_street_of_a_town_" * 2 + "0a1b2c3d4e5f"
+    totals = [WIDE_TOTAL | {"method": method} for method in METHODS] + [WIDE_TOTAL | {"family": place, "method": "sac"}]
+    results = {
+        "campaign_id": "c1",
+        "state": "succeeded",
+        "complete": True,
+        "headline": 12,
+        "runs": [],
+        "totals": totals,
+    }
+    Console(width=80).print(results_table(Results.model_validate(results), Bounds(ecr=0.1)))
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    assert all(f"{method} " in printed for method in METHODS)
+    assert printed.splitlines()[0].strip() == "headline failures: 12"
+    assert printed.count("above") == printed.count("100 runs") == len(totals)
+    assert place in "".join(line.split()[0] for line in printed.splitlines() if line.strip())
+
+
+def test_each_requirement_is_a_row_below_its_family_and_method(capsys: pytest.CaptureFixture[str]) -> None:
+    own = "keeps_a_distance_of_some_forty_letters_x"
+    found = requirements(no_contact=(0.1, 0.2), safe_ttc=(0.3, 0.4), **{own: (0.999, 1.0)})
+    totals = [TOTAL | {"requirements": found}, TOTAL | {"method": "random"}]  # the latter from before
+    results = {"campaign_id": "c1", "state": "succeeded", "complete": True, "runs": [], "totals": totals}
+    bounds = Bounds(requirements={"no_contact": 0.15, "safe_ttc": 0.1})
+    Console(width=80).print(results_tables(Results.model_validate(results), bounds))
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    rows = [row.split() for row in printed[printed.index("low sac") :].splitlines()]
+    assert rows[1] == ["no_contact", "failure", "12", "12", "2", "0", "0.100", "[0.000,", "0.200]"]
+    assert rows[2] == ["may", "be", "above", "0.15"]
+    assert rows[3] == ["safe_ttc", "report", "12", "–", "–", "–", "0.300", "[0.000,", "0.400]"]
+    assert rows[4] == ["above", "0.1"]
+    assert rows[5][0] + rows[6][0] == own
+    assert "low random" not in printed

@@ -1,28 +1,36 @@
 """A session with an ego in another process, over a stream: what is late, out of turn or gone never drives."""
 
 import math
+import re
+import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import grpc
 import numpy as np
 import pytest
 
-from risk_sac.egos import Control, Episode, Lane, Perceived, Road, StopLine, Trajectory
+from risk_sac import types
+from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.egos import Control, Episode, Lane, Perceived, Road, StopLine, Trajectory, pilot
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.remote.client import RemoteEgo
 from risk_sac.egos.remote.ego_pb2 import CloseReply, Command, Observation, StartReply
 from risk_sac.egos.remote.messages import METHODS, SERVICE, command_message
 from risk_sac.egos.seam import Vehicle
 from risk_sac.egos.serve import Sessions, serve
+from risk_sac.env import RiskSacEnv
 from risk_sac.errors import EgoFailed
+from risk_sac.sim import paths
 from risk_sac.types import WIDTH, Signal
+from tests.server import ROOT
 
 EPISODE = Episode(seed=0, net="", route=("a",), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=0.1)
 PATIENT_S = 60.0
@@ -275,3 +283,86 @@ def test_a_served_ego_is_told_the_road_and_its_signals() -> None:
         assert lane._replace(line=None) == sent._replace(line=None)
     assert told[0].road.stop_lines == ROAD.stop_lines
     assert seen[0].signals == (Signal.YELLOW,)
+
+
+REMOTE = Path("risk_sac/egos/remote")
+OBSERVATION = Observation(
+    session="ä1",
+    time_s=1.5,
+    actors={"id": ["ego", "lead"], "kind": [0, 1], "x_m": [0.0, -2.5]},
+    signal=3,
+    stop_line_m=math.inf,
+)
+# protoc --encode=risk_sac.egos.v2.Observation, of the same as text.
+BY_PROTOC = bytes.fromhex(
+    "0a03c3a43111000000000000f83f1a210a0365676f0a046c656164120200011a10000000000000000000000000000004c038034100000000"
+    "0000f07f"
+)
+
+
+def test_a_message_has_the_bytes_that_other_languages_read() -> None:
+    assert OBSERVATION.SerializeToString() == BY_PROTOC
+    assert Observation.FromString(BY_PROTOC) == OBSERVATION
+
+
+@pytest.mark.parametrize("name", ["ego", "osi"])
+def test_stubs_are_generated_from_their_sources(name: str, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "grpc_tools.protoc", "-I.", f"--python_out={tmp_path}", REMOTE / f"{name}.proto"]
+    subprocess.run(command, cwd=ROOT, check=True)
+    stub = REMOTE / f"{name}_pb2.py"
+    assert (tmp_path / stub).read_text() == (ROOT / stub).read_text(), "run `make protos`"
+
+
+README = (ROOT / "risk_sac" / "egos" / "README.md").read_text(encoding="utf-8")
+
+
+def rows(head: str) -> list[tuple[str, ...]]:
+    """Lines below a head of the block: numbers and names, and what is said of them."""
+    block = README.split("```\nPerceived\n")[1].split("```")[0]
+    (below,) = (part for part in f"Perceived\n{block}".split("\n\n") if part.startswith(head))
+    return [tuple(re.split(r" {2,}", line.strip())) for line in below.splitlines()[1:]]
+
+
+@pytest.fixture(scope="module")
+def readme_perceived() -> list[Perceived]:
+    """Frames of an episode with a pedestrian."""
+    seen: list[Perceived] = []
+    real = pilot.perceive
+
+    def recorded(*arguments: object) -> Perceived:
+        seen.append(real(*arguments))  # type: ignore[arg-type]
+        return seen[-1]
+
+    spec = RunSpec(family="mixed", method="no-adversary", seed=0, ego=EgoConfig(driver="idm-aeb"))
+    with pytest.MonkeyPatch.context() as patch, closing(RiskSacEnv.of(spec)) as env:
+        patch.setattr(pilot, "perceive", recorded)
+        for seed in range(20):
+            env.reset(seed=seed)
+            for _ in range(10):
+                env.step(np.zeros(env.action_size))
+            if any(len(each.ids) > 1 for each in seen):
+                return seen
+    raise AssertionError("no other actor was perceived in 20 episodes")
+
+
+@pytest.mark.parametrize(("module", "name"), [(types, "state"), (paths, "path")])
+def test_rows_are_those_of_the_code(module: object, name: str, readme_perceived: list[Perceived]) -> None:
+    told = rows(f"Rows of {name}, named in {module.__name__}\n")  # type: ignore[attr-defined]
+    assert [(int(index), getattr(module, row)) for index, row, *_ in told] == [(i, i) for i in range(len(told))]
+    (shape,) = (said for field, said in rows("Perceived") if field == name)
+    assert int(shape.partition(" x ")[0]) == len(told)
+    assert {getattr(frame, name).shape[0] for frame in readme_perceived} == {len(told)}
+
+
+def test_what_is_missing_of_others_is_nan_and_nothing_else_is(readme_perceived: list[Perceived]) -> None:
+    missing = [int(index) for index, _, *said in rows("Rows of state") if "NaN of others" in " ".join(said)]
+    assert missing
+    for frame in readme_perceived:
+        unknown = np.isnan(frame.state)
+        assert not unknown[:, 0].any()
+        assert unknown[missing, 1:].all()
+        assert not np.delete(unknown, missing, axis=0).any()
+        assert frame.state.shape[1] == len(frame.ids) == len(frame.kind)
+        assert frame.state[types.OFFSET, 0] == frame.offset_m
+        assert np.allclose(frame.path[paths.COS], np.cos(frame.path[paths.HEADING]))
+        assert not np.isnan(frame.path).any()

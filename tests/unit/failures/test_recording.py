@@ -1,7 +1,24 @@
+import math
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
+from shapely import Polygon, box
 
+import sumo_nets
+from risk_sac.config import FamilyName
+from risk_sac.failures.net import read_net, roads_of
 from risk_sac.failures.recording import Recording, trajectory_digest
+from risk_sac.failures.sentence import sentence, story
+from risk_sac.failures.signals import LETTERS, signal_heads
+from risk_sac.failures.thumbnail import EGO, HEIGHT, STRIKER, WIDTH, thumbnail
+from risk_sac.run_folder.results import RecordedFailure
+from risk_sac.scenario.families import FAMILIES
+from tests.builders import collision, judgement, violation
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
 
 
@@ -62,3 +79,164 @@ def test_the_digest_is_of_the_arrays_and_of_nothing_else() -> None:
 )
 def test_the_digest_changes_with_every_bit(change: dict[str, np.ndarray]) -> None:
     assert trajectory_digest(series() | change) != trajectory_digest(series())
+
+
+def scene(family: FamilyName, offset_s: float) -> dict[str, float]:
+    parameters = FAMILIES[family].space.parameters
+    return {each.name: (each.low + each.high) / 2 for each in parameters} | {"signal_offset_s": offset_s}
+
+
+@pytest.mark.parametrize("offset_s", [0.0, 7.1, 34.8])
+@pytest.mark.parametrize(("family", "heads"), [("low", 0), ("mixed", 6), ("dense", 16)])
+def test_heads_show_what_the_program_shows_from_where_the_scene_puts_it(
+    family: FamilyName, heads: int, offset_s: float
+) -> None:
+    found = signal_heads(family, scene(family, offset_s))
+    assert len(found) == heads
+    net = read_net(Path(sumo_nets.__path__[0]) / family / f"{family}.net.xml")
+    ends = {tuple(lane.centre[-1]): lane for lane in net.lanes.values() if lane.heads}
+    compared = 0
+    for head in found:
+        lane = ends.get((head.x_m, head.y_m))
+        if lane is None:
+            continue  # the other end of a crossing
+        link = next(each for each in lane.heads if each.turn == "s")
+        for time_s in np.arange(0.1, 25.0, 0.1):
+            letters = net.signals[link.signal].letters(offset_s + time_s)
+            assert head.colour(time_s) == LETTERS[letters[link.index].lower()]
+        compared += 1
+    assert compared == len(ends)
+
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def drawn(series: Mapping[str, Any], roads: bool = True) -> list[ET.Element]:
+    """The shapes, as a reader of XML finds them."""
+    contact = synthetic_contact()
+    text = thumbnail(Recording(contact, series), roads_of("mixed", contact.episode.scene) if roads else ())
+    root = ET.fromstring(text)
+    assert (root.tag, root.get("viewBox")) == (f"{SVG}svg", f"0 0 {WIDTH} {HEIGHT}")
+    assert not re.search(r"nan|inf|\d\.\d\d", text)
+    return list(root)
+
+
+def points(shape: ET.Element) -> np.ndarray:
+    return np.array([[float(value) for value in point.split(",")] for point in shape.get("points", "").split()])
+
+
+def body(shapes: list[ET.Element], colour: str) -> ET.Element:
+    (found,) = (shape for shape in shapes if shape.get("fill") == colour)
+    return found
+
+
+def turned(series: Mapping[str, Any], by_rad: float, far_m: float = 0.0) -> dict[str, Any]:
+    """The same encounter elsewhere and in another direction."""
+    cos, sin = np.cos(by_rad), np.sin(by_rad)
+    x, y = series["x_m"] - 300.0, series["y_m"]
+    place = {"x_m": x * cos - y * sin + far_m, "y_m": x * sin + y * cos - far_m}
+    return dict(series) | place | {"heading_rad": series["heading_rad"] + by_rad}
+
+
+@pytest.mark.parametrize("by_rad", np.linspace(0, 2 * np.pi, 9))
+@pytest.mark.parametrize("far_m", [0.0, 700.0])
+def test_both_bodies_are_seen_and_touch_whatever_their_direction(by_rad: float, far_m: float) -> None:
+    shapes = drawn(turned(synthetic_series(), by_rad, far_m), roads=False)
+    ego, walker = Polygon(points(body(shapes, EGO))), body(shapes, STRIKER)
+    assert box(0, 0, WIDTH, HEIGHT).contains(ego)
+    left, top, radius = (float(walker.get(name, "")) for name in ("cx", "cy", "r"))
+    assert 0 < left < WIDTH
+    assert 0 < top < HEIGHT
+    assert ego.distance(box(left, top, left, top)) <= radius
+    length, width = sorted(np.hypot(*np.diff(points(body(shapes, EGO)), axis=0).T))[::-2]
+    series = synthetic_series()
+    assert length / width == pytest.approx(series["length_m"][0] / series["width_m"][0], rel=0.05)
+
+
+def test_north_is_up_and_an_arrow_head_points_to_where_a_car_heads() -> None:
+    for by_rad, ahead in ((0.0, (1, 0)), (np.pi / 2, (0, -1)), (np.pi, (-1, 0))):
+        shapes = drawn(turned(synthetic_series(), by_rad), roads=False)
+        (head,) = (shape for shape in shapes if shape.get("fill") == "#fff")
+        _, tip, _ = points(head)
+        away = tip - points(body(shapes, EGO)).mean(axis=0)
+        np.testing.assert_allclose(away / np.hypot(*away), ahead, atol=0.1)
+
+
+def test_a_violation_near_nothing_shows_the_ego_and_its_path_up_to_then() -> None:
+    episode = synthetic_contact().episode.model_copy(update={"collision": None, "violations": (violation(time_s=1.0),)})
+    shapes = list(ET.fromstring(thumbnail(Recording(RecordedFailure.of("a", episode), synthetic_series()), ())))
+    assert not [shape for shape in shapes if shape.get("fill") == STRIKER]
+    (path,) = (shape for shape in shapes if shape.get("stroke") == EGO)
+    assert len(points(path)) == pytest.approx(11, abs=1)
+    end, ego = points(path)[-1], points(body(shapes, EGO)).mean(axis=0)
+    np.testing.assert_allclose(end, ego, atol=5.0)
+
+
+RELEASE = 5  # frames before it
+ROWS = 41
+
+
+def encounter(*, kind: int = 0, x_m: float = 4.0, y_m: float = 3.2, heading: float = 0.0, **of_striker: Any) -> Any:
+    """Ego at 14 m/s eastward and a striker beside it, for 4 s with the release after the first half second."""
+    zero = np.zeros(ROWS)
+    columns = {
+        "x_m": (14.0 * np.arange(ROWS) / 10, 14.0 * np.arange(ROWS) / 10 + x_m),
+        "y_m": (zero, zero + y_m),
+        "heading_rad": (zero, zero + heading),
+        "speed_mps": (zero + 14.0, zero + of_striker.get("speed_mps", 14.0)),
+        "accel_mps2": (of_striker.get("ego_accel_mps2", zero), of_striker.get("accel_mps2", zero)),
+        "lateral_mps": (zero, of_striker.get("lateral_mps", zero)),
+    }
+    return {
+        **{name: np.column_stack(pair) for name, pair in columns.items()},
+        "time_s": np.arange(ROWS) / 10,
+        "released_s": np.array(RELEASE / 10),
+        "ids": np.array(["ego", "lead"]),
+        "kind": np.array([0, kind], np.int8),
+    }
+
+
+def during(first_s: float, last_s: float, value: float) -> np.ndarray:
+    """A value between two times since the release, and else nothing."""
+    time_s = (np.arange(ROWS) - RELEASE) / 10
+    return np.where((time_s > first_s - 0.05) & (time_s < last_s - 0.05), value, 0.0)
+
+
+def said(response: str = "none", broke: tuple[str, ...] = (), ego_broke: tuple[str, ...] = (), **changes: Any) -> str:
+    judged = judgement(conflict_s=1.0, broke=broke, ego_broke=ego_broke, ego_response=response)
+    return sentence(encounter(**changes), collision(time_s=3.5, judgement=judged))
+
+
+def test_a_neighbour_that_moves_over_while_the_ego_brakes_late() -> None:
+    late = said("late_braking", lateral_mps=during(1.0, 2.5, -1.1), ego_accel_mps2=during(2.65, 3.5, -3.0))
+    assert late == "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.6 s late"
+
+
+def test_in_the_mirror_the_sides_are_exchanged() -> None:
+    mirrored = said(y_m=-3.2, lateral_mps=during(1.0, 2.5, 1.1))
+    assert mirrored == "right neighbour, 4 m ahead, moves left at 1.1 m/s for 1.5 s; ego at 14 m/s does not brake"
+
+
+@pytest.mark.parametrize(
+    ("who", "where"),
+    [
+        ("leader, 12 m ahead", {"x_m": 12.0, "y_m": 0.3}),
+        ("oncoming vehicle, 30 m ahead", {"x_m": 30.0, "heading": math.pi}),
+        ("vehicle from the right, 15 m ahead", {"x_m": 15.0, "y_m": -9.0, "heading": math.pi / 2}),
+        ("vehicle from the left, 15 m ahead", {"x_m": 15.0, "y_m": 9.0, "heading": -math.pi / 2}),
+        ("vehicle from the right, 15 m ahead", {"x_m": 15.0, "y_m": 2.0, "heading": math.pi / 2}),  # past the middle
+        ("pedestrian on the right, 9 m ahead", {"x_m": 9.0, "y_m": -3.2, "kind": 1, "heading": math.pi / 2}),
+        ("pedestrian on the left, 9 m ahead", {"x_m": 9.0, "kind": 1, "heading": -math.pi / 2}),
+        ("left neighbour, 2 m behind", {"x_m": -2.0}),
+        ("left neighbour, level with it", {"x_m": 0.2}),
+    ],
+)
+def test_who_strikes_is_told_from_where_it_is(who: str, where: dict[str, Any]) -> None:
+    assert said(**where).startswith(f"{who}, goes on at 14 m/s; ")
+
+
+def test_a_violation_without_contact_tells_what_the_nearest_actor_did_until_then() -> None:
+    braking = encounter(x_m=20.0, y_m=0.0, accel_mps2=during(0.5, 3.0, -4.0))
+    told = story(braking, violation(time_s=1.5, other_id="lead", ego_speed_mps=14.0, broke=("speeding",)))
+    assert told == "leader, 20 m ahead, brakes at 4.0 m/s² for 1.1 s; ego at 14 m/s speeding violates never_fast"
+    assert story(braking, violation(time_s=0.0)) == "no other road user near; ego at 9 m/s violates never_fast"

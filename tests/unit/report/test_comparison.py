@@ -1,12 +1,22 @@
+"""What a search had found when a budget was spent, counted by hand."""
+
+import math
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from risk_sac.metrics import wilson_interval
-from risk_sac.report import compare
+from risk_sac.config import CampaignSpec
+from risk_sac.metrics import results_digest, wilson_interval
+from risk_sac.report import FinishedRun, compare, figure_names, read_run, write_report
 from risk_sac.report.comparison import declared
+from risk_sac.report.figures import window_ecr, window_pcr
 from risk_sac.report.paired import holm
+from risk_sac.report.runs import Limit, cpu_s, episodes, found_within
+from risk_sac.run_folder.results import EPISODES, RecordedFailure, Results, read_results, write_results
 from risk_sac.scenario.families import FAMILIES
 
 HORIZON = FAMILIES["low"].horizon_steps
@@ -93,3 +103,101 @@ def test_report_loads_without_torch_and_libsumo():
     code = f"import sys, risk_sac.report; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.fixture
+def run(spec: CampaignSpec, finished: Callable[..., FinishedRun]) -> FinishedRun:
+    """F: a failure that no driver prevents, f: one that the careful driver prevents, r: a refused scene."""
+    return replace(finished(spec.runs()[0], ".FrfFf", "f"), episode_cpu_s=(2.0, 4.0, 4.5, 9.0, 10.0, 12.0, 20.0))
+
+
+def test_each_kind_counts_once_from_the_episode_on_that_found_it(run: FinishedRun) -> None:
+    counts = [(found.preventable, found.distinct) for found in run.found]
+    assert counts == [(0, 0), (0, 1), (0, 1), (1, 2), (1, 2), (1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"),
+    [
+        (Limit("", cpu_s, 1.0), (0, 0)),  # the first episode ended later
+        (Limit("", cpu_s, 8.9), (0, 1)),
+        (Limit("", cpu_s, 9.0), (1, 2)),
+        (Limit("", episodes, 2), (0, 1)),
+        (Limit("", episodes, 6), (1, 2)),
+    ],
+)
+def test_what_ended_within_the_limit_counts(run: FinishedRun, limit: Limit, expected: tuple[int, int]) -> None:
+    found = found_within(run, limit)
+    assert found is not None
+    assert (found.preventable, found.distinct) == expected
+
+
+def test_our_own_search_is_tested_against_the_others_on_what_a_user_pays_for(
+    spec: CampaignSpec, finished: Callable[..., FinishedRun]
+) -> None:
+    budget = {"budget": spec.budget.model_copy(update={"evaluation_episodes": 0})}
+    methods = {"methods": ("risk-sac", "risk-sac-diverse", "random"), "seeds": tuple(range(6))}
+    wanted = spec.model_copy(update=budget | methods)
+    letters = {"risk-sac": "....", "risk-sac-diverse": "f...", "random": "f..."}
+    runs = [replace(finished(run, letters[run.method]), episode_cpu_s=(5.0, 10.0, 20.0, 31.0)) for run in wanted.runs()]
+    against = {test.method: test for test in compare(wanted, runs, "a command").paid_tests}
+    assert {test.reference for test in against.values()} == {"risk-sac-diverse"}
+    assert (against["risk-sac"].difference, against["random"].difference) == (1.0, 0.0)
+    assert against["risk-sac"].p == pytest.approx(2 / 2**6)
+    assert against["risk-sac"].p_holm == pytest.approx(2 * 2 / 2**6)  # of two hypotheses, whatever else is tested
+
+
+@pytest.fixture
+def files_comparison(spec, runs):
+    return compare(spec, runs, "risk-sac evaluate --out d", spec_file="d/spec.yaml")
+
+
+def test_sliding_rates_are_of_contacts_and_end_where_the_metrics_do(spec, finished):
+    run = finished(spec.runs()[0], "vfFkd")  # its first failure is no contact
+    np.testing.assert_allclose(window_ecr(run), [0, 1 / 2, 2 / 3, 2 / 4, 2 / 5])
+    np.testing.assert_allclose(window_pcr(run), [0, 1 / 2, 1 / 3, 1 / 4, 1 / 5])
+    metrics = run.metrics["search"]
+    assert (metrics.window_ecr, metrics.window_pcr) == (0.4, 0.2)
+
+
+MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml"}
+
+
+def test_report_is_written_twice_alike(spec, runs, tmp_path):
+    # Without the evaluation, whose figures tests/acceptance/test_evaluate.py draws twice.
+    search = {"budget": spec.budget.model_copy(update={"evaluation_episodes": 0})}
+    searches = [replace(run, spec=run.spec.model_copy(update=search)) for run in runs]
+    files_comparison = compare(spec.model_copy(update=search), searches, "")
+
+    def content():
+        write_report(files_comparison, tmp_path)
+        return {path.relative_to(tmp_path): path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+    first = content()
+    assert len(first) == 3 + 2 * len(figure_names(files_comparison))
+    assert {file.suffix for file in first} == {".json", ".md", ".csv", *MAGIC}
+    assert all(written.startswith(MAGIC.get(file.suffix, b"")) for file, written in first.items())
+    assert content() == first
+
+
+def test_a_run_in_which_nothing_was_ever_close_can_be_read(runs, tmp_path):
+    records = [never_close(record) for record in runs[0].records]
+    results = Results(
+        spec=runs[0].spec,
+        spec_digest=runs[0].spec.digest,
+        finished=True,
+        digest=results_digest(records),
+        failures=tuple(
+            RecordedFailure.of(runs[0].spec.id, record) for record in records if record.worst_violation is not None
+        ),
+    )
+    write_results(tmp_path, results)
+    (tmp_path / EPISODES).write_text("".join(record.model_dump_json() + "\n" for record in records))
+    assert read_results(tmp_path).failures == results.failures
+    assert read_run(tmp_path).records == tuple(records)
+
+
+def never_close(record):
+    least = {"min_ttc_s": math.inf, "min_robustness": math.inf}
+    collision = record.collision and record.collision.model_copy(update=least | {"min_rss_margin_m": math.inf})
+    return record.model_copy(update=least | {"collision": collision})

@@ -3,13 +3,19 @@ import os
 import stat
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from risk_sac.errors import DamagedError
+from risk_sac.config import RunSpec
+from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.records import EpisodeId
 from risk_sac.run_folder.durable import replace_file, seal, unseal
+from risk_sac.run_folder.results import RESULTS, Results, read_results, records_to_json, write_results
+from risk_sac.run_folder.series import read_series, write_series
+from tests.builders import collision, episode_record
 
 
 class Note(BaseModel):
@@ -50,3 +56,52 @@ def test_a_file_gets_its_mode_whatever_a_killed_writer_left(tmp_path: Path) -> N
         os.umask(before)
     assert (file.read_bytes(), stat.S_IMODE(file.stat().st_mode)) == (b"new", 0o600)
     assert [each.name for each in tmp_path.iterdir()] == ["secret"]
+
+
+SPEC = RunSpec(family="low", method="random", seed=0)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_results(tmp_path, Results(spec=SPEC, spec_digest=SPEC.digest, finished=False, wall_s=1.25))
+    return tmp_path
+
+
+def test_damaged_results_are_named(folder):
+    content = (folder / RESULTS).read_bytes()
+    for damaged in (b"", content[:-1], content.replace(b'"low"', b'"lou"')):
+        (folder / RESULTS).write_bytes(damaged)
+        with pytest.raises(ConfigError, match=r"results\.json is damaged"):
+            read_results(folder)
+
+
+@pytest.mark.parametrize("damage", [lambda content: content[:-9], lambda content: b"", lambda content: b"no archive"])
+def test_a_damaged_series_is_named(damage, tmp_path: Path) -> None:
+    file = tmp_path / "000001.npz"
+    write_series(file, {"x_m": np.arange(100.0)})
+    np.testing.assert_array_equal(read_series(file)["x_m"], np.arange(100.0))
+    file.write_bytes(damage(file.read_bytes()))
+    with pytest.raises(DamagedError, match=r"000001\.npz is damaged"):
+        read_series(file)
+
+
+RECORD = episode_record(4, collision=collision(min_ttc_s=0.7), min_ttc_s=0.0)
+
+
+def test_the_minima_of_a_collision_have_names_of_their_own_wherever_it_is_written() -> None:
+    for text in (RECORD.model_dump_json(), records_to_json([RECORD])[1:-1], json.dumps(RECORD.model_dump())):
+        written = json.loads(text)
+        assert written["min_ttc_s"] == 0.0
+        assert written["collision"]["early_min_ttc_s"] == 0.7
+        assert "min_ttc_s" not in written["collision"]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "-", "search", "low-search-x", "low-walk-4", "a\0-search-4", "low-search-1234567890"]
+)
+def test_a_malformed_id_has_no_parts(text: str) -> None:
+    assert EpisodeId.parse(text) is None
+
+
+def test_a_run_whose_own_id_names_a_phase_keeps_it() -> None:
+    assert EpisodeId.parse("low-iid-random-0-iid-12") == EpisodeId("low-iid-random-0", "iid", 12)

@@ -7,9 +7,11 @@ import pytest
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.executor import Cause, Exited
 from risk_sac.execution.messages import Failed, Finished
-from service.errors import OutdatedError
+from service.errors import OutdatedError, QuotaError
 from service.runs.manager import Manager
+from service.runs.quota import check_quota, exhausted
 from service.settings import ServiceSettings
+from service.store.stored import Usage
 
 SPEC = CampaignSpec(families=("low",), methods=("random",))
 
@@ -98,3 +100,28 @@ def test_what_was_queued_before_it_was_refused_fails_and_holds_nobody_up(store, 
     assert (outdated.state, "learner.checkpoint_every" in outdated.reason) == ("failed", True)
     with pytest.raises(OutdatedError, match=r"learner\.checkpoint_every, which this one refuses"):
         store.campaign(before.id).spec  # noqa: B018
+
+
+SETTINGS = ServiceSettings(quota_queued_runs=10, quota_cpu_hours=2.0)
+
+
+def usage(queued_runs: int = 0, hours: float = 0.0) -> Usage:
+    return Usage(queued_runs=queued_runs, cpu_s=3600.0 * hours)
+
+
+@pytest.mark.parametrize(("waiting", "new"), [(0, 11), (9, 2), (10, 1)])
+def test_one_run_more_is_refused_with_the_figures(waiting: int, new: int) -> None:
+    with pytest.raises(
+        QuotaError, match=f"got {new} runs with {waiting} waiting already; wanted at most 10"
+    ) as refusal:
+        check_quota(usage(waiting), new, SETTINGS)
+    assert refusal.value.retry_after_s > 0
+
+
+def test_worker_hours_are_used_up_when_they_are_reached() -> None:
+    check_quota(usage(hours=1.999), 1, SETTINGS)
+    assert not exhausted(usage(hours=1.999), SETTINGS)
+    assert exhausted(usage(hours=2.0), SETTINGS)
+    with pytest.raises(QuotaError, match=r"has used 2.00 worker hours within 24; wanted at most 2") as refusal:
+        check_quota(usage(hours=2.0), 1, SETTINGS)
+    assert refusal.value.retry_after_s > 0

@@ -1,10 +1,27 @@
+"""Which scene parameters set failing episodes apart, and which cells of the ODD were played."""
+
+import itertools
+import json
+import random
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic_core import from_json
+from scipy.stats import mannwhitneyu
 
 from risk_sac.config import CampaignSpec
-from risk_sac.metrics import wilson_interval
-from risk_sac.records import RequirementCounts
+from risk_sac.metrics import MetricsAccumulator, wilson_interval
+from risk_sac.records import Grade, Outcome, Repetition, RequirementCounts, Severity, State, stored, wire
+from risk_sac.verdicts.distinct import DistinctFailures
+from service.store.stored import PlainEpisode
+from service.views.curves import curves, spread
+from service.views.failure_table import failure_table
 from service.views.progress import progress
+from service.views.scenes import scene_effects
 from service.views.totals import results
+from tests.begun import BEGUN as RUN
+from tests.builders import LOW_SCENE, collision, episode_record, judgement, violation
 
 
 def changed(record, **fields):
@@ -59,3 +76,212 @@ def test_one_run_keeps_its_wilson_interval(ledger, metrics):
     (total,) = results(changed(campaign, runs=(changed(campaign.runs[0], metrics=metrics),))).totals
     assert (total.ecr_low, total.ecr_high) == pytest.approx((0.0456, 0.6994), abs=1e-4)  # of 1 in 4
     assert (total.pcr_low, total.pcr_high) == (total.ecr_low, total.ecr_high)  # the same one
+
+
+SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
+
+
+def plain(run, record):
+    return PlainEpisode(1, run.number, record.phase, record.index, record.outcome, from_json(stored(record)))
+
+
+def drawn(count):
+    """Records of a search: half of them contacts of several kinds, some with or after a violation without contact."""
+    dice = random.Random(5)
+    for index in range(count):
+        outcome = dice.choice([Outcome.SAFE, Outcome.REJECTED, Outcome.FAILURE, Outcome.FAILURE, Outcome.DEGENERATE])
+        grade = dice.choice(list(Grade)) if outcome is Outcome.FAILURE else None
+        hit = collision(
+            ego_speed_mps=dice.choice([5.0, 15.0]), judgement=judgement(grade, signature=dice.choice("abcdefgh"))
+        )
+        touched = outcome in (Outcome.FAILURE, Outcome.DEGENERATE)
+        if outcome is Outcome.DEGENERATE:
+            hit = hit.model_copy(update={"verdicts": {"ego_moving": False}})
+        more = {"mean_cost": dice.random(), "dual_variable": dice.random()}
+        if outcome is Outcome.FAILURE and dice.random() < 0.4:
+            more["violations"] = (violation(grade=dice.choice(list(Grade)), signature=dice.choice("abcd")),)
+            touched = dice.random() < 0.5
+        yield episode_record(index, outcome, collision=hit if touched else None, **more)
+
+
+def test_curves_are_what_the_metrics_of_the_run_were_at_each_point(ledger):
+    campaign = ledger.create(SPEC)
+    records = list(drawn(250))
+    told, accumulator = [], MetricsAccumulator(horizon_steps=200)
+    for record in records:
+        told.append(accumulator.add(record))
+    found, empty = curves(campaign, [plain(campaign.runs[0], each) for each in records], 40).runs
+    assert len(found.episodes) == 40
+    assert found.episodes[-1] == 250
+    at = [told[count - 1] for count in found.episodes]
+    for name in ("window_ecr", "window_pcr", "preventable", "distinct_preventable", "dual_variable"):
+        assert getattr(found, name) == pytest.approx([getattr(each, name) for each in at]), name
+    assert found.distinct == [each.distinct_failures for each in at]
+    assert found.distinct[-1] > found.distinct_preventable[-1] > 3
+    assert (found.run_id, found.family, found.method, found.seed) == ("low-random-3", "low", "random", 3)
+    assert [value for _, value in empty if isinstance(value, list)] == [[]] * 8
+
+
+@given(count=st.integers(1, 3000), points=st.integers(1, 1000))
+def test_points_are_evenly_spread_and_the_newest_is_one(count, points):
+    at = spread(count, points).tolist()
+    assert len(at) == min(count, points)
+    assert at[-1] == count
+    gaps = [later - earlier for earlier, later in zip([0, *at], at, strict=False)]
+    assert min(gaps) >= 1
+    assert max(gaps) - min(gaps) <= 1
+
+
+FAILURE, REFUSED = Outcome.FAILURE, Outcome.DEGENERATE
+
+
+def plain_failure(run, index, hit, outcome=FAILURE, phase="search", **changes):
+    record = episode_record(index, outcome, phase=phase, collision=hit, **changes)
+    return PlainEpisode(1, run.number, phase, index, outcome, from_json(stored(record)))
+
+
+def told(table):
+    return json.loads(wire(table))
+
+
+def test_distinct_are_those_that_the_run_counted(ledger):
+    campaign = ledger.create(SPEC)
+    first, second = campaign.runs
+    hits = [
+        collision(judgement=judgement(), ego_speed_mps=5.0),
+        collision(judgement=judgement(), ego_speed_mps=6.0),
+        collision(judgement=judgement(), ego_speed_mps=9.0),
+        collision(judgement=judgement(Grade.FULL_BRAKING, signature="leader"), ego_speed_mps=9.0),
+        collision(judgement=judgement(conflict_s=0.5), ego_speed_mps=9.0),
+        collision(),
+    ]
+    contacts = [plain_failure(first, index, hit) for index, hit in enumerate(hits)]
+    contacts += [
+        plain_failure(second, 0, hits[0]),
+        plain_failure(first, 9, hits[0], phase="evaluation"),
+        plain_failure(first, 10, hits[0], phase="evaluation"),
+    ]
+    counted = DistinctFailures()
+    table = failure_table(campaign, contacts, {})
+    assert table.prevented_by[2:6] == [["r157", "bound"], ["bound"], ["r157", "bound"], []]
+    assert table.distinct == [*(counted.add(hit) for hit in hits), True, True, False]
+    assert table.distinct[:6] == [True, False, True, True, True, True]
+    assert [(kind.name, kind.failures, kind.distinct, kind.preventable) for kind in table.kinds] == [
+        ("cut-in, straight", 7, 5, 7),
+        ("leader", 1, 1, 0),
+        ("unjudged adversary vehicle", 1, 1, 0),
+    ]
+    assert [kind.signature for kind in table.kinds] == ["cut-in, straight", "leader", None]
+    assert table.kind == [0, 0, 0, 1, 0, 2, 0, 0, 0]
+    assert (table.grade[5], table.conflict_type[5], table.hidden[5], table.broke[5]) == (None, None, None, [])
+
+
+def test_the_headline_has_the_first_of_a_kind_over_all_runs_that_is_not_minor_and_repeats(ledger):
+    campaign = ledger.create(SPEC)
+    first, second = (
+        run.model_copy(update={"repetitions": {index: Repetition(times=2, same=2) for index in (0, 1, 3)}})
+        for run in campaign.runs
+    )
+    searched = campaign.model_copy(update={"runs": (first, second)})
+    minor, grave = (collision(judgement=judgement(severity=each)) for each in (Severity.MINOR, Severity.SEVERE))
+    other = collision(judgement=judgement(signature="leader"))
+    hits = [(first, 0, minor), (first, 1, grave), (first, 2, other), (second, 0, grave), (second, 3, other)]
+    found = told(failure_table(searched, [plain_failure(*each) for each in hits], {}))
+    assert list(zip(found["severity"], found["headline"], strict=True)) == [
+        ("minor", False),
+        ("severe", True),
+        ("moderate", False),  # not replayed
+        ("severe", False),  # as in the other run
+        ("moderate", True),
+    ]
+
+
+def test_what_two_runs_found_alike_is_one_failure_of_the_campaign(ledger):
+    campaign = ledger.create(SPEC)
+    first, second = campaign.runs
+    slow, other = collision(ego_speed_mps=2.0), collision(judgement=judgement(signature="leader"))
+    hits = [(first, 0, collision()), (first, 1, slow), (second, 0, collision()), (second, 1, other)]
+    assert failure_table(campaign, [plain_failure(*each) for each in hits], {}).niche == [0, 1, 0, 2]
+
+
+SCENES_SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3,))
+F, S, R = Outcome.FAILURE, Outcome.SAFE, Outcome.REJECTED
+GAPS = ((F, 12.0), (F, 14.0), (S, 13.0), (S, 30.0), (S, 40.0), (R, 11.0))
+
+
+@pytest.fixture
+def found(ledger):
+    """Makes the answer about low of episodes with these outcomes and gaps to the leader."""
+
+    def effects(gaps, **others):
+        campaign = ledger.create(SCENES_SPEC)
+        episodes = [
+            PlainEpisode(
+                i, campaign.runs[0].number, "search", i, each, {"scene": LOW_SCENE | {"lead_gap_m": gap} | others}
+            )
+            for i, (each, gap) in enumerate(gaps)
+        ]
+        families = scene_effects(campaign, episodes).families
+        return families[0] if families else None
+
+    return effects
+
+
+def by_name(family):
+    return {parameter.name: parameter for parameter in family.parameters}
+
+
+def test_an_effect_is_how_often_a_failing_scene_has_the_larger_value(found):
+    gap = by_name(found(GAPS))["lead_gap_m"]
+    assert gap.effect == pytest.approx(1 / 6)  # 14 > 13, of 2 x 3 pairs
+    wanted = mannwhitneyu([12, 14], [13, 30, 40], method="asymptotic").pvalue
+    assert gap.p == pytest.approx(min(1.0, 9 * wanted))  # of nine parameters
+
+
+def test_failing_and_safe_scenes_exchanged_mirror_the_effect(found):
+    exchanged = [({F: S, S: F}.get(each, each), gap) for each, gap in GAPS]
+    assert by_name(found(exchanged))["lead_gap_m"].effect == pytest.approx(5 / 6)
+
+
+def test_each_two_parameters_have_their_cells_once(found):
+    family = found(GAPS)
+    pairs = {frozenset(pair.parameters): pair for pair in family.pairs}
+    assert pairs.keys() == {frozenset(pair) for pair in itertools.combinations(by_name(family), 2)}
+    pair = pairs[frozenset(("lead_gap_m", "friction"))]
+    for counts, of in ((pair.played, "played"), (pair.failed, "failed")):
+        for axis, name in enumerate(pair.parameters):
+            sums = [sum(row) for row in (counts if axis == 0 else zip(*counts, strict=True))]
+            assert sums == getattr(by_name(family)[name], of)
+
+
+def test_progress_counts_all_runs_and_shows_those_at_work(ledger, metrics):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random")))
+    ended = changed(RUN, state=State.SUCCEEDED, episodes_done=100, failures=5, raw_collisions=9, metrics=metrics)
+    ended = changed(ended, distinct_failures=4, preventable=3, distinct_preventable=2)
+    present = metrics.model_copy(update={"dual_variable": 0.9, "window_ecr": 0.1, "window_pcr": 0.05})
+    at_work = changed(RUN, episodes_done=50, failures=1, distinct_failures=1, metrics=present)
+    shown = progress(changed(campaign, state=State.RUNNING, runs=(ended, at_work)), workers=1)
+    assert (shown.episodes_done, shown.episodes_total) == (150, 200)
+    assert (shown.failures, shown.raw_collisions) == (6, 9)
+    assert (shown.distinct_failures, shown.preventable, shown.distinct_preventable) == (5, 3, 2)
+    assert (shown.dual_variable, shown.window_ecr, shown.window_pcr) == (0.9, 0.1, 0.05)
+    replayed = changed(ended, metrics=metrics.model_copy(update={"headline": 1}), headline_candidates=2)
+    waiting = changed(at_work, headline_candidates=4)
+    partly = progress(changed(campaign, state=State.RUNNING, runs=(replayed, waiting)), workers=1)
+    assert (partly.headline_candidates, partly.headline_waiting) == (6, 4)
+    final = progress(changed(campaign, state=State.SUCCEEDED, runs=(ended, ended)), workers=1)
+    assert (final.dual_variable, final.eta_s) == (0.3, 0.0)
+
+
+def test_rates_are_those_of_the_methods_that_learn_where_there_are_any(ledger, metrics):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random")))
+    learning = changed(RUN, metrics=metrics.model_copy(update={"window_ecr": 0.4, "dual_variable": 0.5}))
+    control = changed(
+        RUN, method="random", metrics=metrics.model_copy(update={"window_ecr": 0.0, "dual_variable": 0.0})
+    )
+    for state in (State.RUNNING, State.SUCCEEDED):
+        runs = (changed(learning, state=state), control)
+        shown = progress(changed(campaign, state=State.RUNNING, runs=runs), workers=1)
+        assert (shown.window_ecr, shown.dual_variable) == (0.4, 0.5)
+    alone = progress(changed(campaign, state=State.RUNNING, runs=(control,)), workers=1)
+    assert (alone.window_ecr, alone.dual_variable) == (0.0, 0.0)
