@@ -3,11 +3,9 @@ import multiprocessing
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from itertools import combinations
-from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -37,7 +35,7 @@ Outcome = tuple[np.ndarray, float, bool, bool, dict[str, object]]
 
 
 @pytest.fixture
-def low() -> Iterator[RiskSacEnv]:
+def low():
     with closing(make_default("low")) as env:
         yield env
 
@@ -66,15 +64,14 @@ def same(one: list[Outcome], other: list[Outcome]) -> bool:
 
 
 @each_family
-def test_gymnasiums_checker_accepts_the_registered_environment(family: str) -> None:
+def test_gymnasiums_checker_accepts_the_registered_environment(family):
     with closing(gym.make(f"RiskSAC/{family.capitalize()}-v0", render_mode="rgb_array")) as env:
-        assert env.spec is not None
         assert env.spec.max_episode_steps == FAMILIES[family].horizon_steps
         check_env(env.unwrapped, skip_render_check=True)  # which opens a second one; libsumo has one simulation
 
 
 @each_family
-def test_a_rendered_frame_shows_the_ego_in_its_middle_and_moves_on(family: str) -> None:
+def test_a_rendered_frame_shows_the_ego_in_its_middle_and_moves_on(family):
     with closing(gym.make(f"RiskSAC/{family.capitalize()}-v0", render_mode="rgb_array")) as env:
         env.reset(seed=1)
         frames = [env.render()]
@@ -89,14 +86,14 @@ def test_a_rendered_frame_shows_the_ego_in_its_middle_and_moves_on(family: str) 
     assert not np.array_equal(*frames)
 
 
-def test_the_package_alone_is_cheap_to_import() -> None:
+def test_the_package_alone_is_cheap_to_import():
     program = "import sys, risk_sac\nprint(sorted({'gymnasium', 'numpy', 'torch', 'pydantic'} & set(sys.modules)))"
     said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert said.stdout == "[]\n"
 
 
 @each_family
-def test_the_same_seed_gives_the_same_episode_to_the_last_bit(family: FamilyName) -> None:
+def test_the_same_seed_gives_the_same_episode_to_the_last_bit(family):
     with closing(make_default(family)) as env:
         first = episode(env, 3)
         episode(env, 4, action_seed=1)  # what came before leaves no trace
@@ -108,7 +105,7 @@ def test_the_same_seed_gives_the_same_episode_to_the_last_bit(family: FamilyName
 
 
 @each_family
-def test_one_scene_under_two_seeds_starts_alike_and_then_differs(family: FamilyName) -> None:
+def test_one_scene_under_two_seeds_starts_alike_and_then_differs(family):
     starts, episodes = [], []
     with closing(make_default(family)) as env:
         for seed in (1, 2):
@@ -120,15 +117,15 @@ def test_one_scene_under_two_seeds_starts_alike_and_then_differs(family: FamilyN
 
 
 @each_family
-def test_every_number_is_finite_and_an_episode_ends_at_the_horizon_or_at_a_contact(family: FamilyName) -> None:
+def test_every_number_is_finite_and_an_episode_ends_at_the_horizon_or_at_a_contact(family):
     with closing(make_default(family)) as env:
         for seed in range(5):
             outcomes = episode(env, seed)
             for observation, reward, _, _, info in outcomes:
                 assert env.observation_space.contains(observation)
                 assert math.isfinite(reward)
-                assert math.isfinite(info["robustness"])  # type: ignore[arg-type]
-                assert 0.0 <= info.get("cost", 0.0) <= 1.0  # type: ignore[operator]
+                assert math.isfinite(info["robustness"])
+                assert 0.0 <= info.get("cost", 0.0) <= 1.0
             *_, (_, _, terminated, truncated, info) = outcomes
             assert terminated == ("collision" in info)
             assert truncated == (len(outcomes) - 1 == FAMILIES[family].horizon_steps)
@@ -159,9 +156,7 @@ LEADERS: list[tuple[dict[str, float], str | None]] = [
 
 
 @pytest.mark.parametrize(("changes", "rule"), LEADERS, ids=[f"{c['lead_gap_m']} m, {r}" for c, r in LEADERS])
-def test_a_scene_is_refused_by_what_it_has_come_to_at_the_release(
-    low: RiskSacEnv, changes: dict[str, float], rule: str | None
-) -> None:
+def test_a_scene_is_refused_by_what_it_has_come_to_at_the_release(low, changes, rule):
     family = FAMILIES["low"]
     wide = replace(family.space, parameters=tuple(replace(p, low=-100, high=100) for p in family.space.parameters))
     low.problem = replace(low.problem, space=wide)
@@ -169,7 +164,7 @@ def test_a_scene_is_refused_by_what_it_has_come_to_at_the_release(
 
 
 @each_family
-def test_hardly_a_random_scene_has_bodies_that_overlap_before_the_release(family: FamilyName) -> None:
+def test_hardly_a_random_scene_has_bodies_that_overlap_before_the_release(family):
     space, generator = FAMILIES[family].space, np.random.default_rng(5)
     with closing(make_default(family)) as env:
         reasons = [refusal(env, space.from_unit(generator.random(space.dimension))) for _ in range(100)]
@@ -177,9 +172,7 @@ def test_hardly_a_random_scene_has_bodies_that_overlap_before_the_release(family
     assert sum(reason is not None for reason in reasons) <= 10
 
 
-def test_a_scene_is_refused_by_bodies_that_overlap_at_its_start_although_they_part_before_the_release(
-    low: RiskSacEnv,
-) -> None:
+def test_a_scene_is_refused_by_bodies_that_overlap_at_its_start_although_they_part_before_the_release(low):
     parameters = FAMILIES["low"].space.parameters
     low.problem = replace(
         low.problem,
@@ -218,21 +211,19 @@ MEETING = {
     ],
     ids=["at the kerb", "0.9 s from it", "1.1 s from it", "standing", "behind the ego by then", "hidden"],
 )
-def test_a_scene_is_refused_if_the_careful_driver_already_sees_a_pedestrian_coming(
-    changes: dict[str, float], rule: str | None
-) -> None:
+def test_a_scene_is_refused_if_the_careful_driver_already_sees_a_pedestrian_coming(changes, rule):
     with closing(make_default("mixed")) as env:
         assert refusal(env, middle("mixed", **(MEETING | changes))) == rule
 
 
-def test_a_refused_scene_leaves_the_environment_usable(low: RiskSacEnv) -> None:
+def test_a_refused_scene_leaves_the_environment_usable(low):
     expected = episode(low, 3)
     assert refusal(low, middle("low", lead_gap_m=8.0, ego_speed_mps=16.0, lead_speed_mps=6.0)) == "initial_rss"
     assert same(episode(low, 3), expected)
 
 
 @each_family
-def test_scenes_that_are_let_in_are_plausible_and_fair(family: FamilyName) -> None:
+def test_scenes_that_are_let_in_are_plausible_and_fair(family):
     with closing(make_default(family)) as env:
         for seed in range(30):
             env.reset(seed=seed)
@@ -259,7 +250,7 @@ def box(x: float, y: float, heading: float, length: float, width: float) -> Poly
 
 
 @each_family
-def test_nobody_attacks_before_the_release(family: FamilyName) -> None:
+def test_nobody_attacks_before_the_release(family):
     with closing(make_default(family)) as env:
         starts = []
         for action in (-1.0, 1.0):
@@ -319,7 +310,7 @@ def is_ahead(series: dict[str, np.ndarray], step: int, j: int) -> bool:
     return bool(dx * math.cos(heading) + dy * math.sin(heading) > -series["length_m"][0] / 2)
 
 
-def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low: RiskSacEnv) -> None:
+def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low):
     config = RewardConfig()
     for run in (lambda: episode(low, 1), lambda: first_contacts(low, 1)[0]):
         outcomes = run()
@@ -328,7 +319,6 @@ def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low: Ri
         for step, (_, reward, terminated, _, _) in enumerate(outcomes[1:], start=1):
             bonus = 0.0
             if terminated and collision is not None:
-                assert collision.judgement is not None
                 shares = {
                     Grade.PREVENTABLE: 1.0,
                     Grade.FULL_BRAKING: config.unpreventable,
@@ -342,13 +332,12 @@ def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low: Ri
 
 
 @each_family
-def test_sumo_is_asked_about_vehicles_alone_and_early_conflicts_are_artefacts(family: FamilyName) -> None:
+def test_sumo_is_asked_about_vehicles_alone_and_early_conflicts_are_artefacts(family):
     with closing(make_default(family)) as env:
         collisions = [c for c in map(collision_of, first_contacts(env, 1)) if c is not None]
     assert collisions
     for collision in collisions:
         assert (collision.simulator_agrees is None) == (collision.other_kind == "pedestrian")
-        assert collision.judgement is not None
         began_s = collision.judgement.conflict_s
         assert began_s <= collision.time_s + 0.1
         noticed_s = collision.judgement.noticed_s
@@ -359,7 +348,7 @@ def test_sumo_is_asked_about_vehicles_alone_and_early_conflicts_are_artefacts(fa
 
 
 @each_family
-def test_without_control_actions_are_ignored(family: FamilyName) -> None:
+def test_without_control_actions_are_ignored(family):
     spec = RunSpec(family=family, method="no-adversary", seed=0)
     with closing(RiskSacEnv(Problem.from_spec(spec), spec.learner.reward, controlled=False)) as env:
         scene = middle(family)
@@ -393,7 +382,7 @@ def test_without_control_actions_are_ignored(family: FamilyName) -> None:
     ],
     ids=lambda action: repr(action)[:30],
 )
-def test_an_action_that_is_none_is_refused_and_the_episode_goes_on(low: RiskSacEnv, action: Any) -> None:
+def test_an_action_that_is_none_is_refused_and_the_episode_goes_on(low, action):
     expected = episode(low, 3)
     low.reset(seed=3)
     with pytest.raises(ValueError, match=r"^action: got .*; wanted shape \(6,\), finite numbers in \[-1, 1\]$"):
@@ -402,7 +391,7 @@ def test_an_action_that_is_none_is_refused_and_the_episode_goes_on(low: RiskSacE
     assert low.step(generator.uniform(-1, 1, 6).astype(np.float32))[1] == expected[1][1]
 
 
-def test_a_second_environment_of_a_process_is_refused_until_the_first_one_is_gone(low: RiskSacEnv) -> None:
+def test_a_second_environment_of_a_process_is_refused_until_the_first_one_is_gone(low):
     expected = episode(low, 3)
     with closing(make_default("mixed")) as second:
         for _ in range(2):
@@ -418,20 +407,20 @@ def test_a_second_environment_of_a_process_is_refused_until_the_first_one_is_gon
     assert same(episode(low, 3), expected)
 
 
-def test_an_environment_that_is_lost_gives_way() -> None:
+def test_an_environment_that_is_lost_gives_way():
     lost = make_default("low")
     lost.reset(seed=1)
-    lost.itself = lost  # type: ignore[attr-defined]  # a cycle
+    lost.itself = lost  # a cycle
     del lost
     with closing(make_default("low")) as env:
         env.reset(seed=1)
 
 
-def test_a_child_process_has_a_simulation_of_its_own(low: RiskSacEnv) -> None:
+def test_a_child_process_has_a_simulation_of_its_own(low):
     expected = episode(low, 3)
     low.reset(seed=3)
 
-    def child() -> None:
+    def child():
         with closing(make_default("low")) as env:
             os._exit(0 if same(episode(env, 3), expected) else 1)
 
@@ -443,9 +432,7 @@ def test_a_child_process_has_a_simulation_of_its_own(low: RiskSacEnv) -> None:
     assert same(episode(low, 3), expected)
 
 
-def test_the_nearest_miss_is_the_least_time_to_encounter_while_ahead_and_in_sight_and_the_ego_on_the_move(
-    low: RiskSacEnv,
-) -> None:
+def test_the_nearest_miss_is_the_least_time_to_encounter_while_ahead_and_in_sight_and_the_ego_on_the_move(low):
     frames = counted = 0
     for seed in range(6):
         episode(low, seed)

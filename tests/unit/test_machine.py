@@ -48,9 +48,7 @@ V1 = "/ {} rw - cgroup cgroup rw,cpu,cpuacct"
         ("0::/a", V2, {"a/cpu.max": "damaged"}, 8),
     ],
 )
-def test_as_many_cores_are_used_as_affinity_and_quotas_allow(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cgroup: str, mount: str, files: dict[str, str], wanted: int
-) -> None:
+def test_as_many_cores_are_used_as_affinity_and_quotas_allow(tmp_path, monkeypatch, cgroup, mount, files, wanted):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(8)))
     folder = tmp_path / "with a blank"
     folder.mkdir()
@@ -61,7 +59,7 @@ def homeless() -> Path:
     raise RuntimeError("Could not determine home directory.")
 
 
-def test_a_user_without_a_home_has_no_cache_and_the_library_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_user_without_a_home_has_no_cache_and_the_library_says_so(monkeypatch):
     for name in ("XDG_CACHE_HOME", library.VARIABLE):
         monkeypatch.delenv(name, raising=False)
     for home in (homeless, lambda: Path("relative")):
@@ -96,9 +94,7 @@ def inner(x):
 
 
 @pytest.mark.parametrize("read_only", [False, True])
-def test_a_change_in_a_called_function_or_a_constant_is_not_hidden_by_the_cache(
-    tmp_path: Path, read_only: bool
-) -> None:
+def test_a_change_in_a_called_function_or_a_constant_is_not_hidden_by_the_cache(tmp_path, read_only):
     package = tmp_path / "risk_sac"
     (package / "risk").mkdir(parents=True)
     for module in (risk_sac.jit, risk_sac.machine):
@@ -135,7 +131,7 @@ print(time.process_time() - began_s, cpu_s() - counted_s)
 """
 
 
-def test_a_budget_of_processor_time_is_not_spent_on_compilation(tmp_path: Path) -> None:
+def test_a_budget_of_processor_time_is_not_spent_on_compilation(tmp_path):
     """With an empty cache, as in a fresh clone, compilation takes most of the first call."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     answer = subprocess.run(

@@ -1,6 +1,5 @@
 """What is used otherwise than it was asked for is said."""
 
-from collections.abc import Iterator
 from contextlib import closing
 
 import pytest
@@ -51,14 +50,14 @@ def wanted_ttc_s(posed: Problem) -> float:
         ("low", Odd(dynamic=DynamicElements(ego_speed_mps=Interval(low=0, high=5))), "odd.dynamic.ego_speed_mps"),
     ],
 )
-def test_an_odd_that_leaves_no_scene_is_an_error_that_names_its_field(family: str, odd: Odd, field: str) -> None:
+def test_an_odd_that_leaves_no_scene_is_an_error_that_names_its_field(family, odd, field):
     with pytest.raises(OddError) as refused:
         problem(family, odd=odd)
     assert refused.value.field == field
     assert "wanted" in str(refused.value)
 
 
-def test_an_episode_goes_on_to_the_horizon_where_more_than_a_contact_can_make_it_fail() -> None:
+def test_an_episode_goes_on_to_the_horizon_where_more_than_a_contact_can_make_it_fail():
     assert problem("dense").contact_alone_counts
     assert not problem("dense", ego=EgoConfig(driver="idm-aeb")).contact_alone_counts
     assert not problem("dense", requirements=(Requirement(name="safe_ttc"),)).contact_alone_counts
@@ -73,13 +72,13 @@ def test_an_episode_goes_on_to_the_horizon_where_more_than_a_contact_can_make_it
         (Requirement(name="wide_berth"), "requirements[0].formula"),
     ],
 )
-def test_a_contact_counts_and_an_own_requirement_needs_a_formula(requirement: Requirement, field: str) -> None:
+def test_a_contact_counts_and_an_own_requirement_needs_a_formula(requirement, field):
     with pytest.raises(ConfigError) as refused:
         problem(requirements=(requirement,))
     assert refused.value.field == field
 
 
-def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs() -> None:
+def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs():
     spec = CampaignSpec(
         families=("low", "mixed"), requirements=(Requirement(name="soon", formula="eventually(ttc_s > 1)", scale=1),)
     )
@@ -89,7 +88,7 @@ def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs() -> None:
     assert refused.value.position == 0
 
 
-def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_it_says_it_is() -> None:
+def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_it_says_it_is():
     """RSS decides which scenes are refused: by an ego's own time a slow one would be offered the milder ones."""
     egos = [EgoConfig(reaction_time_s=t) for t in (0.1, 0.5, 1.0)]
     egos += [EgoConfig(driver=name) for name in ("rss", "idm-aeb", "broken", "r157")]
@@ -103,7 +102,7 @@ def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_
     assert wanted_s[-1] == 6.0
 
 
-def test_a_method_whose_package_is_not_installed_is_refused_before_it_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_method_whose_package_is_not_installed_is_refused_before_it_runs(monkeypatch):
     campaign = CampaignSpec(families=("low",), methods=("random", "sb3-sac"))
     checked_campaign(campaign)
     monkeypatch.setattr("risk_sac.problem.find_spec", lambda name: None)
@@ -113,15 +112,13 @@ def test_a_method_whose_package_is_not_installed_is_refused_before_it_runs(monke
 
 
 @pytest.fixture(scope="module")
-def sim() -> Iterator[SumoSimulation]:
+def sim():
     with closing(SumoSimulation(EgoConfig())) as simulation:
         yield simulation
 
 
 @pytest.mark.parametrize("family", ["low", "mixed", "dense"])
-def test_the_ego_meets_a_pedestrian_on_its_way_and_touches_none_from_either_side(
-    sim: SumoSimulation, family: str
-) -> None:
+def test_the_ego_meets_a_pedestrian_on_its_way_and_touches_none_from_either_side(sim, family):
     left_m, right_m = (meet(sim, family, side) for side in (LEFT, RIGHT))
     assert 0.0 < min(left_m, right_m) < MET_M
     assert abs(left_m - right_m) <= ALIKE_M
@@ -131,7 +128,7 @@ def said(families: tuple[str, ...] = ("low", "mixed", "dense"), ego: object = No
     return [str(each) for each in adjustments(CampaignSpec(families=families, odd=odd, ego=ego or {}))]
 
 
-def test_nothing_is_said_of_an_odd_that_is_used_as_it_is() -> None:
+def test_nothing_is_said_of_an_odd_that_is_used_as_it_is():
     assert said() == []
     assert said(environment={"friction": {"low": 0.6, "high": 0.7}}) == []
     assert said(("mixed",), environment={"time_of_day": ["day", "night"], "precipitation": ["rain"]}) == []
@@ -169,5 +166,5 @@ def test_nothing_is_said_of_an_odd_that_is_used_as_it_is() -> None:
         ),
     ],
 )
-def test_what_is_clipped_is_said(families: tuple[str, ...], odd: dict[str, object], words: str) -> None:
+def test_what_is_clipped_is_said(families, odd, words):
     assert words in said(families, **odd)

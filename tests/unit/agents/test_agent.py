@@ -1,14 +1,12 @@
 """What every agent must do, whichever algorithm it runs."""
 
 import io
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
-from risk_sac.agents.agent import Agent
 from risk_sac.agents.ddpg import DdpgAgent
 from risk_sac.agents.learner import Learner
 from risk_sac.agents.replay import Batch
@@ -20,7 +18,6 @@ from risk_sac.errors import ConfigError
 
 OBSERVATIONS, ACTIONS, ROWS = 5, 2, 16
 CONFIG = AgentConfig(hidden_sizes=(16, 16), batch_size=ROWS, critic_learning_rate=1e-3, target_rate=0.01)
-Make = Callable[..., Agent]
 
 
 def sac(config: AgentConfig = CONFIG, *, seed: int = 0) -> SacAgent:
@@ -53,7 +50,7 @@ def random_batch(generator: np.random.Generator, rows: int = ROWS) -> Batch:
 
 
 @both
-def test_actions_stay_in_the_unit_box_and_the_frozen_policy_is_deterministic(make: Make) -> None:
+def test_actions_stay_in_the_unit_box_and_the_frozen_policy_is_deterministic(make):
     agent = make()
     observation = np.full(OBSERVATIONS, 100.0)
     drawn = np.array([agent.act(observation, explore=True) for _ in range(50)])
@@ -64,7 +61,7 @@ def test_actions_stay_in_the_unit_box_and_the_frozen_policy_is_deterministic(mak
     assert np.array_equal(agent.act(observation, explore=False), agent.act(observation, explore=False))
 
 
-def test_the_temperature_has_a_bound_where_the_policy_cannot_reach_its_entropy() -> None:
+def test_the_temperature_has_a_bound_where_the_policy_cannot_reach_its_entropy():
     hot = SacConfig(initial_temperature=99.9, temperature_learning_rate=0.01, target_entropy_per_action=0.5)
     config = CONFIG.model_copy(update={"actor_learning_rate": 1e-7})
     agent = SacAgent(OBSERVATIONS, ACTIONS, config, hot, 0)
@@ -74,7 +71,7 @@ def test_the_temperature_has_a_bound_where_the_policy_cannot_reach_its_entropy()
 
 
 @both
-def test_agent_neither_reads_nor_moves_the_global_generator(make: Make) -> None:
+def test_agent_neither_reads_nor_moves_the_global_generator(make):
     torch.manual_seed(1)
     before = torch.get_rng_state()
     figures = []
@@ -91,7 +88,7 @@ def test_agent_neither_reads_nor_moves_the_global_generator(make: Make) -> None:
 
 
 @both
-def test_td_errors_are_those_of_an_update_at_equal_noise(make: Make) -> None:
+def test_td_errors_are_those_of_an_update_at_equal_noise(make):
     agent = make()
     state = agent.state()
     batch = random_batch(np.random.default_rng(0))
@@ -103,7 +100,7 @@ def test_td_errors_are_those_of_an_update_at_equal_noise(make: Make) -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @both
-def test_learns_what_is_rewarded(make: Make, sign: float) -> None:
+def test_learns_what_is_rewarded(make, sign):
     agent = make(CONFIG.model_copy(update={"discount": 0.01, "actor_learning_rate": 3e-3}))
     batch = random_batch(np.random.default_rng(0), 64)
     losses = [agent.update(batch, sign * batch.action.sum(dim=1)).critic_loss for _ in range(200)]
@@ -113,8 +110,8 @@ def test_learns_what_is_rewarded(make: Make, sign: float) -> None:
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU here")
-def test_the_cpu_is_taken_unless_a_gpu_is_asked_for_and_a_missing_one_is_refused() -> None:
-    def learner(device: str) -> Learner:
+def test_the_cpu_is_taken_unless_a_gpu_is_asked_for_and_a_missing_one_is_refused():
+    def learner(device):
         config = LearnerConfig.model_validate({"agent": {"device": device}})
         return Learner(OBSERVATIONS, ACTIONS, METHODS["sac"], config, 0)
 
@@ -125,7 +122,7 @@ def test_the_cpu_is_taken_unless_a_gpu_is_asked_for_and_a_missing_one_is_refused
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
-def test_an_agent_on_the_gpu_learns_what_one_on_the_cpu_learns() -> None:
+def test_an_agent_on_the_gpu_learns_what_one_on_the_cpu_learns():
     slow = sac()
     fast = SacAgent(OBSERVATIONS, ACTIONS, CONFIG, SacConfig(), 0, "cuda")
     fast.load(slow.state() | {"generator": fast.state()["generator"]})
@@ -138,7 +135,7 @@ def test_an_agent_on_the_gpu_learns_what_one_on_the_cpu_learns() -> None:
 
 
 @both
-def test_resumed_agent_equals_one_never_interrupted_bit_for_bit(make: Make) -> None:
+def test_resumed_agent_equals_one_never_interrupted_bit_for_bit(make):
     agents = [make(seed=seed) for seed in (0, 99)]
     generator = np.random.default_rng(0)
     for _ in range(10):
@@ -186,7 +183,7 @@ def learnt(agent: Sb3Agent, updates: int) -> list[float]:
     return [agent.update(batch, reward).critic_loss for _ in range(updates)]
 
 
-def test_learns_what_is_rewarded_of_sb3() -> None:
+def test_learns_what_is_rewarded_of_sb3():
     agent = Sb3Agent(5, 2, SB3_CONFIG, SacConfig(), 0)
     observation = np.zeros(5, np.float32)
     before = np.abs(agent.act(observation, explore=False) - 0.5).max()
@@ -197,7 +194,7 @@ def test_learns_what_is_rewarded_of_sb3() -> None:
     assert 0.0 < agent.temperature < SacConfig().initial_temperature
 
 
-def test_goes_on_from_its_state_bit_for_bit() -> None:
+def test_goes_on_from_its_state_bit_for_bit():
     agent, other = Sb3Agent(5, 2, SB3_CONFIG, SacConfig(), 0), Sb3Agent(5, 2, SB3_CONFIG, SacConfig(), 1)
     learnt(agent, 3)
     state = agent.state()

@@ -1,4 +1,3 @@
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -9,7 +8,6 @@ from hypothesis import strategies as st
 from risk_sac.agents.controls import RandomAgent, ScriptedAgent
 from risk_sac.agents.decisions import Decision, Held
 from risk_sac.agents.follower import BEHIND_STEPS, ScriptFollower
-from risk_sac.agents.replay import Transition
 from risk_sac.observation_layout import PER_ADVERSARY, X_M, Y_M
 from risk_sac.risk.reward import shaped_reward
 from risk_sac.scenario.families import FAMILIES
@@ -24,7 +22,7 @@ def played(agent: RandomAgent, steps: int) -> np.ndarray:
     return np.array([agent.act(NOTHING) for _ in range(steps)]).reshape(steps, ADVERSARIES, 2)
 
 
-def test_actions_are_uniform_and_in_the_space() -> None:
+def test_actions_are_uniform_and_in_the_space():
     actions = played(RandomAgent(2 * ADVERSARIES, seed=0), 20_000)
     assert actions.dtype == np.float32
     assert np.abs(actions).max() <= 1.0
@@ -32,7 +30,7 @@ def test_actions_are_uniform_and_in_the_space() -> None:
     np.testing.assert_allclose(shares / actions.size, 0.25, atol=0.02)
 
 
-def test_each_adversarys_action_is_held_for_a_second_on_average_and_changes_as_a_whole() -> None:
+def test_each_adversarys_action_is_held_for_a_second_on_average_and_changes_as_a_whole():
     actions = played(RandomAgent(2 * ADVERSARIES, seed=1), 20_000)
     changed = np.diff(actions, axis=0) != 0.0
     assert np.array_equal(changed[..., 0], changed[..., 1])
@@ -41,7 +39,7 @@ def test_each_adversarys_action_is_held_for_a_second_on_average_and_changes_as_a
     np.testing.assert_allclose(both, 0.01, atol=0.004)
 
 
-def test_a_restored_agent_goes_on_as_the_one_that_was_saved() -> None:
+def test_a_restored_agent_goes_on_as_the_one_that_was_saved():
     agent = RandomAgent(2 * ADVERSARIES, seed=3)
     played(agent, 7)
     state = agent.state()
@@ -55,7 +53,7 @@ def seen(x_m: float, y_m: float, cos: float) -> list[float]:
     return [x_m / X_M, y_m / Y_M, 0.0, 0.0, cos, *[0.0] * (PER_ADVERSARY - 5)]
 
 
-def test_those_ahead_cut_in_and_brake_and_all_others_keep_on() -> None:
+def test_those_ahead_cut_in_and_brake_and_all_others_keep_on():
     ahead_left, beside, oncoming, crossing = seen(12, 3.5, 1), seen(2, -3.5, 1), seen(40, 3.5, -1), seen(20, 5, 0)
     observation = np.array([*ahead_left, *beside, *oncoming, *crossing, 0.5, 0.5], np.float32)
     action = ScriptedAgent(8, seed=0).act(observation)
@@ -64,13 +62,10 @@ def test_those_ahead_cut_in_and_brake_and_all_others_keep_on() -> None:
     assert in_the_path.tolist() == [-0.5, -0.25]
 
 
-Make = Callable[..., Transition]
-
-
-def test_an_action_is_held_and_an_episode_begins_with_a_new_one() -> None:
+def test_an_action_is_held_and_an_episode_begins_with_a_new_one():
     held, drawn = Held(3), iter(np.arange(10.0))
 
-    def acts(steps: int) -> list[float]:
+    def acts(steps):
         return [float(held.act(lambda: np.array([next(drawn)]))[0]) for _ in range(steps)]
 
     assert acts(7) == [0, 0, 0, 1, 1, 1, 2]
@@ -78,7 +73,7 @@ def test_an_action_is_held_and_an_episode_begins_with_a_new_one() -> None:
     assert acts(4) == [3, 3, 3, 4]
 
 
-def test_three_steps_make_one_transition(transition: Make) -> None:
+def test_three_steps_make_one_transition(transition):
     decision = Decision(3, 0.5)
     steps = [
         transition(value, risk_reward=value, cost=cost, robustness=value, next_robustness=value + 1.0)
@@ -86,7 +81,6 @@ def test_three_steps_make_one_transition(transition: Make) -> None:
     ]
     assert [decision.add(step) for step in steps[:2]] == [None, None]
     made = decision.add(steps[2])
-    assert made is not None
     assert made.risk_reward == 1.0 + 0.5 * 2.0 + 0.25 * 4.0
     assert made.cost == pytest.approx(0.4 + 0.5 * 0.2 + 0.25 * 0.8)
     assert (made.robustness, made.next_robustness) == (1.0, 5.0)
@@ -96,11 +90,10 @@ def test_three_steps_make_one_transition(transition: Make) -> None:
     assert decision.add(steps[0]) is None  # the next decision
 
 
-def test_the_end_of_the_world_completes_a_decision_and_that_of_the_horizon_forgets_it(transition: Make) -> None:
+def test_the_end_of_the_world_completes_a_decision_and_that_of_the_horizon_forgets_it(transition):
     decision = Decision(3, 0.5)
     decision.add(transition(1.0))
     ended = decision.add(transition(2.0, terminated=True))
-    assert ended is not None
     assert (ended.risk_reward, ended.terminated) == (1.0 + 0.5 * 2.0, True)
     decision.add(transition(8.0))
     decision.begin()  # the horizon cut the decision off
@@ -112,7 +105,7 @@ def test_the_end_of_the_world_completes_a_decision_and_that_of_the_horizon_forge
 
 
 @given(robustness=st.lists(st.floats(-3, 3), min_size=5, max_size=5))
-def test_shaping_of_a_decision_is_the_discounted_sum_of_its_steps(robustness: list[float]) -> None:
+def test_shaping_of_a_decision_is_the_discounted_sum_of_its_steps(robustness):
     """sum_i g^i (g phi_{i+1} - phi_i) = g^k phi_k - phi_0."""
     discount = 0.9
     pairs = list(pairwise(robustness))

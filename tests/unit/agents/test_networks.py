@@ -18,7 +18,7 @@ from risk_sac.agents.sac import actor_loss, soft_value, temperature_loss
 from risk_sac.config import LagrangianConfig
 
 
-def test_log_prob_of_a_hand_computed_case() -> None:
+def test_log_prob_of_a_hand_computed_case():
     action, log_prob = tanh_gaussian(torch.tensor([[0.0]]), torch.tensor([[0.0]]), torch.tensor([[1.0]]))
     # tanh(1) = 0.76159; log N(1; 0, 1) = -1.41894; log(1 - tanh(1)²) = -0.86756
     assert action.item() == pytest.approx(0.7615942)
@@ -26,7 +26,7 @@ def test_log_prob_of_a_hand_computed_case() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(-3, 3), st.floats(-3, 1), st.floats(-3, 3)), min_size=1, max_size=6))
-def test_log_prob_agrees_with_torch_distributions(rows: list[tuple[float, float, float]]) -> None:
+def test_log_prob_agrees_with_torch_distributions(rows):
     mean, log_std, noise = torch.tensor(rows, dtype=torch.float64).T.unsqueeze(1)  # each 1 x action_size
     base = Independent(Normal(mean, log_std.exp()), 1)
     reference = TransformedDistribution(base, TanhTransform(cache_size=1))
@@ -38,7 +38,7 @@ def test_log_prob_agrees_with_torch_distributions(rows: list[tuple[float, float,
         torch.testing.assert_close(log_prob, reference.log_prob(action), rtol=1e-6, atol=1e-6)
 
 
-def test_log_prob_and_its_gradient_stay_finite_where_tanh_saturates() -> None:
+def test_log_prob_and_its_gradient_stay_finite_where_tanh_saturates():
     mean = torch.tensor([[40.0, -40.0]], requires_grad=True)
     action, log_prob = tanh_gaussian(mean, torch.zeros(1, 2), torch.zeros(1, 2))
     log_prob.sum().backward()
@@ -49,7 +49,7 @@ def test_log_prob_and_its_gradient_stay_finite_where_tanh_saturates() -> None:
 
 
 @pytest.mark.parametrize("normalised", [False, True])
-def test_stacked_networks_equal_separate_ones_in_values_and_gradients(normalised: bool) -> None:
+def test_stacked_networks_equal_separate_ones_in_values_and_gradients(normalised):
     generator = torch.Generator().manual_seed(0)
     stacked = Mlp((5, 16, 12, 3), generator, count=2, normalised=normalised)
     inputs, slope = torch.randn(9, 5, generator=generator), torch.randn(2, 9, 3, generator=generator)
@@ -68,7 +68,7 @@ def test_stacked_networks_equal_separate_ones_in_values_and_gradients(normalised
             torch.testing.assert_close(one[each], other, rtol=1e-5, atol=1e-5)
 
 
-def test_a_normalised_layer_has_mean_0_and_variance_1_before_its_relu() -> None:
+def test_a_normalised_layer_has_mean_0_and_variance_1_before_its_relu():
     network = Mlp((1, 2, 1), torch.Generator().manual_seed(0), normalised=True)
     values = [[[1.0, 3.0]]], [[[0.0, 0.0]]], [[[1.0], [5.0]]], [[[0.5]]]  # raw (x, 3x), scaled (-1, 1) for x > 0
     for parameter, value in zip(network.parameters(), values, strict=True):
@@ -78,7 +78,7 @@ def test_a_normalised_layer_has_mean_0_and_variance_1_before_its_relu() -> None:
 
 
 @pytest.mark.parametrize("normalised", [False, True])
-def test_one_input_gives_what_a_batch_gives_even_after_a_copy_or_a_change(normalised: bool) -> None:
+def test_one_input_gives_what_a_batch_gives_even_after_a_copy_or_a_change(normalised):
     generator = torch.Generator().manual_seed(0)
     network = Mlp((5, 16, 16, 6), generator, normalised=normalised)
     twin = copy.deepcopy(network)
@@ -92,7 +92,7 @@ def test_one_input_gives_what_a_batch_gives_even_after_a_copy_or_a_change(normal
     assert not torch.allclose(network(inputs), twin(inputs))
 
 
-def test_target_and_soft_value_of_a_hand_computed_case() -> None:
+def test_target_and_soft_value_of_a_hand_computed_case():
     next_values, log_prob = torch.tensor([[3.0, 3.0], [5.0, 2.0]]), torch.tensor([-2.0, 1.0])
     value = soft_value(next_values, log_prob, torch.tensor(0.5))
     assert value.tolist() == [3.0 + 1.0, 2.0 - 0.5]
@@ -100,17 +100,17 @@ def test_target_and_soft_value_of_a_hand_computed_case() -> None:
     assert target.tolist() == pytest.approx([1.0 + 0.9 * 4.0, 1.0])
 
 
-def test_critic_loss_of_a_hand_computed_case() -> None:
+def test_critic_loss_of_a_hand_computed_case():
     # First critic: ½ mean(1·4, ½·0) = 1; second: ½ mean(1·1, ½·16) = 2.25.
     assert critic_loss(torch.tensor([[2.0, 0.0], [1.0, 4.0]]), torch.tensor([1.0, 0.5])).item() == 3.25
 
 
-def test_actor_loss_of_a_hand_computed_case() -> None:
+def test_actor_loss_of_a_hand_computed_case():
     loss = actor_loss(torch.tensor([1.5, -0.5]), torch.tensor([1.5, 0.5]))
     assert loss.item() == pytest.approx((1.5 * -1.5 + 0.5 * 0.5) / 2)
 
 
-def test_temperature_falls_while_entropy_exceeds_its_target_and_rises_below() -> None:
+def test_temperature_falls_while_entropy_exceeds_its_target_and_rises_below():
     for entropy in (3.0, -3.0):
         log_temperature = torch.tensor(-1.3, requires_grad=True)
         temperature = log_temperature.exp()
@@ -122,7 +122,7 @@ def test_temperature_falls_while_entropy_exceeds_its_target_and_rises_below() ->
 CONFIG = LagrangianConfig(initial=0.5, learning_rate=0.1, cost_limit=0.2, maximum=2.0)
 
 
-def test_dual_step_of_hand_computed_cases() -> None:
+def test_dual_step_of_hand_computed_cases():
     assert dual_step(1.0, 0.7, CONFIG) == pytest.approx(1.05)
     assert dual_step(1.0, 0.1, CONFIG) == pytest.approx(0.99)
     assert dual_step(1.0, 0.2, CONFIG) == 1.0
@@ -131,7 +131,7 @@ def test_dual_step_of_hand_computed_cases() -> None:
 
 
 @given(st.lists(st.floats(0.0, 1e6), max_size=30))
-def test_dual_variable_never_goes_negative_nor_above_its_cap(costs: list[float]) -> None:
+def test_dual_variable_never_goes_negative_nor_above_its_cap(costs):
     dual_variable = CONFIG.initial
     for cost in costs:
         dual_variable = dual_step(dual_variable, cost, CONFIG)

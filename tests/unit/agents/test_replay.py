@@ -35,7 +35,7 @@ def filled(kind: type[Replay], count: int, make: Make, seed: int = 0) -> Replay:
 
 
 @KINDS
-def test_a_batch_holds_what_was_stored(kind: type[Replay], transition: Make) -> None:
+def test_a_batch_holds_what_was_stored(kind, transition):
     replay = kind(3, 2, CONFIG)
     stored = transition(0.5, cost=0.2, robustness=-1.5, next_robustness=2.5, terminated=True, accumulated_reward=9.0)
     store(replay, stored, 0.1)
@@ -54,7 +54,7 @@ def test_a_batch_holds_what_was_stored(kind: type[Replay], transition: Make) -> 
 
 
 @KINDS
-def test_the_oldest_transition_gives_way_once_full(kind: type[Replay], transition: Make) -> None:
+def test_the_oldest_transition_gives_way_once_full(kind, transition):
     replay = kind(3, 2, CONFIG)
     for value in range(CONFIG.capacity + 10):
         store(replay, transition(float(value)), 1.0)
@@ -64,13 +64,13 @@ def test_the_oldest_transition_gives_way_once_full(kind: type[Replay], transitio
     assert batch.risk_reward.max() == CONFIG.capacity + 9
 
 
-def test_uniform_draws_every_transition_equally_often(random_transition: Make) -> None:
+def test_uniform_draws_every_transition_equally_often(random_transition):
     replay = filled(UniformReplay, 50, random_transition)
     counts = np.bincount(replay.sample(50_000, np.random.default_rng(1)).indices, minlength=50)
     assert ((counts - 1000.0) ** 2 / 1000.0).sum() < 86.0  # χ² at 49 degrees of freedom, p = 0.001
 
 
-def test_rper_draws_in_proportion_to_the_priorities(random_transition: Make) -> None:
+def test_rper_draws_in_proportion_to_the_priorities(random_transition):
     replay = filled(RiskPrioritizedReplay, 50, random_transition)
     expected = expected_priorities(replay)
     expected /= expected.sum()
@@ -84,7 +84,7 @@ def test_rper_draws_in_proportion_to_the_priorities(random_transition: Make) -> 
     assert np.abs(counts - 1000 * expected).max() <= 2.0
 
 
-def test_rper_weights_follow_equation_10(random_transition: Make) -> None:
+def test_rper_weights_follow_equation_10(random_transition):
     replay = filled(RiskPrioritizedReplay, 40, random_transition)
     priorities = expected_priorities(replay)
     batch = replay.sample(64, np.random.default_rng(2))
@@ -92,7 +92,7 @@ def test_rper_weights_follow_equation_10(random_transition: Make) -> None:
     assert batch.weight.numpy() == pytest.approx(weights / weights.max(), rel=1e-6)
 
 
-def test_rper_leaves_equal_equation_9_after_any_mix_of_additions_and_updates(random_transition: Make) -> None:
+def test_rper_leaves_equal_equation_9_after_any_mix_of_additions_and_updates(random_transition):
     replay = RiskPrioritizedReplay(3, 2, CONFIG)
     generator = np.random.default_rng(3)
     for _ in range(2500):
@@ -105,7 +105,7 @@ def test_rper_leaves_equal_equation_9_after_any_mix_of_additions_and_updates(ran
     assert replay._tree.total == pytest.approx(leaves.sum(), rel=1e-14)
 
 
-def test_rper_hands_out_the_new_transitions_once_and_in_their_order(transition: Make) -> None:
+def test_rper_hands_out_the_new_transitions_once_and_in_their_order(transition):
     replay = RiskPrioritizedReplay(3, 2, CONFIG)
     assert replay.take_unmeasured(9) is None
     for count in (3, 4, CONFIG.capacity + 5):  # the last wraps around, and its first five are overwritten
@@ -124,7 +124,7 @@ def test_rper_hands_out_the_new_transitions_once_and_in_their_order(transition: 
 
 
 @KINDS
-def test_a_loaded_replay_draws_what_the_original_draws(kind: type[Replay], random_transition: Make) -> None:
+def test_a_loaded_replay_draws_what_the_original_draws(kind, random_transition):
     original = filled(kind, 1300, random_transition)  # has wrapped around
     generator = np.random.default_rng(4)
     original.update(original.sample(64, generator).indices, generator.exponential(size=64))
@@ -153,7 +153,7 @@ PRIORITY_CONFIG = ReplayConfig(
 terms = hnp.arrays(np.float64, st.tuples(st.just(3), st.integers(1, 30)), elements=st.floats(-1e3, 1e3))
 
 
-def test_priority_of_a_hand_computed_case() -> None:
+def test_priority_of_a_hand_computed_case():
     #              |δ|: min 0, mean 2      R̂: min -1, mean 1     -ρ: constant
     stored = np.array([[0.0, 1.0, 5.0], [-1.0, 0.0, 4.0], [0.3, 0.3, 0.3]])
     # On the common scale: 0, 1/2, 5/2 and 0, 1/2, 5/2 and nothing.
@@ -161,14 +161,14 @@ def test_priority_of_a_hand_computed_case() -> None:
 
 
 @given(terms)
-def test_priority_is_floored_and_bounded(stored: np.ndarray) -> None:
+def test_priority_is_floored_and_bounded(stored):
     values = priority(stored, TermScales.of(stored), PRIORITY_CONFIG)
     assert (values >= PRIORITY_CONFIG.priority_floor).all()
     assert (values <= 2.0 * TERM_CAP).all()
 
 
 @given(terms, st.floats(0.1, 10.0), st.floats(-100.0, 100.0))
-def test_priority_ignores_the_unit_and_the_zero_of_a_term(stored: np.ndarray, factor: float, offset: float) -> None:
+def test_priority_ignores_the_unit_and_the_zero_of_a_term(stored, factor, offset):
     spread = stored.mean(axis=1) - stored.min(axis=1)
     stored[spread < 1e-3] = 0.0  # either side of the threshold below which a term counts as constant
     moved = stored * factor + offset
@@ -176,20 +176,20 @@ def test_priority_ignores_the_unit_and_the_zero_of_a_term(stored: np.ndarray, fa
     assert priority(moved, TermScales.of(moved), PRIORITY_CONFIG) == pytest.approx(before, rel=1e-6, abs=1e-6)
 
 
-def test_one_outlier_counts_for_at_most_ten_average_terms() -> None:
+def test_one_outlier_counts_for_at_most_ten_average_terms():
     stored = np.zeros((3, 1000))
     stored[0] = 1.0
     stored[0, :2] = 0.0, 1e6
     assert priority(stored, TermScales.of(stored), PRIORITY_CONFIG).max() == TERM_CAP
 
 
-def test_importance_weights_of_a_hand_computed_case() -> None:
+def test_importance_weights_of_a_hand_computed_case():
     # N P = 4, 1, 1/4; ^-0.5 = 1/2, 1, 2; over the largest.
     weights = importance_weights(np.array([1.0, 0.25, 0.0625]), size=4, correction=0.5)
     assert weights == pytest.approx([0.25, 0.5, 1.0])
 
 
-def test_find_walks_the_cumulative_sum() -> None:
+def test_find_walks_the_cumulative_sum():
     tree = SumTree(4)
     tree.rebuild(np.array([1.0, 0.0, 2.0, 1.0]))  # ends at 1, 1, 3, 4
     assert tree.total == 4.0
@@ -197,7 +197,7 @@ def test_find_walks_the_cumulative_sum() -> None:
 
 
 @given(hnp.arrays(np.float64, st.integers(1, 200), elements=st.integers(0, 2**20).map(float)), st.data())
-def test_total_is_exactly_the_sum_after_any_writes(values: np.ndarray, data: st.DataObject) -> None:
+def test_total_is_exactly_the_sum_after_any_writes(values, data):
     # Whole numbers add without rounding, so nothing but the exact sum passes.
     tree = SumTree(len(values))
     tree.rebuild(values)
@@ -216,7 +216,7 @@ def test_total_is_exactly_the_sum_after_any_writes(values: np.ndarray, data: st.
     ),
     st.lists(st.floats(0.0, 1.0), min_size=1, max_size=50),
 )
-def test_find_never_returns_a_leaf_of_priority_zero(values: np.ndarray, fractions: list[float]) -> None:
+def test_find_never_returns_a_leaf_of_priority_zero(values, fractions):
     tree = SumTree(128)
     tree.rebuild(values)
     found = tree.find(np.array(fractions))
@@ -225,7 +225,7 @@ def test_find_never_returns_a_leaf_of_priority_zero(values: np.ndarray, fraction
 
 
 @given(hnp.arrays(np.float64, st.integers(1, 300), elements=st.integers(0, 1000).map(float)), st.data())
-def test_find_agrees_with_a_linear_scan(values: np.ndarray, data: st.DataObject) -> None:
+def test_find_agrees_with_a_linear_scan(values, data):
     values[data.draw(st.integers(0, len(values) - 1))] += 1.0
     tree = SumTree(300)
     tree.rebuild(values)

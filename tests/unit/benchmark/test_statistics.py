@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -44,7 +42,7 @@ FOUND = [
 ]
 
 
-def test_a_method_is_summed_up_over_defects_and_seeds() -> None:
+def test_a_method_is_summed_up_over_defects_and_seeds():
     archive, random = summaries(FOUND)  # the quickest first
     assert (archive.method, archive.runs, archive.detected) == ("archive", 6, 4)
     assert (archive.mean_steps, archive.median_steps) == (250.0, 250.0)
@@ -57,21 +55,21 @@ def test_a_method_is_summed_up_over_defects_and_seeds() -> None:
     assert (random.a12, random.p) == (None, None)
 
 
-def test_survival_falls_at_detections_and_not_at_the_budget() -> None:
+def test_survival_falls_at_detections_and_not_at_the_budget():
     steps, left = survival(runs("archive", "latency", 100, 300, 300, None))
     assert dict(zip(steps.tolist(), left.tolist(), strict=True)) == pytest.approx({100: 0.75, 300: 0.25, 1000: 0.25})
     _, left = survival(runs("archive", "latency", None, None))
     assert left.tolist() == [1.0]
 
 
-def test_the_log_rank_test_tells_quick_from_slow() -> None:
+def test_the_log_rank_test_tells_quick_from_slow():
     quick, slow = runs("archive", "latency", *range(10, 20)), runs("random", "latency", *range(500, 510))
     assert log_rank(quick, slow) < 0.001
     assert log_rank(quick, quick) == pytest.approx(1.0)
     assert log_rank(runs("archive", "x", None), runs("random", "x", None)) == 1.0
 
 
-def test_an_early_detection_counts_for_a_larger_budget_once_it_is_called_with_it(tmp_path: Path) -> None:
+def test_an_early_detection_counts_for_a_larger_budget_once_it_is_called_with_it(tmp_path):
     (early,) = runs("archive", "latency", 400)
     spec = RunSpec(family="low", method="archive", seed=0, ego=read_ego("idm-aeb+latency"))
     (tmp_path / ANSWER).write_text(early.model_dump_json())
@@ -82,7 +80,7 @@ def test_an_early_detection_counts_for_a_larger_budget_once_it_is_called_with_it
     assert answer_of(tmp_path, BUDGET) == early
 
 
-def test_ranks_that_never_differ_are_no_coincidence() -> None:
+def test_ranks_that_never_differ_are_no_coincidence():
     means = np.array([[1.0, 2.0, 3.0]] * 9)
     p = friedman(means)
     assert p is not None
@@ -101,7 +99,7 @@ latency,low,random,0,5000,5000,50,,
 RUNS = runs_of(TEXT)
 
 
-def test_the_power_of_a_budget_is_what_was_detected_within_it() -> None:
+def test_the_power_of_a_budget_is_what_was_detected_within_it():
     found = method_power("archive", {"low": (9000, 1), "mixed": (9000, 1)}, RUNS)
     assert found.defects == (
         DefectPower(defect="latency", family="low", detected=1, runs=2),
@@ -116,7 +114,7 @@ def test_the_power_of_a_budget_is_what_was_detected_within_it() -> None:
     assert (found.expected, found.in_most_seeds, found.never) == (0.5, (), ("speeds",))
 
 
-def test_steps_of_a_campaign_are_those_of_its_own_episodes_once_there_are_some() -> None:
+def test_steps_of_a_campaign_are_those_of_its_own_episodes_once_there_are_some():
     spec = CampaignSpec(families=("low",), methods=("archive",), seeds=(0, 1), budget=Budget(episodes=2))
     (before,) = power_of(spec, [], RUNS).methods[0].budgets
     assert (before.runs, before.steps, before.estimated_from) == (2, 200, "benchmark")
@@ -132,7 +130,7 @@ def test_steps_of_a_campaign_are_those_of_its_own_episodes_once_there_are_some()
     assert (found.budgets[0].steps, found.expected) == (75, 0.0)
 
 
-def test_the_command_tells_the_power_of_flags_and_of_the_folder_of_a_run(tmp_path, capsys, metrics) -> None:
+def test_the_command_tells_the_power_of_flags_and_of_the_folder_of_a_run(tmp_path, capsys, metrics):
     file = tmp_path / "detections.csv"
     file.write_text(TEXT)
     assert cli.main(["power", "--families", "low", "--steps", "20000", "--measured", str(file)]) == 0

@@ -1,6 +1,5 @@
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from rich.console import Console
@@ -21,9 +20,7 @@ def untimed(results: Results) -> Results:
 
 
 @pytest.mark.parametrize("grade", [*Grade, None])
-def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(
-    grade: Grade | None, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(grade, capsys):
     judged = judgement(
         grade,
         conflict_type=ConflictType.CROSSING,
@@ -45,7 +42,7 @@ def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(
 @pytest.mark.parametrize(
     "form", ["{run}-search-{index}", "search-{index}", "{run}-train-{index}", "{index:06d}", "{index}"]
 )
-def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder: Path, tmp_path: Path, form: str) -> None:
+def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder, tmp_path, form):
     results = read_results(folder)
     index = results.failures[0].episode.index
     picture = tmp_path / "contact.png"
@@ -69,9 +66,7 @@ def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder: Path, t
         (["--spec", "nowhere.yaml"], "--spec: "),
     ],
 )
-def test_wrong_settings_name_the_field_and_leave_no_folder(
-    arguments: list[str], complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_settings_name_the_field_and_leave_no_folder(arguments, complaint, tmp_path, capsys):
     assert cli.main(["run", *arguments, "--out", str(tmp_path / "out")]) == 2
     printed = capsys.readouterr().err
     assert printed.startswith(complaint)
@@ -79,21 +74,21 @@ def test_wrong_settings_name_the_field_and_leave_no_folder(
     assert not (tmp_path / "out").exists()
 
 
-def test_folder_of_another_run_is_refused_and_kept(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folder_of_another_run_is_refused_and_kept(folder, capsys):
     before = (folder / "results.json").read_bytes()
     assert cli.main(["run", "--family", "low", "--method", "sac", "--episodes", "8", "--out", str(folder)]) == 2
     assert "holds a run with another method, seed" in capsys.readouterr().err
     assert (folder / "results.json").read_bytes() == before
 
 
-def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert cli.main(["run", "--family", "low", "--method", "random", "--out", str(tmp_path / "file" / "out")]) == 2
     complaint = capsys.readouterr().err
     assert re.fullmatch(r"--out: got .*/file/out, which cannot be written \(Not a directory\); wanted .*\n", complaint)
 
 
-def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path: Path) -> None:
+def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path):
     whole = run(SPEC, tmp_path, ignore)
     (tmp_path / "checkpoint").unlink()  # as if killed before the first one
     write_results(

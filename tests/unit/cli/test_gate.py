@@ -2,7 +2,6 @@ import argparse
 import io
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -86,7 +85,7 @@ def by_rate(**bounds: Any) -> Bounds:
     return Bounds(judged_by="rate", **bounds)
 
 
-def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above() -> None:
+def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above():
     status, reason = verdict(results("succeeded", FEW), Bounds(ecr=0.1))
     assert status == 1
     assert reason == (
@@ -95,7 +94,7 @@ def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above() ->
     assert verdict(results("succeeded", FEW), Bounds(ecr=0.14))[0] == 0
 
 
-def test_the_rate_of_a_requirement_is_judged_in_the_i_i_d_phase_too() -> None:
+def test_the_rate_of_a_requirement_is_judged_in_the_i_i_d_phase_too():
     metrics = run_metrics(40, requirements=requirements(never_fast=(0.3, 0.45)))
     drawn = RunResult(
         **{"id": "low-iid-random-0", "family": "low", "method": "iid-random", "seed": 0, "state": "succeeded"},
@@ -113,7 +112,7 @@ def test_the_rate_of_a_requirement_is_judged_in_the_i_i_d_phase_too() -> None:
     ("field", "bounds"),
     [("--max-ecr", {"max_ecr": 0.0}), ("--max-pcr", {"max_pcr": 0.0}), ("--max-rate", {"max_rate": [("a", 0.0)]})],
 )
-def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field: str, bounds: dict[str, Any]) -> None:
+def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field, bounds):
     options = argparse.Namespace(**UNBOUND | bounds)
     with pytest.raises(ConfigError, match="wanted more, or --judge-by rate") as error:
         Bounds.of(options)
@@ -123,7 +122,7 @@ def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field: str, bou
 
 
 @pytest.mark.parametrize(("bound", "status"), [(0, 1), (1, 0), (2, 0)])
-def test_more_distinct_preventable_failures_than_may_be_are_named(bound: int, status: int) -> None:
+def test_more_distinct_preventable_failures_than_may_be_are_named(bound, status):
     found, reason = verdict(
         results("succeeded", {}, {"method": "random", "distinct_preventable": 0}), Bounds(preventable=bound)
     )
@@ -132,9 +131,7 @@ def test_more_distinct_preventable_failures_than_may_be_are_named(bound: int, st
     assert "random" not in reason
 
 
-def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_found_it_in_that_family(
-    tmp_path: Path,
-) -> None:
+def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_found_it_in_that_family(tmp_path):
     file = tmp_path / "known.json"
     earlier = results("succeeded", {"signatures": {LEADER: 2}}, {"method": "random", "signatures": {CUT_IN: 1}})
     file.write_text(earlier.model_dump_json())
@@ -151,7 +148,7 @@ def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_fou
 
 @pytest.mark.parametrize("bounds", [Bounds(), Bounds(ecr=0.5), Bounds(pcr=0.5)])
 @pytest.mark.parametrize("state", ["failed", "cancelled"])
-def test_a_campaign_that_was_not_measured_to_the_end_could_not_run(state: str, bounds: Bounds) -> None:
+def test_a_campaign_that_was_not_measured_to_the_end_could_not_run(state, bounds):
     assert verdict(results(state, {"ecr": 0.9}), bounds)[0] == 2
 
 
@@ -201,7 +198,7 @@ def report(
     return ElementTree.fromstring(written.getvalue())
 
 
-def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_does() -> None:
+def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_does():
     root = report(
         {}, {"seed": 1, "id": "low-sac-1"}, totals=[{"runs": 2, "ecr": 0.25, "ecr_high": 0.278, "failures": 250}]
     )
@@ -213,7 +210,7 @@ def test_a_method_above_the_bound_fails_in_a_case_of_its_own_as_the_exit_status_
     )
 
 
-def test_whatever_a_reason_holds_the_report_is_well_formed() -> None:
+def test_whatever_a_reason_holds_the_report_is_well_formed():
     reason = "".join(map(chr, range(0x180))) + "\ud800\ufffe\uffff\U0001f697 <![CDATA[ ]]> &amp; \"'"
     (error,) = report({"state": "failed", "reason": reason}).iter("error")
     assert "\x1b" not in error.attrib["message"]
@@ -239,7 +236,7 @@ WIDE_TOTAL = TOTAL | {
 }
 
 
-def test_results_of_every_method_fit_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
+def test_results_of_every_method_fit_80_columns(capsys):
     place = "car_following_" + "a_street_of_a_town_" * 2 + "0a1b2c3d4e5f"
     totals = [WIDE_TOTAL | {"method": method} for method in METHODS] + [WIDE_TOTAL | {"family": place, "method": "sac"}]
     results = {
@@ -259,7 +256,7 @@ def test_results_of_every_method_fit_80_columns(capsys: pytest.CaptureFixture[st
     assert place in "".join(line.split()[0] for line in printed.splitlines() if line.strip())
 
 
-def test_each_requirement_is_a_row_below_its_family_and_method(capsys: pytest.CaptureFixture[str]) -> None:
+def test_each_requirement_is_a_row_below_its_family_and_method(capsys):
     own = "keeps_a_distance_of_some_forty_letters_x"
     found = requirements(no_contact=(0.1, 0.2), safe_ttc=(0.3, 0.4), **{own: (0.999, 1.0)})
     totals = [TOTAL | {"requirements": found}, TOTAL | {"method": "random"}]  # the latter from before

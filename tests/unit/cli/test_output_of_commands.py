@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(autouse=True)
-def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
+def narrow(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
 
 
@@ -29,7 +29,7 @@ def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
         "places NET --why",
     ],
 )
-def test_output_fits_80_columns(words: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_output_fits_80_columns(words, folder, capsys):
     places = {"RUN": str(folder), "NET": str(ROOT / "sumo_nets" / "dense" / "dense.net.xml")}
     assert cli.main([places.get(word, word) for word in words.split()]) == 0
     printed = capsys.readouterr().out
@@ -41,13 +41,13 @@ def test_output_fits_80_columns(words: str, folder: Path, capsys: pytest.Capture
 @pytest.mark.parametrize(
     "words", ["show RUN", "show RUN --raw --sort severity", "clusters RUN", "verify RUN --times 1"]
 )
-def test_json_is_one_document(words: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_is_one_document(words, folder, capsys):
     assert cli.main([str(folder) if word == "RUN" else word for word in words.split()] + ["--json"]) == 0
     json.loads(capsys.readouterr().out)
 
 
-def test_filters_leave_what_they_say(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    def shown(*flags: str) -> list[dict]:
+def test_filters_leave_what_they_say(folder, capsys):
+    def shown(*flags):
         assert cli.main(["show", str(folder), "--json", "--limit", "1000", *flags]) == 0
         return json.loads(capsys.readouterr().out)
 

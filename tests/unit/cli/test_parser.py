@@ -23,9 +23,7 @@ COMMANDS = {parser.prog: parser for parser in leaves(cli._parser())}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help_has_a_paragraph_an_example_that_parses_and_fits_80_columns(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_help_has_a_paragraph_an_example_that_parses_and_fits_80_columns(name, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     text = COMMANDS[name].format_help()
     assert all(len(line) <= 80 for line in text.splitlines()), text
@@ -83,12 +81,10 @@ def test_help_has_a_paragraph_an_example_that_parses_and_fits_80_columns(
         ("evaluate --families low --seeds 0 --out x", "--seeds: got 0"),
     ],
 )
-def test_a_wrong_word_is_named_as_typed_beside_what_is_close(
-    words: str, said: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_word_is_named_as_typed_beside_what_is_close(words, said, capsys):
     try:
         status = cli.main(words.split())
     except SystemExit as ended:
-        status = ended.code  # type: ignore[assignment]
+        status = ended.code
     assert status == 2
     assert said in capsys.readouterr().err

@@ -7,13 +7,12 @@ import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
 from unicodedata import category
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rich.console import Group, RenderableType
+from rich.console import Group
 from rich.progress import BarColumn, Progress
 from rich.table import Table
 from rich.text import Text
@@ -47,13 +46,13 @@ print(locale.localeconv()["decimal_point"])
         (f"{EGOS} >&- 2>&- <&-", {}),
     ],
 )
-def test_a_command_ends_well_whatever_reads_its_output(command: str, environment: dict[str, str]) -> None:
+def test_a_command_ends_well_whatever_reads_its_output(command, environment):
     done = subprocess.run(["bash", "-c", command], env=os.environ | environment, capture_output=True, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
 
 
 @pytest.mark.parametrize("command", [EGOS, KEYS])
-def test_a_full_disk_behind_the_output_is_one_line_and_a_failure(command: str, tmp_path: Path) -> None:
+def test_a_full_disk_behind_the_output_is_one_line_and_a_failure(command, tmp_path):
     environment = os.environ | {"RISK_SAC_DATA_DIR": str(tmp_path)}
     done = subprocess.run(
         ["bash", "-c", f"{command} > /dev/full"], env=environment, capture_output=True, text=True, check=False
@@ -63,7 +62,7 @@ def test_a_full_disk_behind_the_output_is_one_line_and_a_failure(command: str, t
     assert done.stderr.count("\n") == 1
 
 
-def test_letters_that_a_terminal_lacks_are_written_in_ascii(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_letters_that_a_terminal_lacks_are_written_in_ascii(monkeypatch):
     written = io.BytesIO()
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, encoding="ascii"))
     prepare_streams()
@@ -81,10 +80,8 @@ def test_letters_that_a_terminal_lacks_are_written_in_ascii(monkeypatch: pytest.
         (OSError(28, "No space left on device", "out/results.json"), 1, "out/results.json: No space left on device"),
     ],
 )
-def test_however_a_command_ends_its_status_says_that_it_is_not_done(
-    end: BaseException, status: int, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def ending(options: object) -> int:
+def test_however_a_command_ends_its_status_says_that_it_is_not_done(end, status, said, monkeypatch, capsys):
+    def ending(options):
         raise end
 
     monkeypatch.setattr("risk_sac.cli.egos._list", ending)
@@ -95,7 +92,7 @@ def test_however_a_command_ends_its_status_says_that_it_is_not_done(
 
 
 @pytest.mark.skipif(shutil.which("localedef") is None, reason="no localedef to make a locale with")
-def test_a_decimal_comma_of_the_process_does_not_reach_the_simulator(tmp_path: Path) -> None:
+def test_a_decimal_comma_of_the_process_does_not_reach_the_simulator(tmp_path):
     made = subprocess.run(
         ["localedef", "-i", "de_DE", "-f", "UTF-8", str(tmp_path / "de_DE.UTF-8")], capture_output=True, check=False
     )
@@ -110,7 +107,7 @@ ANY = st.text(st.characters(exclude_categories=[]))
 
 
 @given(ANY)
-def test_what_is_printable_can_be_put_into_xml(text: str) -> None:
+def test_what_is_printable_can_be_put_into_xml(text):
     element = ElementTree.Element("a", {"b": printable(text)})
     element.text = printable(text)
     assert ElementTree.fromstring(ElementTree.tostring(element, "utf-8")).text == (printable(text) or None)
@@ -124,18 +121,18 @@ def commands(text: str) -> list[str]:
 
 
 @given(ANY)
-def test_printable_text_commands_no_terminal(text: str) -> None:
+def test_printable_text_commands_no_terminal(text):
     assert not commands(printable(text))
     assert printable(printable(text)) == printable(text)
 
 
 @given(st.dictionaries(ANY, ANY))
-def test_a_json_document_stays_the_same_document(document: dict[str, str]) -> None:
+def test_a_json_document_stays_the_same_document(document):
     text = json.dumps(document, ensure_ascii=False)
     assert json.loads(printable(text)) == document
 
 
-def test_text_for_people_stays_as_it_is() -> None:
+def test_text_for_people_stays_as_it_is():
     assert printable("λ\tÄ\n\U0001f697\u3000\xa0") == "λ\tÄ\n\U0001f697\u3000\xa0"
     assert printable("a\u202eb\x1b[0m\U000e0001") == r"a\u202eb\u001b[0m\udb40\udc01"
     assert on_one_line("a\r\n \u2028 two") == "a two"
@@ -154,16 +151,14 @@ FOREIGN = "a\u202eb\x1b[31mc\u2066"
         folded_table(["name"], [[FOREIGN]]),
     ],
 )
-def test_whatever_is_printed_shows_control_characters_as_escapes(
-    shown: RenderableType, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_whatever_is_printed_shows_control_characters_as_escapes(shown, capsys):
     console.print(shown, markup=False)
     printed = capsys.readouterr().out
     assert r"a\u202eb\u001b[31mc\u2066" in printed
     assert not commands(printed)
 
 
-def test_bars_and_complaints_show_control_characters_as_escapes(capsys: pytest.CaptureFixture[str]) -> None:
+def test_bars_and_complaints_show_control_characters_as_escapes(capsys):
     with Progress(*columns(BarColumn(5)), console=notes) as bar:
         Board(bar).show(1, 2, FOREIGN, {FOREIGN: (1, 2)})
     complain(FOREIGN)

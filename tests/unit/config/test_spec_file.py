@@ -27,7 +27,7 @@ def yaml_file(folder: Path, text: str) -> Path:
     return file
 
 
-def test_run_file_keeps_its_fields_and_flags_override_them(tmp_path: Path) -> None:
+def test_run_file_keeps_its_fields_and_flags_override_them(tmp_path):
     file = yaml_file(
         tmp_path,
         "family: mixed\nmethod: sac\nseed: 4\nbudget: {episodes: 9, evaluation_episodes: 2}\n"
@@ -40,7 +40,7 @@ def test_run_file_keeps_its_fields_and_flags_override_them(tmp_path: Path) -> No
     assert spec.requirements[0].name == "slow"
 
 
-def test_flags_pick_one_run_of_a_campaign(tmp_path: Path) -> None:
+def test_flags_pick_one_run_of_a_campaign(tmp_path):
     file = yaml_file(tmp_path, "label: all\nfamilies: [low, mixed]\nmethods: [random, sac]\nseeds: [1, 2]\n")
     with pytest.raises(ConfigError, match="got a campaign of 8 runs; wanted one") as raised:
         read_spec(file, FLAGS)
@@ -72,7 +72,7 @@ def test_flags_pick_one_run_of_a_campaign(tmp_path: Path) -> None:
         ("family: 2020-01-01\nmethod: sac\nseed: 0", "family", "2020"),
     ],
 )
-def test_wrong_file_names_the_field(tmp_path: Path, text: str, field: str, message: str) -> None:
+def test_wrong_file_names_the_field(tmp_path, text, field, message):
     with pytest.raises(ConfigError) as raised:
         read_spec(yaml_file(tmp_path, text), FLAGS)
     assert raised.value.field == field
@@ -83,7 +83,7 @@ CAMPAIGN_FLAGS: dict[str, Any] = dict.fromkeys(("families", "methods", "seeds", 
 DEFAULTS: dict[str, Any] = {"families": ["low"], "methods": ["sac"], "seeds": [0, 1]}
 
 
-def test_campaign_written_as_yaml_is_the_same_campaign(tmp_path: Path) -> None:
+def test_campaign_written_as_yaml_is_the_same_campaign(tmp_path):
     text = "label: 'a: b'\nego: {profile: perfect}\nlearner: {lagrangian: {learning_rate: 1.0e-7}}\n"
     text += "odd: {environment: {friction: {low: 0.5, high: 0.7}}}\n"
     text += "requirements: [{name: slow, formula: ego_speed_mps < 5, scale: 1.0}]\n"
@@ -157,7 +157,7 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-32"])
 @pytest.mark.parametrize("name", READERS)
-def test_a_byte_order_mark_and_other_ends_of_lines_change_nothing(name: str, encoding: str, tmp_path: Path) -> None:
+def test_a_byte_order_mark_and_other_ends_of_lines_change_nothing(name, encoding, tmp_path):
     text, read = READERS[name]
     plain, marked = tmp_path / "plain.yaml", tmp_path / "marked.yaml"
     plain.write_text(text, encoding="utf-8")
@@ -167,7 +167,7 @@ def test_a_byte_order_mark_and_other_ends_of_lines_change_nothing(name: str, enc
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_another_encoding_is_one_line_that_says_what_to_do(name: str, tmp_path: Path) -> None:
+def test_another_encoding_is_one_line_that_says_what_to_do(name, tmp_path):
     file = tmp_path / "latin.yaml"
     file.write_bytes("label: Straße\n".encode("latin-1"))
     with pytest.raises(

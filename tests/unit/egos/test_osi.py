@@ -67,7 +67,7 @@ def perceived() -> Perceived:
     )
 
 
-def test_what_is_told_is_an_osi_ground_truth() -> None:
+def test_what_is_told_is_an_osi_ground_truth():
     """The literal is what `osi3.GroundTruth.FromString` read, `SerializeToString` wrote again, byte for byte."""
     assert ground_truth(perceived(), {}, Road()).hex() == GROUND_TRUTH
 
@@ -100,7 +100,7 @@ ROAD_MESSAGE = (
 )
 
 
-def test_the_road_is_told_as_osi_lanes() -> None:
+def test_the_road_is_told_as_osi_lanes():
     """The literal is what `osi3.GroundTruth.FromString` read, `SerializeToString` wrote again, byte for byte."""
     assert road_message(ROAD).hex() == ROAD_MESSAGE
     own = ground_truth(perceived()._replace(signals=(Signal.YELLOW,)), {}, ROAD)
@@ -121,7 +121,7 @@ def test_the_road_is_told_as_osi_lanes() -> None:
     assert len(truth.moving_object) == 3
 
 
-def test_an_osi_motion_request_is_a_trajectory_of_the_middle_of_the_body() -> None:
+def test_an_osi_motion_request_is_a_trajectory_of_the_middle_of_the_body():
     found = trajectory_of(bytes.fromhex(REQUEST), perceived(), 1.5)
     np.testing.assert_allclose(found.time_s, [0.0, 0.5, 1.0])
     np.testing.assert_allclose(found.x_m, [10.0, 14.0, 18.0])
@@ -130,7 +130,7 @@ def test_an_osi_motion_request_is_a_trajectory_of_the_middle_of_the_body() -> No
 
 
 @pytest.mark.parametrize("nothing", ["", "0a00", "1801", "2200", "18012a020a00", "ff", "22"])
-def test_what_is_no_motion_request_is_refused(nothing: str) -> None:
+def test_what_is_no_motion_request_is_refused(nothing):
     with pytest.raises(ValueError, match="motion request"):
         trajectory_of(bytes.fromhex(nothing), perceived(), 1.5)
 
@@ -162,7 +162,7 @@ class ByOsi(OsiEgo):
         return request.SerializeToString()
 
 
-def test_it_drives_an_episode(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_drives_an_episode(monkeypatch):
     monkeypatch.setitem(SHIPPED, "by-osi", "tests.unit.egos.test_osi:ByOsi")
     spec = RunSpec(family="low", method="random", seed=0, ego=EgoConfig(driver="by-osi"))
     with closing(RiskSacEnv(RiskSacEnv.of(spec).problem, spec.learner.reward, controlled=False)) as env:

@@ -93,7 +93,7 @@ def drive(
 
 @pytest.mark.parametrize("name", PLANNERS)
 @pytest.mark.parametrize("signal", [Signal.RED, Signal.GREEN])
-def test_it_stops_before_a_red_light_only(name: str, signal: Signal) -> None:
+def test_it_stops_before_a_red_light_only(name, signal):
     start = Motion(220.0, 0.0, 0.0, 12.0)
     last = drive(name, two_lanes(stop_line=True), steps=130, start=start, signal=signal)[-1]
     front_m = last.x_m + VEHICLE.length_m / 2
@@ -111,7 +111,7 @@ def slow(time_s: float, x_m: float = 60.0, speed_mps: float = 3.0) -> tuple[floa
 @pytest.mark.parametrize("name", ["fop", "fiss-plus"])  # FISS stays behind it
 @pytest.mark.parametrize("right", [True, False])
 @pytest.mark.parametrize("change", [True, False])
-def test_it_overtakes_where_the_markings_let_it(name: str, right: bool, change: bool) -> None:
+def test_it_overtakes_where_the_markings_let_it(name, right, change):
     motions = drive(name, two_lanes(right=right, change=change), (slow,), start=Motion(20.0, 0.0, 0.0, 12.0))
     aside_m = max(motion.y_m * (-1.0 if right else 1.0) for motion in motions)
     ahead_m = motions[-1].x_m - slow(12.0)[0]
@@ -123,7 +123,7 @@ def test_it_overtakes_where_the_markings_let_it(name: str, right: bool, change: 
         assert ahead_m < -VEHICLE.length_m
 
 
-def test_a_mirrored_scene_is_driven_mirrored() -> None:
+def test_a_mirrored_scene_is_driven_mirrored():
     left, right = (
         drive("fiss-plus", two_lanes(right=side), (slow,), start=Motion(20.0, 0.0, 0.0, 12.0)) for side in (False, True)
     )
@@ -132,27 +132,27 @@ def test_a_mirrored_scene_is_driven_mirrored() -> None:
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_it_brakes_as_hard_as_the_car_can_where_it_finds_no_plan(name: str) -> None:
+def test_it_brakes_as_hard_as_the_car_can_where_it_finds_no_plan(name):
     wall = partial(slow, x_m=42.0, speed_mps=0.0)
     motions = drive(name, two_lanes(change=False), (wall,), steps=20, start=Motion(20.0, 0.0, 0.0, 13.0))
     assert min(motion.accel_mps2 for motion in motions) == pytest.approx(-VEHICLE.brake_mps2)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_it_follows_its_plan_back_to_the_middle_of_its_lane(side: float) -> None:
+def test_it_follows_its_plan_back_to_the_middle_of_its_lane(side):
     road = two_lanes(right=side > 0.0, change=False)
     motions = drive("fiss-plus", road, steps=40, start=Motion(20.0, 0.8 * side, 0.15 * side, 8.0))
     assert max(side * motion.y_m for motion in motions) < 1.9  # as its plans, which reach 1.7 m
 
 
 @pytest.mark.parametrize(("ahead_m", "stopped"), [(25.0, True), (10.0, False)])
-def test_a_yellow_light_stops_it_where_it_can_still_stop(ahead_m: float, stopped: bool) -> None:
+def test_a_yellow_light_stops_it_where_it_can_still_stop(ahead_m, stopped):
     motion = Motion(300.0 - ahead_m - VEHICLE.length_m / 2, 0.0, 0.0, 12.0)  # from 12 m/s, 4.5 m/s² take 16 m
     view = perceived(motion, 0.0, [], Signal.YELLOW)
     assert stops(two_lanes(stop_line=True), view, SignalStops())[0] is stopped
 
 
-def test_it_keeps_stopping_at_a_yellow_light_until_the_light_changes() -> None:
+def test_it_keeps_stopping_at_a_yellow_light_until_the_light_changes():
     signals = SignalStops()
     near = {"speed_mps": 12.0, "way_m": 10.0}  # 4.5 m/s² no longer do
     assert not signals.at(0, Signal.YELLOW, **near)

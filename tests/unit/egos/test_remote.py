@@ -72,8 +72,8 @@ def keeping(request: Observation) -> Command:
     return command_message(Control(1.0, 0.0), request.time_s)
 
 
-def test_each_answer_has_the_whole_deadline() -> None:
-    def acts(requests: Iterator[Observation]) -> Iterator[Command]:
+def test_each_answer_has_the_whole_deadline():
+    def acts(requests):
         for request in requests:
             time.sleep(0.5)
             yield keeping(request)
@@ -83,7 +83,7 @@ def test_each_answer_has_the_whole_deadline() -> None:
             assert ego.act(perceived(0.1 * step)) == Control(1.0, 0.0)
 
 
-def test_loopback_is_reached_whatever_proxy_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_loopback_is_reached_whatever_proxy_there_is(monkeypatch):
     for name in ("grpc_proxy", "https_proxy", "http_proxy"):
         monkeypatch.setenv(name, "http://127.0.0.1:9")
     with talking(lambda requests: map(keeping, requests)) as ego:
@@ -91,10 +91,10 @@ def test_loopback_is_reached_whatever_proxy_there_is(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("answered", [0, 3])
-def test_who_does_not_answer_in_time_has_failed(answered: int) -> None:
+def test_who_does_not_answer_in_time_has_failed(answered):
     asked = threading.Event()
 
-    def acts(requests: Iterator[Observation]) -> Iterator[Command]:
+    def acts(requests):
         for step, request in enumerate(requests):
             if step == answered:
                 asked.wait(PATIENT_S)
@@ -161,7 +161,7 @@ def silent(requests: Iterator[Observation]) -> Iterator[Command]:
         (raising, "ego_crash", "by me"),
     ],
 )
-def test_an_answer_out_of_turn_or_none_is_not_driven(acts: Acts, reason: str, says: str) -> None:
+def test_an_answer_out_of_turn_or_none_is_not_driven(acts, reason, says):
     with talking(acts) as ego:
         ego.act(perceived(0.5))
         with pytest.raises(EgoFailed, match=says) as failed:
@@ -194,7 +194,7 @@ class Saying:
         (lambda: 1 / 0, "ego_crash"),
     ],
 )
-def test_what_is_wrong_with_a_served_ego_has_the_reason_that_it_has_here(says: Callable[[], Any], reason: str) -> None:
+def test_what_is_wrong_with_a_served_ego_has_the_reason_that_it_has_here(says, reason):
     server, port = serve(Sessions(lambda: Saying(says), "1"), "127.0.0.1:0")
     far = RemoteEgo("far", f"127.0.0.1:{port}", "1", PATIENT_S)
     try:
@@ -225,7 +225,7 @@ class Counting:
         self._closed.release()
 
 
-def test_thirty_sessions_are_served_at_a_time_and_end_with_their_streams() -> None:
+def test_thirty_sessions_are_served_at_a_time_and_end_with_their_streams():
     closed = threading.Semaphore(0)
     server, port = serve(Sessions(lambda: Counting(closed), "1"), "127.0.0.1:0")
     with ExitStack() as stack:
@@ -255,19 +255,19 @@ ROAD = Road(
 )
 
 
-def test_a_served_ego_is_told_the_road_and_its_signals() -> None:
+def test_a_served_ego_is_told_the_road_and_its_signals():
     told: list[Episode] = []
     seen: list[Perceived] = []
 
     class Listening:
-        def reset(self, episode: Episode) -> None:
+        def reset(self, episode):
             told.append(episode)
 
-        def act(self, perceived: Perceived) -> Control:
+        def act(self, perceived):
             seen.append(perceived)
             return Control(0.0)
 
-        def close(self) -> None:
+        def close(self):
             pass
 
     server, port = serve(Sessions(Listening, "1"), "127.0.0.1:0")
@@ -300,13 +300,13 @@ BY_PROTOC = bytes.fromhex(
 )
 
 
-def test_a_message_has_the_bytes_that_other_languages_read() -> None:
+def test_a_message_has_the_bytes_that_other_languages_read():
     assert OBSERVATION.SerializeToString() == BY_PROTOC
     assert Observation.FromString(BY_PROTOC) == OBSERVATION
 
 
 @pytest.mark.parametrize("name", ["ego", "osi"])
-def test_stubs_are_generated_from_their_sources(name: str, tmp_path: Path) -> None:
+def test_stubs_are_generated_from_their_sources(name, tmp_path):
     command = [sys.executable, "-m", "grpc_tools.protoc", "-I.", f"--python_out={tmp_path}", REMOTE / f"{name}.proto"]
     subprocess.run(command, cwd=ROOT, check=True)
     stub = REMOTE / f"{name}_pb2.py"
@@ -324,13 +324,13 @@ def rows(head: str) -> list[tuple[str, ...]]:
 
 
 @pytest.fixture(scope="module")
-def readme_perceived() -> list[Perceived]:
+def readme_perceived():
     """Frames of an episode with a pedestrian."""
     seen: list[Perceived] = []
     real = pilot.perceive
 
-    def recorded(*arguments: object) -> Perceived:
-        seen.append(real(*arguments))  # type: ignore[arg-type]
+    def recorded(*arguments):
+        seen.append(real(*arguments))
         return seen[-1]
 
     spec = RunSpec(family="mixed", method="no-adversary", seed=0, ego=EgoConfig(driver="idm-aeb"))
@@ -346,15 +346,15 @@ def readme_perceived() -> list[Perceived]:
 
 
 @pytest.mark.parametrize(("module", "name"), [(types, "state"), (paths, "path")])
-def test_rows_are_those_of_the_code(module: object, name: str, readme_perceived: list[Perceived]) -> None:
-    told = rows(f"Rows of {name}, named in {module.__name__}\n")  # type: ignore[attr-defined]
+def test_rows_are_those_of_the_code(module, name, readme_perceived):
+    told = rows(f"Rows of {name}, named in {module.__name__}\n")
     assert [(int(index), getattr(module, row)) for index, row, *_ in told] == [(i, i) for i in range(len(told))]
     (shape,) = (said for field, said in rows("Perceived") if field == name)
     assert int(shape.partition(" x ")[0]) == len(told)
     assert {getattr(frame, name).shape[0] for frame in readme_perceived} == {len(told)}
 
 
-def test_what_is_missing_of_others_is_nan_and_nothing_else_is(readme_perceived: list[Perceived]) -> None:
+def test_what_is_missing_of_others_is_nan_and_nothing_else_is(readme_perceived):
     missing = [int(index) for index, _, *said in rows("Rows of state") if "NaN of others" in " ".join(said)]
     assert missing
     for frame in readme_perceived:

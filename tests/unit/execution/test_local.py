@@ -155,11 +155,11 @@ def test_time_that_nobody_watched_is_not_held_against_a_worker():
         ("4 m/s, 1 / 2 and https://a.example/b/c", "4 m/s, 1 / 2 and https://a.example/b/c"),
     ],
 )
-def test_a_text_keeps_the_names_of_files_and_no_folders(said: str, told: str) -> None:
+def test_a_text_keeps_the_names_of_files_and_no_folders(said, told):
     assert without_folders(said, Path("data/c1/run")) == told
 
 
-def test_the_last_lines_of_a_log_are_told_without_folders(tmp_path: Path) -> None:
+def test_the_last_lines_of_a_log_are_told_without_folders(tmp_path):
     log = tmp_path / "worker.log"
     log.write_text(f'an older worker\'s\nTraceback:\n  File "{log}", line 1\nValueError: no\n')
     assert (
@@ -177,7 +177,7 @@ def test_every_event_survives_the_wire(episode, metrics):
 def test_numbers_that_are_not_finite_survive_as_strict_json(episode):
     line = encode(episode(0, Outcome.FAILURE))
 
-    def refuse(constant: str) -> None:
+    def refuse(constant):
         raise AssertionError(constant)
 
     json.loads(line, parse_constant=refuse)

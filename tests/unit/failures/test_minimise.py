@@ -3,7 +3,6 @@
 import math
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,7 +15,7 @@ from risk_sac.failures.minimise import _reduce_actions, without
 from risk_sac.failures.question import TwinPlay, read_twin, twin_bytes
 from risk_sac.failures.studied import STUDIES, Core, Extent, Studied, note, read_studies
 from risk_sac.failures.variants import Variant, alike
-from risk_sac.records import Collision, ConflictType, EpisodeRecord, Grade, Outcome, Violation
+from risk_sac.records import Collision, ConflictType, EpisodeRecord, Grade, Outcome
 from tests.builders import collision, episode_record, judgement, violation
 from tests.unit.failures.staged import synthetic_series
 
@@ -37,25 +36,25 @@ class Needs:
 
 
 @pytest.mark.parametrize("needed", [set(), {0}, {11}, {3, 4}, {0, 5, 11}, set(range(12))])
-def test_what_is_not_needed_goes(needed: set[int]) -> None:
+def test_what_is_not_needed_goes(needed):
     failure = Needs(range(12), needed)
     without(range(12), failure.unneeded)
     assert failure.left == needed
 
 
-def test_what_is_not_needed_together_costs_one_try() -> None:
+def test_what_is_not_needed_together_costs_one_try():
     failure = Needs(range(32), set())
     without(range(32), failure.unneeded)
     assert failure.tried == 1
 
 
-def test_where_no_action_is_left_nothing_is_weakened() -> None:
+def test_where_no_action_is_left_nothing_is_weakened():
     family = SimpleNamespace(adversaries=("lead",))
     env = SimpleNamespace(problem=SimpleNamespace(family=family))
     search: Any = SimpleNamespace(stage=SimpleNamespace(env=env, failure=SimpleNamespace(other_id=None)), taken=0)
     search.left = Variant(scene=np.zeros(1), actions=np.ones((10, 2)), seed=0)
 
-    def take(variant: Variant) -> bool:
+    def take(variant):
         search.left = variant
         search.taken += 1
         return search.taken < 20  # so that the test ends
@@ -75,7 +74,7 @@ def found(*collisions: Collision) -> list[tuple[str, EpisodeRecord]]:
     ]
 
 
-def test_failures_of_a_signature_are_a_cluster_with_the_most_preventable_and_shortest_first() -> None:
+def test_failures_of_a_signature_are_a_cluster_with_the_most_preventable_and_shortest_first():
     cut_in = [
         failure("cut-in", grade)
         for grade in (Grade.UNAVOIDABLE, Grade.PREVENTABLE, Grade.FULL_BRAKING, Grade.PREVENTABLE)
@@ -89,7 +88,7 @@ def test_failures_of_a_signature_are_a_cluster_with_the_most_preventable_and_sho
     assert overviewed.cells == 1872
 
 
-def test_the_vendi_score_counts_what_has_nothing_in_common() -> None:
+def test_the_vendi_score_counts_what_has_nothing_in_common():
     one = failure("cut-in", Grade.PREVENTABLE)
     assert vendi([]) == 0.0
     assert vendi([[one] * 7]) == pytest.approx(1.0)
@@ -110,7 +109,7 @@ CORE = Core(
 )
 
 
-def test_of_other_results_or_damaged_nothing_is_told(tmp_path: Path) -> None:
+def test_of_other_results_or_damaged_nothing_is_told(tmp_path):
     assert read_studies(tmp_path, "d") == {}
     note(tmp_path, "other", 3, Studied(core=CORE))
     note(tmp_path, "d", 4, Studied(core=CORE))
@@ -120,7 +119,7 @@ def test_of_other_results_or_damaged_nothing_is_told(tmp_path: Path) -> None:
     assert read_studies(tmp_path, "d") == {}
 
 
-def test_a_twin_reads_back_with_its_series_and_what_is_not_finite() -> None:
+def test_a_twin_reads_back_with_its_series_and_what_is_not_finite():
     hit = collision(min_ttc_s=math.inf)
     play = TwinPlay.of(None, hit, [hit])
     read, series = read_twin(twin_bytes(play, synthetic_series()))
@@ -130,7 +129,7 @@ def test_a_twin_reads_back_with_its_series_and_what_is_not_finite() -> None:
         np.testing.assert_array_equal(series[name], array)
 
 
-def test_the_twin_of_a_violation_says_whether_it_keeps_that_requirement() -> None:
+def test_the_twin_of_a_violation_says_whether_it_keeps_that_requirement():
     broken, hit = violation(), collision(other_id="lead", ego_speed_mps=12.3, relative_speed_mps=1.34)
     assert TwinPlay.of(None, broken, []).outcome == "keeps never_fast"
     assert TwinPlay.of(None, broken, [broken]).outcome == "violates never_fast after 1.5 s, at 9.0 m/s"
@@ -146,7 +145,7 @@ BY_LEAD = violation(other_id="lead", other_role="adversary")
 @pytest.mark.parametrize(
     ("wanted", "found"), [(HIT, HIT), (BY_LEAD, BY_LEAD), (BY_LEAD, violation()), (violation(), BY_LEAD)]
 )
-def test_these_are_alike(wanted: Collision | Violation, found: Collision | Violation) -> None:
+def test_these_are_alike(wanted, found):
     assert alike([violation(requirement="gentle"), found], wanted) is found
 
 
@@ -162,18 +161,16 @@ def test_these_are_alike(wanted: Collision | Violation, found: Collision | Viola
         (BY_LEAD, BY_LEAD.model_copy(update={"verdicts": {"no_teleport": False}})),
     ],
 )
-def test_these_are_not(wanted: Collision | Violation, found: Collision | Violation) -> None:
+def test_these_are_not(wanted, found):
     assert alike([found], wanted) is None
 
 
 @pytest.mark.parametrize(("killed", "status", "lines"), [(2, 0, 3), (99, 9, 0)])
-def test_a_process_that_is_killed_is_replaced_but_not_for_ever(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, killed: int, status: int, lines: int
-) -> None:
+def test_a_process_that_is_killed_is_replaced_but_not_for_ever(tmp_path, monkeypatch, killed, status, lines):
     tries = tmp_path / "tries"
     tries.mkdir()
 
-    def tell(file: Path, runs: object) -> None:
+    def tell(file, runs):
         (tries / str(os.getpid())).touch()
         if len(list(tries.iterdir())) <= killed:
             os.kill(os.getpid(), 9)

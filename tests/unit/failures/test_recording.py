@@ -22,13 +22,13 @@ from tests.builders import collision, judgement, violation
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
 
 
-def test_pose_at_the_contact_lies_between_the_frames() -> None:
+def test_pose_at_the_contact_lies_between_the_frames():
     recording = Recording(synthetic_contact(), synthetic_series())
     assert recording.pose(0, 0.0) == pytest.approx((280 + 19.5, -1.65, 0.0))
     assert recording.pose(recording.other, -0.95) == pytest.approx((302, -3.0, np.pi / 2))
 
 
-def test_frames_before_the_release_come_before_it() -> None:
+def test_frames_before_the_release_come_before_it():
     recording = Recording(synthetic_contact(), with_release())
     assert len(recording.time_s) == 36
     assert (recording.time_s[0], recording.time_s[-1]) == pytest.approx((-3.45, 0.05))
@@ -37,7 +37,7 @@ def test_frames_before_the_release_come_before_it() -> None:
     assert recording.pose(0, -2.95) == pytest.approx((270, -1.65, 0.0))
 
 
-def test_the_conflict_begins_as_long_before_the_contact_as_its_judgement_says() -> None:
+def test_the_conflict_begins_as_long_before_the_contact_as_its_judgement_says():
     for series in (synthetic_series(), with_release()):
         assert Recording(synthetic_contact(), series).conflict_s == pytest.approx(-1.2)
     early = JUDGED.model_copy(update={"conflict_s": -1.0})  # before the release
@@ -46,7 +46,7 @@ def test_the_conflict_begins_as_long_before_the_contact_as_its_judgement_says() 
     assert Recording(synthetic_contact(None), synthetic_series()).conflict_s is None
 
 
-def test_hidden_span_ends_where_the_other_comes_into_view() -> None:
+def test_hidden_span_ends_where_the_other_comes_into_view():
     recording = Recording(synthetic_contact(), synthetic_series())
     assert [tuple(np.round(span, 6)) for span in recording.hidden()] == [(-1.95, -0.85)]
 
@@ -60,7 +60,7 @@ def series() -> dict[str, np.ndarray]:
     }
 
 
-def test_the_digest_is_of_the_arrays_and_of_nothing_else() -> None:
+def test_the_digest_is_of_the_arrays_and_of_nothing_else():
     backwards = dict(reversed(series().items()))
     backwards["x_m"] = np.asfortranarray(backwards["x_m"])
     assert trajectory_digest(backwards) == trajectory_digest(series())
@@ -77,7 +77,7 @@ def test_the_digest_is_of_the_arrays_and_of_nothing_else() -> None:
     ],
     ids=["a bit", "shape", "type", "one more", "a name"],
 )
-def test_the_digest_changes_with_every_bit(change: dict[str, np.ndarray]) -> None:
+def test_the_digest_changes_with_every_bit(change):
     assert trajectory_digest(series() | change) != trajectory_digest(series())
 
 
@@ -88,9 +88,7 @@ def scene(family: FamilyName, offset_s: float) -> dict[str, float]:
 
 @pytest.mark.parametrize("offset_s", [0.0, 7.1, 34.8])
 @pytest.mark.parametrize(("family", "heads"), [("low", 0), ("mixed", 6), ("dense", 16)])
-def test_heads_show_what_the_program_shows_from_where_the_scene_puts_it(
-    family: FamilyName, heads: int, offset_s: float
-) -> None:
+def test_heads_show_what_the_program_shows_from_where_the_scene_puts_it(family, heads, offset_s):
     found = signal_heads(family, scene(family, offset_s))
     assert len(found) == heads
     net = read_net(Path(sumo_nets.__path__[0]) / family / f"{family}.net.xml")
@@ -140,7 +138,7 @@ def turned(series: Mapping[str, Any], by_rad: float, far_m: float = 0.0) -> dict
 
 @pytest.mark.parametrize("by_rad", np.linspace(0, 2 * np.pi, 9))
 @pytest.mark.parametrize("far_m", [0.0, 700.0])
-def test_both_bodies_are_seen_and_touch_whatever_their_direction(by_rad: float, far_m: float) -> None:
+def test_both_bodies_are_seen_and_touch_whatever_their_direction(by_rad, far_m):
     shapes = drawn(turned(synthetic_series(), by_rad, far_m), roads=False)
     ego, walker = Polygon(points(body(shapes, EGO))), body(shapes, STRIKER)
     assert box(0, 0, WIDTH, HEIGHT).contains(ego)
@@ -153,7 +151,7 @@ def test_both_bodies_are_seen_and_touch_whatever_their_direction(by_rad: float, 
     assert length / width == pytest.approx(series["length_m"][0] / series["width_m"][0], rel=0.05)
 
 
-def test_north_is_up_and_an_arrow_head_points_to_where_a_car_heads() -> None:
+def test_north_is_up_and_an_arrow_head_points_to_where_a_car_heads():
     for by_rad, ahead in ((0.0, (1, 0)), (np.pi / 2, (0, -1)), (np.pi, (-1, 0))):
         shapes = drawn(turned(synthetic_series(), by_rad), roads=False)
         (head,) = (shape for shape in shapes if shape.get("fill") == "#fff")
@@ -162,7 +160,7 @@ def test_north_is_up_and_an_arrow_head_points_to_where_a_car_heads() -> None:
         np.testing.assert_allclose(away / np.hypot(*away), ahead, atol=0.1)
 
 
-def test_a_violation_near_nothing_shows_the_ego_and_its_path_up_to_then() -> None:
+def test_a_violation_near_nothing_shows_the_ego_and_its_path_up_to_then():
     episode = synthetic_contact().episode.model_copy(update={"collision": None, "violations": (violation(time_s=1.0),)})
     shapes = list(ET.fromstring(thumbnail(Recording(RecordedFailure.of("a", episode), synthetic_series()), ())))
     assert not [shape for shape in shapes if shape.get("fill") == STRIKER]
@@ -207,12 +205,12 @@ def said(response: str = "none", broke: tuple[str, ...] = (), ego_broke: tuple[s
     return sentence(encounter(**changes), collision(time_s=3.5, judgement=judged))
 
 
-def test_a_neighbour_that_moves_over_while_the_ego_brakes_late() -> None:
+def test_a_neighbour_that_moves_over_while_the_ego_brakes_late():
     late = said("late_braking", lateral_mps=during(1.0, 2.5, -1.1), ego_accel_mps2=during(2.65, 3.5, -3.0))
     assert late == "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.6 s late"
 
 
-def test_in_the_mirror_the_sides_are_exchanged() -> None:
+def test_in_the_mirror_the_sides_are_exchanged():
     mirrored = said(y_m=-3.2, lateral_mps=during(1.0, 2.5, 1.1))
     assert mirrored == "right neighbour, 4 m ahead, moves left at 1.1 m/s for 1.5 s; ego at 14 m/s does not brake"
 
@@ -231,11 +229,11 @@ def test_in_the_mirror_the_sides_are_exchanged() -> None:
         ("left neighbour, level with it", {"x_m": 0.2}),
     ],
 )
-def test_who_strikes_is_told_from_where_it_is(who: str, where: dict[str, Any]) -> None:
+def test_who_strikes_is_told_from_where_it_is(who, where):
     assert said(**where).startswith(f"{who}, goes on at 14 m/s; ")
 
 
-def test_a_violation_without_contact_tells_what_the_nearest_actor_did_until_then() -> None:
+def test_a_violation_without_contact_tells_what_the_nearest_actor_did_until_then():
     braking = encounter(x_m=20.0, y_m=0.0, accel_mps2=during(0.5, 3.0, -4.0))
     told = story(braking, violation(time_s=1.5, other_id="lead", ego_speed_mps=14.0, broke=("speeding",)))
     assert told == "leader, 20 m ahead, brakes at 4.0 m/s² for 1.1 s; ego at 14 m/s speeding violates never_fast"

@@ -10,7 +10,7 @@ from tests.unit.failures.staged import JUDGED, synthetic_contact, with_release
 
 
 @pytest.mark.parametrize("conflict_s", [0.75, -1.0])
-def test_what_happens_is_marked_in_every_panel_and_the_conflict_from_above(conflict_s: float) -> None:
+def test_what_happens_is_marked_in_every_panel_and_the_conflict_from_above(conflict_s):
     contact = synthetic_contact(JUDGED.model_copy(update={"conflict_s": conflict_s}))
     view, *panels = draw_recording("mixed", Recording(contact, with_release())).axes
     assert len(panels) == 5
@@ -37,7 +37,7 @@ def lines(**judged: object) -> list[str]:
 
 
 @pytest.mark.parametrize("other_id", ["pedestrian", None])
-def test_a_violation_without_contact_is_marked_while_the_episode_goes_on(other_id: str | None) -> None:
+def test_a_violation_without_contact_is_marked_while_the_episode_goes_on(other_id):
     near = {"other_id": other_id, "other_kind": "pedestrian", "other_role": "adversary"} if other_id else {}
     drivers = {"r157": True, "full_braking": False}
     broken = violation(requirement="safe_ttc", time_s=1.0, grade=Grade.PREVENTABLE, drivers=drivers, **near)
@@ -61,7 +61,7 @@ def test_a_violation_without_contact_is_marked_while_the_episode_goes_on(other_i
     assert "grade preventable: R157's driver would have prevented it" in title
 
 
-def test_no_label_covers_another_nor_a_body() -> None:
+def test_no_label_covers_another_nor_a_body():
     series, crowd = with_release(), 6
     several = {
         name: np.concatenate([values, *[values[..., -1:]] * crowd], axis=-1)

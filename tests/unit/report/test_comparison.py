@@ -3,15 +3,13 @@
 import math
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from risk_sac.config import CampaignSpec
 from risk_sac.metrics import results_digest, wilson_interval
-from risk_sac.report import FinishedRun, compare, figure_names, read_run, write_report
+from risk_sac.report import compare, figure_names, read_run, write_report
 from risk_sac.report.comparison import declared
 from risk_sac.report.figures import window_ecr, window_pcr
 from risk_sac.report.paired import holm
@@ -106,12 +104,12 @@ def test_report_loads_without_torch_and_libsumo():
 
 
 @pytest.fixture
-def run(spec: CampaignSpec, finished: Callable[..., FinishedRun]) -> FinishedRun:
+def run(spec, finished):
     """F: a failure that no driver prevents, f: one that the careful driver prevents, r: a refused scene."""
     return replace(finished(spec.runs()[0], ".FrfFf", "f"), episode_cpu_s=(2.0, 4.0, 4.5, 9.0, 10.0, 12.0, 20.0))
 
 
-def test_each_kind_counts_once_from_the_episode_on_that_found_it(run: FinishedRun) -> None:
+def test_each_kind_counts_once_from_the_episode_on_that_found_it(run):
     counts = [(found.preventable, found.distinct) for found in run.found]
     assert counts == [(0, 0), (0, 1), (0, 1), (1, 2), (1, 2), (1, 2)]
 
@@ -126,15 +124,12 @@ def test_each_kind_counts_once_from_the_episode_on_that_found_it(run: FinishedRu
         (Limit("", episodes, 6), (1, 2)),
     ],
 )
-def test_what_ended_within_the_limit_counts(run: FinishedRun, limit: Limit, expected: tuple[int, int]) -> None:
+def test_what_ended_within_the_limit_counts(run, limit, expected):
     found = found_within(run, limit)
-    assert found is not None
     assert (found.preventable, found.distinct) == expected
 
 
-def test_our_own_search_is_tested_against_the_others_on_what_a_user_pays_for(
-    spec: CampaignSpec, finished: Callable[..., FinishedRun]
-) -> None:
+def test_our_own_search_is_tested_against_the_others_on_what_a_user_pays_for(spec, finished):
     budget = {"budget": spec.budget.model_copy(update={"evaluation_episodes": 0})}
     methods = {"methods": ("risk-sac", "risk-sac-diverse", "random"), "seeds": tuple(range(6))}
     wanted = spec.model_copy(update=budget | methods)

@@ -44,7 +44,7 @@ def measured(subject: Gauge, *gaps_m: float) -> list[Measures]:
     return [subject.measure(behind(gap_m), None, SEEN) for gap_m in gaps_m]
 
 
-def test_a_frame_is_measured_by_the_functions_of_the_paper() -> None:
+def test_a_frame_is_measured_by_the_functions_of_the_paper():
     (measures,) = measured(gauge(), 20.0)
     assessment = assess(behind(20.0), RSS, SEEN)
     assert np.array_equal(measures.assessment.others, assessment.others)
@@ -54,13 +54,13 @@ def test_a_frame_is_measured_by_the_functions_of_the_paper() -> None:
     assert measures.soft_min == soft_min(measures.robustness, 20.0)
 
 
-def test_an_actor_that_was_touched_in_the_step_and_is_past_has_no_gap_left() -> None:
+def test_an_actor_that_was_touched_in_the_step_and_is_past_has_no_gap_left():
     measures = gauge().measure(behind(0.7), None, SEEN, struck=1)
     assert measures.signals["vehicle_gap_m"] == measures.signals["ttc_s"] == measures.signals["encounter_s"] == 0.0
     assert measures.robustness.tolist() == pytest.approx([-1.0, -0.5])
 
 
-def test_requirements_remember_the_frames_of_an_episode_and_nothing_before_it() -> None:
+def test_requirements_remember_the_frames_of_an_episode_and_nothing_before_it():
     subject = gauge()
     assert [m.robustness[1] for m in measured(subject, 20.0, 8.0, 20.0)] == pytest.approx([1.5, 0.3, 0.3])
     subject.reset(Carriageway())
@@ -102,26 +102,26 @@ others = st.tuples(place, place, st.floats(-4, 4), st.floats(-20, 20), st.floats
 
 @settings(deadline=None, max_examples=100)  # the first call compiles
 @given(speed, others, st.booleans())
-def test_it_is_the_formula_s_minimum_over_time(ego_mps: float, other: Other, walks: bool) -> None:
+def test_it_is_the_formula_s_minimum_over_time(ego_mps, other, walks):
     view = view_of(ego_mps, other)
     assert encounter(ego_mps, other, walks=walks) == pytest.approx(by_brute_force(view, walks), abs=0.15)
 
 
-def test_a_leader_as_fast_as_the_ego_is_met_at_a_share_of_both_speeds() -> None:
+def test_a_leader_as_fast_as_the_ego_is_met_at_a_share_of_both_speeds():
     assert encounter(10.0, (16.0, 0, 0, 10, 0)) == pytest.approx(12 / (0.3 + 0.2 * 20))
 
 
-def test_a_car_beside_the_ego_is_met_by_drifting() -> None:
+def test_a_car_beside_the_ego_is_met_by_drifting():
     assert encounter(10.0, (0.0, 3.2, 0, 10, 0)) == pytest.approx(1.2 / 0.3)
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_a_cut_in_is_seen_as_soon_as_it_begins(side: int) -> None:
+def test_a_cut_in_is_seen_as_soon_as_it_begins(side):
     drifting = encounter(10.0, (0.0, side * 3.2, 0, 10, -side * 1.0))
     assert drifting == pytest.approx(1.2)  # and so before the gap has shrunk at all
 
 
-def test_who_comes_from_behind_fades_out() -> None:
+def test_who_comes_from_behind_fades_out():
     beside, behind, farther = (encounter(10.0, (x, 3.2, 0, 10, 0)) for x in (-2.0, -2.5, -4.0))
     assert beside == pytest.approx(4.0)
     assert behind == pytest.approx(4.0 + 0.5 * BEHIND_S_PER_M)
@@ -129,14 +129,14 @@ def test_who_comes_from_behind_fades_out() -> None:
 
 
 @pytest.mark.parametrize("miss_m", np.arange(0.0, 6.0, 0.05).tolist())
-def test_a_near_miss_is_continuous_where_ttc_jumps(miss_m: float) -> None:
+def test_a_near_miss_is_continuous_where_ttc_jumps(miss_m):
     """A crossing car that passes ever farther behind the ego."""
     near, farther = (encounter(10.0, (20.0, -20.0 - m, math.pi / 2, 0, 10)) for m in (miss_m, miss_m + 0.05))
     assert abs(farther - near) < 0.05
 
 
 @pytest.mark.parametrize("braking_mps2", [3.0, 6.0, 9.0])
-def test_an_ego_that_brakes_too_late_wins_no_time_back(braking_mps2: float) -> None:
+def test_an_ego_that_brakes_too_late_wins_no_time_back(braking_mps2):
     contact_mps = 3.0
     falling = []
     for speed_mps in np.arange(14.0, contact_mps, -0.25):
@@ -151,7 +151,7 @@ SHARES = 8  # one test each, so that several processes can share the work
 
 
 @pytest.fixture(scope="module")
-def trace() -> list[dict[str, float]]:
+def trace():
     """Any values that the signals may have."""
     generator = np.random.default_rng(0)
     return [{name: generator.uniform(info.low, info.high) for name, info in SIGNALS.items()} for _ in range(STEPS)]
@@ -170,7 +170,7 @@ def watch(formula: str, trace: list[dict[str, float]]) -> FormulaError | Validat
 
 
 @pytest.mark.parametrize("share", range(SHARES))
-def test_hostile_formulas_are_refused_or_watched_to_the_end(share: int, trace: list[dict[str, float]]) -> None:
+def test_hostile_formulas_are_refused_or_watched_to_the_end(share, trace):
     refusals = [watch(formula, trace) for formula in FORMULAS[share::SHARES]]
     assert refusals.count(None) > 10
     wrong = [refusal for refusal in refusals if isinstance(refusal, FormulaError)]

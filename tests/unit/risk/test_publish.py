@@ -66,11 +66,11 @@ def signals_of(
     ("x_m", "y_m", "charged"),
     [(20, 0, True), (0, 3, True), (-1.9, 3, True), (-2.1, 3, False), (-20, 0, False), (5, -40, True)],
 )
-def test_the_ego_answers_for_whoever_is_not_behind_its_rear_bumper(x_m: float, y_m: float, charged: bool) -> None:
+def test_the_ego_answers_for_whoever_is_not_behind_its_rear_bumper(x_m, y_m, charged):
     assert in_charge(relative_view(frame_of((x_m, y_m, VEHICLE)))).tolist() == [charged]
 
 
-def test_the_least_value_among_those_in_charge_is_published() -> None:
+def test_the_least_value_among_those_in_charge_is_published():
     frame = frame_of((30, 0, VEHICLE), (50, 3, VEHICLE), (-20, 0, VEHICLE))
     published = signals_of(frame, [4.0, 2.5, 0.5], [0.3, -0.2, -2.0], [3.5, 2.4, 7.0])
     assert published["encounter_s"] == 2.4  # in which the tailgater's counts, faded out by its own measure
@@ -78,7 +78,7 @@ def test_the_least_value_among_those_in_charge_is_published() -> None:
     assert published["rss_margin"] == -0.2
 
 
-def test_gaps_count_in_every_direction_and_by_kind() -> None:
+def test_gaps_count_in_every_direction_and_by_kind():
     frame = frame_of((-9, 0, VEHICLE), (20, 0, VEHICLE), (0, -8, PEDESTRIAN))
     published = signals_of(frame, [9.0] * 3, [2.0] * 3)
     assert published["vehicle_gap_m"] == pytest.approx(5.0)
@@ -99,7 +99,7 @@ def at_light(signal: Signal, stop_line_m: float) -> Frame:
         (Signal.NONE, math.inf, GAP_CAP_M),
     ],
 )
-def test_only_a_red_light_has_a_margin(signal: Signal, stop_line_m: float, margin_m: float) -> None:
+def test_only_a_red_light_has_a_margin(signal, stop_line_m, margin_m):
     assert red_light_margin(at_light(signal, stop_line_m), None) == margin_m
 
 
@@ -112,7 +112,7 @@ def test_only_a_red_light_has_a_margin(signal: Signal, stop_line_m: float, margi
         pytest.param(at_light(Signal.RED, 1.3), at_light(Signal.NONE, math.inf), id="at 13 m/s"),
     ],
 )
-def test_passing_the_stop_line_on_red_is_negative(before: Frame, after: Frame) -> None:
+def test_passing_the_stop_line_on_red_is_negative(before, after):
     assert red_light_margin(after, before) == CROSSED_ON_RED_M < 0
     assert red_light_braking(after, before) == RED_LIGHT_BRAKING_CAP_MPS2
 
@@ -127,7 +127,7 @@ def test_passing_the_stop_line_on_red_is_negative(before: Frame, after: Frame) -
         pytest.param(at_light(Signal.NONE, math.inf), at_light(Signal.GREEN, 90.0), id="a signal comes into view"),
     ],
 )
-def test_no_red_light_was_run(before: Frame, after: Frame) -> None:
+def test_no_red_light_was_run(before, after):
     assert red_light_margin(after, before) >= 0
     assert red_light_braking(after, before) < RED_LIGHT_BRAKING_CAP_MPS2
 
@@ -143,6 +143,6 @@ def test_no_red_light_was_run(before: Frame, after: Frame) -> None:
         (Signal.YELLOW, 10.0, 2.0, 0.0),
     ],
 )
-def test_braking_for_a_red_light(signal: Signal, speed_mps: float, stop_line_m: float, braking_mps2: float) -> None:
+def test_braking_for_a_red_light(signal, speed_mps, stop_line_m, braking_mps2):
     frame = frame_of(speed_mps=speed_mps)._replace(signal=signal, stop_line_m=stop_line_m)
     assert red_light_braking(frame, None) == pytest.approx(braking_mps2)

@@ -181,7 +181,7 @@ def monitored(watched: Monitor, traces: Traces) -> np.ndarray:
     return np.array(result)
 
 
-def test_shipped_requirements_agree_with_the_oracle_on_1000_random_traces() -> None:
+def test_shipped_requirements_agree_with_the_oracle_on_1000_random_traces():
     assert [r.name for r in SHIPPED] == list(SHIPPED_FORMULAS)
     traces = random_traces(1000, 40, seed=1)
     robustness = monitored(Monitor(SHIPPED, STEP_S, HORIZON), traces)
@@ -190,7 +190,7 @@ def test_shipped_requirements_agree_with_the_oracle_on_1000_random_traces() -> N
         np.testing.assert_allclose(robustness[:, :, i], expected, atol=1e-9, rtol=0, err_msg=shipped.name)
 
 
-def test_user_formulas_agree_with_the_oracle_on_1000_random_traces() -> None:
+def test_user_formulas_agree_with_the_oracle_on_1000_random_traces():
     traces = random_traces(1000, 30, seed=2)
     robustness = monitored(monitor(*FORMULAS, scale=20.0), traces)
     for i, (text, formula) in enumerate(FORMULAS.items()):
@@ -228,26 +228,26 @@ def written(formula: Any) -> str:
 
 
 @given(trees.filter(lambda tree: len(written(tree)) <= 500), st.integers(0, 2**31))
-def test_random_formulas_agree_with_the_oracle(tree: Any, seed: int) -> None:
+def test_random_formulas_agree_with_the_oracle(tree, seed):
     traces = random_traces(2, 20, seed)
     expected = np.clip(oracle(tree, traces) / 20.0, -3, 3)
     np.testing.assert_allclose(monitored(monitor(written(tree), scale=20.0), traces)[:, :, 0], expected, atol=1e-9)
 
 
-def test_half_a_second_is_five_samples_before_the_current_one() -> None:
+def test_half_a_second_is_five_samples_before_the_current_one():
     watched = monitor("historically[0,0.5](ttc_s >= 1.5)")
     trace = [0.5] + [2.0] * 7
     robustness = [watched.update(at_rest() | {"ttc_s": ttc_s})[0] for ttc_s in trace]
     assert robustness == [-1.0] * 6 + [0.5] * 2
 
 
-def test_window_bounds_are_exact_multiples_of_the_step() -> None:
+def test_window_bounds_are_exact_multiples_of_the_step():
     assert parse("once[0.3,0.7](ttc_s >= 1)", 0.1, 100).window == (3, 7)  # 0.3 / 0.1 is 2.9999999999999996
     assert parse("once[0,0.5](ttc_s >= 1)", 0.05, 100).window == (0, 10)
     assert parse("once[100ms:1s](ttc_s >= 1)", 0.1, 100).window == (1, 10)
 
 
-def test_reset_forgets_everything() -> None:
+def test_reset_forgets_everything():
     watched, fresh = monitor(*FORMULAS, scale=20.0), monitor(*FORMULAS, scale=20.0)
     traces = random_traces(2, 30, seed=3)
     monitored(watched, traces)
@@ -259,13 +259,13 @@ def test_reset_forgets_everything() -> None:
     np.testing.assert_array_equal(watched.update(at_rest()), fresh.update(at_rest()))
 
 
-def test_equal_sub_formulas_of_two_requirements_are_both_right() -> None:
+def test_equal_sub_formulas_of_two_requirements_are_both_right():
     watched = monitor("once[0,0.2](ttc_s <= 1)", "not once[0,0.2](ttc_s <= 1)")
     for ttc_s, expected in ((0.5, 0.5), (2.0, 0.5), (2.0, 0.5), (2.0, -1.0)):
         assert watched.update(at_rest() | {"ttc_s": ttc_s}).tolist() == [expected, -expected]
 
 
-def test_robustness_is_scaled_and_clipped_and_warm_up_is_finite() -> None:
+def test_robustness_is_scaled_and_clipped_and_warm_up_is_finite():
     watched = Monitor(
         [
             requirement("ttc_s >= 1", 4.0),
@@ -281,7 +281,7 @@ def test_robustness_is_scaled_and_clipped_and_warm_up_is_finite() -> None:
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_signal_that_is_not_finite_is_refused(value: float) -> None:
+def test_a_signal_that_is_not_finite_is_refused(value):
     with pytest.raises(NotFinite, match="'ttc_s'"):
         monitor("ttc_s >= 1").update(at_rest() | {"ttc_s": value})
 
@@ -332,7 +332,7 @@ BAD: list[tuple[str, int | None, str]] = [  # formula, position, reason
 
 
 @pytest.mark.parametrize(("formula", "position", "reason"), BAD, ids=[formula[:40] for formula, *_ in BAD])
-def test_bad_formulas_are_refused_with_position_and_reason(formula: str, position: int | None, reason: str) -> None:
+def test_bad_formulas_are_refused_with_position_and_reason(formula, position, reason):
     with pytest.raises(FormulaError, match=reason) as caught:
         Monitor([requirement(TTC), requirement(formula)], STEP_S, HORIZON)
     assert caught.value.field == "requirements[1].formula"
@@ -341,12 +341,12 @@ def test_bad_formulas_are_refused_with_position_and_reason(formula: str, positio
 
 
 @given(st.text(alphabet="aHOSY()[],:.0123456789+-*/<>=!&| smtcgpev_", min_size=1, max_size=60))
-def test_no_text_gets_through_as_anything_but_a_formula_or_a_formula_error(text: str) -> None:
+def test_no_text_gets_through_as_anything_but_a_formula_or_a_formula_error(text):
     with contextlib.suppress(FormulaError):
         Monitor([requirement(text)], STEP_S, HORIZON).update(at_rest())
 
 
-def test_soft_min_is_equation_7() -> None:
+def test_soft_min_is_equation_7():
     # -(1/2) log(exp(-2) + exp(-4)) = 1 - log(1 + exp(-2)) / 2
     assert soft_min(np.array([1.0, 2.0]), 2.0) == pytest.approx(0.9365359944785137)
     assert soft_min(np.array([0.7]), 5.0) == pytest.approx(0.7)
@@ -354,7 +354,7 @@ def test_soft_min_is_equation_7() -> None:
 
 
 @given(arrays(np.float64, 6, elements=st.floats(-1e6, 1e6)), st.floats(0.1, 100))
-def test_soft_min_stays_within_log_m_over_beta_below_the_minimum(robustness: np.ndarray, beta: float) -> None:
+def test_soft_min_stays_within_log_m_over_beta_below_the_minimum(robustness, beta):
     least = robustness.min()
     result = soft_min(robustness, beta)
     slack = 1e-9 * max(1.0, abs(least))

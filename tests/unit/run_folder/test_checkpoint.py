@@ -4,7 +4,6 @@ import io
 import logging
 import os
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -66,7 +65,7 @@ def assert_same(found, wanted):
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     path = tmp_path / "run.ckpt"
     checkpoint.save(path, example_state(), RUN)
     return path

@@ -1,7 +1,6 @@
 import json
 import os
 import stat
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,17 +23,17 @@ class Note(BaseModel):
     sha256_of: dict[str, str] = {"sha256": "of something else"}
 
 
-def test_sealed_text_is_json_with_one_more_field() -> None:
+def test_sealed_text_is_json_with_one_more_field():
     assert json.loads(seal(Note())).keys() - Note.model_fields.keys() == {"sha256"}
     assert unseal(seal(Note()), Note) == Note()
 
 
 @given(st.dictionaries(st.text(), st.integers() | st.text(), min_size=1))
-def test_what_was_sealed_comes_back(value: dict[str, int | str]) -> None:
+def test_what_was_sealed_comes_back(value):
     assert unseal(seal(value), dict) == value
 
 
-def test_every_flipped_bit_and_every_lost_end_is_noticed() -> None:
+def test_every_flipped_bit_and_every_lost_end_is_noticed():
     sealed = seal(Note())
     damaged = [sealed[:length] for length in range(len(sealed))]
     damaged += [
@@ -46,7 +45,7 @@ def test_every_flipped_bit_and_every_lost_end_is_noticed() -> None:
             unseal(content, Note)
 
 
-def test_a_file_gets_its_mode_whatever_a_killed_writer_left(tmp_path: Path) -> None:
+def test_a_file_gets_its_mode_whatever_a_killed_writer_left(tmp_path):
     file = tmp_path / "secret"
     (tmp_path / ".secret.tmp").write_text("left over")
     before = os.umask(0)
@@ -76,7 +75,7 @@ def test_damaged_results_are_named(folder):
 
 
 @pytest.mark.parametrize("damage", [lambda content: content[:-9], lambda content: b"", lambda content: b"no archive"])
-def test_a_damaged_series_is_named(damage, tmp_path: Path) -> None:
+def test_a_damaged_series_is_named(damage, tmp_path):
     file = tmp_path / "000001.npz"
     write_series(file, {"x_m": np.arange(100.0)})
     np.testing.assert_array_equal(read_series(file)["x_m"], np.arange(100.0))
@@ -88,7 +87,7 @@ def test_a_damaged_series_is_named(damage, tmp_path: Path) -> None:
 RECORD = episode_record(4, collision=collision(min_ttc_s=0.7), min_ttc_s=0.0)
 
 
-def test_the_minima_of_a_collision_have_names_of_their_own_wherever_it_is_written() -> None:
+def test_the_minima_of_a_collision_have_names_of_their_own_wherever_it_is_written():
     for text in (RECORD.model_dump_json(), records_to_json([RECORD])[1:-1], json.dumps(RECORD.model_dump())):
         written = json.loads(text)
         assert written["min_ttc_s"] == 0.0
@@ -99,9 +98,9 @@ def test_the_minima_of_a_collision_have_names_of_their_own_wherever_it_is_writte
 @pytest.mark.parametrize(
     "text", ["", "-", "search", "low-search-x", "low-walk-4", "a\0-search-4", "low-search-1234567890"]
 )
-def test_a_malformed_id_has_no_parts(text: str) -> None:
+def test_a_malformed_id_has_no_parts(text):
     assert EpisodeId.parse(text) is None
 
 
-def test_a_run_whose_own_id_names_a_phase_keeps_it() -> None:
+def test_a_run_whose_own_id_names_a_phase_keeps_it():
     assert EpisodeId.parse("low-iid-random-0-iid-12") == EpisodeId("low-iid-random-0", "iid", 12)

@@ -23,7 +23,7 @@ def refused(records: tuple[EpisodeRecord, ...]) -> list[int]:
     return [record.index for record in records if REPEATS in record.reason]
 
 
-def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not() -> None:
+def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not():
     records = [
         failure(0),
         failure(1),  # like it, and not replayed
@@ -37,13 +37,11 @@ def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not(
     assert [record.outcome for record in found[:3]] == [Outcome.DEGENERATE, Outcome.DEGENERATE, Outcome.FAILURE]
     assert found[2:] == tuple(records[2:])
     first = found[0].collision
-    assert first is not None
     assert first.artefact
-    assert first.judgement is not None
     assert (first.judgement.grade, first.judgement.drivers) == (None, {})
 
 
-def test_a_violation_is_refused_by_its_kind_and_what_else_the_episode_violates_stays() -> None:
+def test_a_violation_is_refused_by_its_kind_and_what_else_the_episode_violates_stays():
     contact, broken = collision(judgement=judgement()), violation()
     records = [
         episode_record(0, Outcome.FAILURE, violations=(broken,)),
@@ -69,7 +67,7 @@ MINOR = judgement(severity=Severity.MINOR)
 HEADLINE = ("no_contact: cut-in, straight [1-0-0]", "never_fast: never_fast violated; straight [1]")
 
 
-def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repeats() -> None:
+def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repeats():
     results = results_of(
         failure(0, judgement=MINOR, other_speed_mps=20.0),
         failure(1),
@@ -81,13 +79,11 @@ def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repe
         failure(7, phase="evaluation"),
     )
     found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e5=2, e6=2, e7=2)).metrics
-    assert found is not None
     assert (found.headline, found.headline_kinds) == (2, HEADLINE)
-    assert results.metrics is not None
     assert results.metrics.headline is None, "before a replay"
 
 
-def test_a_headline_failure_counts_for_what_drove_the_first_of_its_kind() -> None:
+def test_a_headline_failure_counts_for_what_drove_the_first_of_its_kind():
     results = results_of(
         failure(0, judgement=MINOR, driven_by=DrivenBy.RANDOM),
         failure(1, driven_by=DrivenBy.SCRIPT),
@@ -96,7 +92,6 @@ def test_a_headline_failure_counts_for_what_drove_the_first_of_its_kind() -> Non
         failure(4, judgement=judgement(signature="crossing")),  # of an older version
     )
     found = with_headline(results, verified(e0=2, e1=2, e2=2, e3=2, e4=2)).metrics
-    assert found is not None
     assert found.headline_kinds_driven_by == (DrivenBy.SCRIPT, DrivenBy.POLICY, None)
     assert headline_driven_by([found]) == {"script": 1, "policy": 1}
     later = found.model_copy(update={"headline_kinds_driven_by": (DrivenBy.MODEL,) * 3})

@@ -33,7 +33,7 @@ def listed(text: str) -> list[tuple[str, dict[str, str]]]:
 
 
 @pytest.mark.parametrize("net", NETS, ids=lambda path: path.name)
-def test_what_is_written_again_says_the_same(net: Path, tmp_path: Path) -> None:
+def test_what_is_written_again_says_the_same(net, tmp_path):
     (once,) = written(net.read_bytes(), tmp_path)
     assert listed(once) == listed(net.read_text())
     assert written(once, tmp_path) == [once]
@@ -41,7 +41,7 @@ def test_what_is_written_again_says_the_same(net: Path, tmp_path: Path) -> None:
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(name=st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=50))
-def test_a_name_survives_unless_it_hides_a_variable_or_turns_text(name: str, tmp_path: Path) -> None:
+def test_a_name_survives_unless_it_hides_a_variable_or_turns_text(name, tmp_path):
     root = ET.fromstring(NET)
     root[0].set("name", name)
     (text,) = written(ET.tostring(root), tmp_path)
@@ -53,12 +53,12 @@ def test_a_name_survives_unless_it_hides_a_variable_or_turns_text(name: str, tmp
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "iso-8859-1"])
-def test_a_map_is_read_in_any_encoding(encoding: str, tmp_path: Path) -> None:
+def test_a_map_is_read_in_any_encoding(encoding, tmp_path):
     text = f'<?xml version="1.0" encoding="{encoding.removesuffix("-sig")}"?>\r\n{NET.replace("road", "Straße")}'
     assert listed(*written(text.encode(encoding), tmp_path)) == listed(NET.replace("road", "Straße"))
 
 
-def test_comments_text_and_schemas_are_left_out_and_unknown_elements_are_told(tmp_path: Path) -> None:
+def test_comments_text_and_schemas_are_left_out_and_unknown_elements_are_told(tmp_path):
     schema = '<net xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="http://x/y.xsd"'
     noisy = NET.replace("<net", schema).replace("</net>", "text<viewsettings><zoom/></viewsettings></net>")
     (tmp_path / "upload").write_text(f"<!-- a --><?evil b?>{noisy}<!-- c -->")
@@ -68,13 +68,13 @@ def test_comments_text_and_schemas_are_left_out_and_unknown_elements_are_told(tm
 
 
 @pytest.mark.parametrize("packing", PACKED)
-def test_documents_come_out_of_a_package_as_they_went_in(packing: str, tmp_path: Path) -> None:
+def test_documents_come_out_of_a_package_as_they_went_in(packing, tmp_path):
     files = [NET, ROUTES][: 2 if packing == "zip" else 1]
     assert [listed(text) for text in written(PACKED[packing], tmp_path)] == [listed(file) for file in files]
 
 
 @pytest.mark.parametrize("packing", ["gzip", "zip"])
-def test_damage_of_any_kind_is_refused_and_nothing_else_happens(packing: str, tmp_path: Path) -> None:
+def test_damage_of_any_kind_is_refused_and_nothing_else_happens(packing, tmp_path):
     generator = random.Random(4)
     refused = 0
     for _ in range(300):
@@ -90,7 +90,7 @@ def test_damage_of_any_kind_is_refused_and_nothing_else_happens(packing: str, tm
     assert refused > 250
 
 
-def test_all_files_of_an_archive_count_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_files_of_an_archive_count_together(tmp_path, monkeypatch):
     monkeypatch.setattr(unpack, "MAX_BYTES", len(NET) + len(ROUTES))
     assert len(written(zipped(NET, ROUTES), tmp_path)) == 2
     with pytest.raises(MapError, match="what unpacks to more than"):

@@ -1,4 +1,3 @@
-from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
@@ -20,7 +19,7 @@ each_family = pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 
 
 @pytest.fixture(scope="module")
-def sim() -> Iterator[SumoSimulation]:
+def sim():
     simulation = SumoSimulation(EgoConfig())
     yield simulation
     simulation.close()
@@ -33,7 +32,7 @@ def random_layouts(family: Family, seed: int, n: int) -> list[tuple[Scene, Layou
 
 
 @each_family
-def test_every_parameter_changes_the_layout(family: Family) -> None:
+def test_every_parameter_changes_the_layout(family):
     middle = np.full(family.space.dimension, 0.4)
     base = family.layout(family.space.from_unit(middle).values)
     for axis, name in enumerate(family.space.names):
@@ -43,7 +42,7 @@ def test_every_parameter_changes_the_layout(family: Family) -> None:
 
 
 @each_family
-def test_sumo_accepts_100_random_scenes_and_places_everybody_as_told(family: Family, sim: SumoSimulation) -> None:
+def test_sumo_accepts_100_random_scenes_and_places_everybody_as_told(family, sim):
     for seed, (scene, layout) in enumerate(random_layouts(family, 1, 100)):
         frame = sim.reset(layout, seed)
         vehicles, pedestrians = (layout.ego, *layout.vehicles), layout.pedestrians
@@ -54,7 +53,7 @@ def test_sumo_accepts_100_random_scenes_and_places_everybody_as_told(family: Fam
         np.testing.assert_allclose(frame.speed_mps, [s.speed_mps for s in (*vehicles, *pedestrians)], atol=1e-6)
 
 
-def test_low_scenes_place_the_neighbours_by_their_gaps(sim: SumoSimulation) -> None:
+def test_low_scenes_place_the_neighbours_by_their_gaps(sim):
     family = FAMILIES["low"]
     scene, layout = random_layouts(family, 2, 1)[0]
     frame = sim.reset(layout, 0)
@@ -68,7 +67,7 @@ def test_low_scenes_place_the_neighbours_by_their_gaps(sim: SumoSimulation) -> N
     assert frame.y_m[right] - frame.y_m[ego] == pytest.approx(-3.3)
 
 
-def test_mixed_scenes_place_everybody_before_the_chosen_crossing(sim: SumoSimulation) -> None:
+def test_mixed_scenes_place_everybody_before_the_chosen_crossing(sim):
     family = FAMILIES["mixed"]
     for (scene, layout), seed in zip(random_layouts(family, 3, 10), range(10), strict=True):
         frame = sim.reset(layout, seed)
@@ -87,7 +86,7 @@ def test_mixed_scenes_place_everybody_before_the_chosen_crossing(sim: SumoSimula
 
 
 @each_family
-def test_vehicles_on_one_lane_start_and_are_released_apart(family: Family) -> None:
+def test_vehicles_on_one_lane_start_and_are_released_apart(family):
     for scene, layout in random_layouts(family, 5, 500):
         for a, b in combinations((layout.ego, *layout.vehicles), 2):
             if (a.route[0], a.lane) == (b.route[0], b.lane):
@@ -110,7 +109,7 @@ def dense_with(**changes: float) -> dict[str, float]:
     return {start.id: APPROACH_M - start.position_m for start in (layout.ego, *layout.vehicles)}
 
 
-def test_background_traffic_makes_way_for_who_turns_right_from_its_lane() -> None:
+def test_background_traffic_makes_way_for_who_turns_right_from_its_lane():
     at = {"background_gap_m": 25.0, "from_right_distance_m": 50.0, "from_right_speed_mps": 9.0}
     elsewhere = dense_with(**at, from_right_turn=0.5)
     beside = dense_with(**at, from_right_turn=0.9)
@@ -121,7 +120,7 @@ def test_background_traffic_makes_way_for_who_turns_right_from_its_lane() -> Non
     assert {name: beside[name] for name in others} == pytest.approx({name: elsewhere[name] for name in others})
 
 
-def test_background_traffic_without_room_behind_others_is_left_out() -> None:
+def test_background_traffic_without_room_behind_others_is_left_out():
     place = PLACES.validate_json((NETS / "dense" / "place.json").read_bytes())
     assert isinstance(place, JunctionPlace)
     short = junction.room_of_a_stream_m()

@@ -26,7 +26,7 @@ def turned(points, angle):
 
 
 @given(st.floats(-3.1, 3.1), st.booleans())
-def test_triangles_cover_an_outline_of_any_shape_and_nothing_else(angle: float, clockwise: bool) -> None:
+def test_triangles_cover_an_outline_of_any_shape_and_nothing_else(angle, clockwise):
     outline = turned(ELL, angle)
     found = triangles(outline[::-1] if clockwise else outline)
     assert sum(shapely.Polygon(each).area for each in found) == pytest.approx(shapely.Polygon(outline).area)
@@ -38,7 +38,7 @@ def test_triangles_cover_an_outline_of_any_shape_and_nothing_else(angle: float, 
 
 
 @given(st.floats(-3.1, 3.1))
-def test_a_ribbon_keeps_its_width_round_bends(angle: float) -> None:
+def test_a_ribbon_keeps_its_width_round_bends(angle):
     line = turned(BEND, angle)
     cover = shapely.union_all([shapely.Polygon(quad) for quad in ribbon(line, 3.0)])
     expected = shapely.LineString(line).buffer(1.5, cap_style="flat", join_style="mitre")
@@ -70,18 +70,18 @@ def shipped(name: str) -> Carriageway:
         pytest.param(300.0, -7.6, EAST, -1.0, id="on the walkway beside the pedestrian crossing"),
     ],
 )
-def test_a_road_of_two_directions(x_m: float, y_m: float, sector: int, depth_m: float) -> None:
+def test_a_road_of_two_directions(x_m, y_m, sector, depth_m):
     assert depth_at(shipped("mixed"), x_m, y_m, sector) == pytest.approx(depth_m, abs=1e-3)
 
 
 @pytest.mark.parametrize("sector", [EAST, NORTH, WEST, SOUTH, ANY_WAY])
-def test_a_junction_belongs_to_all_directions_but_its_walkways_do_not(sector: int) -> None:
+def test_a_junction_belongs_to_all_directions_but_its_walkways_do_not(sector):
     dense = shipped("dense")
     assert depth_at(dense, 0.0, 0.0, sector) > 10.0
     assert depth_at(dense, 14.0, 14.0, sector) < -2.0  # the corner where pedestrians wait
 
 
-def test_from_a_junction_a_road_leads_on_only_in_its_direction() -> None:
+def test_from_a_junction_a_road_leads_on_only_in_its_direction():
     """Along the road to the east, whose lanes away from the junction are the southern ones."""
     dense = shipped("dense")
     for x_m in (17.0, 19.6, 22.0, 40.0):
@@ -92,7 +92,7 @@ def test_from_a_junction_a_road_leads_on_only_in_its_direction() -> None:
 
 
 @pytest.mark.parametrize("name", ["mixed", "dense"])
-def test_no_seam_between_lanes_junctions_and_squares(name: str) -> None:
+def test_no_seam_between_lanes_junctions_and_squares(name):
     """A metre more to the side is a metre less deep, wherever a lane is driven."""
     carriageway = shipped(name)
     for x_m in np.arange(-60.0, 60.0, 0.37):
@@ -112,7 +112,7 @@ def bend(radius_m: float, width_m: float = 3.2) -> Carriageway:
 
 
 @pytest.mark.parametrize("radius_m", [15.0, 60.0])
-def test_a_bend_is_as_wide_as_its_lane(radius_m: float) -> None:
+def test_a_bend_is_as_wide_as_its_lane(radius_m):
     carriageway = bend(radius_m)
     for angle in np.linspace(0.2, math.pi / 2 - 0.2, 30):
         sector = sector_of(angle + math.pi / 2)
@@ -123,7 +123,7 @@ def test_a_bend_is_as_wide_as_its_lane(radius_m: float) -> None:
 
 
 @pytest.mark.parametrize("sector", [*range(SECTORS), ANY_WAY])
-def test_outlines_are_closed_to_the_last_digit(sector: int) -> None:
+def test_outlines_are_closed_to_the_last_digit(sector):
     edges = shipped("dense").around(5.0, 5.0, sector).edges
     assert sorted(map(tuple, edges[:, :2])) == sorted(map(tuple, edges[:, 2:4]))
 
@@ -138,7 +138,7 @@ SPACE = SceneSpace(
 )
 
 
-def test_the_cubes_corners_are_the_bounds() -> None:
+def test_the_cubes_corners_are_the_bounds():
     assert SPACE.dimension == 3
     assert SPACE.names == ("gap_m", "speed_mps", "lane")
     assert SPACE.from_unit(np.zeros(3)).values == {"gap_m": 5.0, "speed_mps": 0.1, "lane": 1.0}
@@ -147,7 +147,7 @@ def test_the_cubes_corners_are_the_bounds() -> None:
 
 
 @given(arrays(np.float64, 3, elements=st.floats(0, 1)))
-def test_a_point_comes_back_from_its_scene(point: np.ndarray) -> None:
+def test_a_point_comes_back_from_its_scene(point):
     scene = SPACE.from_unit(point)
     SPACE.check(scene)
     np.testing.assert_allclose(SPACE.to_unit(scene)[:2], point[:2], atol=1e-12)
@@ -165,14 +165,14 @@ def test_a_point_comes_back_from_its_scene(point: np.ndarray) -> None:
         ("low", {"lane": None}, r"lacks \['lane'\]"),
     ],
 )
-def test_scenes_outside_the_space_are_refused(family: str, change: dict[str, float | None], message: str) -> None:
+def test_scenes_outside_the_space_are_refused(family, change, message):
     values = {"gap_m": 10.0, "speed_mps": 0.5, "lane": 1.0} | change
     scene = Scene(family, {name: value for name, value in values.items() if value is not None})
     with pytest.raises(SceneError, match=message):
         SPACE.check(scene)
 
 
-def test_narrowing_intersects_and_keeps_the_rest() -> None:
+def test_narrowing_intersects_and_keeps_the_rest():
     narrowed = SPACE.narrow({"gap_m": Interval(low=-10, high=20)})
     assert [(p.low, p.high) for p in narrowed.parameters] == [(5.0, 20.0), (0.1, 0.7), (1.0, 1.0)]
     assert SPACE.narrow({}) == SPACE

@@ -38,13 +38,13 @@ def shipped(name: str):
 
 
 @pytest.fixture(scope="module")
-def town(tmp_path_factory: pytest.TempPathFactory) -> Map:
+def town(tmp_path_factory):
     folder = tmp_path_factory.mktemp("town")
     (folder / "town.osm").write_text(osm_town())
     return Map(present_net(folder / "town.osm", folder).file)
 
 
-def test_the_finder_finds_the_place_of_the_junction_that_is_shipped() -> None:
+def test_the_finder_finds_the_place_of_the_junction_that_is_shipped():
     found = place_at(read_net(NETS / "dense" / "dense.net.xml"), "junction", "from_south").place
     ours = shipped("dense")
     assert isinstance(found, JunctionPlace)
@@ -61,7 +61,7 @@ def test_the_finder_finds_the_place_of_the_junction_that_is_shipped() -> None:
 
 
 @pytest.mark.parametrize(("edge", "site"), [("e1", 0), ("e2", 1)])
-def test_the_finder_finds_the_crossings_that_are_shipped(edge: str, site: int) -> None:
+def test_the_finder_finds_the_crossings_that_are_shipped(edge, site):
     found = place_at(read_net(NETS / "mixed" / "mixed.net.xml"), "crossing", edge).place
     assert isinstance(found, CrossingPlace)
     ours = shipped("mixed").sites[site]
@@ -76,7 +76,7 @@ def test_the_finder_finds_the_crossings_that_are_shipped(edge: str, site: int) -
     assert (found.sites[0].walk.x_m, found.sites[0].walk.y_m) == pytest.approx((ours.walk.x_m, ours.walk.y_m))
 
 
-def test_ground_that_is_found_is_the_ground_that_was_drawn_by_hand() -> None:
+def test_ground_that_is_found_is_the_ground_that_was_drawn_by_hand():
     found = place_at(read_net(NETS / "dense" / "dense.net.xml"), "junction", "from_south").place
     mine, ours = family_at("dense", found), FAMILIES["dense"]
     middle = ours.space.from_unit(np.full(ours.space.dimension, 0.5)).values
@@ -89,7 +89,7 @@ def test_ground_that_is_found_is_the_ground_that_was_drawn_by_hand() -> None:
                 assert any(area.contains(x, y) for area in getattr(layouts[0], name)) == here[0], (name, x, y)
 
 
-def test_a_town_has_places_of_all_patterns_and_each_is_kept_as_a_small_net(town: Map, tmp_path, monkeypatch) -> None:
+def test_a_town_has_places_of_all_patterns_and_each_is_kept_as_a_small_net(town, tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     found = survey(town.net)
     assert set(found.counts) == {"car_following", "crossing", "junction"}
@@ -111,7 +111,7 @@ def test_a_town_has_places_of_all_patterns_and_each_is_kept_as_a_small_net(town:
             libsumo.close()
 
 
-def test_a_kept_place_that_was_changed_is_refused(town: Map, tmp_path: Path, monkeypatch) -> None:
+def test_a_kept_place_that_was_changed_is_refused(town, tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     name = town.keep(survey(town.net, ("junction",)).fits[0])
     net = tmp_path / name / library.NET
@@ -138,7 +138,7 @@ def road(id_: str, a: str, b: str, metres: float, line: str) -> str:
         ('<osm><relation id="1"><tag k="type" v="lanelet"/></relation></osm>', "map, a Lanelet2 map; .* as OpenDRIVE"),
     ],
 )
-def test_what_is_no_map_is_not_converted(tmp_path: Path, content: str, says: str) -> None:
+def test_what_is_no_map_is_not_converted(tmp_path, content, says):
     file = tmp_path / "map"
     file.write_text(content)
     with pytest.raises(MapError, match=says):
@@ -157,7 +157,7 @@ def test_what_is_no_map_is_not_converted(tmp_path: Path, content: str, says: str
         ("echo 'Error: no nodes' >&2; exit 1", "netconvert cannot convert map.osm: no nodes"),
     ],
 )
-def test_why_netconvert_failed_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, says: str) -> None:
+def test_why_netconvert_failed_is_told(tmp_path, monkeypatch, script, says):
     program, file = tmp_path / "netconvert", tmp_path / "map.osm"
     program.write_text(f"#!/bin/sh\n{script}\n")
     program.chmod(0o755)
@@ -167,9 +167,7 @@ def test_why_netconvert_failed_is_told(tmp_path: Path, monkeypatch: pytest.Monke
         present_net(file, tmp_path)
 
 
-def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_the_left(
-    town: Map, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_the_left(town, tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     fits = [fit for fit in survey(town.net, ("crossing",)).fits if fit.place.sites[0].beyond]
     assert len(fits) > 10
@@ -206,9 +204,7 @@ RIGHT = '<connection from="b" to="c" fromLane="0" toLane="0" dir="s"/>'
 
 
 @pytest.mark.parametrize(("right", "comes_from"), [(RIGHT, []), ("", ["a"])])
-def test_nobody_is_placed_before_a_fork_that_would_lead_it_into_another_lane(
-    tmp_path: Path, right: str, comes_from: list[str]
-) -> None:
+def test_nobody_is_placed_before_a_fork_that_would_lead_it_into_another_lane(tmp_path, right, comes_from):
     """Of lanes that lead on alike, SUMO's drivers take the right one; of others the one that leads on."""
     file = tmp_path / "map.net.xml"
     file.write_text(FORK.format(right=right))
@@ -218,10 +214,10 @@ def test_nobody_is_placed_before_a_fork_that_would_lead_it_into_another_lane(
 
 
 @pytest.mark.parametrize(("x_m", "stands_clear"), [(0.0, True), (-6.0, False)])
-def test_who_waits_askew_in_the_way_of_others_is_told_from_who_stands_clear(x_m: float, stands_clear: bool) -> None:
+def test_who_waits_askew_in_the_way_of_others_is_told_from_who_stands_clear(x_m, stands_clear):
     """The middle of its front is 1.6 m from the middle of the lane that it is to cross, as SUMO has it."""
 
-    def lane(id_: str, *line: tuple[float, float]) -> Lane:
+    def lane(id_, *line):
         return Lane(id_, id_, 0, 10.0, 3.2, 10.0, line, True)
 
     before, behind = lane("i_0", (x_m, -5.6), (0.0, -1.6)), lane("i_1", (0.0, -1.6), (-3.0, 6.0))
@@ -249,9 +245,7 @@ BEND = (
 
 
 @pytest.mark.parametrize(("signal", "comes_from"), [("", ["a"]), (' tl="t" linkIndex="0"', [])])
-def test_nobody_is_placed_before_a_signal_that_may_be_red_until_the_end(
-    tmp_path: Path, signal: str, comes_from: list[str]
-) -> None:
+def test_nobody_is_placed_before_a_signal_that_may_be_red_until_the_end(tmp_path, signal, comes_from):
     file = tmp_path / "map.net.xml"
     to_the_left = '<connection from="a" to="b" fromLane="0" toLane="1" dir="s"'
     file.write_text(FORK.format(right="").replace(to_the_left, to_the_left + signal))
@@ -260,7 +254,7 @@ def test_nobody_is_placed_before_a_signal_that_may_be_red_until_the_end(
     assert [lane.edge for lane in way.lanes] == [*comes_from, "b"]
 
 
-def test_nobody_is_led_where_a_signal_stays_red(tmp_path: Path) -> None:
+def test_nobody_is_led_where_a_signal_stays_red(tmp_path):
     """A signal with several programmes, of which SUMO runs the last."""
     shipped_net = (NETS / "dense" / "dense.net.xml").read_text()
     stays = '<tlLogic id="centre" type="static" programID="1"><phase duration="1000" state="{}"/></tlLogic><junction'
@@ -294,9 +288,7 @@ def bend(file: Path, middle: str, *, to_the_left: bool) -> Net:
 
 @pytest.mark.parametrize("to_the_left", [True, False])
 @pytest.mark.parametrize(("middle", "there_is_room"), [(WIDE, True), (NARROW, False)])
-def test_nobody_is_led_over_a_junction_that_two_abreast_have_no_room_on(
-    tmp_path: Path, middle: str, there_is_room: bool, to_the_left: bool
-) -> None:
+def test_nobody_is_led_over_a_junction_that_two_abreast_have_no_room_on(tmp_path, middle, there_is_room, to_the_left):
     net = bend(tmp_path / "map.net.xml", middle, to_the_left=to_the_left)
     for lane, other in (("a_0", "a_1"), ("a_1", "a_0")):
         (link,) = net.onward[lane]
@@ -310,14 +302,12 @@ def test_nobody_is_led_over_a_junction_that_two_abreast_have_no_room_on(
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize(("radius_m", "reaches"), [(12.0, False), (0.5, True)])
-def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(
-    radius_m: float, reaches: bool, side: float
-) -> None:
+def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(radius_m, reaches, side):
     """It turns away from a car that drives straight on 3.2 m beside it."""
     quarter = [math.radians(10.0 * i) for i in range(10)]
     arc = [(radius_m * math.sin(a), -side * radius_m * (1.0 - math.cos(a))) for a in quarter]
 
-    def link(id_: str, *lines: list[tuple[float, float]]) -> Link:
+    def link(id_, *lines):
         source, middle, target = (Lane(id_, id_, 0, 1.0, 3.2, 10.0, tuple(line), True) for line in lines)
         return Link(source, target, (middle,), None, 0)
 
@@ -333,7 +323,7 @@ def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("radius_m", [1.5, 4.0, 12.0])
-def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radius_m: float, side: float) -> None:
+def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radius_m, side):
     """It drives north, 1.6 m from the kerb on its right or its left, and turns to that side behind the crossing."""
     quarter = [math.radians(5.0 * i) for i in range(19)]
     arc = [(side * (-1.6 + radius_m * (1.0 - math.cos(a))), 2.0 + radius_m * math.sin(a)) for a in quarter]
@@ -357,7 +347,7 @@ def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radiu
     assert (walk.x_m == pytest.approx(-0.05 * side)) == (radius_m == 12.0)  # none is sent back without need
 
 
-def test_places_that_nobody_names_go_when_they_are_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_places_that_nobody_names_go_when_they_are_old(tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     named, new, old = (library.keep(shipped(name), b"<net/>") for name in ("low", "mixed", "dense"))
     (tmp_path / "of another program").mkdir()

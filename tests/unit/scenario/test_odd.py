@@ -33,7 +33,7 @@ DEFAULT = Odd(
 )
 
 
-def test_intersection_narrows_the_given_fields_and_keeps_the_rest() -> None:
+def test_intersection_narrows_the_given_fields_and_keeps_the_rest():
     assert intersect(DEFAULT, Odd()) == DEFAULT
     user = Odd(scenery=Scenery(signal_types=("none",)), dynamic=DynamicElements(vehicle_speed_mps=interval(10, 30)))
     both = intersect(DEFAULT, user)
@@ -47,7 +47,7 @@ SPEED = st.just(0.0) | st.floats(1e-6, 60)
 
 
 @given(st.tuples(SPEED, SPEED).map(sorted))
-def test_intersection_is_the_set_of_common_values(bounds: list[float]) -> None:
+def test_intersection_is_the_set_of_common_values(bounds):
     low, high = bounds
     user = Odd(dynamic=DynamicElements(vehicle_speed_mps=interval(low, high)))
     if low > 20:
@@ -106,7 +106,7 @@ def test_intersection_is_the_set_of_common_values(bounds: list[float]) -> None:
         ),
     ],
 )
-def test_a_bad_odd_is_refused_by_field_with_got_and_wanted(user: Odd, field: str, message: str) -> None:
+def test_a_bad_odd_is_refused_by_field_with_got_and_wanted(user, field, message):
     with pytest.raises(OddError, match=message) as caught:
         intersect(DEFAULT, user)
     assert caught.value.field == field
@@ -123,7 +123,7 @@ def test_a_bad_odd_is_refused_by_field_with_got_and_wanted(user: Odd, field: str
         (Environment(precipitation=("rain", "heavy_rain"), friction=interval(0.5, 0.6)), (0.5, 0.6)),
     ],
 )
-def test_rain_bounds_the_friction(environment: Environment, friction: tuple[float, float]) -> None:
+def test_rain_bounds_the_friction(environment, friction):
     assert intersect(DEFAULT, Odd(environment=environment)).environment.friction == interval(*friction)
 
 
@@ -131,13 +131,13 @@ def test_rain_bounds_the_friction(environment: Environment, friction: tuple[floa
     ("signals", "crossings"),
     [(("none",), ("zebra",)), (("fixed_time",), ("signalised",)), (None, ("signalised", "zebra"))],
 )
-def test_crossings_keep_to_the_signals(signals: tuple[str, ...] | None, crossings: tuple[str, ...]) -> None:
+def test_crossings_keep_to_the_signals(signals, crossings):
     both = Scenery(signal_types=("fixed_time", "none"), crossing_types=("signalised", "zebra"))
     default = DEFAULT.model_copy(update={"scenery": both})
     assert intersect(default, Odd(scenery=Scenery(signal_types=signals))).scenery.crossing_types == crossings
 
 
-def test_requirements_follow_the_odd() -> None:
+def test_requirements_follow_the_odd():
     everything = {r.name for r in requirements_from_odd(DEFAULT, 0.5)}
     assert everything == {
         "no_contact",
@@ -156,7 +156,7 @@ def test_requirements_follow_the_odd() -> None:
     assert counting == {"no_contact", "on_carriageway", "no_red_light_entry"}
 
 
-def test_thresholds_follow_the_odd_and_the_reaction_time() -> None:
+def test_thresholds_follow_the_odd_and_the_reaction_time():
     slow = {r.name: r.formula for r in requirements_from_odd(DEFAULT, 1.2)}
     assert slow["safe_ttc"] == "encounter_s >= 2.2"
     # 0.5 · 9.81, and nine tenths of it
@@ -168,7 +168,7 @@ def test_thresholds_follow_the_odd_and_the_reaction_time() -> None:
     assert quick["bounded_braking"].endswith(">= 8.1)")  # 0.9 · min(9.81, 9)
 
 
-def test_an_ego_that_nobody_threatens_has_a_robustness_of_about_1_in_every_requirement() -> None:
+def test_an_ego_that_nobody_threatens_has_a_robustness_of_about_1_in_every_requirement():
     requirements = requirements_from_odd(DEFAULT, 0.5)
     monitor = Monitor(requirements, 0.1, 150)
     calm = {"encounter_s": 4.2, "rss_margin": 1.0, "pedestrian_gap_m": 12.0, "red_light_braking_mps2": 0.0}
@@ -180,9 +180,7 @@ def test_an_ego_that_nobody_threatens_has_a_robustness_of_about_1_in_every_requi
 
 
 @pytest.mark.parametrize(("gap_m", "speed_mps"), [(2.0, 13.9), (3.0, 16.6), (1.1, 5.0), (0.0, 0.4)])
-def test_passing_a_pedestrian_on_the_sidewalk_or_standing_beside_one_violates_nothing(
-    gap_m: float, speed_mps: float
-) -> None:
+def test_passing_a_pedestrian_on_the_sidewalk_or_standing_beside_one_violates_nothing(gap_m, speed_mps):
     [requirement] = [r for r in requirements_from_odd(DEFAULT, 0.5) if r.name == "pedestrian_gap"]
     monitor = Monitor([requirement], 0.1, 150)
     assert monitor.update({"pedestrian_gap_m": gap_m, "ego_speed_mps": speed_mps})[0] > 0

@@ -71,13 +71,13 @@ def limits(net: Net) -> list[tuple[float, list[float]]]:
         ("", 13.89),
     ],
 )
-def test_the_limit_of_a_road_is_that_of_its_lanes(tmp_path: Path, speed: str, mps: float) -> None:
+def test_the_limit_of_a_road_is_that_of_its_lanes(tmp_path, speed, mps):
     net, made = read(tmp_path, road(section(lane(-1), lane(-2)), types=kind(speed)))
     assert limits(net) == [(0.0, [mps, mps])]
     assert any("without a speed limit" in warning for warning in made.warnings) == (mps == 13.89)
 
 
-def test_limits_begin_where_they_are_given_and_that_of_a_lane_is_ahead(tmp_path: Path) -> None:
+def test_limits_begin_where_they_are_given_and_that_of_a_lane_is_ahead(tmp_path):
     types = kind('<speed max="30"/>') + kind('<speed max="20"/>', 400.0) + kind("", 800.0)
     own = '<speed sOffset="100" max="36" unit="km/h"/><speed sOffset="200" max="undefined"/>'
     content = road(
@@ -101,7 +101,7 @@ def test_limits_begin_where_they_are_given_and_that_of_a_lane_is_ahead(tmp_path:
 
 @pytest.mark.parametrize("curvature", [0.01, -0.01])
 @pytest.mark.parametrize("by", [0.0, 1e-17, 5e-7])
-def test_a_spiral_of_nearly_constant_curvature_is_the_arc(tmp_path: Path, curvature: float, by: float) -> None:
+def test_a_spiral_of_nearly_constant_curvature_is_the_arc(tmp_path, curvature, by):
     turn = curvature * 150.0
     x, y = 300.0 + math.sin(turn) / curvature, (1.0 - math.cos(turn)) / curvature
     bend = f'<spiral curvStart="{curvature}" curvEnd="{curvature + by:.20f}"/>'
@@ -112,7 +112,7 @@ def test_a_spiral_of_nearly_constant_curvature_is_the_arc(tmp_path: Path, curvat
     assert max(off) < 0.05
 
 
-def test_a_real_spiral_stays_one(tmp_path: Path) -> None:
+def test_a_real_spiral_stays_one(tmp_path):
     heading = [0.01 * s**2 / 300.0 for s in np.arange(0.05, 150.0, 0.1)]
     x, y = 300.0 + 0.1 * np.cos(heading).sum(), 0.1 * np.sin(heading).sum()
     line = _drawn(tmp_path, '<spiral curvStart="0" curvEnd="0.01"/>', (x, y, 0.75))
@@ -138,7 +138,7 @@ SIDEWALK = {"kind": "sidewalk", "width": 'a="2" b="0" c="0" d="0"'}
 
 
 @pytest.mark.parametrize("has_sidewalks", [True, False])
-def test_a_crosswalk_amid_a_road_is_a_crossing(tmp_path: Path, has_sidewalks: bool) -> None:
+def test_a_crosswalk_amid_a_road_is_a_crossing(tmp_path, has_sidewalks):
     left, right = lane(1), lane(-1)
     if has_sidewalks:
         left, right = lane(2, **SIDEWALK) + left, right + lane(-2, **SIDEWALK)
@@ -152,7 +152,7 @@ def test_a_crosswalk_amid_a_road_is_a_crossing(tmp_path: Path, has_sidewalks: bo
     assert not any("crosswalk" in warning for warning in made.warnings)
 
 
-def test_a_crosswalk_within_a_junction_is_that_of_the_road_beside(tmp_path: Path) -> None:
+def test_a_crosswalk_within_a_junction_is_that_of_the_road_beside(tmp_path):
     both = section(lane(-1, LINKED.format(-1)), left=lane(1, LINKED.format(1)))
     ends = '<link><predecessor elementType="road" elementId="1" contactPoint="end"/>{}</link>'
     into = ends.format('<successor elementType="road" elementId="2" contactPoint="start"/>')

@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import pytest
 
 from risk_sac.errors import MapError
@@ -28,7 +26,7 @@ def carriageways(side: int) -> str:
 
 
 @pytest.fixture
-def extract(tmp_path: Path) -> Path:
+def extract(tmp_path):
     return tmp_path / "town.osm"
 
 
@@ -50,7 +48,7 @@ def extract(tmp_path: Path) -> Path:
         (carriageways(-1), "the carriageways of A 9 are driven on the left"),
     ],
 )
-def test_an_extract_with_left_hand_traffic_is_refused_and_says_where(extract: Path, more: str, where: str) -> None:
+def test_an_extract_with_left_hand_traffic_is_refused_and_says_where(extract, more, where):
     extract.write_text(osm_town(more))
     with pytest.raises(MapError, match=f"left-hand traffic: {where}; wanted right-hand"):
         side_remarks(extract)
@@ -71,7 +69,7 @@ def test_an_extract_with_left_hand_traffic_is_refused_and_says_where(extract: Pa
         ),
     ],
 )
-def test_an_extract_with_right_hand_traffic_says_by_what(extract: Path, more: str, where: str) -> None:
+def test_an_extract_with_right_hand_traffic_says_by_what(extract, more, where):
     extract.write_text(osm_town(more))
     assert side_remarks(extract) == [f"right-hand traffic: {where}"]
 
@@ -80,9 +78,7 @@ def test_an_extract_with_right_hand_traffic_says_by_what(extract: Path, more: st
     ("rules", "keeps_left"),
     [((), None), (('rule="LHT"',), True), (('rule="RHT"',), False), (("",), False), (('rule="LHT"', "", ""), False)],
 )
-def test_opendrive_says_by_the_rules_of_its_roads_on_which_side_people_drive(
-    extract: Path, rules: tuple[str, ...], keeps_left: bool | None
-) -> None:
+def test_opendrive_says_by_the_rules_of_its_roads_on_which_side_people_drive(extract, rules, keeps_left):
     roads = "".join(f'<road id="20" {rule}/>' for rule in rules)
     extract.write_text(f"<OpenDRIVE>{roads}</OpenDRIVE>")
     if keeps_left:
@@ -93,7 +89,7 @@ def test_opendrive_says_by_the_rules_of_its_roads_on_which_side_people_drive(
         assert said == UNKNOWN if keeps_left is None else said.startswith("right-hand traffic: road 20 has rule=RHT")
 
 
-def test_roundabouts_are_read_whatever_comes_first(extract: Path) -> None:
+def test_roundabouts_are_read_whatever_comes_first(extract):
     nodes, mark, ways = osm_roundabout(clockwise=True).partition("<way")
     extract.write_text(f"<osm>{mark}{ways}{nodes}</osm>")
     with pytest.raises(MapError, match="runs clockwise"):

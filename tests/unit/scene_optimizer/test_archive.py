@@ -119,7 +119,7 @@ def bandit(*unit_costs: float) -> DiscountedBandit:
     )
 
 
-def test_the_chance_follows_the_square_of_what_each_yielded_for_its_cost() -> None:
+def test_the_chance_follows_the_square_of_what_each_yielded_for_its_cost():
     subject = bandit(1.0, 4.0)
     subject.tell(0, 1.0, 10)
     subject.tell(1, 3.0, 10)
@@ -130,7 +130,7 @@ def test_the_chance_follows_the_square_of_what_each_yielded_for_its_cost() -> No
 
 
 @pytest.mark.parametrize("better", [0, 1])
-def test_the_worse_arm_spends_the_least_share_of_all_costs(better: int) -> None:
+def test_the_worse_arm_spends_the_least_share_of_all_costs(better):
     subject = bandit(1.0, 4.0)
     for _ in range(200):
         subject.tell(better, 1.0)
@@ -139,7 +139,7 @@ def test_the_worse_arm_spends_the_least_share_of_all_costs(better: int) -> None:
     assert spent[1 - better] / sum(spent) == pytest.approx(LEAST)
 
 
-def test_it_continues_from_its_state() -> None:
+def test_it_continues_from_its_state():
     subject, other = bandit(), bandit()
     subject.tell(1, 1.0)
     other.load(subject.state())

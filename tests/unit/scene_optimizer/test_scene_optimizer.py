@@ -186,7 +186,7 @@ def test_the_posterior_is_that_of_the_equations():
     model = surrogate.condition(points, values, surrogate.fit(points, values, None, seed=0))
     lengthscales, constant = model.covar_module.lengthscale.detach(), model.mean_module.constant.detach()
 
-    def kernel(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+    def kernel(a, b):
         return (-0.5 * torch.cdist(a / lengthscales, b / lengthscales) ** 2).exp()
 
     x = torch.from_numpy(np.random.default_rng(1).random((20, 5)))
@@ -203,10 +203,10 @@ def test_the_posterior_is_that_of_the_equations():
 def test_finds_the_optimum_of_a_noisy_function_far_more_often_than_sobol():
     centre = np.array([0.2, 0.7, 0.6, 0.35])
 
-    def risk(u: Floats) -> float:
+    def risk(u):
         return float(np.exp(-8 * ((u[:4] - centre) ** 2).sum()))  # two of six parameters do not matter
 
-    def hits(optimizer: SceneOptimizer, seed: int) -> int:
+    def hits(optimizer, seed):
         noise = np.random.default_rng(seed + 100).normal(scale=0.1, size=80)
         asked = drive(optimizer, 80, lambda episode, u: None if u[5] > 0.85 else risk(u) + noise[episode])
         return sum(risk(u) > 0.6 for u in asked)
@@ -223,7 +223,7 @@ def test_comes_back_to_a_needle_that_a_smooth_model_does_not_see(seed):
     random = np.random.default_rng(seed)
     needle = random.uniform(0.2, 0.8, 18)
 
-    def risk(episode: int, u: Floats) -> float:
+    def risk(episode, u):
         return float(random.normal(scale=0.1) + (np.abs(u - needle)[:8] < 0.12).all())
 
     optimizer = BotorchOptimizer(18, SceneOptimizerConfig(), seed)

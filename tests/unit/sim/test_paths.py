@@ -3,7 +3,6 @@
 import math
 import subprocess
 import sys
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -43,7 +42,7 @@ ROUTES = (
 
 
 @pytest.fixture(scope="module")
-def sim() -> Iterator[SumoSimulation]:
+def sim():
     with closing(SumoSimulation(EgoConfig())) as simulation:
         yield simulation
 
@@ -58,9 +57,7 @@ def alone(family: str, route: tuple[str, ...], lane: int, position_m: float) -> 
 @pytest.mark.parametrize(
     ("family", "route", "lane", "position_m"), ROUTES, ids=[f"{r[0]} {r[1]} {r[2]}" for r in ROUTES]
 )
-def test_a_vehicle_drives_along_its_path(
-    sim: SumoSimulation, family: str, route: tuple[str, ...], lane: int, position_m: float
-) -> None:
+def test_a_vehicle_drives_along_its_path(sim, family, route, lane, position_m):
     frame = sim.reset(alone(family, route, lane, position_m), 0)
     path, station_m, offset_m = sim.along("ego")
     np.testing.assert_allclose(np.hypot(*np.diff(path[:2])), np.diff(path[STATION]))
@@ -82,7 +79,7 @@ def test_a_vehicle_drives_along_its_path(
     assert before_m > station_m + 50.0 or frame.signal.name == "RED"
 
 
-def test_a_lane_shorter_than_it_is_drawn_has_its_vehicles_where_they_are(sim: SumoSimulation, tmp_path: Path) -> None:
+def test_a_lane_shorter_than_it_is_drawn_has_its_vehicles_where_they_are(sim, tmp_path):
     """As the outer lanes of a bend are, since an edge has one length."""
     shipped = (Path(sumo_nets.__file__).parent / "low" / "low.net.xml").read_text()
     net = tmp_path / "short.net.xml"
@@ -102,9 +99,7 @@ LINK = '<connection from="{}" to="{}" fromLane="{}" toLane="{}"/>'
 
 
 @pytest.mark.parametrize("own", [0, 1])
-def test_where_a_lane_forks_the_path_leads_over_the_one_that_leads_on(
-    sim: SumoSimulation, tmp_path: Path, own: int
-) -> None:
+def test_where_a_lane_forks_the_path_leads_over_the_one_that_leads_on(sim, tmp_path, own):
     """The other one leads off the route, to the right or to the left."""
     links = [("a", "b", 0, 0), ("a", "b", 0, 1), ("b", "c", own, 0), ("b", "d", 1 - own, 0)]
     parts = {
@@ -141,9 +136,7 @@ def test_where_a_lane_forks_the_path_leads_over_the_one_that_leads_on(
         ((100.0, 1.1), [(0, 0), (100, 0), (100, 1.1), (200, 0)]),  # another place
     ],
 )
-def test_a_lane_that_begins_beside_the_end_of_another_is_led_to_without_a_step(
-    side: float, behind: tuple[float, float], expected: list[tuple[float, float]]
-) -> None:
+def test_a_lane_that_begins_beside_the_end_of_another_is_led_to_without_a_step(side, behind, expected):
     x, y = behind
     lines = [np.array([(0.0, 0.0), (100.0, 0.0)]), np.array([(x, side * y), (200.0, 0.0)])]
     points = path_along(lines, [13.9, 13.9])
@@ -165,13 +158,13 @@ def with_headings(*heading_rad: float) -> np.ndarray:
     return path_through(np.zeros(3), np.zeros(3), np.array([0.0, 10.0, 20.0]), np.array(heading_rad), np.full(3, 13.89))
 
 
-def test_a_corner_turns_the_body_over_its_own_length_by_hand() -> None:
+def test_a_corner_turns_the_body_over_its_own_length_by_hand():
     got = bends(corner(0.46), LIMITS)
     assert got[HERE] == pytest.approx([0.0] * 20 + [0.1] * 10 + [0.0] * 11)  # 10 to 14.5 m: 0.46 rad / 4.6 m
     assert got[SOON] == pytest.approx([0.0] * 10 + [0.1] * 20 + [0.0] * 11)  # from 5 m before
 
 
-def test_a_bend_is_approached_by_hand() -> None:
+def test_a_bend_is_approached_by_hand():
     limits = Limits(
         speed_mps=20, accel_mps2=3, brake_mps2=8, grip_mps2=5, lateral_accel_mps2=1,
         walk_speed_mps=2, walk_accel_mps2=1.5, walk_brake_mps2=1.5,
@@ -186,7 +179,7 @@ def test_a_bend_is_approached_by_hand() -> None:
 
 @settings(max_examples=30)
 @given(radii, st.floats(0.3, math.pi), st.floats(0.2, 4))
-def test_an_arc_has_its_own_curvature_and_the_speed_for_it(radius: float, turn: float, piece: float) -> None:
+def test_an_arc_has_its_own_curvature_and_the_speed_for_it(radius, turn, piece):
     got = bends(road(radius, turn_rad=turn, piece_m=piece), LIMITS)
     start, end = (round(s / GRID_M) for s in arc_m(radius, turn))
     body = math.ceil((BODY_M + piece) / GRID_M)
@@ -199,11 +192,11 @@ def test_an_arc_has_its_own_curvature_and_the_speed_for_it(radius: float, turn: 
 
 @settings(max_examples=30)
 @given(radii, st.floats(0.3, math.pi))
-def test_every_cap_can_be_braked_to(radius: float, turn: float) -> None:
+def test_every_cap_can_be_braked_to(radius, turn):
     square = bends(road(radius, turn_rad=turn), LIMITS)[CAP] ** 2
     assert np.all(square[:-1] - square[1:] <= 2 * LIMITS.approach_mps2 * GRID_M + 1e-6)
 
 
-def test_a_heading_that_passes_pi_is_no_bend() -> None:
+def test_a_heading_that_passes_pi_is_no_bend():
     got = bends(with_headings(math.pi - 0.01, -math.pi + 0.01, -math.pi + 0.01), LIMITS)
     assert max(got[HERE]) == pytest.approx(0.02 / BODY_M)

@@ -2,10 +2,8 @@
 
 import math
 import shutil
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 
 import libsumo
 import numpy as np
@@ -16,7 +14,6 @@ from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
 from risk_sac.sim.commands import VehicleCommand
-from risk_sac.sim.ego import Belief
 from risk_sac.sim.sumo import NETS, SumoSimulation
 from risk_sac.types import Frame, Role
 from tests.builders import Told, belief_of
@@ -25,7 +22,7 @@ LEAD_IN_STEPS = 15
 
 
 @pytest.fixture(scope="module")
-def sim() -> Iterator[SumoSimulation]:
+def sim():
     with closing(SumoSimulation(EgoConfig())) as simulation:
         yield simulation
 
@@ -40,7 +37,7 @@ def speed(frame: Frame, id_: str) -> float:
 
 
 @pytest.mark.parametrize("folder", ["Tests, 2026", "a;b", "${HOME}", "100%", "ü é"])
-def test_a_net_is_loaded_whatever_its_folder_is_called(sim: SumoSimulation, tmp_path: Path, folder: str) -> None:
+def test_a_net_is_loaded_whatever_its_folder_is_called(sim, tmp_path, folder):
     layout = middle(FAMILIES["low"])
     (tmp_path / folder).mkdir()
     net = tmp_path / folder / "net.xml"
@@ -50,15 +47,13 @@ def test_a_net_is_loaded_whatever_its_folder_is_called(sim: SumoSimulation, tmp_
 
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("speed_mps", [6.0, 10.0, 14.0])
-def test_before_the_release_an_adversary_keeps_the_speed_of_the_scene(
-    sim: SumoSimulation, side: str, speed_mps: float
-) -> None:
+def test_before_the_release_an_adversary_keeps_the_speed_of_the_scene(sim, side, speed_mps):
     layout = middle(FAMILIES["low"], **{f"{side}_speed_mps": speed_mps, "lead_gap_m": 50.0})
     sim.reset(layout, 0)
     assert [speed(sim.step(), side) for _ in range(LEAD_IN_STEPS)] == pytest.approx([speed_mps] * LEAD_IN_STEPS)
 
 
-def test_before_the_release_an_adversary_stops_for_whom_sumo_s_models_see(sim: SumoSimulation) -> None:
+def test_before_the_release_an_adversary_stops_for_whom_sumo_s_models_see(sim):
     layout = middle(FAMILIES["low"], left_speed_mps=14.0)
     left = next(v for v in layout.vehicles if v.id == "left")
     parked = replace(left, id="parked", role=Role.BACKGROUND, position_m=left.position_m + 30.0, speed_mps=0.0)
@@ -72,8 +67,8 @@ def test_before_the_release_an_adversary_stops_for_whom_sumo_s_models_see(sim: S
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_only_after_the_release_a_command_is_driven_whatever_is_in_the_way(sim: SumoSimulation, side: str) -> None:
-    def driven(*, released: bool) -> float:
+def test_only_after_the_release_a_command_is_driven_whatever_is_in_the_way(sim, side):
+    def driven(*, released):
         layout = middle(FAMILIES["low"], **{f"{side}_speed_mps": 10.0})
         sim.reset(layout, 0)
         if released:
@@ -89,7 +84,7 @@ def pedestrian(id_: str, heading: float, speed_mps: float) -> PedestrianStart:
     return PedestrianStart(id=id_, role=Role.ADVERSARY, x_m=500.0, y_m=-9.0, heading_rad=heading, speed_mps=speed_mps)
 
 
-def test_room_is_what_is_left_of_the_road_on_both_sides(sim: SumoSimulation) -> None:
+def test_room_is_what_is_left_of_the_road_on_both_sides(sim):
     frame = sim.reset(middle(FAMILIES["low"]), 0)
     width = 3.3
     for id_, lanes_right in (("right", 0), ("lead", 1), ("left", 2)):
@@ -106,10 +101,10 @@ def test_room_is_what_is_left_of_the_road_on_both_sides(sim: SumoSimulation) -> 
 
 
 @pytest.mark.parametrize("family", ["mixed", "dense"])
-def test_a_released_driver_intends_to_stop_for_a_pedestrian_in_its_way(sim: SumoSimulation, family: str) -> None:
+def test_a_released_driver_intends_to_stop_for_a_pedestrian_in_its_way(sim, family):
     adversary = FAMILIES[family].vehicles[0]
 
-    def intended(ahead_m: float) -> float:
+    def intended(ahead_m):
         layout = middle(FAMILIES[family], occluder_speed_mps=8.0, oncoming_speed_mps=8.0, oncoming_distance_m=60.0)
         only = next(v for v in layout.vehicles if v.id == adversary)
         frame = sim.reset(replace(layout, vehicles=(only,), pedestrians=()), 0)
@@ -132,20 +127,18 @@ def test_a_released_driver_intends_to_stop_for_a_pedestrian_in_its_way(sim: Sumo
     assert intended(-12.0) > -0.5
 
 
-def test_each_frame_is_perceived_once_and_before_the_next_step(
-    sim: SumoSimulation, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_each_frame_is_perceived_once_and_before_the_next_step(sim, monkeypatch):
     """SUMO's models ignore actors unknown to the ego from the same frame on."""
     perceived: list[Frame] = []
     ignored: list[list[set[str]]] = []
     tell_sumo = libsumo.vehicle.setParameter
 
-    def tell_ego(frame: Frame, _: int) -> Belief:
+    def tell_ego(frame, _):
         perceived.append(frame)
         ignored.append([])
         return belief_of(frame, hidden=() if len(perceived) == 2 else ("lead", "left"))
 
-    def noted(vehicle: str, name: str, value: str) -> None:
+    def noted(vehicle, name, value):
         assert vehicle == "ego"
         ignored[-1].append(set(value.split()))
         tell_sumo(vehicle, name, value)

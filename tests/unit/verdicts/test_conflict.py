@@ -1,15 +1,13 @@
 """Each type's beginning against times worked out by hand; all of it again in the mirror."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from risk_sac.records import ConflictType
-from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
-from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.conflict import find_conflict, unresponsive
 from tests.unit.verdicts.staged import (
     LANE_M,
     crossing_car,
@@ -23,15 +21,13 @@ from tests.unit.verdicts.staged import (
     straight,
 )
 
-Staged = Callable[..., Evidence]
-
 
 @pytest.fixture(params=[False, True], ids=["as it is", "mirrored"])
-def found(request: pytest.FixtureRequest) -> Callable[[Evidence], Conflict]:
+def found(request):
     return lambda evidence: find_conflict(mirrored(evidence) if request.param else evidence, 1)
 
 
-def test_a_leader_counts_from_braking_harder_than_5(found: Staged) -> None:
+def test_a_leader_counts_from_braking_harder_than_5(found):
     hard, soft = leader_brakes(gap=25.0, braking=5.5), leader_brakes(gap=25.0, braking=4.5)
     assert found(hard).type is ConflictType.LEADER
     assert found(hard).time_s == pytest.approx(2.15, abs=0.06)
@@ -39,34 +35,34 @@ def test_a_leader_counts_from_braking_harder_than_5(found: Staged) -> None:
     assert found(soft).time_s == pytest.approx(2.0 + 1.89, abs=0.16)
 
 
-def test_a_cut_in_begins_0_375_m_off_its_lane_below_two_seconds(found: Staged) -> None:
+def test_a_cut_in_begins_0_375_m_off_its_lane_below_two_seconds(found):
     conflict = found(cut_in(gap=8.0))  # 5 m/s closing: 1.6 s from the start; 0.375 m take 0.3125 s of 1.2 m/s
     assert conflict.type is ConflictType.CUT_IN
     assert conflict.time_s == pytest.approx(2.3125, abs=0.1)
     assert conflict.position == "ahead"
 
 
-def test_who_drifts_over_alongside_is_in_conflict_whatever_its_speed(found: Staged) -> None:
+def test_who_drifts_over_alongside_is_in_conflict_whatever_its_speed(found):
     conflict = found(cut_in(gap=-3.0, ego=12.0, other=12.0))
     assert (conflict.type, conflict.position) == (ConflictType.CUT_IN, "alongside")
     assert conflict.time_s == pytest.approx(2.3125, abs=0.1)
 
 
-def test_who_hangs_over_alongside_is_noticed_and_in_conflict_once_it_comes(found: Staged) -> None:
+def test_who_hangs_over_alongside_is_noticed_and_in_conflict_once_it_comes(found):
     conflict = found(hangs_over(at_s=1.0, comes_at_s=3.0))
     assert (conflict.type, conflict.position) == (ConflictType.CUT_IN, "alongside")
     assert conflict.noticed_s == pytest.approx(1.3125, abs=0.1)
     assert conflict.time_s == pytest.approx(3.0, abs=0.11)
 
 
-def test_without_recorded_offsets_the_place_across_the_path_decides(found: Staged) -> None:
+def test_without_recorded_offsets_the_place_across_the_path_decides(found):
     evidence = cut_in(gap=8.0)
     unknown = replace(evidence, lane_offset_m=np.full_like(evidence.lane_offset_m, np.nan))
     assert found(unknown) == found(evidence)
 
 
 @pytest.mark.parametrize("speed", [9.0, 11.0, 14.0])
-def test_a_pedestrian_counts_within_four_seconds_and_one_of_the_kerb(found: Staged, speed: float) -> None:
+def test_a_pedestrian_counts_within_four_seconds_and_one_of_the_kerb(found, speed):
     evidence = pedestrian_crosses(speed=speed, walk=1.4)
     conflict = found(evidence)
     assert conflict.type is ConflictType.PEDESTRIAN
@@ -74,21 +70,21 @@ def test_a_pedestrian_counts_within_four_seconds_and_one_of_the_kerb(found: Stag
 
 
 @pytest.mark.parametrize("seen_from_s", [5.0, 6.0, 7.5])
-def test_a_hidden_pedestrians_conflict_begins_with_its_sight(found: Staged, seen_from_s: float) -> None:
+def test_a_hidden_pedestrians_conflict_begins_with_its_sight(found, seen_from_s):
     conflict = found(pedestrian_crosses(seen_from_s=seen_from_s))
     assert conflict.time_s == pytest.approx(seen_from_s)
     assert conflict.hidden
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_a_crossing_vehicle_counts_within_four_seconds(found: Staged, side: int) -> None:
+def test_a_crossing_vehicle_counts_within_four_seconds(found, side):
     evidence = crossing_car(side=side)
     conflict = found(evidence)
     assert conflict.type is ConflictType.CROSSING
     assert evidence.time_s[-1] - conflict.time_s == pytest.approx(4.0, abs=0.15)
 
 
-def test_an_ego_that_drifts_into_its_neighbour_is_in_conflict_on_a_collision_course(found: Staged) -> None:
+def test_an_ego_that_drifts_into_its_neighbour_is_in_conflict_on_a_collision_course(found):
     ego = sideways(straight(0.0, 0.0, 0.0, 12.0), 1.0, 1.0, LANE_M)
     evidence = stage(ego, straight(0.0, LANE_M, 0.0, 12.0))
     conflict = found(evidence)
@@ -110,12 +106,12 @@ def test_an_ego_that_drifts_into_its_neighbour_is_in_conflict_on_a_collision_cou
         pytest.param(stage(straight(0.0, 0.0, 0.0, 12.0), straight(70.0, 0.0, 0.0, 0.0)), True, id="into a parked car"),
     ],
 )
-def test_an_ego_that_never_brakes_for_what_it_sees_is_unresponsive(evidence: Evidence, smells: bool) -> None:
+def test_an_ego_that_never_brakes_for_what_it_sees_is_unresponsive(evidence, smells):
     assert unresponsive(evidence, find_conflict(evidence, 1)) is smells
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_a_crossing_vehicle_that_brakes_is_trusted_until_the_two_would_meet(found: Staged, side: int) -> None:
+def test_a_crossing_vehicle_that_brakes_is_trusted_until_the_two_would_meet(found, side):
     # From 12 m/s it brakes with 4 m/s² from 2 s to 3.8 s, and goes on with 4.8 m/s into the ego, 44.9 m from its start.
     # At 2 s it could stop within 12²/12 = 12 m by braking firmly, within 21 m gently; the corridor is 17 m away.
     # From 3 s and 8 m/s on the two would meet if both kept their speeds: it is 10.9 m from the ego's axis, 1.4 s.

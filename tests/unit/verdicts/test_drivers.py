@@ -1,7 +1,6 @@
 """Literals by hand from the formulas; both surfaces are monotone in what makes a gap more dangerous."""
 
 import math
-import random
 from typing import Any
 
 import pytest
@@ -23,11 +22,11 @@ DRY, WET = 9.81, 0.6 * 9.81
     ("since_s", "braking"),
     [(0.0, 0.4), (0.75, 0.4), (0.95, 0.4 + 2.53), (1.30, 7.3575), (1.32, 7.59294), (9.0, 7.59294)],
 )
-def test_careful_brakes_as_r157_says(since_s: float, braking: float) -> None:
+def test_careful_brakes_as_r157_says(since_s, braking):
     assert r157(since_s, DRY) == pytest.approx(braking)
 
 
-def test_no_driver_brakes_harder_than_the_road_bears() -> None:
+def test_no_driver_brakes_harder_than_the_road_bears():
     assert r157(3.0, WET) == pytest.approx(5.886)
     assert full_braking(WET) == pytest.approx(5.886)
     assert full_braking(DRY) == 8.0
@@ -35,11 +34,11 @@ def test_no_driver_brakes_harder_than_the_road_bears() -> None:
 
 
 @given(st.floats(0, 10), st.floats(0.5, 12))
-def test_the_bound_never_brakes_less_than_careful(since_s: float, grip: float) -> None:
+def test_the_bound_never_brakes_less_than_careful(since_s, grip):
     assert full_braking(grip) >= r157(since_s, grip)
 
 
-def test_a_command_builds_up_at_its_jerk() -> None:
+def test_a_command_builds_up_at_its_jerk():
     assert towards_command(0.0, 6.0, DRY, 0.1) == pytest.approx(1.265)
     assert towards_command(5.9, 6.0, DRY, 0.1) == 6.0
     assert towards_command(6.0, 0.0, DRY, 0.1) == pytest.approx(4.735)
@@ -54,25 +53,25 @@ def situation(
 
 # RSS: after = 20 + 0.75·3 = 22.25; (20 + 22.25)·0.375 + 22.25²/12 − 100/12 = 15.844 + 41.255 − 8.333 = 48.765 m.
 @pytest.mark.parametrize(("gap", "braking"), [(48.7, 6.0), (48.8, 0.0)])
-def test_rss_responds_below_its_longitudinal_distance(gap: float, braking: float) -> None:
+def test_rss_responds_below_its_longitudinal_distance(gap, braking):
     assert rss(situation(gap)) == braking
 
 
 # Sideways, each: 0.75 · 0.75/2 + 0.75²/2 = 0.5625 m; two of them and μ = 0.3 make 1.425 m between the bodies.
 @pytest.mark.parametrize(("across", "braking"), [(3.2, 6.0), (-3.2, 6.0), (3.23, 0.0), (-3.23, 0.0)])
-def test_rss_responds_below_its_lateral_distance_only(across: float, braking: float) -> None:
+def test_rss_responds_below_its_lateral_distance_only(across, braking):
     assert rss(situation(10.0, across)) == braking
 
 
 @pytest.mark.parametrize("driver", [fuzzy, rss])
 @pytest.mark.parametrize("side", [1, -1])
-def test_who_is_out_of_the_way_is_no_reason_to_brake(driver: object, side: int) -> None:
-    assert driver(situation(10.0, 5.0 * side, 0.5 * side)) == 0.0  # type: ignore[operator]  # moves away
-    assert driver(situation(-30.0)) == 0.0  # type: ignore[operator]  # behind
+def test_who_is_out_of_the_way_is_no_reason_to_brake(driver, side):
+    assert driver(situation(10.0, 5.0 * side, 0.5 * side)) == 0.0  # moves away
+    assert driver(situation(-30.0)) == 0.0  # behind
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_fuzzy_brakes_for_who_is_coming(side: int) -> None:
+def test_fuzzy_brakes_for_who_is_coming(side):
     assert fuzzy(situation(10.0, 5.0 * side, -0.5 * side)) == 6.0
 
 
@@ -81,28 +80,28 @@ speeds, gaps = st.floats(0, 40), st.floats(0, 150)
 
 # 20 m/s behind 10 m/s: τ 20 = 15; 400/8 = 50; 400/12 = 33.33; 100/14 = 7.143; safe 57.857, unsafe 41.190, d1 = 2.
 @pytest.mark.parametrize(("gap", "pfs"), [(59.9, 0.0), (59.857 - 8.333, 0.5), (43.0, 1.0), (0.0, 1.0)])
-def test_proactive(gap: float, pfs: float) -> None:
+def test_proactive(gap, pfs):
     assert proactive(gap, 20.0, 10.0) == pytest.approx(pfs, abs=1e-3)
 
 
 # 20 behind 10, no acceleration: d_new = 7.5; safe 7.5 + 100/8 = 20; unsafe 7.5 + 100/12 = 15.833.
 @pytest.mark.parametrize(("gap", "cfs"), [(20.0, 0.0), (17.917, 0.5), (15.8, 1.0)])
-def test_critical(gap: float, cfs: float) -> None:
+def test_critical(gap, cfs):
     assert critical(gap, 20.0, 0.0, 10.0) == pytest.approx(cfs, abs=1e-3)
 
 
 # Braking with 3 it is 17.75 after τ: d_new = (18.875 - 10) 0.75 = 6.656; 7.75² = 60.0625: safe 14.164, unsafe 11.661.
 @pytest.mark.parametrize(("gap", "cfs"), [(14.2, 0.0), (12.913, 0.5), (11.6, 1.0)])
-def test_critical_of_who_brakes_already(gap: float, cfs: float) -> None:
+def test_critical_of_who_brakes_already(gap, cfs):
     assert critical(gap, 20.0, -3.0, 10.0) == pytest.approx(cfs, abs=1e-3)
 
 
 @pytest.mark.parametrize(("gap", "cfs"), [(0.51, 0.0), (0.49, 1.0)])
-def test_critical_of_who_is_slower_within_the_reaction(gap: float, cfs: float) -> None:
+def test_critical_of_who_is_slower_within_the_reaction(gap, cfs):
     assert critical(gap, 12.0, -9.0, 10.0) == cfs  # a' = -4: 4 / 8 = 0.5 m
 
 
-def test_braking_is_comfortable_until_the_gap_is_critical() -> None:
+def test_braking_is_comfortable_until_the_gap_is_critical():
     assert braking(51.524, 20.0, 0.0, 10.0) == pytest.approx(2.0, abs=1e-3)
     assert braking(17.917, 20.0, 0.0, 10.0) == pytest.approx(5.0, abs=1e-3)
     assert braking(1.0, 20.0, 0.0, 10.0) == 6.0
@@ -110,13 +109,13 @@ def test_braking_is_comfortable_until_the_gap_is_critical() -> None:
 
 
 @given(gaps, gaps, speeds, speeds, st.floats(-9, 3))
-def test_a_longer_gap_is_never_more_dangerous(a: float, b: float, ego: float, leader: float, accel: float) -> None:
+def test_a_longer_gap_is_never_more_dangerous(a, b, ego, leader, accel):
     near, far = min(a, b), max(a, b)
     assert 0.0 <= proactive(far, ego, leader) <= proactive(near, ego, leader) <= 1.0
     assert 0.0 <= critical(far, ego, accel, leader) <= critical(near, ego, accel, leader) <= 1.0
 
 
-def test_who_comes_closer_is_more_critical_than_who_stands() -> None:
+def test_who_comes_closer_is_more_critical_than_who_stands():
     assert braking(25.0, 10.0, 0.0, -5.0) > braking(25.0, 10.0, 0.0, 0.0)
 
 
@@ -153,12 +152,12 @@ any_failure = st.builds(
         (failure(ego_zone="left", other_id="adv_1", min_robustness=0.0), False),
     ],
 )
-def test_signature_first_and_then_the_cell(second: Collision, distinct: bool) -> None:
+def test_signature_first_and_then_the_cell(second, distinct):
     assert distinct_failures([failure(), second]) == ((0, 1) if distinct else (0,))
 
 
 @given(st.lists(any_failure, max_size=30), st.randoms(use_true_random=False))
-def test_the_count_is_the_same_in_any_order_and_after_a_resume(hits: list[Collision], order: random.Random) -> None:
+def test_the_count_is_the_same_in_any_order_and_after_a_resume(hits, order):
     found, again = DistinctFailures(), DistinctFailures()
     for hit in hits:
         found.add(hit)
@@ -189,5 +188,5 @@ def kind(judged: dict[str, Any] | None = None, **changes: Any) -> FailureKind:
         ({"other_role": "background"}, "striker", "background vehicle"),
     ],
 )
-def test_a_kind_is_told_by_its_edges(changes: dict[str, Any], field: str, value: object) -> None:
+def test_a_kind_is_told_by_its_edges(changes, field, value):
     assert getattr(kind(**changes), field) == value

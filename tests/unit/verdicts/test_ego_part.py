@@ -34,16 +34,14 @@ def part(evidence: Evidence, yields: str | None = None) -> EgoPart:
     ("changes", "after_s", "braking"),
     [((), None, 0.0), (((4.0, -3.0),), 1.1, 3.0), (((4.0, -1.0),), None, 1.0), (((2.0, -2.0),), 0.0, 2.0)],
 )
-def test_when_and_how_hard_it_braked(
-    changes: tuple[tuple[float, float], ...], after_s: float | None, braking: float
-) -> None:
+def test_when_and_how_hard_it_braked(changes, after_s, braking):
     found = part(stage(straight(0.0, 0.0, 0.0, 12.0, *changes), straight(80.0, 0.0, 0.0, 0.0)))
     assert found.braked_after_s == (None if after_s is None else pytest.approx(after_s, abs=0.25))
     assert found.braking_mps2 == pytest.approx(braking, abs=0.01)
 
 
 @pytest.mark.parametrize(("after_s", "gained"), [(0.1, 0.0), (1.2, 2.0)])
-def test_what_it_gained_within_its_response_time_does_not_count(after_s: float, gained: float) -> None:
+def test_what_it_gained_within_its_response_time_does_not_count(after_s, gained):
     since_s = 1.5 + after_s  # the conflict begins when the bodies would touch within 4 s
     ego = straight(0.0, 0.0, 0.0, 10.0, (since_s, 2.0), (since_s + 1.0, 0.0))
     evidence = stage(ego, straight(72.0, 0.0, 0.0, 0.0), kinds=WALKING)
@@ -52,7 +50,7 @@ def test_what_it_gained_within_its_response_time_does_not_count(after_s: float, 
 
 
 @pytest.mark.parametrize(("y", "near"), [(1.5, True), (2.9, True), (4.0, False)])
-def test_it_is_aware_of_a_pedestrian_on_the_carriageway_beside_its_way(y: float, near: bool) -> None:
+def test_it_is_aware_of_a_pedestrian_on_the_carriageway_beside_its_way(y, near):
     ego = straight(0.0, 0.0, 0.0, 6.0, (2.0, 1.0))
     touches_s = next(t / 10 for t in range(200) if ego(t / 10)[0] + CAR_M[0] / 2 >= 40.0)
     aside = y - CAR_M[1] / 2
@@ -63,7 +61,7 @@ def test_it_is_aware_of_a_pedestrian_on_the_carriageway_beside_its_way(y: float,
     assert found.sped_up == near
 
 
-def test_the_speed_that_its_sight_allowed() -> None:
+def test_the_speed_that_its_sight_allowed():
     found = part(pedestrian_crosses(speed=12.0, seen_from_s=6.8))  # 1.3 s before it
     assert found.sighted_mps == pytest.approx(12.0)
     assert found.sight_mps is not None
@@ -87,5 +85,5 @@ def test_the_speed_that_its_sight_allowed() -> None:
         (crossing_car(), None, None),  # at the same time
     ],
 )
-def test_which_left_the_proper_response_first(evidence: Evidence, yields: str | None, left: str | None) -> None:
+def test_which_left_the_proper_response_first(evidence, yields, left):
     assert part(evidence, yields).left_first == left

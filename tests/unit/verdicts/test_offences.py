@@ -71,23 +71,21 @@ GREEN = [(0.0, "G"), (3.5, "")]
         ([], ()),
     ],
 )
-def test_what_crossing_traffic_passed_its_stop_line_on(
-    link: list[tuple[float, str]], expected: tuple[str, ...]
-) -> None:
+def test_what_crossing_traffic_passed_its_stop_line_on(link, expected):
     assert labels(crossing(GREEN, link)) == expected
 
 
 @pytest.mark.parametrize("ego", [[(0.0, "g"), (3.5, "")], [(0.0, "r"), (3.5, "")], []])
-def test_priority_takes_an_ego_that_had_it(ego: list[tuple[float, str]]) -> None:
+def test_priority_takes_an_ego_that_had_it(ego):
     assert labels(crossing(ego, [(0.0, "g"), (3.5, "")])) == ()
 
 
 @pytest.mark.parametrize(("speed", "expected"), [(13.89 * 1.09, ()), (13.89 * 1.11, ("speeding",))])
-def test_more_than_ten_percent_over_the_limit_is_speeding(speed: float, expected: tuple[str, ...]) -> None:
+def test_more_than_ten_percent_over_the_limit_is_speeding(speed, expected):
     assert labels(crossing_car(other=speed)) == expected
 
 
-def test_a_vehicle_that_goes_backwards_is_in_the_wrong_direction() -> None:
+def test_a_vehicle_that_goes_backwards_is_in_the_wrong_direction():
     head_on = stage(straight(0.0, 0.0, 0.0, 8.0), straight(60.0, 0.0, np.pi, 8.0))
     assert labels(head_on) == ()
     assert labels(replace(head_on, heading_rad=np.zeros_like(head_on.heading_rad))) == ("wrong_direction",)
@@ -103,9 +101,7 @@ def test_a_vehicle_that_goes_backwards_is_in_the_wrong_direction() -> None:
         ([], ()),
     ],
 )
-def test_a_pedestrian_is_judged_by_the_light_it_stepped_out_on(
-    link: list[tuple[float, str]], expected: tuple[str, ...]
-) -> None:
+def test_a_pedestrian_is_judged_by_the_light_it_stepped_out_on(link, expected):
     assert labels(with_links(pedestrian_crosses(), [], link)) == expected  # at the kerb at 3.4 s
 
 
@@ -120,9 +116,7 @@ def test_a_pedestrian_is_judged_by_the_light_it_stepped_out_on(
         (GREEN, GREEN, ()),
     ],
 )
-def test_what_the_ego_passed_its_stop_line_on(
-    ego: list[tuple[float, str]], other: list[tuple[float, str]], expected: tuple[str, ...]
-) -> None:
+def test_what_the_ego_passed_its_stop_line_on(ego, other, expected):
     assert of_ego(crossing(ego, other)) == expected
 
 
@@ -131,15 +125,13 @@ def test_what_the_ego_passed_its_stop_line_on(
     [([], ("priority",)), ([(0.0, "G")], ("priority",)), ([(0.0, "r")], ())],
     ids=["zebra", "on green", "on red"],
 )
-def test_a_pedestrian_on_a_crossing_has_priority_unless_it_stepped_out_on_red(
-    link: list[tuple[float, str]], expected: tuple[str, ...]
-) -> None:
+def test_a_pedestrian_on_a_crossing_has_priority_unless_it_stepped_out_on_red(link, expected):
     assert of_ego(with_links(pedestrian_crosses(), [], link)) == expected
     elsewhere = with_links(pedestrian_crosses(), [], link)
     assert of_ego(replace(elsewhere, ground=replace(STREET, crossings=()))) == ()
 
 
-def test_a_pedestrian_that_walks_into_an_ego_on_the_crossing_has_lost_nothing() -> None:
+def test_a_pedestrian_that_walks_into_an_ego_on_the_crossing_has_lost_nothing():
     ego, walker = straight(96.0, 0.0, 0.0, 2.0, start_s=0.0), straight(100.0, 8.0, -np.pi / 2, 2.6, start_s=0.0)
     evidence = stage(ego, walker, kinds=WALKING, from_s=0.0)
     assert evidence.x_m[-1, 0] > 99.0
@@ -160,17 +152,15 @@ def on_two_way_road(moved_m: float, *others: Motion, until_s: float = 6.0) -> tu
     [(0.01, ()), (-3.3, ()), (1.6, ()), (3.3, ("wrong_direction",)), (13.2, ("off_road",)), (-9.9, ("off_road",))],
     ids=["stays", "changes lanes", "over the line", "oncoming lane", "beyond it", "ditch"],
 )
-def test_an_ego_beside_its_carriageway_is_off_the_road_or_in_oncoming_traffic(
-    moved_m: float, expected: tuple[str, ...]
-) -> None:
+def test_an_ego_beside_its_carriageway_is_off_the_road_or_in_oncoming_traffic(moved_m, expected):
     assert on_two_way_road(moved_m, until_s=9.0) == expected
 
 
-def test_an_ego_that_overtakes_may_use_the_oncoming_lane() -> None:
+def test_an_ego_that_overtakes_may_use_the_oncoming_lane():
     assert on_two_way_road(3.3, straight(160.0, -1.65, 0.0, 4.0)) == ()
 
 
-def test_an_ego_that_came_back_three_seconds_ago_has_broken_nothing() -> None:
+def test_an_ego_that_came_back_three_seconds_ago_has_broken_nothing():
     away = sideways(straight(100.0, -1.65, 0.0, 12.0), 0.0, 3.0, 3.3)
     back = sideways(away, 2.0, -3.0, 3.3)
     ground = Ground(net="mixed/mixed.net.xml")

@@ -29,7 +29,7 @@ from tests.unit.verdicts.staged import (
 MPH = 0.44704  # m/s
 
 
-def test_a_pedestrian_dies_as_often_as_was_published() -> None:
+def test_a_pedestrian_dies_as_often_as_was_published():
     at = {kmh: fatality_risk(kmh / 3.6) for kmh in (0, 30, 40, 50, 76.7, 100)}
     assert at[50] > 2 * at[40]
     assert at[50] > 5 * at[30]
@@ -38,7 +38,7 @@ def test_a_pedestrian_dies_as_often_as_was_published() -> None:
     assert at[0] < 0.0011
 
 
-def test_an_occupant_is_seriously_injured_as_often_as_was_published() -> None:
+def test_an_occupant_is_seriously_injured_as_often_as_was_published():
     assert serious_injury_risk(6.9540 / 0.1637 * MPH) == pytest.approx(0.5)
     assert serious_injury_risk(30 * MPH) == pytest.approx(0.115, abs=0.001)
     assert serious_injury_risk(0.0) < 0.001
@@ -55,7 +55,7 @@ def test_an_occupant_is_seriously_injured_as_often_as_was_published() -> None:
         (12.0, 0.01, True, Severity.SEVERE),
     ],
 )
-def test_classes_at_their_edges(closing_mps: float, risk: float, pedestrian: bool, expected: Severity) -> None:
+def test_classes_at_their_edges(closing_mps, risk, pedestrian, expected):
     assert severity(closing_mps, risk, pedestrian=pedestrian) is expected
 
 
@@ -82,14 +82,14 @@ def stands_in_the_way(speed: float) -> Evidence:
         (stands_in_the_way(1.0), Severity.MODERATE),
     ],
 )
-def test_a_contact_says_how_bad_it_is(evidence: Evidence, expected: Severity) -> None:
+def test_a_contact_says_how_bad_it_is(evidence, expected):
     found, again = (judge(each, "actor_1", valid=True) for each in (evidence, mirrored(evidence)))
     assert (found.severity, found.injury_risk) == (again.severity, again.injury_risk)
     assert found.severity is expected
     assert found.injury_risk is not None
 
 
-def test_a_striker_that_has_left_cannot_have_struck() -> None:
+def test_a_striker_that_has_left_cannot_have_struck():
     evidence = cut_in()
     evidence.x_m[-1, 1] = np.nan
     with pytest.raises(ValueError, match="'actor_1' has left"):
@@ -99,7 +99,7 @@ def test_a_striker_that_has_left_cannot_have_struck() -> None:
 
 
 @pytest.mark.parametrize("evidence", [cut_in(), leader_brakes()], ids=["cut-in", "leader"])
-def test_what_is_stored_is_judged_alike(evidence: Evidence) -> None:
+def test_what_is_stored_is_judged_alike(evidence):
     names = (*PER_ACTOR, "link", "kind", "role", "length_m", "width_m")
     stored = {name: getattr(evidence, name) for name in names} | {"ids": np.array(evidence.ids)}
     stored |= {"time_s": evidence.time_s + 1.5, "visible": np.where(evidence.known, 1.0, np.nan)}
@@ -113,11 +113,11 @@ CAR = Kind.VEHICLE
 
 
 @pytest.mark.parametrize("evidence", [cut_in(), pedestrian_crosses()], ids=["vehicle", "pedestrian"])
-def test_the_two_that_touch_at_the_end_are_no_overlap(evidence) -> None:  # type: ignore[no-untyped-def]
+def test_the_two_that_touch_at_the_end_are_no_overlap(evidence):
     assert overlaps_before_contact(evidence) == []
 
 
-def test_every_frame_in_which_two_others_overlap_is_found_and_named() -> None:
+def test_every_frame_in_which_two_others_overlap_is_found_and_named():
     # The third passes through the fourth, 4.6 m long, at 10 m/s: it is inside it for 0.92 s.
     passing, standing = straight(-10.0, 6.0, 0.0, 10.0, start_s=0.0), straight(0.0, 6.0, 0.0, 0.0)
     ego, struck = straight(0.0, 0.0, 0.0, 10.0, start_s=0.0), straight(50.0, 0.0, 0.0, 0.0)
@@ -128,7 +128,7 @@ def test_every_frame_in_which_two_others_overlap_is_found_and_named() -> None:
     assert overlaps_before_contact(mirrored(evidence)) == found
 
 
-def test_a_pedestrian_inside_a_vehicle_is_an_overlap() -> None:
+def test_a_pedestrian_inside_a_vehicle_is_an_overlap():
     walker, truck = straight(30.0, 4.0, 0.0, 0.0), straight(29.0, 4.0, 0.0, 0.0)
     ego, struck = straight(0.0, 0.0, 0.0, 10.0, start_s=0.0), straight(6.0, 0.0, 0.0, 0.0)
     evidence = stage(ego, struck, walker, truck, kinds=(CAR, CAR, Kind.PEDESTRIAN, CAR), from_s=0.0)
@@ -165,13 +165,13 @@ def verdict(name: str) -> Judgement:
 
 
 @pytest.mark.parametrize("name", NAMED)
-def test_what_an_engineer_says(name: str) -> None:
+def test_what_an_engineer_says(name):
     found, expected = verdict(name), NAMED[name]
     assert (found.fault, found.grade, found.ego_response, found.severity) == expected
 
 
 @pytest.mark.parametrize("name", NAMED)
-def test_the_mirrored_contact_has_the_same_verdict(name: str) -> None:
+def test_the_mirrored_contact_has_the_same_verdict(name):
     evidence, striker = recorded(name)
     evidence = replace(evidence, ground=replace(evidence.ground, net=""))  # there is no mirrored net
     first, second = (judge(each, striker, valid=True) for each in (evidence, mirrored(evidence)))
@@ -180,16 +180,13 @@ def test_the_mirrored_contact_has_the_same_verdict(name: str) -> None:
         assert getattr(second, name) == getattr(first, name)
 
 
-def test_an_ego_that_sped_up_or_started_is_said_to_have() -> None:
+def test_an_ego_that_sped_up_or_started_is_said_to_have():
     past_pedestrian, into_car = (verdict(name).ego_part for name in ("dense_267", "dense_263"))
-    assert past_pedestrian is not None
     assert (past_pedestrian.seen_s, past_pedestrian.gained_mps) == (4.6, pytest.approx(2.0, abs=0.1))
-    assert into_car is not None
     assert (into_car.seen_s, into_car.started) == (7.7, True)
 
 
-def test_a_speed_that_did_not_fit_its_sight_is_stated() -> None:
+def test_a_speed_that_did_not_fit_its_sight_is_stated():
     part = verdict("mixed_71").ego_part
-    assert part is not None
     assert part.sighted_mps == pytest.approx(13.4, abs=0.1)
     assert part.sight_mps == pytest.approx(7.6, abs=0.1)

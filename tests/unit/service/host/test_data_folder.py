@@ -1,6 +1,5 @@
 import os
 import stat
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,7 @@ from service.store.reading import Store
 
 
 @pytest.fixture(autouse=True)
-def _generous() -> Iterator[None]:
+def _generous():
     """What is made is for everybody, unless its maker says otherwise."""
     before = os.umask(0)
     yield
@@ -22,12 +21,12 @@ def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat().st_mode)
 
 
-def test_a_new_data_folder_is_nobody_elses(tmp_path: Path) -> None:
+def test_a_new_data_folder_is_nobody_elses(tmp_path):
     hold_data_folder(tmp_path / "new" / "data").close()
     assert mode(tmp_path / "new" / "data") == 0o700
 
 
-def test_a_folder_that_others_need_is_refused_and_stays_as_it_is(tmp_path: Path) -> None:
+def test_a_folder_that_others_need_is_refused_and_stays_as_it_is(tmp_path):
     folder = tmp_path / "lib"
     (folder / "of-another-program").mkdir(parents=True, mode=0o755)
     folder.chmod(0o755)
@@ -38,10 +37,8 @@ def test_a_folder_that_others_need_is_refused_and_stays_as_it_is(tmp_path: Path)
     hold_data_folder(folder).close()
 
 
-def test_what_is_not_ours_to_change_is_refused_where_everybody_may_look(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(path: Path, mode: int) -> None:
+def test_what_is_not_ours_to_change_is_refused_where_everybody_may_look(tmp_path, monkeypatch):
+    def refuse(path, mode):
         raise PermissionError(1, "Operation not permitted", str(path))
 
     monkeypatch.setattr(Path, "chmod", refuse)
@@ -57,7 +54,7 @@ def test_what_is_not_ours_to_change_is_refused_where_everybody_may_look(
     assert mode(folder) == 0o770
 
 
-def test_only_the_owner_may_read_the_database_and_its_journal(tmp_path: Path) -> None:
+def test_only_the_owner_may_read_the_database_and_its_journal(tmp_path):
     store = Store(f"sqlite:///{tmp_path}/risk-sac.db")
     store.campaigns(limit=1)
     files = sorted(tmp_path.glob("risk-sac.db*"))

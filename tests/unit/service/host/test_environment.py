@@ -24,7 +24,7 @@ def start(program: str, folder: Path, **settings: str) -> subprocess.CompletedPr
 
 
 @pytest.mark.parametrize("program", PROGRAMS)
-def test_each_wrong_setting_is_one_line_and_the_exit_status_is_2(program: str, tmp_path: Path) -> None:
+def test_each_wrong_setting_is_one_line_and_the_exit_status_is_2(program, tmp_path):
     wrong = {"port": "http", "grace_s": "nan", "log_format": "xml", "cors_origins": "*", "allowed_hosts": "[1]"}
     ended = start(program, tmp_path, **wrong)
     assert (ended.returncode, ended.stdout) == (2, "")
@@ -38,7 +38,7 @@ def test_each_wrong_setting_is_one_line_and_the_exit_status_is_2(program: str, t
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_missing_folder_of_secrets_or_a_file_in_its_place_ends_the_start_in_one_line(tmp_path: Path) -> None:
+def test_a_missing_folder_of_secrets_or_a_file_in_its_place_ends_the_start_in_one_line(tmp_path):
     ended = start("service", tmp_path, secrets_dir="/run/no-such-secrets")
     assert (ended.returncode, ended.stdout) == (2, "")
     wanted = "which is missing; wanted a folder that has settings as files"

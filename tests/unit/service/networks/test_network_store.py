@@ -1,6 +1,5 @@
 import re
 import shutil
-from pathlib import Path
 
 import pytest
 
@@ -11,12 +10,12 @@ from tests.hostile_networks import NET
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     return tmp_path / "networks"
 
 
 @pytest.fixture
-def shelf(folder: Path) -> NetworkStore:
+def shelf(folder):
     return NetworkStore(folder, most=5)
 
 
@@ -27,7 +26,7 @@ def add(shelf: NetworkStore, project: str = "default", label: str = "", content:
         return shelf.add(incoming, project, label)
 
 
-def test_a_network_is_kept_as_it_was_described(shelf: NetworkStore, folder: Path) -> None:
+def test_a_network_is_kept_as_it_was_described(shelf, folder):
     network = add(shelf, label="ring road")
     assert (network.label, network.edges, network.bytes) == ("ring road", 1, len(NET))
     assert re.fullmatch("n[0-9a-f]{16}", network.id)
@@ -36,7 +35,7 @@ def test_a_network_is_kept_as_it_was_described(shelf: NetworkStore, folder: Path
     assert NetworkStore(folder).get(network.id, None) == network  # another server, later
 
 
-def test_no_project_sees_another_ones(shelf: NetworkStore) -> None:
+def test_no_project_sees_another_ones(shelf):
     mine, theirs = add(shelf, "mine"), add(shelf, "theirs")
     assert [network.id for network in shelf.list(9, None, "mine").items] == [mine.id]
     assert {network.id for network in shelf.list(9, None, None).items} == {mine.id, theirs.id}
@@ -46,7 +45,7 @@ def test_no_project_sees_another_ones(shelf: NetworkStore) -> None:
     assert shelf.get(theirs.id, "theirs") == theirs
 
 
-def test_a_project_has_as_many_networks_as_it_may(folder: Path) -> None:
+def test_a_project_has_as_many_networks_as_it_may(folder):
     shelf = NetworkStore(folder, most=1)
     network = add(shelf)
     with pytest.raises(ConflictError, match=r"has 1 networks; wanted fewer than 1: delete one first"):
@@ -56,7 +55,7 @@ def test_a_project_has_as_many_networks_as_it_may(folder: Path) -> None:
     add(shelf)
 
 
-def test_one_key_has_a_part_of_the_places_only(folder: Path) -> None:
+def test_one_key_has_a_part_of_the_places_only(folder):
     shelf = NetworkStore(folder)
     with shelf.receive("mine"), shelf.receive("mine"):
         with pytest.raises(QuotaError, match="2 uploads of this key are at work; wanted fewer"), shelf.receive("mine"):
@@ -67,7 +66,7 @@ def test_one_key_has_a_part_of_the_places_only(folder: Path) -> None:
         pass
 
 
-def test_what_an_earlier_server_left_unfinished_is_removed(shelf: NetworkStore, folder: Path) -> None:
+def test_what_an_earlier_server_left_unfinished_is_removed(shelf, folder):
     network = add(shelf)
     shutil.copytree(folder / "default" / network.id, folder / INCOMING / "left")
     assert NetworkStore(folder).get(network.id, None) == network
@@ -75,7 +74,7 @@ def test_what_an_earlier_server_left_unfinished_is_removed(shelf: NetworkStore, 
 
 
 @pytest.mark.parametrize("at", [0.01, 0.5, 0.9, 0.999])
-def test_a_damaged_record_is_noticed(shelf: NetworkStore, folder: Path, at: float) -> None:
+def test_a_damaged_record_is_noticed(shelf, folder, at):
     good, damaged = add(shelf), add(shelf)
     record = folder / "default" / damaged.id / RECORD
     content = bytearray(record.read_bytes())
@@ -87,7 +86,7 @@ def test_a_damaged_record_is_noticed(shelf: NetworkStore, folder: Path, at: floa
     shelf.delete(damaged.id, None)
 
 
-def test_a_disk_that_refuses_is_a_storage_error(shelf: NetworkStore, folder: Path) -> None:
+def test_a_disk_that_refuses_is_a_storage_error(shelf, folder):
     network = add(shelf)
     shutil.rmtree(folder)
     folder.write_text("no folder")

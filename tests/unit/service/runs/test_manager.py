@@ -110,7 +110,7 @@ def usage(queued_runs: int = 0, hours: float = 0.0) -> Usage:
 
 
 @pytest.mark.parametrize(("waiting", "new"), [(0, 11), (9, 2), (10, 1)])
-def test_one_run_more_is_refused_with_the_figures(waiting: int, new: int) -> None:
+def test_one_run_more_is_refused_with_the_figures(waiting, new):
     with pytest.raises(
         QuotaError, match=f"got {new} runs with {waiting} waiting already; wanted at most 10"
     ) as refusal:
@@ -118,7 +118,7 @@ def test_one_run_more_is_refused_with_the_figures(waiting: int, new: int) -> Non
     assert refusal.value.retry_after_s > 0
 
 
-def test_worker_hours_are_used_up_when_they_are_reached() -> None:
+def test_worker_hours_are_used_up_when_they_are_reached():
     check_quota(usage(hours=1.999), 1, SETTINGS)
     assert not exhausted(usage(hours=1.999), SETTINGS)
     assert exhausted(usage(hours=2.0), SETTINGS)

@@ -3,7 +3,6 @@
 import json
 import sqlite3
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 from sqlalchemy import create_engine, inspect
@@ -26,7 +25,7 @@ FAILURE = "low-random-0-search-0"
 
 
 @pytest.fixture
-def settings(tmp_path: Path, database_url: str, monkeypatch: pytest.MonkeyPatch) -> ServiceSettings:
+def settings(tmp_path, database_url, monkeypatch):
     monkeypatch.setenv("RISK_SAC_DATA_DIR", str(tmp_path / "data"))
     monkeypatch.setenv("RISK_SAC_DATABASE_URL", database_url)
     return ServiceSettings()
