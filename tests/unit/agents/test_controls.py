@@ -30,15 +30,6 @@ def test_actions_are_uniform_and_in_the_space():
     np.testing.assert_allclose(shares / actions.size, 0.25, atol=0.02)
 
 
-def test_each_adversarys_action_is_held_for_a_second_on_average_and_changes_as_a_whole():
-    actions = played(RandomAgent(2 * ADVERSARIES, seed=1), 20_000)
-    changed = np.diff(actions, axis=0) != 0.0
-    assert np.array_equal(changed[..., 0], changed[..., 1])
-    np.testing.assert_allclose(changed[..., 0].mean(axis=0), 0.1, atol=0.01)
-    both = (changed[:, 0, 0] & changed[:, 1, 0]).mean()  # each by itself: 0.1 · 0.1
-    np.testing.assert_allclose(both, 0.01, atol=0.004)
-
-
 def test_a_restored_agent_goes_on_as_the_one_that_was_saved():
     agent = RandomAgent(2 * ADVERSARIES, seed=3)
     played(agent, 7)

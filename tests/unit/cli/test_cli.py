@@ -2,41 +2,16 @@ import re
 from dataclasses import replace
 
 import pytest
-from rich.console import Console
 
 from risk_sac import cli
-from risk_sac.cli.show import _table
 from risk_sac.execution.runs import run
-from risk_sac.records import ConflictType, Fault, Grade, Severity
-from risk_sac.run_folder.results import RecordedFailure, Results, read_results, write_results
-from tests.builders import judgement
+from risk_sac.run_folder.results import Results, read_results, write_results
 from tests.unit.cli.conftest import SPEC, ignore
-from tests.unit.failures.staged import synthetic_contact
 
 
 def untimed(results: Results) -> Results:
     """Without what differs from one execution to the next."""
     return replace(results, wall_s=0.0, cpu_s=0.0, episode_cpu_s=())
-
-
-@pytest.mark.parametrize("grade", [*Grade, None])
-def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(grade, capsys):
-    judged = judgement(
-        grade,
-        conflict_type=ConflictType.CROSSING,
-        broke=("pedestrian_on_red", "wrong_direction"),
-        conflict_s=-11.25,
-        conflict_x_m=-1301.0,
-        conflict_y_m=-1202.5,
-        severity=Severity.MODERATE,
-        fault=Fault.SHARED,
-    )
-    episode = synthetic_contact(judged).episode
-    Console(width=80).print(_table(SPEC.id, [RecordedFailure.of(SPEC.id, episode)]))
-    printed = capsys.readouterr().out
-    assert "…" not in printed
-    for word in (grade or "failure", "crossing vehicle", "-11.2, -1301 -1202", "wrong", "moderate", "fault: shared"):
-        assert word in printed
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,8 @@ from rich.console import Console
 
 from risk_sac.cli.campaigns.gate import Bounds, verdict
 from risk_sac.cli.campaigns.junit import junit
-from risk_sac.cli.campaigns.output import results_table, results_tables
+from risk_sac.cli.campaigns.output import results_tables
 from risk_sac.client import Episode, Results, RunResult
-from risk_sac.config import METHODS
 from risk_sac.errors import ConfigError
 from tests.builders import run_metrics
 
@@ -215,45 +214,6 @@ def test_whatever_a_reason_holds_the_report_is_well_formed():
     (error,) = report({"state": "failed", "reason": reason}).iter("error")
     assert "\x1b" not in error.attrib["message"]
     assert error.attrib["message"].endswith("\U0001f697 <![CDATA[ ]]> &amp; \"'")
-
-
-WIDE_TOTAL = TOTAL | {
-    "family": "dense",
-    "runs": 100,
-    "episodes": 100_000,
-    "raw_collisions": 99_999,
-    "failures": 99_999,
-    "ecr": 0.999,
-    "ecr_low": 0.99,
-    "ecr_high": 1.0,
-    "distinct_failures": 9_999,
-    "preventable": 9_999,
-    "distinct_preventable": 9_999,
-    "headline": 9_999,
-    "pcr": 0.999,
-    "pcr_low": 0.99,
-    "pcr_high": 1.0,
-}
-
-
-def test_results_of_every_method_fit_80_columns(capsys):
-    place = "car_following_" + "a_street_of_a_town_" * 2 + "0a1b2c3d4e5f"
-    totals = [WIDE_TOTAL | {"method": method} for method in METHODS] + [WIDE_TOTAL | {"family": place, "method": "sac"}]
-    results = {
-        "campaign_id": "c1",
-        "state": "succeeded",
-        "complete": True,
-        "headline": 12,
-        "runs": [],
-        "totals": totals,
-    }
-    Console(width=80).print(results_table(Results.model_validate(results), Bounds(ecr=0.1)))
-    printed = capsys.readouterr().out
-    assert "…" not in printed
-    assert all(f"{method} " in printed for method in METHODS)
-    assert printed.splitlines()[0].strip() == "headline failures: 12"
-    assert printed.count("above") == printed.count("100 runs") == len(totals)
-    assert place in "".join(line.split()[0] for line in printed.splitlines() if line.strip())
 
 
 def test_each_requirement_is_a_row_below_its_family_and_method(capsys):

@@ -30,12 +30,6 @@ def test_lists_are_read_page_by_page_as_far_as_they_are_wanted(server, client):
     ]
 
 
-def test_an_id_stays_one_part_of_the_path(server, client):
-    server.answer(200, campaign())
-    client.campaign("../c1?x=y#z")
-    assert server.asked[0].path == "/v1/campaigns/..%2Fc1%3Fx%3Dy%23z"
-
-
 def test_the_key_is_sent_with_every_request_and_shown_nowhere(server):
     server.answer(200, campaign())
     with Client(server.url, "rs_secret") as client:

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +18,7 @@ import pytest
 
 from risk_sac import types
 from risk_sac.config import EgoConfig, RunSpec
-from risk_sac.egos import Control, Episode, Lane, Perceived, Road, StopLine, Trajectory, pilot
-from risk_sac.egos.guard import Guarded
+from risk_sac.egos import Control, Episode, Perceived, Trajectory, pilot
 from risk_sac.egos.remote.client import RemoteEgo
 from risk_sac.egos.remote.ego_pb2 import CloseReply, Command, Observation, StartReply
 from risk_sac.egos.remote.messages import METHODS, SERVICE, command_message
@@ -169,45 +167,6 @@ def test_an_answer_out_of_turn_or_none_is_not_driven(acts, reason, says):
     assert failed.value.reason == reason
 
 
-class Saying:
-    """Does the same in each step."""
-
-    def __init__(self, says: Callable[[], Any]) -> None:
-        self._says = says
-
-    def reset(self, episode: Episode) -> None:
-        pass
-
-    def act(self, perceived: Perceived) -> Any:
-        return self._says()
-
-    def close(self) -> None:
-        sys.exit("by me")
-
-
-@pytest.mark.parametrize(
-    ("says", "reason"),
-    [
-        (lambda: None, "ego_malformed"),
-        (lambda: Control(math.nan), "ego_malformed"),
-        (lambda: sys.exit(0), "ego_crash"),
-        (lambda: 1 / 0, "ego_crash"),
-    ],
-)
-def test_what_is_wrong_with_a_served_ego_has_the_reason_that_it_has_here(says, reason):
-    server, port = serve(Sessions(lambda: Saying(says), "1"), "127.0.0.1:0")
-    far = RemoteEgo("far", f"127.0.0.1:{port}", "1", PATIENT_S)
-    try:
-        for ego in (Guarded(lambda: far, PATIENT_S), Guarded(lambda: Saying(says), PATIENT_S, foreign=True)):
-            ego.reset(EPISODE)
-            with pytest.raises(EgoFailed) as failed:
-                ego.act(perceived(0.5))
-            assert failed.value.reason == reason
-            ego.close()
-    finally:
-        server.stop(0)
-
-
 class Counting:
     """Commands how often it was asked, and tells when it is closed."""
 
@@ -243,46 +202,6 @@ def test_thirty_sessions_are_served_at_a_time_and_end_with_their_streams():
             assert closed.acquire(timeout=PATIENT_S)
         for ego in egos[20:]:
             ego._stream.close()
-
-
-LINE = np.array([[0.0, 50.0, 90.0], [1.5, 1.5, -2.0]])
-ROAD = Road(
-    (
-        Lane("a_0", LINE, 3.5, 13.9, "a_1", "", True, False, (":j_0",), True),
-        Lane("a_1", LINE + 3.5, 3.5, 13.9, "", "a_0", False, True, (), False),
-    ),
-    (StopLine("a_0", ":j_0", "j", 4),),
-)
-
-
-def test_a_served_ego_is_told_the_road_and_its_signals():
-    told: list[Episode] = []
-    seen: list[Perceived] = []
-
-    class Listening:
-        def reset(self, episode):
-            told.append(episode)
-
-        def act(self, perceived):
-            seen.append(perceived)
-            return Control(0.0)
-
-        def close(self):
-            pass
-
-    server, port = serve(Sessions(Listening, "1"), "127.0.0.1:0")
-    ego = RemoteEgo("far", f"127.0.0.1:{port}", "1", PATIENT_S)
-    try:
-        ego.reset(replace(EPISODE, road=ROAD))
-        ego.act(perceived(0.0)._replace(signals=(Signal.YELLOW,)))
-    finally:
-        ego.close()
-        server.stop(0)
-    for lane, sent in zip(told[0].road.lanes, ROAD.lanes, strict=True):
-        np.testing.assert_array_equal(lane.line, sent.line)
-        assert lane._replace(line=None) == sent._replace(line=None)
-    assert told[0].road.stop_lines == ROAD.stop_lines
-    assert seen[0].signals == (Signal.YELLOW,)
 
 
 REMOTE = Path("risk_sac/egos/remote")

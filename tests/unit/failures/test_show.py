@@ -3,9 +3,6 @@ import pytest
 
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.show import caption, draw_recording
-from risk_sac.records import Grade, Outcome
-from risk_sac.run_folder.results import RecordedFailure
-from tests.builders import episode_record, violation
 from tests.unit.failures.staged import JUDGED, synthetic_contact, with_release
 
 
@@ -34,31 +31,6 @@ def test_what_happens_is_marked_in_every_panel_and_the_conflict_from_above(confl
 def lines(**judged: object) -> list[str]:
     contact = synthetic_contact(JUDGED.model_copy(update=judged))
     return caption("mixed", Recording(contact, with_release())).splitlines()
-
-
-@pytest.mark.parametrize("other_id", ["pedestrian", None])
-def test_a_violation_without_contact_is_marked_while_the_episode_goes_on(other_id):
-    near = {"other_id": other_id, "other_kind": "pedestrian", "other_role": "adversary"} if other_id else {}
-    drivers = {"r157": True, "full_braking": False}
-    broken = violation(requirement="safe_ttc", time_s=1.0, grade=Grade.PREVENTABLE, drivers=drivers, **near)
-    episode = episode_record(7, Outcome.FAILURE, scene=synthetic_contact().episode.scene, violations=(broken,))
-    recording = Recording(RecordedFailure.of("low-random-0", episode), with_release())
-    figure = draw_recording("mixed", recording)
-    view, *panels = figure.axes
-    bodies = [text.get_text() for text in view.get_legend().get_texts()]
-    assert ("pedestrian (adversary)" in bodies, "ego" in bodies) == (other_id is not None, True)
-    assert "touched here" not in bodies
-    (ego,) = (patch for patch in view.patches if patch.get_label() == "ego")
-    np.testing.assert_allclose(ego.get_path().vertices[:-1].mean(axis=0), (290.0, -1.65))  # as it was violated
-    assert [text.get_text() for text in panels[0].texts] == ["safe_ttc violated", "adversaries released"]
-    assert all(panel.lines for panel in panels)
-    assert panels[0].get_xlim()[1] == pytest.approx(recording.time_s[-1]) == pytest.approx(1.0)
-    bold = [line.get_label() for line in panels[-1].lines if line.get_linewidth() > 2]
-    assert bold == ["safe_ttc"]
-    title = figure.get_suptitle()
-    assert "the ego, at 9.0 m/s, violated safe_ttc" in title
-    assert ("'pedestrian' first" in title) == (other_id is not None)
-    assert "grade preventable: R157's driver would have prevented it" in title
 
 
 def test_no_label_covers_another_nor_a_body():

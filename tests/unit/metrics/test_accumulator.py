@@ -12,7 +12,7 @@ from risk_sac.metrics.rows import (
     outcome_dispersion,
     preventable_collision_rate,
 )
-from risk_sac.records import Fault, Funnel, Grade, Outcome, RequirementResult, RunMetrics, Severity
+from risk_sac.records import Fault, Funnel, Grade, Outcome, RunMetrics, Severity
 from risk_sac.verdicts.distinct import distinct_failures, kind_of
 from tests.builders import AVOIDS, TOUCHES, judgement, violation
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
@@ -64,37 +64,6 @@ def test_contacts_are_counted_by_reference_driver_and_severity_and_failures_by_f
     assert metrics.by_fault == {"ego": 3, "shared": 1}
     old = metrics.model_dump(exclude={"prevented_by", "by_severity", "by_fault"})
     assert RunMetrics.model_validate(old).prevented_by == {}
-
-
-def test_each_requirement_has_a_funnel_and_records_from_before_have_none():
-    def results(**violated_s):
-        kept = {"counts": "failure", "robustness": 0.0}
-        return {name: RequirementResult(**kept, violated_s=time_s) for name, time_s in violated_s.items()}
-
-    struck = contact(judgement=judgement())
-    slow = violation(grade=Grade.PREVENTABLE)
-    refused = violation(verdicts={"no_teleport": False})
-    metrics = feed(
-        [
-            episode(Outcome.FAILURE, hit=struck, requirements=results(no_contact=3.0, never_fast=None)),
-            *[both(struck, slow, results(no_contact=3.0, never_fast=1.5))] * 2,
-            episode(Outcome.DEGENERATE, requirements=results(no_contact=None, never_fast=1.5)).model_copy(
-                update={"collision": None, "violations": (refused,)}
-            ),
-        ]
-    )
-    funnels = {
-        name: (each.violated, each.valid, each.distinct, each.preventable, each.rate)
-        for name, each in metrics.requirements.items()
-    }
-    assert funnels == {"no_contact": (3, 3, 1, 1, 0.75), "never_fast": (3, 2, 1, 1, 0.5)}
-    assert (metrics.failures, metrics.collisions, metrics.distinct_failures) == (3, 3, 2)
-    assert feed(JUDGED).requirements == {}
-
-
-def both(struck, without, results):
-    """A failure by a contact and by a violation without one."""
-    return episode(Outcome.FAILURE, hit=struck, violations=(without,), requirements=results)
 
 
 def test_histogram_literals():

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from risk_sac.metrics import (
     METRICS,
-    RATIOS,
     RESAMPLING_SEED,
     Estimate,
     Tally,
@@ -32,7 +31,7 @@ from risk_sac.metrics.rows import (
     preventable_collision_rate,
     steps_per_distinct_failure,
 )
-from risk_sac.records import Counts, DriverPcr
+from risk_sac.records import DriverPcr
 from tests.unit.metrics.episodes import JUDGED, RUN, contact, episode, feed
 
 FORMULAS = {metric.name: metric.formula for metric in METRICS}
@@ -61,27 +60,6 @@ def test_formula_literals():
     assert cost_rate(tally) == 0.25
     assert outcome_dispersion(tally) == 0.5  # 6 over six pairs, over √4
     assert (FORMULAS["distinct_per_1000_steps"](tally), steps_per_distinct_failure(tally)) == (5, 200)
-
-
-def test_ratio_literals():
-    counts = Counts(
-        episodes=20,
-        rejected=1,
-        raw_collisions=9,
-        failures=5,
-        distinct_failures=2,
-        artefacts=3,
-        unresponsive=2,
-        environment_steps=700,
-    )
-    assert {ratio.name: ratio.formula(counts) for ratio in RATIOS} == {
-        "steps_per_distinct_failure": 350,
-        "raw_rate": 0.45,
-        "artefact_rate": 0.15,
-        "degenerate_rate": 0.2,
-        "rejected_rate": 0.05,
-        "unresponsive_share": 0.4,
-    }
 
 
 def test_outcome_features_are_scaled_and_clipped():

@@ -8,7 +8,6 @@ from risk_sac.risk.own_motion import OwnMotion
 from risk_sac.risk.publish import (
     CROSSED_ON_RED_M,
     ENCOUNTER,
-    GAP_CAP_M,
     RED_LIGHT_BRAKING_CAP_MPS2,
     RSS_SCALED,
     TTC,
@@ -87,20 +86,6 @@ def test_gaps_count_in_every_direction_and_by_kind():
 
 def at_light(signal: Signal, stop_line_m: float) -> Frame:
     return frame_of()._replace(signal=signal, stop_line_m=stop_line_m)
-
-
-@pytest.mark.parametrize(
-    ("signal", "stop_line_m", "margin_m"),
-    [
-        (Signal.RED, 12.0, 12.0),
-        (Signal.RED, 400.0, GAP_CAP_M),
-        (Signal.GREEN, 12.0, GAP_CAP_M),
-        (Signal.YELLOW, 12.0, GAP_CAP_M),
-        (Signal.NONE, math.inf, GAP_CAP_M),
-    ],
-)
-def test_only_a_red_light_has_a_margin(signal, stop_line_m, margin_m):
-    assert red_light_margin(at_light(signal, stop_line_m), None) == margin_m
 
 
 @pytest.mark.parametrize(

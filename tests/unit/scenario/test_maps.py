@@ -129,23 +129,6 @@ def road(id_: str, a: str, b: str, metres: float, line: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("content", "says"),
-    [
-        ("<html/>", "map, whose root is <html>"),
-        ("nothing", "map is no well-formed XML"),
-        ("<osm/>", "map without roads"),
-        ('<osm><way id="2"><nd ref="1"/><tag k="highway" v="primary"/></way></osm>', "netconvert cannot convert map"),
-        ('<osm><relation id="1"><tag k="type" v="lanelet"/></relation></osm>', "map, a Lanelet2 map; .* as OpenDRIVE"),
-    ],
-)
-def test_what_is_no_map_is_not_converted(tmp_path, content, says):
-    file = tmp_path / "map"
-    file.write_text(content)
-    with pytest.raises(MapError, match=says):
-        present_net(file, tmp_path)
-
-
-@pytest.mark.parametrize(
     ("script", "says"),
     [
         (

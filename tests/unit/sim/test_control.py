@@ -150,30 +150,6 @@ def test_who_starts_too_fast_inside_a_bend_slows_down_until_it_may_drive_as_it_w
             assert after < before
 
 
-def test_a_vehicle_that_is_on_the_next_lane_still_turns_in_the_bend_behind():
-    bend, beyond = road(10.0), road()
-    control = VehicleControl(replace(LIMITS, grip_mps2=5.6), 7.0)
-    control.step(0.0, 0.0, WIDE, Along(bend, 70.0, 0.0))
-    for _ in range(2):
-        control.step(-1.0, 0.0, WIDE, Along(beyond, 0.5, 0.0))
-    assert control.accel_mps2 > -2.0  # nearly all of its grip is used up
-    for _ in range(4):
-        control.step(-1.0, 0.0, WIDE, Along(beyond, 6.0, 0.0))
-    assert control.accel_mps2 < -5.0
-
-
-def test_a_full_action_reaches_the_limits_it_is_a_share_of():
-    control = VehicleControl(LIMITS, 10.0)
-    for _ in range(8):
-        command = control.step(-1.0, 1.0, WIDE, STRAIGHT)
-    assert control.accel_mps2 == pytest.approx(-8.0)  # 2 m/s² more per step at 20 m/s³
-    assert command.lateral_mps == pytest.approx(LIMITS.slip * command.speed_mps)  # of 1.2 allowed, 0.9 at this speed
-    control = VehicleControl(LIMITS, 12.0)
-    lateral = [control.step(1.0, 1.0, WIDE, STRAIGHT).lateral_mps for _ in range(9)]
-    assert control.accel_mps2 == pytest.approx(3.5)
-    assert lateral == pytest.approx([0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.05, 1.2, 1.2])
-
-
 def test_braking_to_a_halt_by_hand():
     control = VehicleControl(LIMITS, 10.0)
     speeds = [control.step(-1.0, 0.0, WIDE, STRAIGHT).speed_mps for _ in range(30)]

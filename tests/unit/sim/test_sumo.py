@@ -16,7 +16,6 @@ from risk_sac.scenario.layout import Layout, PedestrianStart
 from risk_sac.sim.commands import VehicleCommand
 from risk_sac.sim.sumo import NETS, SumoSimulation
 from risk_sac.types import Frame, Role
-from tests.builders import Told, belief_of
 
 LEAD_IN_STEPS = 15
 
@@ -84,22 +83,6 @@ def pedestrian(id_: str, heading: float, speed_mps: float) -> PedestrianStart:
     return PedestrianStart(id=id_, role=Role.ADVERSARY, x_m=500.0, y_m=-9.0, heading_rad=heading, speed_mps=speed_mps)
 
 
-def test_room_is_what_is_left_of_the_road_on_both_sides(sim):
-    frame = sim.reset(middle(FAMILIES["low"]), 0)
-    width = 3.3
-    for id_, lanes_right in (("right", 0), ("lead", 1), ("left", 2)):
-        row = frame.ids.index(id_)
-        offset = float(frame.lane_offset_m[row])
-        place = sim.place(id_)
-        assert place is not None
-        room, along = place
-        spare = (width - float(frame.width_m[row])) / 2 - 0.01
-        assert room.right_m == pytest.approx(lanes_right * width + spare + offset)
-        assert room.left_m == pytest.approx((2 - lanes_right) * width + spare - offset)
-        assert along.station_m == pytest.approx(float(frame.x_m[row]) + 2.3)
-        assert along == sim.along(id_)
-
-
 @pytest.mark.parametrize("family", ["mixed", "dense"])
 def test_a_released_driver_intends_to_stop_for_a_pedestrian_in_its_way(sim, family):
     adversary = FAMILIES[family].vehicles[0]
@@ -125,27 +108,3 @@ def test_a_released_driver_intends_to_stop_for_a_pedestrian_in_its_way(sim, fami
     assert intended(12.0) < -4.0
     assert intended(39.0) > -0.5
     assert intended(-12.0) > -0.5
-
-
-def test_each_frame_is_perceived_once_and_before_the_next_step(sim, monkeypatch):
-    """SUMO's models ignore actors unknown to the ego from the same frame on."""
-    perceived: list[Frame] = []
-    ignored: list[list[set[str]]] = []
-    tell_sumo = libsumo.vehicle.setParameter
-
-    def tell_ego(frame, _):
-        perceived.append(frame)
-        ignored.append([])
-        return belief_of(frame, hidden=() if len(perceived) == 2 else ("lead", "left"))
-
-    def noted(vehicle, name, value):
-        assert vehicle == "ego"
-        ignored[-1].append(set(value.split()))
-        tell_sumo(vehicle, name, value)
-
-    monkeypatch.setattr(sim, "_senses", Told(tell_ego))
-    monkeypatch.setattr(libsumo.vehicle, "setParameter", noted)
-    frames = [sim.reset(middle(FAMILIES["low"]), 0), *(sim.step() for _ in range(3))]
-    assert all(one is other for one, other in zip(perceived, frames, strict=True))
-    hidden: set[str] = {"lead", "left"}
-    assert ignored == [[hidden] * 2, [set()] * 2, [hidden] * 2, []]  # both models, where anything has changed

@@ -90,17 +90,6 @@ def test_critical(gap, cfs):
     assert critical(gap, 20.0, 0.0, 10.0) == pytest.approx(cfs, abs=1e-3)
 
 
-# Braking with 3 it is 17.75 after τ: d_new = (18.875 - 10) 0.75 = 6.656; 7.75² = 60.0625: safe 14.164, unsafe 11.661.
-@pytest.mark.parametrize(("gap", "cfs"), [(14.2, 0.0), (12.913, 0.5), (11.6, 1.0)])
-def test_critical_of_who_brakes_already(gap, cfs):
-    assert critical(gap, 20.0, -3.0, 10.0) == pytest.approx(cfs, abs=1e-3)
-
-
-@pytest.mark.parametrize(("gap", "cfs"), [(0.51, 0.0), (0.49, 1.0)])
-def test_critical_of_who_is_slower_within_the_reaction(gap, cfs):
-    assert critical(gap, 12.0, -9.0, 10.0) == cfs  # a' = -4: 4 / 8 = 0.5 m
-
-
 def test_braking_is_comfortable_until_the_gap_is_critical():
     assert braking(51.524, 20.0, 0.0, 10.0) == pytest.approx(2.0, abs=1e-3)
     assert braking(17.917, 20.0, 0.0, 10.0) == pytest.approx(5.0, abs=1e-3)

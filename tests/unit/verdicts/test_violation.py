@@ -11,12 +11,12 @@ from risk_sac.records import Fault, Grade, Violation
 from risk_sac.risk.measures import Gauge
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.scenario.carriageway import Carriageway
-from risk_sac.types import Kind, Role, Signal
+from risk_sac.types import Kind, Signal
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
 from risk_sac.verdicts.keeping import History
 from risk_sac.verdicts.violation import requirement_results, violations_of
 from tests.builders import frame_of
-from tests.unit.verdicts.staged import CAR_M, LANE_M, WALKING, Motion, mirrored, sideways, stage, straight
+from tests.unit.verdicts.staged import CAR_M, WALKING, Motion, mirrored, sideways, stage, straight
 
 
 def own(formula: str, name: str = "own") -> Requirement:
@@ -139,24 +139,6 @@ def test_a_reference_driver_stops_at_red_where_it_can(yellow_m, red_m, grade):
     assert found.signature == "red light entered; ego goes straight, nobody near"
     assert found.broke == ("red_light",)
     assert found.fault is (Fault.EGO if grade is Grade.PREVENTABLE else Fault.OTHER)
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "heading", "name"),
-    [
-        (20.0, 0.0, 0.0, "vehicle ahead"),
-        (2.0, LANE_M, 0.0, "vehicle beside it"),
-        (30.0, LANE_M, np.pi, "oncoming vehicle"),
-        (24.0, -20.0, np.pi / 2, "vehicle from the right"),
-    ],
-)
-def test_the_actor_is_named_by_where_it_is_and_drives(x, y, heading, name):
-    other = straight(x, y, heading, 10.0, start_s=0.0)
-    evidence = staged(straight(0.0, 0.0, 0.0, 12.0, start_s=0.0), other)
-    evidence = replace(evidence, role=np.array([Role.EGO, Role.BACKGROUND], dtype=np.int8))
-    found = violated(evidence, own("ego_speed_mps <= 5"))
-    assert found.signature == f"own violated; ego goes straight, {name}"
-    assert found.other_role == "background"
 
 
 @pytest.mark.parametrize(("broken_s", "valid"), [(-0.5, False), (3.0, True)])

@@ -36,15 +36,3 @@ def test_each_wrong_setting_is_one_line_and_the_exit_status_is_2(program, tmp_pa
         "RISK_SAC_CORS_ORIGINS: got '*'; wanted JSON list",
     ]
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_missing_folder_of_secrets_or_a_file_in_its_place_ends_the_start_in_one_line(tmp_path):
-    ended = start("service", tmp_path, secrets_dir="/run/no-such-secrets")
-    assert (ended.returncode, ended.stdout) == (2, "")
-    wanted = "which is missing; wanted a folder that has settings as files"
-    assert ended.stderr == f"RISK_SAC_SECRETS_DIR: got '/run/no-such-secrets', {wanted}\n"
-    assert list(tmp_path.iterdir()) == []
-    (tmp_path / "secrets").write_text("")
-    ended = start("keys", tmp_path / "data", secrets_dir=str(tmp_path / "secrets"))
-    assert (ended.returncode, ended.stderr.count("\n")) == (2, 1)
-    assert "which is no folder" in ended.stderr

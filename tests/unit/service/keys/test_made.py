@@ -11,7 +11,7 @@ from service.keys.made import AuthEnabledFlag, ever_made
 from service.keys.ring import KeyRing
 from service.settings import ServiceSettings
 from service.store.reading import Store
-from service.store.server import keys_were_made, noting_keys
+from service.store.server import keys_were_made
 
 CREATE = ["create", "--project", "maps"]
 
@@ -83,34 +83,6 @@ def test_a_server_notes_keys_that_it_sees_and_heeds_what_is_noted(file, store, c
     assert ring.find(token) is None
     assert not ring.open
     assert caplog.text.count("missing, although") == 1, "said once"
-
-
-def test_a_server_notes_keys_that_are_made_while_nobody_asks(file, store):
-    made = AuthEnabledFlag()
-    made.settle(store.engine, file)
-    assert not made.known
-    ring = KeyRing(file.path, made)
-    assert ring.open
-    with noting_keys(store.engine):
-        pass
-    made.settle(store.engine, file)
-    with pytest.raises(KeysError, match="missing"):
-        _ = ring.open
-
-
-def test_open_is_what_an_administrator_has_said(file):
-    ring = KeyRing(file.path, AuthEnabledFlag())
-    _, token = file.create("maps", "", Scope.RUN)
-    file.open_all()
-    assert ring.open
-    assert ring.find(token) is None
-    content = file.path.read_bytes()
-    file.path.write_bytes(content.replace(b"true", b"false"))
-    with pytest.raises(KeysError, match="damaged"):
-        _ = ring.open
-    file.path.write_bytes(content)
-    file.create("maps", "", Scope.RUN)
-    assert not ring.open
 
 
 def test_a_file_that_is_replaced_is_never_missing_nor_open(file):

@@ -4,10 +4,6 @@ from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import Finished
 from risk_sac.records import Episode, Outcome, State, TriageState
 from service.errors import NotFoundError, TransitionError
-from service.store.finding import Judged
-from service.views.curves import curves
-from service.views.progress import progress
-from service.views.totals import results
 from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
@@ -92,47 +88,6 @@ def test_failures_that_did_not_repeat_are_refused_with_the_end_of_their_run(stor
     ]
 
 
-def test_what_an_i_i_d_phase_counts_is_added_to_nothing_that_searches_found(store, ledger, episode, metrics):
-    spec = CampaignSpec(families=("low",), methods=("random",), budget={"episodes": 3}, iid={"episodes": 3})
-    campaign = ledger.create(spec)
-    assert [campaign.run_spec(run) for run in campaign.runs] == list(spec.runs())
-    for phase in ("search", "iid", "iid"):
-        number = start(store, ledger)
-        outcomes = (Outcome.SAFE, Outcome.FAILURE, Outcome.REJECTED)
-        ledger.add_episodes([(number, episode(index, outcome, phase)) for index, outcome in enumerate(outcomes)])
-        end = {"metrics": metrics, "evaluation": None, "digest": phase, "versions": {}, "wall_s": 1.0}
-        ledger.end_run(number, State.SUCCEEDED, result=Finished(finished=True, **end))
-    found = store.campaign(campaign.id)
-    assert found.state is State.SUCCEEDED
-    assert found.methods == ["random"]
-    assert [run.failures for run in found.runs] == [1, 1, 1]  # each by itself
-    counted = progress(found, 1)
-    assert (counted.episodes_done, counted.episodes_total) == (9, 9)
-    assert (counted.failures, counted.raw_collisions, counted.rejected) == (1, 1, 1)
-    assert [(total.method, total.runs) for total in results(found).totals] == [("random", 1)]
-
-    def ids(**asked):
-        return [each.id for each in store.episodes(found.id, limit=9, outcomes=(Outcome.FAILURE,), **asked).items]
-
-    assert ids(judged=Judged(iid=False)) == ["low-random-0-search-1"]
-    assert ids(run_id="low-iid-random-0", judged=Judged()) == ["low-iid-random-0-iid-1"]
-    assert store.failure(found.id, "low-iid-random-0-iid-1").episode.phase == "iid"
-    assert {each.phase for each in store.plain_episodes(found.number)} == {"search"}
-    assert [curve.run_id for curve in curves(found, store.plain_episodes(found.number), 9).runs] == ["low-random-0"]
-
-
-def test_cancel_stops_what_runs_and_drops_what_waits(store, ledger):
-    campaign = ledger.create(SPEC)
-    number = start(store, ledger)
-    assert ledger.cancel(campaign.id) == [number]
-    assert ledger.cancel(campaign.id) == [number]
-    states = [run.state for run in store.campaign(campaign.id).runs]
-    assert states == [State.CANCELLING] + [State.CANCELLED] * 3
-    ledger.end_run(number, State.CANCELLED)
-    assert store.campaign(campaign.id).state is State.CANCELLED
-    assert ledger.cancel(campaign.id) == []
-
-
 def test_a_state_outside_the_table_is_refused_and_changes_nothing(store, ledger):
     campaign = ledger.create(SPEC)
     with pytest.raises(TransitionError, match="state is queued; got succeeded"):
@@ -150,21 +105,6 @@ def test_what_has_no_worker_any_more_waits_again_or_ends_cancelled(store, ledger
     assert store.campaign(kept.id).state is State.QUEUED
     assert store.campaign(dropped.id).state is State.CANCELLED
     assert ledger.resume() == 0
-
-
-def test_every_stored_change_has_another_revision(store, ledger, episode, metrics):
-    campaign = ledger.create(SPEC)
-    seen = [store.revision(campaign.id)]
-    number = start(store, ledger)
-    seen.append(store.revision(campaign.id))
-    ledger.add_episodes([(number, episode(0))])
-    seen.append(store.revision(campaign.id))
-    ledger.requeue_run(number, "worker was killed by SIGKILL")
-    seen.append(store.revision(campaign.id))
-    ledger.cancel(campaign.id)
-    seen.append(store.revision(campaign.id))
-    assert len(set(seen)) == len(seen)
-    assert store.campaign(campaign.id).revision == seen[-1]
 
 
 def test_a_deleted_campaign_leaves_no_row(store, ledger, episode):

@@ -11,8 +11,8 @@ from pydantic_core import from_json
 from scipy.stats import mannwhitneyu
 
 from risk_sac.config import CampaignSpec
-from risk_sac.metrics import MetricsAccumulator, wilson_interval
-from risk_sac.records import Grade, Outcome, Repetition, RequirementCounts, Severity, State, stored, wire
+from risk_sac.metrics import MetricsAccumulator
+from risk_sac.records import Grade, Outcome, Repetition, Severity, State, stored, wire
 from risk_sac.verdicts.distinct import DistinctFailures
 from service.store.stored import PlainEpisode
 from service.views.curves import curves, spread
@@ -26,36 +26,6 @@ from tests.builders import LOW_SCENE, collision, episode_record, judgement, viol
 
 def changed(record, **fields):
     return record.model_copy(update=fields)
-
-
-def test_totals_have_the_funnel_and_its_histograms(ledger, metrics):
-    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0, 1)))
-    found = {
-        "raw_collisions": 5,
-        "collisions": 2,
-        "failures": 3,
-        "distinct_failures": 2,
-        "preventable": 2,
-        "distinct_preventable": 1,
-        "pcr": 0.5,
-        "unresponsive": 1,
-        "requirements": {"never_fast": RequirementCounts(counts="failure", violated=2, valid=1)},
-        "signatures": {"pedestrian": 2, "cut-in, straight": 1},
-        "conflicts_by_second": (1, 1, 1, 0),
-        "contacts_by_second": (0, 0, 1, 2),
-    }
-    second = metrics.model_copy(update=found)
-    first = metrics.model_copy(update={"requirements": second.requirements})
-    runs = tuple(changed(run, metrics=(first, second)[run.seed]) for run in campaign.runs)
-    (total,) = results(changed(campaign, runs=runs)).totals
-    assert (total.raw_collisions, total.failures, total.distinct_failures) == (7, 4, 3)
-    assert (total.preventable, total.distinct_preventable, total.artefacts) == (3, 2, 2)
-    assert (total.pcr, total.pcr_low, total.pcr_high) == (0.375, *wilson_interval(3, 8))
-    assert (total.collisions, total.unresponsive, total.unresponsive_share) == (3, 1, 1 / 3)
-    pooled = total.requirements["never_fast"]
-    assert (pooled.violated, pooled.valid, pooled.rate) == (4, 2, 2 / 8)
-    assert total.signatures == {"cut-in, straight": 2, "pedestrian": 2}
-    assert (total.conflicts_by_second, total.contacts_by_second) == ([1, 1, 2, 0], [0, 0, 1, 3])
 
 
 def test_what_two_methods_found_alike_counts_once_in_the_campaign_and_once_for_each(ledger, metrics):
@@ -252,25 +222,6 @@ def test_each_two_parameters_have_their_cells_once(found):
         for axis, name in enumerate(pair.parameters):
             sums = [sum(row) for row in (counts if axis == 0 else zip(*counts, strict=True))]
             assert sums == getattr(by_name(family)[name], of)
-
-
-def test_progress_counts_all_runs_and_shows_those_at_work(ledger, metrics):
-    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random")))
-    ended = changed(RUN, state=State.SUCCEEDED, episodes_done=100, failures=5, raw_collisions=9, metrics=metrics)
-    ended = changed(ended, distinct_failures=4, preventable=3, distinct_preventable=2)
-    present = metrics.model_copy(update={"dual_variable": 0.9, "window_ecr": 0.1, "window_pcr": 0.05})
-    at_work = changed(RUN, episodes_done=50, failures=1, distinct_failures=1, metrics=present)
-    shown = progress(changed(campaign, state=State.RUNNING, runs=(ended, at_work)), workers=1)
-    assert (shown.episodes_done, shown.episodes_total) == (150, 200)
-    assert (shown.failures, shown.raw_collisions) == (6, 9)
-    assert (shown.distinct_failures, shown.preventable, shown.distinct_preventable) == (5, 3, 2)
-    assert (shown.dual_variable, shown.window_ecr, shown.window_pcr) == (0.9, 0.1, 0.05)
-    replayed = changed(ended, metrics=metrics.model_copy(update={"headline": 1}), headline_candidates=2)
-    waiting = changed(at_work, headline_candidates=4)
-    partly = progress(changed(campaign, state=State.RUNNING, runs=(replayed, waiting)), workers=1)
-    assert (partly.headline_candidates, partly.headline_waiting) == (6, 4)
-    final = progress(changed(campaign, state=State.SUCCEEDED, runs=(ended, ended)), workers=1)
-    assert (final.dual_variable, final.eta_s) == (0.3, 0.0)
 
 
 def test_rates_are_those_of_the_methods_that_learn_where_there_are_any(ledger, metrics):
