@@ -50,33 +50,24 @@ def test_flags_pick_one_run_of_a_campaign(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "field", "message"),
+    ("text", "field"),
     [
-        ("method: sac\nseed: 0", "family", "got nothing; wanted a value"),
-        ("family: high\nmethod: sac\nseed: 0", "family", "got \"high\"; wanted 'low', 'mixed'"),
-        ("family: low\nmethod: sac\nseed: '3'", "seed", 'got "3"; wanted an integer'),
-        ("family: low\nmethod: sac\nseed: 0\nbudget: {episodes: .nan}", "budget.episodes", "NaN"),
-        ("family: low\nmethod: sac\nseed: 0\nbudgets: {}", "budgets", "wanted one of budget, ego"),
-        ("family: low\nmethod: sac\nseed: 0\nbudget: 3", "budget", "got 3"),
-        (
-            "family: low\nmethod: sac\nseed: 0\nrequirements: [{name: a, formula: x, scale: -1}]",
-            "requirements[0].scale",
-            "got -1; wanted >= 0.001",
-        ),
-        ("families: [low, low]", "families", "wanted each value once"),
-        ("[1, 2]", "spec", "holds a list"),
-        ("family: [", "spec", "spec.yaml, which is no YAML from line 1, column 10 on: expected"),
-        ("family: low\nmethod: a: b", "spec", "spec.yaml, which is no YAML from line 2, column 10 on: mapping"),
-        ("family: low\nbuget: {episodes: 5}", "buget", "did you mean budget?"),
-        ("famly: low\nseed: 0", "famly", "did you mean family?"),
-        ("family: 2020-01-01\nmethod: sac\nseed: 0", "family", "2020"),
+        ("method: sac\nseed: 0", "family"),
+        ("family: high\nmethod: sac\nseed: 0", "family"),
+        ("family: low\nmethod: sac\nseed: '3'", "seed"),
+        ("family: low\nmethod: sac\nseed: 0\nbudget: {episodes: .nan}", "budget.episodes"),
+        ("family: low\nrequirements: [{name: a, formula: x, scale: -1}]", "requirements[0].scale"),
+        ("families: [low, low]", "families"),
+        ("[1, 2]", "spec"),
+        ("family: [", "spec"),
+        ("family: low\nbuget: {episodes: 5}", "buget"),
+        ("family: 2020-01-01\nmethod: sac\nseed: 0", "family"),
     ],
 )
-def test_wrong_file_names_the_field(tmp_path, text, field, message):
+def test_wrong_file_names_the_field(tmp_path, text, field):
     with pytest.raises(ConfigError) as raised:
         read_spec(yaml_file(tmp_path, text), FLAGS)
     assert raised.value.field == field
-    assert message in str(raised.value)
 
 
 CAMPAIGN_FLAGS: dict[str, Any] = dict.fromkeys(("families", "methods", "seeds", "episodes", "evaluation_episodes"))
