@@ -87,18 +87,6 @@ def test_the_same_seed_gives_the_same_episode_to_the_last_bit(family):
 
 
 @each_family
-def test_one_scene_under_two_seeds_starts_alike_and_then_differs(family):
-    starts, episodes = [], []
-    with closing(make_default(family)) as env:
-        for seed in (1, 2):
-            episodes.append(episode(env, seed, scene=middle(family)))
-            starts.append(env.trace.frames[0])
-    for name in ("x_m", "y_m", "heading_rad", "speed_mps"):
-        assert np.array_equal(getattr(starts[0], name), getattr(starts[1], name)), name
-    assert not same(*episodes)
-
-
-@each_family
 def test_every_number_is_finite_and_an_episode_ends_at_the_horizon_or_at_a_contact(family):
     with closing(make_default(family)) as env:
         for seed in range(5):

@@ -53,19 +53,6 @@ def test_an_episode_goes_on_to_the_horizon_where_more_than_a_contact_can_make_it
     assert problem("dense", requirements=(mine,)).contact_alone_counts
 
 
-@pytest.mark.parametrize(
-    ("requirement", "field"),
-    [
-        (Requirement(name="no_contact", counts="report"), "requirements[0].counts"),
-        (Requirement(name="wide_berth"), "requirements[0].formula"),
-    ],
-)
-def test_a_contact_counts_and_an_own_requirement_needs_a_formula(requirement, field):
-    with pytest.raises(ConfigError) as refused:
-        problem(requirements=(requirement,))
-    assert refused.value.field == field
-
-
 def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs():
     spec = CampaignSpec(
         families=("low", "mixed"), requirements=(Requirement(name="soon", formula="eventually(ttc_s > 1)", scale=1),)

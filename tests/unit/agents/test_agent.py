@@ -87,17 +87,6 @@ def test_agent_neither_reads_nor_moves_the_global_generator(make):
     assert figures[0].critic_loss == figures[1].critic_loss
 
 
-@both
-def test_td_errors_are_those_of_an_update_at_equal_noise(make):
-    agent = make()
-    state = agent.state()
-    batch = random_batch(np.random.default_rng(0))
-    measured = agent.td_errors(batch, batch.risk_reward)
-    assert measured.shape == (ROWS,)
-    agent.load(state)
-    assert agent.update(batch, batch.risk_reward).td_errors == pytest.approx(measured, rel=1e-6)
-
-
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @both
 def test_learns_what_is_rewarded(make, sign):

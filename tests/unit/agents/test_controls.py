@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from risk_sac.agents.controls import RandomAgent, ScriptedAgent
 from risk_sac.agents.decisions import Decision, Held
-from risk_sac.agents.follower import BEHIND_STEPS, ScriptFollower
+from risk_sac.agents.follower import ScriptFollower
 from risk_sac.observation_layout import PER_ADVERSARY, X_M, Y_M
 from risk_sac.risk.reward import shaped_reward
 from risk_sac.scenario.families import FAMILIES
@@ -20,14 +20,6 @@ ADVERSARIES = 3
 def played(agent: RandomAgent, steps: int) -> np.ndarray:
     """`steps x adversaries x 2`."""
     return np.array([agent.act(NOTHING) for _ in range(steps)]).reshape(steps, ADVERSARIES, 2)
-
-
-def test_actions_are_uniform_and_in_the_space():
-    actions = played(RandomAgent(2 * ADVERSARIES, seed=0), 20_000)
-    assert actions.dtype == np.float32
-    assert np.abs(actions).max() <= 1.0
-    shares, _ = np.histogram(actions, bins=4, range=(-1, 1))
-    np.testing.assert_allclose(shares / actions.size, 0.25, atol=0.02)
 
 
 def test_a_restored_agent_goes_on_as_the_one_that_was_saved():
@@ -133,16 +125,6 @@ def test_it_strikes_at_its_cue_and_begins_anew_with_every_episode():
     assert drives == pytest.approx([0.0] * 5 + [-1.0] * 5, abs=1e-6)  # 6 m ahead is where it wants to be
     subject.begin(np.tile(MIDDLE, 3))
     assert subject.act(ahead)[0] == pytest.approx(0.0, abs=1e-6)
-
-
-def test_an_episode_can_stop_once_all_that_act_have_fallen_behind():
-    subject = follower(0.9, 0.0, 0.0)
-    for _ in range(BEHIND_STEPS):
-        assert not subject.can_stop_early
-        subject.act(observed((-7, 3.3), (12, 3.3), (14, -3.3)))
-    assert subject.can_stop_early
-    subject.begin(np.tile(MIDDLE, 3))
-    assert not subject.can_stop_early
 
 
 def test_an_episode_can_stop_a_while_after_the_last_strike():

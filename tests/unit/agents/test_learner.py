@@ -116,15 +116,6 @@ def test_updates_keep_pace_with_own_steps_and_with_those_that_came_before_them(r
         assert len(updates) == expected
 
 
-def test_what_a_guide_does_costs_the_policy_nothing(transition):
-    subject = learner("sac-lag")
-    for _ in range(CONFIG.agent.warmup_steps + 5):
-        subject.observe(transition(cost=0.6), own=False)
-    assert subject.dual_variable == 0.0
-    subject.observe(transition(cost=0.6))
-    assert subject.dual_variable > 0.0
-
-
 def test_the_policy_decides_every_few_steps_and_its_memory_holds_decisions(random_transition):
     agent = CONFIG.agent.model_copy(update={"decision_steps": 4})
     subject = learner(config=CONFIG.model_copy(update={"agent": agent}))

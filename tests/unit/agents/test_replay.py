@@ -35,25 +35,6 @@ def filled(kind: type[Replay], count: int, make: Make, seed: int = 0) -> Replay:
 
 
 @KINDS
-def test_a_batch_holds_what_was_stored(kind, transition):
-    replay = kind(3, 2, CONFIG)
-    stored = transition(0.5, cost=0.2, robustness=-1.5, next_robustness=2.5, terminated=True, accumulated_reward=9.0)
-    store(replay, stored, 0.1)
-    batch = replay.sample(4, np.random.default_rng(0))
-    assert batch.observation.tolist() == [[0.5, 0.5, 0.5]] * 4
-    assert batch.next_observation.tolist() == [[1.5, 1.5, 1.5]] * 4
-    assert batch.action.numpy() == pytest.approx(np.full((4, 2), np.tanh(0.5)))
-    assert batch.risk_reward.tolist() == [0.5] * 4
-    assert batch.cost.numpy() == pytest.approx(np.full(4, 0.2))
-    assert batch.robustness.tolist() == [-1.5] * 4
-    assert batch.next_robustness.tolist() == [2.5] * 4
-    assert batch.terminated.tolist() == [1.0] * 4
-    assert batch.weight.tolist() == [1.0] * 4
-    assert batch.indices.tolist() == [0] * 4
-    assert {tensor.dtype for tensor in (batch.observation, batch.terminated, batch.weight)} == {torch.float32}
-
-
-@KINDS
 def test_the_oldest_transition_gives_way_once_full(kind, transition):
     replay = kind(3, 2, CONFIG)
     for value in range(CONFIG.capacity + 10):

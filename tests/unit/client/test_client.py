@@ -117,12 +117,6 @@ def test_a_campaign_that_takes_too_long_is_overdue(server, client):
     assert time.monotonic() - before < 5
 
 
-def test_a_campaign_deleted_meanwhile_is_an_error(server, client):
-    script(server, [now("running"), Answer(404, {"detail": "no campaign", "reason": "unknown_id"})])
-    with pytest.raises(Refused, match="no campaign"):
-        client.wait("c1")
-
-
 def test_events_come_as_they_were_sent_and_go_on_after_a_break(server, client):
     script(server, [now("succeeded")], Answer(200, [RUNNING, ": ping\n\n", EPISODE, None]), Answer(200, [ENDED]))
     found = list(client.events("c1"))
@@ -207,13 +201,6 @@ def test_a_deletion_whose_answer_is_lost_is_not_repeated(server, client):
     with pytest.raises(Unreachable):
         client.delete("c1")
     assert [asked.method for asked in server.asked] == ["DELETE"]
-
-
-def test_a_deletion_that_cannot_have_begun_is_repeated(server, client):
-    server.answer(503)
-    server.answer(204)
-    client.delete("c1")
-    assert len(server.asked) == 2
 
 
 def test_a_redirection_is_not_followed_and_the_key_goes_nowhere_else(server):

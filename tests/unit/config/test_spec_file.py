@@ -27,28 +27,6 @@ def yaml_file(folder: Path, text: str) -> Path:
     return file
 
 
-def test_run_file_keeps_its_fields_and_flags_override_them(tmp_path):
-    file = yaml_file(
-        tmp_path,
-        "family: mixed\nmethod: sac\nseed: 4\nbudget: {episodes: 9, evaluation_episodes: 2}\n"
-        "ego: {profile: perfect}\nrequirements: [{name: slow, formula: ego_speed_mps < 5, scale: 1.0}]\n",
-    )
-    spec = read_spec(file, FLAGS | {"seed": 5, "episodes": 3})
-    assert (spec.family, spec.method, spec.seed) == ("mixed", "sac", 5)
-    assert (spec.budget.episodes, spec.budget.evaluation_episodes) == (3, 2)
-    assert spec.ego.sensor is None
-    assert spec.requirements[0].name == "slow"
-
-
-def test_flags_pick_one_run_of_a_campaign(tmp_path):
-    file = yaml_file(tmp_path, "label: all\nfamilies: [low, mixed]\nmethods: [random, sac]\nseeds: [1, 2]\n")
-    with pytest.raises(ConfigError, match="got a campaign of 8 runs; wanted one") as raised:
-        read_spec(file, FLAGS)
-    assert raised.value.field == "spec"
-    picked = read_spec(file, FLAGS | {"family": "mixed", "method": "sac", "seed": 2})
-    assert (picked.family, picked.method, picked.seed) == ("mixed", "sac", 2)
-
-
 @pytest.mark.parametrize(
     ("text", "field"),
     [
@@ -86,16 +64,6 @@ def test_campaign_written_as_yaml_is_the_same_campaign(tmp_path):
 
 
 ENDS = {"families": ["low", "dense"], "methods": ["random", "archive"], "seeds": [0, 7], "iid": {"seed": 7}}
-
-
-def test_its_runs_come_last_one_for_each_family_and_kind_of_traffic():
-    spec = CampaignSpec.model_validate(ENDS)
-    ids = [run.id for run in spec.runs()]
-    assert len(spec.searches()) == 8
-    assert ids[8:] == ["low-iid-undisturbed-7", "low-iid-random-7", "dense-iid-undisturbed-7", "dense-iid-random-7"]
-    assert len(set(ids)) == len(ids)
-    assert {run.budget.total_episodes for run in spec.drawn()} == {300}
-    assert CampaignSpec.model_validate_json(spec.model_dump_json()) == spec
 
 
 def test_no_generator_of_it_is_seeded_as_one_of_a_search_or_of_another_of_its_runs():

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +16,13 @@ import grpc
 import numpy as np
 import pytest
 
-from risk_sac import types
-from risk_sac.config import EgoConfig, RunSpec
-from risk_sac.egos import Control, Episode, Perceived, Trajectory, pilot
+from risk_sac.egos import Control, Episode, Perceived, Trajectory
 from risk_sac.egos.remote.client import RemoteEgo
 from risk_sac.egos.remote.ego_pb2 import CloseReply, Command, Observation, StartReply
 from risk_sac.egos.remote.messages import METHODS, SERVICE, command_message
 from risk_sac.egos.seam import Vehicle
 from risk_sac.egos.serve import Sessions, serve
-from risk_sac.env import RiskSacEnv
 from risk_sac.errors import EgoFailed
-from risk_sac.sim import paths
 from risk_sac.types import WIDTH, Signal
 from tests.server import ROOT
 
@@ -240,48 +236,3 @@ def rows(head: str) -> list[tuple[str, ...]]:
     block = README.split("```\nPerceived\n")[1].split("```")[0]
     (below,) = (part for part in f"Perceived\n{block}".split("\n\n") if part.startswith(head))
     return [tuple(re.split(r" {2,}", line.strip())) for line in below.splitlines()[1:]]
-
-
-@pytest.fixture(scope="module")
-def readme_perceived():
-    """Frames of an episode with a pedestrian."""
-    seen: list[Perceived] = []
-    real = pilot.perceive
-
-    def recorded(*arguments):
-        seen.append(real(*arguments))
-        return seen[-1]
-
-    spec = RunSpec(family="mixed", method="no-adversary", seed=0, ego=EgoConfig(driver="idm-aeb"))
-    with pytest.MonkeyPatch.context() as patch, closing(RiskSacEnv.of(spec)) as env:
-        patch.setattr(pilot, "perceive", recorded)
-        for seed in range(20):
-            env.reset(seed=seed)
-            for _ in range(10):
-                env.step(np.zeros(env.action_size))
-            if any(len(each.ids) > 1 for each in seen):
-                return seen
-    raise AssertionError("no other actor was perceived in 20 episodes")
-
-
-@pytest.mark.parametrize(("module", "name"), [(types, "state"), (paths, "path")])
-def test_rows_are_those_of_the_code(module, name, readme_perceived):
-    told = rows(f"Rows of {name}, named in {module.__name__}\n")
-    assert [(int(index), getattr(module, row)) for index, row, *_ in told] == [(i, i) for i in range(len(told))]
-    (shape,) = (said for field, said in rows("Perceived") if field == name)
-    assert int(shape.partition(" x ")[0]) == len(told)
-    assert {getattr(frame, name).shape[0] for frame in readme_perceived} == {len(told)}
-
-
-def test_what_is_missing_of_others_is_nan_and_nothing_else_is(readme_perceived):
-    missing = [int(index) for index, _, *said in rows("Rows of state") if "NaN of others" in " ".join(said)]
-    assert missing
-    for frame in readme_perceived:
-        unknown = np.isnan(frame.state)
-        assert not unknown[:, 0].any()
-        assert unknown[missing, 1:].all()
-        assert not np.delete(unknown, missing, axis=0).any()
-        assert frame.state.shape[1] == len(frame.ids) == len(frame.kind)
-        assert frame.state[types.OFFSET, 0] == frame.offset_m
-        assert np.allclose(frame.path[paths.COS], np.cos(frame.path[paths.HEADING]))
-        assert not np.isnan(frame.path).any()

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from risk_sac.failures import replay
-from risk_sac.failures.clusters import overview, vendi
+from risk_sac.failures.clusters import vendi
 from risk_sac.failures.minimise import _reduce_actions, without
 from risk_sac.failures.question import TwinPlay, read_twin, twin_bytes
 from risk_sac.failures.studied import STUDIES, Core, Extent, Studied, note, read_studies
@@ -72,20 +72,6 @@ def found(*collisions: Collision) -> list[tuple[str, EpisodeRecord]]:
     return [
         (f"e{i}", episode_record(i, Outcome.FAILURE, steps=90 - i, collision=each)) for i, each in enumerate(collisions)
     ]
-
-
-def test_failures_of_a_signature_are_a_cluster_with_the_most_preventable_and_shortest_first():
-    cut_in = [
-        failure("cut-in", grade)
-        for grade in (Grade.UNAVOIDABLE, Grade.PREVENTABLE, Grade.FULL_BRAKING, Grade.PREVENTABLE)
-    ]
-    overviewed = overview(found(*cut_in, *[failure("leader", Grade.FULL_BRAKING)] * 9))
-    first, second = overviewed.clusters
-    assert (first.name, first.failures, first.preventable, first.distinct) == ("cut-in", 4, 2, 1)
-    assert (first.representative, first.grade) == ("e3", Grade.PREVENTABLE)
-    assert (second.name, second.failures, second.preventable) == ("leader", 9, 0)
-    assert overviewed.covered == 1  # the signature is no part of the taxonomy
-    assert overviewed.cells == 1872
 
 
 def test_the_vendi_score_counts_what_has_nothing_in_common():

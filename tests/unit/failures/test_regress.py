@@ -1,8 +1,5 @@
-from xml.etree import ElementTree as ET
-
 import pytest
 
-from risk_sac.cli.regress import junit
 from risk_sac.config import EgoConfig
 from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.failures.regress import compared
@@ -46,20 +43,6 @@ def test_a_baseline_makes_the_same_verdict_of_the_same_failure_known_and_no_othe
     assert [each.known for each in now.beside(before).cases] == [True, False, False, False]
     assert not now.beside(before).passed
     assert now.beside(now).passed
-
-
-def test_junit_has_a_case_for_each_failure():
-    cases = [case(verdict, verdict) for verdict in Verdict]
-    report = ET.fromstring(junit(regression(*cases, case(Verdict.FLAKY, "old", known=True))))
-    results = {str(each.get("classname")).removeprefix("cut-in "): each for each in report.iter("testcase")}
-    assert all(each.get("name") == "same" for each in results.values())
-    failed = {name for name, each in results.items() if each.find("failure") is not None}
-    wrong = {name for name, each in results.items() if each.find("error") is not None}
-    skipped = {name for name, each in results.items() if each.find("skipped") is not None}
-    assert failed == {"still_failing", "new_kind"}
-    assert wrong == {"flaky", "not_comparable"}
-    assert skipped == {"old"}
-    assert report.find("testsuite").get("tests") == "6"
 
 
 HIT = collision(other_id="lead", judgement=judgement(signature="cut-in"))

@@ -12,9 +12,9 @@ from risk_sac.metrics.rows import (
     outcome_dispersion,
     preventable_collision_rate,
 )
-from risk_sac.records import Fault, Funnel, Grade, Outcome, RunMetrics, Severity
+from risk_sac.records import Funnel, Grade, Outcome
 from risk_sac.verdicts.distinct import distinct_failures, kind_of
-from tests.builders import AVOIDS, TOUCHES, judgement, violation
+from tests.builders import judgement
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
 
 
@@ -38,32 +38,6 @@ def test_funnel_literals():
     assert metrics.pcr == metrics.window_pcr == preventable_collision_rate(counted(JUDGED)) == 3 / 8
     # Wilson for 3 of 8 by hand: centre (0.375 + 0.2401)/1.4802 = 0.4155, half width 0.2787.
     assert (metrics.pcr_low, metrics.pcr_high) == pytest.approx((0.1368, 0.6943), abs=5e-4)
-
-
-def test_contacts_are_counted_by_reference_driver_and_severity_and_failures_by_fault():
-    def struck(fault, severity, **drivers):
-        outcomes = {name: AVOIDS if avoids else TOUCHES for name, avoids in drivers.items()}
-        return contact(judgement=judgement(fault=fault, severity=severity, drivers=outcomes))
-
-    hits = [
-        struck(Fault.EGO, Severity.SEVERE, r157=False, rss=True, full_braking=True),
-        struck(Fault.SHARED, Severity.SEVERE, r157=False, rss=True, full_braking=True, r157_ttc=True),
-        struck(Fault.EGO, Severity.MINOR, r157=False, rss=False, full_braking=False),
-    ]
-    refused = contact(verdicts={"ego_moving": False}, judgement=hits[0].judgement)
-    slow = violation(fault=Fault.EGO)
-    metrics = feed(
-        [
-            *(episode(Outcome.FAILURE, hit=hit) for hit in hits),
-            episode(Outcome.DEGENERATE, hit=refused),
-            episode(Outcome.FAILURE).model_copy(update={"collision": None, "violations": (slow,)}),
-        ]
-    )
-    assert metrics.prevented_by == {"r157": 0, "rss": 2, "full_braking": 2, "r157_ttc": 1}
-    assert metrics.by_severity == {"severe": 2, "minor": 1}
-    assert metrics.by_fault == {"ego": 3, "shared": 1}
-    old = metrics.model_dump(exclude={"prevented_by", "by_severity", "by_fault"})
-    assert RunMetrics.model_validate(old).prevented_by == {}
 
 
 def test_histogram_literals():

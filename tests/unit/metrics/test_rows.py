@@ -18,8 +18,6 @@ from risk_sac.metrics import (
     mean_over_runs,
     outcome_features,
     pcr_by_driver,
-    pooled_counts,
-    pooled_names,
     results_digest,
     wilson_interval,
 )
@@ -84,19 +82,6 @@ def test_digest_does_not_depend_on_the_order_or_kind_of_mappings():
 def test_digest_notices_the_smallest_change(change):
     assert results_digest([RUN[1].model_copy(update=change)]) != results_digest([RUN[1]])
     assert results_digest(RUN[::-1]) != results_digest(RUN)
-
-
-def test_runs_are_pooled_by_sums_and_signatures_keep_their_order():
-    metrics = [feed(JUDGED), feed(JUDGED[3:])]
-    counts = pooled_counts(metrics)
-    assert (counts.episodes, counts.raw_collisions, counts.failures) == (13, 11, 7)
-    assert (counts.distinct_failures, counts.preventable, counts.distinct_preventable) == (6, 4, 3)
-    assert (counts.artefacts, counts.unresponsive, counts.environment_steps) == (2, 2, 518 + 380)
-    assert list(pooled_names([each.signatures for each in metrics]).items()) == [
-        ("cut-in, straight", 3),
-        ("pedestrian, straight", 2),
-        ("unjudged adversary vehicle", 2),
-    ]
 
 
 def test_each_drivers_pcr_is_over_the_runs_that_asked_it():

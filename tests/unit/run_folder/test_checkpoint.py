@@ -76,22 +76,6 @@ def test_state_survives_the_round_trip_with_types_and_bits(path):
     assert [entry.name for entry in path.parent.iterdir()] == ["run.ckpt"]
 
 
-@pytest.mark.parametrize(
-    "array",
-    [
-        np.arange(10)[::-2],
-        np.asfortranarray(np.arange(6.0).reshape(2, 3)),
-        np.broadcast_to(np.float32(1), (2, 2)),
-        np.empty((0, 4)),
-        np.array([2**63], dtype=np.uint64),
-    ],
-    ids=["reversed", "fortran", "read-only", "empty", "uint64"],
-)
-def test_unusual_arrays_survive(tmp_path, array):
-    checkpoint.save(tmp_path / "a", {"array": array}, RUN)
-    assert_same(checkpoint.load(tmp_path / "a", RUN)["array"], array)
-
-
 def flipped(content, position):
     damaged = bytearray(content)
     damaged[position // 8] ^= 1 << (position % 8)

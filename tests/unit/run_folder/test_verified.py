@@ -1,8 +1,7 @@
 """Which failures are refused because one of them does not repeat."""
 
 from risk_sac.config import RunSpec
-from risk_sac.metrics import headline_driven_by
-from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, Repetition, RunMetrics, Severity
+from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, Repetition, Severity
 from risk_sac.run_folder.results import RecordedFailure, Results
 from risk_sac.run_folder.verified import Verified, with_headline
 from tests.builders import collision, episode_record, judgement, run_metrics, violation
@@ -81,20 +80,3 @@ def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repe
     found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e5=2, e6=2, e7=2)).metrics
     assert (found.headline, found.headline_kinds) == (2, HEADLINE)
     assert results.metrics.headline is None, "before a replay"
-
-
-def test_a_headline_failure_counts_for_what_drove_the_first_of_its_kind():
-    results = results_of(
-        failure(0, judgement=MINOR, driven_by=DrivenBy.RANDOM),
-        failure(1, driven_by=DrivenBy.SCRIPT),
-        failure(2, driven_by=DrivenBy.POLICY),  # like it
-        failure(3, judgement=judgement(signature="merge"), driven_by=DrivenBy.POLICY),
-        failure(4, judgement=judgement(signature="crossing")),  # of an older version
-    )
-    found = with_headline(results, verified(e0=2, e1=2, e2=2, e3=2, e4=2)).metrics
-    assert found.headline_kinds_driven_by == (DrivenBy.SCRIPT, DrivenBy.POLICY, None)
-    assert headline_driven_by([found]) == {"script": 1, "policy": 1}
-    later = found.model_copy(update={"headline_kinds_driven_by": (DrivenBy.MODEL,) * 3})
-    assert headline_driven_by([found, later]) == {"script": 1, "policy": 1}, "what an earlier run found counts for it"
-    older = found.model_dump(exclude={"headline_kinds_driven_by", "episodes_driven_by"})
-    assert headline_driven_by([RunMetrics.model_validate(older)]) == {}

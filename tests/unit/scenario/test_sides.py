@@ -55,26 +55,6 @@ def test_an_extract_with_left_hand_traffic_is_refused_and_says_where(extract, mo
 
 
 @pytest.mark.parametrize(
-    ("more", "where"),
-    [
-        (RIGHT_STREET, "way 8 has driving_side=right"),
-        (osm_roundabout(clockwise=False), "the roundabout way 99 runs counter-clockwise"),
-        (osm_roundabout(clockwise=True, oneway="-1"), "the roundabout way 99 runs counter-clockwise"),
-        (osm_roundabout(clockwise=False, pieces=2), "the roundabout way 99 runs counter-clockwise"),
-        (MINI.format("anticlockwise"), "the mini-roundabout node 71 runs anticlockwise"),
-        (carriageways(1), "the carriageways of A 9 are driven on the right"),
-        (  # one street has its sides swapped
-            LEFT_STREET + RIGHT_STREET + osm_roundabout(clockwise=False),
-            "way 8 has driving_side=right (and 1 more like it), although way 7 has driving_side=left",
-        ),
-    ],
-)
-def test_an_extract_with_right_hand_traffic_says_by_what(extract, more, where):
-    extract.write_text(osm_town(more))
-    assert side_remarks(extract) == [f"right-hand traffic: {where}"]
-
-
-@pytest.mark.parametrize(
     ("rules", "keeps_left"),
     [((), None), (('rule="LHT"',), True), (('rule="RHT"',), False), (("",), False), (('rule="LHT"', "", ""), False)],
 )

@@ -146,30 +146,6 @@ def test_the_mirrored_scene_has_the_mirrored_targets(x, y, heading, pace, kind, 
     assert left == pytest.approx(right)
 
 
-CORNER = path_through(
-    np.array([0.0, 10.0, 10.0]),
-    np.array([0.0, 0.0, 10.0]),
-    np.array([0.0, 10.0, 20.0]),
-    np.array([0.0, 1, 1]) * np.pi / 2,
-    np.full(3, 13.89),
-)
-
-
-@pytest.mark.parametrize(
-    ("x", "y", "expected"),
-    [
-        (4.0, 1.0, (4.0, 1.0, 0.0)),
-        (-3.0, -1.0, (-3.0, -1.0, 0.0)),  # before the start
-        (12.0, 5.0, (15.0, -2.0, math.pi / 2)),
-        (9.0, 13.0, (23.0, 1.0, math.pi / 2)),  # beyond the end
-        (12.0, -1.0, (10.0, -1.0, 0.0)),  # outside the corner, as far from either side
-        (12.0, -0.5, (10.0, -0.5, 0.0)),
-    ],
-)
-def test_places_beside_a_corner_by_hand(x, y, expected):
-    assert project(CORNER, x, y) == pytest.approx(expected)
-
-
 @settings(max_examples=100)
 @given(st.floats(5, 150), st.floats(-60, 60), st.sampled_from((8.0, 20.0, 40.0)), st.booleans())
 def test_the_nearest_place_is_the_one_that_shapely_finds(x, y, radius, left):

@@ -44,14 +44,6 @@ def test_a_net_is_loaded_whatever_its_folder_is_called(sim, tmp_path, folder):
     assert sim.reset(replace(layout, net=str(net)), 0).ids == sim.reset(layout, 0).ids
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
-@pytest.mark.parametrize("speed_mps", [6.0, 10.0, 14.0])
-def test_before_the_release_an_adversary_keeps_the_speed_of_the_scene(sim, side, speed_mps):
-    layout = middle(FAMILIES["low"], **{f"{side}_speed_mps": speed_mps, "lead_gap_m": 50.0})
-    sim.reset(layout, 0)
-    assert [speed(sim.step(), side) for _ in range(LEAD_IN_STEPS)] == pytest.approx([speed_mps] * LEAD_IN_STEPS)
-
-
 def test_before_the_release_an_adversary_stops_for_whom_sumo_s_models_see(sim):
     layout = middle(FAMILIES["low"], left_speed_mps=14.0)
     left = next(v for v in layout.vehicles if v.id == "left")

@@ -61,15 +61,6 @@ def test_it_is_aware_of_a_pedestrian_on_the_carriageway_beside_its_way(y, near):
     assert found.sped_up == near
 
 
-def test_the_speed_that_its_sight_allowed():
-    found = part(pedestrian_crosses(speed=12.0, seen_from_s=6.8))  # 1.3 s before it
-    assert found.sighted_mps == pytest.approx(12.0)
-    assert found.sight_mps is not None
-    assert found.sight_mps * 0.75 + found.sight_mps**2 / (2 * 3.4) == pytest.approx(15.9, abs=0.7)
-    assert found.too_fast
-    assert part(pedestrian_crosses()).sight_mps is None
-
-
 @pytest.mark.parametrize(
     ("evidence", "yields", "left"),
     [

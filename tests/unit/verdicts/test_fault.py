@@ -8,12 +8,11 @@ import pytest
 
 from risk_sac.records import ConflictType, Fault, Grade
 from risk_sac.scenario.ground import Area
-from risk_sac.types import Kind, Role
+from risk_sac.types import Kind
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.endangering import endangered_ego
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.fault import Parts, fault, has_to_yield, parts_of_violation
-from risk_sac.verdicts.judge import judge
 from tests.unit.verdicts.staged import (
     CAR_M,
     LANE_M,
@@ -152,11 +151,6 @@ def test_a_follower_that_does_not_brake_shares_the_fault_of_a_brake_check():
     assert judged(leader_brakes()).fault is Fault.SHARED
 
 
-def test_what_is_not_valid_has_no_fault():
-    found = judge(cut_in(), "actor_1", valid=False)
-    assert (found.fault, found.ego_part) == (None, None)
-
-
 def named(evidence: Evidence) -> tuple[str, ...]:
     found, again = (endangered_ego(each, 1, find_conflict(each, 1)) for each in (evidence, mirrored(evidence)))
     assert found == again
@@ -202,16 +196,6 @@ def test_a_leader_that_brakes_for_nobody(ahead_m, y_m, kind, expected):
     other = straight(CAR_M[0] + 10.0 + ahead_m, y_m, 0.0, 14.0)
     assert named(led(8.0)) == CHECKS
     assert named(led(8.0, other, kinds=(kind,))) == expected
-
-
-def test_who_brakes_gently_or_for_a_signal_checks_nobody():
-    assert named(led(3.9)) == ()
-    hard = led(8.0)
-    for letter, expected in (("r", ()), ("y", ()), ("G", CHECKS)):
-        link = hard.link.copy()
-        link[:, 1] = ord(letter)
-        assert named(replace(hard, link=link)) == expected
-    assert named(replace(hard, role=hard.role.clip(max=Role.BACKGROUND) * [1, 0] + [0, Role.BACKGROUND])) == ()
 
 
 def walks(x_m: float, y_m: float, turn_rad: float, at_s: float) -> Motion:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ConflictType, Grade, Judgement
-from risk_sac.scenario.ground import Area
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import DEFINITIONS, judge
 from tests.unit.verdicts.staged import (
@@ -115,12 +114,3 @@ def test_an_ego_in_a_turn(turn, name, speed_mps):
     assert found.ego_manoeuvre == name
     if speed_mps == 6.0:
         assert found.conflict_s < 1.0  # foreseen round the bend
-
-
-@pytest.mark.parametrize(
-    ("x", "where"), [(100.0, "crossing"), (104.0, "beside_crossing"), (106.0, "lane"), (120.0, "junction")]
-)
-def test_grounds(x, where):
-    evidence = stage(straight(20.0, 0.0, 0.0, 12.0), straight(x, 0.0, 0.0, 0.0), kinds=WALKING)
-    junctions = (Area.box(115.0, 130.0, -10.0, 10.0),)
-    assert judged(replace(evidence, ground=replace(evidence.ground, junctions=junctions))).ground == where

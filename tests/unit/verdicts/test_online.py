@@ -80,10 +80,6 @@ def test_who_has_to_stop_and_can_is_expected_to(letter, expected):
     assert in_conflict(near)
 
 
-def test_a_standing_ego_is_in_nobodys_way():
-    assert not in_conflict(frame((30.0, -8.0, math.pi / 2, 10.0, CAR), ego=0.0))
-
-
 def test_the_path_ahead_decides():
     walker = (20.0, 20.0, 0.0, 0.0, WALKER)
     bend = polyline(np.array([0.0, 20.0, 20.0]), np.array([0.0, 0.0, 50.0]))

@@ -103,12 +103,6 @@ def test_an_ego_that_drifts_comes_over_if_its_neighbour_came_less_far(other_m, e
     assert judged(stage(ego, passing)).conflict_type is expected
 
 
-def test_an_ego_that_swerves_away_from_a_cut_in_was_cut_in_on():
-    beside = sideways(straight(3.0, LANE_M, 0.0, 12.0), 2.0, -1.8, 3 * LANE_M)
-    swerves = sideways(straight(0.0, 0.0, 0.0, 12.0), 2.8, -0.9, LANE_M)
-    assert judged(stage(swerves, beside)).conflict_type is ConflictType.CUT_IN
-
-
 def test_a_reference_driver_keeps_its_lane_and_looks_out_for_who_is_there():
     # The leader brakes hard and the ego swerves into its neighbour: in the lane, a careful driver brakes too late.
     ego = sideways(straight(0.0, 0.0, 0.0, 14.0), 2.0, 2.0, LANE_M)

@@ -87,13 +87,6 @@ def test_a_distance_that_nobody_could_keep_is_unavoidable():
     assert (found.grade, found.fault) == (Grade.UNAVOIDABLE, Fault.EGO)  # a follower has to keep its distance
 
 
-def test_a_driver_acts_too_late_if_it_acts_after_the_violation():
-    found = violated(staged(straight(0.0, 0.0, 0.0, 12.0), straight(500.0, 0.0, 0.0, 12.0)), own("ego_speed_mps <= 5"))
-    assert (found.time_s, found.grade, any(found.drivers.values())) == (0.0, Grade.UNAVOIDABLE, False)
-    assert found.other_id is None
-    assert found.signature == "own violated; ego goes straight, nobody near"
-
-
 def test_an_ego_that_passes_a_pedestrian_too_closely_would_have_had_room_in_its_lane():
     swerves = sideways(straight(0.0, 0.0, 0.0, 10.0), 2.0, 1.0, 2.0)
     evidence = staged(swerves, straight(60.0, 4.2, 0.0, 0.0), kinds=WALKING)
@@ -139,11 +132,3 @@ def test_a_reference_driver_stops_at_red_where_it_can(yellow_m, red_m, grade):
     assert found.signature == "red light entered; ego goes straight, nobody near"
     assert found.broke == ("red_light",)
     assert found.fault is (Fault.EGO if grade is Grade.PREVENTABLE else Fault.OTHER)
-
-
-@pytest.mark.parametrize(("broken_s", "valid"), [(-0.5, False), (3.0, True)])
-def test_an_artefact_before_a_violation_refuses_it_and_no_driver_is_asked(broken_s, valid):
-    evidence = staged(straight(0.0, 0.0, 0.0, 12.0), straight(500.0, 0.0, 0.0, 12.0))
-    [found] = played(evidence, own("ego_speed_mps <= 5"), artefacts={"inside_limits": broken_s})
-    assert (found.valid, found.broken) == (valid, () if valid else ("inside_limits",))
-    assert (found.grade is not None, bool(found.drivers)) == (valid, valid)

@@ -1,7 +1,4 @@
-import math
 from dataclasses import replace
-
-import pytest
 
 from risk_sac.config import Interval, Odd, RunSpec
 from risk_sac.metrics import clopper_pearson
@@ -9,7 +6,6 @@ from risk_sac.records import Outcome
 from risk_sac.report.evidence.coverage import axis_of, coverage, kinds
 from risk_sac.report.evidence.gathered import drawn
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.odd import narrow
 from risk_sac.scenario.space import Parameter
 from tests.builders import collision, episode_record, judgement
 
@@ -33,19 +29,6 @@ def test_a_bin_holds_its_lower_edge_and_the_last_one_both():
     fixed = Parameter("length_m", "m", 3, 3, "a length")
     assert axis_of(fixed, length, 5).names == ("3",)
     assert axis_of(fixed, length, 5).places([3.0]).tolist() == [0]
-
-
-@pytest.mark.parametrize(
-    ("allowed", "names"),
-    [(None, ("zebra", "signalised")), (("zebra",), ("zebra",)), (("signalised",), ("signalised",))],
-)
-def test_a_category_is_a_bin_and_one_that_the_odd_excludes_is_none(allowed, names):
-    odd = Odd.model_validate({"scenery": {"crossing_types": allowed}})
-    whole, bounded = MIXED.space.parameters[0], narrow(MIXED.space, odd).parameters[0]
-    axis = axis_of(bounded, whole, 10)
-    assert axis.names == names
-    if allowed is None:
-        assert axis.places([0.0, math.nextafter(0.5, 0.0), 0.5, 1.0]).tolist() == [0, 0, 1, 1]
 
 
 def test_what_was_played_failed_and_refused_in_each_bin_and_what_never_was():

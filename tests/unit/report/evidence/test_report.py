@@ -4,11 +4,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from risk_sac import cli
 from risk_sac.benchmark.power import played_by, power_of
-from risk_sac.config import CampaignSpec, EgoConfig, Iid, RunSpec
+from risk_sac.config import CampaignSpec, EgoConfig, Iid
 from risk_sac.config.spec_file import campaign_yaml
-from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.records import Grade
 from risk_sac.report import compare
@@ -152,25 +150,6 @@ def test_a_picture_that_cannot_be_had_is_said_to_be_missing(told, tmp_path):
     series.write_bytes(b"PK\x03\x04 damaged")
     assert "is damaged" in both(told, folders={run.spec.digest: tmp_path for run in told.runs})[0]
     assert "the folder of its run is missing" in both(told)[0]
-
-
-def test_folders_without_runs_and_runs_of_different_campaigns_are_refused(tmp_path, capsys):
-    out = tmp_path / "out" / "report.html"
-    assert cli.main(["report", str(tmp_path), "--out", str(out)]) == 2
-    assert "RESULTS: there is no" in capsys.readouterr().err
-    assert cli.main(["report", str(tmp_path), "--out", str(out.with_suffix(".pdf"))]) == 2
-    assert "wanted a name that ends in .html, .md, .json" in capsys.readouterr().err
-    assert not out.parent.exists()
-    with pytest.raises(ConfigError, match="there is no"):
-        read_folders([tmp_path / "nowhere"])
-    runs = [
-        RunSpec(family="low", method="random", seed=seed, ego=EgoConfig(reaction_time_s=0.1 + seed)) for seed in (0, 1)
-    ]
-    for run in runs:
-        (tmp_path / run.id).mkdir()
-        write_results(tmp_path / run.id, Results(spec=run, spec_digest=run.digest, finished=False))
-    with pytest.raises(ConfigError, match="low-random-0 and low-random-1, which differ in their ego"):
-        read_folders([tmp_path / run.id for run in runs])
 
 
 def test_a_campaigns_folder_is_told_with_what_is_unfinished_or_damaged_in_it(tmp_path):

@@ -42,31 +42,6 @@ def test_pages_continue_where_they_ended_while_more_arrives(store, ledger, episo
     assert [item.index for item in failures.items] == [1, 3]
 
 
-@pytest.mark.parametrize(
-    "failure_id",
-    [
-        "",
-        "-",
-        "x",
-        "low-risk-sac-3-search-0",
-        "low-risk-sac-3-search-9",
-        "low-risk-sac-3-search-٣",
-        "a-search-99999999999",
-    ],
-)
-def test_what_does_not_exist_is_not_found(store, ledger, episode, failure_id):
-    campaign = ledger.create(SPEC)
-    ledger.add_episodes([(start(store, ledger), episode(0))])
-    with pytest.raises(NotFoundError):
-        store.failure(campaign.id, failure_id)
-    with pytest.raises(NotFoundError, match="no run 'x'; its runs are low-risk-sac-3"):
-        store.episodes(campaign.id, limit=1, run_id="x")
-    with pytest.raises(NotFoundError):
-        store.campaign("x")
-    with pytest.raises(NotFoundError):
-        ledger.cancel("x")
-
-
 def test_a_pause_that_the_disk_refuses_to_note_is_shown_all_the_same(store, ledger):
     campaign, waiting = ledger.create(SPEC), ledger.create(SPEC)
     start(store, ledger)

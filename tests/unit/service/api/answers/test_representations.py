@@ -1,13 +1,13 @@
 import base64
 
 import pytest
-from fastapi import HTTPException, Request
+from fastapi import HTTPException
 from hypothesis import given
 from hypothesis import strategies as st
 
 from service.api.answers.pages import Cursors
 from service.api.answers.problems import ProblemError
-from service.api.answers.representations import NotModified, accepted, cacheable, entity_tag, has, takes
+from service.api.answers.representations import accepted, takes
 
 OFFERED = ("application/json", "text/markdown", "text/csv")
 BROWSER = "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,*/*;q=0.8"
@@ -39,32 +39,6 @@ def test_nothing_acceptable_is_a_406_that_lists_what_there_is(accept):
     with pytest.raises(HTTPException, match="text/markdown") as caught:
         accepted(accept, OFFERED)
     assert caught.value.status_code == 406
-
-
-@pytest.mark.parametrize(
-    ("sent", "there"),
-    [
-        ('W/"7"', True),
-        ('"7"', True),  # a weak comparison
-        ('W/"6", W/"7"', True),
-        ("*", True),
-        ('W/"77"', False),
-        ("7", False),
-        ("", False),
-        (None, False),
-    ],
-)
-def test_a_tag_is_among_those_that_the_client_has(sent, there):
-    headers = [] if sent is None else [(b"if-none-match", sent.encode())]
-    request = Request({"type": "http", "headers": headers})
-    assert has(request, entity_tag("7")) is there
-    if not there:
-        wanted = {"Cache-Control": "no-cache", "ETag": 'W/"7"', "Vary": "Accept"}
-        assert cacheable(request, "7", others={"Vary": "Accept"}) == wanted
-        return
-    with pytest.raises(NotModified) as answer:
-        cacheable(request, "7", others={"Vary": "Accept"})
-    assert answer.value.headers["Vary"] == "Accept"
 
 
 @pytest.mark.parametrize("header", ["gzip", "br, GZip", "gzip;q=0.001", "deflate;q=0.5 , gzip ; q=1"])
