@@ -66,17 +66,8 @@ def test_a_damaged_copy_is_refused(tmp_path):
         kept(prior)
 
 
-@pytest.mark.parametrize(
-    ("prior", "says"),
-    [
-        ("missing", "got 'missing'"),
-        ("of-mixed", "whose runs are of mixed"),
-        ("no-scripts", "whose episodes followed no scripts"),
-        ("damaged", "whose run damaged cannot be read"),
-        ("v1_0123456789ab", "got 'v1_0123456789ab'"),
-    ],
-)
-def test_what_cannot_be_gone_on_from_is_refused_in_one_line(tmp_path, monkeypatch, prior, says):
+@pytest.mark.parametrize("prior", ["missing", "of-mixed", "no-scripts", "damaged", "v1_0123456789ab"])
+def test_what_cannot_be_gone_on_from_is_refused_in_one_line(tmp_path, monkeypatch, prior):
     monkeypatch.chdir(tmp_path)
     run_folder(tmp_path / "of-mixed", "mixed")
     run_folder(tmp_path / "no-scripts", scripts=False)
@@ -84,7 +75,6 @@ def test_what_cannot_be_gone_on_from_is_refused_in_one_line(tmp_path, monkeypatc
     with pytest.raises(ConfigError) as refused:
         pinned_prior(prior, ["low"])
     assert refused.value.field == "prior"
-    assert says in str(refused.value)
     assert "\n" not in str(refused.value)
 
 

@@ -53,38 +53,6 @@ def test_sumo_accepts_100_random_scenes_and_places_everybody_as_told(family, sim
         np.testing.assert_allclose(frame.speed_mps, [s.speed_mps for s in (*vehicles, *pedestrians)], atol=1e-6)
 
 
-def test_low_scenes_place_the_neighbours_by_their_gaps(sim):
-    family = FAMILIES["low"]
-    scene, layout = random_layouts(family, 2, 1)[0]
-    frame = sim.reset(layout, 0)
-    ego, lead, left, right, follower = (frame.ids.index(i) for i in ("ego", "lead", "left", "right", "follower"))
-    x, half = frame.x_m, frame.length_m / 2
-    assert x[lead] - half[lead] - x[ego] - half[ego] == pytest.approx(scene.values["lead_gap_m"], abs=0.02)
-    assert x[ego] - half[ego] - x[follower] - half[follower] == pytest.approx(scene.values["follower_gap_m"], abs=0.02)
-    assert x[left] - x[ego] == pytest.approx(scene.values["left_offset_m"], abs=0.02)
-    assert x[right] - x[ego] == pytest.approx(scene.values["right_offset_m"], abs=0.02)
-    assert frame.y_m[left] - frame.y_m[ego] == pytest.approx(3.3)
-    assert frame.y_m[right] - frame.y_m[ego] == pytest.approx(-3.3)
-
-
-def test_mixed_scenes_place_everybody_before_the_chosen_crossing(sim):
-    family = FAMILIES["mixed"]
-    for (scene, layout), seed in zip(random_layouts(family, 3, 10), range(10), strict=True):
-        frame = sim.reset(layout, seed)
-        near_edge = (700.0 if scene.values["crossing"] >= 0.5 else 300.0) - 2.0
-        front = frame.x_m + frame.length_m / 2
-        xi = scene.values
-        # The scene says where they are at the release, 1.5 s later.
-        assert near_edge - front[0] == pytest.approx(xi["ego_distance_m"] + 1.5 * xi["ego_speed_mps"], abs=0.1)
-        occluder = frame.ids.index("occluder")
-        before = xi["occluder_distance_m"] + 1.5 * xi["occluder_speed_mps"]
-        assert near_edge - front[occluder] == pytest.approx(before, abs=0.1)
-        walker = layout.pedestrians[0]
-        assert walker.x_m - near_edge - 2.0 == pytest.approx(xi["pedestrian_offset_m"])
-        assert walker.y_m == pytest.approx(-6.55 - xi["pedestrian_setback_m"] - 1.5 * xi["pedestrian_speed_mps"])
-        assert any(a.contains(walker.x_m, -1.0) for a in layout.crossings)
-
-
 @each_family
 def test_vehicles_on_one_lane_start_and_are_released_apart(family):
     for scene, layout in random_layouts(family, 5, 500):

@@ -8,7 +8,7 @@ import pytest
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import Collision, Grade, ReferenceOutcome, Severity
 from risk_sac.scene_optimizer import ArchiveOptimizer, DiscountedBandit, Encounter
-from risk_sac.scene_optimizer.archive import INITIAL, NEW, NEW_CANDIDATE, Elites
+from risk_sac.scene_optimizer.archive import INITIAL, NEW_CANDIDATE, Elites
 from tests.builders import collision, judgement, violation
 
 HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)
@@ -35,20 +35,6 @@ def test_a_niche_keeps_what_the_careful_driver_came_nearest_to_preventing():
     (preventable,) = elites.pool()
     np.testing.assert_array_equal(preventable.point, HERE)
     assert preventable.worth > almost.worth
-
-
-def test_a_parent_is_credited_with_what_was_new_and_most_with_what_was_preventable():
-    elites = Elites()
-    elites.add_failure(HERE, failure(Grade.FULL_BRAKING), None)
-    (parent,) = elites.pool()
-    elites.add_failure(THERE, failure(Grade.FULL_BRAKING), parent)
-    assert parent.credit == 0.0
-    elites.add_failure(THERE, failure(Grade.PREVENTABLE), parent)
-    assert parent.credit == NEW_CANDIDATE
-    elites.add_failure(THERE, failure(Grade.FULL_BRAKING, "leader"), parent)
-    assert parent.credit == NEW_CANDIDATE + NEW
-    elites.add_failure(THERE, failure(Grade.PREVENTABLE), parent)
-    assert parent.credit == NEW_CANDIDATE + NEW
 
 
 def test_a_minor_contact_ranks_below_what_the_headline_counts():

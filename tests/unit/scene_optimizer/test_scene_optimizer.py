@@ -79,15 +79,6 @@ def test_running_maximum_literals():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_asks_are_points_of_the_unit_cube(kind):
-    asked = drive(kind(3, QUICK, 0), 20, bowl)
-    assert asked.shape == (20, 3)
-    assert asked.dtype == np.float64
-    assert asked.min() >= 0
-    assert asked.max() <= 1
-
-
-@pytest.mark.parametrize("kind", KINDS)
 def test_same_seed_asks_the_same_scenes_and_another_seed_others(kind):
     first, again, other = (drive(kind(3, QUICK, seed), 20, bowl) for seed in (4, 4, 5))
     np.testing.assert_array_equal(first, again)

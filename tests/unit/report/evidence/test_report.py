@@ -18,7 +18,6 @@ from risk_sac.scenario.families import FAMILIES
 HOSTILE = (
     '<script>alert(1)</script><img src=x onerror=y> "q" `tick` [link](javascript:a) |cell| \u202egnp.exe \x07 &amp;'
 )
-BANNER = "Search results are no crash rate"
 
 
 def origin(**more):
@@ -68,20 +67,6 @@ class Tags(HTMLParser):
 
     def handle_data(self, data):
         self.text += data
-
-
-def test_it_says_what_was_found_how_often_and_where_nobody_looked(told):
-    page, text = both(told)
-    for each in (Tags(page).text, text):
-        assert BANNER in each
-        for title in ("Operational design domain", "Budget", "The funnel", "Coverage", "Limits", "Each number again"):
-            assert title in each
-        assert "1 of 7" in each  # valid failures of the scenes with random adversaries that were played
-        assert "0 of 8" in each
-        assert "31.23 %" in each  # 1 - 0.05^(1/8)
-        assert "Never sampled" in each
-        assert "risk-sac evaluate --iid 8" in each
-        assert told.runs[0].digest in each
 
 
 def test_an_i_i_d_phase_is_in_no_other_number(told, spec, runs):

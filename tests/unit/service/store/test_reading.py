@@ -3,14 +3,12 @@ import math
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Fault, Grade, Outcome, RequirementResult, Severity, State
+from risk_sac.records import Fault, Grade, Outcome, Severity, State
 from service.errors import NotFoundError
 from service.store.finding import Judged
 from tests.begun import start
-from tests.builders import judgement, violation
+from tests.builders import judgement
 
-REFUSED = violation(verdicts={"inside_limits": False})
-REPORTED = RequirementResult(counts="report", robustness=-0.1, violated_s=2.0)
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
 
 
@@ -94,41 +92,6 @@ def test_contacts_are_found_by_grade_severity_fault_what_was_broken_and_signatur
     first = store.episodes(campaign.id, limit=1, judged=Judged(grade=Grade.PREVENTABLE))
     rest = store.episodes(campaign.id, limit=9, after=first.last, judged=Judged(grade=Grade.PREVENTABLE))
     assert [item.index for item in (*first.items, *rest.items)] == [0, 3] * 2
-
-
-def test_failures_are_found_by_the_requirement_that_was_violated(store, ledger, episode):
-    campaign = ledger.create(SPEC)
-    number = start(store, ledger)
-    kept, broken = RequirementResult(counts="report", robustness=0.1, violated_s=None), {"safe_ttc": REPORTED}
-    told = [
-        (Outcome.FAILURE, {"failed": ("never_fast",), "violations": (violation(),), "collision": None}),
-        (Outcome.FAILURE, {"failed": ("no_contact",), "violations": (REFUSED,), "requirements": broken}),
-        (Outcome.DEGENERATE, {"violations": (REFUSED,), "collision": None}),
-        (Outcome.SAFE, {"requirements": {"safe_ttc": kept}}),
-        (Outcome.SAFE, {"requirements": broken}),
-    ]
-    for index, (outcome, changes) in enumerate(told):
-        changes["requirements"] = changes.get("requirements", {}) | {
-            each.requirement: RequirementResult(counts="failure", robustness=each.robustness, violated_s=each.time_s)
-            for each in changes.get("violations", ())
-        }
-        event = episode(index, outcome)
-        ledger.add_episodes([(number, event.model_copy(update={"record": event.record.model_copy(update=changes)}))])
-
-    def found(requirement, *outcomes, valid=False):
-        asked = Judged(requirement=requirement, valid=valid)
-        return [item.index for item in store.episodes(campaign.id, limit=50, outcomes=outcomes, judged=asked).items]
-
-    assert found("never_fast") == [0, 1, 2]
-    assert found("never_fast", Outcome.FAILURE, valid=True) == [0]
-    assert found("no_contact", Outcome.FAILURE, valid=True) == found("no_contact") == [1]
-    assert found("safe_ttc") == [1, 4]
-    assert found("never") == found("fast") == found("never%") == []
-    (run, *_) = store.campaign(campaign.id).runs
-    assert (run.raw_collisions, run.failures) == (1, 2)
-    (first,) = store.episodes(campaign.id, limit=1, judged=Judged(signature=violation().signature)).items
-    assert (first.index, first.worst_violation.requirement) == (0, "never_fast")
-    assert store.failure(campaign.id, first.id).episode == first
 
 
 def test_an_id_with_a_nul_is_unknown_on_every_database(store, ledger):

@@ -2,29 +2,11 @@ import pytest
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import Finished
-from risk_sac.records import Episode, Outcome, State, TriageState
-from service.errors import NotFoundError, TransitionError
+from risk_sac.records import Outcome, State, TriageState
+from service.errors import TransitionError
 from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
-
-
-def test_episodes_told_together_are_each_stored_and_one_change(store, ledger, episode):
-    campaign = ledger.create(SPEC)
-    first, second = start(store, ledger), start(store, ledger)
-    ledger.add_episodes([(second, episode(0))])
-    before = int(store.campaign(campaign.id).revision)
-    told = [(first, episode(0)), (second, episode(0)), (first, episode(0)), (first, episode(1, Outcome.FAILURE))]
-    assert ledger.add_episodes(told) == {first}
-    found = store.campaign(campaign.id)
-    assert int(found.revision) == before + 1
-    assert [(run.episodes_done, run.failures) for run in found.runs[:2]] == [(2, 1), (1, 0)]
-    stored = [event for event in store.events(campaign.id, limit=9).items if isinstance(event, Episode)]
-    assert [(event.run_id, event.index) for event in stored] == [
-        (found.runs[1].id, 0),
-        (found.runs[0].id, 0),
-        (found.runs[0].id, 1),
-    ]
 
 
 def test_an_episode_reported_twice_is_stored_and_counted_once(store, ledger, episode):
@@ -105,21 +87,6 @@ def test_what_has_no_worker_any_more_waits_again_or_ends_cancelled(store, ledger
     assert store.campaign(kept.id).state is State.QUEUED
     assert store.campaign(dropped.id).state is State.CANCELLED
     assert ledger.resume() == 0
-
-
-def test_a_deleted_campaign_leaves_no_row(store, ledger, episode):
-    campaign, kept = ledger.create(SPEC), ledger.create(SPEC)
-    for _ in range(5):
-        ledger.add_episodes([(start(store, ledger), episode(0))])
-    ledger.delete(campaign.id)
-    with pytest.raises(NotFoundError):
-        store.revision(campaign.id)
-    assert store.episodes(kept.id, limit=5).items
-    with store.engine.connect() as connection:
-        for table in ("campaigns", "runs", "episodes", "changes"):
-            column = "number" if table == "campaigns" else "campaign_number"
-            numbers = connection.exec_driver_sql(f"SELECT DISTINCT {column} FROM {table}").scalars().all()
-            assert numbers == [kept.number]
 
 
 def test_a_triage_outlives_that_its_run_reports_the_episode_again(store, ledger, episode):
