@@ -1,7 +1,6 @@
 """A session with an ego in another process, over a stream: what is late, out of turn or gone never drives."""
 
 import math
-import re
 import subprocess
 import sys
 import threading
@@ -226,13 +225,3 @@ def test_stubs_are_generated_from_their_sources(name, tmp_path):
     subprocess.run(command, cwd=ROOT, check=True)
     stub = REMOTE / f"{name}_pb2.py"
     assert (tmp_path / stub).read_text() == (ROOT / stub).read_text(), "run `make protos`"
-
-
-README = (ROOT / "risk_sac" / "egos" / "README.md").read_text(encoding="utf-8")
-
-
-def rows(head: str) -> list[tuple[str, ...]]:
-    """Lines below a head of the block: numbers and names, and what is said of them."""
-    block = README.split("```\nPerceived\n")[1].split("```")[0]
-    (below,) = (part for part in f"Perceived\n{block}".split("\n\n") if part.startswith(head))
-    return [tuple(re.split(r" {2,}", line.strip())) for line in below.splitlines()[1:]]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.show import caption, draw_recording
+from risk_sac.failures.show import draw_recording
 from tests.unit.failures.staged import JUDGED, synthetic_contact, with_release
 
 
@@ -26,11 +26,6 @@ def test_what_happens_is_marked_in_every_panel_and_the_conflict_from_above(confl
     np.testing.assert_allclose(centres, [(280 + 10 * conflict_s, -1.65), (302, pedestrian_y)])
     low, high = view.get_xlim()
     assert low < 280 + 10 * conflict_s < high
-
-
-def lines(**judged: object) -> list[str]:
-    contact = synthetic_contact(JUDGED.model_copy(update=judged))
-    return caption("mixed", Recording(contact, with_release())).splitlines()
 
 
 def test_no_label_covers_another_nor_a_body():

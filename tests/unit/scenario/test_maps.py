@@ -29,8 +29,6 @@ from risk_sac.sim.sumo import SumoSimulation
 from tests.maps import osm_town
 
 NETS = Path(sumo_nets.__path__[0])
-LANE = '<lane id="{id}_0" index="0" speed="13.89" length="{m}" shape="{line}"/>'
-ROAD = '<edge id="{id}" from="{a}" to="{b}">' + LANE + "</edge>"
 
 
 def shipped(name: str):
@@ -122,10 +120,6 @@ def test_a_kept_place_that_was_changed_is_refused(town, tmp_path, monkeypatch):
     assert library.kept(name)
     with pytest.raises(ConfigError, match="there is no place 'junction_000000000000'"):
         family_named("junction_000000000000")
-
-
-def road(id_: str, a: str, b: str, metres: float, line: str) -> str:
-    return ROAD.format(id=id_, a=a, b=b, m=metres, line=line)
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,6 @@ from risk_sac.sim.commands import VehicleCommand
 from risk_sac.sim.sumo import NETS, SumoSimulation
 from risk_sac.types import Frame, Role
 
-LEAD_IN_STEPS = 15
-
 
 @pytest.fixture(scope="module")
 def sim():

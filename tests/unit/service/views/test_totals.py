@@ -102,7 +102,7 @@ def test_points_are_evenly_spread_and_the_newest_is_one(count, points):
     assert max(gaps) - min(gaps) <= 1
 
 
-FAILURE, REFUSED = Outcome.FAILURE, Outcome.DEGENERATE
+FAILURE = Outcome.FAILURE
 
 
 def plain_failure(run, index, hit, outcome=FAILURE, phase="search", **changes):
