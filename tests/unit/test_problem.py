@@ -121,3 +121,11 @@ def test_what_is_clipped_is_said(family, part, asked, used):
     (words,) = said((family,), **{part: asked})
     assert used in words
     assert words.startswith(f"odd.{part}.{next(iter(asked))}: ")
+
+
+def test_a_shipped_requirement_that_a_family_lacks_is_said_and_counts_where_there_is_one():
+    spec = CampaignSpec(families=("low", "mixed"), requirements=(Requirement(name="pedestrian_gap"),))
+    checked_campaign(spec)
+    (adjustment,) = adjustments(spec)
+    assert (adjustment.families, adjustment.field, adjustment.used) == (("low",), "requirements[0]", "nothing")
+    assert "pedestrian_gap" in adjustment.why

@@ -13,7 +13,7 @@ from torch.nn.functional import layer_norm
 
 from risk_sac.agents.agent import critic_loss, td_target
 from risk_sac.agents.lagrangian import dual_step
-from risk_sac.agents.networks import Mlp, tanh_gaussian
+from risk_sac.agents.networks import LOG_STD_MAX, LOG_STD_MIN, Mlp, bounded_log_std, tanh_gaussian
 from risk_sac.agents.sac import actor_loss, soft_value, temperature_loss
 from risk_sac.config import LagrangianConfig
 
@@ -127,3 +127,8 @@ def test_dual_variable_never_goes_negative_nor_above_its_cap(costs):
     for cost in costs:
         dual_variable = dual_step(dual_variable, cost, CONFIG)
         assert 0.0 <= dual_variable <= CONFIG.maximum
+
+
+@given(st.floats(-1e6, 1e6))
+def test_log_std_stays_within_its_bounds(raw):
+    assert LOG_STD_MIN <= bounded_log_std(torch.tensor(raw)).item() <= LOG_STD_MAX

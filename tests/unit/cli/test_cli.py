@@ -1,5 +1,8 @@
+import argparse
+import os
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -73,3 +76,14 @@ def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path):
     again = run(SPEC, tmp_path, ignore)
     assert untimed(again) == untimed(whole)
     assert len((tmp_path / "episodes.jsonl").read_text().splitlines()) == 3
+
+
+def test_a_command_takes_all_paths_from_where_it_begins(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("RISK_SAC_PLACES", "places")
+    monkeypatch.delenv("RISK_SAC_EGOS", raising=False)
+    options = argparse.Namespace(out=Path("run"), runs=[Path("a"), Path("/b")], name="run", seed=3)
+    cli._make_absolute(options)
+    assert vars(options) == {"out": tmp_path / "run", "runs": [tmp_path / "a", Path("/b")], "name": "run", "seed": 3}
+    assert os.environ["RISK_SAC_PLACES"] == str(tmp_path / "places")
+    assert "RISK_SAC_EGOS" not in os.environ

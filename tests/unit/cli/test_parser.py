@@ -64,3 +64,14 @@ def test_a_wrong_word_is_named_as_typed_beside_what_is_close(words, said, capsys
         status = ended.code
     assert status == 2
     assert said in capsys.readouterr().err
+
+
+def test_keys_hands_its_words_on_with_their_flags():
+    words = ["create", "--project", "default", "--scope", "run"]
+    assert cli._parser().parse_known_args(["keys", *words])[0].rest == words
+
+
+def test_a_flag_may_be_shortened_and_words_after_two_dashes_are_no_flags():
+    options, unknown = cli._parser().parse_known_args(["run", "--fam", "low", "--out", "x"])
+    assert (options.family, unknown) == ("low", [])
+    assert cli._parser().parse_known_args(["show", "--", "--results"])[0].results.name == "--results"

@@ -200,3 +200,8 @@ def test_a_series_is_a_plain_file_name(episode, name):
     line = json.loads(encode(episode(0)))
     with pytest.raises(ValidationError, match="series"):
         decode(json.dumps(line | {"series": name}).encode())
+
+
+def test_a_text_about_no_folder_of_ours_loses_those_it_names():
+    said = 'connection to server on socket "/run/postgresql/.s.PGSQL.5432" failed'
+    assert without_folders(said) == 'connection to server on socket ".s.PGSQL.5432" failed'

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from risk_sac.metrics import results_digest, wilson_interval
-from risk_sac.report import compare, figure_names, read_run, write_report
+from risk_sac.report import compare, figure_bytes, figure_names, read_run, write_report
 from risk_sac.report.comparison import declared
-from risk_sac.report.figures import window_ecr, window_pcr
+from risk_sac.report.figures import CURVES, window_ecr, window_pcr
 from risk_sac.report.paired import holm
 from risk_sac.report.runs import Limit, cpu_s, episodes, found_within
 from risk_sac.run_folder.results import EPISODES, RecordedFailure, Results, read_results, write_results
@@ -196,3 +196,12 @@ def never_close(record):
     least = {"min_ttc_s": math.inf, "min_robustness": math.inf}
     collision = record.collision and record.collision.model_copy(update=least | {"min_rss_margin_m": math.inf})
     return record.model_copy(update=least | {"collision": collision})
+
+
+def test_runs_of_unequal_length_are_drawn_as_far_as_all_came(spec, finished):
+    runs = [finished(run, "..f.f" if run.seed else "..f", ".") for run in spec.runs()]
+    comparison = compare(spec, runs, "")
+    (curve,) = [curve for curve in CURVES if curve.name == "ecr"]
+    at, values = curve.over([runs[0], next(run for run in runs if run.spec.seed)])
+    assert (at.tolist(), values.shape) == ([1.0, 2.0, 3.0], (2, 3))
+    assert figure_bytes(comparison, "ecr_low", "svg").startswith(b"<?xml")

@@ -60,3 +60,10 @@ def test_a12_by_hand():
     assert vargha_delaney([1, 2], [3, 4]) == 0
     assert vargha_delaney([1, 2], [1, 2]) == 0.5
     assert vargha_delaney([1, 3, 5], [2, 3]) == pytest.approx((0 + 1.5 + 2) / 6)
+
+
+@given(st.lists(st.floats(0, 1), max_size=8))
+def test_holm_only_raises_and_keeps_the_order(values):
+    adjusted = holm(values)
+    assert all(p <= p_holm <= 1 for p, p_holm in zip(values, adjusted, strict=True))
+    assert [p for _, p in sorted(zip(values, adjusted, strict=True))] == sorted(adjusted)

@@ -174,3 +174,9 @@ LINKED = '<link><predecessor id="{0}"/><successor id="{0}"/></link>'
 
 def _straight(x: float, length: float) -> str:
     return f'<geometry s="0" x="{x}" y="0" hdg="0" length="{length}"><line/></geometry>'
+
+
+def test_a_lane_keeps_its_width_where_a_limit_begins_within_its_section(tmp_path):
+    types = kind('<speed max="30"/>') + kind('<speed max="20"/>', 450.0)
+    net, _ = read(tmp_path, road(section(lane(-1, width='a="3" b="0.002" c="0" d="0"')), types=types))
+    assert [edge.lanes[0].width_m for edge in net.edges.values()] == pytest.approx([3.0, 3.9], abs=0.01)

@@ -4,11 +4,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import Collision, Grade, ReferenceOutcome, Severity
 from risk_sac.scene_optimizer import ArchiveOptimizer, DiscountedBandit, Encounter
-from risk_sac.scene_optimizer.archive import INITIAL, NEW_CANDIDATE, Elites
+from risk_sac.scene_optimizer.archive import INITIAL, NEW_CANDIDATE, Elites, mutated
 from tests.builders import collision, judgement, violation
 
 HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)
@@ -132,3 +134,11 @@ def test_it_continues_from_its_state():
     assert other.probability == subject.probability != 0.5
     other.tell(0, 2.0)  # the state is a copy
     assert other.probability != subject.probability
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(0, 1), min_size=2, max_size=2), st.integers(0, 2**31))
+def test_mutants_stay_in_the_unit_cube(corner, seed):
+    mutant = mutated(np.full(5, corner[0]), np.full(5, corner[1]), np.random.default_rng(seed))
+    assert mutant.min() >= 0
+    assert mutant.max() <= 1

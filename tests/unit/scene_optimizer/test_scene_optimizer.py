@@ -222,3 +222,13 @@ def test_comes_back_to_a_needle_that_a_smooth_model_does_not_see(seed):
         optimizer.tell(needle, risk(0, needle))
     asked = drive(optimizer, 100, risk)
     assert (np.abs(asked[30:] - needle)[:, :8] < 0.12).all(axis=1).mean() > 0.3  # of anywhere: 4e-6
+
+
+@settings(deadline=None)
+@given(st.lists(returns, min_size=1, max_size=30), st.floats(0.01, 1))
+def test_running_maximum_rises_towards_the_largest_return_and_never_past_it(values, rate):
+    maximum, before = RunningMaximum(rate), -math.inf
+    for count, value in enumerate(values, start=1):
+        maximum.score(value)
+        assert before <= maximum.smoothed <= maximum.largest == max(values[:count])
+        before = maximum.smoothed

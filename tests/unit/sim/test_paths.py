@@ -200,3 +200,8 @@ def test_every_cap_can_be_braked_to(radius, turn):
 def test_a_heading_that_passes_pi_is_no_bend():
     got = bends(with_headings(math.pi - 0.01, -math.pi + 0.01, -math.pi + 0.01), LIMITS)
     assert max(got[HERE]) == pytest.approx(0.02 / BODY_M)
+
+
+def test_of_a_lane_shorter_than_the_way_to_a_step_its_beginning_stays():
+    lines = [np.array(line) for line in ([(0.0, 0.0), (3.0, 0.0)], [(3.0, 0.3), (9.0, 0.3)], [(9.0, 0.3), (50.0, 0.3)])]
+    np.testing.assert_allclose(path_along(lines, [9.0, 8.0, 7.0])[[X, Y]].T, [(0, 0), (3, 0.3), (9, 0.3), (50, 0.3)])

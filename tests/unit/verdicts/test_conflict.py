@@ -5,9 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from risk_sac.records import ConflictType
+from risk_sac.verdicts.along import towards
 from risk_sac.verdicts.conflict import find_conflict, unresponsive
+from risk_sac.verdicts.path import polyline, pose_at, project
 from tests.unit.verdicts.staged import (
     LANE_M,
     crossing_car,
@@ -120,3 +124,21 @@ def test_a_crossing_vehicle_that_brakes_is_trusted_until_the_two_would_meet(foun
     assert conflict.type is ConflictType.CROSSING
     assert conflict.noticed_s == pytest.approx(1.7, abs=0.25)
     assert conflict.time_s == pytest.approx(3.0, abs=0.15)
+
+
+@given(st.floats(-9.0, 9.0))
+def test_a_wrapped_offset_says_what_the_place_says(across):
+    offset = (across + LANE_M / 2) % LANE_M - LANE_M / 2
+    assert towards(across, offset, LANE_M) == pytest.approx(towards(across, math.nan, LANE_M))
+
+
+@given(
+    st.lists(st.tuples(st.floats(-50, 50), st.floats(-50, 50)), min_size=2, max_size=8, unique=True), st.floats(0, 1)
+)
+def test_a_point_of_the_path_projects_onto_itself(points, share):
+    x, y = np.array(points).T
+    path = polyline(x, y)
+    here = pose_at(path, share * path.s[-1])
+    s, left, _ = project(path, 0, here[0], here[1])
+    assert left == pytest.approx(0.0, abs=1e-6)
+    assert pose_at(path, s)[:2] == pytest.approx(here[:2], abs=1e-5)

@@ -175,3 +175,7 @@ def kind(judged: dict[str, Any] | None = None, **changes: Any) -> FailureKind:
 )
 def test_a_kind_is_told_by_its_edges(changes, field, value):
     assert getattr(kind(**changes), field) == value
+
+
+def test_who_comes_closer_is_more_critical_than_who_stands():
+    assert braking(25.0, 10.0, 0.0, -5.0) > braking(25.0, 10.0, 0.0, 0.0)

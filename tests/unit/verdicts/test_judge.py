@@ -114,3 +114,8 @@ def test_an_ego_in_a_turn(turn, name, speed_mps):
     assert found.ego_manoeuvre == name
     if speed_mps == 6.0:
         assert found.conflict_s < 1.0  # foreseen round the bend
+
+
+def test_an_ego_that_sets_off_again_where_it_has_just_stopped_is_starting():
+    ego = straight(0.0, 0.0, 0.0, 6.0, (0.5, -6.0), (1.6, 2.0))
+    assert judged(stage(ego, straight(23.0, 0.0, 0.0, 0.0))).ego_response == "starting"

@@ -112,3 +112,11 @@ def test_a_crash_of_the_simulator_may_have_been_a_failure_or_none(finished):
     assert (found.refused, found.unended, found.played, found.failures.count) == (1, 1, 4, 1)
     assert found.failures.low == clopper_pearson(1, 5)[0]
     assert found.failures.high == clopper_pearson(2, 5)[1]
+
+
+def test_an_ego_that_failed_to_drive_may_have_failed_or_not(finished):
+    run = run_of(finished, "...f.")
+    invalid = run.records[4].model_copy(update={"outcome": Outcome.INVALID, "reason": "ego_deadline"})
+    found = drawn(replace(run, records=(*run.records[:4], invalid)))
+    assert (found.refused, found.unended, found.played, found.failures.count) == (0, 1, 4, 1)
+    assert (found.failures.low, found.failures.high) == (clopper_pearson(1, 5)[0], clopper_pearson(2, 5)[1])

@@ -152,3 +152,11 @@ def test_a_campaigns_folder_is_told_with_what_is_unfinished_or_damaged_in_it(tmp
     ]
     assert "is not finished" in found.missing[0].reason
     assert [run.spec.id for run in found.undrawn] == ["low-iid-undisturbed-0", "low-iid-random-0"]
+
+
+def test_a_family_whose_place_on_a_map_is_gone_is_named_and_the_others_are_told(spec, monkeypatch, tmp_path):
+    monkeypatch.setenv("RISK_SAC_PLACES", str(tmp_path))
+    gone = CampaignSpec.model_validate(spec.model_dump() | {"families": ("low", "junction_0123456789ab")})
+    for text in both(compare(gone, [], "")):
+        assert "junction_0123456789ab: family: there is no" in text
+        assert "posted limit" in text

@@ -94,3 +94,14 @@ def test_a_disk_that_refuses_is_a_storage_error(shelf, folder):
         add(shelf)
     with pytest.raises(NotFoundError):
         shelf.get(network.id, "default")
+
+
+@pytest.mark.parametrize(
+    "name", ["", "..", "../default", "n0", "nffffffffffffffff", ".incoming", "n" + "0" * 16 + "/.."]
+)
+def test_only_ids_that_were_given_out_are_found(shelf, name):
+    add(shelf)
+    with pytest.raises(NotFoundError):
+        shelf.get(name, None)
+    with pytest.raises(NotFoundError):
+        shelf.delete(name, None)

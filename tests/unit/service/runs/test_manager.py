@@ -125,3 +125,10 @@ def test_worker_hours_are_used_up_when_they_are_reached():
     with pytest.raises(QuotaError, match=r"has used 2.00 worker hours within 24; wanted at most 2") as refusal:
         check_quota(usage(hours=2.0), 1, SETTINGS)
     assert refusal.value.retry_after_s > 0
+
+
+@pytest.mark.parametrize(("slots", "wanted"), [(math.inf, 7), (3, 3), (0, 0)])
+def test_as_many_are_at_work_as_may_be_and_as_there_is_room_for(store, tmp_path, slots, wanted):
+    executor = Scripted()
+    executor.slots = slots
+    assert Manager(ServiceSettings(data_dir=tmp_path, max_workers=7), store, executor).workers == wanted
