@@ -32,17 +32,13 @@ V1 = "/ {} rw - cgroup cgroup rw,cpu,cpuacct"
 @pytest.mark.parametrize(
     ("cgroup", "mount", "files", "wanted"),
     [
-        ("0::/a/b", V2, {}, 8),
         ("0::/a/b", V2, {"a/b/cpu.max": "max 100000\n", "a/cpu.max": "max 100000\n"}, 8),
         ("0::/a/b", V2, {"a/b/cpu.max": "200000 100000\n"}, 2),
         ("0::/a/b", V2, {"a/b/cpu.max": "max 100000\n", "a/cpu.max": "300000 100000\n"}, 3),
         ("0::/", V2, {"cpu.max": "150000 100000\n"}, 2),
         ("0::/a", V2, {"a/cpu.max": "10000 100000\n"}, 1),
-        ("0::/a", V2, {"a/cpu.max": "9900000 100000\n"}, 8),
         ("0::/docker/1", "/docker/1 {} rw - cgroup2 cgroup2 rw", {"cpu.max": "400000 100000"}, 4),
-        ("0::/docker/1/a", "/docker/1 {} rw - cgroup2 cgroup2 rw", {"a/cpu.max": "400000 100000"}, 4),
         ("4:cpu,cpuacct:/a", V1, {"a/cpu.cfs_quota_us": "250000\n", "a/cpu.cfs_period_us": "100000\n"}, 3),
-        ("4:cpu,cpuacct:/a/b", V1, {"a/cpu.cfs_quota_us": "100000", "a/cpu.cfs_period_us": "100000"}, 1),
         ("4:cpu,cpuacct:/a", V1, {"a/cpu.cfs_quota_us": "-1", "a/cpu.cfs_period_us": "100000"}, 8),
         ("4:memory:/a", V1, {"a/cpu.cfs_quota_us": "100000", "a/cpu.cfs_period_us": "100000"}, 8),
         ("0::/a", V2, {"a/cpu.max": "damaged"}, 8),

@@ -18,16 +18,12 @@ def refuses(check: object, *arguments: object) -> int:
     ("host", "status"),
     [
         ("localhost", 0),
-        ("LOCALHOST:8000", 0),
         ("127.0.0.1:8000", 0),
-        ("[::1]", 0),
         ("[::1]:8000", 0),
         ("search.example:443", 0),
         ("192.168.1.7:8000", 0),  # where the connection came in
         ("192.168.1.8:8000", 421),
-        ("127.0.0.2", 421),
         ("localhost.evil.example", 421),
-        ("evil.example", 421),
         ("localhost@evil.example", 421),
         ("[::1].evil.example", 421),
         ("[::2]", 421),
@@ -55,11 +51,8 @@ def test_a_star_answers_all_hosts_and_no_host_is_none():
         (b"https://friend.example", 0),
         (b"HTTPS://Friend.example", 0),
         (b"http://friend.example", 403),
-        (b"http://localhost:9000", 403),
-        (b"http://localhost", 403),
         (b"https://friend.example.evil.example", 403),
         (b"null", 403),
-        (b"", 403),
         (b"\xff", 403),
     ],
 )

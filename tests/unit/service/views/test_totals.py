@@ -13,7 +13,6 @@ from scipy.stats import mannwhitneyu
 from risk_sac.config import CampaignSpec
 from risk_sac.metrics import MetricsAccumulator
 from risk_sac.records import Grade, Outcome, Repetition, Severity, State, stored, wire
-from risk_sac.verdicts.distinct import DistinctFailures
 from service.store.stored import PlainEpisode
 from service.views.curves import curves, spread
 from service.views.failure_table import failure_table
@@ -112,38 +111,6 @@ def plain_failure(run, index, hit, outcome=FAILURE, phase="search", **changes):
 
 def told(table):
     return json.loads(wire(table))
-
-
-def test_distinct_are_those_that_the_run_counted(ledger):
-    campaign = ledger.create(SPEC)
-    first, second = campaign.runs
-    hits = [
-        collision(judgement=judgement(), ego_speed_mps=5.0),
-        collision(judgement=judgement(), ego_speed_mps=6.0),
-        collision(judgement=judgement(), ego_speed_mps=9.0),
-        collision(judgement=judgement(Grade.FULL_BRAKING, signature="leader"), ego_speed_mps=9.0),
-        collision(judgement=judgement(conflict_s=0.5), ego_speed_mps=9.0),
-        collision(),
-    ]
-    contacts = [plain_failure(first, index, hit) for index, hit in enumerate(hits)]
-    contacts += [
-        plain_failure(second, 0, hits[0]),
-        plain_failure(first, 9, hits[0], phase="evaluation"),
-        plain_failure(first, 10, hits[0], phase="evaluation"),
-    ]
-    counted = DistinctFailures()
-    table = failure_table(campaign, contacts, {})
-    assert table.prevented_by[2:6] == [["r157", "bound"], ["bound"], ["r157", "bound"], []]
-    assert table.distinct == [*(counted.add(hit) for hit in hits), True, True, False]
-    assert table.distinct[:6] == [True, False, True, True, True, True]
-    assert [(kind.name, kind.failures, kind.distinct, kind.preventable) for kind in table.kinds] == [
-        ("cut-in, straight", 7, 5, 7),
-        ("leader", 1, 1, 0),
-        ("unjudged adversary vehicle", 1, 1, 0),
-    ]
-    assert [kind.signature for kind in table.kinds] == ["cut-in, straight", "leader", None]
-    assert table.kind == [0, 0, 0, 1, 0, 2, 0, 0, 0]
-    assert (table.grade[5], table.conflict_type[5], table.hidden[5], table.broke[5]) == (None, None, None, [])
 
 
 def test_the_headline_has_the_first_of_a_kind_over_all_runs_that_is_not_minor_and_repeats(ledger):
