@@ -115,8 +115,3 @@ def test_an_export_is_the_same_file_each_time(tmp_path: Path, exported: Callable
         again = tmp_path / out.name
         assert main(["export", str(BUNDLE), "--format", name, "--out", str(again)]) == 0
         assert again.read_bytes() == out.read_bytes(), f"{out.name} is not what is exported now: `make examples`"
-
-
-def test_there_is_one_example_of_each_format() -> None:
-    examples = {file.name for file in FOLDER.iterdir() if file.suffix not in (".npz", ".svg")}
-    assert examples == {example(name).name for name in FormatName}

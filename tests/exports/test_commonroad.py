@@ -1,7 +1,6 @@
 """CommonRoad scenarios, read by commonroad-io and put before CommonRoad's checker."""
 
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from risk_sac.failures.export.commonroad import ACTORS, LANELETS, STATES
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.net import colour
-from tests.exports.conftest import CHECKERS, CM, ask_checkers, checked
+from tests.exports.conftest import CM, ask_checkers, checked
 from tests.exports.make_examples import FAMILIES
 
 NAMES = {"failure.xml": 1, "failure-as-recorded.xml": 0}
@@ -21,11 +20,6 @@ NAMES = {"failure.xml": 1, "failure-as-recorded.xml": 0}
 
 def read(file: Path, frames: int) -> Any:
     return json.loads(ask_checkers("read_commonroad.py", file, str(frames)))
-
-
-@pytest.mark.skipif("CI" not in os.environ, reason="readers of exports may be missing")
-def test_the_readers_of_exports_are_installed() -> None:
-    assert CHECKERS.exists()
 
 
 @checked

@@ -87,9 +87,3 @@ def test_runs_that_differ_in_their_odd_alone_keep_their_specs_and_ids_apart(tmp_
     assert len({json.dumps(spec["odd"]) for spec in specs.values()}) == 2
     assert set(table["run_id"].to_pylist()) == set(specs)
     assert len(set(table["id"].to_pylist())) == table.num_rows == 4
-
-
-def test_what_is_no_run_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", str(tmp_path), "--format", "parquet", "--out", str(tmp_path / "e.parquet")]) == 2
-    assert "holds no run" in capsys.readouterr().err
-    assert not (tmp_path / "e.parquet").exists()

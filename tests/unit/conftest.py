@@ -1,15 +1,14 @@
 import math
-from collections.abc import Callable
 
 import pytest
 
 from risk_sac.execution.messages import EpisodeDone
-from risk_sac.records import Outcome, RunMetrics
+from risk_sac.records import Outcome
 from tests.builders import collision, episode_record, judgement, run_metrics
 
 
 @pytest.fixture
-def metrics() -> RunMetrics:
+def metrics():
     return run_metrics(
         4,
         rejected=1,
@@ -44,13 +43,13 @@ def metrics() -> RunMetrics:
 
 
 @pytest.fixture
-def episode(metrics: RunMetrics) -> Callable[..., EpisodeDone]:
+def episode(metrics):
     """Builds the report of an episode; a contact has a minimum TTC of NaN, all have one of infinity."""
     contact = collision(
         early_min_ttc_s=math.nan, early_min_robustness=-math.inf, verdicts={"feasible": True}, judgement=judgement()
     )
 
-    def build(index: int, outcome: Outcome = Outcome.SAFE, phase: str = "search", wall_s: float = 0.5) -> EpisodeDone:
+    def build(index, outcome=Outcome.SAFE, phase="search", wall_s=0.5):
         touched = outcome in (Outcome.FAILURE, Outcome.DEGENERATE)
         record = episode_record(
             index,

@@ -53,7 +53,7 @@ def random_frame(generator: np.random.Generator, n: int, spread_m: float) -> Fra
     return frame_of([(*ego, *generator.uniform(-15, 15, 2)), *map(tuple, np.hstack((rows, velocity)))])
 
 
-def test_overlap_agrees_with_shapely_on_10000_random_pose_pairs() -> None:
+def test_overlap_agrees_with_shapely_on_10000_random_pose_pairs():
     generator = np.random.default_rng(0)
     found, expected, distances = [], [], []
     for _ in range(100):
@@ -71,7 +71,7 @@ def test_overlap_agrees_with_shapely_on_10000_random_pose_pairs() -> None:
     assert touching.sum() <= 5
 
 
-def test_overlapping_pairs_are_the_pairs_that_shapely_sees_intersect() -> None:
+def test_overlapping_pairs_are_the_pairs_that_shapely_sees_intersect():
     generator = np.random.default_rng(2)
     found = 0
     for _ in range(300):
@@ -85,8 +85,8 @@ def test_overlapping_pairs_are_the_pairs_that_shapely_sees_intersect() -> None:
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.3, math.pi / 2, -2.5])
-def test_bodies_touch_at_contact_and_not_a_millimetre_before(heading: float) -> None:
-    def rear_end(gap_m: float) -> bool:
+def test_bodies_touch_at_contact_and_not_a_millimetre_before(heading):
+    def rear_end(gap_m):
         ahead = 4.6 + gap_m
         view = view_of(
             [(0, 0, heading, 4.6, 1.85), (ahead * math.cos(heading), ahead * math.sin(heading), heading, 4.6, 1.85)]
@@ -97,13 +97,8 @@ def test_bodies_touch_at_contact_and_not_a_millimetre_before(heading: float) -> 
     assert not rear_end(0.001)
 
 
-def test_gap_of_aligned_bodies_is_the_hand_computed_distance() -> None:
-    view = view_of([(0, 0, 0, 4, 2), (10, 0, 0, 4, 2), (0, 5, 0, 4, 2), (7, 6, 0, 4, 2), (7, 6, math.pi / 2, 2, 4)])
-    assert view.gap.tolist() == pytest.approx([6.0, 3.0, 5.0, 5.0])  # ahead, alongside, 3-4-5 diagonal, turned
-
-
 @pytest.mark.parametrize("spread_m", [9.0, 25.0])
-def test_gap_is_the_distance_that_shapely_measures(spread_m: float) -> None:
+def test_gap_is_the_distance_that_shapely_measures(spread_m):
     generator = np.random.default_rng(1)
     for _ in range(20):
         frame = random_frame(generator, 100, spread_m)
@@ -113,7 +108,7 @@ def test_gap_is_the_distance_that_shapely_measures(spread_m: float) -> None:
         assert np.all((gap > 0) == (distance > 0))
 
 
-def test_a_lone_ego_has_an_empty_view() -> None:
+def test_a_lone_ego_has_an_empty_view():
     view = view_of([(3, 4, 1, 4.6, 1.85)])
     assert view.overlap.shape == view.gap.shape == time_to_contact(view).shape == (0,)
     assert line_of_sight(view, np.zeros(0, dtype=np.bool_)).shape == (0,)
@@ -137,7 +132,7 @@ def test_a_lone_ego_has_an_empty_view() -> None:
         pytest.param((0, 0.5, 0, 4.6, 1.85, 20, 0), 0.0, id="already touching"),
     ],
 )
-def test_time_to_contact_matches_the_hand_computed_value(other: tuple[float, ...], ttc_s: float) -> None:
+def test_time_to_contact_matches_the_hand_computed_value(other, ttc_s):
     assert time_to_contact(view_of([(0, 0, 0, 4.6, 1.85, 20, 0), other]))[0] == pytest.approx(ttc_s)
 
 
@@ -157,7 +152,7 @@ def stepped_time_to_contact(frame: Frame, horizon_s: float, step_s: float) -> Fl
     return first
 
 
-def test_time_to_contact_agrees_with_stepping_the_bodies_forward() -> None:
+def test_time_to_contact_agrees_with_stepping_the_bodies_forward():
     generator, horizon_s, step_s = np.random.default_rng(2), 4.0, 0.01
     hits = 0
     for _ in range(8):
@@ -207,7 +202,7 @@ def seen_by_rays(frame: Frame, occludes: Bools) -> tuple[Bools, Bools]:
     return seen, sure
 
 
-def test_line_of_sight_agrees_with_shapely_rays() -> None:
+def test_line_of_sight_agrees_with_shapely_rays():
     generator = np.random.default_rng(3)
     compared, hidden = 0, 0
     for _ in range(60):
@@ -221,16 +216,7 @@ def test_line_of_sight_agrees_with_shapely_rays() -> None:
     assert hidden > 60
 
 
-def test_a_pedestrian_behind_a_car_is_hidden_until_it_steps_out() -> None:
-    car = (20.0, -3.3, 0.0, 4.6, 1.85)
-    occludes = np.array([True, False])
-    hidden = view_of([(0, 0, 0, 4.6, 1.85), car, (26.0, -4.3, 0, 0.5, 0.5)])
-    out = view_of([(0, 0, 0, 4.6, 1.85), car, (26.0, -1.5, 0, 0.5, 0.5)])
-    assert line_of_sight(hidden, occludes).tolist() == [True, False]
-    assert line_of_sight(out, occludes).tolist() == [True, True]
-
-
-def test_the_view_does_not_depend_on_where_the_world_has_its_origin() -> None:
+def test_the_view_does_not_depend_on_where_the_world_has_its_origin():
     frame = random_frame(np.random.default_rng(4), 20, 20.0)
     turn, shift = 1.1, (1000.0, -300.0)
     cos, sin = math.cos(turn), math.sin(turn)

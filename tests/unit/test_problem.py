@@ -1,18 +1,21 @@
+"""What is used otherwise than it was asked for is said."""
+
+from contextlib import closing
+
 import pytest
 
+from risk_sac.adjustments import adjustments
 from risk_sac.config import (
     CampaignSpec,
-    DynamicElements,
     EgoConfig,
-    Environment,
-    Interval,
     Odd,
     Requirement,
     RunSpec,
-    Scenery,
 )
 from risk_sac.errors import ConfigError, FormulaError, OddError
 from risk_sac.problem import Problem, checked_campaign
+from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.tryout import ALIKE_M, LEFT, MET_M, RIGHT, meet
 
 
 def problem(family: str = "mixed", **settings: object) -> Problem:
@@ -24,85 +27,25 @@ def wanted_ttc_s(posed: Problem) -> float:
     return float(safe.formula.rpartition(" ")[2])
 
 
-def bounds(posed: Problem, name: str) -> tuple[float, float]:
-    [parameter] = [p for p in posed.space.parameters if p.name == name]
-    return parameter.low, parameter.high
-
-
-def test_the_default_odd_leaves_the_whole_scene_space() -> None:
-    for family in ("low", "mixed", "dense"):
-        posed = problem(family)
-        assert posed.space.parameters == posed.family.space.parameters
-
-
-def test_a_users_odd_narrows_the_scene_space_and_the_requirements() -> None:
-    odd = Odd(
-        environment=Environment(friction=Interval(low=0.6, high=0.7), visibility_m=Interval(low=40, high=500)),
-        dynamic=DynamicElements(ego_speed_mps=Interval(low=8, high=10)),
-    )
-    posed = problem(odd=odd)
-    assert bounds(posed, "ego_speed_mps") == (8, 10)
-    assert bounds(posed, "friction") == (0.6, 0.7)
-    assert bounds(posed, "visibility_m") == (40, 500)
-
-
-def test_day_and_night_together_are_a_parameter_and_one_of_them_is_none() -> None:
-    both = problem(odd=Odd(environment=Environment(time_of_day=("day", "night"))))
-    assert bounds(both, "night") == (0, 1)
-    assert "night" not in problem(odd=Odd(environment=Environment(time_of_day=("night",)))).space.names
-
-
-def test_an_odd_without_signals_leaves_the_zebra() -> None:
-    low, high = bounds(problem(odd=Odd(scenery=Scenery(signal_types=("none",)))), "crossing")
-    assert low == 0
-    assert high < 0.5
-
-
 @pytest.mark.parametrize(
-    ("family", "odd", "field"),
+    ("family", "part", "field", "value"),
     [
-        ("dense", Odd(scenery=Scenery(signal_types=("none",))), "odd.scenery.signal_types"),
-        ("mixed", Odd(scenery=Scenery(crossing_types=("none",))), "odd.scenery.crossing_types"),
-        (
-            "mixed",
-            Odd(scenery=Scenery(signal_types=("none",), crossing_types=("signalised",))),
-            "odd.scenery.crossing_types",
-        ),
-        ("mixed", Odd(dynamic=DynamicElements(actor_kinds=("vehicle",))), "odd.dynamic.actor_kinds"),
-        ("low", Odd(dynamic=DynamicElements(actor_kinds=("pedestrian",))), "odd.dynamic.actor_kinds"),
-        ("low", Odd(scenery=Scenery(lanes=Interval(low=1, high=2))), "odd.scenery.lanes"),
-        ("low", Odd(scenery=Scenery(speed_limit_mps=Interval(low=20, high=30))), "odd.scenery.speed_limit_mps"),
-        ("low", Odd(environment=Environment(friction=Interval(low=0.1, high=0.3))), "odd.environment.friction"),
-        ("low", Odd(environment=Environment(time_of_day=("night",))), "odd.environment.time_of_day"),
-        ("low", Odd(dynamic=DynamicElements(ego_speed_mps=Interval(low=0, high=5))), "odd.dynamic.ego_speed_mps"),
+        ("dense", "scenery", "signal_types", ("none",)),
+        ("mixed", "scenery", "crossing_types", ("none",)),
+        ("mixed", "dynamic", "actor_kinds", ("vehicle",)),
+        ("low", "scenery", "lanes", {"low": 1, "high": 2}),
+        ("low", "scenery", "speed_limit_mps", {"low": 20, "high": 30}),
+        ("low", "environment", "time_of_day", ("night",)),
+        ("low", "dynamic", "ego_speed_mps", {"low": 0, "high": 5}),
     ],
 )
-def test_an_odd_that_leaves_no_scene_is_an_error_that_names_its_field(family: str, odd: Odd, field: str) -> None:
+def test_an_odd_that_leaves_no_scene_is_an_error_that_names_its_field(family, part, field, value):
     with pytest.raises(OddError) as refused:
-        problem(family, odd=odd)
-    assert refused.value.field == field
-    assert "wanted" in str(refused.value)
+        problem(family, odd=Odd.model_validate({part: {field: value}}))
+    assert refused.value.field == f"odd.{part}.{field}"
 
 
-def test_a_users_requirement_joins_the_shipped_ones() -> None:
-    mine = Requirement(name="wide_berth", formula="pedestrian_gap_m >= 2", scale=2)
-    assert problem(requirements=(mine,)).requirements[-1] == mine
-
-
-def test_a_requirement_may_not_take_a_shipped_name() -> None:
-    with pytest.raises(ConfigError, match="safe_ttc") as refused:
-        problem(requirements=(Requirement(name="safe_ttc", formula="ttc_s >= 9", scale=1),))
-    assert refused.value.field == "requirements[0].name"
-
-
-def test_a_user_says_which_shipped_requirements_count() -> None:
-    counts = {r.name: r.counts for r in problem(requirements=(Requirement(name="safe_ttc"),)).requirements}
-    assert counts == {r.name: r.counts for r in problem().requirements} | {"safe_ttc": "failure"}
-    reported = problem("dense", requirements=(Requirement(name="no_red_light_entry", counts="report"),)).requirements
-    assert [r.counts for r in reported if r.name == "no_red_light_entry"] == ["report"]
-
-
-def test_an_episode_goes_on_to_the_horizon_where_more_than_a_contact_can_make_it_fail() -> None:
+def test_an_episode_goes_on_to_the_horizon_where_more_than_a_contact_can_make_it_fail():
     assert problem("dense").contact_alone_counts
     assert not problem("dense", ego=EgoConfig(driver="idm-aeb")).contact_alone_counts
     assert not problem("dense", requirements=(Requirement(name="safe_ttc"),)).contact_alone_counts
@@ -110,20 +53,7 @@ def test_an_episode_goes_on_to_the_horizon_where_more_than_a_contact_can_make_it
     assert problem("dense", requirements=(mine,)).contact_alone_counts
 
 
-@pytest.mark.parametrize(
-    ("requirement", "field"),
-    [
-        (Requirement(name="no_contact", counts="report"), "requirements[0].counts"),
-        (Requirement(name="wide_berth"), "requirements[0].formula"),
-    ],
-)
-def test_a_contact_counts_and_an_own_requirement_needs_a_formula(requirement: Requirement, field: str) -> None:
-    with pytest.raises(ConfigError) as refused:
-        problem(requirements=(requirement,))
-    assert refused.value.field == field
-
-
-def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs() -> None:
+def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs():
     spec = CampaignSpec(
         families=("low", "mixed"), requirements=(Requirement(name="soon", formula="eventually(ttc_s > 1)", scale=1),)
     )
@@ -133,7 +63,7 @@ def test_a_bad_formula_anywhere_in_a_campaign_is_found_before_it_runs() -> None:
     assert refused.value.position == 0
 
 
-def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_it_says_it_is() -> None:
+def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_it_says_it_is():
     """RSS decides which scenes are refused: by an ego's own time a slow one would be offered the milder ones."""
     egos = [EgoConfig(reaction_time_s=t) for t in (0.1, 0.5, 1.0)]
     egos += [EgoConfig(driver=name) for name in ("rss", "idm-aeb", "broken", "r157")]
@@ -147,16 +77,55 @@ def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_
     assert wanted_s[-1] == 6.0
 
 
-def test_rss_reckons_with_the_worst_friction() -> None:
-    assert problem(
-        odd=Odd(environment=Environment(friction=Interval(low=0.6, high=1)))
-    ).rss.brake_min_mps2 == pytest.approx(0.6 * 9.81)
-
-
-def test_a_method_whose_package_is_not_installed_is_refused_before_it_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_method_whose_package_is_not_installed_is_refused_before_it_runs(monkeypatch):
     campaign = CampaignSpec(families=("low",), methods=("random", "sb3-sac"))
     checked_campaign(campaign)
     monkeypatch.setattr("risk_sac.problem.find_spec", lambda name: None)
     with pytest.raises(ConfigError, match=r"'sb3-sac', which needs stable_baselines3; pip install") as refusal:
         checked_campaign(campaign)
     assert refusal.value.field == "methods"
+
+
+@pytest.fixture(scope="module")
+def sim():
+    with closing(SumoSimulation(EgoConfig())) as simulation:
+        yield simulation
+
+
+@pytest.mark.parametrize("family", ["low", "mixed", "dense"])
+def test_the_ego_meets_a_pedestrian_on_its_way_and_touches_none_from_either_side(sim, family):
+    left_m, right_m = (meet(sim, family, side) for side in (LEFT, RIGHT))
+    assert 0.0 < min(left_m, right_m) < MET_M
+    assert abs(left_m - right_m) <= ALIKE_M
+
+
+def said(families: tuple[str, ...] = ("low", "mixed", "dense"), ego: object = None, **odd: object) -> list[str]:
+    return [str(each) for each in adjustments(CampaignSpec(families=families, odd=odd, ego=ego or {}))]
+
+
+def test_nothing_is_said_of_an_odd_that_is_used_as_it_is():
+    assert said() == []
+    assert said(environment={"friction": {"low": 0.6, "high": 0.7}}) == []
+    assert said(("mixed",), environment={"time_of_day": ["day", "night"], "precipitation": ["rain"]}) == []
+
+
+@pytest.mark.parametrize(
+    ("family", "part", "asked", "used"),
+    [
+        ("mixed", "environment", {"friction": {"low": 0.2, "high": 0.9}}, "used [0.4, 0.9] in mixed"),
+        ("low", "environment", {"time_of_day": ["day", "night"]}, "used {day} in low"),
+        ("mixed", "dynamic", {"pedestrian_speed_mps": {"low": 0, "high": 3}}, "used [0, 2] in mixed"),
+    ],
+)
+def test_what_is_clipped_is_said(family, part, asked, used):
+    (words,) = said((family,), **{part: asked})
+    assert used in words
+    assert words.startswith(f"odd.{part}.{next(iter(asked))}: ")
+
+
+def test_a_shipped_requirement_that_a_family_lacks_is_said_and_counts_where_there_is_one():
+    spec = CampaignSpec(families=("low", "mixed"), requirements=(Requirement(name="pedestrian_gap"),))
+    checked_campaign(spec)
+    (adjustment,) = adjustments(spec)
+    assert (adjustment.families, adjustment.field, adjustment.used) == (("low",), "requirements[0]", "nothing")
+    assert "pedestrian_gap" in adjustment.why

@@ -60,7 +60,7 @@ OTHERS: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
 
 
 @pytest.mark.parametrize("name", [*QUICK, *OTHERS])
-def test_what_foreign_code_changes_holds_for_it_and_not_for_us(name: str) -> None:
+def test_what_foreign_code_changes_holds_for_it_and_not_for_us(name):
     change, read = (QUICK | OTHERS)[name]
     state: Preserved = preserved()
     block = state.quick if name in QUICK else state
@@ -76,7 +76,7 @@ def test_what_foreign_code_changes_holds_for_it_and_not_for_us(name: str) -> Non
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_what_a_quick_block_overlooks_is_put_right_at_the_next_block_of_all(name: str) -> None:
+def test_what_a_quick_block_overlooks_is_put_right_at_the_next_block_of_all(name):
     change, read = OTHERS[name]
     state, before = preserved(), read()
     with state:
@@ -89,7 +89,7 @@ def test_what_a_quick_block_overlooks_is_put_right_at_the_next_block_of_all(name
     assert read() == before
 
 
-def test_what_it_puts_back_is_forgotten_and_an_error_passes(tmp_path: Path) -> None:
+def test_what_it_puts_back_is_forgotten_and_an_error_passes(tmp_path):
     state, here = preserved(), os.getcwd()
     with pytest.raises(SystemExit), state:
         sys.exit(os.chdir(tmp_path))
@@ -104,13 +104,13 @@ def test_what_it_puts_back_is_forgotten_and_an_error_passes(tmp_path: Path) -> N
         os.chdir(here)
 
 
-def test_a_process_that_foreign_code_forks_does_not_come_back() -> None:
+def test_a_process_that_foreign_code_forks_does_not_come_back():
     with preserved().quick:
         child = os.fork()
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1
 
 
-def test_a_thread_that_never_ends_does_not_keep_the_process() -> None:
+def test_a_thread_that_never_ends_does_not_keep_the_process():
     program = (
         "import threading, time; from risk_sac.process_state import leave; "
         "threading.Thread(target=time.sleep, args=(600,)).start(); print('done'); leave(3)"
@@ -119,7 +119,7 @@ def test_a_thread_that_never_ends_does_not_keep_the_process() -> None:
     assert (done.returncode, done.stdout) == (3, "done\n"), done.stderr
 
 
-def test_a_folder_that_is_gone_is_no_error(tmp_path: Path) -> None:
+def test_a_folder_that_is_gone_is_no_error(tmp_path):
     here, gone = os.getcwd(), tmp_path / "gone"
     gone.mkdir()
     os.chdir(gone)

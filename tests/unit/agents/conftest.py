@@ -1,5 +1,3 @@
-from collections.abc import Callable, Iterator
-
 import numpy as np
 import pytest
 import torch
@@ -8,7 +6,7 @@ from risk_sac.agents.replay import Transition
 
 
 @pytest.fixture(autouse=True)
-def one_thread() -> Iterator[None]:
+def one_thread():
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     yield
@@ -16,8 +14,8 @@ def one_thread() -> Iterator[None]:
 
 
 @pytest.fixture
-def transition() -> Callable[..., Transition]:
-    def make(value: float = 0.0, *, observation_size: int = 3, action_size: int = 2, **changes: object) -> Transition:
+def transition():
+    def make(value=0.0, *, observation_size=3, action_size=2, **changes):
         fields = {
             "observation": np.full(observation_size, value, np.float32),
             "action": np.full(action_size, np.tanh(value), np.float32),
@@ -35,8 +33,8 @@ def transition() -> Callable[..., Transition]:
 
 
 @pytest.fixture
-def random_transition(transition: Callable[..., Transition]) -> Callable[..., Transition]:
-    def make(generator: np.random.Generator, observation_size: int = 3, action_size: int = 2) -> Transition:
+def random_transition(transition):
+    def make(generator, observation_size=3, action_size=2):
         return transition(
             observation=generator.standard_normal(observation_size).astype(np.float32),
             action=generator.uniform(-1, 1, action_size).astype(np.float32),

@@ -1,7 +1,17 @@
+from itertools import pairwise
+
 import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from risk_sac.agents.controls import RandomAgent, ScriptedAgent
+from risk_sac.agents.decisions import Decision, Held
+from risk_sac.agents.follower import ScriptFollower
 from risk_sac.observation_layout import PER_ADVERSARY, X_M, Y_M
+from risk_sac.risk.reward import shaped_reward
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scripts.motions import SIZE, Genes
 
 NOTHING = np.zeros(1, dtype=np.float32)
 ADVERSARIES = 3
@@ -12,32 +22,7 @@ def played(agent: RandomAgent, steps: int) -> np.ndarray:
     return np.array([agent.act(NOTHING) for _ in range(steps)]).reshape(steps, ADVERSARIES, 2)
 
 
-def test_actions_are_uniform_and_in_the_space() -> None:
-    actions = played(RandomAgent(2 * ADVERSARIES, seed=0), 20_000)
-    assert actions.dtype == np.float32
-    assert np.abs(actions).max() <= 1.0
-    shares, _ = np.histogram(actions, bins=4, range=(-1, 1))
-    np.testing.assert_allclose(shares / actions.size, 0.25, atol=0.02)
-
-
-def test_each_adversarys_action_is_held_for_a_second_on_average_and_changes_as_a_whole() -> None:
-    actions = played(RandomAgent(2 * ADVERSARIES, seed=1), 20_000)
-    changed = np.diff(actions, axis=0) != 0.0
-    assert np.array_equal(changed[..., 0], changed[..., 1])
-    np.testing.assert_allclose(changed[..., 0].mean(axis=0), 0.1, atol=0.01)
-    both = (changed[:, 0, 0] & changed[:, 1, 0]).mean()  # each by itself: 0.1 · 0.1
-    np.testing.assert_allclose(both, 0.01, atol=0.004)
-
-
-def test_an_action_once_given_stays_as_it_is() -> None:
-    agent = RandomAgent(2 * ADVERSARIES, seed=2)
-    first = agent.act(NOTHING)
-    kept = first.copy()
-    played(agent, 50)
-    assert np.array_equal(first, kept)
-
-
-def test_a_restored_agent_goes_on_as_the_one_that_was_saved() -> None:
+def test_a_restored_agent_goes_on_as_the_one_that_was_saved():
     agent = RandomAgent(2 * ADVERSARIES, seed=3)
     played(agent, 7)
     state = agent.state()
@@ -51,10 +36,101 @@ def seen(x_m: float, y_m: float, cos: float) -> list[float]:
     return [x_m / X_M, y_m / Y_M, 0.0, 0.0, cos, *[0.0] * (PER_ADVERSARY - 5)]
 
 
-def test_those_ahead_cut_in_and_brake_and_all_others_keep_on() -> None:
+def test_those_ahead_cut_in_and_brake_and_all_others_keep_on():
     ahead_left, beside, oncoming, crossing = seen(12, 3.5, 1), seen(2, -3.5, 1), seen(40, 3.5, -1), seen(20, 5, 0)
     observation = np.array([*ahead_left, *beside, *oncoming, *crossing, 0.5, 0.5], np.float32)
     action = ScriptedAgent(8, seed=0).act(observation)
     assert action.tolist() == [-0.5, -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     in_the_path = ScriptedAgent(2, seed=0).act(np.array(seen(12, 0.25, 1), np.float32))
     assert in_the_path.tolist() == [-0.5, -0.25]
+
+
+def test_an_action_is_held_and_an_episode_begins_with_a_new_one():
+    held, drawn = Held(3), iter(np.arange(10.0))
+
+    def acts(steps):
+        return [float(held.act(lambda: np.array([next(drawn)]))[0]) for _ in range(steps)]
+
+    assert acts(7) == [0, 0, 0, 1, 1, 1, 2]
+    held.begin()
+    assert acts(4) == [3, 3, 3, 4]
+
+
+def test_three_steps_make_one_transition(transition):
+    decision = Decision(3, 0.5)
+    steps = [
+        transition(value, risk_reward=value, cost=cost, robustness=value, next_robustness=value + 1.0)
+        for value, cost in ((1.0, 0.4), (2.0, 0.2), (4.0, 0.8))
+    ]
+    assert [decision.add(step) for step in steps[:2]] == [None, None]
+    made = decision.add(steps[2])
+    assert made.risk_reward == 1.0 + 0.5 * 2.0 + 0.25 * 4.0
+    assert made.cost == pytest.approx(0.4 + 0.5 * 0.2 + 0.25 * 0.8)
+    assert (made.robustness, made.next_robustness) == (1.0, 5.0)
+    assert made.observation[0] == 1.0
+    assert made.next_observation[0] == 5.0
+    np.testing.assert_allclose(made.action, np.mean([step.action for step in steps], axis=0))
+    assert decision.add(steps[0]) is None  # the next decision
+
+
+def test_the_end_of_the_world_completes_a_decision_and_that_of_the_horizon_forgets_it(transition):
+    decision = Decision(3, 0.5)
+    decision.add(transition(1.0))
+    ended = decision.add(transition(2.0, terminated=True))
+    assert (ended.risk_reward, ended.terminated) == (1.0 + 0.5 * 2.0, True)
+    decision.add(transition(8.0))
+    decision.begin()  # the horizon cut the decision off
+    first, *others = (decision.add(transition(value)) for value in (1.0, 2.0, 4.0))
+    assert first is None
+    assert others[0] is None
+    assert others[1] is not None
+    assert others[1].risk_reward == 1.0 + 0.5 * 2.0 + 0.25 * 4.0
+
+
+@given(robustness=st.lists(st.floats(-3, 3), min_size=5, max_size=5))
+def test_shaping_of_a_decision_is_the_discounted_sum_of_its_steps(robustness):
+    """sum_i g^i (g phi_{i+1} - phi_i) = g^k phi_k - phi_0."""
+    discount = 0.9
+    pairs = list(pairwise(robustness))
+    each = [shaped_reward(0.0, before, after, discount, 0.0) for before, after in pairs]
+    of_all = shaped_reward(0.0, robustness[0], robustness[-1], discount ** len(pairs), 0.0)
+    assert sum(discount**i * one for i, one in enumerate(each)) == pytest.approx(of_all)
+
+
+MIDDLE = Genes(*[0.5] * SIZE)
+
+
+def follower(*active: float, family: str = "low") -> ScriptFollower:
+    """One whose adversaries are as active as said, at their cue from the first step that counts on."""
+    subject = ScriptFollower(FAMILIES[family])
+    subject.begin(np.array([MIDDLE._replace(active=share, cue=0.0, drive=0.0) for share in active]).ravel())
+    return subject
+
+
+def observed(*places: tuple[float, float] | None) -> np.ndarray:
+    """Neighbours at (x, y), m, at the ego's speed; None: one that has left the net."""
+    rows = [[0.0] * PER_ADVERSARY if p is None else [p[0] / X_M, p[1] / Y_M, 0, 0, 1, 0, 0.6, 0, 0, 1] for p in places]
+    return np.array([*np.ravel(rows), 0.6], np.float32)
+
+
+def test_who_has_left_the_net_does_nothing():
+    action = follower(0.9, 0.9, 0.9).act(observed(None, (12, 3.3), None)).reshape(-1, 2)
+    assert not action[[0, 2]].any()
+    assert action[1].any()
+
+
+def test_it_strikes_at_its_cue_and_begins_anew_with_every_episode():
+    subject, ahead = follower(0.9, 0.0, 0.0), observed((6, 3.3), (12, 3.3), (14, -3.3))
+    drives = [subject.act(ahead)[0] for _ in range(10)]
+    assert drives == pytest.approx([0.0] * 5 + [-1.0] * 5, abs=1e-6)  # 6 m ahead is where it wants to be
+    subject.begin(np.tile(MIDDLE, 3))
+    assert subject.act(ahead)[0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_an_episode_can_stop_a_while_after_the_last_strike():
+    subject, ahead = follower(0.9, 0.0, 0.0), observed((6, 3.3), (12, 3.3), (14, -3.3))
+    steps = 0
+    while not subject.can_stop_early:
+        subject.act(ahead)
+        steps += 1
+    assert steps == 5 + 20 + 30 + 2  # the cue, the strike, and what may come of it

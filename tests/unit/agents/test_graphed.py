@@ -37,7 +37,7 @@ def batches(count: int) -> list[Batch]:
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU with CUDA")
-def test_updates_of_a_graph_are_those_of_the_agent() -> None:
+def test_updates_of_a_graph_are_those_of_the_agent():
     plain, graphed = (SacAgent(*SIZES, AgentConfig(), SacConfig(), 5, "cuda", normalised=True) for _ in range(2))
     update = GraphedUpdate(graphed)
     for batch in batches(WARM_UP + 40):

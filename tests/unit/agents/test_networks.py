@@ -1,3 +1,5 @@
+"""Losses and targets of SAC and DDPG by hand."""
+
 import copy
 import math
 
@@ -9,20 +11,22 @@ from hypothesis import strategies as st
 from torch.distributions import Independent, Normal, TanhTransform, TransformedDistribution
 from torch.nn.functional import layer_norm
 
+from risk_sac.agents.agent import critic_loss, td_target
+from risk_sac.agents.lagrangian import dual_step
 from risk_sac.agents.networks import LOG_STD_MAX, LOG_STD_MIN, Mlp, bounded_log_std, tanh_gaussian
+from risk_sac.agents.sac import actor_loss, soft_value, temperature_loss
+from risk_sac.config import LagrangianConfig
 
 
-def test_log_prob_of_a_hand_computed_case() -> None:
+def test_log_prob_of_a_hand_computed_case():
     action, log_prob = tanh_gaussian(torch.tensor([[0.0]]), torch.tensor([[0.0]]), torch.tensor([[1.0]]))
     # tanh(1) = 0.76159; log N(1; 0, 1) = -1.41894; log(1 - tanh(1)²) = -0.86756
     assert action.item() == pytest.approx(0.7615942)
     assert log_prob.item() == pytest.approx(-1.4189385 + 0.8675617)
 
 
-@given(
-    st.lists(st.tuples(st.floats(-3, 3), st.floats(-3, 1), st.floats(-3, 3)), min_size=1, max_size=6),
-)
-def test_log_prob_agrees_with_torch_distributions(rows: list[tuple[float, float, float]]) -> None:
+@given(st.lists(st.tuples(st.floats(-3, 3), st.floats(-3, 1), st.floats(-3, 3)), min_size=1, max_size=6))
+def test_log_prob_agrees_with_torch_distributions(rows):
     mean, log_std, noise = torch.tensor(rows, dtype=torch.float64).T.unsqueeze(1)  # each 1 x action_size
     base = Independent(Normal(mean, log_std.exp()), 1)
     reference = TransformedDistribution(base, TanhTransform(cache_size=1))
@@ -34,7 +38,7 @@ def test_log_prob_agrees_with_torch_distributions(rows: list[tuple[float, float,
         torch.testing.assert_close(log_prob, reference.log_prob(action), rtol=1e-6, atol=1e-6)
 
 
-def test_log_prob_and_its_gradient_stay_finite_where_tanh_saturates() -> None:
+def test_log_prob_and_its_gradient_stay_finite_where_tanh_saturates():
     mean = torch.tensor([[40.0, -40.0]], requires_grad=True)
     action, log_prob = tanh_gaussian(mean, torch.zeros(1, 2), torch.zeros(1, 2))
     log_prob.sum().backward()
@@ -44,13 +48,8 @@ def test_log_prob_and_its_gradient_stay_finite_where_tanh_saturates() -> None:
     assert torch.isfinite(mean.grad).all()
 
 
-@given(st.floats(-1e6, 1e6))
-def test_log_std_stays_within_its_bounds(raw: float) -> None:
-    assert LOG_STD_MIN <= bounded_log_std(torch.tensor(raw)).item() <= LOG_STD_MAX
-
-
 @pytest.mark.parametrize("normalised", [False, True])
-def test_stacked_networks_equal_separate_ones_in_values_and_gradients(normalised: bool) -> None:
+def test_stacked_networks_equal_separate_ones_in_values_and_gradients(normalised):
     generator = torch.Generator().manual_seed(0)
     stacked = Mlp((5, 16, 12, 3), generator, count=2, normalised=normalised)
     inputs, slope = torch.randn(9, 5, generator=generator), torch.randn(2, 9, 3, generator=generator)
@@ -69,31 +68,8 @@ def test_stacked_networks_equal_separate_ones_in_values_and_gradients(normalised
             torch.testing.assert_close(one[each], other, rtol=1e-5, atol=1e-5)
 
 
-def test_a_normalised_layer_has_mean_0_and_variance_1_before_its_relu() -> None:
-    network = Mlp((1, 2, 1), torch.Generator().manual_seed(0), normalised=True)
-    values = [[[1.0, 3.0]]], [[[0.0, 0.0]]], [[[1.0], [5.0]]], [[[0.5]]]  # raw (x, 3x), scaled (-1, 1) for x > 0
-    for parameter, value in zip(network.parameters(), values, strict=True):
-        parameter.data.copy_(torch.tensor(value))
-    output = network(torch.tensor([[2.0], [70.0], [-4.0]]))[0, :, 0]
-    assert output.tolist() == pytest.approx([5.5, 5.5, 1.5], abs=1e-4)
-
-
-def test_initialisation_follows_the_seed_and_leaves_the_global_generator_alone() -> None:
-    before = torch.get_rng_state()
-    first, same, other = (Mlp((4, 16, 2), torch.Generator().manual_seed(seed)) for seed in (1, 1, 2))
-    assert torch.equal(torch.get_rng_state(), before)
-    assert all(map(torch.equal, first.parameters(), same.parameters()))
-    assert not any(map(torch.equal, first.parameters(), other.parameters()))
-
-
-def test_initial_weights_fill_the_range_of_a_linear_layer() -> None:
-    weight, _ = Mlp((100, 200), torch.Generator().manual_seed(0)).parameters()
-    assert weight.abs().max().item() == pytest.approx(0.1, rel=1e-3)
-    assert weight.std().item() == pytest.approx(0.1 / math.sqrt(3.0), rel=0.02)
-
-
 @pytest.mark.parametrize("normalised", [False, True])
-def test_one_input_gives_what_a_batch_gives_even_after_a_copy_or_a_change(normalised: bool) -> None:
+def test_one_input_gives_what_a_batch_gives_even_after_a_copy_or_a_change(normalised):
     generator = torch.Generator().manual_seed(0)
     network = Mlp((5, 16, 16, 6), generator, normalised=normalised)
     twin = copy.deepcopy(network)
@@ -105,3 +81,54 @@ def test_one_input_gives_what_a_batch_gives_even_after_a_copy_or_a_change(normal
         alone = np.stack([each.respond(row.numpy()).numpy() for row in inputs])
         np.testing.assert_allclose(alone, batch, atol=1e-5)
     assert not torch.allclose(network(inputs), twin(inputs))
+
+
+def test_target_and_soft_value_of_a_hand_computed_case():
+    next_values, log_prob = torch.tensor([[3.0, 3.0], [5.0, 2.0]]), torch.tensor([-2.0, 1.0])
+    value = soft_value(next_values, log_prob, torch.tensor(0.5))
+    assert value.tolist() == [3.0 + 1.0, 2.0 - 0.5]
+    target = td_target(torch.tensor([1.0, 1.0]), torch.tensor([0.0, 1.0]), value, 0.9)
+    assert target.tolist() == pytest.approx([1.0 + 0.9 * 4.0, 1.0])
+
+
+def test_critic_loss_of_a_hand_computed_case():
+    # First critic: ½ mean(1·4, ½·0) = 1; second: ½ mean(1·1, ½·16) = 2.25.
+    assert critic_loss(torch.tensor([[2.0, 0.0], [1.0, 4.0]]), torch.tensor([1.0, 0.5])).item() == 3.25
+
+
+def test_actor_loss_of_a_hand_computed_case():
+    loss = actor_loss(torch.tensor([1.5, -0.5]), torch.tensor([1.5, 0.5]))
+    assert loss.item() == pytest.approx((1.5 * -1.5 + 0.5 * 0.5) / 2)
+
+
+def test_temperature_falls_while_entropy_exceeds_its_target_and_rises_below():
+    for entropy in (3.0, -3.0):
+        log_temperature = torch.tensor(-1.3, requires_grad=True)
+        temperature = log_temperature.exp()
+        temperature_loss(temperature, torch.tensor(entropy), target_entropy=-2.0).backward()
+        # dJ/dlog α = α (entropy - H̄)
+        assert log_temperature.grad.item() == pytest.approx(temperature.item() * (entropy + 2.0))
+
+
+CONFIG = LagrangianConfig(initial=0.5, learning_rate=0.1, cost_limit=0.2, maximum=2.0)
+
+
+def test_dual_step_of_hand_computed_cases():
+    assert dual_step(1.0, 0.7, CONFIG) == pytest.approx(1.05)
+    assert dual_step(1.0, 0.1, CONFIG) == pytest.approx(0.99)
+    assert dual_step(1.0, 0.2, CONFIG) == 1.0
+    assert dual_step(1.0, 1e9, CONFIG) == 2.0
+    assert dual_step(2.0, 0.0, CONFIG) == pytest.approx(1.98)  # it comes back from the cap
+
+
+@given(st.lists(st.floats(0.0, 1e6), max_size=30))
+def test_dual_variable_never_goes_negative_nor_above_its_cap(costs):
+    dual_variable = CONFIG.initial
+    for cost in costs:
+        dual_variable = dual_step(dual_variable, cost, CONFIG)
+        assert 0.0 <= dual_variable <= CONFIG.maximum
+
+
+@given(st.floats(-1e6, 1e6))
+def test_log_std_stays_within_its_bounds(raw):
+    assert LOG_STD_MIN <= bounded_log_std(torch.tensor(raw)).item() <= LOG_STD_MAX

@@ -3,11 +3,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
-from risk_sac.agents.priority import priority
+from risk_sac.agents.priority import TERM_CAP, TermScales, importance_weights, priority
 from risk_sac.agents.replay import RiskPrioritizedReplay, Transition, UniformReplay
+from risk_sac.agents.sum_tree import SumTree
 from risk_sac.config import ReplayConfig
-from risk_sac.errors import CheckpointError, NotFinite
 
 Make = Callable[..., Transition]
 Replay = UniformReplay | RiskPrioritizedReplay
@@ -32,26 +35,7 @@ def filled(kind: type[Replay], count: int, make: Make, seed: int = 0) -> Replay:
 
 
 @KINDS
-def test_a_batch_holds_what_was_stored(kind: type[Replay], transition: Make) -> None:
-    replay = kind(3, 2, CONFIG)
-    stored = transition(0.5, cost=0.2, robustness=-1.5, next_robustness=2.5, terminated=True, accumulated_reward=9.0)
-    store(replay, stored, 0.1)
-    batch = replay.sample(4, np.random.default_rng(0))
-    assert batch.observation.tolist() == [[0.5, 0.5, 0.5]] * 4
-    assert batch.next_observation.tolist() == [[1.5, 1.5, 1.5]] * 4
-    assert batch.action.numpy() == pytest.approx(np.full((4, 2), np.tanh(0.5)))
-    assert batch.risk_reward.tolist() == [0.5] * 4
-    assert batch.cost.numpy() == pytest.approx(np.full(4, 0.2))
-    assert batch.robustness.tolist() == [-1.5] * 4
-    assert batch.next_robustness.tolist() == [2.5] * 4
-    assert batch.terminated.tolist() == [1.0] * 4
-    assert batch.weight.tolist() == [1.0] * 4
-    assert batch.indices.tolist() == [0] * 4
-    assert {tensor.dtype for tensor in (batch.observation, batch.terminated, batch.weight)} == {torch.float32}
-
-
-@KINDS
-def test_the_oldest_transition_gives_way_once_full(kind: type[Replay], transition: Make) -> None:
+def test_the_oldest_transition_gives_way_once_full(kind, transition):
     replay = kind(3, 2, CONFIG)
     for value in range(CONFIG.capacity + 10):
         store(replay, transition(float(value)), 1.0)
@@ -61,30 +45,13 @@ def test_the_oldest_transition_gives_way_once_full(kind: type[Replay], transitio
     assert batch.risk_reward.max() == CONFIG.capacity + 9
 
 
-@KINDS
-@pytest.mark.parametrize("field", ["risk_reward", "cost", "next_robustness"])
-def test_a_transition_that_is_not_finite_is_refused(kind: type[Replay], field: str, transition: Make) -> None:
-    with pytest.raises(NotFinite):
-        kind(3, 2, CONFIG).add(transition(**{field: float("nan")}))
-
-
-@pytest.mark.parametrize("changes", [{"accumulated_reward": float("inf")}, {"robustness": float("-inf")}])
-def test_a_priority_that_is_not_finite_is_refused(changes: dict[str, float], transition: Make) -> None:
-    replay = RiskPrioritizedReplay(3, 2, CONFIG)
-    with pytest.raises(NotFinite):
-        replay.add(transition(**changes))
-    assert len(replay) == 0
-    with pytest.raises(NotFinite):
-        store(replay, transition(), float("nan"))
-
-
-def test_uniform_draws_every_transition_equally_often(random_transition: Make) -> None:
+def test_uniform_draws_every_transition_equally_often(random_transition):
     replay = filled(UniformReplay, 50, random_transition)
     counts = np.bincount(replay.sample(50_000, np.random.default_rng(1)).indices, minlength=50)
     assert ((counts - 1000.0) ** 2 / 1000.0).sum() < 86.0  # χ² at 49 degrees of freedom, p = 0.001
 
 
-def test_rper_draws_in_proportion_to_the_priorities(random_transition: Make) -> None:
+def test_rper_draws_in_proportion_to_the_priorities(random_transition):
     replay = filled(RiskPrioritizedReplay, 50, random_transition)
     expected = expected_priorities(replay)
     expected /= expected.sum()
@@ -98,7 +65,7 @@ def test_rper_draws_in_proportion_to_the_priorities(random_transition: Make) -> 
     assert np.abs(counts - 1000 * expected).max() <= 2.0
 
 
-def test_rper_weights_follow_equation_10(random_transition: Make) -> None:
+def test_rper_weights_follow_equation_10(random_transition):
     replay = filled(RiskPrioritizedReplay, 40, random_transition)
     priorities = expected_priorities(replay)
     batch = replay.sample(64, np.random.default_rng(2))
@@ -106,25 +73,7 @@ def test_rper_weights_follow_equation_10(random_transition: Make) -> None:
     assert batch.weight.numpy() == pytest.approx(weights / weights.max(), rel=1e-6)
 
 
-def test_rper_prefers_risk_and_surprise(transition: Make) -> None:
-    replay = RiskPrioritizedReplay(3, 2, CONFIG)
-    for slot in range(64):
-        store(replay, transition(robustness=-2.0 if slot == 7 else 1.0), 5.0 if slot == 9 else 0.1)
-    counts = np.bincount(replay.sample(4096, np.random.default_rng(0)).indices, minlength=64)
-    assert set(np.argsort(counts)[-2:]) == {7, 9}
-    assert counts.min() > 0
-
-
-def test_rper_is_uniform_while_nothing_tells_transitions_apart(transition: Make) -> None:
-    replay = RiskPrioritizedReplay(3, 2, CONFIG)
-    for _ in range(30):
-        store(replay, transition(), 0.7)
-    batch = replay.sample(30, np.random.default_rng(0))
-    assert sorted(batch.indices) == list(range(30))
-    assert batch.weight.tolist() == [1.0] * 30
-
-
-def test_rper_leaves_equal_equation_9_after_any_mix_of_additions_and_updates(random_transition: Make) -> None:
+def test_rper_leaves_equal_equation_9_after_any_mix_of_additions_and_updates(random_transition):
     replay = RiskPrioritizedReplay(3, 2, CONFIG)
     generator = np.random.default_rng(3)
     for _ in range(2500):
@@ -137,7 +86,7 @@ def test_rper_leaves_equal_equation_9_after_any_mix_of_additions_and_updates(ran
     assert replay._tree.total == pytest.approx(leaves.sum(), rel=1e-14)
 
 
-def test_rper_hands_out_the_new_transitions_once_and_in_their_order(transition: Make) -> None:
+def test_rper_hands_out_the_new_transitions_once_and_in_their_order(transition):
     replay = RiskPrioritizedReplay(3, 2, CONFIG)
     assert replay.take_unmeasured(9) is None
     for count in (3, 4, CONFIG.capacity + 5):  # the last wraps around, and its first five are overwritten
@@ -156,7 +105,7 @@ def test_rper_hands_out_the_new_transitions_once_and_in_their_order(transition: 
 
 
 @KINDS
-def test_a_loaded_replay_draws_what_the_original_draws(kind: type[Replay], random_transition: Make) -> None:
+def test_a_loaded_replay_draws_what_the_original_draws(kind, random_transition):
     original = filled(kind, 1300, random_transition)  # has wrapped around
     generator = np.random.default_rng(4)
     original.update(original.sample(64, generator).indices, generator.exponential(size=64))
@@ -175,31 +124,93 @@ def test_a_loaded_replay_draws_what_the_original_draws(kind: type[Replay], rando
     assert torch.equal(first.observation, second.observation)
 
 
-@KINDS
-def test_a_state_does_not_change_with_its_owner(kind: type[Replay], random_transition: Make) -> None:
-    replay = filled(kind, 20, random_transition)
-    state, again = replay.state(), kind(3, 2, CONFIG)
-    replay.update(np.arange(20), np.full(20, 99.0))
-    again.load(state)
-    replay = filled(kind, 20, random_transition)
-    draws = [each.sample(50, np.random.default_rng(0)).indices for each in (replay, again)]
-    assert np.array_equal(*draws)
-
-
-@KINDS
-def test_a_state_of_another_shape_is_refused(kind: type[Replay], random_transition: Make) -> None:
-    state = filled(kind, 5, random_transition).state()
-    with pytest.raises(CheckpointError, match="rows"):
-        kind(4, 2, CONFIG).load(state)
-    state = filled(kind, 1000, random_transition).state()
-    with pytest.raises(CheckpointError, match="capacity"):
-        kind(3, 2, ReplayConfig(capacity=1000)).load(state | larger(state))
-
-
-def larger(state: dict[str, object]) -> dict[str, object]:
-    rows = torch.zeros(1001, 13)
-    return {"storage": {"rows": rows, "next": 0}} if "storage" in state else {"rows": rows}
-
-
 def expected_priorities(replay: RiskPrioritizedReplay) -> np.ndarray:
     return priority(replay._terms[:, : len(replay)], replay._scales, CONFIG)
+
+
+PRIORITY_CONFIG = ReplayConfig(
+    td_weight=1.0, return_weight=0.5, robustness_weight=0.5, priority_floor=0.05, correction=0.6
+)
+terms = hnp.arrays(np.float64, st.tuples(st.just(3), st.integers(1, 30)), elements=st.floats(-1e3, 1e3))
+
+
+def test_priority_of_a_hand_computed_case():
+    #              |δ|: min 0, mean 2      R̂: min -1, mean 1     -ρ: constant
+    stored = np.array([[0.0, 1.0, 5.0], [-1.0, 0.0, 4.0], [0.3, 0.3, 0.3]])
+    # On the common scale: 0, 1/2, 5/2 and 0, 1/2, 5/2 and nothing.
+    assert priority(stored, TermScales.of(stored), PRIORITY_CONFIG) == pytest.approx([0.05, 0.75, 3.75])
+
+
+@given(terms)
+def test_priority_is_floored_and_bounded(stored):
+    values = priority(stored, TermScales.of(stored), PRIORITY_CONFIG)
+    assert (values >= PRIORITY_CONFIG.priority_floor).all()
+    assert (values <= 2.0 * TERM_CAP).all()
+
+
+@given(terms, st.floats(0.1, 10.0), st.floats(-100.0, 100.0))
+def test_priority_ignores_the_unit_and_the_zero_of_a_term(stored, factor, offset):
+    spread = stored.mean(axis=1) - stored.min(axis=1)
+    stored[spread < 1e-3] = 0.0  # either side of the threshold below which a term counts as constant
+    moved = stored * factor + offset
+    before = priority(stored, TermScales.of(stored), PRIORITY_CONFIG)
+    assert priority(moved, TermScales.of(moved), PRIORITY_CONFIG) == pytest.approx(before, rel=1e-6, abs=1e-6)
+
+
+def test_one_outlier_counts_for_at_most_ten_average_terms():
+    stored = np.zeros((3, 1000))
+    stored[0] = 1.0
+    stored[0, :2] = 0.0, 1e6
+    assert priority(stored, TermScales.of(stored), PRIORITY_CONFIG).max() == TERM_CAP
+
+
+def test_importance_weights_of_a_hand_computed_case():
+    # N P = 4, 1, 1/4; ^-0.5 = 1/2, 1, 2; over the largest.
+    weights = importance_weights(np.array([1.0, 0.25, 0.0625]), size=4, correction=0.5)
+    assert weights == pytest.approx([0.25, 0.5, 1.0])
+
+
+def test_find_walks_the_cumulative_sum():
+    tree = SumTree(4)
+    tree.rebuild(np.array([1.0, 0.0, 2.0, 1.0]))  # ends at 1, 1, 3, 4
+    assert tree.total == 4.0
+    assert tree.find(np.array([0.0, 0.2, 0.25, 0.7, 0.75, 0.999])).tolist() == [0, 0, 2, 2, 3, 3]
+
+
+@given(hnp.arrays(np.float64, st.integers(1, 200), elements=st.integers(0, 2**20).map(float)), st.data())
+def test_total_is_exactly_the_sum_after_any_writes(values, data):
+    # Whole numbers add without rounding, so nothing but the exact sum passes.
+    tree = SumTree(len(values))
+    tree.rebuild(values)
+    for _ in range(3):
+        indices = np.array(data.draw(st.lists(st.integers(0, len(values) - 1), min_size=1, max_size=20)))
+        written = np.array(data.draw(st.lists(st.integers(0, 2**20), min_size=len(indices), max_size=len(indices))))
+        tree.set(indices, written.astype(float))
+        values[indices] = written
+    assert tree.total == values.sum()
+    assert (tree[np.arange(len(values))] == values).all()
+
+
+@given(
+    hnp.arrays(np.float64, st.integers(1, 100), elements=st.sampled_from([0.0, 1e-12, 0.1, 0.3, 1.0, 7.0, 1e9])).filter(
+        lambda values: values.sum() > 0
+    ),
+    st.lists(st.floats(0.0, 1.0), min_size=1, max_size=50),
+)
+def test_find_never_returns_a_leaf_of_priority_zero(values, fractions):
+    tree = SumTree(128)
+    tree.rebuild(values)
+    found = tree.find(np.array(fractions))
+    assert (found < len(values)).all()
+    assert (values[found] > 0).all()
+
+
+@given(hnp.arrays(np.float64, st.integers(1, 300), elements=st.integers(0, 1000).map(float)), st.data())
+def test_find_agrees_with_a_linear_scan(values, data):
+    values[data.draw(st.integers(0, len(values) - 1))] += 1.0
+    tree = SumTree(300)
+    tree.rebuild(values)
+    prefixes = data.draw(st.lists(st.integers(0, int(values.sum()) - 1), min_size=1, max_size=20))
+    fractions = (np.array(prefixes) + 0.5) / values.sum()
+    ends = np.cumsum(values)
+    assert tree.find(fractions).tolist() == [int(np.argmax(ends > prefix)) for prefix in prefixes]

@@ -1,14 +1,12 @@
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from risk_sac.benchmark import table
 from risk_sac.benchmark.detection import ANSWER, Detection, answer_of, first_detection
-from risk_sac.benchmark.statistics import balanced, friedman, log_rank, restricted_means, summaries, survival
-from risk_sac.benchmark.table import curves, defects_table, detections_csv, methods_table, write
+from risk_sac.benchmark.power import method_power, runs_of
+from risk_sac.benchmark.statistics import friedman, log_rank, summaries, survival
 from risk_sac.config import RunMethod, RunSpec
 from risk_sac.config.spec_file import read_ego
+from risk_sac.records import DefectPower
 
 BUDGET = 1000
 
@@ -42,7 +40,7 @@ FOUND = [
 ]
 
 
-def test_a_method_is_summed_up_over_defects_and_seeds() -> None:
+def test_a_method_is_summed_up_over_defects_and_seeds():
     archive, random = summaries(FOUND)  # the quickest first
     assert (archive.method, archive.runs, archive.detected) == ("archive", 6, 4)
     assert (archive.mean_steps, archive.median_steps) == (250.0, 250.0)
@@ -55,38 +53,21 @@ def test_a_method_is_summed_up_over_defects_and_seeds() -> None:
     assert (random.a12, random.p) == (None, None)
 
 
-def test_survival_falls_at_detections_and_not_at_the_budget() -> None:
+def test_survival_falls_at_detections_and_not_at_the_budget():
     steps, left = survival(runs("archive", "latency", 100, 300, 300, None))
     assert dict(zip(steps.tolist(), left.tolist(), strict=True)) == pytest.approx({100: 0.75, 300: 0.25, 1000: 0.25})
     _, left = survival(runs("archive", "latency", None, None))
     assert left.tolist() == [1.0]
 
 
-def test_the_log_rank_test_tells_quick_from_slow() -> None:
+def test_the_log_rank_test_tells_quick_from_slow():
     quick, slow = runs("archive", "latency", *range(10, 20)), runs("random", "latency", *range(500, 510))
     assert log_rank(quick, slow) < 0.001
     assert log_rank(quick, quick) == pytest.approx(1.0)
     assert log_rank(runs("archive", "x", None), runs("random", "x", None)) == 1.0
 
 
-def test_tables_hold_every_run() -> None:
-    assert methods_table(FOUND).splitlines()[2].startswith("| archive | 6 | 4 of 6 [0.30, 0.90] | 250 | 250 | 500 [")
-    assert defects_table(FOUND).splitlines()[2:] == [
-        "| latency | low | 3 of 3, 200 | 2 of 3, 600 |",
-        "| speeds | low | 1 of 3, 400 | 0 of 3 |",
-    ]
-    assert len(detections_csv(FOUND).decode().splitlines()) == 1 + len(FOUND)
-    assert [line.get_label() for line in curves(FOUND).axes[0].get_lines()] == ["archive", "random"]
-
-
-def test_a_run_tells_what_a_smaller_budget_would_have_told() -> None:
-    (late,) = runs("archive", "latency", 400)
-    early = late.within(300)
-    assert (early.detected, early.triggered, early.signature, early.budget_steps) == (None, None, "", 300)
-    assert late.within(400).detected == 400
-
-
-def test_an_early_detection_counts_for_a_larger_budget_once_it_is_called_with_it(tmp_path: Path) -> None:
+def test_an_early_detection_counts_for_a_larger_budget_once_it_is_called_with_it(tmp_path):
     (early,) = runs("archive", "latency", 400)
     spec = RunSpec(family="low", method="archive", seed=0, ego=read_ego("idm-aeb+latency"))
     (tmp_path / ANSWER).write_text(early.model_dump_json())
@@ -97,15 +78,7 @@ def test_an_early_detection_counts_for_a_larger_budget_once_it_is_called_with_it
     assert answer_of(tmp_path, BUDGET) == early
 
 
-def test_methods_are_compared_on_what_each_has_played() -> None:
-    more = [*FOUND, *runs("archive", "short-gap", 1, 2)]
-    assert balanced(more) == FOUND
-    methods, means = restricted_means(FOUND)
-    assert methods == ["archive", "random"]
-    assert means.tolist() == [[200.0, (500 + 1000 + 700) / 3], [800.0, 1000.0]]
-
-
-def test_ranks_that_never_differ_are_no_coincidence() -> None:
+def test_ranks_that_never_differ_are_no_coincidence():
     means = np.array([[1.0, 2.0, 3.0]] * 9)
     p = friedman(means)
     assert p is not None
@@ -114,23 +87,26 @@ def test_ranks_that_never_differ_are_no_coincidence() -> None:
     assert friedman(np.ones((9, 3))) == 1.0
 
 
-def test_the_test_set_and_the_whole_catalogue_are_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    tasks = ("latency", "kerb-waits", "weak-brakes")
-    times = {"archive": (100, 300), "random": (800, None), "sac": (500, 600)}
-    write(
-        [run for method, at in times.items() for task in tasks for run in runs(method, task, *at)], tmp_path, "command"
+TEXT = """defects,family,method,seed,budget_steps,steps,episodes,detected,signature
+latency,low,archive,0,20000,300,3,300,"a, b"
+latency,low,archive,1,20000,20000,200,,
+speeds,mixed,archive,0,20000,9000,60,9000,a
+no-memory,dense,archive,0,20000,100,1,100,a
+latency,low,random,0,5000,5000,50,,
+"""
+RUNS = runs_of(TEXT)
+
+
+def test_the_power_of_a_budget_is_what_was_detected_within_it():
+    found = method_power("archive", {"low": (9000, 1), "mixed": (9000, 1)}, RUNS)
+    assert found.defects == (
+        DefectPower(defect="latency", family="low", detected=1, runs=2),
+        DefectPower(defect="speeds", family="mixed", detected=1, runs=1),
     )
-    text = (tmp_path / "benchmark.md").read_text()
-    assert "## Test set: 2 defects, 2 seeds, 1000 steps" in text
-    assert "## All: 3 defects, 2 seeds, 1000 steps" in text
-    assert text.count("| latency |") == 1
-    assert {file.name for file in tmp_path.glob("*.svg")} == {
-        f"{what}-{which}.svg" for what in ("curves", "difference") for which in ("test-set", "all")
-    }
-    monkeypatch.setattr(table, "PACKAGE", "no_such_package")
-    write([run for method, at in times.items() for run in runs(method, "latency", *at)], tmp_path, "command")
-    assert "Friedman" not in (tmp_path / "benchmark.md").read_text()  # one defect
-    write(
-        [run for method, at in times.items() for task in tasks for run in runs(method, task, *at)], tmp_path, "command"
+    assert found.sentences == (
+        "Of 2 known defects that it was measured with in low, mixed, this budget detects 1.5 on average; "
+        "never found: none.",
+        "Seeds that were measured: 1 to 2 of each defect.",
     )
-    assert "pip install 'risk-sac[benchmark]'" in (tmp_path / "benchmark.md").read_text()
+    found = method_power("archive", {"low": (9000, 1), "mixed": (8999, 1)}, RUNS)
+    assert (found.expected, found.in_most_seeds, found.never) == (0.5, (), ("speeds",))

@@ -1,5 +1,3 @@
-from pathlib import Path
-
 import pytest
 
 from risk_sac.config import Budget, RunSpec
@@ -14,7 +12,7 @@ def ignore(done: int, metrics: RunMetrics | None) -> None:
 
 
 @pytest.fixture(scope="session")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """A finished run with at least one contact."""
     for seed in range(11, 31):
         folder = tmp_path_factory.mktemp("run")

@@ -1,24 +1,15 @@
 import argparse
-import json
 import os
 import re
-import signal
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
-from risk_sac import __version__, cli
-from risk_sac.cli.show import _table
-from risk_sac.errors import ConfigError
+from risk_sac import cli
 from risk_sac.execution.runs import run
-from risk_sac.records import ConflictType, Fault, Grade, Outcome, RunMetrics, Severity
-from risk_sac.run_folder.results import RecordedFailure, Results, read_results, write_results
-from tests.builders import judgement, violation
+from risk_sac.run_folder.results import Results, read_results, write_results
 from tests.unit.cli.conftest import SPEC, ignore
-from tests.unit.failures.staged import synthetic_contact
 
 
 def untimed(results: Results) -> Results:
@@ -26,89 +17,10 @@ def untimed(results: Results) -> Results:
     return replace(results, wall_s=0.0, cpu_s=0.0, episode_cpu_s=())
 
 
-def test_results_hold_spec_metrics_versions_and_failures(folder: Path) -> None:
-    stored = json.loads((folder / "results.json").read_text())
-    assert stored["finished"] is True
-    assert stored["spec"]["method"] == "random"
-    assert stored["metrics"]["ecr_low"] <= stored["metrics"]["ecr"] <= stored["metrics"]["ecr_high"]
-    assert len(stored["digest"]) == 64
-    assert stored["wall_s"] > 0
-    assert "libsumo" in stored["versions"]
-    contact = stored["failures"][0]
-    assert contact["id"] == f"{SPEC.family}-{SPEC.method}-{stored['spec']['seed']}-search-{contact['episode']['index']}"
-    assert contact["episode"]["collision"]["verdicts"]
-    assert (folder / contact["series"]).exists()
-    lines = (folder / "episodes.jsonl").read_text().splitlines()
-    assert [json.loads(line)["index"] for line in lines] == list(range(8))
-
-
-def test_show_lists_the_failures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["show", str(folder), "--raw"]) == 0
-    printed = capsys.readouterr().out
-    results = read_results(folder)
-    assert results.spec.id in printed
-    numbers = [int(number) for number in re.findall(r"^ (\d+) ", printed, re.MULTILINE)]
-    assert numbers == [failure.episode.index for failure in results.failures]
-    assert printed.count("\n search ") == len(numbers)
-
-
-@pytest.mark.parametrize("grade", [*Grade, None])
-def test_the_list_says_grade_conflict_and_what_was_broken_within_80_columns(
-    grade: Grade | None, capsys: pytest.CaptureFixture[str]
-) -> None:
-    judged = judgement(
-        grade,
-        conflict_type=ConflictType.CROSSING,
-        broke=("pedestrian_on_red", "wrong_direction"),
-        conflict_s=-11.25,
-        conflict_x_m=-1301.0,
-        conflict_y_m=-1202.5,
-        severity=Severity.MODERATE,
-        fault=Fault.SHARED,
-    )
-    episode = synthetic_contact(judged).episode
-    Console(width=80).print(_table(SPEC.id, [RecordedFailure.of(SPEC.id, episode)]))
-    printed = capsys.readouterr().out
-    assert "…" not in printed
-    for word in (grade or "failure", "crossing vehicle", "-11.2, -1301 -1202", "wrong", "moderate", "fault: shared"):
-        assert word in printed
-
-
-def test_the_list_names_failed_rules_in_full_within_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
-    """Beside the longest name of a conflict and of an actor there is."""
-    rules = "conflict_after_release, ego_model_saw, no_spawn_overlap"
-    contact = synthetic_contact(judgement(None, conflict_type=ConflictType.CROSSING))
-    failed = contact.episode.model_copy(update={"outcome": Outcome.DEGENERATE, "reason": rules})
-    Console(width=80).print(_table(SPEC.id, [RecordedFailure.of(SPEC.id, failed)]))
-    printed = capsys.readouterr().out
-    assert "…" not in printed
-    for word in rules.replace(",", "").replace("_", " ").split():
-        assert word in printed
-
-
-def test_the_list_says_which_requirement_was_violated_without_contact(capsys: pytest.CaptureFixture[str]) -> None:
-    near = {"other_id": "pedestrian", "other_kind": "pedestrian", "other_role": "adversary"}
-    long = violation(
-        requirement="a" * 20 + "b" * 20, time_s=12.25, broke=("red_light",), grade=Grade.UNAVOIDABLE, **near
-    )
-    episode = synthetic_contact().episode.model_copy(update={"collision": None, "violations": (long, violation())})
-    Console(width=80).print(_table(SPEC.id, [RecordedFailure.of(SPEC.id, episode)]))
-    printed = capsys.readouterr().out
-    assert "…" not in printed
-    assert "ego: red" in printed
-    for word in ("a" * 20, "b" * 20, "12.2", "pedestrian", "unavoidable"):
-        assert word in printed
-
-
-def test_the_list_shows_what_nobody_judged(capsys: pytest.CaptureFixture[str]) -> None:
-    Console(width=80).print(_table(SPEC.id, [synthetic_contact(None)]))
-    printed = capsys.readouterr().out
-    assert "failure" in printed
-    assert "None" not in printed
-
-
-@pytest.mark.parametrize("form", ["{run}-search-{index}", "search-{index}", "{index:06d}", "{index}"])
-def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder: Path, tmp_path: Path, form: str) -> None:
+@pytest.mark.parametrize(
+    "form", ["{run}-search-{index}", "search-{index}", "{run}-train-{index}", "{index:06d}", "{index}"]
+)
+def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder, tmp_path, form):
     results = read_results(folder)
     index = results.failures[0].episode.index
     picture = tmp_path / "contact.png"
@@ -117,27 +29,6 @@ def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder: Path, t
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert cli.main(["show", str(folder), wanted]) == 0
     assert (folder / results.failures[0].series).with_suffix(".png").exists()
-
-
-@pytest.mark.parametrize("unknown", ["999", "x", "-1", "²"])
-def test_show_names_the_range_of_numbers(folder: Path, unknown: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["show", str(folder), "--", unknown]) == 2
-    complaint = capsys.readouterr().err
-    assert complaint.startswith("FAILURE: ")
-    indices = [each.episode.index for each in read_results(folder).failures]
-    assert f"numbers from {indices[0]} to {indices[-1]};" in complaint
-
-
-@pytest.mark.parametrize(
-    ("content", "complaint"), [(None, "RESULTS: there is no "), ("[1]", "something else wrote it")]
-)
-def test_show_refuses_what_run_did_not_write(
-    content: str | None, complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    if content is not None:
-        (tmp_path / "results.json").write_text(content)
-    assert cli.main(["show", str(tmp_path)]) == 2
-    assert complaint in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -153,9 +44,7 @@ def test_show_refuses_what_run_did_not_write(
         (["--spec", "nowhere.yaml"], "--spec: "),
     ],
 )
-def test_wrong_settings_name_the_field_and_leave_no_folder(
-    arguments: list[str], complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wrong_settings_name_the_field_and_leave_no_folder(arguments, complaint, tmp_path, capsys):
     assert cli.main(["run", *arguments, "--out", str(tmp_path / "out")]) == 2
     printed = capsys.readouterr().err
     assert printed.startswith(complaint)
@@ -163,44 +52,21 @@ def test_wrong_settings_name_the_field_and_leave_no_folder(
     assert not (tmp_path / "out").exists()
 
 
-def test_folder_of_another_run_is_refused_and_kept(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folder_of_another_run_is_refused_and_kept(folder, capsys):
     before = (folder / "results.json").read_bytes()
     assert cli.main(["run", "--family", "low", "--method", "sac", "--episodes", "8", "--out", str(folder)]) == 2
     assert "holds a run with another method, seed" in capsys.readouterr().err
     assert (folder / "results.json").read_bytes() == before
 
 
-def test_checkpoint_without_results_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "checkpoint").write_bytes(b"of another program")
-    with pytest.raises(ConfigError, match="holds a checkpoint but no results"):
-        run(SPEC, tmp_path, ignore)
-
-
-def test_a_folder_that_cannot_be_written_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     assert cli.main(["run", "--family", "low", "--method", "random", "--out", str(tmp_path / "file" / "out")]) == 2
     complaint = capsys.readouterr().err
     assert re.fullmatch(r"--out: got .*/file/out, which cannot be written \(Not a directory\); wanted .*\n", complaint)
 
 
-def test_interrupt_ends_the_run_after_its_episode_and_it_goes_on(tmp_path: Path) -> None:
-    whole = run(SPEC, tmp_path / "whole", ignore)
-
-    def interrupt(done: int, metrics: RunMetrics | None) -> None:
-        if done == 2:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    stopped = run(SPEC, tmp_path / "parts", interrupt)
-    assert (stopped.finished, stopped.metrics and stopped.metrics.episodes) == (False, 2)
-    resumed = run(SPEC, tmp_path / "parts", ignore)
-    assert untimed(resumed) == untimed(whole)
-    assert resumed.cpu_s > stopped.cpu_s > 0
-    assert resumed.wall_s > stopped.wall_s
-    parts, at_once = ((tmp_path / name / "episodes.jsonl").read_bytes() for name in ("parts", "whole"))
-    assert parts == at_once
-
-
-def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path: Path) -> None:
+def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path):
     whole = run(SPEC, tmp_path, ignore)
     (tmp_path / "checkpoint").unlink()  # as if killed before the first one
     write_results(
@@ -212,33 +78,7 @@ def test_killed_run_repeats_what_its_checkpoint_lacks(tmp_path: Path) -> None:
     assert len((tmp_path / "episodes.jsonl").read_text().splitlines()) == 3
 
 
-def test_signal_handlers_are_put_back(tmp_path: Path) -> None:
-    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    run(SPEC, tmp_path, ignore)
-    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
-
-
-def test_serve_becomes_the_service_with_its_settings(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls: list[tuple[str, list[str], dict[str, str]]] = []
-    monkeypatch.setattr(os, "execve", lambda *call: calls.append(call))
-    monkeypatch.setenv("RISK_SAC_GRACE_S", "5")
-    cli.main(["serve", "--host", "0.0.0.0", "--port", "8001", "--runs", "/runs"])
-    ((program, arguments, environment),) = calls
-    assert (program, arguments) == (sys.executable, [sys.executable, "-m", "service"])
-    assert (environment["RISK_SAC_HOST"], environment["RISK_SAC_PORT"]) == ("0.0.0.0", "8001")
-    assert environment["RISK_SAC_GRACE_S"] == "5"
-    assert environment["MALLOC_ARENA_MAX"] == "2"
-    assert environment["RISK_SAC_RUNS"] == "/runs"
-    assert "RISK_SAC_DATA_DIR" not in environment
-
-
-def test_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit, match="0"):
-        cli.main(["--version"])
-    assert capsys.readouterr().out == f"risk-sac {__version__}\n"
-
-
-def test_a_command_takes_all_paths_from_where_it_begins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_command_takes_all_paths_from_where_it_begins(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("RISK_SAC_PLACES", "places")
     monkeypatch.delenv("RISK_SAC_EGOS", raising=False)

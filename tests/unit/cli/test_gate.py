@@ -1,13 +1,11 @@
 import argparse
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from risk_sac.cli.campaigns.gate import Bounds, named_rate, verdict
-from risk_sac.client import Results, RunResult
+from risk_sac.cli.campaigns.gate import Bounds, verdict
+from risk_sac.client import Results
 from risk_sac.errors import ConfigError
-from tests.builders import run_metrics
 
 TOTAL = {
     "family": "low",
@@ -51,17 +49,7 @@ def results(state: str, *totals: dict[str, Any]) -> Results:
     )
 
 
-NEVER_FAST = {"counts": "failure", "violated": 12, "valid": 12, "distinct": 2, "preventable": 0}
 FAST = "never_fast violated; ego goes straight, vehicle near"
-
-
-def requirements(**rates: tuple[float, float]) -> dict[str, Any]:
-    """With these rates and upper ends; `safe_ttc` is reported only."""
-    return {
-        name: NEVER_FAST
-        | {"counts": "report" if name == "safe_ttc" else "failure", "rate": rate, "rate_low": 0.0, "rate_high": high}
-        for name, (rate, high) in rates.items()
-    }
 
 
 UNBOUND: dict[str, Any] = {
@@ -75,15 +63,7 @@ UNBOUND: dict[str, Any] = {
 LEADER, CUT_IN = "leader, ahead; ego brakes late", "cut-in, alongside; ego does not brake"
 
 
-def by_rate(**bounds: Any) -> Bounds:
-    return Bounds(judged_by="rate", **bounds)
-
-
-def test_without_a_bound_any_number_of_failures_is_fine() -> None:
-    assert verdict(results("succeeded", {"ecr": 1.0}), Bounds()) == (0, "")
-
-
-def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above() -> None:
+def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above():
     status, reason = verdict(results("succeeded", FEW), Bounds(ecr=0.1))
     assert status == 1
     assert reason == (
@@ -92,82 +72,11 @@ def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above() ->
     assert verdict(results("succeeded", FEW), Bounds(ecr=0.14))[0] == 0
 
 
-def test_the_rate_alone_is_judged_where_that_is_asked_for() -> None:
-    assert verdict(results("succeeded", FEW), by_rate(ecr=0.1)) == (
-        0,
-        "ECR within 0.1: low sac 0.050 (3 valid contacts in 60 episodes)",
-    )
-    assert verdict(results("succeeded", {"ecr": 0.1, "ecr_high": 0.9}), by_rate(ecr=0.1))[0] == 0
-    assert verdict(results("succeeded", {"ecr": 0.11, "ecr_low": 0.0}), by_rate(ecr=0.1))[0] == 1
-
-
-def test_a_pcr_above_its_bound_is_named_whatever_the_ecr() -> None:
-    worse = {"method": "random", "pcr": 0.2, "preventable": 1, "failures": 5, "episodes": 5}
-    found = results("succeeded", {}, worse)
-    status, reason = verdict(found, by_rate(ecr=0.5, pcr=0.1))
-    assert status == 1
-    assert "PCR above 0.1: low random 0.200 (1 preventable contact in 5 episodes)" in reason
-    assert verdict(found, by_rate(ecr=0.5, pcr=0.2))[0] == 0
-
-
-def test_the_rate_of_a_requirement_is_judged_by_its_interval_or_by_itself() -> None:
-    found = results("succeeded", {"episodes": 60, "requirements": requirements(never_fast=(0.2, 0.32))})
-    assert verdict(found, Bounds(requirements={"never_fast": 0.25})) == (
-        1,
-        "never_fast may be above 0.25: low sac 0.200, 95 % interval up to 0.320 (12 valid violations in 60 episodes)"
-        + HINT,
-    )
-    assert verdict(found, Bounds(requirements={"never_fast": 0.32}))[0] == 0
-    assert verdict(found, by_rate(requirements={"never_fast": 0.2}))[0] == 0
-    status, reason = verdict(found, by_rate(requirements={"never_fast": 0.1}))
-    assert (status, reason) == (1, "never_fast above 0.1: low sac 0.200 (12 valid violations in 60 episodes)")
-
-
-def test_a_requirement_that_is_only_reported_can_be_bound_and_one_that_a_family_lacks_is_not_asked_of_it() -> None:
-    found = results(
-        "succeeded",
-        {"episodes": 60, "requirements": requirements(never_fast=(0.0, 0.06), safe_ttc=(0.2, 0.32))},
-        {"family": "dense", "requirements": requirements(never_fast=(0.0, 0.06))},
-    )
-    status, reason = verdict(found, by_rate(requirements={"safe_ttc": 0.1}))
-    assert (status, reason) == (1, "safe_ttc above 0.1: low sac 0.200 (12 violations in 60 episodes)")
-
-
-def test_the_rate_of_a_requirement_is_judged_in_the_i_i_d_phase_too() -> None:
-    metrics = run_metrics(40, requirements=requirements(never_fast=(0.3, 0.45)))
-    drawn = RunResult(
-        **{"id": "low-iid-random-0", "family": "low", "method": "iid-random", "seed": 0, "state": "succeeded"},
-        **{"reason": None, "metrics": metrics, "evaluation": None, "spec_digest": "", "digest": None},
-        **{"versions": {}, "busy_s": 1.0},
-    )
-    found = results("succeeded", {"requirements": requirements(never_fast=(0.0, 0.06))})
-    found = found.model_copy(update={"runs": [drawn]})
-    status, reason = verdict(found, by_rate(requirements={"never_fast": 0.1}))
-    assert status == 1
-    assert "never_fast above 0.1: low iid-random 0.300 (12 valid violations in 40 episodes)" in reason
-
-
-def test_a_bound_of_no_requirement_names_those_there_are() -> None:
-    found = results("succeeded", {"requirements": requirements(no_contact=(0.1, 0.2), never_fast=(0.0, 0.1))})
-    with pytest.raises(ConfigError) as error:
-        verdict(found, Bounds(requirements={"never_slow": 0.5}))
-    assert str(error.value) == "--max-rate: got the requirement 'never_slow'; wanted one of no_contact, never_fast"
-    with pytest.raises(ConfigError, match="wanted one of those of a campaign whose requirements were counted"):
-        verdict(results("succeeded", {}), Bounds(requirements={"no_contact": 0.5}))
-
-
-@pytest.mark.parametrize("text", ["0.1", "no_contact", "no_contact=", "no_contact=x", "no_contact=2", "=0.1", "a=nan"])
-def test_a_rate_is_a_name_and_a_number_from_0_to_1(text: str) -> None:
-    assert named_rate("no_contact=0.1") == ("no_contact", 0.1)
-    with pytest.raises(argparse.ArgumentTypeError, match="wanted a requirement's name and a rate from 0 to 1"):
-        named_rate(text)
-
-
 @pytest.mark.parametrize(
     ("field", "bounds"),
     [("--max-ecr", {"max_ecr": 0.0}), ("--max-pcr", {"max_pcr": 0.0}), ("--max-rate", {"max_rate": [("a", 0.0)]})],
 )
-def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field: str, bounds: dict[str, Any]) -> None:
+def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field, bounds):
     options = argparse.Namespace(**UNBOUND | bounds)
     with pytest.raises(ConfigError, match="wanted more, or --judge-by rate") as error:
         Bounds.of(options)
@@ -177,7 +86,7 @@ def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field: str, bou
 
 
 @pytest.mark.parametrize(("bound", "status"), [(0, 1), (1, 0), (2, 0)])
-def test_more_distinct_preventable_failures_than_may_be_are_named(bound: int, status: int) -> None:
+def test_more_distinct_preventable_failures_than_may_be_are_named(bound, status):
     found, reason = verdict(
         results("succeeded", {}, {"method": "random", "distinct_preventable": 0}), Bounds(preventable=bound)
     )
@@ -186,9 +95,7 @@ def test_more_distinct_preventable_failures_than_may_be_are_named(bound: int, st
     assert "random" not in reason
 
 
-def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_found_it_in_that_family(
-    tmp_path: Path,
-) -> None:
+def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_found_it_in_that_family(tmp_path):
     file = tmp_path / "known.json"
     earlier = results("succeeded", {"signatures": {LEADER: 2}}, {"method": "random", "signatures": {CUT_IN: 1}})
     file.write_text(earlier.model_dump_json())
@@ -203,31 +110,7 @@ def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_fou
     assert verdict(violation, Bounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file})))[0] == 0
 
 
-@pytest.mark.parametrize(
-    ("content", "complaint"), [(None, "cannot be read"), ("{}", "wanted what `risk-sac campaigns")]
-)
-def test_a_file_that_is_no_earlier_campaign_is_refused_beforehand(
-    content: str | None, complaint: str, tmp_path: Path
-) -> None:
-    file = tmp_path / "known.json"
-    if content is not None:
-        file.write_text(content)
-    with pytest.raises(ConfigError, match=complaint) as error:
-        Bounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file}))
-    assert error.value.field == "--no-new-failures"
-
-
 @pytest.mark.parametrize("bounds", [Bounds(), Bounds(ecr=0.5), Bounds(pcr=0.5)])
 @pytest.mark.parametrize("state", ["failed", "cancelled"])
-def test_a_campaign_that_was_not_measured_to_the_end_could_not_run(state: str, bounds: Bounds) -> None:
+def test_a_campaign_that_was_not_measured_to_the_end_could_not_run(state, bounds):
     assert verdict(results(state, {"ecr": 0.9}), bounds)[0] == 2
-
-
-def test_a_campaign_that_goes_on_cannot_be_judged_yet() -> None:
-    assert verdict(results("running", {"ecr": 0.0}), Bounds(ecr=0.5))[0] == 2
-    assert verdict(results("running", {"ecr": 0.0}), Bounds(pcr=0.5))[0] == 2
-    assert verdict(results("running", {"ecr": 0.0}), Bounds())[0] == 0
-
-
-def test_a_method_without_an_episode_is_not_above() -> None:
-    assert verdict(results("succeeded", {"ecr": None, "pcr": None}), by_rate(ecr=0.0, pcr=0.0))[0] == 0

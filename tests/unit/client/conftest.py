@@ -1,5 +1,3 @@
-from collections.abc import Iterator
-
 import pytest
 
 from risk_sac.client import Client
@@ -7,13 +5,13 @@ from tests.unit.client.scripted_server import Server
 
 
 @pytest.fixture
-def server() -> Iterator[Server]:
+def server():
     with Server() as server:
         yield server
         server.shutdown()
 
 
 @pytest.fixture
-def client(server: Server) -> Iterator[Client]:
+def client(server):
     with Client(server.url, timeout_s=5, patience_s=2) as client:
         yield client

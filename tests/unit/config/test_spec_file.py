@@ -1,11 +1,22 @@
+"""The i.i.d. phase of a campaign: an option that changes nothing where it is not asked for."""
+
+import argparse
+import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
-from risk_sac.config import RunSpec
-from risk_sac.config.spec_file import campaign_yaml, read_campaign, read_spec
+from risk_sac.cli.campaigns.gate import Bounds
+from risk_sac.cli.regress import read_baseline
+from risk_sac.client.address import api_key
+from risk_sac.config import CampaignSpec, EgoConfig
+from risk_sac.config.spec_file import campaign_yaml, read_campaign, read_ego, read_spec
+from risk_sac.egos.registry import card_of
 from risk_sac.errors import ConfigError
+from risk_sac.failures.cases import Regression
 
 FLAGS: dict[str, Any] = dict.fromkeys(("family", "method", "seed", "episodes", "evaluation_episodes"))
 
@@ -16,114 +27,32 @@ def yaml_file(folder: Path, text: str) -> Path:
     return file
 
 
-def test_flags_alone_make_a_run_with_the_defaults() -> None:
-    spec = read_spec(None, FLAGS | {"family": "low", "episodes": 7})
-    assert spec == RunSpec.model_validate({"family": "low", "method": "risk-sac", "seed": 0, "budget": {"episodes": 7}})
-
-
-def test_run_file_keeps_its_fields_and_flags_override_them(tmp_path: Path) -> None:
-    file = yaml_file(
-        tmp_path,
-        "family: mixed\nmethod: sac\nseed: 4\nbudget: {episodes: 9, evaluation_episodes: 2}\n"
-        "ego: {profile: perfect}\nrequirements: [{name: slow, formula: ego_speed_mps < 5, scale: 1.0}]\n",
-    )
-    spec = read_spec(file, FLAGS | {"seed": 5, "episodes": 3})
-    assert (spec.family, spec.method, spec.seed) == ("mixed", "sac", 5)
-    assert (spec.budget.episodes, spec.budget.evaluation_episodes) == (3, 2)
-    assert spec.ego.sensor is None
-    assert spec.requirements[0].name == "slow"
-
-
-def test_campaign_with_one_run_is_that_run(tmp_path: Path) -> None:
-    file = yaml_file(tmp_path, "families: [dense]\nmethods: [random]\nseeds: [3]\n")
-    assert read_spec(file, FLAGS) == RunSpec(family="dense", method="random", seed=3)
-
-
-def test_flags_pick_one_run_of_a_campaign(tmp_path: Path) -> None:
-    file = yaml_file(tmp_path, "label: all\nfamilies: [low, mixed]\nmethods: [random, sac]\nseeds: [1, 2]\n")
-    with pytest.raises(ConfigError, match="got a campaign of 8 runs; wanted one") as raised:
-        read_spec(file, FLAGS)
-    assert raised.value.field == "spec"
-    picked = read_spec(file, FLAGS | {"family": "mixed", "method": "sac", "seed": 2})
-    assert (picked.family, picked.method, picked.seed) == ("mixed", "sac", 2)
-
-
-def test_flags_change_what_the_runs_of_a_campaign_share(tmp_path: Path) -> None:
-    file = yaml_file(tmp_path, "families: [low]\nmethods: [random]\nseeds: [1]\n")
-    spec = read_spec(file, FLAGS | {"prior": "none", "ego": {"profile": "careful"}})
-    assert (spec.prior, spec.ego.profile) == ("none", "careful")
-
-
 @pytest.mark.parametrize(
-    ("text", "field", "message"),
+    ("text", "field"),
     [
-        ("method: sac\nseed: 0", "family", "got nothing; wanted a value"),
-        ("family: high\nmethod: sac\nseed: 0", "family", "got \"high\"; wanted 'low', 'mixed'"),
-        ("family: low\nmethod: sac\nseed: '3'", "seed", 'got "3"; wanted an integer'),
-        ("family: low\nmethod: sac\nseed: 0\nbudget: {episodes: .nan}", "budget.episodes", "NaN"),
-        ("family: low\nmethod: sac\nseed: 0\nbudgets: {}", "budgets", "wanted one of budget, ego"),
-        ("family: low\nmethod: sac\nseed: 0\nbudget: 3", "budget", "got 3"),
-        (
-            "family: low\nmethod: sac\nseed: 0\nrequirements: [{name: a, formula: x, scale: -1}]",
-            "requirements[0].scale",
-            "got -1; wanted >= 0.001",
-        ),
-        ("families: [low, low]", "families", "wanted each value once"),
-        ("[1, 2]", "spec", "holds a list"),
-        ("family: [", "spec", "spec.yaml, which is no YAML from line 1, column 10 on: expected"),
-        ("family: low\nmethod: a: b", "spec", "spec.yaml, which is no YAML from line 2, column 10 on: mapping"),
-        ("family: low\nbuget: {episodes: 5}", "buget", "did you mean budget?"),
-        ("famly: low\nseed: 0", "famly", "did you mean family?"),
-        ("family: 2020-01-01\nmethod: sac\nseed: 0", "family", "2020"),
+        ("method: sac\nseed: 0", "family"),
+        ("family: high\nmethod: sac\nseed: 0", "family"),
+        ("family: low\nmethod: sac\nseed: '3'", "seed"),
+        ("family: low\nmethod: sac\nseed: 0\nbudget: {episodes: .nan}", "budget.episodes"),
+        ("family: low\nrequirements: [{name: a, formula: x, scale: -1}]", "requirements[0].scale"),
+        ("families: [low, low]", "families"),
+        ("[1, 2]", "spec"),
+        ("family: [", "spec"),
+        ("family: low\nbuget: {episodes: 5}", "buget"),
+        ("family: 2020-01-01\nmethod: sac\nseed: 0", "family"),
     ],
 )
-def test_wrong_file_names_the_field(tmp_path: Path, text: str, field: str, message: str) -> None:
+def test_wrong_file_names_the_field(tmp_path, text, field):
     with pytest.raises(ConfigError) as raised:
         read_spec(yaml_file(tmp_path, text), FLAGS)
     assert raised.value.field == field
-    assert message in str(raised.value)
-
-
-def test_all_that_is_wrong_is_told_and_unknown_names_come_first(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError) as raised:
-        read_spec(yaml_file(tmp_path, "seed: x\nbuget: {episodes: 5}\nmetod: sac\n"), FLAGS)
-    assert [each.field for each in (raised.value, *raised.value.others)] == ["buget", "metod", "family", "seed"]
-    with pytest.raises(ConfigError) as raised:
-        read_campaign(yaml_file(tmp_path, "seeds: [-1]\nlabl: x\n"), CAMPAIGN_FLAGS, DEFAULTS)
-    assert [each.field for each in (raised.value, *raised.value.others)] == ["labl", "seeds[0]"]
-
-
-def test_a_run_file_needs_a_family_alone(tmp_path: Path) -> None:
-    spec = read_spec(yaml_file(tmp_path, "family: low\nbudget: {episodes: 7}\n"), FLAGS)
-    assert spec == read_spec(None, FLAGS | {"family": "low", "episodes": 7})
-
-
-def test_missing_file_is_named(tmp_path: Path) -> None:
-    with pytest.raises(
-        ConfigError,
-        match=r"got .*nowhere\.yaml, which cannot be read \(No such file.*; wanted a text file; check its path",
-    ):
-        read_spec(tmp_path / "nowhere.yaml", FLAGS)
-
-
-def test_wrong_flag_names_the_field() -> None:
-    with pytest.raises(ConfigError, match="got -2; wanted >= 1") as raised:
-        read_spec(None, FLAGS | {"family": "low", "episodes": -2})
-    assert raised.value.field == "budget.episodes"
 
 
 CAMPAIGN_FLAGS: dict[str, Any] = dict.fromkeys(("families", "methods", "seeds", "episodes", "evaluation_episodes"))
 DEFAULTS: dict[str, Any] = {"families": ["low"], "methods": ["sac"], "seeds": [0, 1]}
 
 
-def test_campaign_takes_flags_before_file_before_defaults(tmp_path: Path) -> None:
-    file = yaml_file(tmp_path, "methods: [random]\nseeds: [7]\nbudget: {episodes: 9, evaluation_episodes: 2}\n")
-    spec = read_campaign(file, CAMPAIGN_FLAGS | {"seeds": [3], "episodes": 4}, DEFAULTS)
-    assert (spec.families, spec.methods, spec.seeds) == (("low",), ("random",), (3,))
-    assert (spec.budget.episodes, spec.budget.evaluation_episodes) == (4, 2)
-
-
-def test_campaign_written_as_yaml_is_the_same_campaign(tmp_path: Path) -> None:
+def test_campaign_written_as_yaml_is_the_same_campaign(tmp_path):
     text = "label: 'a: b'\nego: {profile: perfect}\nlearner: {lagrangian: {learning_rate: 1.0e-7}}\n"
     text += "odd: {environment: {friction: {low: 0.5, high: 0.7}}}\n"
     text += "requirements: [{name: slow, formula: ego_speed_mps < 5, scale: 1.0}]\n"
@@ -134,7 +63,73 @@ def test_campaign_written_as_yaml_is_the_same_campaign(tmp_path: Path) -> None:
     assert read_campaign(None, CAMPAIGN_FLAGS, DEFAULTS).digest != spec.digest
 
 
-def test_campaign_refuses_the_file_of_a_run(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="wanted one of budget") as raised:
-        read_campaign(yaml_file(tmp_path, "family: low\n"), CAMPAIGN_FLAGS, DEFAULTS)
-    assert raised.value.field == "family"
+ENDS = {"families": ["low", "dense"], "methods": ["random", "archive"], "seeds": [0, 7], "iid": {"seed": 7}}
+
+
+def test_no_generator_of_it_is_seeded_as_one_of_a_search_or_of_another_of_its_runs():
+    spec = CampaignSpec.model_validate(ENDS)
+    streams = [run.stream for run in spec.drawn()]
+    assert len(set(streams)) == 4
+    assert min(streams) > 2**31 - 1  # the largest seed that can be posted
+    assert all(run.stream == run.seed for run in spec.searches())
+
+
+def test_nobody_posts_its_runs_as_methods_nor_more_episodes_than_a_campaign_may_have():
+    with pytest.raises(ValidationError, match="iid-random"):
+        CampaignSpec.model_validate({"families": ["low"], "methods": ["iid-random"]})
+    with pytest.raises(ValidationError, match="episodes"):
+        CampaignSpec.model_validate({"families": ["low"], "iid": {"episodes": 0}})
+    full = {"families": ["low"], "seeds": list(range(20)), "budget": {"episodes": 100_000}}
+    assert CampaignSpec.model_validate(full)
+    with pytest.raises(ValidationError, match=r"and 600 of the i\.i\.d\. phase; wanted at most 2000000"):
+        CampaignSpec.model_validate(full | {"iid": {}})
+
+
+SPEC = "label: Straße\nfamilies: [low]\nmethods: [random]\nlearner: {agent: {actor_learning_rate: 1.0e-7}}\n"
+JSON = '{\n\t"families": ["low"],\n\t"learner": {"agent": {"actor_learning_rate": 1e-7}}\n}\n'
+KNOWN = json.dumps({"campaign_id": "c", "state": "succeeded", "complete": True, "runs": [], "totals": []})
+EGOS = '[far]\naddress = "127.0.0.1:9"\nversion = "ä"\nresponse_time_s = 0.3\n'
+
+
+def read_known(file: Path) -> object:
+    names = ("max_ecr", "max_pcr", "max_preventable", "max_rate")
+    return Bounds.of(argparse.Namespace(**dict.fromkeys(names), no_new_failures=file, judge_by="rate")).known
+
+
+def read_egos(file: Path) -> object:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RISK_SAC_EGOS", str(file))
+        return card_of("far")
+
+
+READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
+    "campaign": (SPEC, lambda file: read_campaign(file, {}, {})),
+    "campaign as JSON": (JSON, lambda file: read_campaign(file, {}, {})),
+    "run": (SPEC, lambda file: read_spec(file, {})),
+    "ego": ("profile: perfect # für\n", lambda file: read_ego(str(file))),
+    "gate": (KNOWN, read_known),
+    "baseline": (Regression(ego=EgoConfig(), cases=()).model_dump_json(), read_baseline),
+    "key": ("a-key\n", lambda file: api_key({"RISK_SAC_API_KEY_FILE": str(file)})),
+    "egos": (EGOS, read_egos),
+}
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-32"])
+@pytest.mark.parametrize("name", READERS)
+def test_a_byte_order_mark_and_other_ends_of_lines_change_nothing(name, encoding, tmp_path):
+    text, read = READERS[name]
+    plain, marked = tmp_path / "plain.yaml", tmp_path / "marked.yaml"
+    plain.write_text(text, encoding="utf-8")
+    for ends in ("\r\n", "\r"):
+        marked.write_bytes(text.replace("\n", ends).encode(encoding))
+        assert read(marked) == read(plain)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_another_encoding_is_one_line_that_says_what_to_do(name, tmp_path):
+    file = tmp_path / "latin.yaml"
+    file.write_bytes("label: Straße\n".encode("latin-1"))
+    with pytest.raises(
+        ConfigError, match=r"latin\.yaml, which is no UTF-8 from byte 11 on; wanted a text file; save it as UTF-8"
+    ):
+        READERS[name][1](file)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from risk_sac.egos.guard import LARGEST, MOST_POINTS, Guarded, sound
+from risk_sac.egos.guard import LARGEST, MOST_POINTS, Guarded
 from risk_sac.egos.seam import Control, Trajectory
 from risk_sac.errors import EgoFailed
 
@@ -179,26 +179,6 @@ def test_what_an_ego_sets_holds_for_it_alone(tmp_path):
     here, ego = os.getcwd(), guarded(doubles)
     assert [ego.act(None), ego.act(None)] == [Control(0.0), Control(1.0)]
     assert (torch.get_default_dtype(), os.getcwd()) == (torch.float32, here)
-
-
-@pytest.mark.parametrize(
-    ("answer", "expected"),
-    [
-        (Control(-3.0), (-3.0, 0.0)),
-        (Control(1, np.float32(0.5)), (1.0, 0.5)),
-        (Control(torch.tensor(1.5), np.array(2)), (1.5, 2.0)),
-    ],
-)
-def test_a_sound_control_is_two_floats(answer, expected):
-    assert sound(answer) == Control(*expected)
-    assert {type(number) for number in sound(answer)} == {float}
-
-
-@pytest.mark.parametrize("row", [ROW, [0, 1], (0.0, np.float32(1.0)), torch.tensor([0.0, 1.0])])
-def test_a_sound_trajectory_is_four_rows_of_its_own(row):
-    found = sound(Trajectory(row, row, row, row))
-    assert [(each.tolist(), each.dtype) for each in found] == [([0.0, 1.0], np.float64)] * 4
-    assert not np.shares_memory(found.time_s, row)
 
 
 def loops():

@@ -39,10 +39,6 @@ REQUEST = (
     "00000000000000000a320a08080210808c8d9e02121b0900000000008030401100000000000000401900000000000000001a0919"
     "0000000000000000"
 )
-STATE = (
-    "1800223d0a08080210808c8d9e0212120900000000000032401100000000000000401a0919182d4454fb21f93f22120900000000"
-    "00000840110000000000001040"
-)
 
 
 def perceived() -> Perceived:
@@ -71,7 +67,7 @@ def perceived() -> Perceived:
     )
 
 
-def test_what_is_told_is_an_osi_ground_truth() -> None:
+def test_what_is_told_is_an_osi_ground_truth():
     """The literal is what `osi3.GroundTruth.FromString` read, `SerializeToString` wrote again, byte for byte."""
     assert ground_truth(perceived(), {}, Road()).hex() == GROUND_TRUTH
 
@@ -104,7 +100,7 @@ ROAD_MESSAGE = (
 )
 
 
-def test_the_road_is_told_as_osi_lanes() -> None:
+def test_the_road_is_told_as_osi_lanes():
     """The literal is what `osi3.GroundTruth.FromString` read, `SerializeToString` wrote again, byte for byte."""
     assert road_message(ROAD).hex() == ROAD_MESSAGE
     own = ground_truth(perceived()._replace(signals=(Signal.YELLOW,)), {}, ROAD)
@@ -125,16 +121,7 @@ def test_the_road_is_told_as_osi_lanes() -> None:
     assert len(truth.moving_object) == 3
 
 
-def test_actors_keep_their_numbers() -> None:
-    numbers: dict[str, int] = {}
-    ground_truth(perceived(), numbers, Road())
-    later = perceived()._replace(ids=("ego", "walker", "new"))
-    told = GroundTruth.FromString(ground_truth(later, numbers, Road()))
-    assert [each.id.value for each in told.moving_object] == [1, 3, 4]
-    assert told.host_vehicle_id.value == 1
-
-
-def test_an_osi_motion_request_is_a_trajectory_of_the_middle_of_the_body() -> None:
+def test_an_osi_motion_request_is_a_trajectory_of_the_middle_of_the_body():
     found = trajectory_of(bytes.fromhex(REQUEST), perceived(), 1.5)
     np.testing.assert_allclose(found.time_s, [0.0, 0.5, 1.0])
     np.testing.assert_allclose(found.x_m, [10.0, 14.0, 18.0])
@@ -142,16 +129,8 @@ def test_an_osi_motion_request_is_a_trajectory_of_the_middle_of_the_body() -> No
     np.testing.assert_allclose(found.speed_mps, [8.0, 8.0, 8.0])
 
 
-def test_a_desired_state_is_where_to_be_then() -> None:
-    found = trajectory_of(bytes.fromhex(STATE), perceived(), 1.5)
-    np.testing.assert_allclose(found.time_s, [0.0, 1.0])
-    np.testing.assert_allclose(found.x_m, [10.0, 18.0])
-    np.testing.assert_allclose(found.y_m, [2.0, 3.5])
-    np.testing.assert_allclose(found.speed_mps, [8.25, 5.0])
-
-
 @pytest.mark.parametrize("nothing", ["", "0a00", "1801", "2200", "18012a020a00", "ff", "22"])
-def test_what_is_no_motion_request_is_refused(nothing: str) -> None:
+def test_what_is_no_motion_request_is_refused(nothing):
     with pytest.raises(ValueError, match="motion request"):
         trajectory_of(bytes.fromhex(nothing), perceived(), 1.5)
 
@@ -183,7 +162,7 @@ class ByOsi(OsiEgo):
         return request.SerializeToString()
 
 
-def test_it_drives_an_episode(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_drives_an_episode(monkeypatch):
     monkeypatch.setitem(SHIPPED, "by-osi", "tests.unit.egos.test_osi:ByOsi")
     spec = RunSpec(family="low", method="random", seed=0, ego=EgoConfig(driver="by-osi"))
     with closing(RiskSacEnv(RiskSacEnv.of(spec).problem, spec.learner.reward, controlled=False)) as env:

@@ -1,14 +1,20 @@
 """What is so of processes of this machine, beyond what every executor must pass."""
 
+import json
+import math
 import time
+from pathlib import Path
 
 import psutil
 import pytest
+from pydantic import ValidationError
 
 from risk_sac.config.campaign import Requirement
 from risk_sac.execution.executor import Cause, Exited, Program
-from risk_sac.execution.local import LocalExecutor
-from risk_sac.execution.messages import Heard
+from risk_sac.execution.local import Lease, LocalExecutor, Signs
+from risk_sac.execution.messages import Failed, Finished, Heard, Heartbeat, Started, decode, encode
+from risk_sac.execution.postmortem import WorkerLog, without_folders
+from risk_sac.records import Outcome
 from tests.contract.executor_contract import ALIVE, SPEC, Runs, outcome
 
 
@@ -102,3 +108,100 @@ def read(executor):
         assert time.monotonic() < deadline
         told += [message for _, message in executor.events(1)]
     return told
+
+
+FOREVER = 1e9
+
+
+def seconds_until_lost(lease, signs, watched_s=0.2):
+    """Time until the worker with these signs of life, one set after another, counts as lost; the last set stays."""
+    signs = list(signs)
+    for count in range(1, 1000):
+        if lease.passed(watched_s, signs.pop(0) if len(signs) > 1 else signs[0]):
+            return round(count * watched_s, 6)
+    return None
+
+
+def test_a_worker_that_neither_speaks_nor_works_is_lost_after_its_lease():
+    assert seconds_until_lost(Lease(4.0, FOREVER), [Signs()]) == 4.0
+
+
+def test_words_and_processor_time_are_signs_of_life():
+    speaks = [Signs(words=count) for count in range(1, 51)]
+    works = [Signs(processor_s=0.01 * count) for count in range(1, 51)]
+    for signs in (speaks, works):
+        assert seconds_until_lost(Lease(4.0, FOREVER), signs) == 50 * 0.2 + 4.0
+
+
+def test_a_worker_that_stays_busy_without_an_episode_is_lost_when_it_stalls():
+    busy = [Signs(words=count, processor_s=float(count)) for count in range(1000)]
+    assert seconds_until_lost(Lease(4.0, 60.0), busy) == 60.0
+
+
+def test_time_that_nobody_watched_is_not_held_against_a_worker():
+    lease = Lease(4.0, FOREVER)
+    lease.passed(3.9, Signs())
+    assert lease.passed(0.0, Signs()) is None
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        ('File "/opt/venv/lib/torch/nn.py", line 3, in f', 'File "nn.py", line 3, in f'),
+        ("OSError: [Errno 28] No space left: '/srv/data/c1/run/a.json'", "OSError: [Errno 28] No space left: 'a.json'"),
+        ("data/c1/run/results.json is damaged", "results.json is damaged"),
+        ("folder 'data/c1/run' is in use", "folder 'run' is in use"),
+        ("/data is full", "data is full"),
+        ("4 m/s, 1 / 2 and https://a.example/b/c", "4 m/s, 1 / 2 and https://a.example/b/c"),
+    ],
+)
+def test_a_text_keeps_the_names_of_files_and_no_folders(said, told):
+    assert without_folders(said, Path("data/c1/run")) == told
+
+
+def test_the_last_lines_of_a_log_are_told_without_folders(tmp_path):
+    log = tmp_path / "worker.log"
+    log.write_text(f'an older worker\'s\nTraceback:\n  File "{log}", line 1\nValueError: no\n')
+    assert (
+        WorkerLog(log, len("an older worker's\n")).tail() == 'Traceback: | File "worker.log", line 1 | ValueError: no'
+    )
+
+
+def test_every_event_survives_the_wire(episode, metrics):
+    finished = Finished(finished=True, metrics=metrics, evaluation=None, digest="d", versions={"sumo": "1"}, wall_s=1.5)
+    contact = episode(1, Outcome.FAILURE).model_copy(update={"series_sha256": "0" * 64})
+    for event in (Started(pid=3), Heartbeat(), contact, episode(0), finished, Failed(reason="no", storage=True)):
+        assert decode(encode(event)).model_dump_json() == event.model_dump_json()  # a NaN is unequal to itself
+
+
+def test_numbers_that_are_not_finite_survive_as_strict_json(episode):
+    line = encode(episode(0, Outcome.FAILURE))
+
+    def refuse(constant):
+        raise AssertionError(constant)
+
+    json.loads(line, parse_constant=refuse)
+    record = decode(line).record
+    assert record.min_ttc_s == math.inf
+    assert math.isnan(record.collision.min_ttc_s)
+    assert record.collision.min_robustness == -math.inf
+
+
+@pytest.mark.parametrize(
+    "line", [b"", b"\n", b"Loading net\n", b"{}", b'{"type":"started"}', b'{"type":"other"}', b"\xff\n", b"null"]
+)
+def test_what_is_no_event_is_refused(line):
+    with pytest.raises(ValidationError):
+        decode(line)
+
+
+@pytest.mark.parametrize("name", ["../a.npz", "/etc/passwd", "a/b.npz", "", ".hidden", "a\x00b"])
+def test_a_series_is_a_plain_file_name(episode, name):
+    line = json.loads(encode(episode(0)))
+    with pytest.raises(ValidationError, match="series"):
+        decode(json.dumps(line | {"series": name}).encode())
+
+
+def test_a_text_about_no_folder_of_ours_loses_those_it_names():
+    said = 'connection to server on socket "/run/postgresql/.s.PGSQL.5432" failed'
+    assert without_folders(said) == 'connection to server on socket ".s.PGSQL.5432" failed'

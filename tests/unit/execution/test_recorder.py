@@ -12,11 +12,7 @@ from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
 from risk_sac.run_folder.verified import Verified, distinct_failures, write_verified
 
 SPEC = RunSpec(
-    family="low",
-    method="random",
-    seed=30,
-    budget=Budget(episodes=8),
-    learner=LearnerConfig(checkpoint_every=2),
+    family="low", method="random", seed=30, budget=Budget(episodes=8), learner=LearnerConfig(checkpoint_every=2)
 )
 
 

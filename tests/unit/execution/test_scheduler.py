@@ -5,9 +5,8 @@ import pytest
 
 from risk_sac.config import RunSpec
 from risk_sac.execution.executor import FOLDER, Program
-from risk_sac.execution.jobs import ATTEMPTS, LOG, Job, execute
+from risk_sac.execution.jobs import LOG, Job, execute
 from risk_sac.execution.local import LocalExecutor
-from risk_sac.execution.messages import Failed
 
 SPEC = RunSpec(family="low", method="random", seed=0)
 BEGIN = """
@@ -54,31 +53,3 @@ def test_a_run_that_is_told_to_stop_may_take_its_time(job):
     assert (job.folder / "told").read_text() == "to stop\n"  # once
     assert (job.folder / "left").exists()
     assert (job.state, job.reason) == ("stopped", "stopped after 0 of 300 episodes")
-
-
-FAILS = (
-    f"os.write(int(os.environ['RISK_SAC_WORDS']), {Failed(reason='bad spec').model_dump_json().encode()!r} + b'\\n')"
-)
-
-
-@pytest.mark.parametrize(
-    ("code", "attempts", "reason"),
-    [
-        ("print('x'); sys.exit('no')", ATTEMPTS, "worker exited with status 1: x | no; "),
-        (FAILS, 1, "bad spec; 0 of 300 episodes done (see "),
-        ("os.kill(os.getpid(), 40)", ATTEMPTS, "worker was killed by signal 40; "),
-        ("pass", ATTEMPTS, "worker left without a word; "),
-    ],
-)
-def test_a_run_is_tried_as_often_as_there_is_hope(job, code, attempts, reason):
-    run(code, job)
-    assert (job.state, job.attempts) == ("failed", attempts)
-    assert job.reason.startswith(reason)
-    assert len((job.folder / "tries").read_text().splitlines()) == attempts
-
-
-def test_a_run_whose_folder_is_in_the_way_fails(job):
-    job.folder.write_text("")
-    run("", job)
-    assert job.state == "failed"
-    assert "File exists" in job.reason

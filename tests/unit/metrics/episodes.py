@@ -84,11 +84,7 @@ any_collision = st.builds(
     robustness=st.floats(-math.inf, math.inf),
 )
 any_episode = st.builds(
-    episode,
-    outcome=st.sampled_from(Outcome),
-    steps=st.integers(1, HORIZON),
-    cost=st.floats(0, 1),
-    hit=any_collision,
+    episode, outcome=st.sampled_from(Outcome), steps=st.integers(1, HORIZON), cost=st.floats(0, 1), hit=any_collision
 )
 any_run = st.lists(any_episode, max_size=40)
 

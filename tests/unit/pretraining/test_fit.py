@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from risk_sac.config import RunSpec
-from risk_sac.errors import ConfigError
 from risk_sac.pretraining import fit as fitting
 from risk_sac.pretraining.egos import training_egos
 from risk_sac.pretraining.fit import Dataset, auc, beliefs, fitted_prior
@@ -21,7 +20,7 @@ def data(count: int = 3000) -> Dataset:
     return Dataset(points, heads, kinds, egos)
 
 
-def test_a_model_learns_which_points_fail_which_ego(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_learns_which_points_fail_which_ego(monkeypatch):
     monkeypatch.setattr(fitting, "EPOCHS", 8)
     prior = fitted_prior("low", data(), seed=0)
     assert prior.model.egos == ("sound", "weak")
@@ -31,7 +30,7 @@ def test_a_model_learns_which_points_fail_which_ego(monkeypatch: pytest.MonkeyPa
     assert (prior.library[:, 0] > 0.5).all()
 
 
-def test_beliefs_are_distributions_under_which_the_ego_is_likely() -> None:
+def test_beliefs_are_distributions_under_which_the_ego_is_likely():
     import torch
 
     drawn = beliefs(torch.full((2000,), 3), 8)
@@ -39,18 +38,13 @@ def test_beliefs_are_distributions_under_which_the_ego_is_likely() -> None:
     assert drawn[:, 3].mean() > 0.55 > 0.1 > drawn[:, 0].mean()
 
 
-def test_auc_is_one_for_a_perfect_order_and_a_half_for_none() -> None:
+def test_auc_is_one_for_a_perfect_order_and_a_half_for_none():
     positive = np.array([False, False, True, True])
     assert auc(np.array([0.1, 0.2, 0.3, 0.4], np.float32), positive) == 1.0
     assert auc(np.zeros(4, np.float32), positive) == 0.5
 
 
-def test_too_few_failures_are_refused() -> None:
-    with pytest.raises(ConfigError, match=r"chunks.*failures in 100 episodes"):
-        fitted_prior("low", data(100), seed=0)
-
-
 @pytest.mark.parametrize("family", ["low", "mixed", "dense"])
-def test_every_training_ego_can_be_run(family: str) -> None:
+def test_every_training_ego_can_be_run(family):
     for ego in training_egos(family).values():
         Problem.from_spec(RunSpec(family=family, method="archive", seed=0, ego=ego))

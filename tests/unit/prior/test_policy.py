@@ -1,16 +1,15 @@
 """The pretrained policy: files, and networks folded into a problem's own layout."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from risk_sac.config import FamilyName, RunMethod, RunSpec
+from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.frozen_policy import respond
 from risk_sac.observation_layout import PER_ADVERSARY, PER_EGO
-from risk_sac.prior.policy import Folded, Layout, PretrainedPolicy, check_prior, read_policy, with_goal, write_policy
+from risk_sac.prior.policy import Folded, Layout, read_policy, with_goal, write_policy
 from risk_sac.problem import Problem
 from risk_sac.types import Vector
 from tests.builders import pretrained_policy
@@ -19,12 +18,12 @@ GOAL_NAMES = ("no_contact: cut-in, ahead, in a lane", "no_contact: leader, ahead
 
 
 @pytest.fixture
-def layout() -> Layout:
+def layout():
     return Layout.of(Problem.from_spec(RunSpec(family="low", method="risk-sac", seed=0)))
 
 
 @pytest.fixture
-def pretrained(layout: Layout) -> PretrainedPolicy:
+def pretrained(layout):
     return pretrained_policy(layout, GOAL_NAMES)
 
 
@@ -37,7 +36,7 @@ def observed(layout: Layout) -> Vector:
     return np.random.default_rng(4).random(layout.observation_size).astype(np.float32)
 
 
-def test_a_file_gives_back_what_was_written(tmp_path: Path, pretrained: PretrainedPolicy) -> None:
+def test_a_file_gives_back_what_was_written(tmp_path, pretrained):
     path = tmp_path / "low-policy.npz"
     write_policy(path, pretrained)
     known = read_policy(path)
@@ -48,7 +47,7 @@ def test_a_file_gives_back_what_was_written(tmp_path: Path, pretrained: Pretrain
 
 
 @pytest.mark.parametrize("damage", ["cut", "text", "layout", "nan", "temperature"])
-def test_other_files_are_refused_in_one_line(tmp_path: Path, pretrained: PretrainedPolicy, damage: str) -> None:
+def test_other_files_are_refused_in_one_line(tmp_path, pretrained, damage):
     path = tmp_path / "low-policy.npz"
     if damage == "layout":
         pretrained = replace(pretrained, layout=replace(pretrained.layout, requirements=("no_contact",)))
@@ -66,7 +65,7 @@ def test_other_files_are_refused_in_one_line(tmp_path: Path, pretrained: Pretrai
     assert "\n" not in str(raised.value)
 
 
-def test_networks_folded_into_their_own_layout_do_the_same(pretrained: PretrainedPolicy, layout: Layout) -> None:
+def test_networks_folded_into_their_own_layout_do_the_same(pretrained, layout):
     folded, seen = Folded.of(pretrained, layout), observed(layout)
     for goal in range(len(GOAL_NAMES) + 1):
         layers = plain(folded.policy)
@@ -82,7 +81,7 @@ def test_networks_folded_into_their_own_layout_do_the_same(pretrained: Pretraine
         np.testing.assert_allclose(value, wanted, atol=1e-4)
 
 
-def test_another_layout_is_read_by_names_and_values(pretrained: PretrainedPolicy, layout: Layout) -> None:
+def test_another_layout_is_read_by_names_and_values(pretrained, layout):
     """The other problem has its adversaries in another order and one more, other bounds, and lacks a requirement."""
     (name, low, high), *others = layout.scene
     own = Layout(
@@ -111,30 +110,3 @@ def test_another_layout_is_read_by_names_and_values(pretrained: PretrainedPolicy
         assert not got[:2].any()  # the stranger does as it likes
         by_name = {a: expected[2 * i : 2 * i + 2] for i, a in enumerate(layout.adversaries)}
         np.testing.assert_allclose(got[2:], np.concatenate([by_name[a] for a in own.adversaries[1:]]), atol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("method", "family", "prior", "message"),
-    [
-        (
-            "risk-sac-pretrained",
-            "dense",
-            "shipped",
-            "method: got risk-sac-pretrained at dense, which has no pretrained",
-        ),
-        ("risk-sac-pretrained", "low", "none", "prior: got none, and the method risk-sac-pretrained"),
-        ("archive-replay", "low", "none", "prior: got none, and the method archive-replay"),
-        ("risk-sac-pretrained", "low", "shipped", ""),
-        ("archive-replay", "dense", "shipped", ""),
-        ("risk-sac-diverse", "dense", "none", ""),
-    ],
-)
-def test_methods_without_their_prior_are_refused(
-    method: RunMethod, family: FamilyName, prior: str, message: str
-) -> None:
-    if not message:
-        check_prior(method, family, prior)
-        return
-    with pytest.raises(ConfigError) as raised:
-        check_prior(method, family, prior)
-    assert str(raised.value).startswith(message)

@@ -39,7 +39,7 @@ def genes_of(points: np.ndarray, family: Family, adversary: str) -> np.ndarray:
     return points[:, first : first + SIZE]
 
 
-def test_points_of_a_narrower_problem_keep_their_values() -> None:
+def test_points_of_a_narrower_problem_keep_their_values():
     family = FAMILIES["low"]
     first = family.space.parameters[0]
     middle = (first.low + first.high) / 2
@@ -51,13 +51,7 @@ def test_points_of_a_narrower_problem_keep_their_values() -> None:
     np.testing.assert_allclose(subject.own(known), point)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-def test_at_its_own_family_the_prior_stays_as_it_is(family: str) -> None:
-    library = shipped_prior(family).library
-    np.testing.assert_allclose(translation(FAMILIES[family], family).own(library), library, atol=1e-12)
-
-
-def test_an_adversary_that_the_place_lacks_is_passive_to_the_model() -> None:
+def test_an_adversary_that_the_place_lacks_is_passive_to_the_model():
     place = low_with("left")
     subject = translation(place, "low")
     point = np.full((1, subject.scene_size + SIZE * 2), 0.9)
@@ -67,7 +61,7 @@ def test_an_adversary_that_the_place_lacks_is_passive_to_the_model() -> None:
     np.testing.assert_allclose(subject.own(known), point)
 
 
-def test_scripts_from_the_left_are_played_from_the_right_where_there_is_no_lane_on_the_left() -> None:
+def test_scripts_from_the_left_are_played_from_the_right_where_there_is_no_lane_on_the_left():
     place = low_with("right")
     library = shipped_prior("low").library
     own = translation(place, "low").own(library)
@@ -76,7 +70,7 @@ def test_scripts_from_the_left_are_played_from_the_right_where_there_is_no_lane_
     np.testing.assert_allclose(own[:, offset], library[:, shipped])
 
 
-def test_a_pedestrian_from_the_left_turns_the_other_way() -> None:
+def test_a_pedestrian_from_the_left_turns_the_other_way():
     mixed = FAMILIES["mixed"]
     library = shipped_prior("mixed").library
     subject = translation(replace(mixed, mirrored=True), "mixed")
@@ -89,7 +83,7 @@ def test_a_pedestrian_from_the_left_turns_the_other_way() -> None:
     np.testing.assert_allclose(subject.known(own), library, atol=1e-12)
 
 
-def test_rows_that_depend_on_a_missing_adversary_are_drawn_less_often() -> None:
+def test_rows_that_depend_on_a_missing_adversary_are_drawn_less_often():
     whole, alone = (start_of(problem_at(low_with(*sides)), "shipped") for sides in (("left", "right"), ()))
     assert whole.library_worth.mean() > 0.99
     assert alone.library_worth.mean() < 0.2

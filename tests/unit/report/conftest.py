@@ -1,8 +1,6 @@
-from collections.abc import Callable
-
 import pytest
 
-from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.config import CampaignSpec
 from risk_sac.metrics import results_digest
 from risk_sac.records import Collision, DrivenBy, Fault, Grade, Judgement, Outcome, RequirementResult, Severity
 from risk_sac.report import FinishedRun
@@ -27,10 +25,7 @@ OUTCOMES = {
     "r": (Outcome.REJECTED, None),
     "f": (Outcome.FAILURE, hit(judged=judgement(conflict_s=1.5))),
     # Another failure than f, which only full braking at once would have prevented.
-    "F": (
-        Outcome.FAILURE,
-        hit(speed=20.0, judged=LEADER),
-    ),
+    "F": (Outcome.FAILURE, hit(speed=20.0, judged=LEADER)),
     "a": (Outcome.DEGENERATE, hit(broken="inside_limits")),
     "d": (Outcome.DEGENERATE, hit(broken="ego_moving")),
 }
@@ -64,10 +59,10 @@ NEWER = {
 
 
 @pytest.fixture
-def finished() -> Callable[..., FinishedRun]:
+def finished():
     """Builds a run from one letter per episode, see `OUTCOMES`; every episode that is not rejected has 50 steps."""
 
-    def build(spec: RunSpec, search: str, evaluation: str = "", cpu_s: float = 60.0) -> FinishedRun:
+    def build(spec, search, evaluation="", cpu_s=60.0):
         records = []
         for index, letter in enumerate(search + evaluation):
             outcome, contact = OUTCOMES[letter]
@@ -97,7 +92,7 @@ def finished() -> Callable[..., FinishedRun]:
 
 
 @pytest.fixture
-def spec() -> CampaignSpec:
+def spec():
     return CampaignSpec.model_validate(
         {
             "families": ("low",),
@@ -109,7 +104,7 @@ def spec() -> CampaignSpec:
 
 
 @pytest.fixture
-def runs(spec: CampaignSpec, finished: Callable[..., FinishedRun]) -> list[FinishedRun]:
+def runs(spec, finished):
     letters = {
         ("risk-sac", 0): ("ffF.", "f"),
         ("risk-sac", 1): ("f..r", "."),

@@ -1,13 +1,20 @@
+"""What a search had found when a budget was spent, counted by hand."""
+
+import math
 import subprocess
 import sys
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from risk_sac.config import CampaignSpec
-from risk_sac.metrics import wilson_interval
-from risk_sac.report import compare
+from risk_sac.metrics import results_digest, wilson_interval
+from risk_sac.report import compare, figure_bytes, figure_names, read_run, write_report
 from risk_sac.report.comparison import declared
+from risk_sac.report.figures import CURVES, window_ecr, window_pcr
 from risk_sac.report.paired import holm
+from risk_sac.report.runs import Limit, cpu_s, episodes, found_within
+from risk_sac.run_folder.results import EPISODES, RecordedFailure, Results, read_results, write_results
 from risk_sac.scenario.families import FAMILIES
 
 HORIZON = FAMILIES["low"].horizon_steps
@@ -21,13 +28,6 @@ def comparison(spec, runs):
 def cell(comparison, method, phase="search"):
     (found,) = [each for each in comparison.cells if (each.method, each.phase) == (method, phase)]
     return found
-
-
-def test_the_reference_comes_first_and_phases_are_apart(comparison):
-    assert [(each.phase, each.method) for each in comparison.cells] == [
-        (phase, method) for phase in ("search", "evaluation") for method in ("risk-sac", "sac", "no-adversary")
-    ]
-    assert comparison.phases == ("search", "evaluation")
 
 
 def test_a_cell_is_the_mean_over_seeds_and_sums_over_seeds(comparison):
@@ -52,36 +52,6 @@ def test_the_funnel_and_pcr_are_those_of_all_seeds(comparison):
     assert (pcr.mean, pcr.low, pcr.high) == (0.375, *wilson_interval(3, 8))  # 2/4 and 1/4
     assert (found.unresponsive, found.unresponsive_share) == (1, 1 / 4)
     assert cell(comparison, "no-adversary").unresponsive_share is None
-
-
-def test_histograms_and_signatures_are_summed_over_the_seeds(comparison):
-    found = cell(comparison, "risk-sac")
-    assert found.signatures == {"cut-in, straight": 3, "leader, straight": 1}
-    assert (found.conflicts_by_second[:3], sum(found.conflicts_by_second)) == ((1, 3, 0), 4)  # -0.5 s and 1.5 s
-    assert (found.contacts_by_second[:4], sum(found.contacts_by_second)) == ((0, 0, 0, 4), 4)
-    assert len(found.contacts_by_second) == len(found.conflicts_by_second) == HORIZON / 10
-
-
-def test_dispersion_is_taken_over_the_seeds_that_have_one(comparison):
-    ofd = cell(comparison, "risk-sac").estimates["ofd"]
-    assert (ofd.mean, ofd.runs) == (pytest.approx(2 / 3 * 0.5 / 2), 1)  # two pairs of three differ by half a range
-    assert (ofd.low, ofd.high) == (None, None)
-    assert cell(comparison, "sac").estimates["ofd"].mean is None
-    assert cell(comparison, "no-adversary").steps_per_distinct_failure is None
-
-
-def test_artefacts_are_the_contacts_nobody_is_to_blame_for(comparison):
-    sac, control = cell(comparison, "sac"), cell(comparison, "no-adversary")
-    assert (sac.raw_rate, sac.degenerate_rate, sac.artefact_rate) == (3 / 8, 2 / 8, 1 / 8)
-    assert (control.raw_rate, control.artefact_rate) == (1 / 8, 1 / 8)
-
-
-def test_evaluation_has_neither_seconds_nor_a_last_window(comparison):
-    found = cell(comparison, "risk-sac", "evaluation")
-    assert found.estimates["ecr"].mean == 0.5
-    assert not {"ecr_last", "pcr_last"} & found.estimates.keys()
-    assert found.steps_per_distinct_failure == 100
-    assert found.cpu_s_per_distinct_failure is None
 
 
 def test_one_seed_has_wilsons_interval(spec, runs):
@@ -126,30 +96,112 @@ def test_a_missing_seed_costs_its_pair(spec, runs):
     assert [(test.pairs, test.p) for test in tests] == [(1, None), (1, None)]
 
 
-def test_nothing_finished_is_a_comparison_too(spec):
-    comparison = compare(spec, [], "")
-    assert comparison.cells == ()
-    assert len(comparison.missing) == 6
-    assert all(test.pairs == 0 for test in comparison.tests)
-
-
-def test_runs_of_other_specs_are_left_out(spec, runs, finished):
-    other = CampaignSpec(families=("low",), seeds=(0, 1)).runs()
-    stray = [finished(run, "ffff") for run in other]
-    assert compare(spec, runs + stray, "") == compare(spec, runs, "")
-
-
-def test_the_order_of_the_runs_does_not_matter(spec, runs):
-    assert compare(spec, runs[::-1], "") == compare(spec, runs, "")
-
-
-def test_without_risk_sac_the_first_method_is_the_reference(spec, runs):
-    others = spec.model_copy(update={"methods": ("sac", "no-adversary")})
-    assert compare(others, runs, "").reference == "sac"
-
-
 def test_report_loads_without_torch_and_libsumo():
     heavy = {"torch", "libsumo", "botorch", "numba", "rtamt"}
     code = f"import sys, risk_sac.report; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.fixture
+def run(spec, finished):
+    """F: a failure that no driver prevents, f: one that the careful driver prevents, r: a refused scene."""
+    return replace(finished(spec.runs()[0], ".FrfFf", "f"), episode_cpu_s=(2.0, 4.0, 4.5, 9.0, 10.0, 12.0, 20.0))
+
+
+def test_each_kind_counts_once_from_the_episode_on_that_found_it(run):
+    counts = [(found.preventable, found.distinct) for found in run.found]
+    assert counts == [(0, 0), (0, 1), (0, 1), (1, 2), (1, 2), (1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"),
+    [
+        (Limit("", cpu_s, 1.0), (0, 0)),  # the first episode ended later
+        (Limit("", cpu_s, 8.9), (0, 1)),
+        (Limit("", cpu_s, 9.0), (1, 2)),
+        (Limit("", episodes, 2), (0, 1)),
+        (Limit("", episodes, 6), (1, 2)),
+    ],
+)
+def test_what_ended_within_the_limit_counts(run, limit, expected):
+    found = found_within(run, limit)
+    assert (found.preventable, found.distinct) == expected
+
+
+def test_our_own_search_is_tested_against_the_others_on_what_a_user_pays_for(spec, finished):
+    budget = {"budget": spec.budget.model_copy(update={"evaluation_episodes": 0})}
+    methods = {"methods": ("risk-sac", "risk-sac-diverse", "random"), "seeds": tuple(range(6))}
+    wanted = spec.model_copy(update=budget | methods)
+    letters = {"risk-sac": "....", "risk-sac-diverse": "f...", "random": "f..."}
+    runs = [replace(finished(run, letters[run.method]), episode_cpu_s=(5.0, 10.0, 20.0, 31.0)) for run in wanted.runs()]
+    against = {test.method: test for test in compare(wanted, runs, "a command").paid_tests}
+    assert {test.reference for test in against.values()} == {"risk-sac-diverse"}
+    assert (against["risk-sac"].difference, against["random"].difference) == (1.0, 0.0)
+    assert against["risk-sac"].p == pytest.approx(2 / 2**6)
+    assert against["risk-sac"].p_holm == pytest.approx(2 * 2 / 2**6)  # of two hypotheses, whatever else is tested
+
+
+@pytest.fixture
+def files_comparison(spec, runs):
+    return compare(spec, runs, "risk-sac evaluate --out d", spec_file="d/spec.yaml")
+
+
+def test_sliding_rates_are_of_contacts_and_end_where_the_metrics_do(spec, finished):
+    run = finished(spec.runs()[0], "vfFkd")  # its first failure is no contact
+    np.testing.assert_allclose(window_ecr(run), [0, 1 / 2, 2 / 3, 2 / 4, 2 / 5])
+    np.testing.assert_allclose(window_pcr(run), [0, 1 / 2, 1 / 3, 1 / 4, 1 / 5])
+    metrics = run.metrics["search"]
+    assert (metrics.window_ecr, metrics.window_pcr) == (0.4, 0.2)
+
+
+MAGIC = {".png": b"\x89PNG", ".svg": b"<?xml"}
+
+
+def test_report_is_written_twice_alike(spec, runs, tmp_path):
+    # Without the evaluation, whose figures tests/acceptance/test_evaluate.py draws twice.
+    search = {"budget": spec.budget.model_copy(update={"evaluation_episodes": 0})}
+    searches = [replace(run, spec=run.spec.model_copy(update=search)) for run in runs]
+    files_comparison = compare(spec.model_copy(update=search), searches, "")
+
+    def content():
+        write_report(files_comparison, tmp_path)
+        return {path.relative_to(tmp_path): path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+
+    first = content()
+    assert len(first) == 3 + 2 * len(figure_names(files_comparison))
+    assert {file.suffix for file in first} == {".json", ".md", ".csv", *MAGIC}
+    assert all(written.startswith(MAGIC.get(file.suffix, b"")) for file, written in first.items())
+    assert content() == first
+
+
+def test_a_run_in_which_nothing_was_ever_close_can_be_read(runs, tmp_path):
+    records = [never_close(record) for record in runs[0].records]
+    results = Results(
+        spec=runs[0].spec,
+        spec_digest=runs[0].spec.digest,
+        finished=True,
+        digest=results_digest(records),
+        failures=tuple(
+            RecordedFailure.of(runs[0].spec.id, record) for record in records if record.worst_violation is not None
+        ),
+    )
+    write_results(tmp_path, results)
+    (tmp_path / EPISODES).write_text("".join(record.model_dump_json() + "\n" for record in records))
+    assert read_results(tmp_path).failures == results.failures
+    assert read_run(tmp_path).records == tuple(records)
+
+
+def never_close(record):
+    least = {"min_ttc_s": math.inf, "min_robustness": math.inf}
+    collision = record.collision and record.collision.model_copy(update=least | {"min_rss_margin_m": math.inf})
+    return record.model_copy(update=least | {"collision": collision})
+
+
+def test_runs_of_unequal_length_are_drawn_as_far_as_all_came(spec, finished):
+    runs = [finished(run, "..f.f" if run.seed else "..f", ".") for run in spec.runs()]
+    comparison = compare(spec, runs, "")
+    (curve,) = [curve for curve in CURVES if curve.name == "ecr"]
+    at, values = curve.over([runs[0], next(run for run in runs if run.spec.seed)])
+    assert (at.tolist(), values.shape) == ([1.0, 2.0, 3.0], (2, 3))
+    assert figure_bytes(comparison, "ecr_low", "svg").startswith(b"<?xml")

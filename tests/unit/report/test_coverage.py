@@ -1,14 +1,12 @@
-import math
+from dataclasses import replace
 
-import pytest
-
-from risk_sac.config import Interval, Odd
+from risk_sac.config import Interval, Odd, RunSpec
+from risk_sac.metrics import clopper_pearson
 from risk_sac.records import Outcome
-from risk_sac.report.coverage import VALUES, axis_of, coverage, kinds
+from risk_sac.report.evidence.coverage import axis_of, coverage, kinds
+from risk_sac.report.evidence.gathered import drawn
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.odd import narrow
 from risk_sac.scenario.space import Parameter
-from risk_sac.verdicts.distinct import CELLS
 from tests.builders import collision, episode_record, judgement
 
 MIXED = FAMILIES["mixed"]
@@ -33,19 +31,6 @@ def test_a_bin_holds_its_lower_edge_and_the_last_one_both():
     assert axis_of(fixed, length, 5).places([3.0]).tolist() == [0]
 
 
-@pytest.mark.parametrize(
-    ("allowed", "names"),
-    [(None, ("zebra", "signalised")), (("zebra",), ("zebra",)), (("signalised",), ("signalised",))],
-)
-def test_a_category_is_a_bin_and_one_that_the_odd_excludes_is_none(allowed, names):
-    odd = Odd.model_validate({"scenery": {"crossing_types": allowed}})
-    whole, bounded = MIXED.space.parameters[0], narrow(MIXED.space, odd).parameters[0]
-    axis = axis_of(bounded, whole, 10)
-    assert axis.names == names
-    if allowed is None:
-        assert axis.places([0.0, math.nextafter(0.5, 0.0), 0.5, 1.0]).tolist() == [0, 0, 1, 1]
-
-
 def test_what_was_played_failed_and_refused_in_each_bin_and_what_never_was():
     failed = scene(Outcome.FAILURE, collision(judgement=judgement()), crossing=0.7, friction=0.99)
     found = coverage(MIXED, Odd(), [scene(), scene(), failed, scene(Outcome.REJECTED, friction=0.8)])
@@ -63,17 +48,6 @@ def test_what_was_played_failed_and_refused_in_each_bin_and_what_never_was():
     assert [(each.name, each.played, each.failed) for each in crossing.bins] == [("zebra", 2, 0), ("signalised", 1, 1)]
 
 
-def test_pairs_are_counted_together_and_their_empty_cells_named():
-    found = coverage(MIXED, Odd(), [scene(), scene(crossing=1.0, friction=1.0)])
-    pair = next(each for each in found.pairs if each.parameters == ("crossing", "friction"))
-    assert (pair.cells, pair.played, pair.failed) == (8, 2, 0)
-    assert len(pair.never) == 6
-    assert "zebra × 0.9 to 1" in pair.never
-    assert "signalised × 0.9 to 1" not in pair.never
-    parameters = len(MIXED.space.parameters)
-    assert len(found.pairs) == parameters * (parameters - 1) // 2
-
-
 def test_bins_follow_the_odd_and_what_it_allows_beyond_scenes_is_named():
     odd = Odd.model_validate({"environment": {"friction": {"low": 0.8, "high": 0.9}}})
     found = coverage(MIXED, odd, [])
@@ -84,13 +58,6 @@ def test_bins_follow_the_odd_and_what_it_allows_beyond_scenes_is_named():
     assert MIXED.odd.dynamic.ego_speed_mps == Interval(low=0, high=13.89)
 
 
-def test_the_words_of_the_taxonomy_are_its_grid():
-    zones = len(VALUES["conflict_type"]) - 1  # but of a pedestrian
-    others = [len(VALUES[name]) for name in ("ego_manoeuvre", "visible", "ego_braked", "closing_speed")]
-    roles = len(VALUES["striker"]) // 2
-    assert roles * (zones * len(VALUES["ego_zone"]) + 1) * math.prod(others) == CELLS
-
-
 def test_cells_that_were_hit_are_in_words_and_values_that_never_were_are_named():
     contact = collision(judgement=judgement())
     found = kinds([contact, contact, None, collision(verdicts={"ego_moving": False}, judgement=judgement())])
@@ -99,3 +66,57 @@ def test_cells_that_were_hit_are_in_words_and_values_that_never_were_are_named()
     assert "pedestrian (background)" in found.never
     assert "vehicle (adversary)" not in found.never
     assert all(name.startswith("vehicle (adversary), the ego") for name in found.hit)
+
+
+SPEC = RunSpec.model_validate({"family": "low", "method": "iid-random", "seed": 3})
+
+
+def run_of(finished, letters, crashed=0):
+    """A run of an i.i.d. phase; in its last refused scenes the simulator died."""
+    run = finished(SPEC, letters)
+    records = [record.model_copy(update={"phase": "iid"}) for record in run.records]
+    refused = [place for place, record in enumerate(records) if record.outcome is Outcome.REJECTED]
+    for place in refused[len(refused) - crashed :]:
+        records[place] = records[place].model_copy(update={"reason": "sim_crash"})
+    return replace(run, records=tuple(records))
+
+
+def test_nothing_of_300_is_at_most_a_hundredth(finished):
+    found = drawn(run_of(finished, "." * 300))
+    assert (found.played, found.failures.count, found.failures.low) == (300, 0, 0.0)
+    assert f"{100 * found.failures.high:.2f}" == "0.99"
+
+
+def test_contacts_valid_and_preventable_failures_are_of_the_scenes_that_were_played(finished):
+    found = drawn(run_of(finished, "....rfFad."))
+    assert (found.scenes, found.refused, found.unended, found.played) == (10, 1, 0, 9)
+    assert [each.count for each in (found.contacts, found.failures, found.preventable)] == [4, 2, 1]
+    assert (found.failures.low, found.failures.high) == clopper_pearson(2, 9)
+
+
+def test_each_requirement_has_bounds_of_its_own(finished):
+    found = drawn(run_of(finished, "kkkkvvkr")).requirements
+    assert {name: (each.counts, each.violated, each.bound.count) for name, each in found.items()} == {
+        "no_contact": ("failure", 0, 0),
+        "safe_ttc": ("report", 2, 2),
+        "never_fast": ("failure", 2, 2),
+    }
+    bound = found["never_fast"].bound
+    assert (bound.low, bound.high) == clopper_pearson(2, 7)
+    assert found["no_contact"].bound.high == clopper_pearson(0, 7)[1]
+    assert drawn(run_of(finished, "..f.")).requirements == {}  # from before they were counted
+
+
+def test_a_crash_of_the_simulator_may_have_been_a_failure_or_none(finished):
+    found = drawn(run_of(finished, "...frr", crashed=1))
+    assert (found.refused, found.unended, found.played, found.failures.count) == (1, 1, 4, 1)
+    assert found.failures.low == clopper_pearson(1, 5)[0]
+    assert found.failures.high == clopper_pearson(2, 5)[1]
+
+
+def test_an_ego_that_failed_to_drive_may_have_failed_or_not(finished):
+    run = run_of(finished, "...f.")
+    invalid = run.records[4].model_copy(update={"outcome": Outcome.INVALID, "reason": "ego_deadline"})
+    found = drawn(replace(run, records=(*run.records[:4], invalid)))
+    assert (found.refused, found.unended, found.played, found.failures.count) == (0, 1, 4, 1)
+    assert (found.failures.low, found.failures.high) == (clopper_pearson(1, 5)[0], clopper_pearson(2, 5)[1])

@@ -4,11 +4,9 @@ from html.parser import HTMLParser
 
 import pytest
 
-from risk_sac import cli
 from risk_sac.benchmark.power import played_by, power_of
-from risk_sac.config import CampaignSpec, EgoConfig, Iid, RunSpec
+from risk_sac.config import CampaignSpec, EgoConfig, Iid
 from risk_sac.config.spec_file import campaign_yaml
-from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.records import Grade
 from risk_sac.report import compare
@@ -21,7 +19,6 @@ from risk_sac.scenario.families import FAMILIES
 HOSTILE = (
     '<script>alert(1)</script><img src=x onerror=y> "q" `tick` [link](javascript:a) |cell| \u202egnp.exe \x07 &amp;'
 )
-BANNER = "Search results are no crash rate"
 
 
 def origin(**more):
@@ -73,48 +70,6 @@ class Tags(HTMLParser):
         self.text += data
 
 
-def test_it_says_what_was_found_how_often_and_where_nobody_looked(told):
-    page, text = both(told)
-    for each in (Tags(page).text, text):
-        assert BANNER in each
-        for title in ("Operational design domain", "Budget", "The funnel", "Coverage", "Limits", "Each number again"):
-            assert title in each
-        assert "1 of 7" in each  # valid failures of the scenes with random adversaries that were played
-        assert "0 of 8" in each
-        assert "31.23 %" in each  # 1 - 0.05^(1/8)
-        assert "Never sampled" in each
-        assert "risk-sac evaluate --iid 8" in each
-        assert told.runs[0].digest in each
-
-
-def test_it_tells_of_each_requirement_what_was_found_and_how_often(spec, finished):
-    some = spec.model_copy(update={"methods": ("sac",), "seeds": (0,), "iid": Iid(episodes=8)})
-    fresh = [drawn(finished, run, letters) for run, letters in zip(some.drawn(), ("kkkkkkkk", "kkvkkkkk"), strict=True)]
-    told = compare(some, [*(finished(run, "kvvk", "k") for run in some.searches()), *fresh], "")
-    _, text = both(told)
-    assert "| low | sac | never_fast | failure | 2 | 2 | 1 | 1 | 0.500 [0.150, 0.850] |" in text
-    assert "| low | sac | safe_ttc | report | 2 | – | – | – | 0.500 [0.150, 0.850] |" in text
-    assert "| low | random adversaries | never_fast | failure | 1 of 8 | 1 of 8 | 47.07 % | 0.64 % |" in text
-    assert "| low | undisturbed | never_fast | failure | 0 of 8 | 0 of 8 | 31.23 % | 0.00 % |" in text
-
-
-def test_it_tells_how_many_known_defects_the_budget_detects(spec):
-    told = compare(spec.model_copy(update={"methods": ("archive", "ddpg-lag")}), [], "")
-    archive, ddpg = power(told).lines
-    assert archive.startswith("archive: Of ")
-    page, text = both(told)
-    for each in (Tags(page).text, text):
-        assert "What finding nothing is worth" in each
-        assert archive in each
-        assert ddpg in each
-
-
-def test_a_report_with_failures_is_silent_on_finding_nothing(told):
-    for text in both(told):
-        assert "What finding nothing is worth" not in text
-        assert "Known defects that this budget detects" in text
-
-
 def test_an_i_i_d_phase_is_in_no_other_number(told, spec, runs):
     without = compare(spec, runs, "")
     assert told.cells == without.cells
@@ -124,13 +79,6 @@ def test_an_i_i_d_phase_is_in_no_other_number(told, spec, runs):
     assert evidence.coverage["low"].search == gathered(without).coverage["low"].search
     assert evidence.coverage["low"].iid.episodes == 15
     assert gathered(without).bounds == ()
-
-
-def test_without_an_i_i_d_phase_it_says_that_nothing_is_known_and_how_to_know(spec, runs):
-    for text in both(compare(spec, runs, "")):
-        assert "had no i.i.d. phase, so nothing can be said of how often the ego fails" in text
-        assert "--iid 300" in text
-        assert "at most" not in text
 
 
 def test_runs_that_are_missing_are_named_with_the_reason(told, spec):
@@ -188,46 +136,6 @@ def test_a_picture_that_cannot_be_had_is_said_to_be_missing(told, tmp_path):
     series.write_bytes(b"PK\x03\x04 damaged")
     assert "is damaged" in both(told, folders={run.spec.digest: tmp_path for run in told.runs})[0]
     assert "the folder of its run is missing" in both(told)[0]
-
-
-def test_a_regression_is_told_with_what_a_baseline_knows(told):
-    told_of = {"digest": "d", "name": "cut-in", "grade": None, "reason": "as told"}
-    cases = [
-        Case(id=f"low-x-{verdict}", verdict=verdict, known=known, **told_of)
-        for verdict, known in ((Verdict.FIXED, False), (Verdict.STILL_FAILING, True))
-    ]
-    page, text = both(told, regression=Regression(ego=EgoConfig(profile="careful"), cases=tuple(cases)))
-    for each in (page, text):
-        assert "1 fixed, 1 still failing; 1 known from a baseline. All are fixed or known." in each
-        assert "still failing, known" in each
-
-
-def test_an_ego_is_told_with_its_driver_sight_and_defects(spec):
-    ego = {"driver": "idm", "defects": ("latency", "speeds"), "sensor": {"range_m": 30, "field_of_view_rad": 3.1416}}
-    told = compare(CampaignSpec.model_validate(spec.model_dump() | {"ego": ego}), [], "")
-    _, text = both(told, regression=Regression(ego=EgoConfig(profile="perfect"), cases=()))
-    assert "registered driver idm, responds within 0.5 s, sees 30 m far over 180°" in text
-    assert "with the planted defects latency and speeds" in text
-    assert "decides every 0.1 s, sees everything" in text
-
-
-def test_folders_without_runs_and_runs_of_different_campaigns_are_refused(tmp_path, capsys):
-    out = tmp_path / "out" / "report.html"
-    assert cli.main(["report", str(tmp_path), "--out", str(out)]) == 2
-    assert "RESULTS: there is no" in capsys.readouterr().err
-    assert cli.main(["report", str(tmp_path), "--out", str(out.with_suffix(".pdf"))]) == 2
-    assert "wanted a name that ends in .html, .md, .json" in capsys.readouterr().err
-    assert not out.parent.exists()
-    with pytest.raises(ConfigError, match="there is no"):
-        read_folders([tmp_path / "nowhere"])
-    runs = [
-        RunSpec(family="low", method="random", seed=seed, ego=EgoConfig(reaction_time_s=0.1 + seed)) for seed in (0, 1)
-    ]
-    for run in runs:
-        (tmp_path / run.id).mkdir()
-        write_results(tmp_path / run.id, Results(spec=run, spec_digest=run.digest, finished=False))
-    with pytest.raises(ConfigError, match="low-random-0 and low-random-1, which differ in their ego"):
-        read_folders([tmp_path / run.id for run in runs])
 
 
 def test_a_campaigns_folder_is_told_with_what_is_unfinished_or_damaged_in_it(tmp_path):

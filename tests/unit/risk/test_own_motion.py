@@ -47,7 +47,7 @@ def at(net: str, *poses: Pose, speed_mps: Sequence[float] | float = 10.0, kind: 
         pytest.param("dense", (14, 14, NORTH), 6.02, -6.24, -1.81, id="on the corner of a junction"),
     ],
 )
-def test_where_an_ego_is(net: str, pose: Pose, offset_m: float, edge_m: float, carriageway_m: float) -> None:
+def test_where_an_ego_is(net, pose, offset_m, edge_m, carriageway_m):
     own = at(net, pose)
     assert own.lane_offset_m == pytest.approx(offset_m, abs=0.01)
     assert own.edge_m == pytest.approx(edge_m, abs=0.1)
@@ -58,7 +58,7 @@ def place(own: OwnMotion) -> tuple[float, ...]:
     return own.lane_offset_m, own.over_limit_mps, own.edge_m, own.carriageway_m
 
 
-def test_places_are_alike_on_nets_that_are_alike_turned_or_mirrored() -> None:
+def test_places_are_alike_on_nets_that_are_alike_turned_or_mirrored():
     generator = np.random.default_rng(1)
     for x, y, turn in generator.uniform((-60, -12, -0.7), (60, 12, 0.7), (100, 3)):
         one = place(at("mixed", (500 + x, y, turn)))
@@ -82,15 +82,13 @@ def test_places_are_alike_on_nets_that_are_alike_turned_or_mirrored() -> None:
         pytest.param([(510, -7.85, EAST)], [0.0], False, id="one that is parked on the sidewalk"),
     ],
 )
-def test_oncoming_lanes_count_only_while_the_ego_overtakes(
-    others: list[Pose], speeds: list[float], overtakes: bool
-) -> None:
+def test_oncoming_lanes_count_only_while_the_ego_overtakes(others, speeds, overtakes):
     own = at("mixed", (500, 1.65, EAST), *others, speed_mps=[10.0, *speeds])
     assert (own.carriageway_m > 0) == (own.edge_m > 0) == overtakes
     assert own.lane_offset_m == pytest.approx(3.3)
 
 
-def test_no_overtaking_makes_a_field_a_road() -> None:
+def test_no_overtaking_makes_a_field_a_road():
     assert at("mixed", (500, -9, EAST), (510, -1.65, EAST), speed_mps=[10.0, 0.0]).carriageway_m < -1.0
 
 
@@ -105,7 +103,7 @@ def test_no_overtaking_makes_a_field_a_road() -> None:
         pytest.param("mixed", (500, 300, EAST), 15.0, -60.0, id="without a road there is none"),
     ],
 )
-def test_speed_over_the_limit(net: str, pose: Pose, speed_mps: float, over_mps: float) -> None:
+def test_speed_over_the_limit(net, pose, speed_mps, over_mps):
     assert at(net, pose, speed_mps=speed_mps).over_limit_mps == pytest.approx(over_mps, abs=0.01)
 
 
@@ -127,17 +125,17 @@ def series(steps: int, speed_mps: float = 10.0, yaw_rad_s: float = 0.0, accel_mp
     )
 
 
-def test_jerk_is_the_change_of_acceleration_over_three_steps() -> None:
+def test_jerk_is_the_change_of_acceleration_over_three_steps():
     jerks = [own.ego_jerk_mps3 for own in series(8, accel_mps2=[0, 0, 0, 0, -3, -3, -3, -3])]
     assert jerks == pytest.approx([0, 0, 0, 0, 10, 10, 10, 0])
 
 
-def test_how_an_episode_begins_is_no_motion() -> None:
+def test_how_an_episode_begins_is_no_motion():
     assert [own.ego_jerk_mps3 for own in series(3, accel_mps2=[0, -4.5, -4.5])] == [0, 0, 0]
 
 
 @pytest.mark.parametrize("yaw_rad_s", [0.3, -0.3])
-def test_lateral_acceleration_is_speed_times_yaw_rate_across_any_heading(yaw_rad_s: float) -> None:
+def test_lateral_acceleration_is_speed_times_yaw_rate_across_any_heading(yaw_rad_s):
     frames = series(30, speed_mps=8.0, yaw_rad_s=yaw_rad_s)  # past 180° on the way
     assert [own.ego_lateral_accel_mps2 for own in frames[3:]] == pytest.approx([2.4] * 27)
 
@@ -158,13 +156,13 @@ VEHICLE, PEDESTRIAN = Kind.VEHICLE, Kind.PEDESTRIAN
         pytest.param((504.0, 0.0, 0.0), VEHICLE, 0.0, id="in contact"),
     ],
 )
-def test_headway_is_the_time_gap_to_the_vehicle_that_is_followed(pose: Pose, kind: Kind, headway_s: float) -> None:
+def test_headway_is_the_time_gap_to_the_vehicle_that_is_followed(pose, kind, headway_s):
     own = at("low", (500, 0, 0.0), pose, speed_mps=[10.0, 5.0], kind=[VEHICLE, kind])
     assert own.headway_s == pytest.approx(headway_s)
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_headway_follows_the_bend(side: int) -> None:
+def test_headway_follows_the_bend(side):
     """A leader 30 m ahead on an arc of 40 m radius; another vehicle is straight ahead, beside that arc."""
     radius_m, speed_mps, angle = 40.0, 10.0, side * 30.0 / 40.0
     leader = side * radius_m * math.sin(abs(angle)), side * radius_m * (1 - math.cos(angle))
@@ -184,7 +182,7 @@ def test_headway_follows_the_bend(side: int) -> None:
 
 
 @pytest.mark.parametrize("family", ["low", "mixed", "dense"])
-def test_sumos_driver_stays_on_the_carriageway_and_every_signal_in_its_range(family: str) -> None:
+def test_sumos_driver_stays_on_the_carriageway_and_every_signal_in_its_range(family):
     lateral, offset = 0.0, 0.0
     with closing(RiskSacEnv.of(RunSpec(family=family, method="no-adversary", seed=0))) as env:
         which = env._gauge.names.index("on_carriageway")

@@ -13,7 +13,6 @@ from risk_sac.risk.rss import (
     LATERAL_CAP_M,
     LATERAL_SCALE_M,
     LONGITUDINAL_CAP_M,
-    LONGITUDINAL_SCALE_S,
     SCALED_HIGH,
     SCALED_LOW,
     RssParameters,
@@ -55,7 +54,7 @@ def scaled(view: RelativeView, p: RssParameters = P, *, walks: bool = False) -> 
         (20.0, 20.0, 56.5),  # 20 + 1 + 22²/8 - 20²/16 = 21 + 60.5 - 25
     ],
 )
-def test_longitudinal_distance_in_the_same_direction(rear_mps: float, front_mps: float, distance_m: float) -> None:
+def test_longitudinal_distance_in_the_same_direction(rear_mps, front_mps, distance_m):
     assert same_direction(rear_mps, front_mps, P) == pytest.approx(distance_m)
 
 
@@ -67,7 +66,7 @@ def test_longitudinal_distance_in_the_same_direction(rear_mps: float, front_mps:
         (10.0, 0.0, 30.5),  # 29 + 1.5
     ],
 )
-def test_longitudinal_distance_in_opposite_directions(ego_mps: float, other_mps: float, distance_m: float) -> None:
+def test_longitudinal_distance_in_opposite_directions(ego_mps, other_mps, distance_m):
     assert opposite_direction(ego_mps, other_mps, P) == pytest.approx(distance_m)
 
 
@@ -81,7 +80,7 @@ def test_longitudinal_distance_in_opposite_directions(ego_mps: float, other_mps:
         (-0.5, -0.5, 0.1),  # both drift apart: (-0.5 + 0)/2 + 0 each, so only the fluctuation is left
     ],
 )
-def test_lateral_distance(ego_mps: float, other_mps: float, distance_m: float) -> None:
+def test_lateral_distance(ego_mps, other_mps, distance_m):
     assert lateral(ego_mps, other_mps, P) == pytest.approx(distance_m)
 
 
@@ -103,7 +102,7 @@ def lateral_approach(ego_mps: float, other_mps: float, p: RssParameters) -> floa
 @pytest.mark.parametrize(
     ("ego", "other"), [(0.5, 0.5), (1.0, -0.2), (1.5, -1.2), (-1.5, 1.9), (0.0, 0.0), (-2.0, -1.0)]
 )
-def test_the_lateral_distance_is_what_def_6_says_in_words_for_who_moves_away_too(ego: float, other: float) -> None:
+def test_the_lateral_distance_is_what_def_6_says_in_words_for_who_moves_away_too(ego, other):
     expected = P.fluctuation_m + max(lateral_approach(ego, other, P), 0.0)
     assert lateral(ego, other, P) == pytest.approx(expected, abs=1e-3)
 
@@ -116,23 +115,23 @@ def view_of(ego_mps: float, *others: tuple[float, float, float, float, float]) -
     return relative_view(frame)
 
 
-def test_margin_to_a_leader_is_the_gap_minus_the_distance() -> None:
+def test_margin_to_a_leader_is_the_gap_minus_the_distance():
     longitudinal, _ = margins(view_of(10.0, (34.0, 0, 0, 8, 0)), P)
     assert longitudinal.tolist() == pytest.approx([5.0])  # 30 m gap, 25 m wanted
 
 
-def test_margin_to_an_oncoming_vehicle_uses_the_opposite_direction_distance() -> None:
+def test_margin_to_an_oncoming_vehicle_uses_the_opposite_direction_distance():
     longitudinal, _ = margins(view_of(10.0, (44.0, 0, math.pi, -8, 0)), P)
     assert longitudinal.tolist() == pytest.approx([-10.5])  # 40 m gap, 50.5 m wanted
 
 
-def test_margin_to_a_follower_takes_the_follower_as_the_rear_vehicle() -> None:
+def test_margin_to_a_follower_takes_the_follower_as_the_rear_vehicle():
     longitudinal, _ = margins(view_of(8.0, (-34.0, 0, 0, 10, 0)), P)
     assert longitudinal.tolist() == pytest.approx([5.0])
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_lateral_margin_is_the_same_on_both_sides(side: int) -> None:
+def test_lateral_margin_is_the_same_on_both_sides(side):
     _, parallel = margins(view_of(10.0, (0, side * 5.0, 0, 10, 0)), P)
     _, closing = margins(view_of(10.0, (0, side * 5.0, 0, 10, -side * 1.0)), P)
     _, leaving = margins(view_of(10.0, (0, side * 5.0, 0, 10, side * 1.0)), P)
@@ -142,12 +141,7 @@ def test_lateral_margin_is_the_same_on_both_sides(side: int) -> None:
     assert leaving.tolist() == pytest.approx([2.9])
 
 
-def test_alongside_the_longitudinal_distance_is_how_far_the_bodies_overlap() -> None:
-    longitudinal, _ = margins(view_of(10.0, (1.0, 3.0, 0, 10, 0)), P)
-    assert longitudinal.tolist() == pytest.approx([-3 - (11 + 18 - 100 / 16)])
-
-
-def test_the_scaled_margin_is_the_larger_of_both_each_in_its_scale() -> None:
+def test_the_scaled_margin_is_the_larger_of_both_each_in_its_scale():
     leader, beside = (34.0, 0, 0, 8, 0), (1.0, 3.0, 0, 10, 0)
     assert scaled(view_of(10.0, leader)) == pytest.approx(
         [5 / 25]
@@ -161,9 +155,7 @@ def test_the_scaled_margin_is_the_larger_of_both_each_in_its_scale() -> None:
     st.tuples(*(st.floats(-80, 80), st.floats(-40, 40), st.floats(-4, 4), st.floats(-30, 30), st.floats(-30, 30))),
     st.booleans(),
 )
-def test_the_scaled_margin_is_negative_exactly_where_both_margins_are(
-    ego_mps: float, other: tuple[float, float, float, float, float], walks: bool
-) -> None:
+def test_the_scaled_margin_is_negative_exactly_where_both_margins_are(ego_mps, other, walks):
     view = view_of(ego_mps, other)
     [along], [across] = margins(view, P, walks=walks)
     [margin] = scaled(view, walks=walks)
@@ -187,27 +179,13 @@ def test_the_scaled_margin_is_negative_exactly_where_both_margins_are(
         pytest.param(14.0, (0.0, 3.2, 0.0, 14, 0), id="beside it in the next lane"),
     ],
 )
-def test_undisturbed_traffic_is_not_dangerous(
-    ego_mps: float, other: tuple[float, float, float, float, float], side: int
-) -> None:
+def test_undisturbed_traffic_is_not_dangerous(ego_mps, other, side):
     x, y, heading, vx, vy = other
     assert scaled(view_of(ego_mps, (x, side * y, side * heading, vx, side * vy)), RssParameters())[0] > 0
 
 
-def test_the_margin_falls_all_the_way_to_a_leader_that_stands() -> None:
-    far_to_near = [scaled(view_of(12.0, (x, 0.2, 0, 0, 0)), RssParameters())[0] for x in np.arange(40.0, 4.0, -0.5)]
-    assert np.all(np.diff(far_to_near) < 0)
-    assert far_to_near[0] > 0.5
-    assert far_to_near[-1] == pytest.approx(-1, abs=0.1)
-
-
-def test_a_leader_that_leaves_more_than_the_distance_is_measured_in_time() -> None:
-    # 29 m - 20²/16 = 4 m are wanted, less than what the ego drives in 0.85 s
-    assert scaled(view_of(10.0, (12.0, 0, 0, 20, 0))) == pytest.approx([(8 - 4) / (10 * LONGITUDINAL_SCALE_S)])
-
-
 @pytest.mark.parametrize("braking_mps2", [6.0, 8.0, 9.0])
-def test_an_ego_that_brakes_too_late_wins_no_margin_back(braking_mps2: float) -> None:
+def test_an_ego_that_brakes_too_late_wins_no_margin_back(braking_mps2):
     """It would in metres: braking harder than b_min shortens the distance by more than the room it costs."""
     contact_mps = 4.0
     falling = []

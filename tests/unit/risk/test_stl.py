@@ -111,19 +111,11 @@ FORMULAS: dict[str, Any] = {
     "not prev ego_speed_mps <= 5": ("not", ("prev", SLOW)),
     # precedence: and over or over implies, implies to the right, temporal operators over and
     "ttc_s >= 1 or vehicle_gap_m <= 10 and ego_speed_mps <= 5": ("or", (">=", "ttc_s", 1), ("and", NEAR, SLOW)),
-    "vehicle_gap_m <= 10 -> ego_speed_mps <= 5 -> ttc_s >= 1": (
-        "implies",
-        NEAR,
-        ("implies", SLOW, (">=", "ttc_s", 1)),
-    ),
+    "vehicle_gap_m <= 10 -> ego_speed_mps <= 5 -> ttc_s >= 1": ("implies", NEAR, ("implies", SLOW, (">=", "ttc_s", 1))),
     "not vehicle_gap_m <= 10 & ego_speed_mps <= 5": ("and", ("not", NEAR), SLOW),
     "once[0,0.2] vehicle_gap_m <= 10 and ego_speed_mps <= 5": ("and", ("once", (0, 2), NEAR), SLOW),
     # arithmetic, to the left
-    "vehicle_gap_m - ego_speed_mps + ttc_s >= 3": (
-        ">=",
-        ("+", ("-", "vehicle_gap_m", "ego_speed_mps"), "ttc_s"),
-        3,
-    ),
+    "vehicle_gap_m - ego_speed_mps + ttc_s >= 3": (">=", ("+", ("-", "vehicle_gap_m", "ego_speed_mps"), "ttc_s"), 3),
     "vehicle_gap_m/2*ttc_s - 1.5*ego_speed_mps >= -3": (
         ">=",
         ("-", ("*", ("/", "vehicle_gap_m", 2), "ttc_s"), ("*", 1.5, "ego_speed_mps")),
@@ -189,7 +181,7 @@ def monitored(watched: Monitor, traces: Traces) -> np.ndarray:
     return np.array(result)
 
 
-def test_shipped_requirements_agree_with_the_oracle_on_1000_random_traces() -> None:
+def test_shipped_requirements_agree_with_the_oracle_on_1000_random_traces():
     assert [r.name for r in SHIPPED] == list(SHIPPED_FORMULAS)
     traces = random_traces(1000, 40, seed=1)
     robustness = monitored(Monitor(SHIPPED, STEP_S, HORIZON), traces)
@@ -198,7 +190,7 @@ def test_shipped_requirements_agree_with_the_oracle_on_1000_random_traces() -> N
         np.testing.assert_allclose(robustness[:, :, i], expected, atol=1e-9, rtol=0, err_msg=shipped.name)
 
 
-def test_user_formulas_agree_with_the_oracle_on_1000_random_traces() -> None:
+def test_user_formulas_agree_with_the_oracle_on_1000_random_traces():
     traces = random_traces(1000, 30, seed=2)
     robustness = monitored(monitor(*FORMULAS, scale=20.0), traces)
     for i, (text, formula) in enumerate(FORMULAS.items()):
@@ -236,26 +228,26 @@ def written(formula: Any) -> str:
 
 
 @given(trees.filter(lambda tree: len(written(tree)) <= 500), st.integers(0, 2**31))
-def test_random_formulas_agree_with_the_oracle(tree: Any, seed: int) -> None:
+def test_random_formulas_agree_with_the_oracle(tree, seed):
     traces = random_traces(2, 20, seed)
     expected = np.clip(oracle(tree, traces) / 20.0, -3, 3)
     np.testing.assert_allclose(monitored(monitor(written(tree), scale=20.0), traces)[:, :, 0], expected, atol=1e-9)
 
 
-def test_half_a_second_is_five_samples_before_the_current_one() -> None:
+def test_half_a_second_is_five_samples_before_the_current_one():
     watched = monitor("historically[0,0.5](ttc_s >= 1.5)")
     trace = [0.5] + [2.0] * 7
     robustness = [watched.update(at_rest() | {"ttc_s": ttc_s})[0] for ttc_s in trace]
     assert robustness == [-1.0] * 6 + [0.5] * 2
 
 
-def test_window_bounds_are_exact_multiples_of_the_step() -> None:
+def test_window_bounds_are_exact_multiples_of_the_step():
     assert parse("once[0.3,0.7](ttc_s >= 1)", 0.1, 100).window == (3, 7)  # 0.3 / 0.1 is 2.9999999999999996
     assert parse("once[0,0.5](ttc_s >= 1)", 0.05, 100).window == (0, 10)
     assert parse("once[100ms:1s](ttc_s >= 1)", 0.1, 100).window == (1, 10)
 
 
-def test_reset_forgets_everything() -> None:
+def test_reset_forgets_everything():
     watched, fresh = monitor(*FORMULAS, scale=20.0), monitor(*FORMULAS, scale=20.0)
     traces = random_traces(2, 30, seed=3)
     monitored(watched, traces)
@@ -267,13 +259,13 @@ def test_reset_forgets_everything() -> None:
     np.testing.assert_array_equal(watched.update(at_rest()), fresh.update(at_rest()))
 
 
-def test_equal_sub_formulas_of_two_requirements_are_both_right() -> None:
+def test_equal_sub_formulas_of_two_requirements_are_both_right():
     watched = monitor("once[0,0.2](ttc_s <= 1)", "not once[0,0.2](ttc_s <= 1)")
     for ttc_s, expected in ((0.5, 0.5), (2.0, 0.5), (2.0, 0.5), (2.0, -1.0)):
         assert watched.update(at_rest() | {"ttc_s": ttc_s}).tolist() == [expected, -expected]
 
 
-def test_robustness_is_scaled_and_clipped_and_warm_up_is_finite() -> None:
+def test_robustness_is_scaled_and_clipped_and_warm_up_is_finite():
     watched = Monitor(
         [
             requirement("ttc_s >= 1", 4.0),
@@ -289,72 +281,61 @@ def test_robustness_is_scaled_and_clipped_and_warm_up_is_finite() -> None:
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_a_signal_that_is_not_finite_is_refused(value: float) -> None:
+def test_a_signal_that_is_not_finite_is_refused(value):
     with pytest.raises(NotFinite, match="'ttc_s'"):
         monitor("ttc_s >= 1").update(at_rest() | {"ttc_s": value})
 
 
 GAP, TTC = "vehicle_gap_m >= 1", "ttc_s >= 1"
-BAD: list[tuple[str, int | None, str]] = [  # formula, position, reason
-    ("always(ttc_s >= 1)", 0, "'always', which looks into the future.*wanted the past-time operator 'historically'"),
-    ("not eventually[0,1](ttc_s >= 1)", 4, "'eventually'.*'once'"),
-    (f"{TTC} until[0,1] {GAP}", 11, "'until'.*'since'"),
-    ("next(ttc_s >= 1)", 0, "'next'.*'prev'"),
-    (f"{TTC} iff {GAP}", 11, r"'iff' is not supported; use \(p implies q\) and \(q implies p\)"),
-    ("ttc_s == 1", 6, r"use abs\(x - c\) <= tolerance"),
-    ("ttc_s != 1", 6, "'!=' is not supported"),
-    ("rise(ttc_s >= 1)", 0, "'rise' is not supported; use p and not prev p"),
-    ("true and ttc_s >= 1", 0, "'true' is not supported; use a comparison"),
-    ("tcc_s >= 1", 0, "unknown signal 'tcc_s'; wanted one of ttc_s, encounter_s"),
-    ("ego.speed >= 1", 3, "unknown character '.'"),
-    ("ttc_s ≥ 1", 6, "unknown character '≥'"),
-    ("(ttc_s >= 1", 11, r"got 'the end'; wanted '\)'"),
-    ("ttc_s >= 1)", 10, r"got '\)'; wanted the end"),
-    (f"{TTC} {GAP}", 11, "got 'vehicle_gap_m'; wanted an operator or the end"),
-    ("ttc_s >=", 8, "got 'the end'; wanted a signal, a number"),
-    (f"{TTC} and and {GAP}", 15, "got 'and'; wanted a signal"),
-    ("ttc_s", 0, "got a number; wanted a comparison such as ttc_s >= 1.5"),
-    ("historically ttc_s", 13, "got a number; wanted a comparison"),
-    ("(ttc_s >= 1) + 2 >= 3", 1, r"got a formula; wanted numbers around '\+'"),
-    ("abs(ttc_s >= 1) >= 2", 10, r"got '>='; wanted '\)'"),
-    ("1 <= ttc_s <= 3", 11, "cannot be chained; write a <= x and x <= b"),
-    ("vehicle_gap_m / ego_speed_mps >= 1", 16, "only a number other than 0 can divide; multiply the inequality out"),
-    ("historically[0,1.55](ttc_s >= 1)", 15, "1.55 s is no multiple of the 0.1 s step"),
-    ("historically[1,0.5](ttc_s >= 1)", 12, "ends before it begins"),
-    ("historically[0,1", 16, r"got 'the end'; wanted '\]'"),
-    ("historically[0 1](ttc_s >= 1)", 15, "got '1'; wanted ',' or ':'"),
-    ("historically[-1,1](ttc_s >= 1)", 13, "got '-'; wanted a window bound in seconds"),
-    ("historically[0,1e999999999](ttc_s >= 1)", 15, "got '1e999999999'; wanted a window bound"),
-    ("historically[0,inf](ttc_s >= 1)", 15, "got 'inf'; wanted a window bound"),
-    ("historically[0,5ns](ttc_s >= 1)", 16, r"got 'ns'; wanted '\]'"),
-    ("not[0,1](ttc_s >= 1)", 3, r"got '\['"),
-    ("historically[0,20](ttc_s >= 1)", 0, "reach 20 s back; wanted at most the 15 s of an episode"),
-    ("once[0,8] once[0,8] ttc_s >= 1", 0, "reach 16 s back; wanted at most the 15 s of an episode"),
-    (f"({TTC}) since[0,12] ({GAP})", 1, "need 7260 comparisons per step; wanted at most 4000"),
-    ("ttc_s * 1e300 >= 1", 8, r"may reach 1e\+300"),
-    ("ttc_s >= 1e999", 9, "may reach inf"),
-    ("*".join(["vehicle_gap_m"] * 8) + " >= 1", None, "wanted at most 1e\\+09"),
-    ("!" * 400 + TTC, None, "more than 40 nested operators"),
-    ("+".join("1" * 200) + ">= ttc_s", None, "more than 40 nested operators"),
-]
+BAD: dict[str, int] = {  # formula: position of what is wrong
+    "always(ttc_s >= 1)": 0,
+    f"{TTC} until[0,1] {GAP}": 11,
+    "ttc_s == 1": 6,
+    "rise(ttc_s >= 1)": 0,
+    "tcc_s >= 1": 0,
+    "ttc_s ≥ 1": 6,
+    "(ttc_s >= 1": 11,
+    "ttc_s >= 1)": 10,
+    f"{TTC} {GAP}": 11,
+    "ttc_s >=": 8,
+    "historically ttc_s": 13,
+    "(ttc_s >= 1) + 2 >= 3": 1,
+    "1 <= ttc_s <= 3": 11,
+    "vehicle_gap_m / ego_speed_mps >= 1": 16,
+    "historically[0,1.55](ttc_s >= 1)": 15,
+    "historically[1,0.5](ttc_s >= 1)": 12,
+    "historically[-1,1](ttc_s >= 1)": 13,
+    "historically[0,1e999999999](ttc_s >= 1)": 15,
+    "not[0,1](ttc_s >= 1)": 3,
+    "once[0,8] once[0,8] ttc_s >= 1": 0,  # reaches back beyond the episode
+    f"({TTC}) since[0,12] ({GAP})": 1,  # too many comparisons in a step
+    "ttc_s * 1e300 >= 1": 8,
+    "ttc_s >= 1e999": 9,
+}
+DEEP = ("*".join(["vehicle_gap_m"] * 8) + " >= 1", "!" * 400 + TTC, "+".join("1" * 200) + ">= ttc_s")
 
 
-@pytest.mark.parametrize(("formula", "position", "reason"), BAD, ids=[formula[:40] for formula, *_ in BAD])
-def test_bad_formulas_are_refused_with_position_and_reason(formula: str, position: int | None, reason: str) -> None:
-    with pytest.raises(FormulaError, match=reason) as caught:
+@pytest.mark.parametrize("formula", [*BAD, *DEEP], ids=lambda formula: formula[:40])
+def test_bad_formulas_are_refused_with_their_position(formula):
+    with pytest.raises(FormulaError) as caught:
         Monitor([requirement(TTC), requirement(formula)], STEP_S, HORIZON)
     assert caught.value.field == "requirements[1].formula"
+    assert caught.value.position == BAD.get(formula, caught.value.position)
     assert caught.value.position is not None
-    assert position is None or caught.value.position == position
+
+
+def test_a_formula_of_the_future_is_told_its_past():
+    with pytest.raises(FormulaError, match="wanted the past-time operator 'historically'"):
+        Monitor([requirement("always(ttc_s >= 1)")], STEP_S, HORIZON)
 
 
 @given(st.text(alphabet="aHOSY()[],:.0123456789+-*/<>=!&| smtcgpev_", min_size=1, max_size=60))
-def test_no_text_gets_through_as_anything_but_a_formula_or_a_formula_error(text: str) -> None:
+def test_no_text_gets_through_as_anything_but_a_formula_or_a_formula_error(text):
     with contextlib.suppress(FormulaError):
         Monitor([requirement(text)], STEP_S, HORIZON).update(at_rest())
 
 
-def test_soft_min_is_equation_7() -> None:
+def test_soft_min_is_equation_7():
     # -(1/2) log(exp(-2) + exp(-4)) = 1 - log(1 + exp(-2)) / 2
     assert soft_min(np.array([1.0, 2.0]), 2.0) == pytest.approx(0.9365359944785137)
     assert soft_min(np.array([0.7]), 5.0) == pytest.approx(0.7)
@@ -362,7 +343,7 @@ def test_soft_min_is_equation_7() -> None:
 
 
 @given(arrays(np.float64, 6, elements=st.floats(-1e6, 1e6)), st.floats(0.1, 100))
-def test_soft_min_stays_within_log_m_over_beta_below_the_minimum(robustness: np.ndarray, beta: float) -> None:
+def test_soft_min_stays_within_log_m_over_beta_below_the_minimum(robustness, beta):
     least = robustness.min()
     result = soft_min(robustness, beta)
     slack = 1e-9 * max(1.0, abs(least))

@@ -4,14 +4,12 @@ import io
 import logging
 import os
 import pickle
-from collections import namedtuple
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
-from risk_sac.errors import CheckpointError, DamagedCheckpoint
+from risk_sac.errors import CheckpointError
 from risk_sac.run_folder import checkpoint
 
 RUN = "a" * 64
@@ -67,7 +65,7 @@ def assert_same(found, wanted):
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
+def path(tmp_path):
     path = tmp_path / "run.ckpt"
     checkpoint.save(path, example_state(), RUN)
     return path
@@ -76,28 +74,6 @@ def path(tmp_path: Path) -> Path:
 def test_state_survives_the_round_trip_with_types_and_bits(path):
     assert_same(checkpoint.load(path, RUN), example_state())
     assert [entry.name for entry in path.parent.iterdir()] == ["run.ckpt"]
-
-
-@pytest.mark.parametrize(
-    "array",
-    [
-        np.arange(10)[::-2],
-        np.asfortranarray(np.arange(6.0).reshape(2, 3)),
-        np.broadcast_to(np.float32(1), (2, 2)),
-        np.empty((0, 4)),
-        np.array([2**63], dtype=np.uint64),
-    ],
-    ids=["reversed", "fortran", "read-only", "empty", "uint64"],
-)
-def test_unusual_arrays_survive(tmp_path, array):
-    checkpoint.save(tmp_path / "a", {"array": array}, RUN)
-    assert_same(checkpoint.load(tmp_path / "a", RUN)["array"], array)
-
-
-def test_view_does_not_drag_its_whole_storage_along(tmp_path):
-    big, big_array = torch.zeros(1_000_000), np.zeros(1_000_000)
-    checkpoint.save(tmp_path / "v", {"few": big[:10], "array": big_array[:10]}, RUN)
-    assert (tmp_path / "v").stat().st_size < 10_000
 
 
 def flipped(content, position):
@@ -164,13 +140,6 @@ def test_a_checkpoint_of_another_run_is_no_reason_to_begin_anew(two):
         checkpoint.load_newest(two, "b" * 64)
 
 
-def test_file_of_another_program_or_version_is_refused(tmp_path):
-    path = tmp_path / "model.pt"
-    torch.save({"weights": torch.zeros(2)}, path)
-    with pytest.raises(DamagedCheckpoint, match="an earlier version wrote it"):
-        checkpoint.load(path, RUN)
-
-
 class Bomb:
     def __reduce__(self):
         return os.mkdir, ("bomb",)
@@ -187,24 +156,6 @@ def test_well_signed_file_with_foreign_content_is_refused_and_never_run(tmp_path
     with pytest.raises(CheckpointError, match="something else"):
         checkpoint.load(path, RUN)
     assert not (tmp_path / "bomb").exists()
-
-
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
-        ({"a": [0, np.float64(1)]}, r"state\['a'\]\[1\] is a float64"),
-        ({"a": {1, 2}}, r"state\['a'\] is a set"),
-        ({"a": np.array(["x"])}, r"state\['a'\] is an array of <U1"),
-        ({"a": namedtuple("Pair", "a b")(1, 2)}, r"state\['a'\] is a Pair"),
-        ({2.5: 0}, "state has keys"),
-        ({"__ndarray__": 0}, "state has keys"),
-    ],
-)
-def test_what_could_not_be_read_back_is_refused_when_saving(path, value, message):
-    before = path.read_bytes()
-    with pytest.raises(TypeError, match=message):
-        checkpoint.save(path, value, RUN)
-    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize("function", ["fsync", "replace"])

@@ -33,41 +33,41 @@ def playable(folder: Path) -> list[int]:
         return [episode for episode in range(6) if guard.begin(episode)]
 
 
-def test_an_episode_that_crashes_again_at_the_same_place_is_left_out_and_no_other(tmp_path: Path) -> None:
+def test_an_episode_that_crashes_again_at_the_same_place_is_left_out_and_no_other(tmp_path):
     assert [play(tmp_path) for _ in range(FATAL)] == FATAL * [-11]
     assert play(tmp_path) == 0
     assert playable(tmp_path) == [0, 1, 2, 4, 5]
 
 
 @pytest.mark.parametrize(("what", "by_ego"), [(IN_EGO, True), (SEGFAULT, False)])
-def test_a_crash_in_the_ego_s_code_is_its_own(tmp_path: Path, what: str, by_ego: bool) -> None:
+def test_a_crash_in_the_ego_s_code_is_its_own(tmp_path, what, by_ego):
     assert [play(tmp_path, what) for _ in range(FATAL)] == FATAL * [-11]
     with CrashGuard(tmp_path) as guard:
         assert not guard.begin(3)
         assert guard.by_ego(3) is by_ego
 
 
-def test_crashes_at_several_places_take_longer_to_convince(tmp_path: Path) -> None:
+def test_crashes_at_several_places_take_longer_to_convince(tmp_path):
     for step in range(PATIENCE):
         assert play(tmp_path, step=step) == -11
     assert play(tmp_path) == 0
 
 
-def test_an_episode_that_was_played_to_its_end_was_not_to_blame(tmp_path: Path) -> None:
+def test_an_episode_that_was_played_to_its_end_was_not_to_blame(tmp_path):
     assert play(tmp_path) == -11
     assert play(tmp_path, "pass") == 0
     assert play(tmp_path) == -11
     assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
 
 
-def test_a_run_that_was_killed_from_outside_has_not_crashed(tmp_path: Path) -> None:
+def test_a_run_that_was_killed_from_outside_has_not_crashed(tmp_path):
     for _ in range(PATIENCE):
         assert play(tmp_path, KILL) == -9
     assert not (tmp_path / COUNTS).exists()
     assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
 
 
-def test_a_crash_counts_once_and_its_traceback_goes_to_the_log(tmp_path, caplog) -> None:
+def test_a_crash_counts_once_and_its_traceback_goes_to_the_log(tmp_path, caplog):
     play(tmp_path)
     assert playable(tmp_path) == [0, 1, 2, 3, 4, 5]
     assert "crashed in episode 3, step 5, which makes 1 times:\nFatal Python error: Segmentation fault" in caplog.text
@@ -77,7 +77,7 @@ def test_a_crash_counts_once_and_its_traceback_goes_to_the_log(tmp_path, caplog)
 
 
 @pytest.fixture
-def crashed(tmp_path: Path) -> Path:
+def crashed(tmp_path):
     """The folder of a run that knows of one crash, and whose last process has crashed too."""
     play(tmp_path)
     play(tmp_path)
@@ -86,13 +86,13 @@ def crashed(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_damaged_counts_begin_at_zero_again(crashed: Path, caplog) -> None:
+def test_damaged_counts_begin_at_zero_again(crashed, caplog):
     (crashed / COUNTS).write_bytes((crashed / COUNTS).read_bytes().replace(b"step 5", b"step 4"))
     assert playable(crashed) == [0, 1, 2, 3, 4, 5]
     assert f"crashes are counted from zero again: {crashed / COUNTS} is damaged" in caplog.text
 
 
-def test_a_damaged_note_of_the_episode_leaves_out_no_other(crashed: Path) -> None:
+def test_a_damaged_note_of_the_episode_leaves_out_no_other(crashed):
     before = {part: (crashed / part).read_bytes() for part in (LOG, COUNTS, CURRENT)}
     note = before[CURRENT]
     damages = [note[:length] for length in range(len(note))]

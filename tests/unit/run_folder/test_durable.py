@@ -1,15 +1,23 @@
+"""A field of a record is declared once: store, answer and client have it without another edit."""
+
 import json
+import math
 import os
 import stat
-from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel
 
-from risk_sac.errors import DamagedError
-from risk_sac.run_folder.durable import read_sealed, replace_file, seal, unseal, write_sealed
+from risk_sac.config import RunSpec
+from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.records import Episode, EpisodeId, EpisodeRecord, stored, wire
+from risk_sac.run_folder.durable import replace_file, seal, unseal
+from risk_sac.run_folder.results import RESULTS, Results, read_results, records_to_json, write_results
+from risk_sac.run_folder.series import read_series, write_series
+from tests.builders import collision, episode_record, judgement
 
 
 class Note(BaseModel):
@@ -18,17 +26,17 @@ class Note(BaseModel):
     sha256_of: dict[str, str] = {"sha256": "of something else"}
 
 
-def test_sealed_text_is_json_with_one_more_field() -> None:
+def test_sealed_text_is_json_with_one_more_field():
     assert json.loads(seal(Note())).keys() - Note.model_fields.keys() == {"sha256"}
     assert unseal(seal(Note()), Note) == Note()
 
 
 @given(st.dictionaries(st.text(), st.integers() | st.text(), min_size=1))
-def test_what_was_sealed_comes_back(value: dict[str, int | str]) -> None:
+def test_what_was_sealed_comes_back(value):
     assert unseal(seal(value), dict) == value
 
 
-def test_every_flipped_bit_and_every_lost_end_is_noticed() -> None:
+def test_every_flipped_bit_and_every_lost_end_is_noticed():
     sealed = seal(Note())
     damaged = [sealed[:length] for length in range(len(sealed))]
     damaged += [
@@ -40,17 +48,7 @@ def test_every_flipped_bit_and_every_lost_end_is_noticed() -> None:
             unseal(content, Note)
 
 
-def test_a_damaged_file_and_one_that_holds_something_else_are_named(tmp_path: Path) -> None:
-    file = tmp_path / "note.json"
-    file.write_text("{}")
-    with pytest.raises(DamagedError, match=r"note\.json is damaged: it does not end in its SHA-256"):
-        read_sealed(file, Note)
-    write_sealed(file, {"values": "none"})
-    with pytest.raises(DamagedError, match=r"note\.json is damaged: it holds something else"):
-        read_sealed(file, Note)
-
-
-def test_a_file_gets_its_mode_whatever_a_killed_writer_left(tmp_path: Path) -> None:
+def test_a_file_gets_its_mode_whatever_a_killed_writer_left(tmp_path):
     file = tmp_path / "secret"
     (tmp_path / ".secret.tmp").write_text("left over")
     before = os.umask(0)
@@ -60,3 +58,72 @@ def test_a_file_gets_its_mode_whatever_a_killed_writer_left(tmp_path: Path) -> N
         os.umask(before)
     assert (file.read_bytes(), stat.S_IMODE(file.stat().st_mode)) == (b"new", 0o600)
     assert [each.name for each in tmp_path.iterdir()] == ["secret"]
+
+
+SPEC = RunSpec(family="low", method="random", seed=0)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write_results(tmp_path, Results(spec=SPEC, spec_digest=SPEC.digest, finished=False, wall_s=1.25))
+    return tmp_path
+
+
+def test_damaged_results_are_named(folder):
+    content = (folder / RESULTS).read_bytes()
+    for damaged in (b"", content[:-1], content.replace(b'"low"', b'"lou"')):
+        (folder / RESULTS).write_bytes(damaged)
+        with pytest.raises(ConfigError, match=r"results\.json is damaged"):
+            read_results(folder)
+
+
+@pytest.mark.parametrize("damage", [lambda content: content[:-9], lambda content: b"", lambda content: b"no archive"])
+def test_a_damaged_series_is_named(damage, tmp_path):
+    file = tmp_path / "000001.npz"
+    write_series(file, {"x_m": np.arange(100.0)})
+    np.testing.assert_array_equal(read_series(file)["x_m"], np.arange(100.0))
+    file.write_bytes(damage(file.read_bytes()))
+    with pytest.raises(DamagedError, match=r"000001\.npz is damaged"):
+        read_series(file)
+
+
+RECORD = episode_record(4, collision=collision(min_ttc_s=0.7), min_ttc_s=0.0)
+
+
+def test_the_minima_of_a_collision_have_names_of_their_own_wherever_it_is_written():
+    for text in (RECORD.model_dump_json(), records_to_json([RECORD])[1:-1], json.dumps(RECORD.model_dump())):
+        written = json.loads(text)
+        assert written["min_ttc_s"] == 0.0
+        assert written["collision"]["early_min_ttc_s"] == 0.7
+        assert "min_ttc_s" not in written["collision"]
+
+
+@pytest.mark.parametrize(
+    "text", ["", "-", "search", "low-search-x", "low-walk-4", "a\0-search-4", "low-search-1234567890"]
+)
+def test_a_malformed_id_has_no_parts(text):
+    assert EpisodeId.parse(text) is None
+
+
+def test_a_run_whose_own_id_names_a_phase_keeps_it():
+    assert EpisodeId.parse("low-iid-random-0-iid-12") == EpisodeId("low-iid-random-0", "iid", 12)
+
+
+# Loads `risk_sac.records.violation` with one field more, and passes a contact that has it through the service.
+
+
+def test_a_number_that_is_not_finite_is_a_word_where_it_is_stored_and_null_where_it_is_answered():
+    hit = collision(min_ttc_s=math.inf, ego_speed_mps=math.nan, judgement=judgement(conflict_s=-math.inf))
+    record = episode_record(3, collision=hit, min_ttc_s=math.inf)
+    kept = json.loads(stored(record))
+    assert (kept["min_ttc_s"], kept["collision"]["early_min_ttc_s"]) == ("Infinity", "Infinity")
+    assert kept["collision"]["judgement"]["conflict_s"] == "-Infinity"
+    assert repr(EpisodeRecord.model_validate_json(stored(record))) == repr(record)
+    episode = Episode(**dict(record), id="r-search-3", run_id="r", wall_s=0.5)
+    told = json.loads(wire(episode))
+    assert (told["min_ttc_s"], told["collision"]["early_min_ttc_s"]) == (None, None)
+    assert told["collision"]["ego_speed_mps"] is told["collision"]["judgement"]["conflict_s"] is None
+    read = Episode.model_validate_json(wire(episode))
+    assert (read.min_ttc_s, read.collision.min_ttc_s) == (math.inf, math.inf)
+    assert math.isnan(read.collision.ego_speed_mps)
+    assert wire(read) == wire(episode)

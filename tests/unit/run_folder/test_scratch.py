@@ -22,7 +22,7 @@ with scratch_folder() as folder:
 """
 
 
-def test_what_a_killed_process_left_goes_and_nothing_else_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_killed_process_left_goes_and_nothing_else_does(tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
     others = [tmp_path / name for name in ("risk-sac-results", "risk-sac.0123456789abcdef", "tmpabc")]
@@ -41,7 +41,7 @@ def test_what_a_killed_process_left_goes_and_nothing_else_does(tmp_path: Path, m
     assert not dead.exists()
 
 
-def test_only_our_half_written_files_of_before_are_removed(tmp_path: Path) -> None:
+def test_only_our_half_written_files_of_before_are_removed(tmp_path):
     ours = [
         ".results.json.tmp",
         "failures/.000012.npz.tmp",
@@ -60,7 +60,7 @@ def test_only_our_half_written_files_of_before_are_removed(tmp_path: Path) -> No
     assert {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()} == set(others)
 
 
-def test_a_folder_is_held_by_one_process_at_a_time(tmp_path: Path) -> None:
+def test_a_folder_is_held_by_one_process_at_a_time(tmp_path):
     with held(tmp_path / "run"):
         with pytest.raises(ConfigError, match="in which another process is at work"), held(tmp_path / "run"):
             pass
@@ -73,17 +73,13 @@ def test_a_folder_is_held_by_one_process_at_a_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("number", "told"), [(13, "which cannot be written .Permission denied"), (30, "Read-only file system")]
 )
-def test_a_folder_that_cannot_be_written_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, told: str
-) -> None:
+def test_a_folder_that_cannot_be_written_is_named(tmp_path, monkeypatch, number, told):
     monkeypatch.setattr(durable, "lock", refusing(number))
     with pytest.raises(ConfigError, match=told), held(tmp_path):
         pass
 
 
-def test_a_folder_without_locks_is_used_and_the_log_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_folder_without_locks_is_used_and_the_log_says_so(tmp_path, monkeypatch, caplog):
     monkeypatch.setattr(durable, "lock", refusing(37))
     with held(tmp_path):
         pass
@@ -97,8 +93,8 @@ def refusing(number: int):
     return lock
 
 
-def test_a_temporary_folder_needs_no_locks(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(handle: int, how: int) -> None:
+def test_a_temporary_folder_needs_no_locks(monkeypatch):
+    def refuse(handle, how):
         raise OSError(errno.EBADF, "a network's file system locks no folder")
 
     monkeypatch.setattr("fcntl.flock", refuse)

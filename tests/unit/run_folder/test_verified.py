@@ -1,12 +1,9 @@
 """Which failures are refused because one of them does not repeat."""
 
-from dataclasses import replace
-
 from risk_sac.config import RunSpec
-from risk_sac.metrics import headline_driven_by, pooled_headline
-from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, Repetition, RunMetrics, Severity
+from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, Repetition, Severity
 from risk_sac.run_folder.results import RecordedFailure, Results
-from risk_sac.run_folder.verified import Verified, distinct_failures, with_headline
+from risk_sac.run_folder.verified import Verified, with_headline
 from tests.builders import collision, episode_record, judgement, run_metrics, violation
 
 
@@ -25,7 +22,7 @@ def refused(records: tuple[EpisodeRecord, ...]) -> list[int]:
     return [record.index for record in records if REPEATS in record.reason]
 
 
-def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not() -> None:
+def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not():
     records = [
         failure(0),
         failure(1),  # like it, and not replayed
@@ -39,18 +36,11 @@ def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not(
     assert [record.outcome for record in found[:3]] == [Outcome.DEGENERATE, Outcome.DEGENERATE, Outcome.FAILURE]
     assert found[2:] == tuple(records[2:])
     first = found[0].collision
-    assert first is not None
     assert first.artefact
-    assert first.judgement is not None
     assert (first.judgement.grade, first.judgement.drivers) == (None, {})
 
 
-def test_where_all_repeat_nothing_is_refused() -> None:
-    records = (failure(0), failure(1))
-    assert verified(e0=2).judged(records) == records
-
-
-def test_a_violation_is_refused_by_its_kind_and_what_else_the_episode_violates_stays() -> None:
+def test_a_violation_is_refused_by_its_kind_and_what_else_the_episode_violates_stays():
     contact, broken = collision(judgement=judgement()), violation()
     records = [
         episode_record(0, Outcome.FAILURE, violations=(broken,)),
@@ -66,22 +56,6 @@ def test_a_violation_is_refused_by_its_kind_and_what_else_the_episode_violates_s
     assert found[1].collision == contact
 
 
-def test_an_episode_is_distinct_by_any_of_its_violations() -> None:
-    hit = collision(judgement=judgement())
-    episodes = [
-        episode_record(0, Outcome.FAILURE, violations=(violation(),)),
-        episode_record(1, Outcome.FAILURE, violations=(violation(),)),
-        episode_record(2, Outcome.FAILURE, violations=(violation(),), collision=hit),
-        episode_record(
-            3, Outcome.DEGENERATE, violations=(violation(requirement="a", verdicts={"no_teleport": False}),)
-        ),
-    ]
-    spec = RunSpec(family="low", method="random", seed=0)
-    failures = tuple(RecordedFailure.of(spec.id, each) for each in episodes)
-    results = Results(spec=spec, spec_digest="", finished=True, failures=failures)
-    assert [episode.index for episode in distinct_failures(results)] == [0, 2]
-
-
 def results_of(*episodes: EpisodeRecord) -> Results:
     spec = RunSpec(family="low", method="random", seed=0)
     failures = tuple(RecordedFailure.of(spec.id, each) for each in episodes)
@@ -92,7 +66,7 @@ MINOR = judgement(severity=Severity.MINOR)
 HEADLINE = ("no_contact: cut-in, straight [1-0-0]", "never_fast: never_fast violated; straight [1]")
 
 
-def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repeats() -> None:
+def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repeats():
     results = results_of(
         failure(0, judgement=MINOR, other_speed_mps=20.0),
         failure(1),
@@ -104,44 +78,5 @@ def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repe
         failure(7, phase="evaluation"),
     )
     found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e5=2, e6=2, e7=2)).metrics
-    assert found is not None
     assert (found.headline, found.headline_kinds) == (2, HEADLINE)
-    assert results.metrics is not None
     assert results.metrics.headline is None, "before a replay"
-
-
-def test_the_evaluation_has_a_headline_of_its_own() -> None:
-    results = replace(results_of(failure(0, judgement=MINOR), failure(1, phase="evaluation")), evaluation=run_metrics())
-    found = with_headline(results, verified(e0=2, e1=2))
-    assert [phase and phase.headline for phase in (found.metrics, found.evaluation)] == [0, 1]
-
-
-def test_the_first_that_is_not_minor_is_replayed_though_another_of_its_kind_is_preventable() -> None:
-    results = results_of(failure(0, judgement=MINOR), failure(1, judgement=MINOR), failure(2), failure(3))
-    assert [episode.index for episode in distinct_failures(results)] == [0, 2]
-
-
-def test_a_headline_failure_counts_for_what_drove_the_first_of_its_kind() -> None:
-    results = results_of(
-        failure(0, judgement=MINOR, driven_by=DrivenBy.RANDOM),
-        failure(1, driven_by=DrivenBy.SCRIPT),
-        failure(2, driven_by=DrivenBy.POLICY),  # like it
-        failure(3, judgement=judgement(signature="merge"), driven_by=DrivenBy.POLICY),
-        failure(4, judgement=judgement(signature="crossing")),  # of an older version
-    )
-    found = with_headline(results, verified(e0=2, e1=2, e2=2, e3=2, e4=2)).metrics
-    assert found is not None
-    assert found.headline_kinds_driven_by == (DrivenBy.SCRIPT, DrivenBy.POLICY, None)
-    assert headline_driven_by([found]) == {"script": 1, "policy": 1}
-    later = found.model_copy(update={"headline_kinds_driven_by": (DrivenBy.MODEL,) * 3})
-    assert headline_driven_by([found, later]) == {"script": 1, "policy": 1}, "what an earlier run found counts for it"
-    older = found.model_dump(exclude={"headline_kinds_driven_by", "episodes_driven_by"})
-    assert headline_driven_by([RunMetrics.model_validate(older)]) == {}
-
-
-def test_runs_have_the_union_of_their_headlines() -> None:
-    one = run_metrics(headline=2, headline_kinds=HEADLINE)
-    other = run_metrics(headline=2, headline_kinds=("no_contact: merge [0-0-0]", HEADLINE[0]))
-    assert pooled_headline([one, other, run_metrics()]) == 3
-    assert pooled_headline([one, one]) == 2
-    assert pooled_headline([run_metrics()]) is None

@@ -26,18 +26,12 @@ from risk_sac.scenario.maps.finder import Map, place_at, survey
 from risk_sac.scenario.maps.found import NoFit, lacking
 from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net
 from risk_sac.scenario.maps.read_net import read_net
-from risk_sac.scenario.maps.summary import net_remarks
 from risk_sac.scenario.maps.ways import way_back, way_on
-from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Stretch
+from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace
 from risk_sac.sim.sumo import SumoSimulation
 from tests.maps import osm_town
 
 NETS = Path(sumo_nets.__path__[0])
-LANE = '<lane id="{id}_0" index="0" speed="13.89" length="{m}" shape="{line}"/>'
-ROAD = '<edge id="{id}" from="{a}" to="{b}">' + LANE + "</edge>"
-RAILS = (
-    '<edge id="r" from="a" to="b"><lane id="r_0" index="0" allow="rail" speed="9" length="9" shape="0,0 9,0"/></edge>'
-)
 
 
 def shipped(name: str):
@@ -45,13 +39,13 @@ def shipped(name: str):
 
 
 @pytest.fixture(scope="module")
-def town(tmp_path_factory: pytest.TempPathFactory) -> Map:
+def town(tmp_path_factory):
     folder = tmp_path_factory.mktemp("town")
     (folder / "town.osm").write_text(osm_town())
     return Map(present_net(folder / "town.osm", folder).file)
 
 
-def test_the_finder_finds_the_place_of_the_junction_that_is_shipped() -> None:
+def test_the_finder_finds_the_place_of_the_junction_that_is_shipped():
     found = place_at(read_net(NETS / "dense" / "dense.net.xml"), "junction", "from_south").place
     ours = shipped("dense")
     assert isinstance(found, JunctionPlace)
@@ -68,7 +62,7 @@ def test_the_finder_finds_the_place_of_the_junction_that_is_shipped() -> None:
 
 
 @pytest.mark.parametrize(("edge", "site"), [("e1", 0), ("e2", 1)])
-def test_the_finder_finds_the_crossings_that_are_shipped(edge: str, site: int) -> None:
+def test_the_finder_finds_the_crossings_that_are_shipped(edge, site):
     found = place_at(read_net(NETS / "mixed" / "mixed.net.xml"), "crossing", edge).place
     assert isinstance(found, CrossingPlace)
     ours = shipped("mixed").sites[site]
@@ -83,14 +77,7 @@ def test_the_finder_finds_the_crossings_that_are_shipped(edge: str, site: int) -
     assert (found.sites[0].walk.x_m, found.sites[0].walk.y_m) == pytest.approx((ours.walk.x_m, ours.walk.y_m))
 
 
-def test_the_finder_finds_the_road_that_is_shipped() -> None:
-    found = place_at(read_net(NETS / "low" / "low.net.xml"), "car_following", "road").place
-    assert isinstance(found, Stretch)
-    assert family_at("low", found).space == FAMILIES["low"].space
-    assert family_at("low", found).odd == FAMILIES["low"].odd
-
-
-def test_ground_that_is_found_is_the_ground_that_was_drawn_by_hand() -> None:
+def test_ground_that_is_found_is_the_ground_that_was_drawn_by_hand():
     found = place_at(read_net(NETS / "dense" / "dense.net.xml"), "junction", "from_south").place
     mine, ours = family_at("dense", found), FAMILIES["dense"]
     middle = ours.space.from_unit(np.full(ours.space.dimension, 0.5)).values
@@ -103,7 +90,7 @@ def test_ground_that_is_found_is_the_ground_that_was_drawn_by_hand() -> None:
                 assert any(area.contains(x, y) for area in getattr(layouts[0], name)) == here[0], (name, x, y)
 
 
-def test_a_town_has_places_of_all_patterns_and_each_is_kept_as_a_small_net(town: Map, tmp_path, monkeypatch) -> None:
+def test_a_town_has_places_of_all_patterns_and_each_is_kept_as_a_small_net(town, tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     found = survey(town.net)
     assert set(found.counts) == {"car_following", "crossing", "junction"}
@@ -125,7 +112,7 @@ def test_a_town_has_places_of_all_patterns_and_each_is_kept_as_a_small_net(town:
             libsumo.close()
 
 
-def test_a_kept_place_that_was_changed_is_refused(town: Map, tmp_path: Path, monkeypatch) -> None:
+def test_a_kept_place_that_was_changed_is_refused(town, tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     name = town.keep(survey(town.net, ("junction",)).fits[0])
     net = tmp_path / name / library.NET
@@ -138,137 +125,15 @@ def test_a_kept_place_that_was_changed_is_refused(town: Map, tmp_path: Path, mon
         family_named("junction_000000000000")
 
 
-def road(id_: str, a: str, b: str, metres: float, line: str) -> str:
-    return ROAD.format(id=id_, a=a, b=b, m=metres, line=line)
-
-
-@pytest.mark.parametrize(
-    ("content", "says"),
-    [
-        ("<net><edge", "is no XML"),
-        ("<routes/>", "with the root <routes>"),
-        (f'<net lefthand="true">{road("r", "a", "b", 900, "0,0 900,0")}</net>', "left-hand traffic"),
-        (f"<net>{RAILS}</net>", "none of the 1 edges of the map has a lane for passenger cars"),
-        ('<net><edge id="r" from="a" to="b"><lane id="r_0"/></edge></net>', "the net lacks 'shape'"),
-    ],
-)
-def test_a_map_that_nothing_fits_on_says_why(tmp_path: Path, content: str, says: str) -> None:
-    file = tmp_path / "map.net.xml"
-    file.write_text(content)
-    with pytest.raises(MapError, match=says):
-        read_net(file)
-
-
-def test_a_place_that_cannot_be_run_says_why(tmp_path: Path) -> None:
-    file = tmp_path / "map.net.xml"
-    file.write_text(f"<net>{road('short', 'a', 'b', 90, '0,0 90,0')}</net>")
-    with pytest.raises(MapError, match=r"the longest way on .* edge 'short' after driving 3\.2 s; wanted 17 s"):
-        place_at(read_net(file), "car_following", "short")
-    with pytest.raises(MapError, match="the map has no edge 'x'"):
-        place_at(read_net(file), "car_following", "x")
-    with pytest.raises(MapError, match="junction does not fit at 'short': wanted a road to a junction"):
-        place_at(read_net(file), "junction", "short")
-    with pytest.raises(MapError, match="crossing fits nowhere on this map: the net has no crossing; netconvert drops"):
-        Map(file).fits("crossing", None)
-    with pytest.raises(MapError, match="car_following fits nowhere on this map: at 'short', the longest way"):
-        Map(file).fits("car_following", None)
-
-
-def test_a_pattern_without_any_candidate_says_why() -> None:
-    found = survey(read_net(NETS / "low" / "low.net.xml"))
-    assert set(found.nowhere) == {"crossing", "junction"}
-    assert "has no road to a junction" in found.nowhere["junction"]
-
-
-def test_a_way_that_is_barely_too_short_contradicts_itself_nowhere(tmp_path: Path) -> None:
-    file = tmp_path / "map.net.xml"
-    for seconds, says in ((16.96, "after driving 16.9 s; wanted 17 s"), (16.999, "after driving 16.9 s; wanted 17 s")):
-        metres = 2 * seconds * 13.89
-        file.write_text(f"<net>{road('r', 'a', 'b', metres, f'0,0 {metres},0')}</net>")
-        (misfit,) = survey(read_net(file), ("car_following",)).misfits
-        assert misfit.why.endswith(says)
-
-
-@given(wanted=st.floats(0.1, 1e4), share=st.floats(0.0, 1.0, exclude_max=True))
-def test_what_is_lacking_is_less_than_what_was_wanted_as_it_is_written(wanted: float, share: float) -> None:
-    if wanted * share < wanted - 1e-6:
-        got, above = lacking(wanted * share, "m", wanted).split(" m; wanted ")
-        assert float(got) < float(above.removesuffix(" m"))
-
-
-@pytest.mark.parametrize("place", ["from_south", "from_west"])
-@pytest.mark.parametrize(
-    ("lane", "share", "fits"),
-    [
-        ("{own}_1", 1.015, True),
-        ("{own}_1", 1.03, False),
-        ("{own}_1", 0.5, False),
-        ("{own}_2", 1.03, False),  # a neighbour
-        ("{own}_0", 2.0, True),  # a sidewalk
-        ("{on}_1", 2.0, False),
-        (":centre_{straight}_0", 1.06, False),
-        (":centre_{pocket}_0", 1.2, True),  # 0.8 m
-        (":centre_{pocket}_0", 1.3, False),
-    ],
-)
-def test_a_place_whose_lanes_are_driven_longer_or_shorter_than_drawn_is_refused(
-    tmp_path: Path, place: str, lane: str, share: float, fits: bool
-) -> None:
-    south = {"own": "from_south", "on": "to_north", "straight": "9", "pocket": "20"}
-    west = {"own": "from_west", "on": "to_east", "straight": "13", "pocket": "22"}
-    changed = re.escape(lane.format(**(south if place == "from_south" else west)))
-    content, count = re.subn(
-        rf'(<lane id="{changed}" [^>]*length=")([\d.]+)',
-        lambda found: f"{found[1]}{float(found[2]) * share:.2f}",
-        (NETS / "dense" / "dense.net.xml").read_text(),
-    )
-    assert count == 1
-    file = tmp_path / "map.net.xml"
-    file.write_text(content)
-    says = r"has the length .* and a shape of .*; wanted a difference of at most .* m \(2%, or 1 m\)"
-    with nullcontext() if fits else pytest.raises(MapError, match=says):
-        place_at(read_net(file), "junction", place)
-
-
-@pytest.mark.parametrize(
-    ("content", "says"),
-    [
-        ("<html/>", "map, whose root is <html>"),
-        ("nothing", "map is no well-formed XML"),
-        ("<osm/>", "map without roads"),
-        ('<osm><way id="2"><nd ref="1"/><tag k="highway" v="primary"/></way></osm>', "netconvert cannot convert map"),
-        ('<osm><relation id="1"><tag k="type" v="lanelet"/></relation></osm>', "map, a Lanelet2 map; .* as OpenDRIVE"),
-    ],
-)
-def test_what_is_no_map_is_not_converted(tmp_path: Path, content: str, says: str) -> None:
-    file = tmp_path / "map"
-    file.write_text(content)
-    with pytest.raises(MapError, match=says):
-        present_net(file, tmp_path)
-
-
-TOO_MUCH = "map.osm, for which netconvert has too little time or memory; wanted .* 4096 MiB; cut"
-
-
 @pytest.mark.parametrize(
     ("script", "says"),
     [
-        (
-            "echo 'Error: odd lane' >&2; kill -SEGV $$",
-            r"SUMO's netconvert crashes on map.osm \(SIGSEGV\); .* odd lane; open",
-        ),
-        ("echo 'std::bad_alloc' >&2; exit 1", TOO_MUCH),
-        ("kill -KILL $$", TOO_MUCH),
-        ("while [ $(ulimit -f) = unlimited ]; do :; done; yes Warning >&2", TOO_MUCH),
-        (
-            "while [ $(ulimit -v) = unlimited ]; do :; done; echo Error: got $(ulimit -v) KiB >&2; exit 1",
-            f"netconvert cannot convert map.osm: got {convert.MEMORY_BYTES >> 10} KiB",
-        ),
-        ("echo 'Error: no nodes' >&2; exit 1", "netconvert cannot convert map.osm: no nodes"),
+        ("kill -SEGV $$", r"\(SIGSEGV\)"),
+        ("kill -KILL $$", "time or memory"),
+        ("echo 'Error: no nodes' >&2; exit 1", "no nodes"),
     ],
 )
-def test_why_netconvert_failed_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, says: str) -> None:
-    monkeypatch.setattr(convert, "FILE_BYTES", 1 << 20)
+def test_why_netconvert_failed_is_told(tmp_path, monkeypatch, script, says):
     program, file = tmp_path / "netconvert", tmp_path / "map.osm"
     program.write_text(f"#!/bin/sh\n{script}\n")
     program.chmod(0o755)
@@ -278,61 +143,7 @@ def test_why_netconvert_failed_is_told(tmp_path: Path, monkeypatch: pytest.Monke
         present_net(file, tmp_path)
 
 
-TWO_WAYS = road("r", "a", "b", 900, "0,0 900,0") + road("s", "b", "a", 900, "900,3 0,3")
-ONWARD = road("t", "b", "c", 90, "900,0 990,0")
-
-
-@pytest.mark.parametrize(
-    ("roads", "says"),
-    [
-        (TWO_WAYS, []),
-        (TWO_WAYS + ONWARD, ["there are no connections, although roads meet: no lane leads on to another"]),
-        (
-            TWO_WAYS + road("u", "d", "e", 90, "0,90 90,90"),
-            ["roads are disconnected: the largest part has 2 of 3 edges for cars"],
-        ),
-    ],
-)
-def test_a_dead_end_is_no_missing_connection(tmp_path: Path, roads: str, says: list[str]) -> None:
-    file = tmp_path / "map.net.xml"
-    file.write_text(f"<net>{roads}</net>")
-    net = read_net(file)
-    assert net_remarks(net) == ["there are no traffic lights", *says]
-    fit = place_at(net, "car_following", "r")
-    assert fit.rare
-    rare = "Contacts are rare here: no vehicle can cut in."
-    assert fit.told()["summary"] == f"Car following on 'r': the vehicle ahead brakes and adapts its speed. {rare}"
-
-
-@pytest.mark.parametrize(
-    ("beside", "stored", "said"),
-    [
-        (("left",), "and left brakes", "and the one on the left brake"),
-        (("left", "right"), "and left and right brakes", "and those on the left and right brake"),
-    ],
-)
-def test_people_read_plain_words_and_the_digest_of_a_place_stays(beside: tuple[str], stored: str, said: str) -> None:
-    shipped = PLACES.validate_json((Path(sumo_nets.__path__[0]) / "low" / "place.json").read_bytes())
-    assert isinstance(shipped, Stretch)
-    place = shipped.model_copy(
-        update=dict.fromkeys(("left", "right"))
-        | dict.fromkeys(beside, shipped.ego)
-        | {"summary": f"Car following on 'r': who is ahead {stored}, adapts speed and cuts in."}
-    )
-    assert place.plain_summary == f"Car following on 'r': the vehicle ahead {said}, adapt their speed and cut in."
-    assert f"who is ahead {stored}" in place.model_dump_json()
-    assert shipped.plain_summary == shipped.summary
-
-
-@pytest.mark.parametrize("name", ["straight_two_way.xodr", "single_road.osm"])
-def test_a_map_of_one_road_has_places(tmp_path: Path, name: str) -> None:
-    found = survey(Map(present_net(Path(__file__).parents[2] / "cases" / name, tmp_path).file).net)
-    assert found.counts["car_following"] >= 1
-
-
-def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_the_left(
-    town: Map, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_the_left(town, tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     fits = [fit for fit in survey(town.net, ("crossing",)).fits if fit.place.sites[0].beyond]
     assert len(fits) > 10
@@ -369,9 +180,7 @@ RIGHT = '<connection from="b" to="c" fromLane="0" toLane="0" dir="s"/>'
 
 
 @pytest.mark.parametrize(("right", "comes_from"), [(RIGHT, []), ("", ["a"])])
-def test_nobody_is_placed_before_a_fork_that_would_lead_it_into_another_lane(
-    tmp_path: Path, right: str, comes_from: list[str]
-) -> None:
+def test_nobody_is_placed_before_a_fork_that_would_lead_it_into_another_lane(tmp_path, right, comes_from):
     """Of lanes that lead on alike, SUMO's drivers take the right one; of others the one that leads on."""
     file = tmp_path / "map.net.xml"
     file.write_text(FORK.format(right=right))
@@ -381,10 +190,10 @@ def test_nobody_is_placed_before_a_fork_that_would_lead_it_into_another_lane(
 
 
 @pytest.mark.parametrize(("x_m", "stands_clear"), [(0.0, True), (-6.0, False)])
-def test_who_waits_askew_in_the_way_of_others_is_told_from_who_stands_clear(x_m: float, stands_clear: bool) -> None:
+def test_who_waits_askew_in_the_way_of_others_is_told_from_who_stands_clear(x_m, stands_clear):
     """The middle of its front is 1.6 m from the middle of the lane that it is to cross, as SUMO has it."""
 
-    def lane(id_: str, *line: tuple[float, float]) -> Lane:
+    def lane(id_, *line):
         return Lane(id_, id_, 0, 10.0, 3.2, 10.0, line, True)
 
     before, behind = lane("i_0", (x_m, -5.6), (0.0, -1.6)), lane("i_1", (0.0, -1.6), (-3.0, 6.0))
@@ -412,9 +221,7 @@ BEND = (
 
 
 @pytest.mark.parametrize(("signal", "comes_from"), [("", ["a"]), (' tl="t" linkIndex="0"', [])])
-def test_nobody_is_placed_before_a_signal_that_may_be_red_until_the_end(
-    tmp_path: Path, signal: str, comes_from: list[str]
-) -> None:
+def test_nobody_is_placed_before_a_signal_that_may_be_red_until_the_end(tmp_path, signal, comes_from):
     file = tmp_path / "map.net.xml"
     to_the_left = '<connection from="a" to="b" fromLane="0" toLane="1" dir="s"'
     file.write_text(FORK.format(right="").replace(to_the_left, to_the_left + signal))
@@ -423,7 +230,7 @@ def test_nobody_is_placed_before_a_signal_that_may_be_red_until_the_end(
     assert [lane.edge for lane in way.lanes] == [*comes_from, "b"]
 
 
-def test_nobody_is_led_where_a_signal_stays_red(tmp_path: Path) -> None:
+def test_nobody_is_led_where_a_signal_stays_red(tmp_path):
     """A signal with several programmes, of which SUMO runs the last."""
     shipped_net = (NETS / "dense" / "dense.net.xml").read_text()
     stays = '<tlLogic id="centre" type="static" programID="1"><phase duration="1000" state="{}"/></tlLogic><junction'
@@ -457,9 +264,7 @@ def bend(file: Path, middle: str, *, to_the_left: bool) -> Net:
 
 @pytest.mark.parametrize("to_the_left", [True, False])
 @pytest.mark.parametrize(("middle", "there_is_room"), [(WIDE, True), (NARROW, False)])
-def test_nobody_is_led_over_a_junction_that_two_abreast_have_no_room_on(
-    tmp_path: Path, middle: str, there_is_room: bool, to_the_left: bool
-) -> None:
+def test_nobody_is_led_over_a_junction_that_two_abreast_have_no_room_on(tmp_path, middle, there_is_room, to_the_left):
     net = bend(tmp_path / "map.net.xml", middle, to_the_left=to_the_left)
     for lane, other in (("a_0", "a_1"), ("a_1", "a_0")):
         (link,) = net.onward[lane]
@@ -473,14 +278,12 @@ def test_nobody_is_led_over_a_junction_that_two_abreast_have_no_room_on(
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize(("radius_m", "reaches"), [(12.0, False), (0.5, True)])
-def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(
-    radius_m: float, reaches: bool, side: float
-) -> None:
+def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(radius_m, reaches, side):
     """It turns away from a car that drives straight on 3.2 m beside it."""
     quarter = [math.radians(10.0 * i) for i in range(10)]
     arc = [(radius_m * math.sin(a), -side * radius_m * (1.0 - math.cos(a))) for a in quarter]
 
-    def link(id_: str, *lines: list[tuple[float, float]]) -> Link:
+    def link(id_, *lines):
         source, middle, target = (Lane(id_, id_, 0, 1.0, 3.2, 10.0, tuple(line), True) for line in lines)
         return Link(source, target, (middle,), None, 0)
 
@@ -496,7 +299,7 @@ def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("radius_m", [1.5, 4.0, 12.0])
-def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radius_m: float, side: float) -> None:
+def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radius_m, side):
     """It drives north, 1.6 m from the kerb on its right or its left, and turns to that side behind the crossing."""
     quarter = [math.radians(5.0 * i) for i in range(19)]
     arc = [(side * (-1.6 + radius_m * (1.0 - math.cos(a))), 2.0 + radius_m * math.sin(a)) for a in quarter]
@@ -520,7 +323,7 @@ def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radiu
     assert (walk.x_m == pytest.approx(-0.05 * side)) == (radius_m == 12.0)  # none is sent back without need
 
 
-def test_places_that_nobody_names_go_when_they_are_old(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_places_that_nobody_names_go_when_they_are_old(tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     named, new, old = (library.keep(shipped(name), b"<net/>") for name in ("low", "mixed", "dense"))
     (tmp_path / "of another program").mkdir()

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.records import Collision, DrivenBy, Grade, ReferenceOutcome, Severity
-from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
-from risk_sac.scene_optimizer.archive import INITIAL, NEW, NEW_CANDIDATE, Elites, mutated
+from risk_sac.records import Collision, Grade, ReferenceOutcome, Severity
+from risk_sac.scene_optimizer import ArchiveOptimizer, DiscountedBandit, Encounter
+from risk_sac.scene_optimizer.archive import INITIAL, NEW_CANDIDATE, Elites, mutated
 from tests.builders import collision, judgement, violation
 
 HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)
@@ -37,31 +37,6 @@ def test_a_niche_keeps_what_the_careful_driver_came_nearest_to_preventing():
     (preventable,) = elites.pool()
     np.testing.assert_array_equal(preventable.point, HERE)
     assert preventable.worth > almost.worth
-
-
-def test_a_parent_is_credited_with_what_was_new_and_most_with_what_was_preventable():
-    elites = Elites()
-    elites.add_failure(HERE, failure(Grade.FULL_BRAKING), None)
-    (parent,) = elites.pool()
-    elites.add_failure(THERE, failure(Grade.FULL_BRAKING), parent)
-    assert parent.credit == 0.0
-    elites.add_failure(THERE, failure(Grade.PREVENTABLE), parent)
-    assert parent.credit == NEW_CANDIDATE
-    elites.add_failure(THERE, failure(Grade.FULL_BRAKING, "leader"), parent)
-    assert parent.credit == NEW_CANDIDATE + NEW
-    elites.add_failure(THERE, failure(Grade.PREVENTABLE), parent)
-    assert parent.credit == NEW_CANDIDATE + NEW
-
-
-def test_what_is_drawn_is_random_and_what_is_bred_is_a_script():
-    search = ArchiveOptimizer(3, SceneOptimizerConfig(), seed=0)
-    drove = []
-    for _ in range(INITIAL + 30):
-        point = search.ask()
-        drove.append(search.driven_by)
-        search.tell(point, 0.0, Encounter(collision=failure(Grade.PREVENTABLE)))
-    assert set(drove[:INITIAL]) == {DrivenBy.RANDOM}
-    assert set(drove[INITIAL:]) == {DrivenBy.RANDOM, DrivenBy.SCRIPT}
 
 
 def test_a_minor_contact_ranks_below_what_the_headline_counts():
@@ -97,22 +72,6 @@ def test_a_requirement_is_aimed_at_once_it_is_nearly_violated_and_until_it_is():
     assert elites.pool()[0].worth < elites.pool()[1].worth
 
 
-def test_preventable_failures_are_built_on_most_often():
-    elites, random = Elites(), np.random.default_rng(0)
-    for kind, grade in (("a", Grade.PREVENTABLE), ("b", Grade.FULL_BRAKING), ("c", Grade.UNAVOIDABLE)):
-        elites.add_failure(HERE, failure(grade, kind, impact_mps=10.0), None)
-    drawn = [elites.draw(elites.pool(), random).kind for _ in range(60)]
-    assert drawn.count("a") > drawn.count("b") + drawn.count("c")
-
-
-@settings(deadline=None)
-@given(st.lists(st.floats(0, 1), min_size=2, max_size=2), st.integers(0, 2**31))
-def test_mutants_stay_in_the_unit_cube(corner, seed):
-    mutant = mutated(np.full(5, corner[0]), np.full(5, corner[1]), np.random.default_rng(seed))
-    assert mutant.min() >= 0
-    assert mutant.max() <= 1
-
-
 def found(seed: int, episodes: int, *, told: bool) -> int:
     """Kinds of failure found, of those that lie side by side in a corner of the cube."""
     optimizer, kinds = ArchiveOptimizer(6, SceneOptimizerConfig(), seed), set()
@@ -137,3 +96,49 @@ def test_a_failure_that_a_rule_refuses_is_not_built_on():
     for _ in range(INITIAL):
         optimizer.tell(optimizer.ask(), 0.0, Encounter(collision=refused))
     assert optimizer.state()["elites"]["failures"] == {}
+
+
+DISCOUNT, WORTH, COST, LEAST = 0.9, 0.5, 5.0, 0.05
+
+
+def bandit(*unit_costs: float) -> DiscountedBandit:
+    return DiscountedBandit(
+        discount=DISCOUNT, prior_worth=WORTH, prior_cost=COST, least=LEAST, unit_costs=unit_costs or (1.0, 1.0)
+    )
+
+
+def test_the_chance_follows_the_square_of_what_each_yielded_for_its_cost():
+    subject = bandit(1.0, 4.0)
+    subject.tell(0, 1.0, 10)
+    subject.tell(1, 3.0, 10)
+    subject.tell(1, 0.0, 10)
+    first = (WORTH + 1.0) / (COST + 10)
+    second = (WORTH + DISCOUNT * 3.0) / (COST + (DISCOUNT + 1) * 4 * 10)
+    assert subject.probability == pytest.approx(second**2 / (first**2 + second**2))
+
+
+@pytest.mark.parametrize("better", [0, 1])
+def test_the_worse_arm_spends_the_least_share_of_all_costs(better):
+    subject = bandit(1.0, 4.0)
+    for _ in range(200):
+        subject.tell(better, 1.0)
+        subject.tell(1 - better, 0.0)
+    spent = 1.0 - subject.probability, 4.0 * subject.probability
+    assert spent[1 - better] / sum(spent) == pytest.approx(LEAST)
+
+
+def test_it_continues_from_its_state():
+    subject, other = bandit(), bandit()
+    subject.tell(1, 1.0)
+    other.load(subject.state())
+    assert other.probability == subject.probability != 0.5
+    other.tell(0, 2.0)  # the state is a copy
+    assert other.probability != subject.probability
+
+
+@settings(deadline=None)
+@given(st.lists(st.floats(0, 1), min_size=2, max_size=2), st.integers(0, 2**31))
+def test_mutants_stay_in_the_unit_cube(corner, seed):
+    mutant = mutated(np.full(5, corner[0]), np.full(5, corner[1]), np.random.default_rng(seed))
+    assert mutant.min() >= 0
+    assert mutant.max() <= 1

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
-from risk_sac.scripts.motions import SIZE, Act, Genes, Seen, act, adversaries_seen, cue, is_over
+from risk_sac.scripts.motions import SIZE, Act, Genes, Seen, act, adversaries_seen, cue
 
 MIDDLE = Genes(*[0.5] * SIZE)
 unit = st.floats(0, 1)
@@ -56,15 +56,6 @@ def test_a_neighbour_takes_up_its_place_and_then_comes_over():
     assert act(strike, beside(), 1.5, pedestrian=False) == Act(1.0, 0.0)
 
 
-def test_a_neighbour_stays_in_the_middle_of_its_lane_a_quarter_of_the_time_to_its_cue():
-    assert act(MIDDLE, beside(time_s=1.2), -0.1, pedestrian=False).steer == 0.0
-    assert act(MIDDLE, beside(time_s=1.3), -0.1, pedestrian=False).steer < 0.0
-
-
-def test_a_leader_keeps_its_lane_until_its_cue():
-    assert act(MIDDLE, beside(11.0, 0.2), -0.1, pedestrian=False) == Act(0.0, pytest.approx(-0.2))
-
-
 @pytest.mark.parametrize("side", [1, -1])
 def test_crossing_traffic_hurries_when_it_would_be_late_and_waits_when_early(side):
     late = Seen(0.0, 20.0, 40.0 * side, 0.0, -1.0 * side, 10.0, 10.0)  # 4 s from the ego's axis, the ego 2 s
@@ -74,12 +65,6 @@ def test_crossing_traffic_hurries_when_it_would_be_late_and_waits_when_early(sid
     assert act(keen, early, -0.1, pedestrian=False).drive == -1.0
     assert act(keen, late._replace(y_m=20.0 * side), -0.1, pedestrian=False).drive == 0.0
     assert act(keen._replace(aside=0.0), late, -0.1, pedestrian=False).drive == 0.4
-
-
-def test_crossing_traffic_has_its_cue_when_the_ego_is_near():
-    oncoming = Seen(0.0, 50.0, 3.0, -1.0, 0.0, 10.0, 10.0)  # 2.5 s from meeting
-    assert cue(MIDDLE._replace(cue=0.6), oncoming, pedestrian=False)
-    assert not cue(MIDDLE, oncoming, pedestrian=False)
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -92,13 +77,6 @@ def test_a_pedestrian_waits_for_the_ego_and_then_steps_out(side):
     assert not cue(keen, far._replace(x_m=11.5), pedestrian=True)
     assert cue(keen, far._replace(x_m=10.5), pedestrian=True)
     assert act(keen, near, 0.0, pedestrian=True).drive == pytest.approx(0.4)
-
-
-def test_a_vehicle_has_its_cue_at_a_time_of_its_own():
-    assert not cue(MIDDLE, beside(time_s=3.4), pedestrian=False)
-    assert cue(MIDDLE, beside(time_s=3.5), pedestrian=False)
-    assert not is_over(MIDDLE, 5.0)
-    assert is_over(MIDDLE, 5.1)
 
 
 def test_the_observation_is_read_back_in_metres():

@@ -1,6 +1,3 @@
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 
 from service.store.reading import Store
@@ -8,7 +5,7 @@ from service.store.writing import Ledger
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
-def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+def database_url(request, tmp_path):
     """An empty database of each kind."""
     if request.param == "sqlite":
         return f"sqlite:///{tmp_path}/test.db"
@@ -17,12 +14,12 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 
 @pytest.fixture
-def store(database_url: str) -> Iterator[Store]:
+def store(database_url):
     store = Store(database_url)
     yield store
     store.close()
 
 
 @pytest.fixture
-def ledger(store: Store) -> Ledger:
+def ledger(store):
     return Ledger(store)

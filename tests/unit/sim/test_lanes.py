@@ -1,7 +1,6 @@
 """The road that an ego is told, on every net: against geometry, and turned."""
 
 import math
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +26,7 @@ ROUTES = {
 
 
 @pytest.fixture(scope="module")
-def sim() -> Iterator[SumoSimulation]:
+def sim():
     with closing(SumoSimulation(EgoConfig())) as simulation:
         yield simulation
 
@@ -48,22 +47,7 @@ def lane(road: Road, id_: str) -> Lane:
     return next(each for each in road.lanes if each.id == id_)
 
 
-def test_a_straight_road_has_its_lanes_side_by_side(sim: SumoSimulation) -> None:
-    road = loaded(sim, "low", ("road",))
-    right, middle, left = road.lanes
-    assert (right.left, middle.left, left.left) == ("road_1", "road_2", "")
-    assert (right.right, middle.right, left.right) == ("", "road_0", "road_1")
-    assert middle.may_change_left
-    assert middle.may_change_right
-    assert not left.may_change_left
-    assert [each.width_m for each in road.lanes] == [3.3] * 3
-    assert [each.limit_mps for each in road.lanes] == pytest.approx([16.67] * 3)
-    np.testing.assert_allclose(right.line, [[0.0, 1200.0], [-3.3, -3.3]], atol=0.01)
-    assert all(each.on_route for each in road.lanes)
-    assert road.stop_lines == ()
-
-
-def test_the_route_through_a_junction_is_marked_and_its_signals_are_told(sim: SumoSimulation) -> None:
+def test_the_route_through_a_junction_is_marked_and_its_signals_are_told(sim):
     road = loaded(sim, "dense", ("from_south", "to_west"))
     on_route = {each.id for each in road.lanes if each.on_route}
     assert on_route == {"from_south_2", ":centre_11_0", ":centre_21_0", "to_west_1", "to_west_2"}
@@ -81,9 +65,7 @@ def test_the_route_through_a_junction_is_marked_and_its_signals_are_told(sim: Su
 
 
 @pytest.mark.parametrize(("family", "route"), [(f, r) for f, routes in ROUTES.items() for r in routes])
-def test_neighbours_are_beside_a_lane_and_successors_behind_it(
-    sim: SumoSimulation, family: str, route: tuple[str, ...]
-) -> None:
+def test_neighbours_are_beside_a_lane_and_successors_behind_it(sim, family, route):
     road = loaded(sim, family, route)
     for each in road.lanes:
         (x, y), (dx, dy) = each.line[:, 0], each.line[:, 1] - each.line[:, 0]
@@ -96,11 +78,11 @@ def test_neighbours_are_beside_a_lane_and_successors_behind_it(
             assert math.dist(each.line[:, -1], lane(road, following).line[:, 0]) < 0.5
 
 
-def test_a_road_turned_by_a_quarter_is_the_same_turned(sim: SumoSimulation) -> None:
+def test_a_road_turned_by_a_quarter_is_the_same_turned(sim):
     south = loaded(sim, "dense", ("from_south", "to_west"))
     east = loaded(sim, "dense", ("from_east", "to_south"))
 
-    def route(road: Road) -> list[Lane]:
+    def route(road):
         return sorted((each for each in road.lanes if each.on_route), key=lambda each: each.line[0, 0])
 
     turned = [each.line[[1, 0]] * [[-1.0], [1.0]] for each in route(south)]
@@ -109,7 +91,7 @@ def test_a_road_turned_by_a_quarter_is_the_same_turned(sim: SumoSimulation) -> N
     assert len(south.stop_lines) == len(east.stop_lines)
 
 
-def test_a_marking_that_may_not_be_crossed_is_told(sim: SumoSimulation, tmp_path: Path) -> None:
+def test_a_marking_that_may_not_be_crossed_is_told(sim, tmp_path):
     net = (Path(sumo_nets.__file__).parent / "low/low.net.xml").read_text()
     (tmp_path / "solid.net.xml").write_text(
         net.replace('<lane id="road_1"', '<lane id="road_1" changeLeft="authority"')
@@ -122,7 +104,7 @@ def test_a_marking_that_may_not_be_crossed_is_told(sim: SumoSimulation, tmp_path
 
 
 @pytest.mark.parametrize("mirrored", [1.0, -1.0])
-def test_the_edges_of_a_bend_keep_their_distance(mirrored: float) -> None:
+def test_the_edges_of_a_bend_keep_their_distance(mirrored):
     turn = np.linspace(0.0, math.pi / 2, 30)
     arc = np.array((20.0 * np.sin(turn), mirrored * 20.0 * (1.0 - np.cos(turn))))
     bend = Lane("bend", arc, 4.0, 10.0, "", "", False, False, (), True)

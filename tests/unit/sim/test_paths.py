@@ -3,7 +3,6 @@
 import math
 import subprocess
 import sys
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -11,15 +10,20 @@ from pathlib import Path
 import libsumo
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import sumo_nets
 from risk_sac.config import EgoConfig
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, VehicleStart
+from risk_sac.scenario.limits import Limits, limits_from_odd
 from risk_sac.sim.lookout import project
-from risk_sac.sim.paths import AHEAD_M, HEADING, STATION, X, Y, path_along
+from risk_sac.sim.paths import AHEAD_M, STATION, X, Y, path_along, path_through
 from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.sim.vehicle_control import BODY_M, CAP, GRID_M, HERE, SOON, bends
 from risk_sac.types import Role
+from tests.roads import arc_m, road
 
 LEGS = ("south", "east", "north", "west")  # counter-clockwise
 ROUTES = (
@@ -38,7 +42,7 @@ ROUTES = (
 
 
 @pytest.fixture(scope="module")
-def sim() -> Iterator[SumoSimulation]:
+def sim():
     with closing(SumoSimulation(EgoConfig())) as simulation:
         yield simulation
 
@@ -53,9 +57,7 @@ def alone(family: str, route: tuple[str, ...], lane: int, position_m: float) -> 
 @pytest.mark.parametrize(
     ("family", "route", "lane", "position_m"), ROUTES, ids=[f"{r[0]} {r[1]} {r[2]}" for r in ROUTES]
 )
-def test_a_vehicle_drives_along_its_path(
-    sim: SumoSimulation, family: str, route: tuple[str, ...], lane: int, position_m: float
-) -> None:
+def test_a_vehicle_drives_along_its_path(sim, family, route, lane, position_m):
     frame = sim.reset(alone(family, route, lane, position_m), 0)
     path, station_m, offset_m = sim.along("ego")
     np.testing.assert_allclose(np.hypot(*np.diff(path[:2])), np.diff(path[STATION]))
@@ -77,18 +79,7 @@ def test_a_vehicle_drives_along_its_path(
     assert before_m > station_m + 50.0 or frame.signal.name == "RED"
 
 
-@pytest.mark.parametrize("turn", [1, 2, 3], ids=["right", "straight", "left"])
-def test_the_intersection_looks_the_same_from_every_leg(sim: SumoSimulation, turn: int) -> None:
-    turned = []
-    for leg in LEGS:
-        route = f"from_{leg}", f"to_{LEGS[(LEGS.index(leg) + turn) % 4]}"
-        sim.reset(alone("dense", route, 1 if turn == 1 else 2, 190.0), 0)
-        path = sim.along("ego").path
-        turned.append(math.remainder(float(path[HEADING, -1] - path[HEADING, 0]), math.tau))
-    assert turned == pytest.approx([{1: -math.pi / 2, 2: 0.0, 3: math.pi / 2}[turn]] * 4, abs=0.02)
-
-
-def test_a_lane_shorter_than_it_is_drawn_has_its_vehicles_where_they_are(sim: SumoSimulation, tmp_path: Path) -> None:
+def test_a_lane_shorter_than_it_is_drawn_has_its_vehicles_where_they_are(sim, tmp_path):
     """As the outer lanes of a bend are, since an edge has one length."""
     shipped = (Path(sumo_nets.__file__).parent / "low" / "low.net.xml").read_text()
     net = tmp_path / "short.net.xml"
@@ -108,9 +99,7 @@ LINK = '<connection from="{}" to="{}" fromLane="{}" toLane="{}"/>'
 
 
 @pytest.mark.parametrize("own", [0, 1])
-def test_where_a_lane_forks_the_path_leads_over_the_one_that_leads_on(
-    sim: SumoSimulation, tmp_path: Path, own: int
-) -> None:
+def test_where_a_lane_forks_the_path_leads_over_the_one_that_leads_on(sim, tmp_path, own):
     """The other one leads off the route, to the right or to the left."""
     links = [("a", "b", 0, 0), ("a", "b", 0, 1), ("b", "c", own, 0), ("b", "d", 1 - own, 0)]
     parts = {
@@ -147,9 +136,7 @@ def test_where_a_lane_forks_the_path_leads_over_the_one_that_leads_on(
         ((100.0, 1.1), [(0, 0), (100, 0), (100, 1.1), (200, 0)]),  # another place
     ],
 )
-def test_a_lane_that_begins_beside_the_end_of_another_is_led_to_without_a_step(
-    side: float, behind: tuple[float, float], expected: list[tuple[float, float]]
-) -> None:
+def test_a_lane_that_begins_beside_the_end_of_another_is_led_to_without_a_step(side, behind, expected):
     x, y = behind
     lines = [np.array([(0.0, 0.0), (100.0, 0.0)]), np.array([(x, side * y), (200.0, 0.0)])]
     points = path_along(lines, [13.9, 13.9])
@@ -157,6 +144,64 @@ def test_a_lane_that_begins_beside_the_end_of_another_is_led_to_without_a_step(
     np.testing.assert_allclose(np.hypot(*np.diff(points[[X, Y]])), np.diff(points[STATION]))
 
 
-def test_of_a_lane_shorter_than_the_way_to_a_step_its_beginning_stays() -> None:
+LIMITS = limits_from_odd(FAMILIES["dense"].odd, friction=0.8)
+radii = st.floats(6, 60)
+
+
+def corner(turn_rad: float) -> np.ndarray:
+    """10 m straight, a corner, 10 m straight."""
+    return with_headings(0.0, turn_rad, turn_rad)
+
+
+def with_headings(*heading_rad: float) -> np.ndarray:
+    """Two pieces of 10 m; points and speeds do not matter."""
+    return path_through(np.zeros(3), np.zeros(3), np.array([0.0, 10.0, 20.0]), np.array(heading_rad), np.full(3, 13.89))
+
+
+def test_a_corner_turns_the_body_over_its_own_length_by_hand():
+    got = bends(corner(0.46), LIMITS)
+    assert got[HERE] == pytest.approx([0.0] * 20 + [0.1] * 10 + [0.0] * 11)  # 10 to 14.5 m: 0.46 rad / 4.6 m
+    assert got[SOON] == pytest.approx([0.0] * 10 + [0.1] * 20 + [0.0] * 11)  # from 5 m before
+
+
+def test_a_bend_is_approached_by_hand():
+    limits = Limits(
+        speed_mps=20, accel_mps2=3, brake_mps2=8, grip_mps2=5, lateral_accel_mps2=1,
+        walk_speed_mps=2, walk_accel_mps2=1.5, walk_brake_mps2=1.5,
+    )  # fmt: skip
+    assert limits.cornering_mps2 == pytest.approx(3.0)
+    assert limits.approach_mps2 == pytest.approx(3.0)  # 3² + (3 + 1)² = 5²
+    cap = bends(corner(0.46), limits)[CAP]
+    assert cap[10] == cap[29] == pytest.approx(math.sqrt(3.0 / 0.1))
+    assert cap[0] == pytest.approx(math.sqrt(30.0 + 2 * 3.0 * 5.0))  # 5 m before
+    assert cap[30] > 1000
+
+
+@settings(max_examples=30)
+@given(radii, st.floats(0.3, math.pi), st.floats(0.2, 4))
+def test_an_arc_has_its_own_curvature_and_the_speed_for_it(radius, turn, piece):
+    got = bends(road(radius, turn_rad=turn, piece_m=piece), LIMITS)
+    start, end = (round(s / GRID_M) for s in arc_m(radius, turn))
+    body = math.ceil((BODY_M + piece) / GRID_M)
+    inside = slice(start + body, end - math.ceil(piece / GRID_M))
+    mean = np.array(got[HERE][inside])
+    if len(mean) > 4 * body:  # on average, for the corners of a coarse arc come one by one
+        assert mean.mean() == pytest.approx(1 / radius, rel=0.25)
+    assert np.all(np.array(got[CAP]) ** 2 * np.array(got[HERE]) <= LIMITS.cornering_mps2 + 1e-9)
+
+
+@settings(max_examples=30)
+@given(radii, st.floats(0.3, math.pi))
+def test_every_cap_can_be_braked_to(radius, turn):
+    square = bends(road(radius, turn_rad=turn), LIMITS)[CAP] ** 2
+    assert np.all(square[:-1] - square[1:] <= 2 * LIMITS.approach_mps2 * GRID_M + 1e-6)
+
+
+def test_a_heading_that_passes_pi_is_no_bend():
+    got = bends(with_headings(math.pi - 0.01, -math.pi + 0.01, -math.pi + 0.01), LIMITS)
+    assert max(got[HERE]) == pytest.approx(0.02 / BODY_M)
+
+
+def test_of_a_lane_shorter_than_the_way_to_a_step_its_beginning_stays():
     lines = [np.array(line) for line in ([(0.0, 0.0), (3.0, 0.0)], [(3.0, 0.3), (9.0, 0.3)], [(9.0, 0.3), (50.0, 0.3)])]
     np.testing.assert_allclose(path_along(lines, [9.0, 8.0, 7.0])[[X, Y]].T, [(0, 0), (3, 0.3), (9, 0.3), (50, 0.3)])

@@ -54,7 +54,7 @@ def driven(
 
 @pytest.mark.parametrize("speed", [2.0, 10.0, 16.0])
 @pytest.mark.parametrize("beside_m", [-1.8, 0.0, 1.8])
-def test_at_full_throttle_a_vehicle_stops_behind_one_that_stands(speed: float, beside_m: float) -> None:
+def test_at_full_throttle_a_vehicle_stops_behind_one_that_stands(speed, beside_m):
     standing = (40.0, beside_m, 0.0, 0.0)
     x, _, _, ends_mps = driven((1.0, 0.0), [standing], speed=speed)[-1]
     assert ends_mps == pytest.approx(0.0, abs=1e-3)
@@ -71,19 +71,19 @@ def test_at_full_throttle_a_vehicle_stops_behind_one_that_stands(speed: float, b
         (30.0, -30.0, math.pi / 2, 25.0),  # crosses long before
     ],
 )
-def test_what_is_not_in_its_way_changes_nothing(other: Pose) -> None:
+def test_what_is_not_in_its_way_changes_nothing(other):
     assert driven((1.0, 0.0), [other]) == driven((1.0, 0.0), [other], keeps_clear=False)
 
 
 @pytest.mark.parametrize("side", [-1, 1])
-def test_the_ego_is_no_body_to_keep_clear_of(side: int) -> None:
+def test_the_ego_is_no_body_to_keep_clear_of(side):
     ego = (2.0, side * 3.3, 0.0, 10.0)
     assert driven((0.0, side), [], ego=ego) == driven((0.0, side), [], keeps_clear=False)
 
 
 @pytest.mark.parametrize("side", [-1, 1])
 @pytest.mark.parametrize("ahead_m", [-5.0, -2.3, 1.0])
-def test_a_vehicle_does_not_steer_into_the_one_beside_it(side: int, ahead_m: float) -> None:
+def test_a_vehicle_does_not_steer_into_the_one_beside_it(side, ahead_m):
     beside = (ahead_m, side * 3.3, 0.0, 10.0)
     poses = driven((0.0, side), [beside])
     assert max(side * y for _, y, _, _ in poses) < 3.3 - CAR_M[1]
@@ -91,7 +91,7 @@ def test_a_vehicle_does_not_steer_into_the_one_beside_it(side: int, ahead_m: flo
 
 
 @pytest.mark.parametrize("side", [-1, 1])
-def test_a_vehicle_lets_another_cross(side: int) -> None:
+def test_a_vehicle_lets_another_cross(side):
     crossing = (40.0, side * -28.0, side * math.pi / 2, 9.0)  # at x = 40 after 3.1 s
     for step, (x, _, _, _) in enumerate(driven((1.0, 0.0), [crossing])):
         y = moved(crossing, step * STEP_S)[1]
@@ -111,14 +111,14 @@ def walked(turn: float, parked: Pose) -> list[Walker]:
 
 @pytest.mark.parametrize("heading", [0.0, math.pi / 2, -math.pi / 2, math.pi])
 @pytest.mark.parametrize("turn", [-0.1, 0.0, 0.1])
-def test_a_pedestrian_stops_before_a_parked_car(turn: float, heading: float) -> None:
+def test_a_pedestrian_stops_before_a_parked_car(turn, heading):
     walkers = walked(turn, (6.0, 0.5, heading, 0.0))
     near_m = 6.0 - (CAR_M[0] if abs(math.cos(heading)) > 0.5 else CAR_M[1]) / 2
     assert max(w.x_m for w in walkers) < near_m - 0.25
     assert walkers[-1].speed_mps < 0.1
 
 
-def test_a_pedestrian_walks_on_from_a_car_that_it_stands_at() -> None:
+def test_a_pedestrian_walks_on_from_a_car_that_it_stands_at():
     away = PedestrianControl(LIMITS, Walker(0.0, 0.0, 0.0, 0.0))
     parked = (-HALF_M - 0.36, 0.0, 0.0, 0.0)
     for _ in range(30):

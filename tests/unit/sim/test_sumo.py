@@ -2,32 +2,24 @@
 
 import math
 import shutil
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 
 import libsumo
 import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.errors import SimulationError
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
-from risk_sac.sim.commands import VehicleCommand, Walker
-from risk_sac.sim.ego import Belief
+from risk_sac.sim.commands import VehicleCommand
 from risk_sac.sim.sumo import NETS, SumoSimulation
 from risk_sac.types import Frame, Role
-from tests.builders import Told, belief_of
-
-LEAD_IN_STEPS = 15
-each_family = pytest.mark.parametrize("family", FAMILIES.values(), ids=FAMILIES)
 
 
 @pytest.fixture(scope="module")
-def sim() -> Iterator[SumoSimulation]:
+def sim():
     with closing(SumoSimulation(EgoConfig())) as simulation:
         yield simulation
 
@@ -41,15 +33,8 @@ def speed(frame: Frame, id_: str) -> float:
     return float(frame.speed_mps[frame.ids.index(id_)])
 
 
-@each_family
-def test_sumo_knows_no_pedestrians(sim: SumoSimulation, family: Family) -> None:
-    frame = sim.reset(middle(family), 0)
-    assert libsumo.person.getIDCount() == 0
-    assert frame.ids[len(libsumo.vehicle.getIDList()) :] == family.pedestrians
-
-
 @pytest.mark.parametrize("folder", ["Tests, 2026", "a;b", "${HOME}", "100%", "ü é"])
-def test_a_net_is_loaded_whatever_its_folder_is_called(sim: SumoSimulation, tmp_path: Path, folder: str) -> None:
+def test_a_net_is_loaded_whatever_its_folder_is_called(sim, tmp_path, folder):
     layout = middle(FAMILIES["low"])
     (tmp_path / folder).mkdir()
     net = tmp_path / folder / "net.xml"
@@ -57,17 +42,7 @@ def test_a_net_is_loaded_whatever_its_folder_is_called(sim: SumoSimulation, tmp_
     assert sim.reset(replace(layout, net=str(net)), 0).ids == sim.reset(layout, 0).ids
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
-@pytest.mark.parametrize("speed_mps", [6.0, 10.0, 14.0])
-def test_before_the_release_an_adversary_keeps_the_speed_of_the_scene(
-    sim: SumoSimulation, side: str, speed_mps: float
-) -> None:
-    layout = middle(FAMILIES["low"], **{f"{side}_speed_mps": speed_mps, "lead_gap_m": 50.0})
-    sim.reset(layout, 0)
-    assert [speed(sim.step(), side) for _ in range(LEAD_IN_STEPS)] == pytest.approx([speed_mps] * LEAD_IN_STEPS)
-
-
-def test_before_the_release_an_adversary_stops_for_whom_sumo_s_models_see(sim: SumoSimulation) -> None:
+def test_before_the_release_an_adversary_stops_for_whom_sumo_s_models_see(sim):
     layout = middle(FAMILIES["low"], left_speed_mps=14.0)
     left = next(v for v in layout.vehicles if v.id == "left")
     parked = replace(left, id="parked", role=Role.BACKGROUND, position_m=left.position_m + 30.0, speed_mps=0.0)
@@ -81,8 +56,8 @@ def test_before_the_release_an_adversary_stops_for_whom_sumo_s_models_see(sim: S
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_only_after_the_release_a_command_is_driven_whatever_is_in_the_way(sim: SumoSimulation, side: str) -> None:
-    def driven(*, released: bool) -> float:
+def test_only_after_the_release_a_command_is_driven_whatever_is_in_the_way(sim, side):
+    def driven(*, released):
         layout = middle(FAMILIES["low"], **{f"{side}_speed_mps": 10.0})
         sim.reset(layout, 0)
         if released:
@@ -94,74 +69,15 @@ def test_only_after_the_release_a_command_is_driven_whatever_is_in_the_way(sim: 
     assert driven(released=False) < 11.0
 
 
-@each_family
-def test_the_release_alone_changes_nobody_s_size(sim: SumoSimulation, family: Family) -> None:
-    frame = sim.reset(middle(family), 0)
-    sim.release()
-    vehicles = [id_ for id_ in frame.ids if id_ not in family.pedestrians]
-    assert [libsumo.vehicle.getLength(v) for v in vehicles] == frame.length_m[: len(vehicles)].tolist()
-    assert [libsumo.vehicle.getWidth(v) for v in vehicles] == frame.width_m[: len(vehicles)].tolist()
-
-
-def with_walkers(*starts: PedestrianStart) -> Layout:
-    return replace(middle(FAMILIES["mixed"]), pedestrians=starts)
-
-
 def pedestrian(id_: str, heading: float, speed_mps: float) -> PedestrianStart:
     return PedestrianStart(id=id_, role=Role.ADVERSARY, x_m=500.0, y_m=-9.0, heading_rad=heading, speed_mps=speed_mps)
 
 
-def test_walkers_walk_on_and_halt_by_hand(sim: SumoSimulation) -> None:
-    sim.reset(with_walkers(pedestrian("up", math.pi / 2, 1.5), pedestrian("back", math.pi, 1.0)), 0)
-    for _ in range(2):
-        sim.walk_on()
-    frame = sim.step()
-    assert frame.x_m[-2:] == pytest.approx([500.0, 499.8])
-    assert frame.y_m[-2:] == pytest.approx([-8.7, -9.0])
-    assert frame.speed_mps[-2:].tolist() == [1.5, 1.0]
-    assert frame.vy_mps[-2:] == pytest.approx([1.5, 0.0], abs=1e-9)
-    sim.halt_walkers()
-    sim.walk_on()
-    halted = sim.step()
-    assert halted.speed_mps[-2:].tolist() == [0.0, 0.0]
-    assert np.array_equal(halted.x_m[-2:], frame.x_m[-2:])
-    assert np.array_equal(halted.heading_rad[-2:], frame.heading_rad[-2:])
-
-
-def test_a_walker_is_where_it_is_told(sim: SumoSimulation) -> None:
-    sim.reset(with_walkers(pedestrian("walker", math.pi / 2, 1.5)), 0)
-    sim.apply({}, {"walker": Walker(123.0, -4.0, 0.5, 0.8, 0.3)})
-    frame = sim.step()
-    state = [float(getattr(frame, n)[-1]) for n in ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")]
-    assert state == [123.0, -4.0, 0.5, 0.8, 0.3]
-
-
-def test_room_is_what_is_left_of_the_road_on_both_sides(sim: SumoSimulation) -> None:
-    frame = sim.reset(middle(FAMILIES["low"]), 0)
-    width = 3.3
-    for id_, lanes_right in (("right", 0), ("lead", 1), ("left", 2)):
-        row = frame.ids.index(id_)
-        offset = float(frame.lane_offset_m[row])
-        place = sim.place(id_)
-        assert place is not None
-        room, along = place
-        spare = (width - float(frame.width_m[row])) / 2 - 0.01
-        assert room.right_m == pytest.approx(lanes_right * width + spare + offset)
-        assert room.left_m == pytest.approx((2 - lanes_right) * width + spare - offset)
-        assert along.station_m == pytest.approx(float(frame.x_m[row]) + 2.3)
-        assert along == sim.along(id_)
-
-
-def test_who_left_the_net_has_no_place(sim: SumoSimulation) -> None:
-    sim.reset(middle(FAMILIES["low"]), 0)
-    assert sim.place("nobody") is None
-
-
 @pytest.mark.parametrize("family", ["mixed", "dense"])
-def test_a_released_driver_intends_to_stop_for_a_pedestrian_in_its_way(sim: SumoSimulation, family: str) -> None:
+def test_a_released_driver_intends_to_stop_for_a_pedestrian_in_its_way(sim, family):
     adversary = FAMILIES[family].vehicles[0]
 
-    def intended(ahead_m: float) -> float:
+    def intended(ahead_m):
         layout = middle(FAMILIES[family], occluder_speed_mps=8.0, oncoming_speed_mps=8.0, oncoming_distance_m=60.0)
         only = next(v for v in layout.vehicles if v.id == adversary)
         frame = sim.reset(replace(layout, vehicles=(only,), pedestrians=()), 0)
@@ -182,36 +98,3 @@ def test_a_released_driver_intends_to_stop_for_a_pedestrian_in_its_way(sim: Sumo
     assert intended(12.0) < -4.0
     assert intended(39.0) > -0.5
     assert intended(-12.0) > -0.5
-
-
-def test_what_sumo_refuses_is_reported(sim: SumoSimulation) -> None:
-    layout = middle(FAMILIES["low"])
-    with pytest.raises(SimulationError, match=r"low/low\.net\.xml"):
-        sim.reset(replace(layout, ego=replace(layout.ego, route=("nowhere",))), 0)
-    assert sim.reset(layout, 0).ids[0] == "ego"
-
-
-def test_each_frame_is_perceived_once_and_before_the_next_step(
-    sim: SumoSimulation, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """SUMO's models ignore actors unknown to the ego from the same frame on."""
-    perceived: list[Frame] = []
-    ignored: list[list[set[str]]] = []
-    tell_sumo = libsumo.vehicle.setParameter
-
-    def tell_ego(frame: Frame, _: int) -> Belief:
-        perceived.append(frame)
-        ignored.append([])
-        return belief_of(frame, hidden=() if len(perceived) == 2 else ("lead", "left"))
-
-    def noted(vehicle: str, name: str, value: str) -> None:
-        assert vehicle == "ego"
-        ignored[-1].append(set(value.split()))
-        tell_sumo(vehicle, name, value)
-
-    monkeypatch.setattr(sim, "_senses", Told(tell_ego))
-    monkeypatch.setattr(libsumo.vehicle, "setParameter", noted)
-    frames = [sim.reset(middle(FAMILIES["low"]), 0), *(sim.step() for _ in range(3))]
-    assert all(one is other for one, other in zip(perceived, frames, strict=True))
-    hidden: set[str] = {"lead", "left"}
-    assert ignored == [[hidden] * 2, [set()] * 2, [hidden] * 2, []]  # both models, where anything has changed

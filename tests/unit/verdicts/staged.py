@@ -25,13 +25,7 @@ STREET = Ground(
     crossings=(Area.box(98.0, 102.0, -6.6, 6.6),),
     roadway=(Area.box(-1000.0, 1000.0, -6.6, 6.6),),
 )
-CLEAN = EpisodeFacts(
-    teleported=False,
-    inside_limits=True,
-    simulator_agrees=True,
-    visible_for_s=3.0,
-    ever_visible=True,
-)
+CLEAN = EpisodeFacts(teleported=False, inside_limits=True, simulator_agrees=True, visible_for_s=3.0, ever_visible=True)
 Motion = Callable[[float], tuple[float, float, float]]  # time from the release -> x, y, heading
 
 

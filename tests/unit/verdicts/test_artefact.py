@@ -9,17 +9,7 @@ from risk_sac.types import Kind
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, inside_grip, used_grip
-from tests.unit.verdicts.staged import (
-    CLEAN,
-    cut_in,
-    hangs_over,
-    leader_brakes,
-    mirrored,
-    pedestrian_crosses,
-    sideways,
-    stage,
-    straight,
-)
+from tests.unit.verdicts.staged import CLEAN, cut_in, hangs_over, leader_brakes, mirrored, sideways, stage, straight
 
 CAR = Kind.VEHICLE
 CARS = (CAR, CAR, CAR)
@@ -31,20 +21,8 @@ def broken(evidence: Evidence, facts: EpisodeFacts = CLEAN) -> set[str]:
     return {rule for rule, passed in found.items() if not passed}
 
 
-def test_a_clean_contact_passes() -> None:
+def test_a_clean_contact_passes():
     assert broken(cut_in()) == set()
-
-
-@pytest.mark.parametrize(
-    ("change", "rule"),
-    [
-        ({"teleported": True}, "no_teleport"),
-        ({"inside_limits": False}, "inside_limits"),
-        ({"simulator_agrees": False}, "ego_model_saw"),
-    ],
-)
-def test_each_fact_breaks_its_own_rule(change: dict[str, bool], rule: str) -> None:
-    assert broken(cut_in(), replace(CLEAN, **change)) == {rule}
 
 
 def beside(x_m: float, until_s: float) -> Evidence:
@@ -64,15 +42,13 @@ def beside(x_m: float, until_s: float) -> Evidence:
         (-30.0, 1.0, {"no_spawn_overlap", "solid_bodies"}),
     ],
 )
-def test_two_others_that_overlap_refuse_the_contact_wherever_they_are(
-    x_m: float, until_s: float, rules: set[str]
-) -> None:
+def test_two_others_that_overlap_refuse_the_contact_wherever_they_are(x_m, until_s, rules):
     record = beside(x_m, until_s)
     assert broken(record) == rules
     assert broken(mirrored(record)) == rules
 
 
-def test_a_striker_that_came_through_another_body_is_refused() -> None:
+def test_a_striker_that_came_through_another_body_is_refused():
     through = stage(*(straight(x, 0.0, 0.0, v) for x, v in ((0.0, 14.0), (40.0, 6.0), (42.0, 14.0))), kinds=CARS)
     assert broken(through) >= {"no_spawn_overlap"}
     walker = straight(30.0, 5.6, -math.pi / 2, 2.0, start_s=0.0)
@@ -81,18 +57,18 @@ def test_a_striker_that_came_through_another_body_is_refused() -> None:
     assert "solid_bodies" in broken(run_into)
 
 
-def test_a_striker_that_the_road_cannot_hold_breaks_inside_grip() -> None:
+def test_a_striker_that_the_road_cannot_hold_breaks_inside_grip():
     braking = leader_brakes(braking=8.0)
     assert broken(replace(braking, ground=replace(braking.ground, friction=0.6))) == {"inside_grip"}
 
 
 @pytest.mark.parametrize(("at_s", "rules"), [(0.5, {"conflict_after_release"}), (0.7, set()), (2.0, set())])
-def test_a_conflict_of_the_first_second_was_inherited(at_s: float, rules: set[str]) -> None:
+def test_a_conflict_of_the_first_second_was_inherited(at_s, rules):
     assert broken(cut_in(gap=8.0, at_s=at_s)) == rules  # 0.3125 s later it is 0.375 m over
 
 
 @pytest.mark.parametrize(("at_s", "rules"), [(0.5, {"conflict_after_release"}), (0.8, set())])
-def test_who_hung_over_in_the_first_second_was_inherited_whenever_it_comes(at_s: float, rules: set[str]) -> None:
+def test_who_hung_over_in_the_first_second_was_inherited_whenever_it_comes(at_s, rules):
     assert broken(hangs_over(at_s=at_s, comes_at_s=2.5)) == rules
 
 
@@ -107,7 +83,7 @@ def driving(path: object, until_s: float = 4.0) -> Evidence:
     """A striker with this motion; the ego stands beside the way, and the contact does not matter here."""
     evidence = stage(straight(0.0, 0.0, 0.0, 0.0), straight(3.0, 0.0, 0.0, 0.0))
     times = np.arange(0, until_s, 0.1)
-    poses = np.array([path(t) for t in times])  # type: ignore[operator]
+    poses = np.array([path(t) for t in times])
     columns = {
         name: np.stack((np.zeros(len(times)), poses[:, i]), axis=1)
         for i, name in enumerate(("x_m", "y_m", "heading_rad"))
@@ -124,23 +100,19 @@ def circle(speed: float, radius: float, jitter_s: float = 0.0) -> object:
     return at
 
 
-def test_cornering_takes_v_squared_over_r() -> None:
+def test_cornering_takes_v_squared_over_r():
     # The front, half a length ahead of the centre, goes round on a circle of √(20² + 2.3²) m.
     used = used_grip(driving(circle(10.0, 20.0)), 1)
     assert used.max() == pytest.approx(5.0 * math.hypot(20.0, 2.3) / 20.0, rel=0.03)
 
 
-def test_braking_takes_its_deceleration() -> None:
-    assert used_grip(leader_brakes(gap=15.0, braking=6.0), 1).max() == pytest.approx(6.0, rel=0.02)
-
-
 @pytest.mark.parametrize(("speed", "friction", "inside"), [(10.0, 1.0, True), (10.0, 0.45, False), (14.5, 1.0, False)])
-def test_a_turn_faster_than_the_road_bears_is_outside(speed: float, friction: float, inside: bool) -> None:
+def test_a_turn_faster_than_the_road_bears_is_outside(speed, friction, inside):
     assert on(friction, driving(circle(speed, 20.0))) is inside
 
 
-def test_cornering_and_braking_share_the_circle() -> None:
-    def brakes_in_a_turn(t: float) -> tuple[float, float, float]:
+def test_cornering_and_braking_share_the_circle():
+    def brakes_in_a_turn(t):
         gone = 16.0 * t - 2.5 * t * t  # 5 m/s², at 8 to 16 m/s
         a = gone / 40.0
         return 40.0 * math.sin(a), 40.0 * (1 - math.cos(a)), a
@@ -151,16 +123,5 @@ def test_cornering_and_braking_share_the_circle() -> None:
     assert not on(0.55, evidence)
 
 
-def test_kinks_of_a_lane_are_no_cornering() -> None:
+def test_kinks_of_a_lane_are_no_cornering():
     assert on(0.9, driving(circle(10.0, 20.0, jitter_s=0.1)))
-
-
-def test_a_sudden_lane_change_is_inside() -> None:
-    assert on(0.6, cut_in(rate=1.2))
-
-
-def test_pedestrians_and_short_records_pass() -> None:
-    assert on(0.01, pedestrian_crosses())
-    short = stage(straight(0.0, 0.0, 0.0, 10.0), straight(3.0, 0.0, 0.0, 0.0))
-    assert used_grip(short, 1).size == 0
-    assert on(0.01, short)

@@ -50,7 +50,7 @@ def _after(reflex: DefensiveReflex, frame: Frame, path: Path, after_s: float) ->
 
 
 @SIDES
-def test_it_can_stop_before_what_it_does_not_see_of_a_crossing(side: int) -> None:
+def test_it_can_stop_before_what_it_does_not_see_of_a_crossing(side):
     beside = (92.0, -LANE_M, 0.0, 0.0, CAR)  # its front 3.7 m before the crossing
     assert braking(ego=14.0, side=side) == 0.0
     assert braking(beside, ego=14.0, side=side) == pytest.approx(3.4)  # 35.7 m: 14 m/s take 39.3 m
@@ -58,20 +58,20 @@ def test_it_can_stop_before_what_it_does_not_see_of_a_crossing(side: int) -> Non
     assert braking((120.0, -LANE_M, 0.0, 0.0, CAR), ego=14.0, side=side) == 0.0  # beyond it
 
 
-def test_it_creeps_past_what_stays_hidden() -> None:
+def test_it_creeps_past_what_stays_hidden():
     frame = frame_of((CAR, CAR), x_m=[95.0, 95.0], y_m=[0.0, -LANE_M], heading_rad=[0.0, 0.0], speed_mps=[1.0, 0.0])
     path = polyline(np.array([95.0, 200.0]), np.zeros(2))
     assert _after(DefensiveReflex(STREET), frame, path, 20.0) == 0.0
 
 
-def test_a_signal_that_gives_it_priority_counts_as_an_empty_crossing() -> None:
+def test_a_signal_that_gives_it_priority_counts_as_an_empty_crossing():
     beside = (90.0, -LANE_M, 0.0, 6.0, CAR)
     assert braking(beside, ego=14.0) == pytest.approx(3.4)
     assert braking(beside, ego=14.0, link=np.array([ord("G"), 0], dtype=np.uint8)) == 0.0
 
 
 @SIDES
-def test_it_sees_the_whole_crossing_before_it_passes_a_vehicle_that_stops_there(side: int) -> None:
+def test_it_sees_the_whole_crossing_before_it_passes_a_vehicle_that_stops_there(side):
     # Two lanes away it hides places too far away to matter before the ego has passed.
     drives, brakes = ((84.0, -2 * LANE_M + 0.8, 0.0, 9.0, CAR) for _ in range(2))
     assert braking(drives, ego=14.0, side=side) == 0.0
@@ -89,17 +89,17 @@ def test_it_sees_the_whole_crossing_before_it_passes_a_vehicle_that_stops_there(
         pytest.param((55.0, -2.0, 0.0, 0.0, WALKER), False, id="stands behind it"),
     ],
 )
-def test_it_does_not_start_beside_a_pedestrian(pedestrian: Actor, restrained: bool, side: int) -> None:
+def test_it_does_not_start_beside_a_pedestrian(pedestrian, restrained, side):
     assert (braking(pedestrian, ego=0.0, side=side) > 0.0) is restrained
 
 
-def test_it_does_not_speed_up_beside_a_pedestrian_and_then_slows_down() -> None:
+def test_it_does_not_speed_up_beside_a_pedestrian_and_then_slows_down():
     beside = (80.0, -2.5, 0.0, 0.0, WALKER)
     assert 0.0 < braking(beside) < NO_FASTER
     assert braking(beside, after_s=0.8) == pytest.approx(3.4)
 
 
-def test_it_does_not_wait_for_ever_for_a_pedestrian_on_the_sidewalk() -> None:
+def test_it_does_not_wait_for_ever_for_a_pedestrian_on_the_sidewalk():
     # The ego stands on the rightmost lane, 0.75 m from the kerb.
     frame = frame_of((CAR, WALKER), x_m=[60.0, 72.0], y_m=[-4.95, -7.0], heading_rad=[0.0, 0.0], speed_mps=[0.0, 0.0])
     path = polyline(np.array([60.0, 200.0]), np.full(2, -4.95))
@@ -110,14 +110,14 @@ def test_it_does_not_wait_for_ever_for_a_pedestrian_on_the_sidewalk() -> None:
 
 
 @SIDES
-def test_it_does_not_start_before_a_vehicle_from_across(side: int) -> None:
+def test_it_does_not_start_before_a_vehicle_from_across(side):
     across = (70.0, -12.0, math.pi / 2, 4.0, CAR)
     assert braking(across, ego=0.0, side=side) > 0.0
     assert braking((70.0, -24.0, math.pi / 2, 4.0, CAR), ego=0.0, side=side) == 0.0
     assert braking((70.0, LANE_M, math.pi, 12.0, CAR), ego=0.0, side=side) == 0.0  # oncoming on its lane
 
 
-def test_it_brakes_gently_where_that_suffices_and_else_as_r157() -> None:
+def test_it_brakes_gently_where_that_suffices_and_else_as_r157():
     far, near = (60.0 + 2.3 + 40.0 + 0.25, 0.0, 0.0, 0.0, WALKER), (60.0 + 2.3 + 14.0 + 0.25, 0.0, 0.0, 0.0, WALKER)
     assert braking(far, ego=10.0, after_s=1.5) == pytest.approx(3.4)
     assert braking(near, ego=12.0, after_s=2.0) == pytest.approx(7.59, abs=0.01)
@@ -148,31 +148,31 @@ def speeds_up_past_a_pedestrian(side: int = 1) -> Evidence:
     return stage(ego, walker, kinds=(CAR, WALKER))
 
 
-def test_it_alone_prevents_who_comes_from_behind_a_standing_car() -> None:
+def test_it_alone_prevents_who_comes_from_behind_a_standing_car():
     for evidence in (from_behind_a_standing_car(), mirrored(from_behind_a_standing_car())):
         assert prevents(evidence)
         assert not any(prevents(evidence, name) for name in ("r157", "fsm", "rss"))
 
 
 @SIDES
-def test_it_alone_prevents_that_the_ego_speeds_up_past_a_pedestrian(side: int) -> None:
+def test_it_alone_prevents_that_the_ego_speeds_up_past_a_pedestrian(side):
     evidence = speeds_up_past_a_pedestrian(side)
     assert prevents(evidence)
     assert not any(prevents(evidence, name) for name in ("r157", "fsm", "rss"))
 
 
-def test_it_prevents_nothing_where_it_had_no_reason_to_slow_down() -> None:
+def test_it_prevents_nothing_where_it_had_no_reason_to_slow_down():
     assert not prevents(from_behind_a_standing_car(crossing=False))
     assert not prevents(cut_in(gap=1.0, ego=14.0, other=9.0, rate=3.0))
     assert not prevents(pedestrian_crosses(seen_from_s=7.6))
 
 
-def test_it_prevents_what_r157_would_have() -> None:
+def test_it_prevents_what_r157_would_have():
     for evidence in (pedestrian_crosses(), cut_in(), leader_brakes(gap=40.0)):
         assert prevents(evidence) == prevents(evidence, "r157") is True
 
 
-def test_what_else_slows_it_down_does_not_prevent() -> None:
+def test_what_else_slows_it_down_does_not_prevent():
     # It would have slowed down for a pedestrian 2 s before a car cuts in, so late that no driver prevents it.
     ego, beside = straight(0.0, 0.0, 0.0, 14.0), straight(14.0 * 5.5 + CAR_M[0] - 2.0 - 9.0 * 5.5, LANE_M, 0.0, 9.0)
     evidence = stage(ego, sideways(beside, 4.0, -3.0, LANE_M), straight(75.0, -2.5, 0.0, 0.0), kinds=(CAR, CAR, WALKER))

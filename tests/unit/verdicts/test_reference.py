@@ -8,13 +8,12 @@ import pytest
 from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
-from risk_sac.records import Grade, ReferenceOutcome
+from risk_sac.records import ReferenceOutcome
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.reference import grade, reference_outcomes
+from risk_sac.verdicts.reference import reference_outcomes
 from tests.unit.verdicts.staged import (
     CAR_M,
-    LANE_M,
     STREET,
     WALKING,
     crossing_car,
@@ -22,7 +21,6 @@ from tests.unit.verdicts.staged import (
     leader_brakes,
     mirrored,
     pedestrian_crosses,
-    sideways,
     stage,
     straight,
     waiting,
@@ -55,36 +53,12 @@ def standing_in_the_way(distance_m: float, speed: float = 15.0, friction: float 
     ("driver", "friction", "needs_m"),
     [("r157", 1.0, 35.21), ("r157", 0.5, 41.54), ("full_braking", 1.0, 14.06), ("full_braking", 0.5, 22.94)],
 )
-def test_a_driver_needs_its_stopping_distance(driver: str, friction: float, needs_m: float) -> None:
+def test_a_driver_needs_its_stopping_distance(driver, friction, needs_m):
     assert outcomes(standing_in_the_way(needs_m + 0.1, friction=friction))[driver].avoids
     assert not outcomes(standing_in_the_way(needs_m - 0.1, friction=friction))[driver].avoids
 
 
-# rss: 0.75 s at 15 m/s: 11.25 m; 0.4743 s of jerk: 15·0.4743 − 12.65·0.4743³/6 = 6.890, then 13.577²/12 = 15.36;
-# 33.50 m.
-def test_rss_needs_its_response_time_and_6_mps2() -> None:
-    assert outcomes(standing_in_the_way(33.6))["rss"].avoids
-    assert not outcomes(standing_in_the_way(33.4))["rss"].avoids
-
-
-def test_fsm_avoids_what_it_sees_in_time_and_not_what_it_does_not() -> None:
-    assert outcomes(standing_in_the_way(34.0))["fsm"].avoids
-    assert not outcomes(standing_in_the_way(30.0))["fsm"].avoids
-
-
-def test_impact_speed_of_the_bound() -> None:
-    # 225 − 2 · 8 · 10 = 65
-    assert outcomes(standing_in_the_way(10.0))["full_braking"].impact_speed_mps == pytest.approx(
-        math.sqrt(65.0), abs=0.2
-    )
-
-
-def test_a_driver_that_does_not_perceive_in_time_strikes_as_the_ego_did() -> None:
-    found = outcomes(standing_in_the_way(5.0))["r157"]  # 0.33 s
-    assert (found.avoids, found.impact_speed_mps) == (False, pytest.approx(15.0))
-
-
-def test_a_driver_counts_on_its_own_where_the_ego_braked_harder() -> None:
+def test_a_driver_counts_on_its_own_where_the_ego_braked_harder():
     # The ego brakes with 9 m/s² from 0.2 s after the conflict began: careful takes over 0.2 s later, at 13.2 m/s.
     ego = straight(-1.5 * 15.0, 0.0, 0.0, 15.0, (0.2, -9.0))
     walker = straight(CAR_M[0] / 2 + 14.0 + 0.25, 0.0, 0.0, 0.0)
@@ -92,7 +66,7 @@ def test_a_driver_counts_on_its_own_where_the_ego_braked_harder() -> None:
     assert found.impact_speed_mps == pytest.approx(13.2, abs=0.6)
 
 
-def test_who_stands_when_it_is_struck_has_avoided() -> None:
+def test_who_stands_when_it_is_struck_has_avoided():
     # A head-on driver: everybody is struck in the end, the bound after it has come to a stand.
     evidence = stage(straight(0.0, 0.0, 0.0, 8.0), straight(60.0, 0.0, math.pi, 8.0))
     assert outcomes(evidence)["full_braking"].avoids
@@ -100,16 +74,7 @@ def test_who_stands_when_it_is_struck_has_avoided() -> None:
     assert outcomes(slow_ego)["r157"].avoids
 
 
-def test_who_is_struck_from_behind_has_avoided() -> None:
-    # It cuts in alongside and slightly behind: the driver that brakes less is struck on the flank.
-    beside = straight(-2.0, LANE_M, 0.0, 13.0)
-    evidence = stage(straight(0.0, 0.0, 0.0, 12.0), sideways(beside, 1.0, -1.0, LANE_M))
-    behind = stage(straight(0.0, 0.0, 0.0, 12.0), straight(-20.0, 0.0, 0.0, 14.0))
-    assert all(found.avoids for name, found in outcomes(behind).items() if name in ("r157", "full_braking"))
-    assert set(outcomes(evidence)) == {"r157", "fsm", "rss", "defensive", "full_braking", "r157_ttc"}
-
-
-def test_who_has_passed_by_then_has_not_avoided() -> None:
+def test_who_has_passed_by_then_has_not_avoided():
     # The ego brakes with 6 m/s² from 0.3 s on for a pedestrian that comes into sight at 0, and is struck on its flank
     # at 1.4 s. The careful driver brakes 0.75 s after 0.5 s, and would have been gone.
     ego = straight(-1.5 * 12.0, 0.0, 0.0, 12.0, (0.3, -6.0))
@@ -122,7 +87,7 @@ def test_who_has_passed_by_then_has_not_avoided() -> None:
         assert found.impact_speed_mps == pytest.approx(10.6, abs=0.1)  # as it passes
 
 
-def test_who_stands_before_the_ego_comes_past_has_avoided() -> None:
+def test_who_stands_before_the_ego_comes_past_has_avoided():
     # The ego brakes with 9 m/s² down to 2 m/s and rolls on into what stands 15.5 m ahead. The bound brakes with 8 m/s²
     # and stands after 1.88 s and 14.06 m, where the ego is at 13.1 m, and not yet at 15.5 m.
     ego = straight(-1.5 * 15.0, 0.0, 0.0, 15.0, (0.0, -9.0), (13.0 / 9.0, 0.0))
@@ -136,27 +101,8 @@ def test_who_stands_before_the_ego_comes_past_has_avoided() -> None:
 # over, 0.854 s after it began, in which the gap shrinks by 4.27 m.
 @pytest.mark.parametrize(("gap", "avoids"), [(4.27 + 3.83 + 0.6, True), (4.27 + 3.83 - 0.6, False)])
 @pytest.mark.parametrize("side", [1, -1])
-def test_r157_measures_a_cut_in_at_the_intrusion(gap: float, avoids: bool, side: int) -> None:
+def test_r157_measures_a_cut_in_at_the_intrusion(gap, avoids, side):
     assert outcomes(cut_in(gap=gap, side=side))["r157_ttc"].avoids is avoids
-
-
-def test_r157_ttc_speaks_of_cut_ins_only() -> None:
-    for evidence in (leader_brakes(), crossing_car(), pedestrian_crosses()):
-        assert set(outcomes(evidence)) == {"r157", "fsm", "rss", "defensive", "full_braking"}
-
-
-@pytest.mark.parametrize(
-    ("r157", "full_braking", "expected"),
-    [
-        (True, True, Grade.PREVENTABLE),
-        (True, False, Grade.PREVENTABLE),
-        (False, True, Grade.FULL_BRAKING),
-        (False, False, Grade.UNAVOIDABLE),
-    ],
-)
-def test_grades(r157: bool, full_braking: bool, expected: Grade) -> None:
-    found = {"r157": r157, "full_braking": full_braking}
-    assert grade(found) is expected
 
 
 STAGED = {
@@ -172,7 +118,7 @@ STAGED = {
 
 
 @pytest.mark.parametrize("name", STAGED)
-def test_the_mirrored_contact_has_the_same_outcomes(name: str) -> None:
+def test_the_mirrored_contact_has_the_same_outcomes(name):
     assert outcomes(mirrored(STAGED[name])) == outcomes(STAGED[name])
 
 
@@ -181,7 +127,7 @@ speeds = st.floats(3.0, 20.0)
 
 @settings(deadline=None, max_examples=40)
 @given(speeds, st.floats(1.0, 60.0), st.sampled_from([0.4, 0.7, 1.0]))
-def test_the_bound_avoids_what_careful_avoids(speed: float, distance: float, friction: float) -> None:
+def test_the_bound_avoids_what_careful_avoids(speed, distance, friction):
     found = outcomes(standing_in_the_way(distance, speed, friction))
     assert found["full_braking"].avoids >= found["r157"].avoids
     assert found["full_braking"].impact_speed_mps <= found["r157"].impact_speed_mps + 0.2
@@ -189,7 +135,7 @@ def test_the_bound_avoids_what_careful_avoids(speed: float, distance: float, fri
 
 @settings(deadline=None, max_examples=30)
 @given(speeds, st.floats(1.0, 40.0), st.floats(0.5, 20.0))
-def test_more_room_never_makes_it_worse(speed: float, distance: float, more: float) -> None:
+def test_more_room_never_makes_it_worse(speed, distance, more):
     near, far = outcomes(standing_in_the_way(distance, speed)), outcomes(standing_in_the_way(distance + more, speed))
     for driver in ("r157", "full_braking", "rss", "fsm"):
         assert far[driver].avoids >= near[driver].avoids
@@ -197,9 +143,7 @@ def test_more_room_never_makes_it_worse(speed: float, distance: float, more: flo
 
 @settings(deadline=None, max_examples=40)
 @given(st.floats(4.0, 15.0), st.floats(0.8, 2.5), st.floats(0.0, 9.0), st.floats(0.2, 1.5), st.floats(0.2, 4.0))
-def test_the_bound_avoids_what_careful_avoids_before_a_pedestrian(
-    speed: float, walk: float, braking: float, braked_s: float, seen_s: float
-) -> None:
+def test_the_bound_avoids_what_careful_avoids_before_a_pedestrian(speed, walk, braking, braked_s, seen_s):
     reach_s = 97.7 / speed
     ego = straight(0.0, 0.0, 0.0, speed, (reach_s - braked_s, -braking), start_s=0.0)
     walker = straight(98.0, walk * reach_s, -math.pi / 2, walk, start_s=0.0)
@@ -211,7 +155,7 @@ def test_the_bound_avoids_what_careful_avoids_before_a_pedestrian(
     assert found["full_braking"].avoids >= found["r157"].avoids
 
 
-def test_a_moved_and_turned_scene_has_the_same_outcomes() -> None:
+def test_a_moved_and_turned_scene_has_the_same_outcomes():
     evidence = STAGED["cut-in"]
     turn, cos, sin = 2.0, math.cos(2.0), math.sin(2.0)
     moved = replace(

@@ -39,7 +39,7 @@ def shifted(evidence: Evidence, lanes: int) -> Evidence:
 @pytest.mark.parametrize(
     "evidence", [cut_in(), cut_in(gap=-3.0, ego=12.0, other=12.0), leader_brakes(), merge(), crossing_car()]
 )
-def test_the_same_encounter_in_another_lane_has_the_same_verdict(evidence: Evidence, lanes: int) -> None:
+def test_the_same_encounter_in_another_lane_has_the_same_verdict(evidence, lanes):
     first, second = judged(evidence), judged(shifted(evidence, lanes))
     assert second.conflict_y_m == pytest.approx(first.conflict_y_m + lanes * LANE_M)
     assert second.model_copy(update={"conflict_y_m": first.conflict_y_m}) == first
@@ -57,13 +57,13 @@ def comes_from_next_lane(encounter: Evidence, side: int) -> Evidence:
 
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("evidence", [cut_in(at_s=9.0), leader_brakes(at_s=9.0), pedestrian_crosses(speed=9.0)])
-def test_a_lane_change_that_is_over_changes_nothing(evidence: Evidence, side: int) -> None:
+def test_a_lane_change_that_is_over_changes_nothing(evidence, side):
     found = comes_from_next_lane(evidence, side)
     assert abs(found.y_m[0, 0]) == pytest.approx(LANE_M)
     assert judged(found) == judged(evidence)
 
 
-def test_an_ego_that_comes_over_to_its_neighbour_merges_into_it() -> None:
+def test_an_ego_that_comes_over_to_its_neighbour_merges_into_it():
     # 0.375 m off its lane's centre 0.31 s after it began, at 2 s.
     found = judged(merge())
     assert found.signature == "neighbour, alongside, in a lane; ego changes lanes, does not brake"
@@ -73,7 +73,7 @@ def test_an_ego_that_comes_over_to_its_neighbour_merges_into_it() -> None:
 
 
 @pytest.mark.parametrize("rate", [0.4, 1.2, 2.0])
-def test_a_merge_right_after_the_release_is_the_egos_own(rate: float) -> None:
+def test_a_merge_right_after_the_release_is_the_egos_own(rate):
     assert judged(merge(rate=rate, at_s=1.0)).conflict_s >= 1.0
 
 
@@ -81,14 +81,14 @@ def test_a_merge_right_after_the_release_is_the_egos_own(rate: float) -> None:
     ("ego_mps", "other_mps", "expected"),
     [(0.0, 1.2, ConflictType.CUT_IN), (0.3, 1.2, ConflictType.CUT_IN), (1.2, 0.0, ConflictType.MERGE)],
 )
-def test_who_comes_over_names_the_conflict(ego_mps: float, other_mps: float, expected: ConflictType) -> None:
+def test_who_comes_over_names_the_conflict(ego_mps, other_mps, expected):
     ego = sideways(straight(0.0, 0.0, 0.0, 12.0), 2.0, max(ego_mps, 1e-9), LANE_M)
     other = sideways(straight(-2.0, LANE_M, 0.0, 12.0), 2.0, -max(other_mps, 1e-9), LANE_M)
     assert judged(stage(ego, other)).conflict_type is expected
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_an_ego_that_swerves_away_from_a_passing_vehicle_did_not_come_over(side: int) -> None:
+def test_an_ego_that_swerves_away_from_a_passing_vehicle_did_not_come_over(side):
     # Its rear corner has just left the ego's front; in its place the ego would have been touched 0.5 s before.
     ego = sideways(straight(0.0, 0.0, 0.0, 12.0), 1.0, -side * 0.8, 0.5)
     passing = sideways(straight(-3.95, side * LANE_M, 0.0, 14.0), 1.0, -side * 1.08, LANE_M)
@@ -96,20 +96,14 @@ def test_an_ego_that_swerves_away_from_a_passing_vehicle_did_not_come_over(side:
 
 
 @pytest.mark.parametrize(("other_m", "expected"), [(1.2, ConflictType.CUT_IN), (0.0, ConflictType.MERGE)])
-def test_an_ego_that_drifts_comes_over_if_its_neighbour_came_less_far(other_m: float, expected: ConflictType) -> None:
+def test_an_ego_that_drifts_comes_over_if_its_neighbour_came_less_far(other_m, expected):
     # The neighbour passes 0.4 m beside the ego's place, into which the ego moves at last.
     ego = sideways(straight(0.0, 0.0, 0.0, 12.0), 2.5, 0.8, 0.6)
     passing = sideways(straight(-12.0, 2.25 + other_m, 0.0, 15.0), 1.0, -0.8, other_m)
     assert judged(stage(ego, passing)).conflict_type is expected
 
 
-def test_an_ego_that_swerves_away_from_a_cut_in_was_cut_in_on() -> None:
-    beside = sideways(straight(3.0, LANE_M, 0.0, 12.0), 2.0, -1.8, 3 * LANE_M)
-    swerves = sideways(straight(0.0, 0.0, 0.0, 12.0), 2.8, -0.9, LANE_M)
-    assert judged(stage(swerves, beside)).conflict_type is ConflictType.CUT_IN
-
-
-def test_a_reference_driver_keeps_its_lane_and_looks_out_for_who_is_there() -> None:
+def test_a_reference_driver_keeps_its_lane_and_looks_out_for_who_is_there():
     # The leader brakes hard and the ego swerves into its neighbour: in the lane, a careful driver brakes too late.
     ego = sideways(straight(0.0, 0.0, 0.0, 14.0), 2.0, 2.0, LANE_M)
     neighbour = straight(-2.0, LANE_M, 0.0, 14.0)
@@ -131,8 +125,8 @@ def bend(t: float, radius_m: float = 60.0, speed: float = 10.0) -> tuple[float, 
 @pytest.mark.parametrize(
     ("recorded", "next_lane"), [(True, False), (True, True), (False, False)], ids=["ditch", "next lane", "no offsets"]
 )
-def test_the_lane_that_an_ego_leaves_goes_on_round_the_bend(recorded: bool, next_lane: bool) -> None:
-    def leaves(t: float) -> tuple[float, float, float]:
+def test_the_lane_that_an_ego_leaves_goes_on_round_the_bend(recorded, next_lane):
+    def leaves(t):
         x, y, heading = bend(t)
         right_m = max(t - 2.0, 0.0)
         return x + right_m * math.sin(heading), y - right_m * math.cos(heading), heading - 0.1 * (t > 2.0)
@@ -164,20 +158,14 @@ def leaves_the_road(walker_y: float = -9.0) -> Evidence:
     return stage(ego, straight(60.0, walker_y, math.pi / 2, 0.0), kinds=WALKING)
 
 
-def test_a_pedestrian_beside_the_road_is_struck_by_an_ego_that_left_it() -> None:
+def test_a_pedestrian_beside_the_road_is_struck_by_an_ego_that_left_it():
     found = judged(leaves_the_road())
     assert found.conflict_s == pytest.approx(2.2, abs=0.11)
     assert (found.hidden, found.grade) == (False, Grade.PREVENTABLE)
 
 
-def test_an_unseen_pedestrian_beside_the_road_would_not_have_been_struck_from_the_lane() -> None:
-    evidence = leaves_the_road()
-    unseen = replace(evidence, known=evidence.known & (np.arange(2) == 0))
-    assert judged(unseen).grade is Grade.PREVENTABLE
-
-
 @pytest.mark.parametrize("speed", [8.0, 12.0])
-def test_an_ego_that_drifts_into_oncoming_traffic_is_avoided_by_keeping_the_lane(speed: float) -> None:
+def test_an_ego_that_drifts_into_oncoming_traffic_is_avoided_by_keeping_the_lane(speed):
     ego = sideways(straight(0.0, 0.0, 0.0, speed), 3.0, 1.5, LANE_M)
     found = judged(stage(ego, straight(120.0, LANE_M, math.pi, 10.0)))
     assert found.conflict_s >= 3.0

@@ -1,7 +1,9 @@
+"""Wrong settings, as an operator of the service's programs sees them."""
+
 import os
-import sqlite3
 import stat
-from collections.abc import Iterator
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,7 +14,7 @@ from service.store.reading import Store
 
 
 @pytest.fixture(autouse=True)
-def _generous() -> Iterator[None]:
+def _generous():
     """What is made is for everybody, unless its maker says otherwise."""
     before = os.umask(0)
     yield
@@ -23,22 +25,12 @@ def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat().st_mode)
 
 
-def test_a_new_data_folder_is_nobody_elses(tmp_path: Path) -> None:
+def test_a_new_data_folder_is_nobody_elses(tmp_path):
     hold_data_folder(tmp_path / "new" / "data").close()
     assert mode(tmp_path / "new" / "data") == 0o700
 
 
-@pytest.mark.parametrize("known_by", [(), (".lock", "campaigns"), ("keys.lock", "keys.json"), ("lost+found",)])
-def test_a_data_folder_from_before_is_mended(tmp_path: Path, known_by: tuple[str, ...]) -> None:
-    folder = tmp_path / "data"
-    folder.mkdir(mode=0o755)
-    for name in known_by:
-        (folder / name).touch()
-    hold_data_folder(folder).close()
-    assert mode(folder) == 0o700
-
-
-def test_a_folder_that_others_need_is_refused_and_stays_as_it_is(tmp_path: Path) -> None:
+def test_a_folder_that_others_need_is_refused_and_stays_as_it_is(tmp_path):
     folder = tmp_path / "lib"
     (folder / "of-another-program").mkdir(parents=True, mode=0o755)
     folder.chmod(0o755)
@@ -49,10 +41,8 @@ def test_a_folder_that_others_need_is_refused_and_stays_as_it_is(tmp_path: Path)
     hold_data_folder(folder).close()
 
 
-def test_what_is_not_ours_to_change_is_refused_where_everybody_may_look(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(path: Path, mode: int) -> None:
+def test_what_is_not_ours_to_change_is_refused_where_everybody_may_look(tmp_path, monkeypatch):
+    def refuse(path, mode):
         raise PermissionError(1, "Operation not permitted", str(path))
 
     monkeypatch.setattr(Path, "chmod", refuse)
@@ -68,7 +58,7 @@ def test_what_is_not_ours_to_change_is_refused_where_everybody_may_look(
     assert mode(folder) == 0o770
 
 
-def test_only_the_owner_may_read_the_database_and_its_journal(tmp_path: Path) -> None:
+def test_only_the_owner_may_read_the_database_and_its_journal(tmp_path):
     store = Store(f"sqlite:///{tmp_path}/risk-sac.db")
     store.campaigns(limit=1)
     files = sorted(tmp_path.glob("risk-sac.db*"))
@@ -77,15 +67,32 @@ def test_only_the_owner_may_read_the_database_and_its_journal(tmp_path: Path) ->
     store.close()
 
 
-def test_a_database_from_before_is_mended_with_what_a_killed_server_left(tmp_path: Path) -> None:
-    Store(f"sqlite:///{tmp_path}/risk-sac.db").close()
-    other = sqlite3.connect(tmp_path / "risk-sac.db")
-    other.execute("SELECT count(*) FROM campaigns").fetchall()
-    files = sorted(tmp_path.glob("risk-sac.db*"))
-    assert len(files) == 3
-    for path in files:
-        path.chmod(0o644)
-    store = Store(f"sqlite:///{tmp_path}/risk-sac.db")
-    assert {mode(path) for path in files} == {0o600}
-    store.close()
-    other.close()
+RISK_SAC = [sys.executable, "-c", "import sys; from risk_sac.cli import main; sys.exit(main())"]
+PROGRAMS = {
+    "service": [sys.executable, "-m", "service"],
+    "serve": [*RISK_SAC, "serve"],
+    "keys": [*RISK_SAC, "keys", "list"],
+    "database": [sys.executable, "-m", "service.store", "back"],
+}
+
+
+def start(program: str, folder: Path, **settings: str) -> subprocess.CompletedProcess[str]:
+    given = {f"RISK_SAC_{name.upper()}": value for name, value in ({"data_dir": str(folder)} | settings).items()}
+    return subprocess.run(
+        PROGRAMS[program], env=os.environ | given, capture_output=True, text=True, timeout=600, check=False
+    )
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_each_wrong_setting_is_one_line_and_the_exit_status_is_2(program, tmp_path):
+    wrong = {"port": "http", "grace_s": "nan", "log_format": "xml", "cors_origins": "*", "allowed_hosts": "[1]"}
+    ended = start(program, tmp_path, **wrong)
+    assert (ended.returncode, ended.stdout) == (2, "")
+    assert ended.stderr.splitlines() == [
+        "RISK_SAC_PORT: got 'http'; wanted integer ≥ 1, ≤ 65535",
+        "RISK_SAC_LOG_FORMAT: got 'xml'; wanted `text` or `json`",
+        "RISK_SAC_GRACE_S: got 'nan'; wanted number > 0, ≤ 600",
+        "RISK_SAC_ALLOWED_HOSTS: got 1; wanted text",
+        "RISK_SAC_CORS_ORIGINS: got '*'; wanted JSON list",
+    ]
+    assert list(tmp_path.iterdir()) == []

@@ -4,7 +4,6 @@ import logging
 import os
 import stat
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import pytest
 
@@ -18,16 +17,16 @@ from service.settings import ServiceSettings
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> KeyFile:
+def file(tmp_path):
     return KeyFile(tmp_path / "data" / "keys.json")
 
 
 @pytest.fixture
-def ring(file: KeyFile) -> KeyRing:
+def ring(file):
     return KeyRing(file.path, AuthEnabledFlag())
 
 
-def test_of_a_key_only_the_hash_of_its_secret_is_kept(file: KeyFile) -> None:
+def test_of_a_key_only_the_hash_of_its_secret_is_kept(file):
     key, token = file.create("maps", "Ann", Scope.RUN)
     secret = token.removeprefix(f"rsk_{key.id}_")
     assert len(secret) == 43  # 256 bits in base64
@@ -35,7 +34,7 @@ def test_of_a_key_only_the_hash_of_its_secret_is_kept(file: KeyFile) -> None:
     assert json.loads(file.path.read_text())["keys"][0]["hash"] == hashlib.sha256(secret.encode()).hexdigest()
 
 
-def test_only_the_owner_may_read_the_file_whatever_the_umask(file: KeyFile) -> None:
+def test_only_the_owner_may_read_the_file_whatever_the_umask(file):
     before = os.umask(0)
     try:
         key, _ = file.create("maps", "", Scope.READ)
@@ -46,13 +45,13 @@ def test_only_the_owner_may_read_the_file_whatever_the_umask(file: KeyFile) -> N
         os.umask(before)
 
 
-def test_commands_at_the_same_time_lose_no_key(file: KeyFile) -> None:
+def test_commands_at_the_same_time_lose_no_key(file):
     with ThreadPoolExecutor(8) as pool:
         made = list(pool.map(lambda n: file.create(f"p{n}", "", Scope.READ)[0], range(40)))
     assert sorted(key.id for key in file.read()) == sorted(key.id for key in made)
 
 
-def test_what_a_killed_command_left_does_not_matter(file: KeyFile) -> None:
+def test_what_a_killed_command_left_does_not_matter(file):
     key, _ = file.create("maps", "", Scope.READ)
     file.path.with_name(".keys.json.tmp").write_text('{"keys": [')
     assert file.read() == (key,)
@@ -60,20 +59,7 @@ def test_what_a_killed_command_left_does_not_matter(file: KeyFile) -> None:
     assert file.read() == (key, other)
 
 
-def test_revoking_twice_keeps_the_first_time(file: KeyFile) -> None:
-    key, _ = file.create("maps", "", Scope.READ)
-    revoked = file.revoke(key.id)
-    assert revoked.revoked_at is not None
-    assert file.revoke(key.id) == revoked
-
-
-def test_revoking_an_unknown_key_is_an_error(file: KeyFile) -> None:
-    file.create("maps", "", Scope.READ)
-    with pytest.raises(KeysError, match="id is 'nobody'; wanted one that"):
-        file.revoke("nobody")
-
-
-def test_a_damaged_file_is_never_written_over(file: KeyFile) -> None:
+def test_a_damaged_file_is_never_written_over(file):
     file.create("maps", "", Scope.READ)
     file.path.write_text("{}")
     with pytest.raises(KeysError, match="damaged"):
@@ -81,7 +67,7 @@ def test_a_damaged_file_is_never_written_over(file: KeyFile) -> None:
     assert file.path.read_text() == "{}"
 
 
-def test_ring_finds_a_key_by_its_token_only(file: KeyFile, ring: KeyRing) -> None:
+def test_ring_finds_a_key_by_its_token_only(file, ring):
     key, token = file.create("maps", "", Scope.READ)
     _, other = file.create("nets", "", Scope.READ)
     assert ring.find(token) == key
@@ -91,7 +77,7 @@ def test_ring_finds_a_key_by_its_token_only(file: KeyFile, ring: KeyRing) -> Non
         assert ring.find(wrong) is None, wrong
 
 
-def test_ring_notices_new_and_revoked_keys_at_the_next_look(file: KeyFile, ring: KeyRing) -> None:
+def test_ring_notices_new_and_revoked_keys_at_the_next_look(file, ring):
     assert ring.keys() == {}
     for _ in range(20):
         key, token = file.create("maps", "", Scope.READ)
@@ -100,9 +86,7 @@ def test_ring_notices_new_and_revoked_keys_at_the_next_look(file: KeyFile, ring:
         assert ring.find(token) is None
 
 
-def test_ring_takes_a_damaged_file_never_for_an_empty_one(
-    file: KeyFile, ring: KeyRing, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_ring_takes_a_damaged_file_never_for_an_empty_one(file, ring, caplog):
     _, token = file.create("maps", "", Scope.READ)
     whole = file.path.read_bytes()
     assert ring.find(token)
@@ -118,21 +102,8 @@ def test_ring_takes_a_damaged_file_never_for_an_empty_one(
     assert ring.find(token)
 
 
-def test_ring_takes_what_is_no_file_never_for_an_empty_one(file: KeyFile, ring: KeyRing) -> None:
-    file.path.mkdir(parents=True)
-    with pytest.raises(KeysError, match="cannot be read: Is a directory"):
-        ring.keys()
-    file.path.rmdir()
-    assert ring.keys() == {}
-
-
-def test_scopes_include_those_before_them() -> None:
-    included = {scope: [other.value for other in Scope if scope.includes(other)] for scope in Scope}
-    assert included == {"read": ["read"], "run": ["read", "run"], "admin": ["read", "run", "admin"]}
-
-
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "fe80::1", "example.org", "localhost.evil.org", ""])
-def test_other_addresses_need_a_key_that_counts(tmp_path: Path, host: str) -> None:
+def test_other_addresses_need_a_key_that_counts(tmp_path, host):
     settings = ServiceSettings(data_dir=tmp_path, host=host)
     file = KeyFile(settings.keys_file)
     with pytest.raises(ConfigError, match="wanted a loopback address, or API keys; create one with `risk-sac keys cr"):
@@ -144,20 +115,12 @@ def test_other_addresses_need_a_key_that_counts(tmp_path: Path, host: str) -> No
         check_exposure(settings)
 
 
-def test_no_address_is_served_with_damaged_keys(tmp_path: Path) -> None:
-    settings = ServiceSettings(data_dir=tmp_path)
-    settings.keys_file.write_text("")
-    with pytest.raises(KeysError, match="damaged"):
-        check_exposure(settings)
-
-
-def test_command_creates_lists_and_revokes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_creates_lists_and_revokes(tmp_path, capsys):
     folder = ["--data-dir", str(tmp_path)]
     ring = KeyRing(tmp_path / "keys.json", AuthEnabledFlag())
     assert main(["create", *folder, "--project", "maps", "--name", "Ann [b]", "--scope", "read"]) == 0
     token = capsys.readouterr().out.strip()
     key = ring.find(token)
-    assert key is not None
     assert (key.project, key.name, key.scope) == ("maps", "Ann [b]", Scope.READ)
     assert main(["list", *folder]) == 0
     listed = capsys.readouterr().out
@@ -168,20 +131,3 @@ def test_command_creates_lists_and_revokes(tmp_path: Path, capsys: pytest.Captur
     assert ring.find(token) is None
     assert main(["revoke", *folder, "nobody"]) == 1
     assert "wanted one that" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        ["--project", "Maps"],
-        ["--project", "-maps"],
-        ["--project", "a" * 41],
-        ["--project", "a\n"],
-        ["--project", "maps", "--name", "a\x1b[31m"],
-        ["--project", "maps", "--scope", "root"],
-    ],
-)
-def test_command_refuses_what_no_key_can_have(tmp_path: Path, wrong: list[str]) -> None:
-    with pytest.raises(SystemExit, match="2"):
-        main(["create", "--data-dir", str(tmp_path), *wrong])
-    assert not (tmp_path / "keys.json").exists()

@@ -1,5 +1,4 @@
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -8,26 +7,26 @@ from service.errors import StorageError
 from service.networks import surveys
 from service.networks.network_store import NetworkStore
 from service.networks.report import PLACES
-from service.networks.schemas import Network, Places
+from service.networks.schemas import Places
 from service.networks.surveys import Surveys
 from tests.hostile_networks import NET
 from tests.server import LONG_S
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> NetworkStore:
+def store(tmp_path):
     return NetworkStore(tmp_path / "networks")
 
 
 @pytest.fixture
-def network(store: NetworkStore) -> Network:
+def network(store):
     with store.receive() as incoming:
         incoming.write(NET.encode())
         return store.add(incoming, "default", "")
 
 
 @pytest.fixture
-def searching(store: NetworkStore, tmp_path: Path) -> Iterator[Surveys]:
+def searching(store, tmp_path):
     searches = Surveys(store, tmp_path / "library")
     yield searches
     searches.stop()
@@ -39,9 +38,7 @@ def flip(file: Path) -> None:
     file.write_bytes(content)
 
 
-def test_who_asks_too_early_is_told_of_the_progress(
-    searching: Surveys, network: Network, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_asks_too_early_is_told_of_the_progress(searching, network, monkeypatch):
     monkeypatch.setattr(surveys, "PATIENCE_S", 0.0)
     assert searching.places(network.id, None) == Places(items=[], elsewhere=[], progress=0.0)
     deadline = time.monotonic() + LONG_S
@@ -52,9 +49,7 @@ def test_who_asks_too_early_is_told_of_the_progress(
     assert set(found.nowhere) == {"crossing", "junction"}
 
 
-def test_damage_of_a_net_is_told_as_the_services_and_that_of_places_is_mended(
-    searching: Surveys, store: NetworkStore, network: Network
-) -> None:
+def test_damage_of_a_net_is_told_as_the_services_and_that_of_places_is_mended(searching, store, network):
     found = searching.places(network.id, None)
     folder = store.folder(network.id, None)
     flip(folder / PLACES)
@@ -77,9 +72,7 @@ time.sleep(600)
 """
 
 
-def test_a_search_ends_when_the_service_stops(
-    store: NetworkStore, network: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_search_ends_when_the_service_stops(store, network, tmp_path, monkeypatch):
     (tmp_path / "surveyor.py").write_text(SLEEPS)
     monkeypatch.setattr(surveys, "SURVEYOR", str(tmp_path / "surveyor.py"))
     begun = store.folder(network.id, None) / "begun"

@@ -5,11 +5,13 @@ import time
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.execution.executor import FOLDER, Cause, Exited
+from risk_sac.execution.executor import Cause, Exited
 from risk_sac.execution.messages import Failed, Finished
-from service.errors import OutdatedError
-from service.runs.manager import Manager, worker_program
+from service.errors import OutdatedError, QuotaError
+from service.runs.manager import Manager
+from service.runs.quota import check_quota, exhausted
 from service.settings import ServiceSettings
+from service.store.stored import Usage
 
 SPEC = CampaignSpec(families=("low",), methods=("random",))
 
@@ -81,13 +83,6 @@ def test_a_run_that_loses_its_cluster_again_and_again_has_not_failed(execute, me
     assert manager.restarts == {Cause.LOST: 6}
 
 
-@pytest.mark.parametrize(("slots", "wanted"), [(math.inf, 7), (3, 3), (0, 0)])
-def test_as_many_are_at_work_as_may_be_and_as_there_is_room_for(store, tmp_path, slots, wanted):
-    executor = Scripted()
-    executor.slots = slots
-    assert Manager(ServiceSettings(data_dir=tmp_path, max_workers=7), store, executor).workers == wanted
-
-
 def test_a_worker_that_stops_although_nobody_asked_was_told_to_by_somebody_else(execute, metrics):
     stopped = Finished(finished=False, metrics=metrics, evaluation=None, digest="", versions={}, wall_s=1.0)
     run, _, manager = execute([stopped, Exited(None, Cause.ENDED, 0)], [Failed(reason="no"), Exited(None)])
@@ -107,8 +102,33 @@ def test_what_was_queued_before_it_was_refused_fails_and_holds_nobody_up(store, 
         store.campaign(before.id).spec  # noqa: B018
 
 
-def test_the_worker_is_the_one_of_the_settings_and_hears_its_folder_and_its_limits():
-    settings = ServiceSettings(worker_module="other", worker_niceness=7, grace_s=1, lease_s=2, stall_s=3, replays=2)
-    program = worker_program(settings)
-    assert program.arguments == ("-m", "other", FOLDER, "7", str(4 << 30), "2")
-    assert (program.linger_s, program.lease_s, program.stall_s, program.log) == (1, 2, 3, "worker.log")
+SETTINGS = ServiceSettings(quota_queued_runs=10, quota_cpu_hours=2.0)
+
+
+def usage(queued_runs: int = 0, hours: float = 0.0) -> Usage:
+    return Usage(queued_runs=queued_runs, cpu_s=3600.0 * hours)
+
+
+@pytest.mark.parametrize(("waiting", "new"), [(0, 11), (9, 2), (10, 1)])
+def test_one_run_more_is_refused_with_the_figures(waiting, new):
+    with pytest.raises(
+        QuotaError, match=f"got {new} runs with {waiting} waiting already; wanted at most 10"
+    ) as refusal:
+        check_quota(usage(waiting), new, SETTINGS)
+    assert refusal.value.retry_after_s > 0
+
+
+def test_worker_hours_are_used_up_when_they_are_reached():
+    check_quota(usage(hours=1.999), 1, SETTINGS)
+    assert not exhausted(usage(hours=1.999), SETTINGS)
+    assert exhausted(usage(hours=2.0), SETTINGS)
+    with pytest.raises(QuotaError, match=r"has used 2.00 worker hours within 24; wanted at most 2") as refusal:
+        check_quota(usage(hours=2.0), 1, SETTINGS)
+    assert refusal.value.retry_after_s > 0
+
+
+@pytest.mark.parametrize(("slots", "wanted"), [(math.inf, 7), (3, 3), (0, 0)])
+def test_as_many_are_at_work_as_may_be_and_as_there_is_room_for(store, tmp_path, slots, wanted):
+    executor = Scripted()
+    executor.slots = slots
+    assert Manager(ServiceSettings(data_dir=tmp_path, max_workers=7), store, executor).workers == wanted

@@ -1,3 +1,5 @@
+"""Going back to the version before, as service/recovery.md describes it."""
+
 import sqlite3
 
 import pytest
@@ -5,24 +7,41 @@ import pytest
 from risk_sac.config import CampaignSpec
 from risk_sac.records import Outcome
 from service.errors import StorageError
+from service.host.data_folder import hold_data_folder
+from service.settings import ServiceSettings
 from service.store import database
+from service.store.__main__ import main
+from service.store.database import held, newest_step, present_step
 from service.store.reading import Store
 from service.store.writing import Ledger
 from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
 
+STEP_0007 = Path(__file__).with_name("step_0007.sql")
+
+
+def opened_from_step_0007(file):
+    """The store of a database that the version before wrote: two runs, the first of which ended with two contacts."""
+    old = sqlite3.connect(file)
+    old.executescript(STEP_0007.read_text(encoding="utf-8"))
+    old.close()
+    return Store(f"sqlite:///{file}")
+
+
+def test_the_migrations_lead_to_the_tables_of_a_new_database(tmp_path, store):
+    upgraded = opened_from_step_0007(tmp_path / "old.db")
+    for engine in (upgraded.engine, store.engine):
+        with engine.connect() as connection:
+            context = MigrationContext.configure(connection, opts={"compare_type": False})  # SQLite forgets them
+            assert compare_metadata(context, Base.metadata) == []
+    upgraded.close()
+
 
 def test_a_file_that_is_no_database_is_a_storage_error(tmp_path):
     (tmp_path / "x.db").write_bytes(b"not a database, but long enough to look at" * 100)
     with pytest.raises(StorageError, match="storage failed while opening the database: file is not a database"):
         Store(f"sqlite:///{tmp_path}/x.db")
-
-
-@pytest.mark.parametrize("url", ["mysql://x/y", "nonsense", "postgresql+nodriver://x/y"])
-def test_a_url_that_names_no_database_we_know_is_refused(url):
-    with pytest.raises(StorageError, match="database_url"):
-        Store(url)
 
 
 def test_what_is_written_is_on_the_disk_before_the_answer(tmp_path):
@@ -79,13 +98,44 @@ def test_a_record_that_cannot_be_read_is_a_storage_error(store, ledger, episode)
         list(store.plain_episodes(campaign.number))
 
 
-def test_a_filter_by_grade_or_signature_uses_its_index(store):
-    if store.engine.dialect.name != "sqlite":
-        pytest.skip("PostgreSQL plans by the size of its tables")
-    with store.engine.connect() as connection:
-        for column in ("grade", "signature"):
-            query = (
-                f"SELECT * FROM episodes WHERE campaign_number = 1 AND {column} = 'x' AND number > 3 ORDER BY number"
-            )
-            (plan,) = connection.exec_driver_sql(f"EXPLAIN QUERY PLAN {query}").all()
-            assert f"USING INDEX episodes_{column}s (campaign_number=? AND {column}=? AND number>?)" in plan[-1]
+@pytest.fixture
+def settings(tmp_path, database_url, monkeypatch):
+    monkeypatch.setenv("RISK_SAC_DATA_DIR", str(tmp_path / "data"))
+    monkeypatch.setenv("RISK_SAC_DATABASE_URL", database_url)
+    return ServiceSettings()
+
+
+def test_no_step_is_taken_beneath_a_server(settings, capsys):
+    store = Store(settings.url)
+    with hold_data_folder(settings.data_dir):
+        assert main(["back"]) == 1
+    assert "is in use by another process" in capsys.readouterr().err
+    if store.engine.dialect.name == "postgresql":
+        with held(store.engine):
+            assert main(["back"]) == 1
+        assert "is in use by another server" in capsys.readouterr().err
+    assert present_step(store.engine) == newest_step()
+    store.close()
+
+
+def test_a_copy_is_whole_though_the_server_writes(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("RISK_SAC_DATA_DIR", str(tmp_path))
+    copy = tmp_path / "copy.db"
+    assert main(["copy", str(copy)]) == 1
+    assert "is missing" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+    store = Store(ServiceSettings().url)
+    spec = CampaignSpec(families=("low",), methods=("random",))
+    campaign = Ledger(store).create(spec)
+    assert main(["copy", str(copy)]) == 0
+    assert copy.stat().st_mode & 0o077 == 0
+    Ledger(store).create(spec)
+    store.close()
+    assert main(["copy", str(copy)]) == 1
+    assert "exists" in capsys.readouterr().err
+    with sqlite3.connect(copy) as database:
+        assert database.execute("SELECT id FROM campaigns").fetchall() == [(campaign.id,)]
+    database.close()
+    copied = Store(f"sqlite:///{copy}")
+    assert [each.id for each in copied.campaigns(limit=9).items] == [campaign.id]
+    copied.close()

@@ -1,12 +1,19 @@
+"""The one order of a campaign's events."""
+
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from threading import Barrier, Event
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import Finished
 from risk_sac.records import Episode, Outcome, State, StateChange
+from service.errors import StorageError, TransitionError
+from service.store.revisions import Revisions
+from service.store.states import TRANSITIONS, advance, campaign_state
 
 
 @pytest.fixture
@@ -129,3 +136,118 @@ def test_an_episode_that_comes_out_otherwise_keeps_its_place(store, ledger, epis
     ledger.add_episodes([(number, episode(2))])
     after = store.events(campaign.id, limit=100).items
     assert [short(each) for each in after] == [*map(short, before), "low-random-0-search-2"]
+
+
+@pytest.fixture
+def revisions():
+    revisions = Revisions()
+    revisions.note("c1", "ours", 1)
+    return revisions
+
+
+def test_the_revision_of_all_campaigns_moves_with_each_of_them(revisions):
+    seen = [revisions.all]
+    for write in (
+        lambda: revisions.note("c1", "ours", 2),
+        lambda: revisions.note("c2", "ours", 1),
+        lambda: revisions.note("c1", "ours", 3),
+        lambda: revisions.forget("c2"),
+    ):
+        write()
+        seen.append(revisions.all)
+    assert len(set(seen)) == 5
+
+
+def test_reading_an_older_revision_changes_nothing(revisions):
+    revisions.note("c1", "ours", 5)
+    before = revisions.all
+    assert revisions.learn("c1", "ours", 4) == 5
+    assert revisions.all == before
+
+
+def test_a_write_that_a_reader_saw_first_counts_all_the_same(revisions):
+    before = revisions.all
+    revisions.learn("c2", "ours", 1)
+    assert revisions.all == before, "a campaign that is only read is no news"
+    revisions.note("c2", "ours", 1)
+    assert revisions.all > before
+
+
+def test_a_page_of_events_ends_where_it_says(store, ledger, episode):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
+    ledger.start_run(campaign.runs[0].number)
+    for index in range(3):
+        ledger.add_episodes([(campaign.runs[0].number, episode(index))])
+    assert store.events(campaign.id, limit=4).last == 4
+    assert store.events(campaign.id, limit=5).last is None
+    assert len(store.events(campaign.id, limit=4, after=3).items) == 2
+    for after in (5, 6, 1 << 62):
+        assert store.events(campaign.id, limit=4, after=after).items == ()
+
+
+@pytest.mark.parametrize("damage", ["DELETE FROM changes", "UPDATE changes SET sequence = 9"])
+def test_an_event_that_is_missing_is_noticed(store, ledger, damage):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
+    ledger.start_run(campaign.runs[0].number)
+    with store.engine.begin() as connection:
+        connection.exec_driver_sql(f"{damage} WHERE number = 2")
+    with pytest.raises(StorageError, match="events 1 to 2 of campaign"):
+        store.events(campaign.id, limit=9)
+
+
+def test_a_refused_write_takes_no_number(store, ledger, episode):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("random",)))
+    number = campaign.runs[0].number
+    ledger.start_run(number)
+    with pytest.raises(TransitionError):
+        ledger.start_run(number)
+    ledger.add_episodes([(number, episode(0))])
+    ledger.add_episodes([(number, episode(0))])  # told again by a run that was taken up
+    ledger.requeue_run(number)
+    assert len(store.events(campaign.id, limit=9).items) == 5
+    assert store.campaign(campaign.id).state is State.QUEUED
+
+
+Q, R, P, X, C, S, F = State
+states = st.sampled_from(State)
+
+
+@given(states, states)
+def test_advance_follows_the_table(current, new):
+    if new in TRANSITIONS[current]:
+        assert advance(current, new) is new
+    else:
+        with pytest.raises(TransitionError, match=f"state is {current}; got {new}"):
+            advance(current, new)
+
+
+@pytest.mark.parametrize(
+    ("current", "runs", "wanted"),
+    [
+        (Q, [Q, Q], Q),
+        (Q, [R, Q], R),
+        (R, [S, Q], R),
+        (R, [F, R], R),
+        (R, [S, S], S),
+        (R, [S, F], F),
+        (R, [Q, Q], Q),  # the server stopped
+        (R, [P, Q], P),
+        (P, [Q, Q], Q),
+        (P, [P, S], P),
+        (X, [P, C], X),
+        (X, [X, C], X),
+        (X, [C, S], C),
+        (X, [S, S], S),
+        (X, [F, C], C),
+        (Q, [C, C], C),
+        (F, [R, S], F),  # a failed campaign stays failed while its workers leave
+    ],
+)
+def test_campaign_state_follows_from_its_runs(current, runs, wanted):
+    assert campaign_state(current, runs) is wanted
+
+
+@given(states, st.lists(states, min_size=1, max_size=6))
+def test_a_campaign_ends_exactly_when_all_its_runs_have(current, runs):
+    ended = campaign_state(current, runs).final
+    assert ended == (current.final or all(run.final for run in runs))

@@ -2,55 +2,11 @@ import pytest
 
 from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import Finished
-from risk_sac.records import Episode, Outcome, State, TriageState
-from service.errors import ConflictError, NotFoundError, TransitionError
-from service.store.finding import Judged
-from service.store.tables import IMPORTED
-from service.views.curves import curves
-from service.views.progress import progress
-from service.views.totals import results
+from risk_sac.records import Outcome, State, TriageState
+from service.errors import TransitionError
 from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
-
-
-def tallies(store, campaign):
-    run = store.campaign(campaign.id).runs[0]
-    return run.distinct_failures, run.preventable, run.distinct_preventable
-
-
-def test_a_campaign_comes_back_as_it_was_posted(store, ledger):
-    campaign = ledger.create(SPEC)
-    assert store.campaign(campaign.id) == campaign
-    assert campaign.spec == SPEC
-    assert [run.id for run in campaign.runs] == ["low-risk-sac-3", "low-random-3", "low-risk-sac-4", "low-random-4"]
-    assert [campaign.run_spec(run) for run in campaign.runs] == list(SPEC.runs())
-    assert [run.spec_digest for run in campaign.runs] == [spec.digest for spec in SPEC.runs()]
-
-
-def test_runs_leave_the_queue_in_the_order_they_came(store, ledger):
-    first, second = ledger.create(SPEC), ledger.create(SPEC)
-    left = [start(store, ledger) for _ in range(8)]
-    assert left == [run.number for run in first.runs + second.runs]
-    assert store.waiting() == {}
-
-
-def test_episodes_told_together_are_each_stored_and_one_change(store, ledger, episode):
-    campaign = ledger.create(SPEC)
-    first, second = start(store, ledger), start(store, ledger)
-    ledger.add_episodes([(second, episode(0))])
-    before = int(store.campaign(campaign.id).revision)
-    told = [(first, episode(0)), (second, episode(0)), (first, episode(0)), (first, episode(1, Outcome.FAILURE))]
-    assert ledger.add_episodes(told) == {first}
-    found = store.campaign(campaign.id)
-    assert int(found.revision) == before + 1
-    assert [(run.episodes_done, run.failures) for run in found.runs[:2]] == [(2, 1), (1, 0)]
-    stored = [event for event in store.events(campaign.id, limit=9).items if isinstance(event, Episode)]
-    assert [(event.run_id, event.index) for event in stored] == [
-        (found.runs[1].id, 0),
-        (found.runs[0].id, 0),
-        (found.runs[0].id, 1),
-    ]
 
 
 def test_an_episode_reported_twice_is_stored_and_counted_once(store, ledger, episode):
@@ -92,21 +48,6 @@ def test_an_episode_that_comes_out_otherwise_replaces_the_first(store, ledger, e
     assert (store.campaign(campaign.id).runs[0].failures, store.campaign(campaign.id).runs[0].episodes_done) == (0, 1)
 
 
-def test_a_campaign_succeeds_with_its_last_run(store, ledger, metrics):
-    campaign = ledger.create(SPEC)
-    result = Finished(
-        finished=True, metrics=metrics, evaluation=metrics, digest="abc", versions={"sumo": "1"}, wall_s=1
-    )
-    for _ in campaign.runs:
-        assert store.campaign(campaign.id).state in (State.QUEUED, State.RUNNING)
-        ledger.end_run(start(store, ledger), State.SUCCEEDED, result=result)
-    campaign = store.campaign(campaign.id)
-    assert campaign.state is State.SUCCEEDED
-    assert campaign.created_at <= campaign.started_at <= campaign.finished_at
-    assert campaign.runs[0].evaluation == metrics
-    assert (campaign.runs[0].digest, campaign.runs[0].versions) == ("abc", {"sumo": "1"})
-
-
 def test_failures_that_did_not_repeat_are_refused_with_the_end_of_their_run(store, ledger, episode, metrics):
     campaign = ledger.create(SPEC)
     first, second = start(store, ledger), start(store, ledger)
@@ -129,58 +70,6 @@ def test_failures_that_did_not_repeat_are_refused_with_the_end_of_their_run(stor
     ]
 
 
-def test_what_an_i_i_d_phase_counts_is_added_to_nothing_that_searches_found(store, ledger, episode, metrics):
-    spec = CampaignSpec(families=("low",), methods=("random",), budget={"episodes": 3}, iid={"episodes": 3})
-    campaign = ledger.create(spec)
-    assert [campaign.run_spec(run) for run in campaign.runs] == list(spec.runs())
-    for phase in ("search", "iid", "iid"):
-        number = start(store, ledger)
-        outcomes = (Outcome.SAFE, Outcome.FAILURE, Outcome.REJECTED)
-        ledger.add_episodes([(number, episode(index, outcome, phase)) for index, outcome in enumerate(outcomes)])
-        end = {"metrics": metrics, "evaluation": None, "digest": phase, "versions": {}, "wall_s": 1.0}
-        ledger.end_run(number, State.SUCCEEDED, result=Finished(finished=True, **end))
-    found = store.campaign(campaign.id)
-    assert found.state is State.SUCCEEDED
-    assert found.methods == ["random"]
-    assert [run.failures for run in found.runs] == [1, 1, 1]  # each by itself
-    counted = progress(found, 1)
-    assert (counted.episodes_done, counted.episodes_total) == (9, 9)
-    assert (counted.failures, counted.raw_collisions, counted.rejected) == (1, 1, 1)
-    assert [(total.method, total.runs) for total in results(found).totals] == [("random", 1)]
-
-    def ids(**asked):
-        return [each.id for each in store.episodes(found.id, limit=9, outcomes=(Outcome.FAILURE,), **asked).items]
-
-    assert ids(judged=Judged(iid=False)) == ["low-random-0-search-1"]
-    assert ids(run_id="low-iid-random-0", judged=Judged()) == ["low-iid-random-0-iid-1"]
-    assert store.failure(found.id, "low-iid-random-0-iid-1").episode.phase == "iid"
-    assert {each.phase for each in store.plain_episodes(found.number)} == {"search"}
-    assert [curve.run_id for curve in curves(found, store.plain_episodes(found.number), 9).runs] == ["low-random-0"]
-
-
-def test_one_failed_run_fails_the_campaign_once_the_others_have_ended(store, ledger):
-    campaign = ledger.create(SPEC)
-    ledger.end_run(start(store, ledger), State.FAILED, "worker was killed by SIGKILL")
-    assert store.campaign(campaign.id).state is State.RUNNING
-    for _ in range(3):
-        ledger.end_run(start(store, ledger), State.SUCCEEDED)
-    campaign = store.campaign(campaign.id)
-    assert campaign.state is State.FAILED
-    assert campaign.reason == "run low-risk-sac-3: worker was killed by SIGKILL"
-
-
-def test_cancel_stops_what_runs_and_drops_what_waits(store, ledger):
-    campaign = ledger.create(SPEC)
-    number = start(store, ledger)
-    assert ledger.cancel(campaign.id) == [number]
-    assert ledger.cancel(campaign.id) == [number]
-    states = [run.state for run in store.campaign(campaign.id).runs]
-    assert states == [State.CANCELLING] + [State.CANCELLED] * 3
-    ledger.end_run(number, State.CANCELLED)
-    assert store.campaign(campaign.id).state is State.CANCELLED
-    assert ledger.cancel(campaign.id) == []
-
-
 def test_a_state_outside_the_table_is_refused_and_changes_nothing(store, ledger):
     campaign = ledger.create(SPEC)
     with pytest.raises(TransitionError, match="state is queued; got succeeded"):
@@ -198,113 +87,6 @@ def test_what_has_no_worker_any_more_waits_again_or_ends_cancelled(store, ledger
     assert store.campaign(kept.id).state is State.QUEUED
     assert store.campaign(dropped.id).state is State.CANCELLED
     assert ledger.resume() == 0
-
-
-def test_a_run_at_import_never_waits_for_a_worker(store, ledger):
-    at_import, posted = ledger.create(SPEC, key=f"{IMPORTED}1"), ledger.create(SPEC, key="imported")
-    for run in (*at_import.runs, *posted.runs):
-        ledger.start_run(run.number)
-    assert ledger.resume() == len(posted.runs)
-    assert store.campaign(at_import.id).state is State.RUNNING
-    assert store.begun_imports() == [at_import.id]
-
-
-def test_a_pause_is_written_with_its_reason_and_can_be_cancelled(store, ledger):
-    campaign = ledger.create(SPEC)
-    number = start(store, ledger)
-    ledger.pause([number], "no room")
-    paused = store.campaign(campaign.id)
-    assert (paused.state, paused.reason) == (State.PAUSED, "run low-risk-sac-3: no room")
-    assert (paused.runs[0].state, paused.runs[0].reason) == (State.PAUSED, "no room")
-    assert ledger.cancel(campaign.id) == []
-    assert store.campaign(campaign.id).state is State.CANCELLED
-
-
-def test_every_stored_change_has_another_revision(store, ledger, episode, metrics):
-    campaign = ledger.create(SPEC)
-    seen = [store.revision(campaign.id)]
-    number = start(store, ledger)
-    seen.append(store.revision(campaign.id))
-    ledger.add_episodes([(number, episode(0))])
-    seen.append(store.revision(campaign.id))
-    ledger.requeue_run(number, "worker was killed by SIGKILL")
-    seen.append(store.revision(campaign.id))
-    ledger.cancel(campaign.id)
-    seen.append(store.revision(campaign.id))
-    assert len(set(seen)) == len(seen)
-    assert store.campaign(campaign.id).revision == seen[-1]
-
-
-def test_the_same_idempotency_key_finds_the_campaign_or_conflicts(store, ledger):
-    campaign = ledger.create(SPEC, "ours", "k1")
-    assert ledger.find("ours", "k1", SPEC).id == campaign.id
-    assert ledger.find("ours", "k2", SPEC) is None
-    assert ledger.find("theirs", "k1", SPEC) is None
-    with pytest.raises(ConflictError, match="belongs to campaign"):
-        ledger.find("ours", "k1", SPEC.model_copy(update={"label": "other"}))
-
-
-def test_a_deleted_campaign_leaves_no_row(store, ledger, episode):
-    campaign, kept = ledger.create(SPEC), ledger.create(SPEC)
-    for _ in range(5):
-        ledger.add_episodes([(start(store, ledger), episode(0))])
-    ledger.delete(campaign.id)
-    with pytest.raises(NotFoundError):
-        store.revision(campaign.id)
-    assert store.episodes(kept.id, limit=5).items
-    with store.engine.connect() as connection:
-        for table in ("campaigns", "runs", "episodes", "changes"):
-            column = "number" if table == "campaigns" else "campaign_number"
-            numbers = connection.exec_driver_sql(f"SELECT DISTINCT {column} FROM {table}").scalars().all()
-            assert numbers == [kept.number]
-
-
-def test_a_run_has_the_sums_of_what_its_phases_counted(store, ledger, episode, metrics):
-    campaign = ledger.create(SPEC)
-    number = start(store, ledger)
-    ledger.add_episodes([(number, episode(0, Outcome.FAILURE))])
-    assert tallies(store, campaign) == (1, 1, 1)
-    counted = metrics.model_copy(update={"distinct_failures": 4, "preventable": 3, "distinct_preventable": 2})
-    evaluated = episode(0, Outcome.FAILURE, phase="evaluation").model_copy(update={"metrics": counted})
-    ledger.add_episodes([(number, evaluated)])
-    assert tallies(store, campaign) == (5, 4, 3)
-    done = Finished(finished=True, metrics=counted, evaluation=counted, digest="d", versions={}, wall_s=1.0)
-    ledger.end_run(number, State.SUCCEEDED, result=done)
-    assert tallies(store, campaign) == (8, 6, 4)
-
-
-def test_a_triage_is_kept_and_moves_the_revision(store, ledger, episode):
-    campaign = ledger.create(SPEC)
-    ledger.add_episodes([(start(store, ledger), episode(5, Outcome.DEGENERATE))])
-    failure = "low-risk-sac-3-search-5"
-    assert store.triage(campaign.id, failure) is None
-    assert store.triages(campaign.number) == {}
-    before = store.revision(campaign.id)
-    noted = ledger.triage(campaign.id, failure, TriageState.CONFIRMED, "late, ünd\nof two lines")
-    assert store.triage(campaign.id, failure) == noted
-    assert (noted.state, noted.comment) == (TriageState.CONFIRMED, "late, ünd\nof two lines")
-    revision = store.revision(campaign.id)
-    assert revision != before
-    assert ledger.triage(campaign.id, failure, noted.state, noted.comment) == noted, "the same again changes nothing"
-    assert store.revision(campaign.id) == revision
-    changed = ledger.triage(campaign.id, failure, TriageState.FIXED, "")
-    assert (changed.state, changed.comment) == (TriageState.FIXED, "")
-    assert store.revision(campaign.id) != revision
-    (stored,) = store.plain_episodes(campaign.number)
-    assert store.triages(campaign.number) == {stored.number: TriageState.FIXED}
-
-
-def test_only_a_contact_of_the_project_has_a_triage(store, ledger, episode):
-    campaign = ledger.create(SPEC, project="maps")
-    number = campaign.runs[0].number
-    ledger.start_run(number)
-    ledger.add_episodes([(number, episode(0)), (number, episode(1, Outcome.FAILURE))])
-    for failure, project in (("low-risk-sac-3-search-0", "maps"), ("low-risk-sac-3-search-1", "rivals"), ("x", "maps")):
-        with pytest.raises(NotFoundError):
-            ledger.triage(campaign.id, failure, TriageState.NEW, "", project)
-        with pytest.raises(NotFoundError):
-            store.triage(campaign.id, failure, project)
-    assert store.triages(campaign.number) == {}
 
 
 def test_a_triage_outlives_that_its_run_reports_the_episode_again(store, ledger, episode):

@@ -1,16 +1,20 @@
-import json
-import math
+"""How long a campaign takes until it ends, told by what it has done."""
+
+import time
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from risk_sac.failures.question import TwinPlay, twin_bytes
-from risk_sac.records import wire
+from risk_sac.config import CampaignSpec
+from risk_sac.records import State
 from risk_sac.run_folder.series import write_series
 from service.errors import StorageError
-from service.views.pictures import twin_body
+from service.views.logs import MOST_BYTES, log_tail
 from service.views.series import load_series
-from tests.builders import collision, judgement
+from service.views.time_left import eta_s, retry_after_s
+from tests.begun import BEGUN
 from tests.contract.recorded_campaigns import series_arrays
 
 
@@ -24,30 +28,6 @@ def test_a_series_is_plain_and_null_where_an_actor_is_absent(tmp_path):
     assert series.signal == ["none", "red", "green"]
     assert series.robustness == [[1.0], [None], [-1.0]]
     assert len(series.actions[0]) == 4
-
-
-def test_a_series_without_the_release_is_a_storage_error(tmp_path):
-    write_series(tmp_path / "a.npz", {name: each for name, each in series_arrays().items() if name != "released_s"})
-    with pytest.raises(StorageError, match=r"'a.npz' is damaged: .*released_s"):
-        load_series(tmp_path / "a.npz", None)
-
-
-@pytest.mark.parametrize(
-    "link",
-    [
-        np.array([[ord("G"), 0], [ord("g"), 0], [ord("r"), 0]], dtype=np.uint8),
-        np.array([[ord("G"), np.nan], [ord("g"), np.nan], [ord("r"), 0]]),
-        np.array([["G", ""], ["g", ""], ["r", ""]]),
-    ],
-)
-def test_a_series_says_when_the_release_was_and_which_signal_lies_ahead(tmp_path, link):
-    rows = np.array([[0.1, np.nan], [0.2, 0.0], [0.3, 0.0]])
-    written = series_arrays() | {"released_s": np.array(1.5), "lane_offset_m": rows, "link": link}
-    write_series(tmp_path / "a.npz", written)
-    series = load_series(tmp_path / "a.npz", None)
-    assert series.released_s == 1.5
-    assert series.lane_offset_m == [[0.1, None], [0.2, 0.0], [0.3, 0.0]]
-    assert series.link == [["G", None], ["g", None], ["r", None]]
 
 
 def test_a_lost_or_damaged_series_is_a_storage_error_not_a_crash(tmp_path):
@@ -90,19 +70,113 @@ def test_a_series_that_is_not_the_one_that_was_written_is_never_shown(tmp_path):
         load_series(path, sha256)
 
 
-def test_a_twin_is_told_with_its_series_and_its_contact_and_null_where_a_number_is_not_finite():
-    speeds = {"ego_speed_mps": 12.3, "relative_speed_mps": 1.34}
-    hit = collision(other_id="lead", **speeds, early_min_ttc_s=math.inf, judgement=judgement())
-    body = json.loads(wire(twin_body("idle", twin_bytes(TwinPlay.of(None, hit, [hit]), series_arrays()))))
-    assert (body["twin"], body["outcome"]) == ("idle", "touches lead at a closing speed of 1.3 m/s")
-    assert body["collision"]["early_min_ttc_s"] is None
-    assert body["collision"]["judgement"]["signature"] == hit.judgement.signature
-    assert body["series"]["x_m"] == [[0.0, 1.0], [2.0, None], [4.0, 5.0]]
-    assert body["series"]["robustness"] == [[1.0], [None], [-1.0]]
+@pytest.fixture
+def log(tmp_path):
+    return tmp_path / "worker.log"
 
 
-def test_what_is_not_told_of_a_series_is_left_out():
-    series = series_arrays() | {"least_ttc_s": series_arrays()["soft_min"]}
-    body = twin_body("careful", twin_bytes(TwinPlay.of(None, collision(), []), series))
-    assert (body.outcome, body.collision) == ("no contact", None)
-    assert "least_ttc_s" not in body.series.model_dump()
+def test_folders_of_the_server_are_left_out(log):
+    log.write_text(f'File "{log.parent}/a.json" of {log.parent}\n  File "/opt/venv/lib/torch/nn.py", line 3\n')
+    assert log_tail(log, 9) == f'File "a.json" of {log.parent.name}\n  File "nn.py", line 3\n'
+
+
+def test_of_a_long_log_only_the_end_is_read_in_whole_lines(log):
+    line = "/srv/secret/name " + "x" * 982
+    log.write_text("\n".join([line] * 2000) + "\nlast\n")
+    told = log_tail(log, 1000).splitlines()
+    assert told[-1] == "last"
+    assert set(told[:-1]) == {"name " + "x" * 982}
+    assert MOST_BYTES - 2 * len(line) < (len(told) - 1) * (len(line) + 1) < MOST_BYTES
+
+
+def test_a_line_that_is_longer_than_what_is_read_is_left_out_since_it_may_begin_within_a_path(log):
+    log.write_text("/srv" + "/secret" * MOST_BYTES)
+    assert log_tail(log, 9) == ""
+
+
+def test_hostile_bytes_are_replaced_and_lines_end_as_they_do_everywhere(log):
+    log.write_bytes(b"\xff\xfe <script>\r\n10 %\r20 %\rdone\n\x1b[2J\x1b]0;title\x07 \x00\xe2\x80\xae\xc2\x9b\ttab\n")
+    assert log_tail(log, 9) == "�� <script>\n10 %\n20 %\ndone\n�[2J�]0;title� ���\ttab\n"
+
+
+@pytest.mark.parametrize("unit", ["-/", " /a/b/c", "/a/b/c/d/e-/-", "-" * 50 + "/", "\x1b/", "é/"])
+def test_no_log_takes_long(log, unit):
+    log.write_text("\n" + unit * MOST_BYTES)
+    log.write_bytes(log.read_bytes()[: MOST_BYTES - 1])
+    began = time.thread_time()
+    log_tail(log, 1000)
+    assert time.thread_time() - began < 3
+
+
+def test_a_log_that_cannot_be_read_says_why_and_not_where(log):
+    log.mkdir()
+    with pytest.raises(StorageError, match="Is a directory") as refused:
+        log_tail(log, 9)
+    assert str(log.parent) not in str(refused.value)
+
+
+SPEC = CampaignSpec(families=("low",), methods=("random",))
+RUN = BEGUN.model_copy(update={"method": "random"})
+
+
+def changed(run, **fields):
+    return run.model_copy(update=fields)
+
+
+def after_start(done, worked_s, start_s=5.0):
+    """A run of `random` that has played so many episodes after its first one."""
+    pace_s = worked_s / done if done else None
+    return changed(RUN, episodes_done=done + 1, pace_s=pace_s, busy_s=start_s + worked_s)
+
+
+@pytest.mark.parametrize(
+    ("done", "workers", "wanted"),
+    [
+        ([(19, 38.0)], 2, 160.0),  # 80 left at 2 s
+        ([(19, 38.0), (59, 59.0)], 2, 160.0),  # the slower of two at once
+        ([(19, 38.0), (59, 59.0)], 1, 200.0),  # one after the other
+    ],
+)
+def test_eta_is_work_left_at_each_runs_own_pace(done, workers, wanted):
+    assert eta_s([after_start(*each) for each in done], SPEC, workers) == pytest.approx(wanted)
+
+
+@given(st.lists(st.tuples(st.integers(1, 99), st.floats(0.1, 100)), min_size=1, max_size=6), st.integers(1, 8))
+def test_more_workers_never_take_longer(done, workers):
+    runs = [after_start(*each) for each in done]
+    assert 0 <= eta_s(runs, SPEC, workers + 1) <= eta_s(runs, SPEC, workers)
+
+
+# Recorded runs in `low` or dense: episodes; processor time until the first, a tenth of them and the end, s.
+RECORDED = {
+    "risk-sac in dense": (120, 4.3, 5.26, 18.3),
+    "random": (100, 30.9, 31.5, 37.0),  # compiles first
+    "archive": (100, 3.1, 3.49, 6.9),
+    "bo-only": (100, 3.0, 3.61, 10.8),
+    "no-adversary": (100, 2.9, 3.34, 6.9),
+    "risk-sac": (200, 4.5, 5.16, 67.4),
+    "risk-sac-diverse": (250, 4.4, 5.28, 14.3),
+    "sac-lag": (100, 4.4, 4.78, 16.4),
+    "ddpg-lag": (170, 4.4, 5.03, 49.4),
+}
+
+
+@pytest.mark.parametrize("name", RECORDED)
+def test_after_a_tenth_of_the_episodes_the_estimate_is_right_within_a_factor_of_two(name):
+    total, first_s, tenth_s, end_s = RECORDED[name]
+    method, _, family = name.partition(" in ")
+    spec = CampaignSpec.model_validate({"families": ["low"], "methods": [method], "budget": {"episodes": total}})
+    run = changed(RUN, method=method, episodes_total=total, episodes_done=total // 10)
+    pace_s = (tenth_s - first_s) / (total // 10 - 1)
+    run = changed(run, pace_s=pace_s, busy_s=tenth_s, family=family or "low")
+    assert 0.5 <= eta_s([run], spec, workers=1) / (end_s - tenth_s) <= 2
+
+
+@pytest.mark.parametrize(
+    ("done", "busy_s", "wanted"),
+    [(0, 0.0, 1), (49, 1.0, 1), (49, 98.0, 5), (49, 100.0, 6), (49, 9_800.0, 30)],  # a little longer than it took
+)
+def test_a_look_pays_after_a_twentieth_of_the_time_left(ledger, done, busy_s, wanted):
+    campaign = ledger.create(SPEC)
+    runs = (after_start(done, busy_s),)
+    assert retry_after_s(changed(campaign, state=State.RUNNING, runs=runs), workers=1) == wanted

@@ -1,60 +1,30 @@
+"""Which scene parameters set failing episodes apart, and which cells of the ODD were played."""
+
+import itertools
+import json
+import random
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic_core import from_json
+from scipy.stats import mannwhitneyu
 
 from risk_sac.config import CampaignSpec
-from risk_sac.metrics import wilson_interval
-from risk_sac.records import RequirementCounts, State
+from risk_sac.metrics import MetricsAccumulator
+from risk_sac.records import Grade, Outcome, Repetition, Severity, State, stored, wire
+from service.store.stored import PlainEpisode
+from service.views.curves import curves, spread
+from service.views.failure_table import failure_table
 from service.views.progress import progress
+from service.views.scenes import scene_effects
 from service.views.totals import results
+from tests.begun import BEGUN as RUN
+from tests.builders import LOW_SCENE, collision, episode_record, judgement, violation
 
 
 def changed(record, **fields):
     return record.model_copy(update=fields)
-
-
-def test_totals_are_per_family_and_method_over_the_seeds(ledger, metrics):
-    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random"), seeds=(0, 1)))
-    sac = [metrics.model_copy(update=each) for each in ({"ecr": 0.25}, {"ecr": 0.75, "failures": 3, "dispersion": 0.5})]
-    runs = tuple(
-        changed(run, metrics=sac[run.seed] if run.method == "sac" else None, state=State.RUNNING)
-        for run in campaign.runs
-    )
-    found = results(changed(campaign, runs=runs))
-    assert not found.complete
-    assert [run.metrics is not None for run in found.runs] == [True, False, True, False]
-    (total,) = found.totals
-    assert (total.method, total.runs, total.episodes, total.failures) == ("sac", 2, 8, 4)
-    assert (total.ecr, total.dispersion, total.steps_per_distinct_failure) == (0.5, 0.5, 400.0)
-    assert total.ecr_low <= 0.5 <= total.ecr_high
-
-
-def test_totals_have_the_funnel_and_its_histograms(ledger, metrics):
-    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0, 1)))
-    found = {
-        "raw_collisions": 5,
-        "collisions": 2,
-        "failures": 3,
-        "distinct_failures": 2,
-        "preventable": 2,
-        "distinct_preventable": 1,
-        "pcr": 0.5,
-        "unresponsive": 1,
-        "requirements": {"never_fast": RequirementCounts(counts="failure", violated=2, valid=1)},
-        "signatures": {"pedestrian": 2, "cut-in, straight": 1},
-        "conflicts_by_second": (1, 1, 1, 0),
-        "contacts_by_second": (0, 0, 1, 2),
-    }
-    second = metrics.model_copy(update=found)
-    first = metrics.model_copy(update={"requirements": second.requirements})
-    runs = tuple(changed(run, metrics=(first, second)[run.seed]) for run in campaign.runs)
-    (total,) = results(changed(campaign, runs=runs)).totals
-    assert (total.raw_collisions, total.failures, total.distinct_failures) == (7, 4, 3)
-    assert (total.preventable, total.distinct_preventable, total.artefacts) == (3, 2, 2)
-    assert (total.pcr, total.pcr_low, total.pcr_high) == (0.375, *wilson_interval(3, 8))
-    assert (total.collisions, total.unresponsive, total.unresponsive_share) == (3, 1, 1 / 3)
-    pooled = total.requirements["never_fast"]
-    assert (pooled.violated, pooled.valid, pooled.rate) == (4, 2, 2 / 8)
-    assert total.signatures == {"cut-in, straight": 2, "pedestrian": 2}
-    assert (total.conflicts_by_second, total.contacts_by_second) == ([1, 1, 2, 0], [0, 0, 1, 3])
 
 
 def test_what_two_methods_found_alike_counts_once_in_the_campaign_and_once_for_each(ledger, metrics):
@@ -70,14 +40,166 @@ def test_what_two_methods_found_alike_counts_once_in_the_campaign_and_once_for_e
     assert results(searched).headline == progress(searched, 1).headline == 3
 
 
-def test_a_campaign_without_a_replay_has_no_headline_yet(ledger, metrics):
-    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0,)))
-    searched = changed(campaign, runs=(changed(campaign.runs[0], metrics=metrics),))
-    assert results(searched).headline is results(searched).totals[0].headline is progress(searched, 1).headline is None
-
-
 def test_one_run_keeps_its_wilson_interval(ledger, metrics):
     campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0,)))
     (total,) = results(changed(campaign, runs=(changed(campaign.runs[0], metrics=metrics),))).totals
     assert (total.ecr_low, total.ecr_high) == pytest.approx((0.0456, 0.6994), abs=1e-4)  # of 1 in 4
     assert (total.pcr_low, total.pcr_high) == (total.ecr_low, total.ecr_high)  # the same one
+
+
+SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
+
+
+def plain(run, record):
+    return PlainEpisode(1, run.number, record.phase, record.index, record.outcome, from_json(stored(record)))
+
+
+def drawn(count):
+    """Records of a search: half of them contacts of several kinds, some with or after a violation without contact."""
+    dice = random.Random(5)
+    for index in range(count):
+        outcome = dice.choice([Outcome.SAFE, Outcome.REJECTED, Outcome.FAILURE, Outcome.FAILURE, Outcome.DEGENERATE])
+        grade = dice.choice(list(Grade)) if outcome is Outcome.FAILURE else None
+        hit = collision(
+            ego_speed_mps=dice.choice([5.0, 15.0]), judgement=judgement(grade, signature=dice.choice("abcdefgh"))
+        )
+        touched = outcome in (Outcome.FAILURE, Outcome.DEGENERATE)
+        if outcome is Outcome.DEGENERATE:
+            hit = hit.model_copy(update={"verdicts": {"ego_moving": False}})
+        more = {"mean_cost": dice.random(), "dual_variable": dice.random()}
+        if outcome is Outcome.FAILURE and dice.random() < 0.4:
+            more["violations"] = (violation(grade=dice.choice(list(Grade)), signature=dice.choice("abcd")),)
+            touched = dice.random() < 0.5
+        yield episode_record(index, outcome, collision=hit if touched else None, **more)
+
+
+def test_curves_are_what_the_metrics_of_the_run_were_at_each_point(ledger):
+    campaign = ledger.create(SPEC)
+    records = list(drawn(250))
+    told, accumulator = [], MetricsAccumulator(horizon_steps=200)
+    for record in records:
+        told.append(accumulator.add(record))
+    found, empty = curves(campaign, [plain(campaign.runs[0], each) for each in records], 40).runs
+    assert len(found.episodes) == 40
+    assert found.episodes[-1] == 250
+    at = [told[count - 1] for count in found.episodes]
+    for name in ("window_ecr", "window_pcr", "preventable", "distinct_preventable", "dual_variable"):
+        assert getattr(found, name) == pytest.approx([getattr(each, name) for each in at]), name
+    assert found.distinct == [each.distinct_failures for each in at]
+    assert found.distinct[-1] > found.distinct_preventable[-1] > 3
+    assert (found.run_id, found.family, found.method, found.seed) == ("low-random-3", "low", "random", 3)
+    assert [value for _, value in empty if isinstance(value, list)] == [[]] * 8
+
+
+@given(count=st.integers(1, 3000), points=st.integers(1, 1000))
+def test_points_are_evenly_spread_and_the_newest_is_one(count, points):
+    at = spread(count, points).tolist()
+    assert len(at) == min(count, points)
+    assert at[-1] == count
+    gaps = [later - earlier for earlier, later in zip([0, *at], at, strict=False)]
+    assert min(gaps) >= 1
+    assert max(gaps) - min(gaps) <= 1
+
+
+FAILURE = Outcome.FAILURE
+
+
+def plain_failure(run, index, hit, outcome=FAILURE, phase="search", **changes):
+    record = episode_record(index, outcome, phase=phase, collision=hit, **changes)
+    return PlainEpisode(1, run.number, phase, index, outcome, from_json(stored(record)))
+
+
+def told(table):
+    return json.loads(wire(table))
+
+
+def test_the_headline_has_the_first_of_a_kind_over_all_runs_that_is_not_minor_and_repeats(ledger):
+    campaign = ledger.create(SPEC)
+    first, second = (
+        run.model_copy(update={"repetitions": {index: Repetition(times=2, same=2) for index in (0, 1, 3)}})
+        for run in campaign.runs
+    )
+    searched = campaign.model_copy(update={"runs": (first, second)})
+    minor, grave = (collision(judgement=judgement(severity=each)) for each in (Severity.MINOR, Severity.SEVERE))
+    other = collision(judgement=judgement(signature="leader"))
+    hits = [(first, 0, minor), (first, 1, grave), (first, 2, other), (second, 0, grave), (second, 3, other)]
+    found = told(failure_table(searched, [plain_failure(*each) for each in hits], {}))
+    assert list(zip(found["severity"], found["headline"], strict=True)) == [
+        ("minor", False),
+        ("severe", True),
+        ("moderate", False),  # not replayed
+        ("severe", False),  # as in the other run
+        ("moderate", True),
+    ]
+
+
+def test_what_two_runs_found_alike_is_one_failure_of_the_campaign(ledger):
+    campaign = ledger.create(SPEC)
+    first, second = campaign.runs
+    slow, other = collision(ego_speed_mps=2.0), collision(judgement=judgement(signature="leader"))
+    hits = [(first, 0, collision()), (first, 1, slow), (second, 0, collision()), (second, 1, other)]
+    assert failure_table(campaign, [plain_failure(*each) for each in hits], {}).niche == [0, 1, 0, 2]
+
+
+SCENES_SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3,))
+F, S, R = Outcome.FAILURE, Outcome.SAFE, Outcome.REJECTED
+GAPS = ((F, 12.0), (F, 14.0), (S, 13.0), (S, 30.0), (S, 40.0), (R, 11.0))
+
+
+@pytest.fixture
+def found(ledger):
+    """Makes the answer about low of episodes with these outcomes and gaps to the leader."""
+
+    def effects(gaps, **others):
+        campaign = ledger.create(SCENES_SPEC)
+        episodes = [
+            PlainEpisode(
+                i, campaign.runs[0].number, "search", i, each, {"scene": LOW_SCENE | {"lead_gap_m": gap} | others}
+            )
+            for i, (each, gap) in enumerate(gaps)
+        ]
+        families = scene_effects(campaign, episodes).families
+        return families[0] if families else None
+
+    return effects
+
+
+def by_name(family):
+    return {parameter.name: parameter for parameter in family.parameters}
+
+
+def test_an_effect_is_how_often_a_failing_scene_has_the_larger_value(found):
+    gap = by_name(found(GAPS))["lead_gap_m"]
+    assert gap.effect == pytest.approx(1 / 6)  # 14 > 13, of 2 x 3 pairs
+    wanted = mannwhitneyu([12, 14], [13, 30, 40], method="asymptotic").pvalue
+    assert gap.p == pytest.approx(min(1.0, 9 * wanted))  # of nine parameters
+
+
+def test_failing_and_safe_scenes_exchanged_mirror_the_effect(found):
+    exchanged = [({F: S, S: F}.get(each, each), gap) for each, gap in GAPS]
+    assert by_name(found(exchanged))["lead_gap_m"].effect == pytest.approx(5 / 6)
+
+
+def test_each_two_parameters_have_their_cells_once(found):
+    family = found(GAPS)
+    pairs = {frozenset(pair.parameters): pair for pair in family.pairs}
+    assert pairs.keys() == {frozenset(pair) for pair in itertools.combinations(by_name(family), 2)}
+    pair = pairs[frozenset(("lead_gap_m", "friction"))]
+    for counts, of in ((pair.played, "played"), (pair.failed, "failed")):
+        for axis, name in enumerate(pair.parameters):
+            sums = [sum(row) for row in (counts if axis == 0 else zip(*counts, strict=True))]
+            assert sums == getattr(by_name(family)[name], of)
+
+
+def test_rates_are_those_of_the_methods_that_learn_where_there_are_any(ledger, metrics):
+    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac", "random")))
+    learning = changed(RUN, metrics=metrics.model_copy(update={"window_ecr": 0.4, "dual_variable": 0.5}))
+    control = changed(
+        RUN, method="random", metrics=metrics.model_copy(update={"window_ecr": 0.0, "dual_variable": 0.0})
+    )
+    for state in (State.RUNNING, State.SUCCEEDED):
+        runs = (changed(learning, state=state), control)
+        shown = progress(changed(campaign, state=State.RUNNING, runs=runs), workers=1)
+        assert (shown.window_ecr, shown.dual_variable) == (0.4, 0.5)
+    alone = progress(changed(campaign, state=State.RUNNING, runs=(control,)), workers=1)
+    assert (alone.window_ecr, alone.dual_variable) == (0.0, 0.0)
