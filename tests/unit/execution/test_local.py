@@ -183,8 +183,8 @@ def test_numbers_that_are_not_finite_survive_as_strict_json(episode):
     json.loads(line, parse_constant=refuse)
     record = decode(line).record
     assert record.min_ttc_s == math.inf
-    assert math.isnan(record.collision.min_ttc_s)
-    assert record.collision.min_robustness == -math.inf
+    assert math.isnan(record.collision.early_min_ttc_s)
+    assert record.collision.early_min_robustness == -math.inf
 
 
 @pytest.mark.parametrize(

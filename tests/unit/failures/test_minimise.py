@@ -106,7 +106,7 @@ def test_of_other_results_or_damaged_nothing_is_told(tmp_path):
 
 
 def test_a_twin_reads_back_with_its_series_and_what_is_not_finite():
-    hit = collision(min_ttc_s=math.inf)
+    hit = collision(early_min_ttc_s=math.inf)
     play = TwinPlay.of(None, hit, [hit])
     read, series = read_twin(twin_bytes(play, synthetic_series()))
     assert read == play

@@ -161,3 +161,12 @@ def test_a_family_whose_place_on_a_map_is_gone_is_named_and_the_others_are_told(
     for text in both(compare(gone, [], "")):
         assert "junction_0123456789ab: family: there is no" in text
         assert "scenery.speed_limit_mps" in text
+
+
+def test_an_ego_is_told_with_its_driver_sight_and_defects(spec):
+    ego = {"driver": "idm", "defects": ("latency", "speeds"), "sensor": {"range_m": 30, "field_of_view_rad": 3.1416}}
+    told = compare(CampaignSpec.model_validate(spec.model_dump() | {"ego": ego}), [], "")
+    _, text = both(told, regression=Regression(ego=EgoConfig(profile="perfect"), cases=()))
+    assert "registered driver idm, responds within 0.5 s, sees 30 m far over 180°" in text
+    assert "with the planted defects latency and speeds" in text
+    assert "decides every 0.1 s, sees everything" in text

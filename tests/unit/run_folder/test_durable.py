@@ -5,7 +5,6 @@ import math
 import os
 import stat
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,8 +14,7 @@ from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import Episode, EpisodeId, EpisodeRecord, stored, wire
 from risk_sac.run_folder.durable import replace_file, seal, unseal
-from risk_sac.run_folder.results import RESULTS, Results, read_results, records_to_json, write_results
-from risk_sac.run_folder.series import read_series, write_series
+from risk_sac.run_folder.results import RESULTS, Results, read_results, write_results
 from tests.builders import collision, episode_record, judgement
 
 
@@ -77,21 +75,11 @@ def test_damaged_results_are_named(folder):
             read_results(folder)
 
 
-@pytest.mark.parametrize("damage", [lambda content: content[:-9], lambda content: b"", lambda content: b"no archive"])
-def test_a_damaged_series_is_named(damage, tmp_path):
-    file = tmp_path / "000001.npz"
-    write_series(file, {"x_m": np.arange(100.0)})
-    np.testing.assert_array_equal(read_series(file)["x_m"], np.arange(100.0))
-    file.write_bytes(damage(file.read_bytes()))
-    with pytest.raises(DamagedError, match=r"000001\.npz is damaged"):
-        read_series(file)
-
-
-RECORD = episode_record(4, collision=collision(min_ttc_s=0.7), min_ttc_s=0.0)
+RECORD = episode_record(4, collision=collision(early_min_ttc_s=0.7), min_ttc_s=0.0)
 
 
 def test_the_minima_of_a_collision_have_names_of_their_own_wherever_it_is_written():
-    for text in (RECORD.model_dump_json(), records_to_json([RECORD])[1:-1], json.dumps(RECORD.model_dump())):
+    for text in (RECORD.model_dump_json(), stored(RECORD), json.dumps(RECORD.model_dump())):
         written = json.loads(text)
         assert written["min_ttc_s"] == 0.0
         assert written["collision"]["early_min_ttc_s"] == 0.7
@@ -113,7 +101,7 @@ def test_a_run_whose_own_id_names_a_phase_keeps_it():
 
 
 def test_a_number_that_is_not_finite_is_a_word_where_it_is_stored_and_null_where_it_is_answered():
-    hit = collision(min_ttc_s=math.inf, ego_speed_mps=math.nan, judgement=judgement(conflict_s=-math.inf))
+    hit = collision(early_min_ttc_s=math.inf, ego_speed_mps=math.nan, judgement=judgement(conflict_s=-math.inf))
     record = episode_record(3, collision=hit, min_ttc_s=math.inf)
     kept = json.loads(stored(record))
     assert (kept["min_ttc_s"], kept["collision"]["early_min_ttc_s"]) == ("Infinity", "Infinity")
@@ -124,6 +112,6 @@ def test_a_number_that_is_not_finite_is_a_word_where_it_is_stored_and_null_where
     assert (told["min_ttc_s"], told["collision"]["early_min_ttc_s"]) == (None, None)
     assert told["collision"]["ego_speed_mps"] is told["collision"]["judgement"]["conflict_s"] is None
     read = Episode.model_validate_json(wire(episode))
-    assert (read.min_ttc_s, read.collision.min_ttc_s) == (math.inf, math.inf)
+    assert (read.min_ttc_s, read.collision.early_min_ttc_s) == (math.inf, math.inf)
     assert math.isnan(read.collision.ego_speed_mps)
     assert wire(read) == wire(episode)

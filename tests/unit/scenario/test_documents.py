@@ -16,6 +16,9 @@ from risk_sac.scenario.maps import unpack
 from risk_sac.scenario.maps.documents import rewritten
 from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
 
+PBF = b"\0\0\0\x0d\n\tOSMHeader\x18\x7c" + bytes(90)
+
+
 NETS = sorted(Path(sumo_nets.__path__[0]).glob("*/*.net.xml"))
 PACKED = {
     "xml": NET.encode(),
@@ -97,3 +100,31 @@ def test_all_files_of_an_archive_count_together(tmp_path, monkeypatch):
     assert len(written(zipped(NET, ROUTES), tmp_path)) == 2
     with pytest.raises(MapError, match="what unpacks to more than"):
         written(zipped(NET, ROUTES, ADDITIONAL), tmp_path)
+
+
+@pytest.mark.parametrize("name", ["NULL", "NUL", "/dev/null", ""])
+def test_an_output_that_is_switched_off_is_left_out(name: str, tmp_path: Path) -> None:
+    off, kept = f'<param key="file" value="{name}"/>', '<param key="max-gap" value="3.0"/>'
+    light = f'<tlLogic id="east" type="actuated">{kept}{{off}}<phase duration="9" state="G"/></tlLogic></net>'
+    detector = f'<e1Detector id="d" lane="road_0" file="{name}"/><poly id="p" shape="0,0 1,1"{{imgFile}}/></additional>'
+    net, more = NET.replace("</net>", light), f"<additional>{detector}"
+    packed = zipped(net.replace("{off}", off), more.replace("{imgFile}", f' imgFile="{name}"'))
+    poly = '<additional><poly id="p" shape="0,0 1,1"/></additional>'
+    assert [listed(text) for text in written(packed, tmp_path)] == [listed(net.replace("{off}", "")), listed(poly)]
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (bz2.compress(NET.encode()), "the map, which is packed by bzip2; wanted XML.* convert it: bunzip2 "),
+        (lzma.compress(NET.encode()), "the map, which is packed by xz; wanted XML.* convert it: unxz "),
+        (PBF, "the map, which is OpenStreetMap's PBF; wanted XML.* convert it: osmium cat MAP.osm.pbf -o MAP.osm"),
+        (gzip.compress(PBF), "the map, which is OpenStreetMap's PBF"),
+        (b"\xff\xe0\x04o5m2" + bytes(90), "the map, which is OpenStreetMap's o5m"),
+    ],
+)
+def test_a_map_in_another_packing_is_told_the_command_that_converts_it(
+    content: bytes, says: str, tmp_path: Path
+) -> None:
+    with pytest.raises(MapError, match=says):
+        written(content, tmp_path)

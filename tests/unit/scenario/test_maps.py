@@ -31,6 +31,16 @@ from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace
 from risk_sac.sim.sumo import SumoSimulation
 from tests.maps import osm_town
 
+LANE = '<lane id="{id}_0" index="0" speed="13.89" length="{m}" shape="{line}"/>'
+
+
+ROAD = '<edge id="{id}" from="{a}" to="{b}">' + LANE + "</edge>"
+
+
+def road(id_: str, a: str, b: str, metres: float, line: str) -> str:
+    return ROAD.format(id=id_, a=a, b=b, m=metres, line=line)
+
+
 NETS = Path(sumo_nets.__path__[0])
 
 
@@ -334,3 +344,59 @@ def test_places_that_nobody_names_go_when_they_are_old(tmp_path, monkeypatch):
     os.utime(tmp_path / new, (0, 0))
     assert library.keep(shipped("mixed"), b"<net/>") == new  # wanted again
     assert library.prune(tmp_path, (), 3600.0, 0.0) == [named]
+
+
+def test_a_pattern_without_any_candidate_says_why() -> None:
+    found = survey(read_net(NETS / "low" / "low.net.xml"))
+    assert set(found.nowhere) == {"crossing", "junction"}
+    assert "has no road to a junction" in found.nowhere["junction"]
+
+
+def test_a_way_that_is_barely_too_short_contradicts_itself_nowhere(tmp_path: Path) -> None:
+    file = tmp_path / "map.net.xml"
+    for seconds, says in ((16.96, "after driving 16.9 s; wanted 17 s"), (16.999, "after driving 16.9 s; wanted 17 s")):
+        metres = 2 * seconds * 13.89
+        file.write_text(f"<net>{road('r', 'a', 'b', metres, f'0,0 {metres},0')}</net>")
+        (misfit,) = survey(read_net(file), ("car_following",)).misfits
+        assert misfit.why.endswith(says)
+
+
+@given(wanted=st.floats(0.1, 1e4), share=st.floats(0.0, 1.0, exclude_max=True))
+def test_what_is_lacking_is_less_than_what_was_wanted_as_it_is_written(wanted: float, share: float) -> None:
+    if wanted * share < wanted - 1e-6:
+        got, above = lacking(wanted * share, "m", wanted).split(" m; wanted ")
+        assert float(got) < float(above.removesuffix(" m"))
+
+
+@pytest.mark.parametrize("place", ["from_south", "from_west"])
+@pytest.mark.parametrize(
+    ("lane", "share", "fits"),
+    [
+        ("{own}_1", 1.015, True),
+        ("{own}_1", 1.03, False),
+        ("{own}_1", 0.5, False),
+        ("{own}_2", 1.03, False),  # a neighbour
+        ("{own}_0", 2.0, True),  # a sidewalk
+        ("{on}_1", 2.0, False),
+        (":centre_{straight}_0", 1.06, False),
+        (":centre_{pocket}_0", 1.2, True),  # 0.8 m
+        (":centre_{pocket}_0", 1.3, False),
+    ],
+)
+def test_a_place_whose_lanes_are_driven_longer_or_shorter_than_drawn_is_refused(
+    tmp_path: Path, place: str, lane: str, share: float, fits: bool
+) -> None:
+    south = {"own": "from_south", "on": "to_north", "straight": "9", "pocket": "20"}
+    west = {"own": "from_west", "on": "to_east", "straight": "13", "pocket": "22"}
+    changed = re.escape(lane.format(**(south if place == "from_south" else west)))
+    content, count = re.subn(
+        rf'(<lane id="{changed}" [^>]*length=")([\d.]+)',
+        lambda found: f"{found[1]}{float(found[2]) * share:.2f}",
+        (NETS / "dense" / "dense.net.xml").read_text(),
+    )
+    assert count == 1
+    file = tmp_path / "map.net.xml"
+    file.write_text(content)
+    says = r"has the length .* and a shape of .*; wanted a difference of at most .* m \(2%, or 1 m\)"
+    with nullcontext() if fits else pytest.raises(MapError, match=says):
+        place_at(read_net(file), "junction", place)

@@ -134,7 +134,7 @@ any_failure = st.builds(
         (failure(after=2.1), True),
         (failure("cut-in"), True),
         (failure(None), True),
-        (failure(ego_zone="left", other_id="adv_1", min_robustness=0.0), False),
+        (failure(ego_zone="left", other_id="adv_1", early_min_robustness=0.0), False),
     ],
 )
 def test_signature_first_and_then_the_cell(second, distinct):

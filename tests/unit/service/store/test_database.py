@@ -7,35 +7,14 @@ import pytest
 from risk_sac.config import CampaignSpec
 from risk_sac.records import Outcome
 from service.errors import StorageError
-from service.host.data_folder import hold_data_folder
 from service.settings import ServiceSettings
 from service.store import database
 from service.store.__main__ import main
-from service.store.database import held, newest_step, present_step
 from service.store.reading import Store
 from service.store.writing import Ledger
 from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
-
-STEP_0007 = Path(__file__).with_name("step_0007.sql")
-
-
-def opened_from_step_0007(file):
-    """The store of a database that the version before wrote: two runs, the first of which ended with two contacts."""
-    old = sqlite3.connect(file)
-    old.executescript(STEP_0007.read_text(encoding="utf-8"))
-    old.close()
-    return Store(f"sqlite:///{file}")
-
-
-def test_the_migrations_lead_to_the_tables_of_a_new_database(tmp_path, store):
-    upgraded = opened_from_step_0007(tmp_path / "old.db")
-    for engine in (upgraded.engine, store.engine):
-        with engine.connect() as connection:
-            context = MigrationContext.configure(connection, opts={"compare_type": False})  # SQLite forgets them
-            assert compare_metadata(context, Base.metadata) == []
-    upgraded.close()
 
 
 def test_a_file_that_is_no_database_is_a_storage_error(tmp_path):
@@ -103,19 +82,6 @@ def settings(tmp_path, database_url, monkeypatch):
     monkeypatch.setenv("RISK_SAC_DATA_DIR", str(tmp_path / "data"))
     monkeypatch.setenv("RISK_SAC_DATABASE_URL", database_url)
     return ServiceSettings()
-
-
-def test_no_step_is_taken_beneath_a_server(settings, capsys):
-    store = Store(settings.url)
-    with hold_data_folder(settings.data_dir):
-        assert main(["back"]) == 1
-    assert "is in use by another process" in capsys.readouterr().err
-    if store.engine.dialect.name == "postgresql":
-        with held(store.engine):
-            assert main(["back"]) == 1
-        assert "is in use by another server" in capsys.readouterr().err
-    assert present_step(store.engine) == newest_step()
-    store.close()
 
 
 def test_a_copy_is_whole_though_the_server_writes(tmp_path, monkeypatch, capsys):

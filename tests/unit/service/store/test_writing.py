@@ -4,6 +4,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import Finished
 from risk_sac.records import Outcome, State, TriageState
 from service.errors import TransitionError
+from service.store.tables import IMPORTED
 from tests.begun import start
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
@@ -96,3 +97,12 @@ def test_a_triage_outlives_that_its_run_reports_the_episode_again(store, ledger,
     noted = ledger.triage(campaign.id, "low-risk-sac-3-search-0", TriageState.DISMISSED, "artefact")
     ledger.add_episodes([(number, episode(0, Outcome.DEGENERATE))])
     assert store.triage(campaign.id, "low-risk-sac-3-search-0") == noted
+
+
+def test_a_run_at_import_never_waits_for_a_worker(store, ledger):
+    at_import, posted = ledger.create(SPEC, key=f"{IMPORTED}1"), ledger.create(SPEC, key="imported")
+    for run in (*at_import.runs, *posted.runs):
+        ledger.start_run(run.number)
+    assert ledger.resume() == len(posted.runs)
+    assert store.campaign(at_import.id).state is State.RUNNING
+    assert store.begun_imports() == [at_import.id]
