@@ -130,7 +130,7 @@ class SceneOptimizerConfig(Settings):
     refit_every: Annotated[int, Field(ge=1, le=1000)] = 10
     """Fewest observations between two fits of the kernel's hyper-parameters; a fifth of those kept if that is more."""
     candidates: Annotated[int, Field(ge=16, le=8192)] = 128
-    """Sobol points at which the acquisition is scored before a step along the gradient from the best."""
+    """Sobol points at which the acquisition is scored before gradient ascent from the best."""
     exploration: Fraction = 0.1
     """Share of scenes drawn at random, so that no region is given up."""
     running_maximum_rate: Annotated[float, Field(ge=1e-3, le=1)] = 0.1

@@ -11,7 +11,6 @@ import warnings
 
 import torch
 from torch import Tensor
-from torch.nn.functional import normalize
 
 with warnings.catch_warnings():
     # linear_operator compiles its helpers with torch.jit while it is imported.
@@ -19,7 +18,7 @@ with warnings.catch_warnings():
     from botorch.acquisition import LogExpectedImprovement, PosteriorMean
     from botorch.fit import fit_gpytorch_mll
     from botorch.models import SingleTaskGP
-    from botorch.optim import optimize_acqf_discrete
+    from botorch.optim import optimize_acqf, optimize_acqf_discrete
     from botorch.utils.sampling import manual_seed
     from gpytorch.mlls import ExactMarginalLogLikelihood
     from gpytorch.settings import fast_pred_var, skip_posterior_variances
@@ -28,7 +27,7 @@ Hyperparameters = dict[str, Tensor]
 """Raw kernel, mean and noise parameters by their name in the model."""
 
 FIT_ITERATIONS = 20  # a warm start continues from here at the next fit
-STEP_LENGTHS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # the cube's diagonal is √d
+ASCENT_ITERATIONS = 3  # within about half a nat of the maximum, which takes five times as long
 
 
 def condition(points: Tensor, values: Tensor, hyperparameters: Hyperparameters | None) -> SingleTaskGP:
@@ -62,25 +61,25 @@ def fit(points: Tensor, values: Tensor, start: Hyperparameters | None, seed: int
 
 
 def maximise_expected_improvement(model: SingleTaskGP, choices: Tensor) -> Tensor:
-    """Returns the point of largest LogEI, `d`, among the choices, `k x d`, and on a line from the best of them.
+    """Returns the point of largest LogEI, `d`.
 
-    Choice: the line follows the gradient and is clipped to the cube. Its steps are evaluated in one batch, which costs
-    a third of three iterations of L-BFGS-B and gains most of what they do.
+    A short gradient ascent starts from the best of the choices, `k x d`.
 
     Choice: the incumbent is the best posterior mean at the observed points. It is not fooled by one lucky noisy value
     as the best observation would be, and costs one pass, where (q)LogNEI integrates over the incumbent by sampling.
     """
-    point: Tensor
+    model.requires_grad_(False)
+    bounds = torch.tensor([[0.0], [1.0]], dtype=choices.dtype).expand(2, choices.shape[1])
     with skip_posterior_variances():
         incumbent = model.posterior(model.train_inputs[0]).mean.max()
     acquisition = LogExpectedImprovement(model, incumbent)
     with fast_pred_var():
-        best, _ = optimize_acqf_discrete(acquisition, q=1, choices=choices)
-        best.requires_grad_()
-        (gradient,) = torch.autograd.grad(acquisition(best), best)
-        lengths = torch.tensor(STEP_LENGTHS, dtype=best.dtype).unsqueeze(-1)
-        line = (best.detach() + lengths * normalize(gradient)).clamp(0.0, 1.0)  # steps x d
-        point, _ = optimize_acqf_discrete(acquisition, q=1, choices=line)
+        start, _ = optimize_acqf_discrete(acquisition, q=1, choices=choices)
+        ascent = {"maxiter": ASCENT_ITERATIONS}
+        point: Tensor
+        point, _ = optimize_acqf(
+            acquisition, bounds, q=1, num_restarts=1, batch_initial_conditions=start[None], options=ascent
+        )
     return point[0]
 
 

@@ -16,7 +16,9 @@ from risk_sac.types import Floats
 
 DIMENSION = 12
 EPISODES = 300
-LIMIT_MS = 25.0  # on average, at the default window
+# On average, at the default window. Two thirds are the gradient ascent of the expected improvement; a single step
+# along the gradient takes half the time, and searches with it found 301 valid failures instead of 342 (8 seeds).
+LIMIT_MS = 30.0
 
 
 @pytest.fixture(autouse=True)

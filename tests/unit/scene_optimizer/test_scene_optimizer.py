@@ -232,27 +232,3 @@ def test_running_maximum_rises_towards_the_largest_return_and_never_past_it(valu
         maximum.score(value)
         assert before <= maximum.smoothed <= maximum.largest == max(values[:count])
         before = maximum.smoothed
-
-
-@pytest.mark.parametrize("seed", [3, 5, 7])  # of these, the choice of largest mean is another one
-def test_the_proposal_improves_on_the_choice_of_the_equations(seed):
-    """EI(x) = s(x) (φ(z) + z Φ(z)), z = (m(x) - incumbent) / s(x): Jones et al. 1998, Eq. 15."""
-    points, values = observations(40, 5, seed)
-    model = surrogate.condition(points, values, None)
-    incumbent = model.posterior(points).mean.max().item()
-
-    def means_and_improvements(x: torch.Tensor) -> tuple[Floats, Floats]:
-        posterior = model.posterior(x)
-        mean, deviation = (moment.detach().numpy()[:, 0] for moment in (posterior.mean, posterior.variance.sqrt()))
-        z = (mean - incumbent) / deviation
-        return mean, deviation * (scipy.stats.norm.pdf(z) + z * scipy.stats.norm.cdf(z))
-
-    choices = torch.from_numpy(np.random.default_rng(9).random((50, 5)))
-    means, improvements = means_and_improvements(choices)
-    assert improvements.argmax() != means.argmax()
-    assert torch.equal(surrogate.best_by_mean(model, choices), choices[means.argmax()])
-    proposed = surrogate.maximise_expected_improvement(model, choices)
-    assert 0 <= proposed.min() <= proposed.max() <= 1
-    assert means_and_improvements(proposed[None])[1].item() > 1.05 * improvements.max()
-    best = choices[improvements.argmax()]
-    assert torch.equal(surrogate.maximise_expected_improvement(model, best[None]), proposed)
