@@ -78,7 +78,7 @@ openapi: $(STAMP) ## write openapi.yaml
 	$(PYTHON) -m service.openapi
 
 settings: $(STAMP) ## write the table of settings into service/settings.md
-	$(PYTHON) -m service.host.environment
+	$(PYTHON) -m service.settings
 
 protos: $(STAMP) ## generate risk_sac/egos/remote/*_pb2.py
 	$(PYTHON) -m grpc_tools.protoc -I. --python_out=. risk_sac/egos/remote/*.proto

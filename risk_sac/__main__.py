@@ -3,7 +3,7 @@
 from typing import NoReturn
 
 from risk_sac.cli import main
-from risk_sac.process_state import leave
+from risk_sac.host.process_state import leave
 
 
 def command() -> NoReturn:

@@ -26,7 +26,7 @@ class RiskSacError(Exception):
 class ConfigError(RiskSacError, ValueError):
     """A setting is wrong.
 
-    A `ValueError`, so that pydantic validators may raise it; `risk_sac.config.invalid` completes its path.
+    A `ValueError`, so that pydantic validators may raise it; `risk_sac.config.base` completes its path.
     """
 
     def __init__(self, field: str, got: str, expected: str = "", remedy: str = "") -> None:

@@ -1,6 +1,6 @@
 """Environment that Gymnasium makes by name: one family, any ego and ODD, with pictures.
 
-gymnasium.make("risk_sac.env:RiskSAC/Low-v0", ego="careful", odd={...}, render_mode="rgb_array")
+gymnasium.make("risk_sac.env.env:RiskSAC/Low-v0", ego="careful", odd={...}, render_mode="rgb_array")
 """
 
 from collections.abc import Mapping
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from risk_sac.config import EgoConfig, FamilyName, Odd
 from risk_sac.config.spec_file import read_ego, read_spec
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError, SimulationError
 from risk_sac.failures.canvas import EGO, OTHER, STRIKER, Canvas
 from risk_sac.failures.net import shipped_net, shipped_surfaces
-from risk_sac.problem import Problem
-from risk_sac.types import STEP_S, Kind, Role
+from risk_sac.world.types import STEP_S, Kind, Role
 
 RGB = "rgb_array"
 

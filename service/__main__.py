@@ -8,12 +8,12 @@ import sys
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.executor import executor_named
-from service.api.guards.connections import Server
+from service.api.connections import Server
 from service.app import create_app
-from service.host.environment import MISUSED, read_settings
 from service.host.logs import set_up_logs
 from service.keys.ring import check_exposure
 from service.runs.manager import worker_program
+from service.settings import MISUSED, read_settings
 
 ANSWERS_END_S = 2  # for answers and streams at work when the server stops; workers are stopped after that
 SWITCH_S = 0.001  # for which a busy thread may hold up the event loop, and with it all answers; 5 ms by default

@@ -12,12 +12,12 @@ from prometheus_client import Histogram
 from risk_sac import __version__
 from risk_sac.execution.executor import Executor, executor_named
 from risk_sac.scenario.library import VARIABLE
-from service.api.answers.pages import Cursors
-from service.api.answers.problems import add_problem_handlers
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
 from service.api.metrics import registry, request_latencies
 from service.api.middleware import add_middleware
+from service.api.pages import Cursors
+from service.api.problems import add_problem_handlers
 from service.api.routes import (
     campaigns,
     catalogue,
@@ -28,7 +28,6 @@ from service.api.routes import (
     exports,
     networks,
     operations,
-    pictures,
     regressions,
     reports,
 )
@@ -42,13 +41,12 @@ from service.networks.surveys import Surveys
 from service.runs.manager import Manager, worker_program
 from service.runs.regressions import Regressions
 from service.settings import ServiceSettings
-from service.store.database import READERS, held
+from service.store.database import READERS, cursor_secret, held
 from service.store.reading import Store
-from service.store.server import cursor_secret
 from service.views.on_demand import KEPT, Helper
-from service.views.pictures import pictures as pictures_of_failures
 from service.views.reports import Reports
-from service.views.studies import Studies, Tables
+from service.views.series import pictures as pictures_of_failures
+from service.views.studies import EpisodeTables, Studies
 from service.views.whole import VIEWS_KEPT, Priors, Views
 
 
@@ -82,7 +80,7 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
         docs_url=None,
         redoc_url=None,
     )
-    shown = (episodes, pictures, exports, events, reports, evidence)
+    shown = (episodes, exports, events, reports, evidence)
     for routes in (campaigns, *shown, regressions, networks, catalogue, operations, docs):
         app.include_router(routes.router)
     app.router.routes += docs.page_routes()
@@ -129,7 +127,7 @@ def opened(
                 reports=reports,
                 pictures=pictures_of_failures(settings),
                 studies=Studies(settings, helper),
-                tables=Tables(helper),
+                tables=EpisodeTables(helper),
                 views=views,
                 priors=Priors(store, priors),
                 regressions=regression_queue,

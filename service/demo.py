@@ -13,16 +13,16 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from risk_sac.cli.campaigns.gate import Bounds
+from risk_sac.cli.campaigns.gate import GateBounds
 from risk_sac.cli.campaigns.output import driven_by_table, results_table
 from risk_sac.cli.campaigns.watch import shown
 from risk_sac.cli.console import headline
 from risk_sac.client import Campaign, Client, ClientError, Episode, Results, Unreachable
 from risk_sac.egos.defects.catalogue import DEFECTS
+from risk_sac.host.terminal import console, run_command
 from risk_sac.records import State
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, series_name
-from risk_sac.terminal import console, run_command
 from service.settings import ServiceSettings
 
 START_S = 60.0
@@ -47,7 +47,7 @@ def main(arguments: list[str] | None = None) -> int:
             failures = list(client.failures(campaign.id))
             results = client.results(campaign.id)
             _write(options.out, campaign, results, failures)
-            console.print(results_table(results, Bounds()))
+            console.print(results_table(results, GateBounds()))
             drove = driven_by_table(results)
             if drove is not None:
                 console.print(drove)
@@ -161,7 +161,7 @@ def _write(out: Path, campaign: Campaign, results: Results, failures: Sequence[E
 
 def first_detections(campaign: Campaign, failures: Sequence[Episode], data_dir: Path) -> Mapping[str, Episode | None]:
     """Returns of each search, by id, the first failure that detects the defect; see `detected`."""
-    from risk_sac.failures.detected import detected  # here, because loading the simulator takes seconds
+    from risk_sac.failures.play import detected  # here, because loading the simulator takes seconds
 
     found: dict[str, Episode | None] = {}
     for spec in campaign.spec.searches():

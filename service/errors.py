@@ -1,4 +1,4 @@
-"""Errors of the service; `service.api.answers.problems` maps them to HTTP statuses."""
+"""Errors of the service; `service.api.problems` maps them to HTTP statuses."""
 
 from risk_sac.errors import RiskSacError
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.prior.policy import GOALS, Layout, PretrainedPolicy
 from risk_sac.records import (
     Collision,
     ConflictType,
@@ -24,7 +23,8 @@ from risk_sac.records import (
     Severity,
     Violation,
 )
-from risk_sac.types import Floats, Frame, Kind, Role, Row, Signal
+from risk_sac.search.prior.policy import GOALS, PolicyLayout, PretrainedPolicy
+from risk_sac.world.types import Floats, Frame, Kind, Role, Row, Signal
 
 if TYPE_CHECKING:
     from risk_sac.sim.ego import Belief
@@ -233,7 +233,7 @@ def run_metrics(episodes: int = 4, **changes: Any) -> RunMetrics:
     return RunMetrics(episodes=episodes, **(values | changes))
 
 
-def pretrained_policy(layout: Layout, goals: tuple[str, ...]) -> PretrainedPolicy:
+def pretrained_policy(layout: PolicyLayout, goals: tuple[str, ...]) -> PretrainedPolicy:
     """A small pretrained policy of random weights that survive half precision."""
     random = np.random.default_rng(3)
     seen, acted, hidden = layout.observation_size + GOALS + 1, layout.action_size, 8

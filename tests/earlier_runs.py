@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from risk_sac.config import FamilyName, RunSpec
-from risk_sac.prior.shipped import shipped_prior
 from risk_sac.records import EpisodeRecord, Outcome
-from risk_sac.run_folder.results import EPISODES, Results, write_results
+from risk_sac.run_folder.results import EPISODES, RunResults, write_results
 from risk_sac.scenario.families import FAMILIES
+from risk_sac.search.prior.shipped import shipped_prior
 from tests.builders import collision, episode_record
 
 FAILURES, SAFE = 2, 3
@@ -33,7 +33,7 @@ def _episodes(family: str, *, scripts: bool = True) -> list[EpisodeRecord]:
 def run_folder(folder: Path, family: FamilyName = "low", *, scripts: bool = True) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     spec = RunSpec(family=family, method="archive", seed=0)
-    write_results(folder, Results(spec=spec, spec_digest=spec.digest, finished=True))
+    write_results(folder, RunResults(spec=spec, spec_digest=spec.digest, finished=True))
     lines = (record.model_dump_json() + "\n" for record in _episodes(family, scripts=scripts))
     (folder / EPISODES).write_text("".join(lines))
     return folder

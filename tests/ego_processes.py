@@ -8,9 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import ClassVar
 
-from risk_sac.egos import Control, Episode, Perceived
-from risk_sac.egos.road import lane_keeping
-from risk_sac.types import SPEED
+from risk_sac.egos import Control, EpisodeStart, Perceived
+from risk_sac.egos.driving import lane_keeping
+from risk_sac.world.types import SPEED
 
 CPP = Path(__file__).parents[1] / "risk_sac" / "egos" / "remote" / "cpp"
 CPP_COMPILES = all(map(shutil.which, ("make", "g++", "protoc", "grpc_cpp_plugin", "pkg-config")))
@@ -57,7 +57,7 @@ class Shadow:
 
     speeds_mps: ClassVar[Sequence[float]] = ()  # after each step
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         self._vehicle, self._step_s = episode.vehicle, episode.step_s
         self._next = iter(self.speeds_mps)
 

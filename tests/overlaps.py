@@ -10,7 +10,7 @@ from risk_sac.errors import RiskSacError
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import read_results
 from risk_sac.verdicts.evidence import Evidence, Ground
-from risk_sac.verdicts.overlap import Overlap, overlaps_before_contact
+from risk_sac.verdicts.validity import Overlap, overlaps_before_contact
 
 
 def overlaps_in(series: Mapping[str, NDArray[Any]]) -> list[Overlap]:

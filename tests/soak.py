@@ -10,7 +10,7 @@ import numpy as np
 import psutil
 
 from risk_sac.config import FamilyName
-from risk_sac.env import make_default
+from risk_sac.env.env import make_default
 
 SEED = 404  # libsumo used to read freed memory in the 47th episode of mixed
 WARM_UP_EPISODES = 25

@@ -12,12 +12,10 @@ from risk_sac.cli import (
     benchmark,
     campaigns,
     egos,
-    export,
     places,
     pretrain,
     regress,
     replay,
-    report,
     run,
     serve,
     show,
@@ -27,8 +25,8 @@ from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
 from risk_sac.cli.parser import Parser, as_typed, example_text, wrong_path
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
+from risk_sac.host.terminal import complain, run_command
 from risk_sac.scenario import library
-from risk_sac.terminal import complain, run_command
 
 EPILOG = """exit status:
   0    done
@@ -94,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"risk-sac {__version__}")
     parser.set_defaults(on_error=FAILED)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    first = (run, places, egos, show, replay, understand, export, regress)
-    for module in (*first, report, benchmark, pretrain, serve, campaigns):
+    first = (run, places, egos, show, replay, understand, replay, regress)
+    for module in (*first, regress, benchmark, pretrain, serve, campaigns):
         module.add(commands)
     return parser

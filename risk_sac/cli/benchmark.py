@@ -11,16 +11,16 @@ from rich.box import SIMPLE_HEAD
 from rich.progress import Progress
 from rich.table import Table
 
-from risk_sac.benchmark.power import Played, Run, measured, method_power, power_of, runs_of
 from risk_sac.cli.console import OK, folded_table, number, say
 from risk_sac.cli.parser import Commands, add_command
 from risk_sac.config import SHIPPED, MethodName
-from risk_sac.config.text import read_text
+from risk_sac.config.base import read_text
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.errors import ConfigError
-from risk_sac.machine import cores
+from risk_sac.host.machine import cores
+from risk_sac.host.terminal import console
 from risk_sac.records import Counts
-from risk_sac.terminal import console
+from risk_sac.report.power import BenchmarkRun, PlayedCounts, measured, method_power, power_of, runs_of
 
 METHODS: Sequence[MethodName] = ("random", "archive", "risk-sac-diverse")
 SEEDS, STEPS = 10, 20_000
@@ -76,10 +76,10 @@ def add(commands: Commands) -> None:
 
 def _benchmark(options: argparse.Namespace) -> int:
     # Here, because loading the simulator takes seconds.
-    from risk_sac.benchmark.runs import Benchmark, ended, play
-    from risk_sac.benchmark.statistics import balanced
-    from risk_sac.benchmark.table import METHODS as COLUMNS
-    from risk_sac.benchmark.table import methods_rows, write
+    from risk_sac.lab.benchmark.runs import Benchmark, ended, play
+    from risk_sac.lab.benchmark.statistics import balanced
+    from risk_sac.lab.benchmark.table import METHODS as COLUMNS
+    from risk_sac.lab.benchmark.table import methods_rows, write
 
     test_set = [name for name, defect in DEFECTS.items() if defect.test_set]
     benchmark = Benchmark(
@@ -122,7 +122,7 @@ def _power(options: argparse.Namespace) -> int:
     return OK
 
 
-def _power_of_folders(options: argparse.Namespace, runs: Sequence[Run]) -> int:
+def _power_of_folders(options: argparse.Namespace, runs: Sequence[BenchmarkRun]) -> int:
     from risk_sac.report.inputs import campaign_in  # here, because loading numpy takes a while
 
     if given := [name for name in ("families", "method", "steps") if getattr(options, name) is not None]:
@@ -130,7 +130,7 @@ def _power_of_folders(options: argparse.Namespace, runs: Sequence[Run]) -> int:
     campaign, results = campaign_in(options.runs)
     searches = [(each, each.metrics or Counts()) for each in results.values() if not each.spec.iid]
     played = [
-        Played(each.spec.family, each.spec.method, did.episodes, did.environment_steps, each.finished)
+        PlayedCounts(each.spec.family, each.spec.method, did.episodes, did.environment_steps, each.finished)
         for each, did in searches
     ]
     found = power_of(campaign, played, runs)

@@ -24,10 +24,10 @@ from rich.progress import (
 from rich.table import Column, Table
 
 from risk_sac.config.spec_file import EGO_FILE, EGO_NAMES
+from risk_sac.host.terminal import Output, console, notes
 from risk_sac.metrics import requirement_cells
 from risk_sac.records import Adjustment, Collision, DrivenBy, EpisodeRecord, RequirementCounts, Violation
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.terminal import Output, console, notes
 
 OK, FAILED, MISUSED, INTERRUPTED = 0, 1, 2, 130
 ABOVE, COULD_NOT_RUN = 1, 2  # of `risk-sac campaigns`, which gates CI jobs

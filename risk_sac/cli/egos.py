@@ -7,18 +7,18 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from risk_sac.cli.campaign_flags import add_campaign_flags, campaign_flags, named_ego
 from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, folded_table, progress_bar, say
+from risk_sac.cli.flags import add_campaign_flags, campaign_flags, named_ego
 from risk_sac.cli.parser import Commands, add_command, add_group
 from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import PROFILES, read_campaign
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.egos.registry import SHIPPED, cards
-from risk_sac.machine import cores
+from risk_sac.host.machine import cores
+from risk_sac.host.terminal import complain
 from risk_sac.metrics import COLUMNS as REQUIREMENT_COLUMNS
 from risk_sac.metrics import pooled_counts, pooled_requirements, requirement_cells, wilson_interval
-from risk_sac.terminal import complain
 
 if TYPE_CHECKING:
     from risk_sac.report import FinishedRun

@@ -11,7 +11,7 @@ from typing import Any, NoReturn, TypeAlias
 from risk_sac.cli.console import MISUSED
 from risk_sac.config import CampaignSpec
 from risk_sac.errors import ConfigError, did_you_mean
-from risk_sac.terminal import complain
+from risk_sac.host.terminal import complain
 
 WIDTH = 78
 FLAG = re.compile(r"--[a-z][\w-]*")

@@ -10,18 +10,18 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from risk_sac.cli.campaign_flags import MAP_HELP
 from risk_sac.cli.console import FAILED, OK, counted
+from risk_sac.cli.flags import MAP_HELP
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
-from risk_sac.run_folder.scratch import scratch_folder
-from risk_sac.scenario.maps.convert import present_net
-from risk_sac.scenario.maps.finder import FINDERS, Map, survey
-from risk_sac.scenario.maps.found import TITLES, Pattern, Survey
-from risk_sac.scenario.maps.summary import net_remarks
-from risk_sac.terminal import console
+from risk_sac.host.terminal import console
+from risk_sac.maps.convert import present_net
+from risk_sac.maps.finder import FINDERS, Map, survey
+from risk_sac.maps.found import TITLES, Pattern, Survey
+from risk_sac.maps.net import net_remarks
+from risk_sac.run_folder.durable import scratch_folder
 
 if TYPE_CHECKING:
-    from risk_sac.tryout import Tried
+    from risk_sac.failures.tryout import Tried
 
 SHOWN = 20
 
@@ -57,7 +57,7 @@ def _places(options: argparse.Namespace) -> int:
         found = survey(chosen.net, patterns)
         warnings = [*converted.warnings, *net_remarks(chosen.net)]
         if options.out is not None:
-            from risk_sac.failures.map_picture import map_png  # here, because loading matplotlib takes a second
+            from risk_sac.failures.from_above import map_png  # here, because loading matplotlib takes a second
 
             options.out.write_bytes(map_png(chosen.net, found))
         if options.tries is not None:
@@ -104,7 +104,7 @@ def _try_places(chosen: Map, found: Survey, options: argparse.Namespace) -> int:
 
     Fails if a place does not run, or if the ego is touched without an attack.
     """
-    from risk_sac.tryout import sample, try_out  # here, because loading the simulator takes a second
+    from risk_sac.failures.tryout import sample, try_out  # here, because loading the simulator takes a second
 
     tried = []
     for fit in sample(found.fits, options.tries, options.seed):

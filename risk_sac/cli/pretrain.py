@@ -11,8 +11,8 @@ from rich.progress import Progress
 from risk_sac.cli.console import OK, number, say
 from risk_sac.cli.parser import Commands, add_command
 from risk_sac.config import SHIPPED, FamilyName
-from risk_sac.machine import cores
-from risk_sac.terminal import console
+from risk_sac.host.machine import cores
+from risk_sac.host.terminal import console
 
 
 def add(commands: Commands) -> None:
@@ -60,9 +60,9 @@ def _pretrain(options: argparse.Namespace) -> int:
 
 def _fit_scripts(options: argparse.Namespace, pool: Executor) -> None:
     # Here, because loading torch and the simulator takes seconds.
-    from risk_sac.pretraining.episodes import play_stream
-    from risk_sac.pretraining.fit import Dataset, fitted_prior
-    from risk_sac.prior.shipped import write_prior
+    from risk_sac.lab.pretraining.episodes import play_stream
+    from risk_sac.lab.pretraining.fit import Dataset, fitted_prior
+    from risk_sac.search.prior.shipped import write_prior
 
     episodes: Path = options.out / "episodes"
     episodes.mkdir(exist_ok=True)
@@ -79,8 +79,8 @@ def _fit_scripts(options: argparse.Namespace, pool: Executor) -> None:
 
 
 def _train_policy(options: argparse.Namespace, pool: Executor, family: FamilyName) -> None:
-    from risk_sac.pretraining.policy import PolicyTraining
-    from risk_sac.prior.policy import write_policy
+    from risk_sac.lab.pretraining.policy import PolicyTraining
+    from risk_sac.search.prior.policy import write_policy
 
     training = PolicyTraining(family, options.seed, options.policy_episodes, options.device, kinds=options.kinds)
 

@@ -11,23 +11,29 @@ from pydantic import ValidationError
 from rich.markup import escape
 from rich.table import Table
 
-from risk_sac.cli.campaign_flags import named_ego
 from risk_sac.cli.console import COULD_NOT_RUN, EGO, FAILED, OK, counted, narrow_table
+from risk_sac.cli.flags import named_ego
 from risk_sac.cli.parser import Commands, add_command
 from risk_sac.config import EgoConfig
-from risk_sac.config.text import read_text
+from risk_sac.config.base import read_text
 from risk_sac.egos.registry import check
 from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.failures.export.formats import FORMATS, FormatName, export, names
+from risk_sac.host.terminal import console, printable
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.run_folder.results import RESULTS, read_results
-from risk_sac.run_folder.verified import distinct_failures
-from risk_sac.terminal import console, printable
+from risk_sac.run_folder.results import RESULTS, distinct_failures, read_results
 
 if TYPE_CHECKING:
     from risk_sac.failures.bundle import Bundle
     from risk_sac.failures.regress import Regressed
+import shlex
+from typing import TYPE_CHECKING, Literal
+
+from risk_sac.cli.console import write_out
+
+if TYPE_CHECKING:
+    from risk_sac.report.inputs import Inputs
 
 
 def add(commands: Commands) -> None:
@@ -91,8 +97,8 @@ def cases_table(found: Regression) -> Table:
 def _export(folder: Path, formats: list[FormatName], bundles: list["Bundle"]) -> None:
     """Bundles, and beside each the formats."""
     from risk_sac.failures.bundle import write_bundle
+    from risk_sac.failures.export.formats import write
     from risk_sac.failures.export.recorded import Recorded
-    from risk_sac.failures.export.written import write
 
     for bundle in bundles:
         stem = bundle.manifest.name
@@ -159,3 +165,67 @@ def _case(case: Case) -> TestCase:
     else:
         found.append((Failure if case.verdict in FAILS else Error)(said, case.verdict))
     return found
+
+
+Format = Literal["html", "md", "json"]
+OUT = "report.html, report.md, or its data as report.json"
+REPORT_FORMATS: dict[str, Format] = {".html": "html", ".md": "md", ".json": "json"}
+
+
+def add_report(commands: Commands) -> None:
+    """Adds the command."""
+    parser = add_command(
+        commands,
+        "report",
+        _report,
+        "write one file on what runs found, with bounds, coverage and limits",
+        example="report runs/compared --out report.html",
+    )
+    parser.add_argument(
+        "runs", type=Path, nargs="+", metavar="RUNS", help="folder of `risk-sac evaluate`, or folders of runs"
+    )
+    regression = "failures against another ego, by `risk-sac regress --out`"
+    output = parser.group("output")
+    output.add_argument("--regression", type=Path, metavar="FILE.json", help=regression)
+    output.add_argument("--out", type=Path, required=True, metavar="FILE", help=OUT)
+
+
+def _report(options: argparse.Namespace) -> int:
+    # Here, because loading numpy takes a while.
+    from risk_sac.report.document import Origin, report_page, show_command
+    from risk_sac.report.evidence import gathered
+    from risk_sac.report.inputs import read_folders
+    from risk_sac.report.power import played_by, power_of
+
+    format_ = format_of(options.out)
+    regression = read_baseline(options.regression, "--regression") if options.regression else None
+    inputs = read_folders(options.runs)
+    evidence = gathered(inputs.comparison)
+    origin = Origin(
+        report=options.typed,
+        data=shlex.join(["risk-sac", "report", *map(str, options.runs), "--out", "report.json"]),
+        show=lambda run, failure: show_command(inputs.folders[run.spec.digest], failure),
+        regress=_regress_report(inputs),
+        folders=inputs.folders,
+        regression=regression,
+    )
+    if format_ == "json":
+        content = evidence.model_dump_json(indent=2) + "\n"
+    else:
+        power = power_of(inputs.comparison.spec, played_by(inputs.comparison.runs))
+        content = report_page(inputs.comparison, evidence, origin, power, "html" if format_ == "html" else "markdown")
+    write_out(options.out, content.encode(), "Report")
+    return OK
+
+
+def format_of(file: Path) -> Format:
+    """Returns the format of a report by the name of its file."""
+    if file.suffix not in REPORT_FORMATS:
+        raise ConfigError("--out", f"{file.name!r}", f"a name that ends in {', '.join(REPORT_FORMATS)}")
+    return REPORT_FORMATS[file.suffix]
+
+
+def _regress_report(inputs: "Inputs") -> str:
+    """Returns the command that plays the failures of all finished searches."""
+    runs = [str(inputs.folders[run.spec.digest]) for run in inputs.comparison.runs]
+    return shlex.join(["risk-sac", "regress", "--failures", *runs, "--ego", "EGO", "--out", "cases.json"])

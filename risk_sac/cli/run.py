@@ -9,18 +9,6 @@ from typing import TYPE_CHECKING, get_args
 
 from rich.table import Table
 
-from risk_sac.adjustments import adjustments
-from risk_sac.cli.campaign_flags import (
-    add_budget_flags,
-    add_campaign_flags,
-    add_ego_flag,
-    add_map_flags,
-    add_prior_flag,
-    budget_flags,
-    campaign_flags,
-    ego_flag,
-    families_on_map,
-)
 from risk_sac.cli.console import (
     FAILED,
     INTERRUPTED,
@@ -35,16 +23,27 @@ from risk_sac.cli.console import (
     requirements_table,
     say_adjustments,
 )
+from risk_sac.cli.flags import (
+    add_budget_flags,
+    add_campaign_flags,
+    add_ego_flag,
+    add_map_flags,
+    add_prior_flag,
+    budget_flags,
+    campaign_flags,
+    ego_flag,
+    families_on_map,
+)
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.config import METHODS, SHIPPED, RunMethod, RunSpec
 from risk_sac.config.spec_file import read_campaign, read_spec
+from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
-from risk_sac.machine import cores
+from risk_sac.host.machine import cores
+from risk_sac.host.terminal import complain, console, notes
 from risk_sac.metrics import METRICS, Metric
 from risk_sac.records import RunMetrics
-from risk_sac.run_folder.results import Results
-from risk_sac.run_folder.verified import TIMES
-from risk_sac.terminal import complain, console, notes
+from risk_sac.run_folder.results import TIMES, RunResults
 
 if TYPE_CHECKING:
     from risk_sac.execution.jobs import Job
@@ -111,7 +110,7 @@ def _run(options: argparse.Namespace) -> int:
     named = {name: getattr(options, name) for name in ("family", "method", "seed", "prior")}
     spec = read_spec(options.spec, named | budget_flags(options) | ego_flag(options))
     say_adjustments(adjustments(spec))
-    from risk_sac.execution.runs import run  # here, because loading torch takes seconds
+    from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
 
     total = spec.budget.total_episodes
     with progress_bar() as bar:
@@ -149,7 +148,7 @@ def _found(metrics: RunMetrics | None) -> str:
     )
 
 
-def _summary(spec: RunSpec, results: Results, phases: Mapping[str, RunMetrics]) -> Table:
+def _summary(spec: RunSpec, results: RunResults, phases: Mapping[str, RunMetrics]) -> Table:
     """One column per phase."""
     columns = {name: _figures(metrics) for name, metrics in phases.items()}
     title = f"{spec.family} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s on {results.device}"

@@ -20,18 +20,18 @@ from risk_sac.cli.console import (
     outcome,
     print_answer,
 )
-from risk_sac.cli.failure_filters import add_filter_flags, listed, matching
+from risk_sac.cli.flags import add_filter_flags, listed, matching
 from risk_sac.cli.parser import FAILURE_HELP, RESULTS_HELP, Commands, add_command, add_json_flag
 from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
+from risk_sac.host.terminal import notes
 from risk_sac.metrics import headline_driven_by
 from risk_sac.records import Collision, EpisodeId, Judgement, RunMetrics, Violation
 from risk_sac.run_folder.arrays import read_series
-from risk_sac.run_folder.results import RESULTS, RecordedFailure, Results, read_results
-from risk_sac.terminal import notes
+from risk_sac.run_folder.results import RESULTS, RecordedFailure, RunResults, read_results
 
 NAME_WIDTH = 20  # of a requirement's name in the list
 
@@ -126,7 +126,7 @@ def newest_run(folder: Path) -> Path:
     return newest
 
 
-def _list(options: argparse.Namespace, results: Results) -> None:
+def _list(options: argparse.Namespace, results: RunResults) -> None:
     by_index = {failure.episode.index: failure for failure in results.failures}
     episodes = [failure.episode for failure in results.failures]
     chosen = [by_index[each.index] for each in listed(options, matching(options, episodes))]

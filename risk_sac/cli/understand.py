@@ -11,11 +11,10 @@ from risk_sac.cli.console import OK, counted, narrow_table, print_answer, say
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Studied, note, valid_failure
+from risk_sac.host.terminal import console
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.verified import read_verified
-from risk_sac.terminal import console
+from risk_sac.run_folder.results import read_results, read_verified
 
 if TYPE_CHECKING:
     from risk_sac.failures.bundle import Bundle

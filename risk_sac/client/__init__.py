@@ -13,15 +13,8 @@ with Client("http://127.0.0.1:8000") as client:
 """
 
 from risk_sac.client.client import Client
-from risk_sac.client.errors import (
-    ClientError,
-    Overdue,
-    Refused,
-    StreamLost,
-    UnexpectedAnswer,
-    Unreachable,
-)
 from risk_sac.client.following import Event
+from risk_sac.client.transport import ClientError, Overdue, Refused, StreamLost, UnexpectedAnswer, Unreachable
 from risk_sac.records import (
     Campaign,
     CampaignSummary,
@@ -37,7 +30,7 @@ from risk_sac.records import (
     RunResult,
     Total,
 )
-from risk_sac.series import Series
+from risk_sac.world.types import Series
 
 __all__ = [
     "Campaign",

@@ -7,10 +7,8 @@ from typing import Any, Literal, Self, TypeVar
 from urllib.parse import quote
 from uuid import uuid4
 
-from risk_sac.client.address import DEFAULT_URL, api_key, checked_key, checked_url
-from risk_sac.client.errors import UnexpectedAnswer
 from risk_sac.client.following import AWAY_S, Event, events, follow
-from risk_sac.client.transport import Transport, read
+from risk_sac.client.transport import DEFAULT_URL, Transport, UnexpectedAnswer, api_key, checked_key, checked_url, read
 from risk_sac.config import CampaignSpec, EgoConfig
 from risk_sac.failures.cases import CampaignRegression
 from risk_sac.records import (

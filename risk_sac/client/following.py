@@ -9,8 +9,7 @@ from typing import Any
 
 import httpx
 
-from risk_sac.client.errors import Overdue, StreamLost, Unreachable
-from risk_sac.client.transport import Transport, read
+from risk_sac.client.transport import Overdue, StreamLost, Transport, Unreachable, read
 from risk_sac.records import FINAL, Campaign
 
 AWAY_S = 120.0  # how long a service that was there may be away, as when it is restarted

@@ -1,21 +1,141 @@
-"""HTTP with retries: for a bounded time, and only where a repetition does no harm."""
+"""Errors of the client."""
 
 import logging
+import math
 import random
 import time
 from collections.abc import Generator, Mapping
 from contextlib import closing
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
+from pathlib import Path
 from typing import TypeVar
 
 import httpx
 from httpx_sse import EventSource, ServerSentEvent, SSEError
-from pydantic import ValidationError
+from pydantic import BaseModel, HttpUrl, TypeAdapter, ValidationError
 
 from risk_sac import __version__
-from risk_sac.client.errors import ClientError, Refused, StreamLost, UnexpectedAnswer, Unreachable
-from risk_sac.errors import ConfigError
-from risk_sac.loopback import is_loopback
-from risk_sac.records import Record
+from risk_sac.config.base import read_text
+from risk_sac.errors import ConfigError, RiskSacError
+from risk_sac.host.machine import is_loopback
+from risk_sac.records import FieldProblem, Record
+
+
+class ClientError(RiskSacError):
+    """Root of the client's errors."""
+
+    passing: bool = False  # a retry may help and does no harm
+    retry_after_s: float | None = None  # the wait that the service asked for
+
+
+class Unreachable(ClientError):
+    """No answer, or an incomplete one."""
+
+    def __init__(self, url: str, error: httpx.RequestError, *, passing: bool) -> None:
+        super().__init__(f"{url} does not answer: {str(error) or type(error).__name__}")
+        self.passing = passing
+
+
+class StreamLost(Unreachable):
+    """The stream of events broke after it had begun; it continues after the last event that arrived."""
+
+
+class _Problem(BaseModel):
+    detail: str
+    reason: str = ""
+    errors: tuple[FieldProblem, ...] = ()
+
+
+class Refused(ClientError):
+    """The service answered with a problem; of a proxy's own page only the status is known."""
+
+    def __init__(self, response: httpx.Response, *, passing: bool) -> None:
+        try:
+            problem = _Problem.model_validate_json(response.content, extra="allow")
+        except ValidationError:
+            problem = _Problem(detail=response.reason_phrase)
+        super().__init__(f"{response.url} answered {response.status_code}: {problem.detail}")
+        self.status = response.status_code
+        self.reason = problem.reason  # one word that is stable for each cause, such as `unknown_id`; empty from a proxy
+        self.detail = problem.detail  # what was got and wanted, for people
+        self.fields = problem.errors  # to blame; may be none
+        self.passing = passing
+        self.retry_after_s = retry_after_s(response)
+
+
+class UnexpectedAnswer(ClientError):
+    """The answer is not what this version of the service says."""
+
+    def __init__(self, response: httpx.Response, wanted: str) -> None:
+        type_ = response.headers.get("content-type", "no content-type")
+        super().__init__(
+            f"{response.url} answered {response.status_code} with {type_}; wanted {wanted}: "
+            "is it a RISK-SAC service, and not much older or newer than this client?"
+        )
+
+
+class Overdue(ClientError):
+    """The campaign did not end within the time that the caller gave it; it goes on."""
+
+
+def retry_after_s(response: httpx.Response) -> float | None:
+    """Returns the seconds of a Retry-After header, a number or a date; None without a valid one."""
+    value = response.headers.get("retry-after", "")
+    try:
+        seconds = float(value)
+    except ValueError:
+        try:
+            at = parsedate_to_datetime(value)
+        except ValueError:
+            return None
+        seconds = (at.replace(tzinfo=at.tzinfo or UTC) - datetime.now(UTC)).total_seconds()
+    return max(0.0, seconds) if math.isfinite(seconds) else None
+
+
+DEFAULT_URL = "http://127.0.0.1:8000"
+
+_URL = TypeAdapter(HttpUrl)
+
+
+def checked_url(url: str) -> str:
+    """The URL of a service.
+
+    Raises:
+      ConfigError: it is none, or holds a password, which would show in messages and reports.
+    """
+    try:
+        parsed = _URL.validate_python(url)
+    except ValidationError as error:
+        raise ConfigError("url", repr(url), f"http(s)://host[:port]: {error.errors()[0]['msg']}") from error
+    if parsed.username or parsed.password:
+        raise ConfigError("url", "a URL that holds a user or a password", "the key in RISK_SAC_API_KEY")
+    return str(parsed).rstrip("/")
+
+
+def api_key(environment: Mapping[str, str]) -> str | None:
+    """The key in RISK_SAC_API_KEY, or in the file that RISK_SAC_API_KEY_FILE names; None where there is neither.
+
+    Raises:
+      ConfigError: the file cannot be read.
+    """
+    key, file = environment.get("RISK_SAC_API_KEY"), environment.get("RISK_SAC_API_KEY_FILE")
+    if key or not file:
+        return key or None
+    return read_text(Path(file), "RISK_SAC_API_KEY_FILE").strip()
+
+
+def checked_key(key: str) -> str:
+    """A key that a header can hold.
+
+    Raises:
+      ConfigError: it cannot; the message does not show it.
+    """
+    if not key or not all("!" <= character <= "~" for character in key):
+        got = "an empty one, or one with a space, a control character or a letter outside of ASCII"
+        raise ConfigError("API key", got, "it as `risk-sac keys` printed it")
+    return key
+
 
 logger = logging.getLogger(__name__)
 

@@ -38,7 +38,7 @@ class Scenery(Settings):
 
 
 class Environment(Settings):
-    """Weather and light, as far as they act on an episode; the rules are in `risk_sac.scenario.environment`."""
+    """Weather and light, as far as they act on an episode; the rules are in `risk_sac.scenario.limits`."""
 
     friction: Interval | None = None
     """Tyre-road friction coefficient, in (0, 1.2]; each scene has one value of it."""

@@ -10,8 +10,7 @@ import yaml
 from pydantic import ValidationError
 
 from risk_sac.config import IID_METHODS, Budget, CampaignSpec, EgoConfig, RunSpec
-from risk_sac.config.invalid import field_errors
-from risk_sac.config.text import read_fields
+from risk_sac.config.base import field_errors, read_fields
 from risk_sac.errors import ConfigError
 
 T = TypeVar("T", RunSpec, CampaignSpec, EgoConfig)

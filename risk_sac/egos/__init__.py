@@ -1,21 +1,13 @@
 """Egos that drive themselves: the seam, those that are shipped, and processes that speak to us."""
 
-from risk_sac.egos.seam import (
-    Command,
-    Control,
-    Ego,
-    Episode,
-    Perceived,
-    Trajectory,
-    Vehicle,
-)
-from risk_sac.types import Lane, Road, StopLine
+from risk_sac.egos.seam import Command, Control, Ego, EpisodeStart, Perceived, Trajectory, Vehicle
+from risk_sac.world.types import Lane, Road, StopLine
 
 __all__ = [
     "Command",
     "Control",
     "Ego",
-    "Episode",
+    "EpisodeStart",
     "Lane",
     "Perceived",
     "Road",

@@ -18,10 +18,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from risk_sac.egos.seam import Command, Control, Ego, Episode, Perceived, Trajectory
+from risk_sac.egos.seam import Command, Control, Ego, EpisodeStart, Perceived, Trajectory
 from risk_sac.errors import EgoFailed
-from risk_sac.process_state import handler_of, preserved
-from risk_sac.types import Floats
+from risk_sac.host.process_state import handler_of, preserved
+from risk_sac.world.types import Floats
 
 DEADLINE, MALFORMED, CRASH = "ego_deadline", "ego_malformed", "ego_crash"  # reasons of an invalid episode
 DEAD_AFTER = 5
@@ -62,7 +62,7 @@ class Guarded:
         reached_s: float | None = self._ego.reached_s  # type: ignore[attr-defined]
         return reached_s
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         """Begins an episode.
 
         Raises:

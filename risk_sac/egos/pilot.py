@@ -1,4 +1,7 @@
-"""Drives an ego: shows it what it perceives, and moves its car by its commands."""
+"""Moves an ego's car: a kinematic bicycle that does as much of a command as its limits allow.
+
+Source: Kong et al. 2015, "Kinematic and dynamic vehicle models for autonomous driving control design", Eq. 1.
+"""
 
 import math
 from functools import cache
@@ -6,17 +9,17 @@ from itertools import compress
 
 import numpy as np
 
-from risk_sac.egos.bicycle import advance, track
+from risk_sac.egos.driving import LEAST_LOOKAHEAD_M, steering_towards
 from risk_sac.egos.guard import Guarded
-from risk_sac.egos.seam import Episode, Perceived, Trajectory, Vehicle
-from risk_sac.jit import compiled
+from risk_sac.egos.seam import Control, EpisodeStart, Perceived, Trajectory, Vehicle
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.ego import Belief
-from risk_sac.sim.lanes import road_around, signals_at
 from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import Motion
-from risk_sac.types import (
+from risk_sac.sim.roads import road_around, signals_at
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import (
     ACCEL,
     HEADING,
     LATERAL,
@@ -33,6 +36,80 @@ from risk_sac.types import (
     X,
     Y,
 )
+
+
+def advance(motion: Motion, accel_mps2: float, steering_rad: float, vehicle: Vehicle, step_s: float) -> Motion:
+    """Returns the motion after a step of a command.
+
+    The steering turns no faster than it can, and no further than the grip bears at this speed. What the curve takes of
+    the grip is not there to brake or speed up with. A braking builds up at the brakes' jerk; it ends at once.
+    """
+    v = vehicle
+    limits = (v.accel_mps2, v.brake_mps2, v.brake_jerk_mps3, v.steering_rad, v.steering_rate_rad_s, v.grip_mps2)
+    return Motion(*_advanced(tuple(motion), (float(accel_mps2), float(steering_rad)), v.wheelbase_m, limits, step_s))
+
+
+@compiled
+def _advanced(
+    motion: tuple[float, ...],
+    command: tuple[float, float],
+    wheelbase_m: float,
+    limits: tuple[float, float, float, float, float, float],
+    step_s: float,
+) -> tuple[float, float, float, float, float, float, float]:
+    """Returns the fields of the next motion."""
+    x_m, y_m, heading_rad, speed, before_mps2, steered_rad, _ = motion
+    wanted_mps2, wanted_rad = command
+    most_accel_mps2, most_brake_mps2, brake_jerk_mps3, most_steering_rad, steering_rate_rad_s, grip_mps2 = limits
+    turn = steering_rate_rad_s * step_s
+    steering = min(max(wanted_rad, steered_rad - turn), steered_rad + turn)
+    largest = min(most_steering_rad, math.atan(wheelbase_m * grip_mps2 / max(speed * speed, 1e-3)))
+    steering = min(max(steering, -largest), largest)
+    slip = math.atan(math.tan(steering) / 2.0)  # the centre is halfway between the axles
+    curvature = 2.0 * math.sin(slip) / wheelbase_m
+    left_mps2 = math.sqrt(max(grip_mps2**2 - (speed * speed * curvature) ** 2, 0.0))
+    accel = max(wanted_mps2, min(before_mps2, 0.0) - brake_jerk_mps3 * step_s)
+    accel = min(max(accel, -min(most_brake_mps2, left_mps2)), min(most_accel_mps2, left_mps2))
+    faster = max(speed + accel * step_s, 0.0)
+    way_m = (speed + faster) / 2.0 * step_s
+    if faster == 0.0:  # to a standstill within the step
+        way_m = speed * speed / (-2.0 * accel) if accel < 0.0 else 0.0
+    turned = curvature * way_m
+    chord_m = way_m * (math.sin(turned / 2.0) / (turned / 2.0) if abs(turned / 2.0) > 1e-9 else 1.0)
+    direction = heading_rad + slip + turned / 2.0
+    return (
+        x_m + chord_m * math.cos(direction),
+        y_m + chord_m * math.sin(direction),
+        heading_rad + turned,
+        faster,
+        (faster - speed) / step_s,
+        steering,
+        slip,
+    )
+
+
+AHEAD_S = 0.5  # of the place that it steers for
+FOLLOW_S = 0.2  # within which the car reaches its plan's speed
+
+
+def track(trajectory: Trajectory, motion: Motion, vehicle: Vehicle) -> Control:
+    """Returns the control that follows a valid trajectory.
+
+    Choice: it aims at the place of `AHEAD_S` from now, but no nearer than `LEAST_LOOKAHEAD_M` where the trajectory goes
+    so far, else straight on: nearer aims make a slow car turn its wheels to and fro. It takes on the
+    speed of `FOLLOW_S` from now: with `AHEAD_S` it braked too late for stop lines.
+    """
+    t = trajectory
+    speed = float(np.interp(FOLLOW_S, t.time_s, t.speed_mps))
+    accel = (speed - motion.speed_mps) / FOLLOW_S
+    away_m = np.hypot(t.x_m - motion.x_m, t.y_m - motion.y_m)
+    far = np.flatnonzero((t.time_s >= AHEAD_S) & (away_m >= LEAST_LOOKAHEAD_M))
+    if not len(far):
+        return Control(accel, 0.0)
+    aim = float(t.x_m[far[0]]), float(t.y_m[far[0]])
+    steering = steering_towards(motion.x_m, motion.y_m, motion.heading_rad, vehicle.wheelbase_m, *aim)
+    return Control(accel, float(steering))
+
 
 BRAKE_MPS2 = 9.0  # as SUMO's driver can, on dry asphalt
 
@@ -79,7 +156,7 @@ class EgoPilot:
         route = layout.ego.route
         self._road = self._road_around(route)
         self._ego.reset(
-            Episode(seed=seed, net=layout.net, route=route, vehicle=self._vehicle, step_s=STEP_S, road=self._road)
+            EpisodeStart(seed=seed, net=layout.net, route=route, vehicle=self._vehicle, step_s=STEP_S, road=self._road)
         )
         return self._motion
 

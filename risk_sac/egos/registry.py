@@ -18,21 +18,19 @@ from typing import Annotated, Any, Literal, NoReturn
 from pydantic import Field, ValidationError
 
 from risk_sac.config import EgoConfig, Settings
+from risk_sac.config.base import field_error, read_text
 from risk_sac.config.ego import EgoName
-from risk_sac.config.invalid import field_error
-from risk_sac.config.text import read_text
-from risk_sac.egos.defects.catalogue import planted, version_of
-from risk_sac.egos.defects.planted import Planted
+from risk_sac.egos.defects.catalogue import Planted, planted, version_of
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.seam import Ego
 from risk_sac.errors import ConfigError, EgoFailed, did_you_mean
 
 GROUP, FILE = "risk_sac.egos", "RISK_SAC_EGOS"
 SHIPPED = {
-    "r157": "risk_sac.egos.r157:R157",
-    "rss": "risk_sac.egos.rss_responder:RssResponder",
-    "idm-aeb": "risk_sac.egos.idm_aeb:IdmAeb",
-    "broken": "risk_sac.egos.broken:Broken",
+    "r157": "risk_sac.egos.shipped:R157",
+    "rss": "risk_sac.egos.shipped:RssResponder",
+    "idm-aeb": "risk_sac.egos.shipped:IdmAeb",
+    "broken": "risk_sac.egos.shipped:Broken",
 }
 PLANNERS = {  # shipped too, where the extra `planners` is installed
     "fop": "risk_sac.egos.planners.fiss:Fop",

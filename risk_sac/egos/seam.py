@@ -1,6 +1,6 @@
 """Interface of an ego that drives itself: what it perceives, and what it may command.
 
-An ego gets what the line-of-sight sensor and its memory have, and a bicycle with limits (`risk_sac.egos.bicycle`) does
+An ego gets what the line-of-sight sensor and its memory have, and a bicycle with limits (`risk_sac.egos.pilot`) does
 as much of a command as a car can. Units are metric: x east, y north, heading 0 = east, counter-clockwise, radians; a
 position is the centre of a body.
 """
@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.types import Floats, Road, Signal
+from risk_sac.world.types import Floats, Road, Signal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +30,7 @@ class Vehicle:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Episode:
+class EpisodeStart:
     """Data that an ego gets before it drives."""
 
     seed: int  # of all chance in the ego: the same seed and the same perceived frames have to give the same commands
@@ -46,15 +46,15 @@ class Perceived(NamedTuple):
 
     Every array has `n` columns, of which the first is the ego itself.
 
-    Rows of `state` are those of `risk_sac.types`; LATERAL, ACCEL and OFFSET of others, which no sensor measures, are
-    NaN. An actor that is out of sight, but remembered, is where the ego expects it.
+    Rows of `state` are those of `risk_sac.world.types`; LATERAL, ACCEL and OFFSET of others are NaN: no sensor measures
+    them. An actor that is out of sight, but remembered, is where the ego expects it.
     """
 
     time_s: float  # since the simulation began
     ids: tuple[str, ...]  # as long as an actor is known, it keeps its id
-    kind: NDArray[np.int8]  # of `risk_sac.types.Kind`
+    kind: NDArray[np.int8]  # of `risk_sac.world.types.Kind`
     state: Floats  # rows x n
-    path: Floats  # rows of `risk_sac.egos.road` x p: the middle of its first lane, on along its route
+    path: Floats  # rows of `risk_sac.egos.driving` x p: the middle of its first lane, on along its route
     station_m: float  # of its front bumper on the path
     offset_m: float  # of its front bumper's middle from the path, positive to the left
     signal: Signal  # ahead of it
@@ -89,7 +89,7 @@ class Ego(Protocol):
     first line of its docstring is its summary.
     """
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         """Begins an episode."""
 
     def act(self, perceived: Perceived) -> Command:

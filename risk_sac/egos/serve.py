@@ -29,9 +29,9 @@ from risk_sac.egos.remote.messages import (
     path_of,
     perceived_of,
 )
-from risk_sac.egos.seam import Ego, Episode, Vehicle
+from risk_sac.egos.seam import Ego, EpisodeStart, Vehicle
 from risk_sac.errors import ConfigError, EgoFailed
-from risk_sac.types import STEP_S, Kind, Lane, Road, Signal
+from risk_sac.world.types import STEP_S, Kind, Lane, Road, Signal
 
 MOST_SESSIONS = 64  # the oldest goes: a client that never acted closed nothing
 SPARE_THREADS = 16  # beside one for each session: to start and to close them
@@ -101,7 +101,7 @@ def warm_up(ego: Guarded) -> None:
     along, still = np.array([0.0, 50.0, 100.0]), np.zeros(3)
     lane = Lane("lane", np.array([along, still]), 3.3, 13.9, "", "", False, False, (), True)
     car = Vehicle(length_m=4.6, width_m=1.85)
-    ego.reset(Episode(seed=0, net="", route=(), vehicle=car, step_s=STEP_S, road=Road((lane,))))
+    ego.reset(EpisodeStart(seed=0, net="", route=(), vehicle=car, step_s=STEP_S, road=Road((lane,))))
     path = np.array([along, still, along, still, np.full(3, 13.9), np.cos(still), np.sin(still)])
     actors = ego_pb2.Actors(
         id=["ego", "lead", "walker"],

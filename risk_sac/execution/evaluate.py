@@ -1,29 +1,171 @@
-"""A campaign without a server: each run in a process of its own, then the comparison of methods.
+"""Executes one run without a server, in a folder.
 
-DIR/spec.yaml                            the campaign
-DIR/runs/<family>-<method>-<seed>/       a run's folder, see `risk_sac.run_folder.results`, and what its process printed
-DIR/table.{json,md,csv}, DIR/figures/    see `risk_sac.report`
+The run is started or resumed, written to the folder as it goes, and stopped by Ctrl-C.
 """
 
+import json
+import logging
+import math
 import signal
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import FrameType
 
-from risk_sac.config import CampaignSpec
+from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.config.spec_file import campaign_yaml, read_campaign
+from risk_sac.env.problem import Problem, checked_campaign
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import executor_named
-from risk_sac.execution.jobs import Job, Progress, execute, worker_program
-from risk_sac.execution.runs import STOPPING, stop_signal
-from risk_sac.execution.verify import verify
-from risk_sac.machine import cores
-from risk_sac.prior.earlier import pinned_prior
-from risk_sac.problem import checked_campaign
+from risk_sac.execution.helper import ANSWER, run_helper
+from risk_sac.execution.jobs import Job, JobProgress, execute, worker_program
+from risk_sac.execution.recorder import Recorder
+from risk_sac.failures.bundle import code_digest, versions
+from risk_sac.host.machine import cores
+from risk_sac.records import EpisodeRecord, Repetition, RunMetrics, SeriesFile
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
 from risk_sac.run_folder.durable import held, replace_file
-from risk_sac.run_folder.verified import TIMES
+from risk_sac.run_folder.results import (
+    TIMES,
+    RunResults,
+    Verified,
+    distinct_failures,
+    read_results,
+    read_verified,
+    with_headline,
+    write_results,
+    write_verified,
+)
+from risk_sac.search.loop import execute_run
+from risk_sac.search.prior.earlier import pinned_prior
+
+STOPPING = (signal.SIGINT, signal.SIGTERM)
+RunProgress = Callable[[int, RunMetrics | None], None]
+"""Told of the episodes done so far and of the metrics of the current phase."""
+
+
+def run(spec: RunSpec, folder: Path, progress: RunProgress) -> RunResults:
+    """Executes a run, or resumes the one in `folder`.
+
+    SIGINT and SIGTERM end it after the episode.
+
+    Raises:
+      ConfigError: the spec poses no problem that can be run, or the folder is in use or holds another run.
+      CheckpointError: the folder's checkpoint is of another run.
+      OSError: the folder cannot be written.
+    """
+    folder = folder.absolute()  # an ego may change the working directory
+    ego, prior = Problem.from_spec(spec).ego, pinned_prior(spec.prior, [spec.family])  # before the folder is claimed
+    spec = spec.model_copy(update={"ego": ego, "prior": prior})
+    with held(folder), stop_signal() as stopping:
+        recorder = Recorder(spec, folder, Watcher(progress, stopping))
+        return recorder.finish(execute_run(spec, folder, recorder))
+
+
+@dataclass(frozen=True, slots=True)
+class Watcher:
+    """The observer that tells the user."""
+
+    progress: RunProgress
+    should_stop: Callable[[], bool]
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
+        """Counts an episode."""
+        self.progress(record.index + 1, metrics)
+
+
+@contextmanager
+def stop_signal(numbers: Sequence[signal.Signals] = STOPPING) -> Iterator[Callable[[], bool]]:
+    """Turns the first of the signals into an answer; a second one acts as always."""
+    stopping = False
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal stopping
+        stopping = True
+        signal.signal(number, earlier[signal.Signals(number)])
+
+    earlier = {number: signal.getsignal(number) for number in numbers}
+    for number in earlier:
+        signal.signal(number, stop)
+    try:
+        yield lambda: stopping
+    finally:
+        for number, handler in earlier.items():
+            signal.signal(number, handler)
+
+
+logger = logging.getLogger(__name__)
+
+
+def verify(
+    folders: Sequence[Path], times: int = TIMES, jobs: int = 1, stopping: Callable[[], bool] = lambda: False
+) -> Mapping[Path, Verified]:
+    """Replays the distinct failures of finished runs, each in `times` processes, and notes what came of it.
+
+    Each run's results.json then has its headline failures.
+
+    What was verified as often before, by the same code, is not replayed again. Of a run whose series cannot be read
+    nothing is noted, and of none whose replay was interrupted; the log says so.
+
+    `jobs` replay at a time, until `stopping`. Returns what is noted, by folder.
+
+    Raises:
+      ConfigError: a folder holds no run, or `times` is not positive.
+      OSError: a folder cannot be written.
+    """
+    if times < 1:
+        raise ConfigError("times", f"{times}", "at least 1")
+    code, found, runs = code_digest(), dict[Path, Verified](), dict[Path, RunResults]()
+    missing: dict[Path, Verified] = {}  # with nothing replayed yet
+    for folder in folders:
+        results = runs[folder] = read_results(folder)
+        if results.digest is None:
+            continue
+        known = read_verified(folder, results.digest)
+        enough = known is not None and all(repetition.times >= times for repetition in known.episodes.values())
+        if known is not None and enough and known.code == code and known.versions == versions():
+            found[folder] = known
+        else:
+            episodes = {episode.index: Repetition(times=0, same=0) for episode in distinct_failures(results)}
+            missing[folder] = Verified(digest=results.digest, code=code, versions=versions(), episodes=episodes)
+    failed = [folder for folder, verified in missing.items() if verified.episodes]
+    told = _replayed(failed, times, max(jobs, 1), stopping) if failed else {}
+    for folder in failed:
+        if len(told[folder]) >= times:  # more, if a process was killed after it had told of this run
+            same = {
+                index: Repetition(times=times, same=sum(index in each for each in told[folder][:times]))
+                for index in missing[folder].episodes
+            }
+            missing[folder] = replace(missing[folder], episodes=same)
+        else:
+            del missing[folder]
+    for folder, verified in missing.items():
+        write_verified(folder, verified)
+    for folder, verified in (found | missing).items():
+        results = with_headline(runs[folder], verified)
+        if results != runs[folder]:
+            write_results(folder, results)
+    return found | missing
+
+
+def _replayed(
+    folders: Sequence[Path], times: int, jobs: int, stopping: Callable[[], bool]
+) -> Mapping[Path, Sequence[Collection[int]]]:
+    """By run, the failures that were the same, for each process that has replayed it to the end."""
+    arguments = [ANSWER, str(times), str(jobs), *map(str, folders)]
+    result = run_helper("risk_sac.failures.replay", arguments, wall_s=math.inf, stopping=stopping)
+    if result.status != 0:
+        logger.warning("replaying failures ended with status %d: %s", result.status, result.log)
+    lines = [json.loads(line) for line in result.answer.splitlines(keepends=True) if line.endswith(b"\n")]
+    for line in lines:
+        if "error" in line:
+            logger.warning("the failures of %s cannot be replayed: %s", line["folder"], line["error"])
+    return {
+        folder: [line["same"] for line in lines if line["folder"] == str(folder) and "same" in line]
+        for folder in folders
+    }
+
 
 SPEC, RUNS = "spec.yaml", "runs"
 
@@ -42,7 +184,7 @@ def evaluate(
     folder: Path,
     command: str,
     jobs: int,
-    progress: Progress,
+    progress: JobProgress,
     executor: str = "local",
     times: int = TIMES,
 ) -> Evaluation:

@@ -38,7 +38,7 @@ class Exited:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Program:
+class WorkerProgram:
     """Settings of a worker's start and of its time limits.
 
     A worker gets its run as a line of JSON on its standard input. The end of that means that nothing reads its words.
@@ -61,7 +61,7 @@ class Program:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Node:
+class ClusterNode:
     """A machine of the cluster."""
 
     id: str  # Ray's; several nodes may share an address
@@ -73,10 +73,10 @@ class Node:
 
 
 @dataclass(frozen=True, slots=True)
-class Cluster:
+class ClusterState:
     """The machines of a cluster, as they were a few seconds ago."""
 
-    nodes: tuple[Node, ...] = ()
+    nodes: tuple[ClusterNode, ...] = ()
 
     @property
     def slots(self) -> int:
@@ -113,7 +113,7 @@ class Executor(Protocol):
         """Attempts that it has room for at present; infinite if it does not know."""
 
     @property
-    def cluster(self) -> Cluster | None:
+    def cluster(self) -> ClusterState | None:
         """Its machines; None if it has this one only."""
 
     def close(self) -> None:
@@ -137,7 +137,7 @@ def taken(messages: Messages, timeout_s: float) -> list[tuple[int, Event | Exite
 
 
 ExecutorName = Literal["local", "ray"]
-MakeExecutor = Callable[[Program], Executor]
+MakeExecutor = Callable[[WorkerProgram], Executor]
 
 
 def executor_named(name: str) -> MakeExecutor:

@@ -21,9 +21,9 @@ from pathlib import Path
 
 import psutil
 
-from risk_sac.execution.postmortem import without_folders
-from risk_sac.process_state import leave
-from risk_sac.run_folder.scratch import scratch_folder
+from risk_sac.execution.messages import without_folders
+from risk_sac.host.process_state import leave
+from risk_sac.run_folder.durable import scratch_folder
 
 logger = logging.getLogger(__name__)
 

@@ -10,11 +10,11 @@ from typing import Literal
 
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import FOLDER, Executor, Program
+from risk_sac.execution.executor import FOLDER, Executor, WorkerProgram
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import QueuedRun, Scheduler
 from risk_sac.records import State as RunState
-from risk_sac.run_folder.crashes import PATIENCE
+from risk_sac.run_folder.checkpoint import PATIENCE
 from risk_sac.run_folder.results import RESULTS, read_results
 
 LOG = "run.log"  # in a run's folder: what its worker printed
@@ -58,13 +58,15 @@ class Job:
             self.state, self.reason = "failed", str(error)
 
 
-Progress = Callable[[Sequence[Job]], None]
+JobProgress = Callable[[Sequence[Job]], None]
 """Told about all jobs a few times a second."""
 
 
-def worker_program() -> Program:
+def worker_program() -> WorkerProgram:
     """The worker without a limit on its memory, that replays no failures."""
-    return Program(arguments=("-m", "risk_sac.execution.worker", FOLDER, "0", "0", "0"), log=LOG, linger_s=LINGER_S)
+    return WorkerProgram(
+        arguments=("-m", "risk_sac.execution.worker", FOLDER, "0", "0", "0"), log=LOG, linger_s=LINGER_S
+    )
 
 
 class JobStore:
@@ -125,7 +127,7 @@ def execute(
     jobs: Sequence[Job],
     executor: Executor,
     at_once: int,
-    progress: Progress,
+    progress: JobProgress,
     stopping: Callable[[], bool],
 ) -> None:
     """Keeps so many jobs at work until each has finished or failed; no worker outlives it."""

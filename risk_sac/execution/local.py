@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from risk_sac.config import RunSpec
-from risk_sac.execution.executor import Cause, Exited, Messages, Program, taken
-from risk_sac.execution.messages import Event
-from risk_sac.execution.postmortem import reason_of
+from risk_sac.execution.executor import Cause, Exited, Messages, WorkerProgram, taken
+from risk_sac.execution.messages import Event, reason_of
 from risk_sac.execution.process import Subprocess
 
 logger = logging.getLogger(__name__)
@@ -70,7 +69,7 @@ class LocalExecutor:
     slots = math.inf  # the caller knows this machine
     cluster = None
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: WorkerProgram) -> None:
         self._program = program
         self._messages: Messages = queue.SimpleQueue()
         self._workers: dict[int, _Worker] = {}
@@ -120,7 +119,7 @@ class LocalExecutor:
 class _Worker:
     """An attempt and its executor's patience with it; but for `stop` and `kill` it belongs to one thread."""
 
-    def __init__(self, program: Program, process: Subprocess) -> None:
+    def __init__(self, program: WorkerProgram, process: Subprocess) -> None:
         self.process = process
         self._program = program
         self._lease = Lease(program.lease_s, program.stall_s)

@@ -12,8 +12,8 @@ from pathlib import Path
 import psutil
 
 from risk_sac.config import RunSpec
-from risk_sac.execution.executor import FOLDER, WORDS, Program
-from risk_sac.execution.postmortem import WorkerLog
+from risk_sac.execution.executor import FOLDER, WORDS, WorkerProgram
+from risk_sac.execution.messages import WorkerLog
 
 logger = logging.getLogger(__name__)
 
@@ -30,7 +30,7 @@ class Subprocess:
       listening: whether its words can still be read.
     """
 
-    def __init__(self, program: Program, spec: RunSpec, folder: Path) -> None:
+    def __init__(self, program: WorkerProgram, spec: RunSpec, folder: Path) -> None:
         """Starts it.
 
         Raises:

@@ -4,16 +4,24 @@ import logging
 from dataclasses import replace
 from pathlib import Path
 
-from risk_sac.adjustments import adjustments
 from risk_sac.config import RunSpec
+from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
-from risk_sac.loop import Observer
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
-from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import set_aside
-from risk_sac.run_folder.results import EPISODES, RESULTS, RecordedFailure, Results, read_results, write_results
-from risk_sac.run_folder.verified import read_verified, with_headline
+from risk_sac.run_folder.results import (
+    EPISODES,
+    RESULTS,
+    RecordedFailure,
+    RunResults,
+    read_results,
+    read_verified,
+    with_headline,
+    write_results,
+)
+from risk_sac.search.loop import Observer
+from risk_sac.search.run import CHECKPOINT, RunOutcome
 
 logger = logging.getLogger(__name__)
 
@@ -51,7 +59,7 @@ class Recorder:
             self._write(replace(self.results, metrics=metrics, failures=tuple(self._failures)))
         self._observer.episode(record, metrics, series)
 
-    def finish(self, summary: RunSummary) -> Results:
+    def finish(self, summary: RunOutcome) -> RunResults:
         """Writes the results of the run, whose last checkpoint has its episodes on the disk."""
         results = replace(
             self.results,
@@ -70,12 +78,12 @@ class Recorder:
         self._write(with_headline(results, verified) if verified else results)
         return self.results
 
-    def _write(self, results: Results) -> None:
+    def _write(self, results: RunResults) -> None:
         write_results(self._folder, results)
         self.results = results
 
 
-def _results_so_far(spec: RunSpec, folder: Path) -> Results:
+def _results_so_far(spec: RunSpec, folder: Path) -> RunResults:
     """Reads earlier results, or claims the folder for `spec`."""
     if (folder / RESULTS).exists():
         results = _read(spec, folder)
@@ -92,13 +100,13 @@ def _results_so_far(spec: RunSpec, folder: Path) -> Results:
     return _claim(spec, folder)
 
 
-def _claim(spec: RunSpec, folder: Path) -> Results:
-    results = Results(spec=spec, spec_digest=spec.digest, adjustments=adjustments(spec), finished=False)
+def _claim(spec: RunSpec, folder: Path) -> RunResults:
+    results = RunResults(spec=spec, spec_digest=spec.digest, adjustments=adjustments(spec), finished=False)
     write_results(folder, results)
     return results
 
 
-def _read(spec: RunSpec, folder: Path) -> Results:
+def _read(spec: RunSpec, folder: Path) -> RunResults:
     """Reads results.json; starts empty if it is damaged.
 
     The run then rewrites it.

@@ -27,12 +27,19 @@ import psutil
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.executor import WORDS
-from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Heartbeat, Started, encode
-from risk_sac.execution.postmortem import without_folders
-from risk_sac.logs import log_to_stderr
+from risk_sac.execution.messages import (
+    EpisodeDone,
+    Event,
+    Failed,
+    Finished,
+    Heartbeat,
+    Started,
+    encode,
+    without_folders,
+)
+from risk_sac.host.terminal import log_to_stderr
 from risk_sac.records import REPEATS, EpisodeRecord, RunMetrics, SeriesFile
-from risk_sac.run_folder.durable import LOCK, lock
-from risk_sac.run_folder.scratch import remove_temporaries
+from risk_sac.run_folder.durable import LOCK, lock, remove_temporaries
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -163,11 +170,11 @@ def _run(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int, rep
 
 
 def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int, replays: int) -> Finished:
+    from risk_sac.execution.evaluate import verify
     from risk_sac.execution.recorder import Recorder  # here, so that the slow import happens with a heartbeat
-    from risk_sac.execution.verify import verify
-    from risk_sac.loop import execute_run
     from risk_sac.report.runs import read_run
-    from risk_sac.run_folder.verified import Verified, with_headline
+    from risk_sac.run_folder.results import Verified, with_headline
+    from risk_sac.search.loop import execute_run
 
     if memory_bytes:
         limit_memory(memory_bytes)  # from here on: where it ends while libsumo is loaded, the process crashes

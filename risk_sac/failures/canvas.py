@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 
 from risk_sac.failures.net import Net, Surface, colour
 from risk_sac.failures.recording import BOX, on_body
-from risk_sac.types import Floats
+from risk_sac.world.types import Floats
 
 WIDTH, HEIGHT, FINE = 560, 340, 2  # px; drawn larger by `FINE`, and then made smooth
 VIEW_M = 56.0  # that the width shows

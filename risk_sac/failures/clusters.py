@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.metrics.features import outcome_features
+from risk_sac.metrics.metric import outcome_features
 from risk_sac.records import Collision, EpisodeRecord, Grade, Record, Violation
-from risk_sac.types import Floats
 from risk_sac.verdicts.distinct import CELLS, distinct_failures, kind_of
+from risk_sac.world.types import Floats
 
 SPEED_MPS, LEAST = 20.0, -3.0  # the same ranges for a violation without contact: of the ego's speed, and of robustness
 WIDTH = 0.25  # of the outcome features' ranges: failures farther apart than that are not much alike

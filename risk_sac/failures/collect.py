@@ -8,23 +8,22 @@ from pathlib import Path
 
 import numpy as np
 
-from risk_sac.agents.learner import Learner
 from risk_sac.config import method_of
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import CheckpointError
 from risk_sac.failures.bundle import Bundle, make_bundle
 from risk_sac.failures.play import repeated
-from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.records import EpisodeRecord
-from risk_sac.run import RunState
 from risk_sac.run_folder.arrays import read_series
-from risk_sac.run_folder.results import FAILURES, Results, series_name
-from risk_sac.run_folder.verified import read_verified
+from risk_sac.run_folder.results import FAILURES, RunResults, read_verified, series_name
+from risk_sac.search.agents.learner import Learner
+from risk_sac.search.frozen_policy import FrozenPolicy
+from risk_sac.search.run import RunState
 
 logger = logging.getLogger(__name__)
 
 
-def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -> Iterator[Bundle]:
+def bundles(folder: Path, results: RunResults, episodes: Sequence[EpisodeRecord]) -> Iterator[Bundle]:
     """Yields bundles of failures of a run, each after it was played again.
 
     Raises:
@@ -38,7 +37,7 @@ def bundles(folder: Path, results: Results, episodes: Sequence[EpisodeRecord]) -
             yield make_bundle(spec, episode, recorded, repeated(env, spec, episode, recorded).signal_heads, policy)
 
 
-def recorded_bundle(folder: Path, results: Results, episode: EpisodeRecord, policy: FrozenPolicy | None) -> Bundle:
+def recorded_bundle(folder: Path, results: RunResults, episode: EpisodeRecord, policy: FrozenPolicy | None) -> Bundle:
     """Returns a bundle of a failure as it was recorded, whether or not it repeats; without signal heads.
 
     By which code it was recorded is known of runs that were verified.
@@ -54,7 +53,7 @@ def recorded_bundle(folder: Path, results: Results, episode: EpisodeRecord, poli
     return replace(made, manifest=made.manifest.model_copy(update=by))
 
 
-def policy_of(folder: Path, results: Results) -> FrozenPolicy | None:
+def policy_of(folder: Path, results: RunResults) -> FrozenPolicy | None:
     """Returns a run's final policy; None if it learns none, goes on, or has no checkpoint that fits."""
     spec = results.spec
     if not method_of(spec.method).learns or not results.finished:

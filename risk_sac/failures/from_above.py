@@ -1,19 +1,82 @@
 """Draws the view from above: roads, signals, paths, and the bodies at the violation and before it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
+from matplotlib.patheffects import withStroke
 
 from risk_sac.config import FamilyName
-from risk_sac.failures.net import SurfaceUse, roads_of
-from risk_sac.failures.picture_labels import ASIDE, Labels
+from risk_sac.failures.net import LAMPS, SurfaceUse, ribbon, roads_of, signal_heads
 from risk_sac.failures.recording import BOX, Recording, on_body
-from risk_sac.failures.signals import LAMPS, signal_heads
+from risk_sac.host.canvas import canvas, picture
+from risk_sac.maps.found import TITLES, Pattern, Survey
+from risk_sac.maps.net import Net
 from risk_sac.records import Collision
-from risk_sac.types import Floats, Kind, Role
+from risk_sac.world.types import Floats, Kind, Role
+
+ASIDE: Floats = np.array([(0, 1), (0, -1), (1, 0), (-1, 0)], dtype=np.float64)  # above, below, right, left
+GAPS_PT = (3.0, 12.0, 24.0)
+CHARACTER = (0.65, 1.3)  # width and height of one, in font sizes
+HALO = [withStroke(linewidth=2, foreground="white")]
+
+
+@dataclass
+class Labels:
+    """Labels of one view; a box is its lower left and its upper right corner, m."""
+
+    axis: Axes
+    low: Floats  # corners of the view, m
+    high: Floats
+    m_per_pt: float
+    _taken: list[tuple[Floats, Floats]] = field(default_factory=list)
+
+    def reserve(self, corners: Floats) -> None:
+        """Keeps labels off a body, given its corners, `k x 2`, m."""
+        self._taken.append((corners.min(axis=0), corners.max(axis=0)))
+
+    def write(self, text: str, body: Floats, ways: Iterable[Floats], size_pt: float, colour: str) -> None:
+        """Writes beside a body, on the first side with room; writes nothing without any, or out of view.
+
+        Args:
+          text: one line.
+          body: its corners, `k x 2`, m.
+          ways: directions from its middle, best first.
+          size_pt: of the font.
+          colour: of the text.
+        """
+        half = np.array((len(text), 1.0)) * CHARACTER * size_pt * self.m_per_pt / 2
+        middle, reach = (body.min(axis=0) + body.max(axis=0)) / 2, np.ptp(body, axis=0) / 2
+        if (middle < self.low).any() or (middle > self.high).any():
+            return
+        for gap_pt in GAPS_PT:
+            for way in ways:
+                centre = middle + way * (reach + half + gap_pt * self.m_per_pt)
+                box = centre - half, centre + half
+                inside = (box[0] > self.low).all() and (box[1] < self.high).all()
+                if inside and not any(_overlap(box, other) for other in self._taken):
+                    self._taken.append(box)
+                    x, y = centre.tolist()
+                    style: dict[str, Any] = {
+                        "fontsize": size_pt,
+                        "color": colour,
+                        "ha": "center",
+                        "va": "center",
+                        "clip_on": True,
+                    }
+                    self.axis.text(x, y, text, path_effects=HALO, zorder=6, **style)
+                    return
+
+
+def _overlap(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> bool:
+    return bool((one[0] < other[1]).all() and (other[0] < one[1]).all())
+
 
 EGO_COLOUR, OTHER_COLOUR, BYSTANDER_COLOUR = "tab:blue", "tab:red", "tab:gray"
 CONFLICT_COLOUR = "tab:orange"
@@ -166,3 +229,61 @@ def _draw_conflict(axis: Axes, recording: Recording) -> None:
     place = judgement.conflict_x_m, judgement.conflict_y_m
     style: dict[str, Any] = {"marker": "D", "color": CONFLICT_COLOUR, "markersize": 5, "linestyle": "none", "zorder": 5}
     axis.plot(*place, label="striker then", **style)
+
+
+MARKS: dict[Pattern, tuple[str, str]] = {
+    "car_following": ("o", "tab:blue"),
+    "crossing": ("s", "tab:orange"),
+    "junction": ("^", "tab:green"),
+}
+WIDTH_IN, DPI = 9.0, 130
+HEIGHT_IN = (4.5, 12.0)  # the least and the most; in between it goes by the map's
+NAMED = 60  # so many names can be told apart
+
+
+def map_png(net: Net, found: Survey) -> bytes:
+    """The picture of a whole map."""
+    (content,) = picture(partial(_figure, net, found), ["png"], DPI, {})
+    return content
+
+
+def _figure(net: Net, found: Survey) -> Figure:
+    ground = _ground(net)
+    figure = canvas((WIDTH_IN, _height_in(ground)))
+    axis = figure.subplots()
+    for use, colour in SURFACE_COLOURS.items():
+        axis.add_collection(PolyCollection(ground[use], facecolors=colour, edgecolors="0.6", linewidths=0.2))
+    x = [misfit.spot.x_m for misfit in found.misfits]
+    y = [misfit.spot.y_m for misfit in found.misfits]
+    axis.scatter(x, y, s=5, color="0.5", marker="x", linewidths=0.5, label=f"does not fit ({len(x)})")
+    for pattern, (marker, colour) in MARKS.items():
+        spots = [fit.spot for fit in found.fits if fit.spot.pattern == pattern]
+        x, y = [spot.x_m for spot in spots], [spot.y_m for spot in spots]
+        label = f"{TITLES[pattern]} ({len(spots)})"
+        axis.scatter(x, y, s=16, color=colour, marker=marker, alpha=0.8, label=label, zorder=3)
+    if len(found.fits) <= NAMED:
+        for id_, spot in {fit.spot.id: fit.spot for fit in found.fits}.items():  # once where several patterns fit
+            if np.isfinite((spot.x_m, spot.y_m)).all():
+                axis.annotate(id_, (spot.x_m, spot.y_m), (3, 3), textcoords="offset points", fontsize=5, zorder=4)
+    axis.autoscale()
+    axis.set_aspect("equal")
+    axis.set(xlabel="x, m", ylabel="y, m")
+    axis.legend(loc="upper right", fontsize=7)  # the best place takes minutes to find on a large map
+    return figure
+
+
+def _ground(net: Net) -> Mapping[SurfaceUse, Sequence[Floats]]:
+    """Returns the outlines of all surfaces; a lane that is closed to cars is drawn as a sidewalk."""
+    lanes = [lane for edge in net.edges.values() for lane in edge.lanes]
+    return {
+        "junction": [np.array(each.outline) for each in net.junctions.values() if each.outline],
+        "lane": [ribbon(np.array(lane.line), lane.width_m) for lane in lanes if lane.drivable],
+        "sidewalk": [ribbon(np.array(lane.line), lane.width_m) for lane in lanes if not lane.drivable],
+        "crossing": [ribbon(np.array(each.line), each.width_m) for each in net.crossings],
+    }
+
+
+def _height_in(ground: Mapping[SurfaceUse, Sequence[Floats]]) -> float:
+    points = np.concatenate([outline for outlines in ground.values() for outline in outlines])
+    wide_m, high_m = np.maximum(np.ptp(points, axis=0), 1.0)
+    return float(np.clip(WIDTH_IN * high_m / wide_m, *HEIGHT_IN))

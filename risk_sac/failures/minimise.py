@@ -15,8 +15,8 @@ from risk_sac.failures.bundle import Bundle, make_bundle
 from risk_sac.failures.play import play
 from risk_sac.failures.sentence import story
 from risk_sac.failures.studied import Core, Extent
-from risk_sac.failures.variants import Stage, Variant, alike
-from risk_sac.types import STEP_S, Bools, Floats
+from risk_sac.failures.variants import Variant, VariantPlayer, alike
+from risk_sac.world.types import STEP_S, Bools, Floats
 
 MOST = 150  # episodes that are played for one failure
 COPIES, HELD, SHARE = 10, 8, 0.01  # a reduction counts if so many copies, perturbed by that much, still fail
@@ -37,18 +37,18 @@ def minimise(bundle: Bundle, most: int = MOST) -> Bundle:
       ConfigError: the bundle holds no valid failure that can be played here.
       SimulationError: it does not happen here.
     """
-    search = _Search(bundle, most)
+    search = _MinimalSearch(bundle, most)
     with closing(search.stage.env):
         _reduce_actions(search)
         _reduce_scene(search)
         return search.bundle(bundle)
 
 
-class _Search:
+class _MinimalSearch:
     """Search for a minimal failure."""
 
     def __init__(self, bundle: Bundle, most: int) -> None:
-        self.stage = Stage(bundle)
+        self.stage = VariantPlayer(bundle)
         self.left = self.stage.original
         self._most = most
         self._random = np.random.default_rng(0)  # new copies each time, or the search would fit fixed ones
@@ -106,14 +106,14 @@ class _Search:
         return make_bundle(origin.manifest.spec, episode, played.series, played.signal_heads, origin.policy, core)
 
 
-def _active_adversaries(search: _Search) -> list[int]:
+def _active_adversaries(search: _MinimalSearch) -> list[int]:
     """Returns the adversaries that act, the striker last."""
     names = search.stage.env.problem.family.adversaries
     active = [k for k in range(len(names)) if search.left.actions[:, _columns(k)].any()]
     return sorted(active, key=lambda k: names[k] == search.stage.failure.other_id)
 
 
-def _units(search: _Search) -> Iterator[list[Cell]]:
+def _units(search: _MinimalSearch) -> Iterator[list[Cell]]:
     """Yields candidates for removal, the coarsest first.
 
     Each group is made from the actions that remain by then.
@@ -125,7 +125,7 @@ def _units(search: _Search) -> Iterator[list[Cell]]:
     yield [(_rows(s), slice(c, c + 1)) for c, s in _channels_of(search.left)]
 
 
-def _reduce_actions(search: _Search) -> None:
+def _reduce_actions(search: _MinimalSearch) -> None:
     """Hands adversaries over to SUMO, then weakens the remaining actions.
 
     It tries whole adversaries, then their drive or steering, then segments of 0.5 s.
@@ -136,7 +136,7 @@ def _reduce_actions(search: _Search) -> None:
         pass
 
 
-def _reduce_scene(search: _Search) -> None:
+def _reduce_scene(search: _MinimalSearch) -> None:
     """Moves parameters to the middle of their ranges, and those that cannot be moved there half the way."""
 
     def unneeded(share: float, chunk: Sequence[int]) -> bool:

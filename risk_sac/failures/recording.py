@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from risk_sac.records import Collision, Violation
 from risk_sac.run_folder.results import RecordedFailure
-from risk_sac.types import Floats
+from risk_sac.world.types import Floats
 
 Series = Mapping[str, NDArray[Any]]
 BOX = [(1, 1), (-1, 1), (-1, -1), (1, -1)]  # corners of a body

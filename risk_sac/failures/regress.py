@@ -16,10 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.agents.decisions import Held
-from risk_sac.agents.follower import ScriptFollower
 from risk_sac.config import EgoConfig, RunSpec, method_of
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import ConfigError, InfeasibleScene, RiskSacError
 from risk_sac.failures.bundle import Bundle, check_world, code_digest, make_bundle, versions
 from risk_sac.failures.cases import Case, Verdict
@@ -28,9 +26,9 @@ from risk_sac.failures.play import Played, Policy, play
 from risk_sac.failures.recording import actions_of, trajectory_digest
 from risk_sac.failures.variants import alike
 from risk_sac.records import Collision, Violation
-from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.verified import distinct_failures
-from risk_sac.types import Floats, Scene
+from risk_sac.run_folder.results import distinct_failures, read_results
+from risk_sac.search.agents.controls import Held, ScriptFollower
+from risk_sac.world.types import Floats, Scene
 
 WORSE = (Verdict.FIXED, Verdict.NOT_COMPARABLE, Verdict.NEW_KIND, Verdict.STILL_FAILING)
 BLIND = "seen_before"  # the rule that an ego breaks by seeing nothing: no way to be fixed

@@ -14,18 +14,17 @@ from pathlib import Path
 
 import numpy as np
 
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene, RiskSacError, SimulationError
 from risk_sac.failures.play import replay
 from risk_sac.failures.recording import trajectory_digest
 from risk_sac.records import EpisodeRecord
 from risk_sac.risk.measures import soft_min
 from risk_sac.run_folder.arrays import read_series
-from risk_sac.run_folder.results import FAILURES, Results, read_results, series_name
-from risk_sac.run_folder.verified import distinct_failures
+from risk_sac.run_folder.results import FAILURES, RunResults, distinct_failures, read_results, series_name
 
 ATTEMPTS = 3
-Prepared = Mapping[Path, tuple[Results, RiskSacEnv]]
+Prepared = Mapping[Path, tuple[RunResults, RiskSacEnv]]
 
 
 def _prepared(file: Path, folders: Sequence[Path]) -> Prepared:

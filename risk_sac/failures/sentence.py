@@ -7,11 +7,11 @@ import numpy as np
 
 from risk_sac.failures.recording import Series
 from risk_sac.records import Collision, Violation
-from risk_sac.types import STEP_S, Floats, Kind
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
 from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
 from risk_sac.verdicts.labels import ONCOMING_COS, RESPONSES
 from risk_sac.verdicts.offences import IN_WORDS, STANDING_MPS
+from risk_sac.world.types import STEP_S, Floats, Kind
 
 IN_LANE_M = 1.5  # a vehicle nearer to the ego's axis leads it, or follows
 ACROSS_MPS = 0.2  # slower lateral motion does not change the place in a lane

@@ -10,15 +10,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from risk_sac.canvas import canvas, picture
 from risk_sac.config import FamilyName
 from risk_sac.errors import ConfigError
 from risk_sac.failures.from_above import CONFLICT_COLOUR, EGO_COLOUR, OTHER_COLOUR, draw_from_above, legend
 from risk_sac.failures.recording import Recording
+from risk_sac.host.canvas import canvas, picture
 from risk_sac.records import Collision, Violation
-from risk_sac.risk.ttc import TTC_CAP_S
-from risk_sac.types import STEP_S, Floats
+from risk_sac.risk.rss import TTC_CAP_S
 from risk_sac.verdicts.words import began, ego_did, known, prevented_by
+from risk_sac.world.types import STEP_S, Floats
 
 CAPTION_WIDTH = 120  # characters
 SEEN_COLOUR, RELEASE_COLOUR, HIDDEN_COLOUR, ALSO_COLOUR = "tab:green", "tab:purple", "0.9", "tab:brown"

@@ -5,20 +5,19 @@ from contextlib import closing
 from pathlib import Path
 
 from risk_sac.config import method_of
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.failures.bundle import bundle_bytes, make_bundle
-from risk_sac.failures.export.formats import FORMATS, export
+from risk_sac.failures.export.formats import FORMATS, export, packed
 from risk_sac.failures.export.recorded import Recorded
-from risk_sac.failures.export.written import packed
 from risk_sac.failures.minimise import minimise
 from risk_sac.failures.play import repeated, twin
 from risk_sac.failures.question import REFUSED, Question, TwinPlay, twin_bytes
 from risk_sac.failures.recording import actions_of
 from risk_sac.failures.variants import region
-from risk_sac.frozen_policy import FrozenPolicy
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, read_results
+from risk_sac.search.frozen_policy import FrozenPolicy
 
 
 def answer(question: Question) -> bytes:

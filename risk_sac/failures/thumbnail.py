@@ -9,10 +9,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from risk_sac.failures.net import Surface
+from risk_sac.failures.net import LAMPS, SignalHead, Surface
 from risk_sac.failures.recording import BOX, Recording, on_body
-from risk_sac.failures.signals import LAMPS, SignalHead
-from risk_sac.types import STEP_S, Floats, Kind
+from risk_sac.world.types import STEP_S, Floats, Kind
 
 WIDTH, HEIGHT = 240, 150  # px
 VIEW_S = 3.0  # before the violation

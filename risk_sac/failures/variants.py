@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.failures.bundle import Bundle, check_world
 from risk_sac.failures.play import play
@@ -17,7 +17,7 @@ from risk_sac.failures.recording import actions_of
 from risk_sac.failures.studied import Region, Share, valid_failure
 from risk_sac.records import Collision, Violation
 from risk_sac.scenario.space import SceneSpace
-from risk_sac.types import STEP_S, Floats, Scene
+from risk_sac.world.types import STEP_S, Floats, Scene
 
 SCENES, COPIES = (0.01, 0.02, 0.05), 40  # of a region: shares of the scene parameters' ranges, and copies at each
 SEEDS = 10  # of the traffic
@@ -46,7 +46,7 @@ class Variant:
         )
 
 
-class Stage:
+class VariantPlayer:
     """Player for variants of one failure.
 
     `original` is the failure up to the violation, and a tail of no action.
@@ -143,13 +143,13 @@ def region(bundle: Bundle) -> Region:
       ConfigError: the bundle holds no valid failure that can be played here.
       SimulationError: it does not happen here.
     """
-    stage = Stage(bundle)
+    stage = VariantPlayer(bundle)
     with closing(stage.env):
         failed = {what: [stage.fails(variant) for variant in variants] for what, variants in _neighbours(stage)}
     return Region(shares=tuple(Share.of(what, sum(each), len(each)) for what, each in failed.items()))
 
 
-def _neighbours(stage: Stage) -> Iterator[tuple[str, list[Variant]]]:
+def _neighbours(stage: VariantPlayer) -> Iterator[tuple[str, list[Variant]]]:
     original, space, random = stage.original, stage.space, np.random.default_rng(0)
     for share in SCENES:
         yield f"scene by {share:.0%}", [original.perturbed(space, share, 0.0, random) for _ in range(COPIES)]

@@ -6,21 +6,24 @@ Source: RISK-SAC, Sec. IV (evaluation metrics); what the paper leaves open is ma
 """
 
 from risk_sac.metrics.accumulator import MetricsAccumulator, results_digest
-from risk_sac.metrics.features import FEATURES, outcome_features
-from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, clopper_pearson, wilson_interval
 from risk_sac.metrics.metric import (
+    FEATURES,
+    RESAMPLING_SEED,
     Estimate,
     Metric,
     Ratio,
+    bootstrap_interval,
+    clopper_pearson,
     estimate,
     headline_driven_by,
     mean_over_runs,
+    outcome_features,
     pcr_by_driver,
     pooled_bins,
     pooled_counts,
     pooled_headline,
     pooled_names,
+    wilson_interval,
 )
-from risk_sac.metrics.requirements import COLUMNS, pooled_requirements, requirement_cells
 from risk_sac.metrics.rows import METRICS, RATIOS, MetricName
-from risk_sac.metrics.tally import WINDOW, Tally, preventable
+from risk_sac.metrics.tally import COLUMNS, WINDOW, Tally, pooled_requirements, preventable, requirement_cells

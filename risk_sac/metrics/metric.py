@@ -1,13 +1,76 @@
 """A row of the metrics: names, formula, and pooling of runs. Pure."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
-from typing import Any
+from typing import Any, NamedTuple
 
-from risk_sac.metrics.intervals import RESAMPLING_SEED, bootstrap_interval, wilson_interval
-from risk_sac.records import Counts, DrivenBy, DriverPcr, RunMetrics
+import numpy as np
+
+from risk_sac.errors import NotFinite
+from risk_sac.records import Collision, Counts, DrivenBy, DriverPcr, RunMetrics
+from risk_sac.world.types import Floats
+
+NORMAL_QUANTILE = 1.959963984540054  # two-sided 95 %
+CONFIDENCE = 0.95  # of each bound
+RESAMPLES = 10_000
+RESAMPLING_SEED = 0
+
+
+def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a rate.
+
+    It lies within [0, 1] and contains k/n; without trials nothing is known and it is [0, 1].
+
+    Source: Wilson 1927, Probable inference, the law of succession, and statistical inference.
+    """
+    if trials == 0:
+        return 0.0, 1.0
+    z2 = NORMAL_QUANTILE**2
+    rate = successes / trials
+    centre = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
+    half = NORMAL_QUANTILE * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials**2)) / (1 + z2 / trials)
+    # At rates of 0 and 1 the bound equals the rate; rounding must not push it past.
+    return max(0.0, min(centre - half, rate)), min(1.0, max(centre + half, rate))
+
+
+def clopper_pearson(successes: int, trials: int) -> tuple[float, float]:
+    """Exact one-sided 95 % bounds of a rate, from trials that are independent and alike.
+
+    With the upper bound as the rate, no more than k successes come in 5 % of all cases; with the lower one, no fewer.
+    The rate is below the one with 95 % confidence, and above the other with 95 %; between both with 90 %.
+
+    0 of 300 gives (0, 0.00994); without trials nothing is known and the bounds are (0, 1).
+
+    Source: Clopper & Pearson 1934, The use of confidence or fiducial limits illustrated in the case of the binomial.
+    """
+    from scipy.special import betaincinv  # here, because few ask for bounds, and every process of a server loads this
+
+    low = float(betaincinv(successes, trials - successes + 1, 1 - CONFIDENCE)) if successes else 0.0
+    high = float(betaincinv(successes + 1, trials - successes, CONFIDENCE)) if successes < trials else 1.0
+    return low, high
+
+
+def bootstrap_interval(values: Sequence[float], seed: int) -> tuple[float, float]:
+    """Percentile bootstrap 95 % interval of the mean over seeds.
+
+    With fewer than about ten seeds it is narrower than its name; one seed gives a point. It stays within the values'
+    range. `seed` is that of the resampling; the same seed gives the same interval.
+
+    Raises:
+        ValueError: there are no values.
+        NotFinite: a value is NaN or infinite.
+    """
+    if not values:
+        raise ValueError("values is empty; wanted one figure per seed")
+    sample = np.asarray(values, dtype=np.float64)
+    if not np.isfinite(sample).all():
+        raise NotFinite(f"values is {list(values)}; wanted finite figures, one per seed")
+    drawn = np.random.default_rng(seed).integers(len(sample), size=(RESAMPLES, len(sample)))
+    low, high = np.quantile(sample[drawn].mean(axis=1), (0.025, 0.975)).clip(sample.min(), sample.max())
+    return float(low), float(high)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -135,3 +198,52 @@ def pcr_by_driver(metrics: Sequence[RunMetrics]) -> dict[str, DriverPcr]:
 def pooled_bins(histograms: Sequence[Sequence[int]]) -> tuple[int, ...]:
     """Histograms summed bin by bin; one from before there were any is empty."""
     return tuple(map(sum, zip_longest(*histograms, fillvalue=0)))
+
+
+class Feature(NamedTuple):
+    """One outcome feature and the physical range that is scaled to [0, 1]; values beyond it are clipped."""
+
+    name: str
+    low: float
+    high: float
+
+
+# Choice: the paper names the features but no scale. Fixed physical ranges keep OFD comparable between runs.
+FEATURES = (
+    Feature("early_min_ttc_s", 0.0, 3.0),  # beyond 3 s there is no conflict
+    Feature("relative_speed_mps", 0.0, 20.0),  # urban: 72 km/h
+    Feature("lateral_offset_m", -3.5, 3.5),  # half a car's length plus half a car's width to either side
+    Feature("early_min_robustness", -3.0, 1.0),  # in scales: the monitor clips at -3, and 1 is a clear margin
+)
+
+
+def outcome_features(collision: Collision) -> Floats:
+    """The outcome features of one failure, in the order of `FEATURES`, each scaled to [0, 1] and clipped.
+
+    Raises:
+        NotFinite: a feature is NaN; infinite ones are clipped.
+    """
+    values = np.array([getattr(collision, feature.name) for feature in FEATURES], dtype=np.float64)
+    if np.isnan(values).any():
+        raise NotFinite(f"collision at {collision.time_s:g} s has outcome features {values.tolist()}; wanted no NaN")
+    low, high = (np.array([getattr(feature, end) for feature in FEATURES]) for end in ("low", "high"))
+    scaled: Floats = ((values - low) / (high - low)).clip(0.0, 1.0)
+    return scaled
+
+
+class Spread:
+    """Σ_{i<j} ||x_i - x_j|| over the failures' features; another failure costs as many distances as there are."""
+
+    def __init__(self) -> None:
+        self.distance = 0.0
+        self._count = 0
+        self._features = np.empty((64, len(FEATURES)))  # doubled when full; the first `_count` rows count
+
+    def add(self, features: Floats) -> None:
+        """Add one failure: `FEATURES`, scaled."""
+        if self._count == len(self._features):
+            self._features = np.concatenate((self._features, np.empty_like(self._features)))
+        rows = self._features[: self._count]
+        self.distance += float(np.sqrt(((rows - features) ** 2).sum(axis=1)).sum())
+        self._features[self._count] = features
+        self._count += 1

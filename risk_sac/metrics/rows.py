@@ -8,8 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from risk_sac.metrics.features import FEATURES
-from risk_sac.metrics.metric import Metric, Ratio
+from risk_sac.metrics.metric import FEATURES, Metric, Ratio
 from risk_sac.metrics.tally import WINDOW, Tally
 from risk_sac.records import ARTEFACT_RULES, Counts
 

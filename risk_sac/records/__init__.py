@@ -10,8 +10,12 @@ from risk_sac.records.campaign import (
     CampaignHead,
     CampaignPage,
     CampaignSummary,
+    DefectPower,
+    MethodPower,
+    Power,
     Progress,
     Results,
+    RunBudget,
     StateChange,
     Total,
 )
@@ -40,7 +44,6 @@ from risk_sac.records.judgement import (
     ReferenceOutcome,
     Severity,
 )
-from risk_sac.records.power import DefectPower, MethodPower, Power, RunBudget
 from risk_sac.records.run import (
     FINAL,
     Counts,

@@ -1,12 +1,83 @@
-"""One campaign: how far it is and what it found."""
+"""Number of known defects that a campaign's budget detects.
+
+It comes from benchmark runs, and says what finding nothing is worth.
+"""
 
 from collections.abc import Mapping
 from datetime import datetime
+from typing import Literal
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records.base import Adjustment, Page, Record
+from risk_sac.records.base import Adjustment, Page, Real, Record
 from risk_sac.records.run import Counts, DriverPcr, Family, RequirementCounts, Run, RunResult, SearchMethod, State
-from risk_sac.series import Real
+from risk_sac.world.types import OptionalReal
+
+
+class RunBudget(Record):
+    """Budget of each run of a method in a family."""
+
+    family: str
+    runs: int
+    """Seeds."""
+    episodes: int
+    """Search episodes: as the budget has them; of runs that have ended, what they played on average."""
+    steps_per_episode: Real
+    """Environment steps, on average."""
+    estimated_from: Literal["campaign", "benchmark"]
+    """Whose episodes that average is of: the campaign's own once there are some."""
+    steps: int
+    """Environment steps of the run."""
+
+
+class DefectPower(Record):
+    """Share of benchmark runs that detected a known defect within the budget."""
+
+    defect: str
+    family: str
+    detected: int
+    """Runs."""
+    runs: int
+    """That were measured, each with a seed of its own."""
+
+
+class MethodPower(Record):
+    """Number of known defects that a method detects with the budget."""
+
+    method: str
+    budgets: tuple[RunBudget, ...]
+    """Of the campaign's families that were measured."""
+    defects: tuple[DefectPower, ...]
+    expected: Real
+    """How many the seeds of the campaign together detect, on average."""
+    at_least: bool
+    """Whether the budget is larger than what was measured, so that it may detect more."""
+    in_most_seeds: tuple[str, ...]
+    """Defects that more than half of the runs detected."""
+    at_least_once: tuple[str, ...]
+    """Defects that some run detected."""
+    never: tuple[str, ...]
+    """Defects that no run detected."""
+    sentences: tuple[str, ...]
+    """The same in words, and in which families nothing was measured."""
+
+
+class Power(Record):
+    """Number of known defects that a campaign's budget detects, by stored benchmark runs.
+
+    Nothing is run for it.
+    """
+
+    note: str
+    """What the figures rest on."""
+    comparison: str
+    """Methods on the defects and steps that all were measured with; empty unless two or more were measured."""
+    methods: tuple[MethodPower, ...]
+
+    @property
+    def lines(self) -> list[str]:
+        """The comparison if there is one, and a line for each method."""
+        lines = [f"{each.method}: {' '.join(each.sentences)}" for each in self.methods]
+        return [self.comparison, *lines] if self.comparison else lines
 
 
 class Progress(Record):
@@ -32,20 +103,20 @@ class Progress(Record):
     """Those without minor contacts."""
     headline_waiting: int = 0
     """Candidates in runs that were not replayed yet."""
-    window_ecr: Real
+    window_ecr: OptionalReal
     """ECR over each run's newest 100 episodes: mean over the runs at work, or all once none is; without
     controls, unless there is nothing else."""
-    window_pcr: Real
+    window_pcr: OptionalReal
     """PCR, averaged the same way."""
-    dual_variable: Real
+    dual_variable: OptionalReal
     """λ, averaged the same way."""
-    temperature: Real
+    temperature: OptionalReal
     """α, averaged the same way."""
-    eta_s: Real
+    eta_s: OptionalReal
     """Seconds until the campaign ends at its present pace; null before there is one, 0 at the end."""
 
 
-class Driver(Record):
+class EgoDriver(Record):
     """The ego's driver. No enums, so that campaigns of earlier versions can be listed."""
 
     profile: str
@@ -77,7 +148,7 @@ class CampaignSummary(CampaignHead):
 
     families: list[str]
     methods: list[str]
-    ego: Driver
+    ego: EgoDriver
     """The rest of its settings is in the campaign's `spec`."""
     progress: Progress
 
@@ -125,21 +196,21 @@ class Total(Counts):
     runs: int
     headline: int | None = None
     """Each kind once."""
-    ecr: Real
-    ecr_low: Real
+    ecr: OptionalReal
+    ecr_low: OptionalReal
     """95 % interval: Wilson over all episodes, widened to the bootstrap over the seeds."""
-    ecr_high: Real
-    pcr: Real
-    pcr_low: Real
+    ecr_high: OptionalReal
+    pcr: OptionalReal
+    pcr_low: OptionalReal
     """95 % interval, as that of the ECR."""
-    pcr_high: Real
-    efficiency: Real
-    cost_rate: Real
-    dispersion: Real
+    pcr_high: OptionalReal
+    efficiency: OptionalReal
+    cost_rate: OptionalReal
+    dispersion: OptionalReal
     """Over the runs that have one."""
-    steps_per_distinct_failure: Real
+    steps_per_distinct_failure: OptionalReal
     """Of the sums."""
-    unresponsive_share: Real
+    unresponsive_share: OptionalReal
     """Of the valid contacts; null without one."""
     pcr_by_driver: Mapping[str, DriverPcr] = {}
     """Reference driver → its own PCR."""

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, get_args
 from risk_sac.records.base import Least, Page, Real, Record
 from risk_sac.records.run import DrivenBy, Funnel
 from risk_sac.records.violation import Collision, RequirementResult, Violation
-from risk_sac.series import Series
+from risk_sac.world.types import Series
 
 
 class Outcome(StrEnum):

@@ -40,7 +40,7 @@ class Fault(StrEnum):
 class Severity(StrEnum):
     """Severity of a contact, by closing speed and risk of injury.
 
-    See `risk_sac.verdicts.severity`.
+    See `risk_sac.verdicts.labels`.
     """
 
     MINOR = "minor"  # between vehicles that close at less than 2 m/s

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, Interval, Odd
 from risk_sac.records import Collision, ConflictType, EpisodeRecord, Outcome, Record
-from risk_sac.scenario.environment import with_environment
 from risk_sac.scenario.family import Family
+from risk_sac.scenario.limits import with_environment
 from risk_sac.scenario.odd import TINY, field, intersect, narrow, paths
 from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.types import Bools, Floats
 from risk_sac.verdicts.distinct import CELLS, FailureKind, kind_of
+from risk_sac.world.types import Bools, Floats
 
 BINS, PAIR_BINS = 10, 4
 NOT_PLAYED = (Outcome.REJECTED, Outcome.INVALID)

@@ -10,9 +10,8 @@ from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.errors import ConfigError, DamagedError, RiskSacError
 from risk_sac.failures.cases import Regression
 from risk_sac.failures.clusters import Cluster
-from risk_sac.failures.net import roads_of
+from risk_sac.failures.net import roads_of, signal_heads
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.signals import signal_heads
 from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.records import Collision, EpisodeRecord, Power, Violation
 from risk_sac.report.comparison import Comparison

@@ -10,7 +10,7 @@ from risk_sac.config.spec_file import read_campaign
 from risk_sac.errors import ConfigError
 from risk_sac.report.comparison import Comparison, compare
 from risk_sac.report.runs import FinishedRun, read_run
-from risk_sac.run_folder.results import Results, read_results
+from risk_sac.run_folder.results import RunResults, read_results
 from risk_sac.scenario.families import family_named
 
 SPEC, RUNS = "spec.yaml", "runs"
@@ -51,7 +51,7 @@ def read_folders(paths: Sequence[Path]) -> Inputs:
     )
 
 
-def campaign_in(paths: Sequence[Path]) -> tuple[CampaignSpec, Mapping[Path, Results]]:
+def campaign_in(paths: Sequence[Path]) -> tuple[CampaignSpec, Mapping[Path, RunResults]]:
     """Reads the campaign of some folders, and the results of its runs by their folder; arguments as above.
 
     Raises:
@@ -69,7 +69,7 @@ def campaign_in(paths: Sequence[Path]) -> tuple[CampaignSpec, Mapping[Path, Resu
     return _campaign([each.spec for each in results.values()]), results
 
 
-def _readable(paths: Iterable[Path]) -> Iterator[tuple[Path, Results]]:
+def _readable(paths: Iterable[Path]) -> Iterator[tuple[Path, RunResults]]:
     for path in paths:
         with contextlib.suppress(ConfigError):
             yield path, read_results(path)

@@ -13,8 +13,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures.studied import Studied, read_studies
 from risk_sac.metrics import MetricsAccumulator, Tally, results_digest
 from risk_sac.records import PHASES, EpisodeRecord, Phase, RunMetrics
-from risk_sac.run_folder.results import EPISODES, read_results, records_from_lines
-from risk_sac.run_folder.verified import Verified, read_verified
+from risk_sac.run_folder.results import EPISODES, Verified, read_results, read_verified, records_from_lines
 from risk_sac.scenario.families import family_named
 
 

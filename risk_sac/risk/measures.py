@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from risk_sac.config import Requirement
-from risk_sac.jit import compiled
-from risk_sac.risk.own_motion import OwnMotionGauge
-from risk_sac.risk.publish import Assessment, assess, publish
+from risk_sac.maps.carriageway import Carriageway
+from risk_sac.risk.publish import Assessment, OwnMotionGauge, assess, publish
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import Monitor
-from risk_sac.scenario.carriageway import Carriageway
-from risk_sac.types import STEP_S, Bools, Floats, Frame
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import STEP_S, Bools, Floats, Frame
 
 
 @compiled

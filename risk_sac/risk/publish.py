@@ -1,17 +1,206 @@
-"""Computes the published signals of a frame."""
+"""The ego's own motion, its place on the carriageway and its headway; one compiled call per frame."""
 
+import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.geometry import RelativeView, frame_view, time_to_contact
-from risk_sac.jit import compiled
-from risk_sac.risk.own_motion import OwnMotion
-from risk_sac.risk.rss import LONGITUDINAL_CAP_M, SCALED_HIGH, margins
+from risk_sac.maps.carriageway import ANY_WAY, Carriageway, sector_of
+from risk_sac.risk.rss import ENCOUNTER_CAP_S, LONGITUDINAL_CAP_M, SCALED_HIGH, TTC_CAP_S, margins, time_to_encounter
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.risk.ttc import ENCOUNTER_CAP_S, TTC_CAP_S, time_to_encounter
-from risk_sac.types import Bools, Floats, Frame, Kind, Signal
+from risk_sac.world.geometry import RelativeView, frame_view, time_to_contact
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import ACCEL, HEADING, LENGTH, SPEED, STEP_S, WIDTH, Bools, Floats, Frame, Kind, Signal, X, Y
+
+WINDOW_S = 0.3  # over which changes of acceleration and heading are taken: SUMO's drivers correct in every step
+JERK_CAP_MPS3 = 60.0
+LATERAL_ACCEL_CAP_MPS2 = 20.0
+LANE_OFFSET_CAP_M = 10.0
+OVER_LIMIT_CAP_MPS = 60.0
+BEYOND_CAP_M = -10.0  # the carriageway is not searched farther away
+EDGE_CAP_M = 5.0
+CARRIAGEWAY_CAP_M = 3.0
+HEADWAY_CAP_S = 10.0
+
+SAME_WAY_COS = 0.5  # lanes at more than 60° are not of the ego's direction
+STANDING_MPS = 0.5
+PASSING_M, PASSED_M = 30.0, 10.0  # before the ego's centre and behind its rear: an ego beside such an actor overtakes
+LEAST_SPEED_MPS = 1.0  # a slower ego has no curvature
+MOST_CURVATURE = 0.2  # 1/m; no car turns more sharply
+VEHICLE = int(Kind.VEHICLE)  # compiled code knows no enums of int8
+
+
+class OwnMotion(NamedTuple):
+    """Values of the ego's motion signals in one frame."""
+
+    ego_jerk_mps3: float
+    ego_lateral_accel_mps2: float
+    lane_offset_m: float
+    over_limit_mps: float
+    edge_m: float
+    carriageway_m: float
+    headway_s: float
+
+
+class OwnMotionGauge:
+    """Measures the ego's motion frame by frame.
+
+    Attributes:
+      carriageway: of the net.
+    """
+
+    def __init__(self) -> None:
+        self.reset(Carriageway())
+
+    def reset(self, carriageway: Carriageway) -> None:
+        """Begins an episode on a net."""
+        self.carriageway = carriageway
+        self._past = deque[tuple[float, float, float]](maxlen=round(WINDOW_S / STEP_S) + 1)
+
+    def remember(self, frame: Frame) -> None:
+        """Stores the next frame without measuring it."""
+        self._past.append((frame.time_s, frame.state.item(HEADING, 0), frame.state.item(ACCEL, 0)))
+
+    def measure(self, frame: Frame) -> OwnMotion:
+        """Measures the next frame."""
+        state = frame.state
+        x_m, y_m, heading_rad = state.item(X, 0), state.item(Y, 0), state.item(HEADING, 0)
+        self.remember(frame)
+        around = self.carriageway.around(x_m, y_m, sector_of(heading_rad))
+        measured, overtakes = _measured(state, frame.kind, self._past[0], frame.time_s, *around)
+        if overtakes:
+            around = self.carriageway.around(x_m, y_m, ANY_WAY)
+            measured, _ = _measured(state, frame.kind, self._past[0], frame.time_s, *around)
+        return OwnMotion(*measured)
+
+
+@compiled
+def _measured(
+    state: Floats, kind: NDArray[np.int8], past: tuple[float, float, float], now_s: float, edges: Floats, lanes: Floats
+) -> tuple[tuple[float, float, float, float, float, float, float], bool]:
+    """The fields of `OwnMotion`, and whether the ego overtakes beyond the edge of its own direction."""
+    past_s, past_heading, past_accel = past
+    speed, span_s = state[SPEED, 0], now_s - past_s
+    jerk, yaw_rate = 0.0, 0.0
+    if span_s > WINDOW_S - STEP_S / 2:  # else the episode has just begun, and how it began is no motion
+        turn = state[HEADING, 0] - past_heading
+        yaw_rate = math.atan2(math.sin(turn), math.cos(turn)) / span_s
+        jerk = min(abs(state[ACCEL, 0] - past_accel) / span_s, JERK_CAP_MPS3)
+    offset, limit = nearest_lane(lanes, state[X, 0], state[Y, 0], state[HEADING, 0])
+    edge, carriageway = depths(edges, state)
+    curvature = 0.0 if speed < LEAST_SPEED_MPS else min(max(yaw_rate / speed, -MOST_CURVATURE), MOST_CURVATURE)
+    measured = (
+        jerk,
+        min(speed * abs(yaw_rate), LATERAL_ACCEL_CAP_MPS2),
+        min(offset, LANE_OFFSET_CAP_M),
+        max(speed - limit, -OVER_LIMIT_CAP_MPS),
+        edge,
+        carriageway,
+        headway(state, kind, curvature),
+    )
+    return measured, edge < 0.0 and overtakes(edges, state)
+
+
+@compiled
+def nearest_lane(lanes: Floats, x: float, y: float, heading: float) -> tuple[float, float]:
+    """Finds the distance to the nearest lane of the ego's direction, and its limit.
+
+    The distance is to the lane's middle, inf without one; the limit is then that of the nearest lane of any direction,
+    inf without one.
+    """
+    cos, sin = math.cos(heading), math.sin(heading)
+    least2, least2_any, limit, limit_any = math.inf, math.inf, math.inf, math.inf
+    for i in range(len(lanes)):
+        dx, dy = x - lanes[i, 0], y - lanes[i, 1]
+        along = min(max(dx * lanes[i, 2] + dy * lanes[i, 3], 0.0), lanes[i, 4])
+        dx, dy = dx - along * lanes[i, 2], dy - along * lanes[i, 3]
+        distance2 = dx * dx + dy * dy
+        if distance2 < least2_any:
+            least2_any, limit_any = distance2, lanes[i, 5]
+        if distance2 < least2 and cos * lanes[i, 2] + sin * lanes[i, 3] > SAME_WAY_COS:
+            least2, limit = distance2, lanes[i, 5]
+    return math.sqrt(least2), limit_any if math.isinf(limit) else limit
+
+
+@compiled
+def depths(edges: Floats, state: Floats) -> tuple[float, float]:
+    """The least and the largest depth of the ego's body in the carriageway, over 15 points of it."""
+    cos, sin = math.cos(state[HEADING, 0]), math.sin(state[HEADING, 0])
+    least, largest = EDGE_CAP_M, BEYOND_CAP_M
+    for i in range(-2, 3):
+        for j in range(-1, 2):
+            along, across = i * state[LENGTH, 0] / 4, j * state[WIDTH, 0] / 2
+            here = depth(edges, state[X, 0] + along * cos - across * sin, state[Y, 0] + along * sin + across * cos)
+            least, largest = min(least, here), max(largest, here)
+    return max(least, BEYOND_CAP_M), min(largest, CARRIAGEWAY_CAP_M)
+
+
+@compiled
+def depth(edges: Floats, x: float, y: float) -> float:
+    """Distance of a point from the edge of the carriageway, negative outside (even-odd rule)."""
+    inside, least2 = False, math.inf
+    for i in range(len(edges)):
+        dx, dy = x - edges[i, 0], y - edges[i, 1]
+        wx, wy = edges[i, 2] - edges[i, 0], edges[i, 3] - edges[i, 1]
+        if (y < edges[i, 1]) != (y < edges[i, 3]) and dx < wx * dy / wy:
+            inside = not inside
+        if edges[i, 4] != 0.0:
+            share = min(max((dx * wx + dy * wy) * edges[i, 4], 0.0), 1.0)
+            dx, dy = dx - share * wx, dy - share * wy
+            least2 = min(least2, dx * dx + dy * dy)
+    return math.sqrt(least2) if inside else -math.sqrt(least2)
+
+
+@compiled
+def overtakes(edges: Floats, state: Floats) -> bool:
+    """Tells whether the ego passes an actor that stands or is slower.
+
+    The actor is on the carriageway of the ego's direction, beside the ego or ahead.
+
+    Choice: from `PASSED_M` behind the ego's rear, room to come back, to `PASSING_M` ahead of its centre.
+    """
+    cos, sin = math.cos(state[HEADING, 0]), math.sin(state[HEADING, 0])
+    for i in range(1, state.shape[1]):
+        dx, dy = state[X, i] - state[X, 0], state[Y, i] - state[Y, 0]
+        ahead = dx * cos + dy * sin
+        front, rear = ahead + state[LENGTH, i] / 2, ahead - state[LENGTH, i] / 2
+        slower = state[SPEED, i] < max(state[SPEED, 0], STANDING_MPS)
+        beside = rear < PASSING_M and front > -state[LENGTH, 0] / 2 - PASSED_M
+        if slower and beside and depth(edges, state[X, i], state[Y, i]) > 0.0:
+            return True
+    return False
+
+
+@compiled
+def headway(state: Floats, kind: NDArray[np.int8], curvature: float) -> float:
+    """Computes the time gap to the vehicle that the ego follows, s.
+
+    The gap is from bumper to body, at the ego's speed.
+
+    The corridor is as wide as the ego, along the arc that it drives now (ISO 15622 predicts the way alike). Vehicles
+    that come towards it or cross at more than 60° are not followed.
+    """
+    cos, sin = math.cos(state[HEADING, 0]), math.sin(state[HEADING, 0])
+    least = math.inf
+    for i in range(1, state.shape[1]):
+        dx, dy = state[X, i] - state[X, 0], state[Y, i] - state[Y, 0]
+        along, across = dx * cos + dy * sin, dy * cos - dx * sin
+        if abs(curvature) > 1e-4:
+            radius, side = 1.0 / abs(curvature), math.copysign(1.0, curvature)
+            inwards = radius - side * across
+            across = side * (radius - math.hypot(along, inwards))
+            along = radius * math.atan2(along, inwards)
+        turn = state[HEADING, i] - state[HEADING, 0] - curvature * along
+        c, s = math.cos(turn), abs(math.sin(turn))
+        half_length, half_width = state[LENGTH, i] / 2, state[WIDTH, i] / 2
+        if kind[i] != VEHICLE or along <= 0.0 or c < SAME_WAY_COS:
+            continue
+        if abs(across) < state[WIDTH, 0] / 2 + half_length * s + half_width * c:
+            least = min(least, max(along - half_length * c - half_width * s - state[LENGTH, 0] / 2, 0.0))
+    return float(min(least / max(state[SPEED, 0], 1e-3), HEADWAY_CAP_S))
+
 
 GAP_CAP_M = 50.0
 PEDESTRIAN_GAP_CAP_M = 30.0

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.errors import InfeasibleScene
-from risk_sac.geometry import overlapping_pairs
-from risk_sac.jit import compiled
 from risk_sac.risk.publish import Assessment, worst_rss_margin
-from risk_sac.types import ACCEL, HEADING, LATERAL, SPEED, STEP_S, Floats, Frame, Kind, Scene
+from risk_sac.world.geometry import overlapping_pairs
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import ACCEL, HEADING, LATERAL, SPEED, STEP_S, Floats, Frame, Kind, Scene
 
 BUILD_UP_S = 0.4  # in which an emergency braking builds up from nothing to an actor's limit
 ORDINARY_JERK = 0.75  # share of the jerk that this takes, up to which a driver counts as ordinary

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from risk_sac.config import LearnerConfig, Method, Requirement, RewardConfig
 from risk_sac.records import NO_CONTACT, Collision, Severity
-from risk_sac.types import Floats
+from risk_sac.world.types import Floats
 
 if TYPE_CHECKING:
     from torch import Tensor

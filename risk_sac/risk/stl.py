@@ -18,7 +18,7 @@ from rtamt.semantics.stl.discrete_time.online import ast_visitor as rtamt
 from risk_sac.config import Requirement
 from risk_sac.errors import FormulaError, NotFinite
 from risk_sac.risk.formula import COMPARISONS, Node, parse, signals_of
-from risk_sac.types import Floats
+from risk_sac.world.types import Floats
 
 ROBUSTNESS_CLIP = 3.0  # in scales; a margin beyond it is as good as any, and rtamt's warm-up is infinite
 

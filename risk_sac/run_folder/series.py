@@ -14,8 +14,8 @@ from risk_sac.records import SeriesFile
 from risk_sac.risk.measures import Measures
 from risk_sac.risk.publish import AHEAD, ENCOUNTER, GAP, RSS_LATERAL, RSS_LONGITUDINAL, SEEN, TTC
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.types import Frame
 from risk_sac.verdicts.evidence import PER_ACTOR as MOTION
+from risk_sac.world.types import Frame
 
 PER_ACTOR = (*MOTION, "link")
 ON_THE_MOVE_MPS = 1.0

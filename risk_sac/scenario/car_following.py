@@ -11,7 +11,7 @@ from risk_sac.scenario.family import EGO, Family, at_most, friction, initial_spe
 from risk_sac.scenario.layout import CAR_LENGTH_M, Layout, VehicleStart, layout_at, vehicle
 from risk_sac.scenario.place import Stretch, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.types import Role
+from risk_sac.world.types import Role
 
 BEHIND_M, AHEAD_M = 15.0, 25.0  # of the neighbours' fronts from the ego's
 LEAST_FOLLOWING_M, MOST_FOLLOWING_M = 10.0, 40.0  # gap behind the ego

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from risk_sac.config import CrossingType, DynamicElements, Environment, FamilyName, Interval, Odd, Scenery, SignalType
 from risk_sac.scenario.layout import Layout
-from risk_sac.scenario.place import Place, Signal
+from risk_sac.scenario.place import FixedSignal, Place
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 EGO = "ego"
@@ -59,7 +59,7 @@ def walking(offset: str) -> tuple[Parameter, ...]:
     )
 
 
-def offset_of(signal: Signal | None) -> tuple[Parameter, ...]:
+def offset_of(signal: FixedSignal | None) -> tuple[Parameter, ...]:
     """The parameter of where in its cycle the signal is, if there is one."""
     if signal is None:
         return ()

@@ -24,7 +24,7 @@ from risk_sac.scenario.family import (
 from risk_sac.scenario.layout import LEAD_IN_S, TRUCK_LENGTH_M, Layout, VehicleStart, layout_at, pedestrian, vehicle
 from risk_sac.scenario.place import CrossingPlace, Site
 from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.types import Role
+from risk_sac.world.types import Role
 
 NEAREST_M, FARTHEST_M = 25.0, 90.0  # the ego from the crossing
 FOLLOWING_M = 25.0  # from the ego's front to its follower's

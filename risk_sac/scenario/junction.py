@@ -19,7 +19,7 @@ from risk_sac.scenario.family import (
 from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S, Layout, VehicleStart, layout_at, pedestrian, vehicle
 from risk_sac.scenario.place import JunctionPlace, Leg, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.types import Role
+from risk_sac.world.types import Role
 
 NEAREST_M, FARTHEST_M = 10.0, 90.0  # attacker and ego, from the stop line
 LEAST_RANGE_M = 10.0  # of those distances at a place

@@ -1,17 +1,115 @@
-"""Layout: plain data of all actors' starts, between a scene and a simulator."""
+"""Convex polygons on the ground; a bent or hollow shape is made of several."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
-from risk_sac.scenario.ground import Area, areas
-from risk_sac.scenario.place import Ground, Place, Track, Walk
-from risk_sac.types import Role
+import numpy as np
+import shapely
+
+from risk_sac.scenario.place import Place, PlaceGround, Track, Walk
+from risk_sac.world.types import Role
+
+Point = tuple[float, float]
+SAME_POINT_M = 1e-6
+ON_THE_EDGE_M2 = 1e-9  # twice the area of a triangle that counts as none
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """Convex polygon: nx·x + ny·y <= c for each of its sides.
+
+    (nx, ny) is the side's unit normal outwards.
+    """
+
+    sides: tuple[tuple[float, float, float], ...]  # nx, ny, c of each
+
+    @classmethod
+    def of(cls, corners: Sequence[Sequence[float]]) -> "Area":
+        """With these corners, counter-clockwise, of a convex polygon."""
+        sides = []
+        for (x, y), (to_x, to_y) in zip(corners, [*corners[1:], corners[0]], strict=True):
+            dx, dy = to_x - x, to_y - y
+            length = math.hypot(dx, dy)
+            if length > SAME_POINT_M:
+                nx, ny = dy / length, -dx / length
+                sides.append((nx, ny, nx * x + ny * y))
+        return cls(tuple(sides))
+
+    @classmethod
+    def box(cls, x_low_m: float, x_high_m: float, y_low_m: float, y_high_m: float) -> "Area":
+        """A rectangle along the axes."""
+        return cls.of([(x_low_m, y_low_m), (x_high_m, y_low_m), (x_high_m, y_high_m), (x_low_m, y_high_m)])
+
+    def contains(self, x_m: float, y_m: float) -> bool:
+        """Whether the point lies in the area."""
+        return all(nx * x_m + ny * y_m <= c for nx, ny, c in self.sides)
+
+    def grown(self, by_m: float) -> "Area":
+        """The area with a border added on every side."""
+        return Area(tuple((nx, ny, c + by_m) for nx, ny, c in self.sides))
+
+
+def ribbon(line: Sequence[Point], width_m: float) -> list[list[Point]]:
+    """The quadrangles, counter-clockwise, of a ribbon along a line; at bends they share a slanting side."""
+    points = np.array(_without_repeats(line), dtype=np.float64)
+    if len(points) < 2:
+        return []
+    steps = np.diff(points, axis=0)
+    steps /= np.hypot(*steps.T)[:, None]
+    left = np.column_stack((-steps[:, 1], steps[:, 0]))
+    across = np.concatenate((left[:1], (left[:-1] + left[1:]) / 2, left[-1:]))
+    # Keeps the width round a bend; bounded, or a hairpin's corner would run away.
+    across /= np.maximum((across * across).sum(axis=1), 0.25)[:, None]
+    a, b = points + across * width_m / 2, points - across * width_m / 2
+    quads = []
+    for i in range(len(points) - 1):
+        corners: list[Point] = [(float(x), float(y)) for x, y in (b[i], b[i + 1], a[i + 1], a[i])]
+        quads += [corners] if is_convex(corners) else triangles(corners)
+    return quads
+
+
+def triangles(outline: Sequence[Point]) -> list[list[Point]]:
+    """A polygon of any shape as triangles, counter-clockwise; none if it has no area.
+
+    Source: shapely's constrained Delaunay triangulation; an outline that crosses itself is made valid before.
+    """
+    ring = _without_repeats(outline)
+    if len(ring) < 3:
+        return []
+    parts = shapely.constrained_delaunay_triangles(shapely.make_valid(shapely.Polygon(ring)))
+    corners = (list(part.exterior.coords)[:3] for part in shapely.orient_polygons(parts).geoms)
+    return [corner for corner in corners if _doubled_area(corner) > ON_THE_EDGE_M2]
+
+
+def is_convex(corners: Sequence[Point]) -> bool:
+    """Whether a polygon turns left, or not at all, at every corner, and so is convex and counter-clockwise."""
+    n = len(corners)
+    turns = (_doubled_area([corners[i - 1], corners[i], corners[(i + 1) % n]]) for i in range(n))
+    return all(turn >= -ON_THE_EDGE_M2 for turn in turns)
+
+
+def areas(polygons: Iterable[Sequence[Sequence[float]]]) -> tuple[Area, ...]:
+    """Of convex polygons."""
+    return tuple(Area.of(polygon) for polygon in polygons)
+
+
+def _doubled_area(ring: Sequence[Point]) -> float:
+    return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
+
+
+def _without_repeats(line: Sequence[Point]) -> list[Point]:
+    kept: list[Point] = []
+    for point in line:
+        if not kept or math.dist(kept[-1], point) >= SAME_POINT_M:
+            kept.append(point)
+    return kept
+
 
 LEAD_IN_S = 1.5  # in which SUMO drives all vehicles, before the adversaries are released to the policy
-Body = Literal["car", "truck"]
+VehicleBody = Literal["car", "truck"]
 CAR_LENGTH_M, CAR_WIDTH_M = 4.6, 1.85  # as `sumo_nets/vtypes.add.xml` has it
 TRUCK_LENGTH_M, TRUCK_WIDTH_M = 8.0, 2.4
 
@@ -26,7 +124,7 @@ class VehicleStart:
     lane: int  # index on the first edge, 0 is the rightmost
     position_m: float  # of the front bumper along the first edge
     speed_mps: float
-    body: Body = "car"
+    body: VehicleBody = "car"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +189,7 @@ def vehicle(
     before_m: float,
     speed_mps: float,
     lead_m: float | None = None,
-    body: Body = "car",
+    body: VehicleBody = "car",
 ) -> VehicleStart:
     """A vehicle whose front is `before_m` before its track's reference once the adversaries are released.
 
@@ -124,5 +222,5 @@ def pedestrian(walk: Walk, xi: Mapping[str, float]) -> PedestrianStart:
 
 
 @cache  # every episode asks for it
-def _areas(ground: Ground) -> tuple[tuple[Area, ...], tuple[Area, ...], tuple[Area, ...]]:
+def _areas(ground: PlaceGround) -> tuple[tuple[Area, ...], tuple[Area, ...], tuple[Area, ...]]:
     return areas(ground.crossings), areas(ground.roadway), areas(ground.junctions)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from risk_sac.config import FAMILY_NAME
 from risk_sac.errors import ConfigError, DamagedError
-from risk_sac.machine import UNWRITABLE, user_cache
+from risk_sac.host.machine import UNWRITABLE, user_cache
 from risk_sac.scenario.place import PLACES, Place
 
 VARIABLE = "RISK_SAC_PLACES"

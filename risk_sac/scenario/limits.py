@@ -1,10 +1,13 @@
 """Kinematic limits of the adversaries, as the ODD and the road surface allow."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
-from risk_sac.config import Interval, Odd
+from risk_sac.config import Interval, Odd, Precipitation
+from risk_sac.scenario.space import Parameter, SceneSpace
 
 GRAVITY_MPS2 = 9.81
 EMERGENCY_DECEL_MPS2 = 9.0  # SUMO's default for passenger cars
@@ -87,3 +90,56 @@ def _high(interval: Interval | None, default: float) -> float:
 def emergency_decel_mps2(friction: float) -> float:
     """Computes the hardest braking of a car on a road of this friction."""
     return min(EMERGENCY_DECEL_MPS2, friction * GRAVITY_MPS2)
+
+
+WET_FRICTION: Mapping[Precipitation, Interval] = {
+    "rain": Interval(low=0.5, high=0.65),  # 0.2 mm of water: up to 7.6 mm/h
+    "heavy_rain": Interval(low=0.4, high=0.55),  # 1 mm of water: up to 50 mm/h
+}
+LOW_BEAM_M = 40.0
+VISIBILITY, NIGHT = "visibility_m", "night"
+"""Scene parameters of an ODD that states the visibility, or day and night."""
+
+
+class Conditions(NamedTuple):
+    """Visibility in an episode, which bounds every sensor."""
+
+    visibility_m: float
+    unlit_m: float  # the same of a body without lights
+
+
+def with_environment(space: SceneSpace, user: Odd, odd: Odd) -> SceneSpace:
+    """Returns a family's space with the parameters that a user's environment adds or widens.
+
+    Args:
+      space: of the family.
+      user: as the user stated it; the ego is no part of the rule, so that another ego can play the same scenes.
+      odd: the user's and the family's together.
+    """
+    environment, parameters = odd.environment, list(space.parameters)
+    for index, parameter in enumerate(parameters):
+        if parameter.odd == "environment.friction" and environment.friction is not None:
+            low, high = environment.friction.low, environment.friction.high
+            parameters[index] = replace(parameter, low=low, high=high)
+    visibility = environment.visibility_m
+    if user.environment.visibility_m is not None and visibility is not None:
+        meaning = "meteorological visibility, beyond which the ego sees nothing"
+        parameters.append(
+            Parameter(VISIBILITY, "m", visibility.low, visibility.high, meaning, "environment.visibility_m")
+        )
+    if environment.time_of_day == ("day", "night"):
+        meaning, times = "day below 0.5, night from 0.5", ("day", "night")
+        parameters.append(Parameter(NIGHT, "1", 0, 1, meaning, "environment.time_of_day", times))
+    return replace(space, parameters=tuple(parameters))
+
+
+def conditions(odd: Odd, scene: Mapping[str, float], *, sensor: bool) -> Conditions:
+    """Returns how far can be seen in a scene of a complete ODD.
+
+    Where the user's ODD does not state the visibility, the default's low end bounds a sensor; an ego without a sensor
+    then sees everything.
+    """
+    usual = odd.environment.visibility_m
+    usual_m = usual.low if sensor and usual is not None else math.inf
+    night = scene[NIGHT] >= 0.5 if NIGHT in scene else odd.environment.time_of_day == ("night",)
+    return Conditions(scene.get(VISIBILITY, usual_m), LOW_BEAM_M if night else math.inf)

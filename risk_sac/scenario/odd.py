@@ -10,8 +10,7 @@ from typing import Any
 from risk_sac.config import Environment, Interval, Odd, Precipitation, Requirement, Scenery
 from risk_sac.errors import OddError
 from risk_sac.records import NO_CONTACT
-from risk_sac.scenario.environment import WET_FRICTION
-from risk_sac.scenario.limits import GRAVITY_MPS2
+from risk_sac.scenario.limits import GRAVITY_MPS2, WET_FRICTION
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 MIN_TTC_S = 1.5  # below it a conflict counts as serious in traffic conflict studies

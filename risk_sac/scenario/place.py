@@ -1,6 +1,6 @@
 """Places of patterns on a net: plain data that a finder derives from it.
 
-The finders are in `risk_sac.scenario.maps`. The places of the shipped families lie beside their nets, in `sumo_nets/`.
+The finders are in `risk_sac.maps`. The places of the shipped families lie beside their nets, in `sumo_nets/`.
 A place names edges; patterns never do.
 """
 
@@ -63,7 +63,7 @@ class Walk(Settings):
     along_y: float
 
 
-class Ground(Settings):
+class PlaceGround(Settings):
     """The ground around a place, as convex polygons with their corners counter-clockwise."""
 
     crossings: tuple[Corners, ...] = ()
@@ -72,7 +72,7 @@ class Ground(Settings):
     junctions: tuple[Corners, ...] = ()
 
 
-class Signal(Settings):
+class FixedSignal(Settings):
     """A traffic light with a fixed programme."""
 
     id: Name
@@ -117,8 +117,8 @@ class _Somewhere(Settings):
     """Of the ego's road, in its direction."""
     speed_limit_mps: float
     lane_width_m: float
-    signal: Signal | None = None
-    ground: Ground = Ground()
+    signal: FixedSignal | None = None
+    ground: PlaceGround = PlaceGround()
     wary: bool = False
     """Whether drivers stop for an ego that stands askew; not so where the shipped families are, whose results stay."""
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from risk_sac.config import Interval
 from risk_sac.errors import SceneError
-from risk_sac.types import Floats, Scene
+from risk_sac.world.types import Floats, Scene
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,9 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from risk_sac.geometry import NO_MOTION, RelativeView, along_axes, contact_point, frame_view, relative_view, zone
-from risk_sac.jit import compiled
-from risk_sac.types import HEADING, LENGTH, VX, VY, WIDTH, Floats, Frame, X, Y
+from risk_sac.world.geometry import (
+    NO_MOTION,
+    RelativeView,
+    along_axes,
+    contact_point,
+    frame_view,
+    relative_view,
+    zone,
+)
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import HEADING, LENGTH, VX, VY, WIDTH, Floats, Frame, X, Y
 
 TOUCHING_M = 1e-5  # bodies no farther apart along any separating axis touch
 

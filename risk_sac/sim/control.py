@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import Limits
-from risk_sac.sim.commands import Walker, clip, taper
-from risk_sac.sim.solid import Others, walks_into
+from risk_sac.sim.solid import Others, Walker, clip, taper, walks_into
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.sim.vehicle_control import VehicleControl
-from risk_sac.types import LATERAL, SPEED, STEP_S, VX, VY, Floats, Frame
+from risk_sac.world.types import LATERAL, SPEED, STEP_S, VX, VY, Floats, Frame
 
 TOLERANCE_MPS = 0.02  # SUMO's rounding, divided by the step
 LEAP_MPS = 4.0  # at a corner of a coarsely drawn lane, a body off its middle moves up to 0.3 m more or less in a step

@@ -16,7 +16,7 @@ from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import MovedEgo
 from risk_sac.sim.reading import Reading
 from risk_sac.sim.roads import Roads
-from risk_sac.types import STEP_S, Bools, Floats, Role
+from risk_sac.world.types import STEP_S, Bools, Floats, Role
 
 ASKEW_M = 0.1  # by which a corner of the ego may be beside where SUMO's models have it
 
@@ -28,7 +28,7 @@ SAFE_MODE = 31  # all of SUMO's checks; told speeds are then held to the normal 
 EMERGENCY_MODE = 26  # without those of safe speed and of deceleration
 
 
-class Driver:
+class SumoDriver:
     """Driver of one vehicle that SUMO drives; decides once per reaction time.
 
     SUMO's models do so too.
@@ -118,11 +118,11 @@ class Drivers:
         emergency = emergency_decel_mps2(layout.friction)
         cruise = {start.id: start.speed_mps for start in layout.vehicles if start.role is Role.ADVERSARY}
         self._others = {
-            start.id: Driver(start.id, STEP_S, emergency, cruise.get(start.id, OWN_CHOICE_MPS))
+            start.id: SumoDriver(start.id, STEP_S, emergency, cruise.get(start.id, OWN_CHOICE_MPS))
             for start in layout.vehicles
         }
-        self._released: dict[str, Driver] = {}
-        self._ego: Driver | None = Driver(layout.ego.id, reaction_time_s, emergency)
+        self._released: dict[str, SumoDriver] = {}
+        self._ego: SumoDriver | None = SumoDriver(layout.ego.id, reaction_time_s, emergency)
         self._walkers = bool(layout.pedestrians)
         self._ego_id, self._wary = layout.ego.id, layout.wary
         self._roads, self._outside = roads, False
@@ -166,7 +166,7 @@ class Drivers:
         _, _, way_rad = project(along.path, float(frame.x_m[0]), float(frame.y_m[0]))
         return abs(math.sin(float(frame.heading_rad[0]) - way_rad)) * float(frame.length_m[0]) / 2 > ASKEW_M
 
-    def _tell_ego(self, ego: Driver, reading: Reading, belief: Belief, braking_mps2: float) -> None:
+    def _tell_ego(self, ego: SumoDriver, reading: Reading, belief: Belief, braking_mps2: float) -> None:
         speed, accel = reading.speed_and_accel[0]
         if ego.step % ego.period == 0:
             ego.wanted_mps2 = self._decide(ego, 0, reading, belief.state, belief.known)
@@ -194,7 +194,7 @@ class Drivers:
             found[id_] = wanted if told is None else min(wanted, told)
         return found
 
-    def _decide(self, driver: Driver, row: int, reading: Reading, state: Floats, candidates: Bools) -> float | None:
+    def _decide(self, driver: SumoDriver, row: int, reading: Reading, state: Floats, candidates: Bools) -> float | None:
         along = self._roads.along(reading.vehicles[row])
         return driver.decide(row, reading.speed_and_accel[row][0], along, state, reading.drives, candidates)
 

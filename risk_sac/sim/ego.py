@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.config import SensorConfig
-from risk_sac.geometry import Sight, frame_view, in_sight
-from risk_sac.jit import compiled
-from risk_sac.types import HEADING, VX, VY, Bools, Floats, Frame, Kind, X, Y
+from risk_sac.world.geometry import Sight, frame_view, in_sight
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import HEADING, VX, VY, Bools, Floats, Frame, Kind, X, Y
 
 EVERYTHING = Sight(reach_m=math.inf, half_view_rad=math.pi, occlusion=False)
 VEHICLE = int(Kind.VEHICLE)  # compiled code knows no enums of int8

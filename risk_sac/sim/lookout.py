@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
-from risk_sac.jit import compiled
 from risk_sac.sim import paths
-from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
 
 LOOK_S = 4.0  # how far ahead a collision course counts
 CUT_IN_LOOK_S = 2.0  # the same in the vehicle's own direction, where sideways motion is soon over

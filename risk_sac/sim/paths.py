@@ -12,7 +12,7 @@ from typing import NamedTuple
 import libsumo
 import numpy as np
 
-from risk_sac.types import Floats
+from risk_sac.world.types import Floats
 
 AHEAD_M = 120.0  # of road beyond a lane's own end: at 16 m/s more than any driver looks ahead
 SAME_POINT_M = 1e-3

@@ -9,14 +9,14 @@ from typing import NamedTuple, Protocol
 
 import libsumo
 
-from risk_sac.jit import compiled
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.lookout import project, stretch
 from risk_sac.sim.paths import STATION, Along, PathStopLine
 from risk_sac.sim.reading import EgoTold
 from risk_sac.sim.roads import Roads
-from risk_sac.types import Floats, Frame
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import Floats, Frame
 
 ROUTE_OR_NOWHERE = 3  # SUMO's word for the nearest place along the route (1), or off the road (2)
 NO_LANE_CHANGE = 0

@@ -9,12 +9,11 @@ import libsumo
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.jit import compiled
-from risk_sac.scenario.ground import Area
-from risk_sac.scenario.layout import Layout
-from risk_sac.sim.commands import Walker
+from risk_sac.scenario.layout import Area, Layout
 from risk_sac.sim.lookout import near_pedestrians
-from risk_sac.types import (
+from risk_sac.sim.solid import Walker
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import (
     ACCEL,
     HEADING,
     LATERAL,

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import Limits
-from risk_sac.sim.commands import VehicleCommand, Walker
 from risk_sac.sim.control import Adversaries
+from risk_sac.sim.solid import VehicleCommand, Walker
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import Frame
+from risk_sac.world.types import Frame
 
 WALK = ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")
 DRIVE = ("speed_mps", "lateral_mps")

@@ -1,5 +1,6 @@
-"""Positions of vehicles along their paths, and their lateral room."""
+"""The lanes around the ego's route, as the loaded net has them, and what their signals show."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from itertools import takewhile
 from typing import NamedTuple
@@ -7,15 +8,123 @@ from typing import NamedTuple
 import libsumo
 import numpy as np
 
-from risk_sac.scenario.layout import Layout
-from risk_sac.sim.paths import HEADING, STATION, Along, Way, X, Y, leads_on, way_of
-from risk_sac.types import Floats
+from risk_sac.config import EgoConfig
+from risk_sac.scenario.layout import Layout, VehicleStart
+from risk_sac.scenario.limits import GRAVITY_MPS2, emergency_decel_mps2
+from risk_sac.sim.paths import (
+    CAR,
+    HEADING,
+    STATION,
+    Along,
+    Way,
+    X,
+    Y,
+    car_may_use,
+    controlled_links,
+    edge_of,
+    leads_on,
+    way_of,
+)
+from risk_sac.sim.reading import COLOURS
+from risk_sac.world.types import Floats, Lane, Road, Signal, StopLine
+
+REACH_M = 600.0  # of the route; no episode drives farther
+LEFT, RIGHT = 1, -1
+NONE = Signal.NONE  # to look it up in the class takes longer than all else in `signals_at`
+SHOWN = COLOURS | {letter.upper(): colour for letter, colour in COLOURS.items()}
+
+
+def road_around(route: Sequence[str]) -> Road:
+    """Returns the road around a route: its lanes, and all lanes of the junctions on it.
+
+    Stop lines are those before the route's lanes: an ego does not see the signals of other directions.
+    """
+    near = _edges_near(route)
+    ids = [id_ for edge in near for id_ in _lanes_of(edge) if car_may_use(id_)]
+    links = {id_: [link[4] or link[0] for link in libsumo.lane.getLinks(id_)] for id_ in ids}
+    on_route = _on_route(route, ids, links)
+    lanes = tuple(_lane(id_, ids, [each for each in links[id_] if each in links], id_ in on_route) for id_ in ids)
+    signals = controlled_links()
+    stop_lines = tuple(
+        StopLine(lane.id, leads_to, *signals[lane.id, leads_to])
+        for lane in lanes
+        if edge_of(lane.id) in route
+        for leads_to in lane.successors
+        if (lane.id, leads_to) in signals
+    )
+    return Road(lanes, stop_lines)
+
+
+def signals_at(stop_lines: Sequence[StopLine]) -> tuple[Signal, ...]:
+    """Returns what the signal of each stop line shows now."""
+    signals = {line.signal for line in stop_lines}
+    states = {signal: libsumo.trafficlight.getRedYellowGreenState(signal) for signal in signals}
+    return tuple([SHOWN.get(states[signal][link], NONE) for _, _, signal, link in stop_lines])
+
+
+def _edges_near(route: Sequence[str]) -> Iterable[str]:
+    """The route's edges, and all edges that meet them at junctions, through the junctions included."""
+    found, reached_m = dict.fromkeys(route[:1]), 0.0
+    for edge in route:
+        if reached_m > REACH_M:
+            break
+        reached_m += libsumo.lane.getLength(f"{edge}_0")
+        for junction in (libsumo.edge.getFromJunction(edge), libsumo.edge.getToJunction(edge)):
+            found |= dict.fromkeys(libsumo.junction.getIncomingEdges(junction))
+            found |= dict.fromkeys(libsumo.junction.getOutgoingEdges(junction))
+    return found
+
+
+def _lanes_of(edge: str) -> list[str]:
+    return [f"{edge}_{i}" for i in range(libsumo.edge.getLaneNumber(edge))]
+
+
+def _on_route(route: Sequence[str], ids: Sequence[str], links: dict[str, list[str]]) -> set[str]:
+    """The lanes that lead on along the route, on its edges and through its junctions."""
+    found = {id_ for id_ in ids if edge_of(id_) in route and leads_on(route, id_)}
+    for id_ in sorted(found):
+        edge = edge_of(id_)
+        if edge in route[:-1]:
+            following = route[route.index(edge) + 1]
+            for via in links[id_]:
+                found |= _through(via, following, links)
+    return found
+
+
+def _through(lane: str, following: str, links: dict[str, list[str]]) -> set[str]:
+    """Collects the lanes of a way through a junction.
+
+    `lane` is its first one; there are none if the way does not lead to the `following` edge.
+    """
+    way: set[str] = set()
+    while lane in links and lane.startswith(":") and lane not in way:
+        way.add(lane)
+        lane = next(iter(links[lane]), "")
+    return way if edge_of(lane) == following else set()
+
+
+def _lane(id_: str, ids: Sequence[str], successors: Sequence[str], on_route: bool) -> Lane:
+    edge, _, index = id_.rpartition("_")
+    left, right = f"{edge}_{int(index) + 1}", f"{edge}_{int(index) - 1}"
+    return Lane(
+        id=id_,
+        line=np.array(libsumo.lane.getShape(id_)).T,
+        width_m=libsumo.lane.getWidth(id_),
+        limit_mps=libsumo.lane.getMaxSpeed(id_),
+        left=left if left in ids else "",
+        right=right if right in ids else "",
+        may_change_left=left in ids and CAR in libsumo.lane.getChangePermissions(id_, LEFT),
+        may_change_right=right in ids and CAR in libsumo.lane.getChangePermissions(id_, RIGHT),
+        successors=tuple(successors),
+        on_route=on_route,
+    )
+
 
 EDGE_M = 0.01  # SUMO refuses a lateral step that ends exactly on the edge of the road
 ROUNDED_M = 0.05  # by which a lane's length may differ from that of its line without a word
 
 
-class Room(NamedTuple):
+class LateralRoom(NamedTuple):
     """Lateral room up to the edges of the drivable lanes.
 
     It counts from a vehicle's sides, or from a lane's middle.
@@ -57,7 +166,7 @@ class Roads:
         y = np.concatenate(([y_m], ahead[Y] + offset_m * cos))
         return x, y
 
-    def place(self, vehicle: str, offset_m: float, width_m: float) -> tuple[Room, Along]:
+    def place(self, vehicle: str, offset_m: float, width_m: float) -> tuple[LateralRoom, Along]:
         """Returns how far a vehicle may move sideways, and where it is on its path.
 
         Only lanes that its route continues from count: SUMO halts a vehicle at the end of any other. `offset_m` is that
@@ -66,9 +175,9 @@ class Roads:
         lane = libsumo.vehicle.getLaneID(vehicle)
         left_m, right_m = self.room(vehicle, lane)
         spare = -width_m / 2 - EDGE_M
-        return Room(left_m + spare - offset_m, right_m + spare + offset_m), self._along(vehicle, lane, offset_m)
+        return LateralRoom(left_m + spare - offset_m, right_m + spare + offset_m), self._along(vehicle, lane, offset_m)
 
-    def room(self, vehicle: str, lane: str) -> Room:
+    def room(self, vehicle: str, lane: str) -> LateralRoom:
         """Returns the room from a lane's middle along a vehicle's route.
 
         It reaches to the edges of the lanes that lead on along the route.
@@ -94,7 +203,7 @@ def _stretch(lane: str) -> float:
     return drawn_m / length_m if abs(drawn_m - length_m) > ROUNDED_M else 1.0
 
 
-def _room(route: tuple[str, ...], lane: str) -> Room:
+def _room(route: tuple[str, ...], lane: str) -> LateralRoom:
     """Returns the room from a lane's middle along `route`.
 
     It reaches to the edges of the lanes beside it that lead on along `route`.
@@ -103,7 +212,7 @@ def _room(route: tuple[str, ...], lane: str) -> Room:
     widths = [_width_on_route(f"{edge}_{i}", route) for i in range(libsumo.edge.getLaneNumber(edge))]
     own, half_m = int(index), libsumo.lane.getWidth(lane) / 2
     right, left = takewhile(bool, reversed(widths[:own])), takewhile(bool, widths[own + 1 :])
-    return Room(sum(left) + half_m, sum(right) + half_m)
+    return LateralRoom(sum(left) + half_m, sum(right) + half_m)
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
@@ -112,3 +221,73 @@ def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
     Cars may not use it, or it does not lead to the route's next edge.
     """
     return float(libsumo.lane.getWidth(lane)) if leads_on(route, lane) else 0.0
+
+
+EGO_DECEL_MPS2 = 4.5  # SUMO's default for passenger cars
+LANE_CHANGE = "laneChangeModel."
+# So that the commanded lateral speed is the one driven; its limits are those of `risk_sac.sim.control`.
+STEERED = {"lcAccelLat": "100", "lcMaxSpeedLatStanding": "5", "lcMaxSpeedLatFactor": "1"}
+
+
+def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None:
+    """Places all vehicles of the layout; SUMO inserts them in its next step.
+
+    Args:
+      layout: of the episode.
+      ego: its driver.
+      settings: further ones of SUMO's driver of the ego: `tau`, or keys of SUMO's `vehicle.setParameter` for its
+        lane-change model, and of `vehicletype.setParameter` for the rest.
+    """
+    ego_type = f"ego_{ego.car_following}"
+    libsumo.vehicletype.setActionStepLength(ego_type, ego.reaction_time_s)
+    libsumo.vehicletype.setEmergencyDecel(ego_type, emergency_decel_mps2(layout.friction))
+    libsumo.vehicletype.setDecel(ego_type, min(EGO_DECEL_MPS2, layout.friction * GRAVITY_MPS2))
+    for name, value in settings.items():
+        if name == "tau":
+            libsumo.vehicletype.setTau(ego_type, value)
+        elif not name.startswith(LANE_CHANGE):
+            libsumo.vehicletype.setParameter(ego_type, name, f"{value:g}")
+    _insert(layout.ego, ego_type)
+    for name, value in settings.items():
+        if name.startswith(LANE_CHANGE):
+            libsumo.vehicle.setParameter(layout.ego.id, name, f"{value:g}")
+    for start in layout.vehicles:
+        _insert(start, f"background_{start.body}")
+    if layout.signal is not None:
+        _set_signal(layout.signal, layout.signal_offset_s)
+
+
+def hand_over(start: VehicleStart) -> None:
+    """Makes a vehicle drive as commanded, whatever is in its way."""
+    libsumo.vehicle.setType(start.id, f"adversary_{start.body}")
+    for name, value in STEERED.items():  # a change of type leaves the lane-change model as it is
+        libsumo.vehicle.setParameter(start.id, f"laneChangeModel.{name}", value)
+    libsumo.vehicle.setSpeedMode(start.id, 0)
+    libsumo.vehicle.setLaneChangeMode(start.id, 0)
+
+
+def _insert(start: VehicleStart, type_id: str) -> None:
+    route = "_".join(("route", *start.route))
+    if route not in libsumo.route.getIDList():
+        libsumo.route.add(route, start.route)
+    libsumo.vehicle.add(
+        start.id,
+        route,
+        typeID=type_id,
+        departLane=str(start.lane),
+        departPos=repr(start.position_m),
+        departSpeed=repr(start.speed_mps),
+    )
+
+
+def _set_signal(signal: str, offset_s: float) -> None:
+    """Puts a fixed-time signal at `offset_s` into its cycle."""
+    (logic, *_) = libsumo.trafficlight.getAllProgramLogics(signal)
+    durations = [phase.duration for phase in logic.phases]
+    left = offset_s % sum(durations)
+    for index, duration in enumerate(durations):
+        if left < duration:
+            libsumo.trafficlight.setPhase(signal, index)
+            libsumo.trafficlight.setPhaseDuration(signal, duration - left)
+            return
+        left -= duration

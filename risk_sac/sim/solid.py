@@ -1,20 +1,57 @@
-"""Keeps adversaries out of other bodies than the ego's.
-
-SUMO's checks are off for vehicles under command, and pedestrians are points of our own. A command is taken if its
-adversary could still stop afterwards before it reaches another body; where it could not, it steers straight or brakes.
-Another vehicle on the same course may brake as hard as the adversary; everything else keeps its velocity.
-"""
+"""Commands of adversaries for the next step, and how fast they may change before a bound."""
 
 import math
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.geometry import Pose, Size, pose_of, size_of, touches
-from risk_sac.jit import compiled
-from risk_sac.sim.commands import clip, taper
 from risk_sac.sim.paths import COS, SIN, STATION
 from risk_sac.sim.paths import HEADING as PATH_HEADING
-from risk_sac.types import HEADING, LENGTH, SPEED, STEP_S, VX, VY, WIDTH, Floats, X, Y
+from risk_sac.world.geometry import Pose, Size, pose_of, size_of, touches
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import HEADING, LENGTH, SPEED, STEP_S, VX, VY, WIDTH, Floats, X, Y
+
+
+@dataclass(slots=True)
+class Walker:
+    """A pedestrian's state; the command of a step is its next state."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    speed_mps: float
+    accel_mps2: float = 0.0
+
+
+class VehicleCommand(NamedTuple):
+    """Speeds of an adversary vehicle during the next step."""
+
+    speed_mps: float
+    lateral_mps: float
+
+
+@compiled
+def taper(distance: float, rate: float) -> float:
+    """Computes the largest value that can fall to 0 within a distance.
+
+    It falls by at most `rate` per second, and its sum over steps stays within `distance`.
+
+    With decrements of c = rate·dt and D = distance/dt, k full decrements fit, k(k+1)/2·c <= D, and the rest is
+    spread over k + 1 steps. The continuous √(2·rate·distance) would overshoot by up to half a decrement.
+    """
+    if distance <= 0.0 or rate <= 0.0:
+        return 0.0
+    change, total = rate * STEP_S, distance / STEP_S
+    full = int((math.sqrt(1.0 + 8.0 * total / change) - 1.0) / 2.0)
+    return full * change / 2.0 + total / (full + 1)
+
+
+@compiled
+def clip(value: float, low: float, high: float) -> float:
+    """The value, or the bound that it is beyond."""
+    return low if value < low else high if value > high else value
+
 
 MARGIN_M = 0.15  # that is kept on every side: the foreseen poses are those of a body that follows its path exactly
 WALKER_MARGIN_M = 0.05  # the same of a pedestrian

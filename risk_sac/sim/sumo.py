@@ -1,30 +1,102 @@
-"""An episode in SUMO behind a few verbs: reset, release, apply, step, close.
+"""The one simulation that libsumo can run in a process, and the object that it runs for."""
 
-libsumo runs one simulation per process, see `risk_sac.sim.holder`. Only this package and the checker of uploaded
-networks call it. Pedestrians are points of our own dynamics that SUMO does not know, see `risk_sac.sim.lookout`.
-"""
-
+import gc
 import math
-from collections.abc import Mapping
+import os
+import re
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from importlib.resources import files
+from pathlib import Path
+from weakref import ref
 
 import libsumo
 
 from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
 from risk_sac.scenario.layout import Layout
-from risk_sac.sim.commands import VehicleCommand, Walker
 from risk_sac.sim.drivers import Drivers
 from risk_sac.sim.ego import EVERYTHING, Belief, Perception, Senses
-from risk_sac.sim.holder import LIBSUMO
 from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import MovedEgo, Pilot
-from risk_sac.sim.placing import hand_over, place
 from risk_sac.sim.reading import Reader, Reading
-from risk_sac.sim.roads import Roads, Room
-from risk_sac.sim.staging import plain_name
-from risk_sac.types import STEP_S, Floats, Frame, Role
+from risk_sac.sim.roads import LateralRoom, Roads, hand_over, place
+from risk_sac.sim.solid import VehicleCommand, Walker
+from risk_sac.world.types import STEP_S, Floats, Frame, Role
+
+
+class Holder:
+    """Lock that lets one owner at a time use libsumo.
+
+    An owner that was garbage-collected, or that belongs to the parent process, no longer counts.
+    """
+
+    def __init__(self) -> None:
+        self._owner: ref[object] | None = None
+        self._process = 0
+
+    def load(self, owner: object, options: Sequence[str]) -> None:
+        """Starts a simulation for an owner, or its next one.
+
+        Raises:
+          SimulationError: the process already runs a simulation for something else.
+        """
+        if libsumo.isLoaded() and self.is_held_by(owner) and self._process == os.getpid():
+            libsumo.load(list(options))
+            return
+        if self._is_taken(owner):
+            gc.collect()  # an owner without references may still be part of a cycle
+        if self._is_taken(owner):
+            raise SimulationError(
+                "this process already runs the simulation of another environment, and libsumo can run only one; close "
+                "that environment first, or run each in a process of its own, as gymnasium.vector.AsyncVectorEnv does"
+            )
+        if libsumo.isLoaded():
+            libsumo.close()
+        self._owner, self._process = ref(owner), os.getpid()
+        libsumo.start(["sumo", *options])
+
+    def is_held_by(self, owner: object) -> bool:
+        """Whether the latest simulation of this process is the owner's."""
+        return self._owner is not None and self._owner() is owner
+
+    def close(self, owner: object) -> None:
+        """Ends the simulation if it is the owner's."""
+        if self.is_held_by(owner):
+            self._owner = None
+            if libsumo.isLoaded():
+                libsumo.close()
+
+    def _is_taken(self, owner: object) -> bool:
+        if self._owner is None:
+            return bool(libsumo.isLoaded())  # by code outside this package
+        return self._process == os.getpid() and self._owner() not in (None, owner)
+
+
+LIBSUMO = Holder()
+
+_PLAIN = re.compile(r"[^,;$%]*")
+
+
+@cache  # one link for each file
+def plain_name(file: str) -> str:
+    """The file's own path, or that of a link to it whose name SUMO takes for one file."""
+    if _PLAIN.fullmatch(file):
+        return file
+    folder = Path(_links().name)
+    link = folder / f"{len(list(folder.iterdir()))}.xml"
+    link.symlink_to(Path(file).absolute())
+    return str(link)
+
+
+@cache
+def _links() -> "tempfile.TemporaryDirectory[str]":
+    """A folder that is removed when the process ends."""
+    usual = tempfile.gettempdir()
+    return tempfile.TemporaryDirectory(prefix="risk-sac-", dir=usual if _PLAIN.fullmatch(usual) else "/tmp")
+
 
 NETS = files("sumo_nets")
 LISTED_WITHIN_S = 0.3
@@ -209,7 +281,7 @@ class SumoSimulation:
         frame = self._reading.frame
         return self._roads.way_ahead(self._layout.ego.id, float(frame.x_m[0]), float(frame.y_m[0]))
 
-    def place(self, vehicle: str) -> tuple[Room, Along] | None:
+    def place(self, vehicle: str) -> tuple[LateralRoom, Along] | None:
         """Returns a vehicle's lateral room and its place on its path.
 
         Returns None once it left the net.

@@ -10,14 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.jit import compiled
 from risk_sac.scenario.layout import CAR_LENGTH_M
 from risk_sac.scenario.limits import Limits
-from risk_sac.sim.commands import VehicleCommand, clip, taper
 from risk_sac.sim.paths import HEADING, STATION, Along, Path
-from risk_sac.sim.roads import Room
-from risk_sac.sim.solid import AHEAD, CLEAR, Others, drives_into
-from risk_sac.types import STEP_S, Floats
+from risk_sac.sim.roads import LateralRoom
+from risk_sac.sim.solid import AHEAD, CLEAR, Others, VehicleCommand, clip, drives_into, taper
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import STEP_S, Floats
 
 CORRECTION_PER_M = 0.05  # curvature that is left for steering in the tightest bend, and so before a road's edge
 TURNING_BACK = 0.85  # share of the heading that leaves just enough room; a step of 0.1 s resolves no more
@@ -87,7 +86,7 @@ class VehicleControl:
         self,
         drive: float,
         steer: float,
-        room: Room,
+        room: LateralRoom,
         along: Along,
         intended_mps2: float = 0.0,
         others: Others | None = None,

@@ -9,23 +9,34 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from risk_sac.geometry import Size
-from risk_sac.jit import compiled
 from risk_sac.records import ConflictType
-from risk_sac.types import Bools, Floats, Kind
-from risk_sac.verdicts.along import WANDER_M, Along, lane_conflicts
-from risk_sac.verdicts.course import HORIZON_S, Body, at, entry_distance, time_to_touch, with_margin
-from risk_sac.verdicts.evidence import Evidence, inside, soon_inside
-from risk_sac.verdicts.path import Path
-from risk_sac.verdicts.recorded import (
+from risk_sac.verdicts.course import (
+    HORIZON_S,
+    WANDER_M,
+    BodyOnPath,
+    MovingBox,
+    Path,
+    at,
+    entry_distance,
+    lane_conflicts,
+    time_to_touch,
+    with_margin,
+)
+from risk_sac.verdicts.evidence import (
+    Evidence,
     column,
     ego_path,
     front_moved_across,
+    inside,
     lane_path,
     recorded_motion,
     recorded_size,
     seen_along,
+    soon_inside,
 )
+from risk_sac.world.geometry import Size
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import Bools, Floats, Kind
 
 BODY_M = 0.5  # from a pedestrian's centre: what a body on the kerb reaches of the carriageway
 KERB_S = 1.0  # a pedestrian this near to the carriageway is about to step onto it
@@ -107,7 +118,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     )
 
 
-def _lane_conflicts(evidence: Evidence, striker: int, seen: Along[Floats], *, wary: bool) -> tuple[Bools, Bools]:
+def _lane_conflicts(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], *, wary: bool) -> tuple[Bools, Bools]:
     e = evidence
     offset, accel = column(e.lane_offset_m, striker), column(e.accel_mps2, striker)
     return lane_conflicts(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, wary)
@@ -145,7 +156,7 @@ def left_its_lane(evidence: Evidence, striker: int) -> int | None:
     return None if touches else left
 
 
-def came_further(evidence: Evidence, striker: int, seen: Along[Floats]) -> bool:
+def came_further(evidence: Evidence, striker: int, seen: BodyOnPath[Floats]) -> bool:
     """Tells whether the striker moved further across than the ego in 3 s.
 
     Each one's movement counts towards the other.
@@ -187,7 +198,7 @@ def lasting_since(begins: Bools, lasts: Bools) -> int:
 
 
 @compiled
-def collision_courses(path: Path, speed: Floats, size: Size, motion: Body[Floats]) -> Bools:
+def collision_courses(path: Path, speed: Floats, size: Size, motion: MovingBox[Floats]) -> Bools:
     """Whether each frame is on a collision course, `T`; looked for backwards, False before it was first interrupted."""
     found = np.zeros(len(speed), dtype=np.bool_)
     missing = 0

@@ -1,12 +1,134 @@
-"""Whether two bodies touch, now or if both keep on as they are."""
+"""Areas of the ground as compiled code needs them."""
 
 import math
+from collections.abc import Sequence
 from typing import Generic, NamedTuple, TypeVar
 
-from risk_sac.geometry import Size, touches
-from risk_sac.jit import compiled
-from risk_sac.types import Floats
-from risk_sac.verdicts.path import Path, pose_at
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.scenario.layout import Area
+from risk_sac.world.geometry import Pose, Size, touches
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import Bools, Floats
+
+
+class Sides(NamedTuple):
+    """Sides of several areas, as compiled code needs them."""
+
+    sides: Floats  # k x 3: nx, ny, c
+    first: NDArray[np.int64]  # one more than there are areas: the first side of each, and k
+
+
+def sides_of(areas: Sequence[Area]) -> Sides:
+    """The sides of areas, one after the other."""
+    sides = np.array([side for area in areas for side in area.sides], dtype=np.float64).reshape(-1, 3)
+    return Sides(sides, np.cumsum([0, *(len(area.sides) for area in areas)]))
+
+
+@compiled
+def within(areas: Sides, x_m: float, y_m: float, margin_m: float = 0.0) -> bool:
+    """Whether a point lies in any of the areas, or no further than `margin_m` outside one."""
+    for area in range(len(areas.first) - 1):
+        here = True
+        for k in range(areas.first[area], areas.first[area + 1]):
+            if areas.sides[k, 0] * x_m + areas.sides[k, 1] * y_m > areas.sides[k, 2] + margin_m:
+                here = False
+                break
+        if here:
+            return True
+    return False
+
+
+STANDING_M = 1e-6  # two points nearer than this are one
+
+
+class Path(NamedTuple):
+    """Path of `m` points, at least one."""
+
+    x: Floats
+    y: Floats
+    heading: Floats  # of the body, without jumps of 2π
+    s: Floats  # metres along the path, never falling
+
+
+def recorded_path(x: Floats, y: Floats, heading: Floats) -> Path:
+    """Builds a path through a body's positions, with its recorded headings."""
+    steps = np.hypot(np.diff(x), np.diff(y))
+    return Path(
+        np.ascontiguousarray(x), np.ascontiguousarray(y), np.unwrap(heading), np.concatenate(([0.0], np.cumsum(steps)))
+    )
+
+
+def polyline(x: Floats, y: Floats, heading_rad: float = 0.0) -> Path:
+    """Builds a path through points, with headings along it.
+
+    Args:
+      x: `m` points, the ego's centre first.
+      y: the same for y.
+      heading_rad: of a path of one point.
+    """
+    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    if len(x) < 2:
+        return Path(x, y, np.array([heading_rad]), np.zeros(1))
+    along = np.arctan2(np.diff(y), np.diff(x))
+    return recorded_path(x, y, np.concatenate((along[:1], along)))
+
+
+@compiled
+def pose_at(path: Path, s: float) -> Pose:
+    """Computes the body's pose after `s` metres: x, y, heading."""
+    last = len(path.s) - 1
+    if s >= path.s[last] or last == 0:
+        beyond, h = s - path.s[last], path.heading[last]
+        return path.x[last] + beyond * math.cos(h), path.y[last] + beyond * math.sin(h), h
+    if s <= path.s[0]:
+        beyond, h = s - path.s[0], path.heading[0]
+        return path.x[0] + beyond * math.cos(h), path.y[0] + beyond * math.sin(h), h
+    k = np.searchsorted(path.s, s, side="right")
+    share = (s - path.s[k - 1]) / max(path.s[k] - path.s[k - 1], STANDING_M)
+    return (
+        path.x[k - 1] + share * (path.x[k] - path.x[k - 1]),
+        path.y[k - 1] + share * (path.y[k] - path.y[k - 1]),
+        path.heading[k - 1] + share * (path.heading[k] - path.heading[k - 1]),
+    )
+
+
+@compiled
+def project(path: Path, first: int, x: float, y: float) -> tuple[float, float, float]:
+    """Projects a position onto the path, from its `first` point on.
+
+    Returns metres along, metres to the left and the heading there. The straight extensions count, also the one behind
+    the `first` point.
+    """
+    last = len(path.s) - 1
+    h = path.heading[first]
+    along = (x - path.x[first]) * math.cos(h) + (y - path.y[first]) * math.sin(h)
+    across = (y - path.y[first]) * math.cos(h) - (x - path.x[first]) * math.sin(h)
+    best, s, d, heading = math.inf, path.s[first] + along, across, h
+    if along <= 0.0:
+        best = across * across
+    h_end = path.heading[last]
+    along = (x - path.x[last]) * math.cos(h_end) + (y - path.y[last]) * math.sin(h_end)
+    across = (y - path.y[last]) * math.cos(h_end) - (x - path.x[last]) * math.sin(h_end)
+    if along >= 0.0 and across * across < best:
+        best, s, d, heading = across * across, path.s[last] + along, across, h_end
+    for k in range(first, last):
+        dx, dy = path.x[k + 1] - path.x[k], path.y[k + 1] - path.y[k]
+        step = path.s[k + 1] - path.s[k]
+        if step < STANDING_M:
+            continue
+        share = min(max(((x - path.x[k]) * dx + (y - path.y[k]) * dy) / (step * step), 0.0), 1.0)
+        off_x, off_y = x - path.x[k] - share * dx, y - path.y[k] - share * dy
+        squared = off_x * off_x + off_y * off_y
+        if squared < best:
+            best = squared
+            s = path.s[k] + share * step
+            side = dx * off_y - dy * off_x
+            d = math.copysign(math.sqrt(squared), side)
+            heading = path.heading[k] + share * (path.heading[k + 1] - path.heading[k])
+    return s, d, heading
+
 
 HORIZON_S = 4.0  # look-ahead of every driver
 LOOK_S = 0.05  # between two looks at what is foreseen; at 30 m/s of closing 1.5 m, less than a car is long
@@ -16,7 +138,7 @@ CORRIDOR_M = 0.375  # the ego's corridor is this much wider than itself to eithe
 F = TypeVar("F", float, Floats)  # one number, or one for each frame
 
 
-class Body(NamedTuple, Generic[F]):
+class MovingBox(NamedTuple, Generic[F]):
     """An oriented box on the move: now, or in each of `T` frames."""
 
     x: F
@@ -34,13 +156,13 @@ def with_margin(size: Size) -> Size:
 
 
 @compiled
-def at(motion: Body[Floats], t: int) -> Body[float]:
+def at(motion: MovingBox[Floats], t: int) -> MovingBox[float]:
     """The body in one frame."""
-    return Body(motion.x[t], motion.y[t], motion.heading[t], motion.vx[t], motion.vy[t], motion.size)
+    return MovingBox(motion.x[t], motion.y[t], motion.heading[t], motion.vx[t], motion.vy[t], motion.size)
 
 
 @compiled
-def time_to_touch(path: Path, s: float, speed: float, size: Size, other: Body[float], horizon: float) -> float:
+def time_to_touch(path: Path, s: float, speed: float, size: Size, other: MovingBox[float], horizon: float) -> float:
     """Computes the time until the ego touches another body, s; inf if never.
 
     The ego keeps its speed along its path, the body its velocity.
@@ -99,3 +221,112 @@ def entry_distance(
             if touches(corridor[k], size, (x[j], y[j], heading[j]), other_size):
                 return gone, start + k * spacing
     return math.inf, math.inf
+
+
+WANDER_M = 0.375  # what a vehicle strays from its lane's centre without meaning anything
+DANGER_TTC_S = 2.0
+LEADER_BRAKES_MPS2 = 5.0
+
+
+class BodyOnPath(NamedTuple, Generic[F]):
+    """Another body as seen along the ego's path: now, or in each of `T` frames."""
+
+    gap_m: F  # from the ego's front to the other's rear, below 0 alongside and behind
+    behind_m: F  # from the other's front to the ego's rear
+    ttc_s: F  # along the path; inf if it is not ahead, or the ego does not close in
+    across_m: F  # of its centre from the ego's path, positive to the left
+    turn_rad: F  # its heading relative to the path, full turns not taken off
+    speed_mps: F  # along the path
+    aside_s: F  # until the sides touch, as the two move across now; inf if they do not come nearer
+
+
+@compiled
+def along(path: Path, first: int, s: float, speed: float, size: Size, other: MovingBox[float]) -> BodyOnPath[float]:
+    """Places a body along the ego's path, which may bend.
+
+    The ego is at `s`; `first` is the last point of the path that it has passed.
+    """
+    other_s, across, heading = project(path, first, other.x, other.y)
+    turn = other.heading - heading
+    cos, sin, (half_length, half_width) = abs(math.cos(turn)), abs(math.sin(turn)), other.size
+    reach = size.half_length + cos * half_length + sin * half_width
+    gap, behind = other_s - s - reach, s - other_s - reach
+    speed_along = other.vx * math.cos(heading) + other.vy * math.sin(heading)
+    closing = speed - speed_along
+    ttc = gap / closing if gap > 0.0 and closing > 0.0 else math.inf
+    beside = size.half_width + cos * half_width + sin * half_length
+    room = max(abs(across) - beside, 0.0)
+    coming = math.copysign(1.0, across) * (other.vx * math.sin(heading) - other.vy * math.cos(heading))
+    aside = room / coming if coming > 0.0 else math.inf
+    return BodyOnPath(gap, behind, ttc, across, turn, speed_along, aside)
+
+
+def along_series(path: Path, speed: Floats, size: Size, other: MovingBox[Floats]) -> BodyOnPath[Floats]:
+    """Places a body along the ego's path frame by frame; the path has a point per frame."""
+    return BodyOnPath(*_along_rows(path, speed, size, other))
+
+
+@compiled
+def _along_rows(path: Path, speed: Floats, size: Size, other: MovingBox[Floats]) -> Floats:
+    rows = np.empty((7, len(speed)))
+    for t in range(len(speed)):
+        for row, value in enumerate(along(path, t, path.s[t], speed[t], size, at(other, t))):
+            rows[row, t] = value
+    return rows
+
+
+@compiled
+def towards(across_m: float, offset_m: float, lane_width_m: float) -> float:
+    """Computes a vehicle's offset from its lane's centre towards the ego, m.
+
+    SUMO's offset jumps by a lane's width when the vehicle passes to the next lane; where it stands across the ego's
+    path tells which lane's centre is meant. Without a recorded offset (NaN) that place alone decides.
+
+    `across_m` is its centre's distance from the ego's path, positive to the left, `offset_m` that from its lane's
+    centre.
+    """
+    seen = lane_width_m - abs(across_m)
+    if math.isnan(offset_m):
+        return seen
+    recorded = -offset_m if across_m > 0.0 else offset_m
+    return recorded + lane_width_m * round((seen - recorded) / lane_width_m)
+
+
+@compiled
+def lane_conflict(
+    other: BodyOnPath[float], speed_mps: float, offset_m: float, accel_mps2: float, lane_width_m: float, wary: bool
+) -> tuple[bool, bool]:
+    """Detects the beginning and the continuation of a conflict with a same-direction vehicle.
+
+    A cut-in begins when the vehicle is more than 0.375 m off its lane's centre towards the ego, and less than 2 s
+    ahead, or alongside and coming nearer; a conflict with a leader when it brakes harder than 5 m/s², or is less than
+    2 s ahead.
+    Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s; one
+    alongside comes nearer if the sides would touch within 4 s, or it is half in the ego's lane. One that merely hangs
+    over the line does not.
+
+    `speed_mps` is the ego's, `accel_mps2` the vehicle's. For a wary driver a vehicle alongside counts if it comes
+    nearer or not.
+    """
+    in_lane = abs(other.across_m) <= lane_width_m / 2
+    coming = in_lane or towards(other.across_m, offset_m, lane_width_m) > WANDER_M
+    alongside = other.gap_m <= 0.0 and other.behind_m <= 0.0 and (wary or in_lane or other.aside_s < HORIZON_S)
+    near = 0.0 < other.gap_m <= HORIZON_S * speed_mps
+    brakes = in_lane and near and accel_mps2 < -LEADER_BRAKES_MPS2
+    begins = brakes or (coming and (alongside or other.ttc_s < DANGER_TTC_S))
+    return begins, begins or (coming and other.ttc_s < HORIZON_S)
+
+
+@compiled
+def lane_conflicts(
+    others: BodyOnPath[Floats], speed_mps: Floats, offset_m: Floats, accel_mps2: Floats, lane_width_m: float, wary: bool
+) -> tuple[Bools, Bools]:
+    """`lane_conflict` in each of `T` frames."""
+    begins, lasts = np.empty(len(speed_mps), dtype=np.bool_), np.empty(len(speed_mps), dtype=np.bool_)
+    for t in range(len(speed_mps)):
+        o = others
+        other = BodyOnPath(
+            o.gap_m[t], o.behind_m[t], o.ttc_s[t], o.across_m[t], o.turn_rad[t], o.speed_mps[t], o.aside_s[t]
+        )
+        begins[t], lasts[t] = lane_conflict(other, speed_mps[t], offset_m[t], accel_mps2[t], lane_width_m, wary)
+    return begins, lasts

@@ -1,25 +1,35 @@
 """The record of a contact and its judgement, from its evidence alone."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 
-from risk_sac.records import Collision, ConflictType, Judgement
-from risk_sac.risk.measures import Measures
-from risk_sac.risk.publish import worst_rss_margin
+import numpy as np
+
+from risk_sac.config import Requirement
+from risk_sac.records import NO_CONTACT, Collision, ConflictType, Fault, Grade, Judgement, RequirementResult, Violation
+from risk_sac.risk.measures import Gauge, Measures
+from risk_sac.risk.publish import AHEAD, ASIDE, ENCOUNTER, worst_rss_margin
+from risk_sac.risk.rss import ENCOUNTER_CAP_S, TTC_CAP_S
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
-from risk_sac.risk.ttc import TTC_CAP_S
 from risk_sac.sim.collision import Contact
-from risk_sac.types import STEP_S, Frame, Kind, Role
-from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
-from risk_sac.verdicts.definitions import DEFINITIONS
-from risk_sac.verdicts.ego_part import ego_part
-from risk_sac.verdicts.endangering import endangered_ego
-from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.fault import fault, has_to_yield, parts_of_contact
-from risk_sac.verdicts.labels import ground, manoeuvre, response, signature
-from risk_sac.verdicts.offences import ego_offences, striker_offences
-from risk_sac.verdicts.reference import grade, reference_outcomes
-from risk_sac.verdicts.severity import severity_of
-from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, validity_verdicts
+from risk_sac.verdicts.conflict import SAME_WAY_COS, Conflict, find_conflict, unresponsive
+from risk_sac.verdicts.evidence import Evidence, lane_heading
+from risk_sac.verdicts.fault import ego_part, fault, has_to_yield, parts_of_contact, parts_of_violation
+from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, ground, manoeuvre, response, severity_of, signature
+from risk_sac.verdicts.offences import ego_offences, endangered_ego, striker_offences
+from risk_sac.verdicts.reference import (
+    NO_RED_LIGHT_ENTRY,
+    ON_CARRIAGEWAY,
+    History,
+    MetActor,
+    grade,
+    kept_by,
+    reference_outcomes,
+)
+from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, overlaps_before_contact, validity_verdicts
+from risk_sac.world.types import STEP_S, Frame, Kind, Role
+
+DEFINITIONS = 7  # raise it with whatever changes a verdict; what was judged before says by which it was
 
 WARNING_STEPS = round(1.0 / STEP_S)  # what a failure is remembered by ends this long before the contact
 
@@ -131,3 +141,158 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
             ego_broke=ego_broke,
         ),
     )
+
+
+# Of `ARTEFACT_RULES`, those that the episode tells; `solid_bodies` is read from its record.
+RULES = ("no_teleport", "inside_limits")
+VIOLATED = {NO_RED_LIGHT_ENTRY: "red light entered", ON_CARRIAGEWAY: "carriageway left"}
+# Signals that others bring about too; all others are the ego's own driving.
+OF_OTHERS = frozenset(
+    {
+        "ttc_s",
+        "encounter_s",
+        "rss_margin",
+        "pedestrian_gap_m",
+        "vehicle_gap_m",
+        "headway_s",
+        "ego_braking_mps2",
+        "ego_jerk_mps3",
+    }
+)
+SAME_OFFENCES = {NO_RED_LIGHT_ENTRY: ("red_light",), ON_CARRIAGEWAY: ("off_road", "wrong_direction")}
+
+
+def requirement_results(
+    requirements: Sequence[Requirement], time_s: Sequence[float], measures: Sequence[Measures], contact_s: float | None
+) -> dict[str, RequirementResult]:
+    """Finds how far each requirement was kept in an episode.
+
+    Args:
+      requirements: `M`.
+      time_s: `T`, from the adversaries' release on.
+      measures: of these frames.
+      contact_s: when the bodies touched.
+    """
+    robustness = np.array([m.robustness for m in measures])
+    first = (robustness < 0.0).argmax(axis=0)
+    results = {}
+    for i, (requirement, least) in enumerate(zip(requirements, robustness.min(axis=0).tolist(), strict=True)):
+        violated_s = time_s[first[i]] if least < 0.0 else None
+        if requirement.name == NO_CONTACT:  # at a contact its robustness is 0
+            violated_s = contact_s
+        results[requirement.name] = RequirementResult(
+            counts=requirement.counts, robustness=least, violated_s=violated_s
+        )
+    return results
+
+
+def violations_of(
+    requirements: Sequence[Requirement],
+    results: Mapping[str, RequirementResult],
+    gather: Callable[[], History],
+    gauge: Gauge,
+    artefacts: Mapping[str, float],
+) -> tuple[Violation, ...]:
+    """The violations without contact of the requirements that count, in the order of time.
+
+    Args:
+      requirements: of the episode.
+      results: how far each requirement was kept.
+      gather: returns the whole episode; it takes milliseconds, and is called if there is a violation.
+      gauge: that measured it.
+      artefacts: rules of `ARTEFACT_RULES` that the episode broke, and when it first did, s of the simulator.
+    """
+    counting = [each for each in requirements if each.name != NO_CONTACT and each.counts == "failure"]
+    violated = [(each, time_s) for each in counting if (time_s := results[each.name].violated_s) is not None]
+    if not violated:
+        return ()
+    history, found = gather(), []
+    overlap_s = min((each.time_s for each in overlaps_before_contact(history.evidence)), default=math.inf)
+    released = int(np.searchsorted(history.evidence.time_s, -STEP_S / 2))
+    for requirement, time_s in violated:
+        index = released + round(time_s / STEP_S)
+        verdicts = {rule: artefacts.get(rule, math.inf) > history.frames[index].time_s for rule in RULES}
+        verdicts["solid_bodies"] = time_s < overlap_s
+        found.append(_violation(requirement, results[requirement.name], history, gauge, index, verdicts))
+    return tuple(sorted(found, key=lambda violation: violation.time_s))
+
+
+def _violation(
+    requirement: Requirement,
+    result: RequirementResult,
+    history: History,
+    gauge: Gauge,
+    index: int,
+    verdicts: Mapping[str, bool],
+) -> Violation:
+    """The record of a violation that began in frame `index`."""
+    frame, measures, evidence = history.frames[index], history.measures[index], history.evidence.until(index)
+    nearest = _soonest_met(measures)
+    met = None
+    if nearest is not None:
+        column = evidence.column(frame.ids[nearest])
+        met = MetActor(column, find_conflict(evidence, column))
+    driven, broke = manoeuvre(evidence), ego_offences(evidence)
+    if requirement.name == NO_RED_LIGHT_ENTRY:  # it may be violated before the line, when the ego cannot stop any more
+        broke = tuple(dict.fromkeys(("red_light", *broke)))
+    hidden = met is not None and met.conflict.hidden
+    own_gauge = gauge.of(requirement)
+    drivers = kept_by(requirement, own_gauge, history, index, met) if all(verdicts.values()) else {}
+    graded = grade(drivers) if drivers else None
+    actor = "nobody near" if nearest is None else _actor(frame, measures, nearest, evidence) + ", hidden" * hidden
+    violated = VIOLATED.get(requirement.name, f"{requirement.name} violated")
+    others = tuple(name for name in broke if name not in SAME_OFFENCES.get(requirement.name, ()))
+    return Violation(
+        requirement=requirement.name,
+        time_s=result.violated_s,
+        robustness=result.robustness,
+        other_id=None if nearest is None else frame.ids[nearest],
+        other_kind=None if nearest is None else Kind(int(frame.kind[nearest])).name.lower(),
+        other_role=None if nearest is None else Role(int(frame.role[nearest])).name.lower(),
+        ego_speed_mps=frame.ego_speed_mps,
+        ego_manoeuvre=driven,
+        hidden=hidden,
+        broke=broke,
+        verdicts=verdicts,
+        grade=graded,
+        drivers=drivers,
+        fault=None if graded is None else _fault(own_gauge.signals, evidence, met, broke, graded),
+        signature=f"{violated}; {ego_in_words(driven, others)}, {actor}",
+        definitions=DEFINITIONS,
+    )
+
+
+def _fault(
+    signals: Sequence[str], evidence: Evidence, met: MetActor | None, broke: Sequence[str], graded: Grade
+) -> Fault:
+    """Judges a violation of a requirement on `signals`; one on the ego's own driving is the ego's."""
+    if met is None or OF_OTHERS.isdisjoint(signals):
+        return fault(parts_of_violation(own=True, yields=None, other_broke=(), broke=broke, grade=graded))
+    conflict, other = met.conflict, met.column
+    other_broke = striker_offences(evidence, other, crossing=conflict.type is ConflictType.CROSSING)
+    other_broke += endangered_ego(evidence, other, conflict)
+    yields = has_to_yield(conflict.type, ground(evidence, other), other_broke, broke)
+    return fault(parts_of_violation(own=False, yields=yields, other_broke=other_broke, broke=broke, grade=graded))
+
+
+def _soonest_met(measures: Measures) -> int | None:
+    """Finds the column of the actor that the ego would meet soonest; None if it would meet none."""
+    encounter_s = measures.assessment.others[ENCOUNTER]
+    nearest = int(encounter_s.argmin())
+    return nearest + 1 if encounter_s[nearest] < ENCOUNTER_CAP_S else None
+
+
+def _actor(frame: Frame, measures: Measures, actor: int, evidence: Evidence) -> str:
+    """Names an actor by where it is and drives, the same in the mirror but for crossing traffic."""
+    ahead, aside = (float(measures.assessment.others[row, actor - 1]) for row in (AHEAD, ASIDE))
+    if frame.kind[actor] == Kind.PEDESTRIAN:
+        return "pedestrian near"
+    # From the lane's heading: an ego that leaves the road turns away from it.
+    turn = float(frame.heading_rad[actor] - lane_heading(evidence)[-1])
+    if math.cos(turn) < ONCOMING_COS:
+        return "oncoming vehicle"
+    if math.cos(turn) < SAME_WAY_COS:
+        return f"vehicle from the {'right' if math.sin(turn) > 0.0 else 'left'}"
+    if abs(aside) > (frame.width_m[0] + frame.width_m[actor]) / 2:
+        return "vehicle beside it"
+    return "vehicle ahead" if ahead > 0.0 else "vehicle behind"

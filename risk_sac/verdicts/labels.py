@@ -1,16 +1,87 @@
-"""Labels of a failure: the ground, what the ego did, and the signature made of them."""
+"""Severity of a contact: the risk of injury at its closing speed, and the class that follows.
+
+Both curves are logistic, P = 1 / (1 + exp(a - b v)). They hold for a population, not for the one contact, and neither
+knows where the body was struck.
+
+Sources:
+  Pedestrians: Rosén and Sander 2009, "Pedestrian fatality risk as a function of car impact speed", Accident Analysis
+    and Prevention 41, 536-542. Fatality by impact speed in km/h; fitted to 490 pedestrians of 15 years and older (36
+    died) that the front of a car struck, GIDAS 1999-2007, weighted by German statistics.
+  Occupants: Wang 2022, "MAIS(05/08) injury probability curves as functions of delta V", NHTSA DOT HS 813 219. Injury of
+    MAIS 3 or more by delta-v in miles/h, all crashes; fitted to occupants of towed cars, NASS-CDS 2010-2015.
+"""
 
 import math
 
 import numpy as np
 
-from risk_sac.records import ConflictType
-from risk_sac.types import Kind, Role
+from risk_sac.records import ConflictType, Severity
 from risk_sac.verdicts.conflict import BRAKES_MPS2, Conflict
 from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
-from risk_sac.verdicts.evidence import Evidence, inside
+from risk_sac.verdicts.evidence import Evidence, front_moved_across, inside
 from risk_sac.verdicts.offences import IN_WORDS, RECENT_S, STANDING_MPS
-from risk_sac.verdicts.recorded import front_moved_across
+from risk_sac.world.types import Kind, Role
+
+KMH = 3.6  # in 1 m/s
+MILES_PER_H = 3.6 / 1.609344
+FATALITY = (6.9, 0.090)
+MAIS3 = (6.9540, 0.1637)
+# Choice: kerb mass and a load. The types in sumo_nets/vtypes.add.xml have none; one of more than 6 m is a truck.
+CAR_KG, TRUCK_KG, TRUCK_FROM_M = 1500.0, 7500.0, 6.0
+MINOR_MPS = 2.0
+# Choice: one in a hundred. It is reached by a pedestrian at 26 km/h, a car struck by a car at a closing speed of
+# 46 km/h, and one struck by a truck at 28 km/h.
+SEVERE_RISK = 0.01
+
+
+def fatality_risk(closing_mps: float) -> float:
+    """Returns the risk that a pedestrian dies of being struck at this speed."""
+    return _logistic(FATALITY, closing_mps * KMH)
+
+
+def serious_injury_risk(delta_v_mps: float) -> float:
+    """Computes an occupant's risk of an injury of MAIS 3 or more for a change of velocity."""
+    return _logistic(MAIS3, delta_v_mps * MILES_PER_H)
+
+
+def mass_kg(length_m: float) -> float:
+    """Returns the mass of a vehicle of this length."""
+    return TRUCK_KG if length_m > TRUCK_FROM_M else CAR_KG
+
+
+def delta_v_mps(closing_mps: float, own_kg: float, other_kg: float) -> float:
+    """Returns by how much a body's velocity changes if both move on as one (conservation of momentum)."""
+    return closing_mps * other_kg / (own_kg + other_kg)
+
+
+def severity(closing_mps: float, risk: float, *, pedestrian: bool) -> Severity:
+    """Returns the class of a contact; one with a pedestrian is never minor."""
+    if risk >= SEVERE_RISK:
+        return Severity.SEVERE
+    return Severity.MINOR if closing_mps < MINOR_MPS and not pedestrian else Severity.MODERATE
+
+
+def severity_of(evidence: Evidence, striker: int) -> tuple[Severity, float]:
+    """Returns the class and the risk of injury of the contact in the last frame.
+
+    Between vehicles it is the risk of whichever is worse off. The closing speed is the whole relative velocity, so the
+    risk is an upper bound where the bodies slide along each other.
+    """
+    e = evidence
+    closing = math.hypot(*(float(each[-1, striker] - each[-1, 0]) for each in (e.vx_mps, e.vy_mps)))
+    pedestrian = bool(e.kind[striker] == Kind.PEDESTRIAN)
+    if pedestrian:
+        risk = fatality_risk(closing)
+    else:
+        ego_kg, other_kg = (mass_kg(float(e.length_m[actor])) for actor in (0, striker))
+        risk = serious_injury_risk(delta_v_mps(closing, min(ego_kg, other_kg), max(ego_kg, other_kg)))
+    return severity(closing, risk, pedestrian=pedestrian), risk
+
+
+def _logistic(curve: tuple[float, float], speed: float) -> float:
+    a, b = curve
+    return 1.0 / (1.0 + math.exp(a - b * speed))
+
 
 RESPONSE_S = 1.0  # before the contact: what the ego does then is its response
 SPEEDS_UP_MPS2 = 1.5  # more than Krauss's drivers dawdle with, as `BRAKES_MPS2`

@@ -8,17 +8,15 @@ from typing import Protocol
 
 import numpy as np
 
-from risk_sac.geometry import size_of
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.types import STEP_S, Bools, Frame, Kind
-from risk_sac.verdicts.course import HORIZON_S
-from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, allowed_accel, nothing_remembered
+from risk_sac.verdicts.course import HORIZON_S, Path
+from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, SceneAhead, allowed_accel, nothing_remembered
 from risk_sac.verdicts.drivers import R157_PERCEIVES_S, r157
 from risk_sac.verdicts.evidence import Ground
-from risk_sac.verdicts.moment import Scene
-from risk_sac.verdicts.path import Path
 from risk_sac.verdicts.present import OnPath, conflict_in, street_of
 from risk_sac.verdicts.unseen import crossings_on
+from risk_sac.world.geometry import size_of
+from risk_sac.world.types import STEP_S, Bools, Frame, Kind
 
 LEAST_MPS2 = 1e-6  # braking that only keeps the ego from speeding up
 LEAST_ACCEL_MPS2 = 0.5  # Choice: a restraint to more is none; SUMO's driver can be told to brake, not how to speed up
@@ -118,7 +116,7 @@ class DefensiveReflex:
         ego = OnPath(path, 0, float(path.s[0]), frame.ego_speed_mps, size)
         crossings = crossings_on(path, ego.s, float(path.s[-1]), self._street.boxes, size.half_width)
         everything = np.ones(len(frame.ids), dtype=np.bool_)
-        scene = Scene(
+        scene = SceneAhead(
             frame.state, frame.kind == Kind.VEHICLE, frame.link, seen, priority, everything, True, 0, math.inf
         )
         accel = allowed_accel(ego, scene, self._street, crossings, self._memory, STEP_S)

@@ -10,18 +10,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.geometry import Size
-from risk_sac.jit import compiled
-from risk_sac.scenario.ground import Area
+from risk_sac.scenario.layout import Area
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.types import ACCEL, HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Floats, X, Y
-from risk_sac.verdicts.along import along, lane_conflict
-from risk_sac.verdicts.areas import Sides, sides_of, within
 from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, KERB_S, SAME_WAY_COS, YIELDING_MPS2
-from risk_sac.verdicts.course import HORIZON_S, Body, entry_distance, time_to_touch, with_margin
+from risk_sac.verdicts.course import (
+    HORIZON_S,
+    MovingBox,
+    Path,
+    Sides,
+    along,
+    entry_distance,
+    lane_conflict,
+    sides_of,
+    time_to_touch,
+    with_margin,
+    within,
+)
 from risk_sac.verdicts.evidence import KERB_STEPS, Ground
-from risk_sac.verdicts.path import Path
 from risk_sac.verdicts.unseen import boxes_of
+from risk_sac.world.geometry import Size
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import ACCEL, HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Floats, X, Y
 
 NEAR_S = 1.0  # two vehicles that pass a place no further apart in time are in each other's way
 AHEAD_M = 1.0  # between two foreseen poses
@@ -64,10 +73,10 @@ def _areas_of(
 
 
 @compiled
-def body_of(state: Floats, i: int) -> Body[float]:
+def body_of(state: Floats, i: int) -> MovingBox[float]:
     """The body of an actor in a frame's state."""
     size = Size(state[LENGTH, i] / 2, state[WIDTH, i] / 2)
-    return Body(state[X, i], state[Y, i], state[HEADING, i], state[VX, i], state[VY, i], size)
+    return MovingBox(state[X, i], state[Y, i], state[HEADING, i], state[VX, i], state[VY, i], size)
 
 
 @compiled
@@ -118,7 +127,7 @@ def must_yield(link: int) -> bool:
 
 
 @compiled
-def soon_walked(street: Street, other: Body[float]) -> bool:
+def soon_walked(street: Street, other: MovingBox[float]) -> bool:
     """Whether a pedestrian is on the carriageway or a crossing, or comes there within 1 s."""
     if len(street.roadway.sides) == 0:
         return True
@@ -131,7 +140,7 @@ def soon_walked(street: Street, other: Body[float]) -> bool:
 
 @compiled
 def _entry(
-    ego: OnPath, corridor: Size, other: Body[float], other_mps: float, braking_mps2: float
+    ego: OnPath, corridor: Size, other: MovingBox[float], other_mps: float, braking_mps2: float
 ) -> tuple[float, float]:
     """`entry_distance` of a straight course as long as stopping takes; inf if it can stop before."""
     stopping_m = other_mps**2 / (2 * braking_mps2)
@@ -144,7 +153,7 @@ def _entry(
 
 @compiled
 def _both_come(
-    entry_m: float, meets_m: float, speed: float, size: Size, other: Body[float], other_speed: float
+    entry_m: float, meets_m: float, speed: float, size: Size, other: MovingBox[float], other_speed: float
 ) -> bool:
     """Whether both pass the place where their ways meet within the horizon, and less than 1 s apart."""
     if speed < STANDING_MPS or other_speed < STANDING_MPS:

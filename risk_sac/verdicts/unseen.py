@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.jit import compiled
-from risk_sac.scenario.ground import Area
-from risk_sac.types import HEADING, LENGTH, WIDTH, Bools, Floats, X, Y
-from risk_sac.verdicts.course import CORRIDOR_M, Body
-from risk_sac.verdicts.path import Path, pose_at
+from risk_sac.scenario.layout import Area
+from risk_sac.verdicts.course import CORRIDOR_M, MovingBox, Path, pose_at
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import HEADING, LENGTH, WIDTH, Bools, Floats, X, Y
 
 WAITING_M = 2.0  # of sidewalk at either end of a crossing, on which pedestrians wait
 SPOT_M = 1.0  # between two places on a crossing that are looked at
@@ -110,8 +109,8 @@ def walls_of(state: Floats, hides: Bools) -> Floats:
 
 
 @compiled
-def is_in_view(walls: Floats, eye_x: float, eye_y: float, body: Body[float]) -> bool:
-    """Whether a corner or the centre of a body can be seen, as `risk_sac.geometry.line_of_sight` asks it."""
+def is_in_view(walls: Floats, eye_x: float, eye_y: float, body: MovingBox[float]) -> bool:
+    """Whether a corner or the centre of a body can be seen, as `risk_sac.world.geometry.line_of_sight` asks it."""
     cos, sin = math.cos(body.heading), math.sin(body.heading)
     for along, across in ((0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
         a, b = along * CORNER * body.size.half_length, across * CORNER * body.size.half_width

@@ -12,8 +12,8 @@ from typing import Any
 from fastapi import Request, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.api.answers.representations import has
 from service.api.context import CALLER
+from service.api.representations import has
 from service.store.reading import Store
 
 MOST_BYTES = 16 << 20  # of all kept answers

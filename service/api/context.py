@@ -7,8 +7,8 @@ from typing import Annotated, cast
 from fastapi import Depends, Request
 from prometheus_client import CollectorRegistry
 
-from service.api.answers.pages import Cursors
-from service.api.answers.problems import ProblemError, Reason
+from service.api.pages import Cursors
+from service.api.problems import ProblemError, Reason
 from service.api.stream import Streams
 from service.keys.file import Scope
 from service.networks.network_store import NetworkStore
@@ -19,9 +19,9 @@ from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign
 from service.views.on_demand import OnDemandCache
-from service.views.pictures import Picture
 from service.views.reports import Reports
-from service.views.studies import Studies, Tables
+from service.views.series import Picture
+from service.views.studies import EpisodeTables, Studies
 from service.views.whole import Priors, Views
 
 
@@ -35,7 +35,7 @@ class Context:
     reports: Reports
     pictures: OnDemandCache[Picture]
     studies: Studies
-    tables: Tables
+    tables: EpisodeTables
     views: Views
     priors: Priors
     regressions: Regressions

@@ -12,13 +12,13 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metri
 from prometheus_client.registry import Collector
 from pydantic_core import from_json
 
-from risk_sac.execution.executor import Cluster, Node
+from risk_sac.execution.executor import ClusterNode, ClusterState
 from risk_sac.records import State
 from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS
 from service.errors import StorageError
 from service.runs.manager import Manager
+from service.store.counting import Statistics, read_statistics
 from service.store.reading import Store
-from service.store.statistics import Statistics, read_statistics
 
 BUCKETS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)
 SEARCH = ("family", "method")
@@ -55,7 +55,7 @@ OF_REQUIREMENTS = {
         "Distinct violations that a reference driver would have prevented.",
     ),
 }
-NODE_GAUGES: tuple[tuple[str, str, Callable[[Node], float]], ...] = (
+NODE_GAUGES: tuple[tuple[str, str, Callable[[ClusterNode], float]], ...] = (
     ("alive", "Whether the cluster counts the node as alive.", lambda node: node.alive),
     ("slots", "Runs that the node has room for.", lambda node: node.slots),
     ("runs", "Runs at work on the node.", lambda node: node.runs),
@@ -140,7 +140,7 @@ class CampaignMetrics(Collector):
             yield self._of_requirements[step].family(name, meaning, sums)
 
 
-def _of_cluster(cluster: Cluster | None) -> Iterator[Metric]:
+def _of_cluster(cluster: ClusterState | None) -> Iterator[Metric]:
     """Yields metrics of each cluster node; none without a cluster."""
     if cluster is None:
         return

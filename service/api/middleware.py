@@ -1,4 +1,9 @@
-"""Middleware of every request, in pure ASGI because of event streams."""
+"""Records every request: duration, log line and request id."""
+
+import logging
+import random
+import re
+import time
 
 from fastapi import FastAPI
 from prometheus_client import Histogram
@@ -8,14 +13,85 @@ from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from risk_sac.loopback import is_loopback
-from service.api.answer_cache import AnswerCache
-from service.api.answers.representations import LEAST_BYTES, takes
-from service.api.guards.connections import BodyLimit
-from service.api.guards.gate import Gate
-from service.api.observe import Observe
+from risk_sac.host.machine import is_loopback
+from service.api.answer_cache import FROM_CACHE, AnswerCache
+from service.api.connections import BodyLimit
+from service.api.context import CALLER, Caller
+from service.api.gate import Gate
+from service.api.representations import LEAST_BYTES, takes
 from service.keys.made import AuthEnabledFlag
 from service.settings import ROOT_PATH, ServiceSettings
+
+logger = logging.getLogger("service.access")
+
+REQUEST_ID = b"x-request-id"
+_SANE = re.compile(rb"[\x21-\x7e]{1,100}")
+_UNKNOWN = "unknown"  # one label for all paths that no route answers, or anybody could make thousands
+_METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+
+
+class Observe:
+    """ASGI middleware, outermost, so that refused requests count as well."""
+
+    def __init__(self, app: ASGIApp, latencies: Histogram) -> None:
+        self._app = app
+        self._latencies = latencies
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes on and records when the answer begins and ends."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        began = time.perf_counter()
+        request_id = _request_id(scope)
+        status = 0
+
+        async def note(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                message["headers"] = [*message.get("headers", ()), (REQUEST_ID, request_id)]
+                self._observe(scope, status, time.perf_counter() - began)
+            await send(message)
+
+        try:
+            await self._app(scope, receive, note)
+        finally:
+            if not status:  # an exception on its way to the handler of last resort
+                status = 500
+                self._observe(scope, status, time.perf_counter() - began)
+            _log(scope, status, time.perf_counter() - began, request_id.decode())
+
+    def _observe(self, scope: Scope, status: int, seconds: float) -> None:
+        method = scope["method"] if scope["method"] in _METHODS else _UNKNOWN
+        self._latencies.labels(_route(scope), method, str(status)).observe(seconds)
+
+
+def _route(scope: Scope) -> str:
+    """The template of the route that answers, which the router leaves behind."""
+    return getattr(scope.get("route"), "path", _UNKNOWN)
+
+
+def _request_id(scope: Scope) -> bytes:
+    given = next((value for name, value in scope["headers"] if name == REQUEST_ID), b"")
+    return given if _SANE.fullmatch(given) else b"%016x" % random.getrandbits(64)
+
+
+def _log(scope: Scope, status: int, seconds: float, request_id: str) -> None:
+    # Clients that poll would fill the disk, so answers from the cache are not logged by default.
+    level = logging.DEBUG if FROM_CACHE in scope else logging.INFO
+    if not logger.isEnabledFor(level):
+        return
+    ms = round(1e3 * seconds, 2)
+    fields = {"method": scope["method"], "route": _route(scope), "status": status, "ms": ms, "request_id": request_id}
+    campaign = scope.get("path_params", {}).get("campaign_id", "")
+    if campaign.isascii() and campaign.isalnum():  # as all ids are; what else was asked for is not for the log
+        fields["campaign"] = campaign
+    caller: Caller | None = scope.get(CALLER)
+    if caller is not None:
+        fields |= {"project": caller.project, "key": caller.key_id}
+    logger.log(level, "%s %s %d %.2f ms", scope["method"], fields["route"], status, ms, extra=fields)
+
 
 GZIP_LEVEL = 4  # of 9; higher levels take several times as long and save a few per cent
 
@@ -35,7 +111,7 @@ def add_middleware(app: FastAPI, settings: ServiceSettings, made: AuthEnabledFla
             expose_headers=("ETag", "Location", "Retry-After"),
         )
     app.add_middleware(SecurityHeaders)
-    app.add_middleware(Head)
+    app.add_middleware(HeadRequests)
     app.add_middleware(Observe, latencies=latencies)
     app.add_middleware(ForwardedPrefix)
 
@@ -115,7 +191,7 @@ class ForwardedPrefix:
         await self._app(scope, receive, send)
 
 
-class Head:
+class HeadRequests:
     """ASGI middleware that answers HEAD like GET, without the body.
 
     A stream would not end by itself, so the app sees a disconnected client.

@@ -1,7 +1,4 @@
-"""Reads posted JSON strictly: `"3"` and `true` are no numbers.
-
-A campaign names families, or places of an uploaded network, which become families here.
-"""
+"""Names of requirements for filters and metric labels."""
 
 import codecs
 import json
@@ -9,7 +6,7 @@ from collections.abc import Collection
 from http import HTTPStatus
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-from fastapi import Depends, Request
+from fastapi import Depends, Query, Request
 from fastapi.concurrency import run_in_threadpool
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, Field, ValidationError, model_validator
@@ -17,10 +14,35 @@ from pydantic_core import from_json
 
 from risk_sac.config import CampaignSpec, Settings
 from risk_sac.errors import ConfigError
-from risk_sac.scenario.maps.found import Pattern
-from service.api.answers.problems import ProblemError, Reason, invalid, invalid_field
+from risk_sac.maps.found import Pattern
+from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS
 from service.api.context import Caller, Context, CurrentCaller, Service
+from service.api.problems import ProblemError, Reason, invalid, invalid_field
 from service.errors import NotFoundError
+
+
+def _known(
+    campaign_id: str,
+    service: Service,
+    caller: CurrentCaller,
+    requirement: Annotated[
+        str | None,
+        Query(
+            max_length=40,
+            description="Only those that violate it. With `tier=valid` it must count, and the violation be valid.",
+        ),
+    ] = None,
+) -> str | None:
+    """Returns the requested requirement; 422 with the campaign's unless it has it."""
+    if requirement is None:
+        return None
+    known = dict.fromkeys([*SHIPPED_REQUIREMENTS, *service.store.own_requirements(campaign_id, caller.sees)])
+    if requirement not in known:
+        raise invalid_field("requirement", requirement, f"one of: {', '.join(known)}")
+    return requirement
+
+
+AskedRequirement = Annotated[str | None, Depends(_known)]
 
 MOST_MISTAKES = 50  # that a refusal names one by one
 MOST_COMMAS = 5_000  # about as many values; validating them holds up all other requests
@@ -92,7 +114,7 @@ def _unsupported(detail: str) -> ProblemError:
     return ProblemError(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, Reason.UNSUPPORTED_MEDIA_TYPE, detail)
 
 
-class Ground(Settings):
+class CampaignPlaces(Settings):
     """Network, pattern and places of a campaign."""
 
     network: Annotated[str, Field(max_length=40)]
@@ -116,8 +138,8 @@ async def _campaign(request: Request, service: Service, caller: CurrentCaller) -
         if "families" in value:
             wanted = "either families or a network with its places, not both"
             raise invalid_field("families", value["families"], wanted)
-        where = {name: value.pop(name) for name in Ground.model_fields if name in value}
-        ground = _validated(json.dumps(where).encode(), Ground)
+        where = {name: value.pop(name) for name in CampaignPlaces.model_fields if name in value}
+        ground = _validated(json.dumps(where).encode(), CampaignPlaces)
         families = await run_in_threadpool(_families, ground, service, caller)
         content = json.dumps({"families": families} | value).encode()
     spec = _validated(content, CampaignSpec)
@@ -129,7 +151,7 @@ async def _campaign(request: Request, service: Service, caller: CurrentCaller) -
 PostedCampaign = Annotated[CampaignSpec, Depends(_campaign)]
 
 
-def _families(ground: Ground, service: Context, caller: Caller) -> list[str]:
+def _families(ground: CampaignPlaces, service: Context, caller: Caller) -> list[str]:
     try:
         return service.surveys.keep(ground.network, caller.sees, ground.pattern, ground.place)
     except NotFoundError as error:
@@ -153,7 +175,7 @@ def input_schemas(model: type[BaseModel]) -> dict[str, Any]:
 def campaign_schemas() -> dict[str, Any]:
     """Returns JSON schemas of both kinds of campaign, as OpenAPI components."""
     schemas = input_schemas(CampaignSpec)
-    plain, ground = schemas[CampaignSpec.__name__], input_schemas(Ground)[Ground.__name__]
+    plain, ground = schemas[CampaignSpec.__name__], input_schemas(CampaignPlaces)[CampaignPlaces.__name__]
     reference = f"{REFERENCE}/properties/{{name}}"
     fields = {
         name: {"$ref": reference.format(model=CampaignSpec.__name__, name=name)}

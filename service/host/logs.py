@@ -7,7 +7,7 @@ from typing import Literal
 from pythonjsonlogger.core import RESERVED_ATTRS
 from pythonjsonlogger.json import JsonFormatter
 
-from risk_sac.logs import LogFormatter
+from risk_sac.host.terminal import LogFormatter
 
 SUBJECTS = ("campaign", "run")  # of a record's `extra`
 _OUR_ERROR = re.compile(r"\n(?:service|risk_sac)\.[\w.]+: (?P<reason>.*)\Z", re.DOTALL)

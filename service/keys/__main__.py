@@ -12,11 +12,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from risk_sac.errors import ConfigError, RiskSacError
-from risk_sac.terminal import Output, complain, errors, run_command
-from service.host.environment import MISUSED, read_settings
+from risk_sac.host.terminal import Output, complain, errors, run_command
 from service.keys.file import PROJECT, Key, KeyFile, Scope, missing
 from service.keys.made import ever_made, noting
-from service.settings import ServiceSettings
+from service.settings import MISUSED, ServiceSettings, read_settings
 
 console = Output(highlight=False, soft_wrap=True)
 

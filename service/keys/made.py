@@ -12,8 +12,16 @@ from sqlalchemy import Engine
 from service.host.data_folder import hold_data_folder
 from service.keys.file import KeyFile
 from service.settings import ServiceSettings
-from service.store.database import connected, held, newest_step, present_step, sqlite_file, step_forward
-from service.store.server import keys_were_made, noting_keys
+from service.store.database import (
+    connected,
+    held,
+    keys_were_made,
+    newest_step,
+    noting_keys,
+    present_step,
+    sqlite_file,
+    step_forward,
+)
 
 
 class AuthEnabledFlag:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from risk_sac.errors import ConfigError
-from risk_sac.loopback import is_loopback
+from risk_sac.host.machine import is_loopback
 from service.errors import KeysError
 from service.keys.file import Document, Key, KeyFile, missing, split
 from service.keys.made import AuthEnabledFlag

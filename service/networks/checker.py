@@ -1,27 +1,83 @@
-"""`service.networks.checker REPORT`: check the file `upload` in the current folder.
-
-Started by `service.networks.sandbox`, which never reads an upload itself. Whatever goes wrong here, by a bug of ours
-or of the simulator's, ends this process and nothing else. What passes is written again beside the upload.
-"""
+"""Loads a network in libsumo, with limits on the process."""
 
 import gc
 import hashlib
 import json
 import os
+import resource
+import signal
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
 from risk_sac.errors import MapError
-from risk_sac.scenario.maps.convert import MEMORY_BYTES, Converted, present_net
-from risk_sac.scenario.maps.documents import MAX_ROADS
-from risk_sac.scenario.maps.read_net import parse_net, read_tree
-from risk_sac.scenario.maps.summary import net_remarks, summary
+from risk_sac.maps.convert import FILE_BYTES, MEMORY_BYTES, Converted, limit, present_net, remarks
+from risk_sac.maps.documents import MAX_ROADS
+from risk_sac.maps.net import net_remarks, summary
+from risk_sac.maps.read_net import parse_net, read_tree
 from service.errors import UploadError
-from service.networks.report import CheckReport, Kind, NetworkFile
-from service.networks.simulator import bind, bind_simulator, load
+from service.networks.schemas import (
+    CPU_S,
+    LOG_BYTES,
+    OPEN_FILES,
+    STEP_S,
+    STEPS,
+    WALL_S,
+    CheckReport,
+    DocumentKind,
+    NetworkFile,
+)
+
+LOG = Path("log")  # where the file descriptors 1 and 2 lead to
+_FLAGS: Mapping[DocumentKind, str] = {DocumentKind.NET: "-n", DocumentKind.ADDITIONAL: "-a", DocumentKind.ROUTES: "-r"}
+_OPTIONS = (
+    "--xml-validation never --xml-validation.net never --xml-validation.routes never --route-steps 0 "
+    f"--step-length {STEP_S} --scale 0 --no-step-log --duration-log.disable"  # flows insert nothing
+).split()
+
+
+def load(names: Mapping[DocumentKind, Sequence[str]]) -> list[str]:
+    """Loads files of the current folder and runs a few steps, without output or user options.
+
+    Returns what SUMO warned of; an UploadError has SUMO's own message.
+    """
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # libsumo imports numpy, which reserves memory for each thread
+    import libsumo  # here, so that most uploads are refused without it
+
+    command = ["sumo", *_OPTIONS]
+    for kind, flag in _FLAGS.items():
+        command += [flag, ",".join(names[kind])] if names[kind] else []
+    try:
+        libsumo.start(command)
+        for _ in range(STEPS):
+            libsumo.simulationStep()
+    except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+        raise UploadError(f"the simulator cannot load it: {'; '.join(_said('Error')[:5]) or error}") from error
+    return _said("Warning")
+
+
+def bind() -> None:
+    """Bound what this process may use, for good."""
+    signal.alarm(WALL_S)  # in case the server dies
+    limit(resource.RLIMIT_CORE, 0)
+    limit(resource.RLIMIT_CPU, CPU_S)
+    limit(resource.RLIMIT_AS, MEMORY_BYTES)
+    limit(resource.RLIMIT_NOFILE, OPEN_FILES)
+    limit(resource.RLIMIT_FSIZE, FILE_BYTES)
+
+
+def bind_simulator() -> None:
+    """Denies the simulator output files, and further processes or threads unless root."""
+    limit(resource.RLIMIT_FSIZE, LOG_BYTES)
+    limit(resource.RLIMIT_NPROC, 0)
+
+
+def _said(severity: str) -> list[str]:
+    """SUMO's messages of a severity, `Error` or `Warning`, so far."""
+    return remarks(LOG.read_text("utf-8", "replace"), severity)
+
 
 UPLOAD = Path("upload")
 MOST_WARNINGS = 20
@@ -41,20 +97,20 @@ def check(upload: Path) -> CheckReport:
     found, remarks = summary(net), net_remarks(net)
     del root, net  # makes room for the simulator's
     bind_simulator()
-    said = load({kind: [file.name for file in files if file.kind is kind] for kind in Kind})
+    said = load({kind: [file.name for file in files if file.kind is kind] for kind in DocumentKind})
     warnings = (*remarks, *converted.warnings, *said)
     return CheckReport(summary=found, files=tuple(files), warnings=warnings[:MOST_WARNINGS])
 
 
 def _kept(converted: Converted, elements: int) -> Iterator[NetworkFile]:
     """Moves the documents to the current folder, the net first."""
-    yield _moved(converted.file, "net.xml", Kind.NET, elements)
+    yield _moved(converted.file, "net.xml", DocumentKind.NET, elements)
     for number, document in enumerate(converted.others, start=1):
-        kind = Kind(document.root)
+        kind = DocumentKind(document.root)
         yield _moved(document.file, f"{kind}-{number}.xml", kind, document.elements)
 
 
-def _moved(file: Path, name: str, kind: Kind, elements: int) -> NetworkFile:
+def _moved(file: Path, name: str, kind: DocumentKind, elements: int) -> NetworkFile:
     content = file.rename(name).read_bytes()
     return NetworkFile(name, kind, len(content), elements, hashlib.sha256(content).hexdigest())
 

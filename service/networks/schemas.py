@@ -1,12 +1,60 @@
-"""Response bodies about networks, stored in the same form."""
+"""Limits on checking an uploaded network and searching its places."""
 
+from dataclasses import dataclass
 from datetime import datetime
+from enum import StrEnum
 
 from pydantic import BaseModel, Field
 
+from risk_sac.maps.found import Pattern
+from risk_sac.maps.net import NetSummary
 from risk_sac.records import Page, Record
-from risk_sac.scenario.maps.found import Pattern
-from service.networks.report import NetworkFile
+
+CPU_S = 150  # a net of 50,000 edges takes 45
+WALL_S = 300
+LOG_BYTES = 64 << 10  # what the simulator may write to its log, and to any other file
+OPEN_FILES = 64
+SURVEY_S = 1800  # that a search for places may take; 50,000 edges take 150 on one core
+SURVEY_MEMORY_BYTES = 4 << 30
+MAX_PLACES = 100  # of a campaign
+STEPS, STEP_S = 3, 0.1  # that the simulator runs
+
+MEDIA_TYPES = ("application/xml", "text/xml", "application/gzip", "application/x-gzip", "application/zip")
+PLACES, PICTURE = "places.json", "places.png"  # what a search for places leaves beside the net
+PROGRESS = "progress"  # of the search, as long as it goes on
+
+
+class DocumentKind(StrEnum):
+    """Kind of a document, by its root element."""
+
+    NET = "net"
+    ROUTES = "routes"
+    ADDITIONAL = "additional"
+
+
+@dataclass(frozen=True, slots=True)
+class NetworkFile:
+    """File of a network, as the service rewrote it."""
+
+    name: str
+    """Given by the service; the names in an archive are not kept."""
+    kind: DocumentKind
+    """Told by its root element."""
+    bytes: int
+    elements: int
+    sha256: str
+
+    __pydantic_config__ = {"use_attribute_docstrings": True}  # noqa: RUF012 - pydantic's name
+
+
+@dataclass(frozen=True, slots=True)
+class CheckReport:
+    """Result of the checker, with either `refused` or `summary`."""
+
+    refused: str | None = None
+    summary: NetSummary | None = None
+    files: tuple[NetworkFile, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 class BoundingBox(Record):
@@ -45,7 +93,7 @@ class NetworkPage(Page[Network]):
     """Networks, newest first."""
 
 
-class Spot(Record):
+class SpotBody(Record):
     """Somewhere on a network, m in its own coordinates."""
 
     pattern: Pattern
@@ -55,7 +103,7 @@ class Spot(Record):
     y_m: float
 
 
-class FoundPlace(Spot):
+class FoundPlace(SpotBody):
     """Place that a pattern fits."""
 
     summary: str
@@ -63,7 +111,7 @@ class FoundPlace(Spot):
     """Contacts are rare there: no vehicle can cut in."""
 
 
-class Elsewhere(Spot):
+class Elsewhere(SpotBody):
     """Place that a pattern does not fit."""
 
     why: str

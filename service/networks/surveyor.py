@@ -13,14 +13,21 @@ import time
 from pathlib import Path
 
 from risk_sac.errors import ConfigError
-from risk_sac.failures.map_picture import map_png
+from risk_sac.failures.from_above import map_png
+from risk_sac.maps.finder import FINDERS, Map, survey
+from risk_sac.maps.found import Pattern
+from risk_sac.maps.read_net import read_net
 from risk_sac.run_folder.durable import replace_file, write_sealed
-from risk_sac.scenario.maps.finder import FINDERS, Map, survey
-from risk_sac.scenario.maps.found import Pattern
-from risk_sac.scenario.maps.read_net import read_net
-from service.networks.limits import MAX_PLACES, SURVEY_MEMORY_BYTES
-from service.networks.report import PICTURE, PLACES, PROGRESS
-from service.networks.schemas import Elsewhere, FoundPlace, Places
+from service.networks.schemas import (
+    MAX_PLACES,
+    PICTURE,
+    PLACES,
+    PROGRESS,
+    SURVEY_MEMORY_BYTES,
+    Elsewhere,
+    FoundPlace,
+    Places,
+)
 
 NET = Path("net.xml")
 TOLD_EVERY_S = 1.0
@@ -41,7 +48,7 @@ def main() -> None:
 
 def _survey() -> dict[str, object]:
     net = read_net(NET)
-    found = survey(net, tell=Progress())
+    found = survey(net, tell=SurveyProgress())
     places = Places(
         items=[FoundPlace.model_validate(fit.told()) for fit in found.fits],
         elsewhere=[Elsewhere.model_validate(misfit.told()) for misfit in found.misfits],
@@ -52,7 +59,7 @@ def _survey() -> dict[str, object]:
     return {}
 
 
-class Progress:
+class SurveyProgress:
     """Writes the share of spots that were looked at, now and then."""
 
     def __init__(self) -> None:

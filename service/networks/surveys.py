@@ -13,10 +13,8 @@ from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.run_folder.durable import read_sealed
 from risk_sac.scenario.library import VARIABLE
 from service.errors import BusyError, StorageError
-from service.networks.limits import SURVEY_MEMORY_BYTES, SURVEY_S
 from service.networks.network_store import NetworkStore
-from service.networks.report import PICTURE, PLACES, PROGRESS
-from service.networks.schemas import Places
+from service.networks.schemas import PICTURE, PLACES, PROGRESS, SURVEY_MEMORY_BYTES, SURVEY_S, Places
 
 SURVEYOR = "service.networks.surveyor"
 NICENESS = 5

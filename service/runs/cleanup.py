@@ -1,22 +1,110 @@
-"""Removes campaigns with their folders, old campaigns, and places that no campaign names.
-
-A deletion is atomic even if the server dies: the folder is renamed, then the rows are deleted, then the renamed folder.
-The name of a leftover folder says which step was reached.
-"""
+"""Quotas of a project. Pure functions."""
 
 import logging
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
-from risk_sac.prior import earlier
 from risk_sac.scenario import library
-from service.errors import StorageError
+from risk_sac.search.prior import earlier
+from service.errors import QuotaError, StorageError
 from service.settings import ServiceSettings
 from service.store.reading import Store
+from service.store.stored import Usage
+from service.store.writing import Ledger
+
+RETRY_S = 60.0
+HOUR_S = 3600.0
+
+
+def check_quota(usage: Usage, new_runs: int, settings: ServiceSettings) -> None:
+    """Raises QuotaError if a project has too many queued runs or no worker hours left."""
+    if usage.queued_runs + new_runs > settings.quota_queued_runs:
+        raise QuotaError(
+            f"got {new_runs} runs with {usage.queued_runs} waiting already; wanted at most "
+            f"{settings.quota_queued_runs} of one project in the queue",
+            RETRY_S,
+        )
+    if exhausted(usage, settings):
+        raise QuotaError(
+            f"the project has used {usage.cpu_s / HOUR_S:.2f} worker hours within 24; wanted at most "
+            f"{settings.quota_cpu_hours:g}",
+            HOUR_S,
+        )
+
+
+def exhausted(usage: Usage, settings: ServiceSettings) -> bool:
+    """Returns whether a project's worker hours are used up, so that its runs wait."""
+    return settings.quota_cpu_hours is not None and usage.cpu_s >= settings.quota_cpu_hours * HOUR_S
+
 
 logger = logging.getLogger(__name__)
+
+PROBE_BYTES = 16 << 20  # what there must be room for before a pause ends: a checkpoint and then some
+FIRST_WAIT_S, LONGEST_WAIT_S = 1.0, 30.0  # before a disk that refused is tried again; doubles while it goes on
+CALM_S = 60.0  # a disk that behaved for so long is trusted again
+
+
+class StoragePause:
+    """State of the pause; only the manager's thread begins and ends it."""
+
+    def __init__(self, store: Store, ledger: Ledger, data_dir: Path) -> None:
+        self._store = store
+        self._ledger = ledger
+        self._data_dir = data_dir
+        self._refused_at, self._wait_s = float("-inf"), FIRST_WAIT_S
+
+    @property
+    def reason(self) -> str | None:
+        """The disk's error while the pause lasts."""
+        return self._store.refusal
+
+    def begin(self, reason: str) -> None:
+        """Shows campaigns at work as paused from now on."""
+        logger.error("paused: %s", reason)
+        calm = time.monotonic() - self._refused_at > CALM_S
+        self._wait_s = FIRST_WAIT_S if calm else min(2 * self._wait_s, LONGEST_WAIT_S)
+        self._refused_at = time.monotonic()
+        self._store.refusal = reason
+
+    def write_down(self, numbers: Collection[int], reason: str) -> None:
+        """Stores which runs are paused, if the disk accepts it."""
+        try:
+            self._ledger.pause(numbers, reason)
+        except StorageError:
+            logger.info("the pause itself cannot be written down; it is shown all the same")
+
+    def try_again(self) -> None:
+        """Ends the pause if the disk has room, else doubles the wait; a no-op before it is over."""
+        if time.monotonic() - self._refused_at < self._wait_s:
+            return
+        try:
+            _probe(self._data_dir)
+            resumed = self._ledger.resume()
+        except (OSError, StorageError) as error:
+            logger.info("still refused: %s", error)
+            self._refused_at = time.monotonic()
+            self._wait_s = min(2 * self._wait_s, LONGEST_WAIT_S)
+            return
+        logger.info("storage works again, which refused (%s); %d runs go on", self.reason, resumed)
+        self._store.refusal = None
+
+
+def refused(doing: str, folder: Path, error: OSError) -> str:
+    """Returns the error in one line without paths; the log has the paths."""
+    return f"storage failed while {doing}: {error.strerror} ({Path(error.filename or folder).name!r})"
+
+
+def _probe(folder: Path) -> None:
+    """Writes as much as the next checkpoints may take."""
+    probe = folder / ".probe"
+    try:
+        with probe.open("wb", buffering=0) as file:
+            file.write(bytes(PROBE_BYTES))
+    finally:
+        probe.unlink(missing_ok=True)
+
 
 PREFIX = ".deleted-"
 RETENTION_S = 10.0  # between two looks for campaigns to delete

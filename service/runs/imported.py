@@ -22,7 +22,7 @@ from risk_sac.metrics import MetricsAccumulator
 from risk_sac.records import REPEATS, Phase, State
 from risk_sac.report.inputs import SPEC, campaign_in
 from risk_sac.report.runs import read_records, read_run
-from risk_sac.run_folder.results import EPISODES, FAILURES, RESULTS, Results, read_results, series_name
+from risk_sac.run_folder.results import EPISODES, FAILURES, RESULTS, RunResults, read_results, series_name
 from risk_sac.scenario.families import family_named
 from service.settings import ServiceSettings
 from service.store.reading import Store
@@ -201,7 +201,7 @@ def check_plain(root: Path) -> None:
             raise ConfigError("RISK_SAC_RUNS", got, "folders and plain files alone", remedy)
 
 
-def _key(spec: CampaignSpec, runs: Mapping[str, Results]) -> str:
+def _key(spec: CampaignSpec, runs: Mapping[str, RunResults]) -> str:
     """Returns the idempotency key of an import; it has a space, as no posted key has."""
     digests = sorted(str(run.digest) for run in runs.values())
     return f"{IMPORTED}{hashlib.sha256(''.join((spec.digest, *digests)).encode()).hexdigest()}"

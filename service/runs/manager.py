@@ -12,18 +12,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from risk_sac.config import CampaignSpec
-from risk_sac.execution.executor import FOLDER, Cluster, Executor, Program
+from risk_sac.env.problem import checked_campaign
+from risk_sac.execution.executor import FOLDER, ClusterState, Executor, WorkerProgram
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import MOST_AT_ONCE, QueuedRun, Scheduler
-from risk_sac.prior.earlier import PriorContent, keep
-from risk_sac.prior.policy import check_prior
-from risk_sac.problem import checked_campaign
 from risk_sac.records import State, Triage, TriageState
-from risk_sac.run_folder.scratch import remove_abandoned, remove_temporaries
+from risk_sac.run_folder.durable import remove_abandoned, remove_temporaries
+from risk_sac.search.prior.earlier import PriorContent, keep
+from risk_sac.search.prior.policy import check_prior
 from service.errors import ConflictError, OutdatedError, StorageError
-from service.runs.cleanup import Retention, dispose, settle
-from service.runs.quota import check_quota, exhausted
-from service.runs.storage_pause import StoragePause, refused
+from service.runs.cleanup import Retention, StoragePause, check_quota, dispose, exhausted, refused, settle
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign
@@ -78,7 +76,7 @@ class Manager:
         return self._storage.reason
 
     @property
-    def cluster(self) -> Cluster | None:
+    def cluster(self) -> ClusterState | None:
         """Cluster that runs execute on; None on this machine."""
         return self._executor.cluster
 
@@ -282,10 +280,10 @@ def _tidy(data_dir: Path, before: float) -> None:
     remove_temporaries(data_dir, before)
 
 
-def worker_program(settings: ServiceSettings) -> Program:
+def worker_program(settings: ServiceSettings) -> WorkerProgram:
     """The worker that the settings name."""
     numbers = settings.worker_niceness, settings.worker_memory_bytes, settings.replays
-    return Program(
+    return WorkerProgram(
         arguments=("-m", settings.worker_module, FOLDER, *map(str, numbers)),
         log=LOG,
         lease_s=settings.lease_s,

@@ -1,16 +1,23 @@
 """Updates row, run counts and project hours for an episode."""
 
 import time
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from operator import itemgetter
 from statistics import fmean, median_low
+from typing import Any
 
 from pydantic_core import from_json
+from sqlalchemy import ColumnElement, Engine, Row, func, select
 from sqlalchemy.orm import Session
 
 from risk_sac.execution.messages import EpisodeDone
-from risk_sac.metrics.requirements import STEPS
-from risk_sac.records import NO_CONTACT, Collision, EpisodeRecord, Funnel, Outcome, stored
-from service.store.tables import EpisodeRow, RequirementRow, RunRow, UsageRow
+from risk_sac.metrics.tally import STEPS
+from risk_sac.records import NO_CONTACT, Collision, Episode, EpisodeRecord, Funnel, Outcome, State, StateChange, stored
+from service.errors import StorageError
+from service.store.database import storage_errors
+from service.store.stored import StoredPage, read_episode
+from service.store.tables import TALLIED, CampaignRow, ChangeRow, EpisodeRow, RequirementRow, RunRow, UsageRow
 
 HOUR_S = 3600
 NEWEST = 40  # episodes that tell the pace of a run
@@ -90,3 +97,73 @@ def listed(names: Iterable[str]) -> str | None:
     """Names as a column has them, each between commas; None without any."""
     found = ",".join(names)
     return f",{found}," if found else None
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """The whole of it, as rows with names."""
+
+    campaigns: Sequence[Row[Any]]  # state, campaigns
+    tallies: Sequence[Row[Any]]  # family, method, state, runs, `TALLIED`
+    requirements: Sequence[Row[Any]]  # name, `STEPS`
+    at_work: Sequence[Row[Any]]  # campaign_id, id, family, method, metrics of each run that has a worker
+
+
+def read_statistics(engine: Engine) -> Statistics:
+    """Reads the current statistics from the database."""
+    campaigns = select(CampaignRow.state, func.count().label("campaigns")).group_by(CampaignRow.state)
+    sums = (func.sum(getattr(RunRow, name)).label(name) for name in TALLIED)
+    kind = (RunRow.family, RunRow.method, RunRow.state)
+    tallies = select(*kind, func.count().label("runs"), *sums).group_by(*kind)
+    steps = (func.sum(getattr(RequirementRow, step)).label(step) for step in STEPS)
+    requirements = select(RequirementRow.name, *steps).group_by(RequirementRow.name)
+    at_work = (
+        select(CampaignRow.id.label("campaign_id"), RunRow.id, RunRow.family, RunRow.method, RunRow.metrics)
+        .join(RunRow.campaign)
+        .where(RunRow.state.in_([State.RUNNING, State.CANCELLING]))
+        .order_by(RunRow.number)
+    )
+    with storage_errors("reading"), engine.connect() as connection:
+        return Statistics(*(connection.execute(query).all() for query in (campaigns, tallies, requirements, at_work)))
+
+
+def check_readable(engine: Engine) -> None:
+    """Ask the database for as little as it can be asked for."""
+    with storage_errors("reading"), engine.connect() as connection:
+        connection.execute(select(CampaignRow.number).limit(1)).first()
+
+
+def hold_campaigns(session: Session, runs: ColumnElement[bool]) -> list[CampaignRow]:
+    """Returns campaigns of these runs; read them before anything else that changes.
+
+    PostgreSQL locks their rows until the transaction ends; SQLite has one writer anyway.
+    """
+    of_runs = select(RunRow.campaign_number).where(runs)
+    query = select(CampaignRow).where(CampaignRow.number.in_(of_runs))
+    return list(session.scalars(query.order_by(CampaignRow.number).with_for_update()))  # ordered against deadlocks
+
+
+def next_sequence(campaign: CampaignRow) -> int:
+    """Returns the number of the next event; the campaign must be held."""
+    campaign.events += 1
+    return campaign.events
+
+
+def event_page(session: Session, campaign: CampaignRow, limit: int, after: int) -> StoredPage[Episode | StateChange]:
+    """Events number `after + 1` and on; StorageError if one is missing."""
+    # No further than the campaign said: the two tables are read one after the other, and what is written in between
+    # would show in the second one without what came before it.
+    last = min(after + limit, campaign.events)
+    if last <= after:
+        return StoredPage(items=(), last=None)
+    episodes = select(EpisodeRow).where(EpisodeRow.sequence.between(after + 1, last))
+    changes = select(ChangeRow).where(ChangeRow.sequence.between(after + 1, last))
+    found: list[tuple[int, Episode | StateChange]] = []
+    for episode in session.scalars(episodes.filter_by(campaign_number=campaign.number)):
+        found.append((episode.sequence, read_episode(episode)))
+    for change in session.scalars(changes.filter_by(campaign_number=campaign.number)):
+        found.append((change.sequence, StateChange.model_validate(change, from_attributes=True)))
+    if len(found) != last - after:
+        raise StorageError(f"events {after + 1} to {last} of campaign {campaign.id} are {len(found)}; restore a copy")
+    items = tuple(event for _, event in sorted(found, key=itemgetter(0)))
+    return StoredPage(items=items, last=last if last < campaign.events else None)

@@ -1,6 +1,7 @@
-"""Opens the database: SQLite in the data folder, or PostgreSQL by URL."""
+"""Server state in the database: the cursor secret, and whether API keys were made."""
 
 import secrets
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,8 +14,9 @@ from alembic.script import ScriptDirectory
 from alembic.util import CommandError
 from sqlalchemy import Connection, Engine, create_engine, event, insert, inspect, make_url, text
 from sqlalchemy.exc import ArgumentError, DatabaseError, IntegrityError, NoSuchModuleError, ProgrammingError
+from sqlalchemy.orm import Session
 
-from risk_sac.execution.postmortem import without_folders
+from risk_sac.execution.messages import without_folders
 from service.errors import StorageError
 from service.host.data_folder import create_private, make_private
 from service.store.tables import Base, ServerRow
@@ -179,3 +181,34 @@ def _config() -> Config:
     config = Config()
     config.set_main_option("script_location", "service.store:migrations")
     return config
+
+
+ONLY = 1  # number of the one row, which the migration wrote
+
+
+def cursor_secret(engine: Engine) -> bytes:
+    """Returns the key that encrypts cursors."""
+    with storage_errors("reading"), Session(engine) as session:
+        return bytes.fromhex(session.get_one(ServerRow, ONLY).cursor_secret)
+
+
+def keys_were_made(engine: Engine) -> bool:
+    """Whether an API key was ever made; this never becomes false again."""
+    with storage_errors("reading"), Session(engine) as session:
+        return session.get_one(ServerRow, ONLY).keys_made_at is not None
+
+
+@contextmanager
+def noting_keys(engine: Engine) -> Iterator[None]:
+    """Notes that keys were made, if what is done meanwhile succeeds."""
+    doing = "noting that there are API keys"
+    with (
+        storage_errors(doing),
+        Session(engine.execution_options(**WRITING)) as session,
+        session.begin(),
+    ):
+        row = session.get_one(ServerRow, ONLY, with_for_update=True)
+        if row.keys_made_at is None:
+            row.keys_made_at = time.time()
+            session.flush()  # so that a database that refuses does so first
+        yield

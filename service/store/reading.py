@@ -11,11 +11,10 @@ from sqlalchemy.orm import Session, selectinload
 
 from risk_sac.records import FINAL, Episode, Outcome, State, StateChange, Triage, TriageState
 from service.errors import StorageError
-from service.store.counting import HOUR_S
+from service.store.counting import HOUR_S, event_page
 from service.store.database import connect, open_database, storage_errors
 from service.store.finding import Judged, episode_page, find_campaign, find_failure, find_run, find_triage
 from service.store.revisions import Revisions
-from service.store.sequence import event_page
 from service.store.stored import PlainEpisode, StoredCampaign, StoredFailure, StoredPage, Usage, read_episode
 from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
 

@@ -8,7 +8,7 @@ history.
 from sqlalchemy import ForeignKey, Index, Text, text
 from sqlalchemy.orm import DeclarativeBase, Mapped, attribute_keyed_dict, mapped_column, relationship
 
-from risk_sac.metrics.requirements import STEPS
+from risk_sac.metrics.tally import STEPS
 
 # What is summed up over runs, per family, method and state.
 TALLIED = (

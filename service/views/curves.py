@@ -1,6 +1,7 @@
-"""Curves of a campaign's runs over the episodes of their search. Pure.
+"""Results of a campaign so far, summed per family and method. Pure.
 
-They follow `risk_sac.metrics`, but go by what each episode is taken for now: a failure may have been refused since.
+Live figures of runs that go on; `service.views.reports` compares those that have finished. Mean ECR and PCR and their
+intervals are those of the report.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,13 +11,104 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, MethodName
-from risk_sac.metrics import WINDOW
-from risk_sac.records import DrivenBy, Outcome, Real, Record, State
-from risk_sac.types import Floats
+from risk_sac.env.problem import adjustments
+from risk_sac.metrics import (
+    METRICS,
+    RATIOS,
+    WINDOW,
+    estimate,
+    headline_driven_by,
+    mean_over_runs,
+    pcr_by_driver,
+    pooled_bins,
+    pooled_counts,
+    pooled_headline,
+    pooled_names,
+    pooled_requirements,
+)
+from risk_sac.records import Adjustment, Counts, DrivenBy, Outcome, Real, Record, Results, RunMetrics, State, Total
+from risk_sac.report.power import PlayedCounts
+from risk_sac.world.types import Floats
+from service.errors import OutdatedError
 from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
-from service.views.failure_table import Kinds, Plain, is_preventable, violations_of
+from service.views.failure_table import KindIndex, Plain, is_preventable, violations_of
 
-Counts = NDArray[np.int64]
+
+def results(campaign: StoredCampaign) -> Results:
+    """Results so far; complete once the campaign has ended."""
+    return Results(
+        campaign_id=campaign.id,
+        state=campaign.state,
+        complete=campaign.state.final,
+        headline=campaign.headline,
+        adjustments=_adjustments(campaign),
+        runs=campaign.runs,
+        totals=totals(campaign.searches),
+    )
+
+
+def played(campaign: StoredCampaign) -> list[PlayedCounts]:
+    """Returns the counts of each search so far."""
+    found = [(run, run.metrics or Counts()) for run in campaign.searches]
+    return [
+        PlayedCounts(run.family, run.method, did.episodes, did.environment_steps, run.state.final) for run, did in found
+    ]
+
+
+def _adjustments(campaign: StoredCampaign) -> tuple[Adjustment, ...]:
+    try:
+        return adjustments(campaign.spec)
+    except OutdatedError:
+        return ()
+
+
+def totals(runs: Sequence[StoredRun]) -> list[Total]:
+    """Returns one total per family and method of the runs that have begun, in run order."""
+    groups: dict[tuple[str, str], list[RunMetrics]] = {}
+    for run in runs:
+        if run.metrics is not None:
+            groups.setdefault((run.family, run.method), []).append(run.metrics)
+    return [_total(family, method, group) for (family, method), group in groups.items()]
+
+
+def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
+    counts = pooled_counts(group)
+    return Total.model_validate(
+        dict(counts)
+        | {ratio.name: ratio.formula(counts) for ratio in RATIOS}
+        | _means(group)
+        | {
+            "family": family,
+            "method": method,
+            "runs": len(group),
+            "headline": pooled_headline(group),
+            "requirements": pooled_requirements(group),
+            "pcr_by_driver": pcr_by_driver(group),
+            "episodes_driven_by": pooled_names([metrics.episodes_driven_by for metrics in group]),
+            "headline_driven_by": headline_driven_by(group),
+            "by_severity": pooled_names([metrics.by_severity for metrics in group]),
+            "by_fault": pooled_names([metrics.by_fault for metrics in group]),
+            "signatures": pooled_names([metrics.signatures for metrics in group]),
+            "conflicts_by_second": pooled_bins([metrics.conflicts_by_second for metrics in group]),
+            "contacts_by_second": pooled_bins([metrics.contacts_by_second for metrics in group]),
+        }
+    )
+
+
+def _means(group: Sequence[RunMetrics]) -> dict[str, float | None]:
+    """Returns the mean metrics of a total, under the names of `RunMetrics`."""
+    means: dict[str, float | None] = {}
+    for metric in METRICS:
+        if metric.field not in Total.model_fields:
+            continue
+        means[metric.field] = mean_over_runs(metric, group)
+        if f"{metric.field}_low" in Total.model_fields:
+            pooled = estimate(metric, group)
+            means |= {f"{metric.field}_low": pooled.low, f"{metric.field}_high": pooled.high}
+    return means
+
+
+Spread = NDArray[np.int64]
 
 
 class RunCurves(Record):
@@ -55,7 +147,7 @@ class Curves(Record):
 
 def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: int) -> Curves:
     """Returns curves of all searches with at most `points` points; a run's episodes come in order."""
-    searches = {run.number: _Search() for run in campaign.searches}
+    searches = {run.number: _RunningSums() for run in campaign.searches}
     for each in episodes:
         if each.phase == "search":
             searches[each.run_number].add(each.outcome, each.record)
@@ -63,7 +155,7 @@ def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: i
 
 
 @dataclass(slots=True)
-class _Search:
+class _RunningSums:
     """Running sums of a run's search."""
 
     rated: list[int] = field(default_factory=list)  # so far: episodes in which the ego did not fail to drive
@@ -76,8 +168,8 @@ class _Search:
     steps: list[int] = field(default_factory=list)
     cost: list[float] = field(default_factory=list)  # summed over the steps
     dual_variable: list[float] = field(default_factory=list)
-    _kinds: Kinds = field(default_factory=Kinds)
-    _preventable_kinds: Kinds = field(default_factory=Kinds)
+    _kinds: KindIndex = field(default_factory=KindIndex)
+    _preventable_kinds: KindIndex = field(default_factory=KindIndex)
 
     def add(self, outcome: str, record: Plain) -> None:
         valid, _ = violations_of(outcome, record)
@@ -96,7 +188,7 @@ class _Search:
         self.dual_variable.append(float(record["dual_variable"]))
 
 
-def _curves(run: StoredRun, search: _Search, points: int) -> RunCurves:
+def _curves(run: StoredRun, search: _RunningSums, points: int) -> RunCurves:
     at = spread(len(search.steps), points)
     steps, cost = (np.diff(_summed(each)[at], prepend=0.0) for each in (search.steps, search.cost))
     lines = {name: _summed(getattr(search, name))[at] for name in ("distinct", "preventable", "distinct_preventable")}
@@ -117,7 +209,7 @@ def _curves(run: StoredRun, search: _Search, points: int) -> RunCurves:
     return RunCurves.model_validate(named | values | {"run_id": run.id, "episodes": at.tolist(), "driven_by": drove})
 
 
-def spread(count: int, points: int) -> Counts:
+def spread(count: int, points: int) -> Spread:
     """Returns at most `points` of 1, …, `count`, evenly spread, with the last."""
     if count == 0:
         return np.empty(0, dtype=np.int64)
@@ -129,7 +221,7 @@ def _summed(values: Sequence[float]) -> Floats:
     return np.concatenate((np.zeros(1), np.cumsum(values)))
 
 
-def _window(happened: Sequence[bool], at: Counts) -> Floats:
+def _window(happened: Sequence[bool], at: Spread) -> Floats:
     """Share of the newest `WINDOW` episodes by then in which it happened."""
     sums, before = _summed(happened), np.maximum(at - WINDOW, 0)
     shares: Floats = (sums[at] - sums[before]) / np.maximum(at - before, 1)

@@ -56,7 +56,7 @@ COUNTED = ("failures", "distinct", "preventable")
 UNJUDGED: Plain = dict.fromkeys((*OF_JUDGEMENT, "signature")) | {"broke": [], "ego_broke": []}
 
 
-class FailureKind(Record):
+class KindRow(Record):
     """The failures of one signature."""
 
     signature: str | None
@@ -165,13 +165,13 @@ class FailureTable(Record):
     """Whether it was the same each time it was replayed; null where it was not."""
     triage: list[TriageState]
     """What people made of it; `new` at first."""
-    kinds: list[FailureKind]
+    kinds: list[KindRow]
     """The most preventable failures first, then the most failures."""
     scenes: Mapping[FamilyName, FamilyScenes]
     """By family, of those with a failure."""
 
 
-class Kinds:
+class KindIndex:
     """Finds the first failure of each kind, as `risk_sac.verdicts.distinct.DistinctFailures` does."""
 
     def __init__(self) -> None:
@@ -241,8 +241,8 @@ def failure_table(
 ) -> FailureTable:
     """Returns the table of these failures in their order; one without a triage is new."""
     runs = {run.number: run for run in campaign.runs}
-    found: defaultdict[tuple[int, str], Kinds] = defaultdict(Kinds)
-    headline, niches = Kinds(), dict[Niche, int]()
+    found: defaultdict[tuple[int, str], KindIndex] = defaultdict(KindIndex)
+    headline, niches = KindIndex(), dict[Niche, int]()
     failures, naming, rows = list(failures), [], []
     for each in failures:
         valid, every = violations_of(each.outcome, each.record)
@@ -301,7 +301,7 @@ def _row(run: StoredRun, failure: PlainEpisode, violation: Plain) -> dict[str, A
     }
 
 
-def _kinds(naming: Sequence[Plain], rows: Sequence[Plain]) -> list[FailureKind]:
+def _kinds(naming: Sequence[Plain], rows: Sequence[Plain]) -> list[KindRow]:
     """Of the signatures, the most preventable failures first."""
     kinds: dict[tuple[str, str], dict[str, Any]] = {}
     for violation, row in zip(naming, rows, strict=True):
@@ -312,7 +312,7 @@ def _kinds(naming: Sequence[Plain], rows: Sequence[Plain]) -> list[FailureKind]:
         kind["distinct"] += row["distinct"]
         kind["preventable"] += row["valid"] and row["grade"] == Grade.PREVENTABLE
     ordered = sorted(kinds.values(), key=lambda kind: (-kind["preventable"], -kind["failures"], kind["name"]))
-    return [FailureKind(**kind) for kind in ordered]
+    return [KindRow(**kind) for kind in ordered]
 
 
 def _scenes(families: Sequence[str], scenes: Sequence[Plain]) -> dict[str, FamilyScenes]:

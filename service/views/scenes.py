@@ -13,7 +13,7 @@ from risk_sac.config import FamilyName, Odd
 from risk_sac.records import Outcome, Real, Record
 from risk_sac.report.coverage import NOT_PLAYED, Axis, axes_of
 from risk_sac.scenario.families import family_named
-from risk_sac.types import Bools, Floats
+from risk_sac.world.types import Bools, Floats
 from service.store.stored import PlainEpisode, StoredCampaign
 
 BINS = 6  # of each parameter, so that a matrix of two can be read

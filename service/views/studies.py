@@ -12,7 +12,7 @@ from pathlib import Path
 from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError
 from risk_sac.execution.helper import ANSWER, QUESTION
-from risk_sac.execution.postmortem import without_folders
+from risk_sac.execution.messages import without_folders
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin
 from risk_sac.failures.studied import valid_failure
@@ -20,8 +20,7 @@ from risk_sac.run_folder.results import RESULTS
 from service.errors import NotPlayable, OutdatedError, StorageError
 from service.settings import ServiceSettings
 from service.views.on_demand import WALL_S, Helper, OnDemandCache
-from service.views.pictures import FailureOfARun
-from service.views.series import load_arrays, series_file
+from service.views.series import FailureOfARun, load_arrays, series_file
 
 logger = logging.getLogger(__name__)
 
@@ -88,7 +87,7 @@ class Studies(OnDemandCache[Study]):
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class EpisodeTable:
     """The episodes in folders of runs, as they are at a time."""
 
     folders: tuple[Path, ...]
@@ -97,7 +96,7 @@ class Table:
     format: FormatName
 
     @classmethod
-    def of(cls, folders: Sequence[Path], format: FormatName) -> "Table":
+    def of(cls, folders: Sequence[Path], format: FormatName) -> "EpisodeTable":
         """The table of those runs that have results by now."""
         written_ns = {}
         for folder in folders:
@@ -106,14 +105,14 @@ class Table:
         return cls(tuple(written_ns), tuple(written_ns.values()), format)
 
 
-class Tables(OnDemandCache[Table]):
+class EpisodeTables(OnDemandCache[EpisodeTable]):
     """Tables, made one at a time; StorageError where one cannot be made."""
 
     def __init__(self, helper: Helper) -> None:
         super().__init__(self._written, "tables", TABLES_KEPT)
         self._helper = helper
 
-    def _written(self, table: Table) -> bytes:
+    def _written(self, table: EpisodeTable) -> bytes:
         folders = map(str, table.folders)
         result = self._helper.run("risk_sac", ["export", *folders, "--format", table.format, "--out", ANSWER])
         if result.status != 0:

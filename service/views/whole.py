@@ -20,16 +20,16 @@ from starlette.concurrency import run_in_threadpool
 from risk_sac.config import CampaignSpec
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.helper import ANSWER, QUESTION
-from risk_sac.execution.postmortem import without_folders
+from risk_sac.execution.messages import without_folders
 from risk_sac.failures.cases import Regression
-from risk_sac.prior.earlier import SHIPPED_OR_NONE, PriorContent, is_kept
 from risk_sac.records import Outcome, wire
 from risk_sac.report.figures import Format
+from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, PriorContent, is_kept
 from service.errors import NotFoundError, StorageError
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign
-from service.views import report_parts
+from service.views import reports
 from service.views.curves import curves
 from service.views.failure_table import failure_table
 from service.views.on_demand import Helper, OnDemandCache
@@ -101,11 +101,11 @@ def content_of(view: View, sources: Sources) -> Content:
 
 _PRIOR = TypeAdapter(PriorContent)
 _OF_REPORT: Mapping[str, Callable[[CampaignReport, View], bytes]] = {
-    "table": lambda made, view: report_parts.table(made, view.format, view.address).encode(),
-    "clusters": lambda made, view: report_parts.clusters(made).encode(),
-    "figures": lambda made, view: report_parts.figures(made, view.address).encode(),
-    "drawn": lambda made, view: report_parts.drawn(made, cast(Format, view.format)),
-    "report": lambda made, view: report_parts.evidence(made, view.format, view.address, view.regression).encode(),
+    "table": lambda made, view: reports.table(made, view.format, view.address).encode(),
+    "clusters": lambda made, view: reports.clusters(made).encode(),
+    "figures": lambda made, view: reports.figures(made, view.address).encode(),
+    "drawn": lambda made, view: reports.drawn(made, cast(Format, view.format)),
+    "report": lambda made, view: reports.evidence(made, view.format, view.address, view.regression).encode(),
 }
 
 

@@ -25,7 +25,7 @@ from risk_sac.config import (
     SceneOptimizerConfig,
     WarmStartConfig,
 )
-from risk_sac.loop import execute_run
+from risk_sac.search.loop import execute_run
 from tests.listener import Listener
 
 RECORDED = Path(__file__).with_suffix(".json")

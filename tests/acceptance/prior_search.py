@@ -17,15 +17,15 @@ from typing import NamedTuple
 from risk_sac.config import SHIPPED, Budget, EgoConfig, RunMethod, RunSpec
 from risk_sac.egos.registry import pinned
 from risk_sac.execution.recorder import Recorder
-from risk_sac.loop import execute_run
+from risk_sac.lab.figures.planner_table import spent
+from risk_sac.lab.figures.regression_prior import Until
+from risk_sac.lab.figures.side_by_side import Row, rows_of
+from risk_sac.maps.convert import present_net
+from risk_sac.maps.finder import Map
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.results import EPISODES, records_from_lines
-from risk_sac.scenario.maps.convert import present_net
-from risk_sac.scenario.maps.finder import Map
+from risk_sac.search.loop import execute_run
 from risk_sac.verdicts.distinct import kind_name
-from tests.acceptance.planner_table import spent
-from tests.acceptance.regression_prior import Until
-from tests.acceptance.side_by_side import Row, rows_of
 from tests.maps import osm_town
 
 # Of each pattern a place of 50 km/h with the most adversaries, chosen before the first run.

@@ -20,7 +20,7 @@ import pytest
 import sumo_nets
 from risk_sac.cli import main
 from risk_sac.errors import ConfigError
-from risk_sac.failures import carried
+from risk_sac.failures import bundle as bundles
 from risk_sac.failures.bundle import MANIFEST, read_bundle
 from risk_sac.failures.recording import trajectory_digest
 from risk_sac.run_folder.arrays import MOST_ARRAYS, MOST_BYTES
@@ -265,8 +265,8 @@ def test_a_failure_on_a_map_is_played_again_where_nobody_has_the_map(placed: Pat
 
 def repack(arrays: Arrays, net: bytes) -> None:
     """Another net under a name that has its digest, as an attacker would forge it."""
-    text = arrays[carried.PLACE].tobytes()
-    arrays[carried.NET] = np.frombuffer(net, dtype=np.uint8)
+    text = arrays[bundles.PLACE].tobytes()
+    arrays[bundles.NET] = np.frombuffer(net, dtype=np.uint8)
     digest = hashlib.sha256(text + b"\0" + net).hexdigest()[: library.DIGITS]
     spec = json.loads(str(arrays[MANIFEST]))["spec"] | {"family": f"junction_{digest}"}
     manifest(arrays, spec=spec)
@@ -295,11 +295,11 @@ def test_a_bundle_that_lost_its_place_or_carries_another_is_refused(
     placed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(library.VARIABLE, str(tmp_path / "places"))
-    told = replayed_elsewhere(changed(placed, tmp_path / "a.npz", lambda arrays: arrays.pop(carried.NET)), tmp_path)
+    told = replayed_elsewhere(changed(placed, tmp_path / "a.npz", lambda arrays: arrays.pop(bundles.NET)), tmp_path)
     assert (told.returncode, "there is no place 'junction_" in told.stderr.replace("\n", " ")) == (2, True), told.stderr
     doctype = np.frombuffer(b"<!DOCTYPE net [<!ENTITY a 'b'>]><net/>", dtype=np.uint8)
     with pytest.raises(ConfigError, match="DTD"):
-        read_bundle(changed(placed, tmp_path / "b.npz", lambda arrays: arrays.update({carried.NET: doctype})))
+        read_bundle(changed(placed, tmp_path / "b.npz", lambda arrays: arrays.update({bundles.NET: doctype})))
     other = np.frombuffer(b"<net/>", dtype=np.uint8)
     with pytest.raises(ConfigError, match="not what its name says"):
-        read_bundle(changed(placed, tmp_path / "c.npz", lambda arrays: arrays.update({carried.NET: other})))
+        read_bundle(changed(placed, tmp_path / "c.npz", lambda arrays: arrays.update({bundles.NET: other})))

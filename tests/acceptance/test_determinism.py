@@ -21,12 +21,12 @@ from risk_sac.config import (
     SceneOptimizerConfig,
     WarmStartConfig,
 )
-from risk_sac.loop import execute_run
 from risk_sac.records import stored
-from risk_sac.run import CHECKPOINT, RunSummary
 from risk_sac.run_folder.checkpoint import previous
 from risk_sac.run_folder.results import FAILURES
-from risk_sac.scene_optimizer.archive import INITIAL
+from risk_sac.search.loop import execute_run
+from risk_sac.search.run import CHECKPOINT, RunOutcome
+from risk_sac.search.scene_optimizer.archive import INITIAL
 from tests.listener import Listener
 
 EPISODES, EVALUATION = 6, 1
@@ -45,13 +45,13 @@ def spec(seed: int = 0, method: str = "risk-sac") -> RunSpec:
     return RunSpec(family="mixed", method=method, seed=seed, budget=budget, learner=LEARNER)
 
 
-def run(folder: Path, *, seed: int = 0, limit: int = 10**9, method: str = "risk-sac") -> tuple[RunSummary, Listener]:
+def run(folder: Path, *, seed: int = 0, limit: int = 10**9, method: str = "risk-sac") -> tuple[RunOutcome, Listener]:
     listener = Listener(limit)
     return execute_run(spec(seed, method), folder, listener), listener
 
 
 @pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunSummary, Listener]:
+def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunOutcome, Listener]:
     return run(tmp_path_factory.mktemp("uninterrupted"))
 
 
@@ -63,7 +63,7 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_run_has_learnt_something_to_be_deterministic_about(uninterrupted: tuple[RunSummary, Listener]) -> None:
+def test_the_run_has_learnt_something_to_be_deterministic_about(uninterrupted: tuple[RunOutcome, Listener]) -> None:
     summary, listener = uninterrupted
     assert summary.finished
     assert [r.phase for r in listener.records] == ["search"] * EPISODES + ["evaluation"] * EVALUATION
@@ -76,7 +76,7 @@ ELSEWHERE = """
 import sys
 from pathlib import Path
 from risk_sac.config import RunSpec
-from risk_sac.loop import execute_run
+from risk_sac.search.loop import execute_run
 from tests.listener import Listener
 
 print(execute_run(RunSpec.model_validate_json(sys.argv[1]), Path(sys.argv[2]), Listener()).digest)
@@ -84,7 +84,7 @@ print(execute_run(RunSpec.model_validate_json(sys.argv[1]), Path(sys.argv[2]), L
 
 
 def test_another_process_goes_on_with_a_stopped_run_as_if_it_never_stopped(
-    uninterrupted: tuple[RunSummary, Listener], stopped: Path, tmp_path: Path
+    uninterrupted: tuple[RunOutcome, Listener], stopped: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(stopped, tmp_path, dirs_exist_ok=True)
     done = subprocess.run(
@@ -99,7 +99,7 @@ def test_another_process_goes_on_with_a_stopped_run_as_if_it_never_stopped(
 
 @pytest.mark.parametrize("stop_after", [*(pytest.param(stop, marks=pytest.mark.torture) for stop in (1, EPISODES)), 4])
 def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
-    uninterrupted: tuple[RunSummary, Listener], tmp_path: Path, stop_after: int
+    uninterrupted: tuple[RunOutcome, Listener], tmp_path: Path, stop_after: int
 ) -> None:
     expected, whole = uninterrupted
     stopped, before = run(tmp_path, limit=stop_after)
@@ -162,7 +162,7 @@ def test_a_resumed_search_by_two_takes_turns_as_if_never_interrupted(tmp_path: P
 
 @pytest.mark.parametrize("damaged", ["newest", "both"])
 def test_a_run_with_damaged_checkpoints_equals_one_never_interrupted(
-    uninterrupted: tuple[RunSummary, Listener], stopped: Path, tmp_path: Path, damaged: str
+    uninterrupted: tuple[RunOutcome, Listener], stopped: Path, tmp_path: Path, damaged: str
 ) -> None:
     expected, whole = uninterrupted
     shutil.copytree(stopped, tmp_path, dirs_exist_ok=True)

@@ -13,9 +13,8 @@ from risk_sac.cli import main
 from risk_sac.failures.bundle import read_bundle
 from risk_sac.failures.cases import Regression, Verdict
 from risk_sac.failures.minimise import COPIES, minimise
-from risk_sac.failures.variants import Stage
-from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.verified import distinct_failures, read_verified
+from risk_sac.failures.variants import VariantPlayer
+from risk_sac.run_folder.results import distinct_failures, read_results, read_verified
 from tests.acceptance.conftest import Tell
 from tests.ego_processes import served
 
@@ -111,7 +110,7 @@ def test_failures_of_an_ego_in_another_process_repeat(
     assert read_results(failure.run).digest == read_results(near.run).digest
     check_repeats(failure.run, tell)
     assert tell("replay", failure.bundle)[0] == 0
-    with closing(Stage(read_bundle(failure.bundle)).env):
+    with closing(VariantPlayer(read_bundle(failure.bundle)).env):
         pass  # it happens again
 
 

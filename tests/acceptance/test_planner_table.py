@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from risk_sac.lab.figures.planner_table import Row, counted, finish, lines, p_value, spec_of, spent
 from risk_sac.records import Outcome
 from risk_sac.report.runs import read_run
 from risk_sac.run_folder.results import EPISODES, FAILURES, read_results
-from tests.acceptance.planner_table import Row, counted, finish, lines, p_value, spec_of, spent
 from tests.builders import collision, episode_record
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from risk_sac.cli import main
 from risk_sac.config import EgoConfig
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import ConfigError
 from risk_sac.failures.bundle import MOST_POLICY_BYTES, Bundle, make_bundle, read_bundle, write_bundle
 from risk_sac.failures.cases import Regression, Verdict
@@ -21,13 +21,12 @@ from risk_sac.failures.minimise import COPIES, MOST, SHARE
 from risk_sac.failures.play import play
 from risk_sac.failures.recording import actions_of
 from risk_sac.failures.regress import regress, regress_run
-from risk_sac.failures.variants import Stage
-from risk_sac.frozen_policy import FrozenPolicy
+from risk_sac.failures.variants import VariantPlayer
 from risk_sac.report import read_run
 from risk_sac.run_folder.arrays import read_series
-from risk_sac.run_folder.results import FAILURES, read_results, series_name
+from risk_sac.run_folder.results import FAILURES, VERIFIED, distinct_failures, read_results, read_verified, series_name
 from risk_sac.run_folder.series import write_series
-from risk_sac.run_folder.verified import VERIFIED, distinct_failures, read_verified
+from risk_sac.search.frozen_policy import FrozenPolicy
 from tests.acceptance.conftest import Tell
 from tests.acceptance.test_bundle import changed, manifest, series
 
@@ -53,7 +52,7 @@ def failures(run: Path) -> Path:
 def failure(failures: Path) -> Path:
     """The first that is no needle: of one that is, hardly anything can be taken away."""
     for file in sorted(failures.iterdir()):
-        stage = Stage(read_bundle(file))
+        stage = VariantPlayer(read_bundle(file))
         with closing(stage.env):
             if all(stage.fails(copy) for copy in stage.copies(stage.original, SHARE, COPIES, np.random.default_rng(0))):
                 return file
@@ -242,7 +241,7 @@ class Sharp:
 
 
 def test_a_policy_acts_on_when_the_recorded_actions_have_ended(failure: Path) -> None:
-    stage = Stage(read_bundle(failure))
+    stage = VariantPlayer(read_bundle(failure))
     with closing(stage.env):
         sharp = Sharp(stage.env.action_size)
         early = stage.original.actions[:5]

@@ -17,8 +17,7 @@ from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.minimise import minimise
 from risk_sac.failures.recording import actions_of
 from risk_sac.records import EpisodeRecord, Violation
-from risk_sac.run_folder.results import read_results
-from risk_sac.run_folder.verified import distinct_failures
+from risk_sac.run_folder.results import distinct_failures, read_results
 from tests.acceptance.conftest import Tell
 from tests.exports.test_mcap import read
 

@@ -16,9 +16,8 @@ from risk_sac.execution.local import LocalExecutor
 from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Started
 from risk_sac.records import Repetition
 from risk_sac.run_folder.arrays import read_series
-from risk_sac.run_folder.results import FAILURES, read_results, series_name
+from risk_sac.run_folder.results import FAILURES, distinct_failures, read_results, series_name
 from risk_sac.run_folder.series import write_series
-from risk_sac.run_folder.verified import distinct_failures
 from service.runs.manager import worker_program
 from service.settings import ServiceSettings
 

@@ -20,10 +20,10 @@ import pytest
 
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.egos.registry import SHIPPED
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
 from risk_sac.scenario.layout import LEAD_IN_S
-from risk_sac.types import STEP_S
+from risk_sac.world.types import STEP_S
 from tests.ego_processes import CPP_COMPILES, Shadow, served, served_by_cpp
 
 ROUNDS = 16

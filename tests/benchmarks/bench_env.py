@@ -13,11 +13,11 @@ import libsumo
 import numpy as np
 import pytest
 
-from risk_sac.env import RiskSacEnv, make_default
+from risk_sac.env.env import RiskSacEnv, make_default
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.sim import drivers, holder, paths, placing, reading, roads, sumo
+from risk_sac.sim import drivers, paths, reading, roads, sumo
 
-CALLERS = (sumo, holder, placing, reading, roads, drivers, paths)  # the modules that import libsumo
+CALLERS = (sumo, sumo, roads, reading, roads, drivers, paths)  # the modules that import libsumo
 STEP_RATIO = 3.5
 RESET_MS = 20.0
 EPISODES, ROUNDS = 8, 5

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from risk_sac.agents.graphed import GraphedUpdate
-from risk_sac.agents.replay import UniformReplay
-from risk_sac.agents.sac import SacAgent
-from risk_sac.pretraining.policy import AGENT, REPLAY, SAC
+from risk_sac.lab.pretraining.policy import AGENT, REPLAY, SAC
+from risk_sac.search.agents.replay import UniformReplay
+from risk_sac.search.agents.sac import GraphedUpdate, SacAgent
 from tests.unit.agents.test_graphed import transition
 
 SIZES, STORED, UPDATES, WANTED = (62, 4), 20_000, 400, 3.0

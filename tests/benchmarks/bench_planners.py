@@ -16,7 +16,7 @@ fp = pytest.importorskip("fiss_planner")
 from risk_sac.config import EgoConfig, RunSpec  # noqa: E402
 from risk_sac.egos.planners.fiss import FissPlus  # noqa: E402
 from risk_sac.egos.seam import Control, Perceived  # noqa: E402
-from risk_sac.env import RiskSacEnv  # noqa: E402
+from risk_sac.env.env import RiskSacEnv  # noqa: E402
 from risk_sac.errors import InfeasibleScene  # noqa: E402
 
 EPISODES = 8

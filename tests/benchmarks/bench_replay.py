@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from risk_sac.agents.priority import priority
-from risk_sac.agents.replay import RiskPrioritizedReplay, Transition, UniformReplay
-from risk_sac.agents.sum_tree import SumTree
 from risk_sac.config import ReplayConfig
-from risk_sac.types import Floats
+from risk_sac.search.agents.priority import SumTree, priority
+from risk_sac.search.agents.replay import RiskPrioritizedReplay, Transition, UniformReplay
+from risk_sac.world.types import Floats
 from tests.benchmarks.timing import interleaved
 
 STORED, BATCH, ROUNDS, IN_A_ROW = 100_000, 256, 400, 20

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.agents.learner import Learner
 from risk_sac.config import Budget, RunSpec
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.execution.evaluate import run
 from risk_sac.execution.recorder import Recorder
-from risk_sac.execution.runs import run
 from risk_sac.records import RunMetrics
-from risk_sac.run import RunState
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scene_optimizer import BotorchOptimizer
+from risk_sac.search.agents.learner import Learner
+from risk_sac.search.run import RunState
+from risk_sac.search.scene_optimizer import BotorchOptimizer
 
 WARM_UP, EPISODES = 1, 299  # a run of the usual length, but for what its first episode compiles and loads
 LIMIT = 0.18  # asks are 11 % of a run, since a learner updates once per decision

@@ -11,8 +11,8 @@ import pytest
 import torch
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.scene_optimizer import BotorchOptimizer
-from risk_sac.types import Floats
+from risk_sac.search.scene_optimizer import BotorchOptimizer
+from risk_sac.world.types import Floats
 
 DIMENSION = 12
 EPISODES = 300

@@ -12,9 +12,9 @@ import numpy as np
 from stable_baselines3 import SAC
 from stable_baselines3.common.logger import Logger
 
-from risk_sac.agents.learner import Learner
-from risk_sac.agents.replay import Transition
 from risk_sac.config import METHODS, LearnerConfig
+from risk_sac.search.agents.learner import Learner
+from risk_sac.search.agents.replay import Transition
 from tests.benchmarks.timing import interleaved
 
 OBSERVATIONS, ACTIONS, STORED = 48, 6, 5000

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from risk_sac.types import Floats
+from risk_sac.world.types import Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

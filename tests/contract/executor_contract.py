@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from risk_sac.config import RunSpec
-from risk_sac.execution.executor import FOLDER, Cause, Executor, Exited, MakeExecutor, Program
+from risk_sac.execution.executor import FOLDER, Cause, Executor, Exited, MakeExecutor, WorkerProgram
 from risk_sac.execution.messages import Heard
 
 SPEC = RunSpec(family="low", method="random", seed=7)
@@ -69,7 +69,7 @@ class Runs:
         self._folder = folder
         self._numbers: set[int] = set()
         arguments = "-c", START, str(folder), FOLDER
-        program = Program(arguments=arguments, log="log", hear=hear, **{"linger_s": LONG_S} | patience)
+        program = WorkerProgram(arguments=arguments, log="log", hear=hear, **{"linger_s": LONG_S} | patience)
         self.executor: Executor = make(program)
 
     def folder(self, number: int, attempt: int = 1) -> Path:

@@ -26,14 +26,7 @@ from risk_sac.records import (
     stored,
 )
 from risk_sac.report import FinishedRun
-from risk_sac.run_folder.results import (
-    EPISODES,
-    FAILURES,
-    RecordedFailure,
-    Results,
-    series_name,
-    write_results,
-)
+from risk_sac.run_folder.results import EPISODES, FAILURES, RecordedFailure, RunResults, series_name, write_results
 from risk_sac.run_folder.series import PER_ACTOR, PER_OTHER, write_series
 from service.settings import ServiceSettings
 from service.store.reading import Store
@@ -253,7 +246,7 @@ class Recorded:
         result = finished(spec, done)
         write_results(
             folder,
-            Results(
+            RunResults(
                 spec=spec,
                 spec_digest=spec.digest,
                 finished=True,

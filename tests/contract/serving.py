@@ -11,7 +11,7 @@ from pathlib import Path
 from risk_sac.config import RunSpec
 from risk_sac.execution.executor import Exited
 from risk_sac.execution.messages import Event
-from service.api.guards.connections import Server
+from service.api.connections import Server
 from service.app import create_app
 from service.settings import ServiceSettings
 

@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from service.host.environment import with_table
-from service.settings import ServiceSettings
+from service.settings import ServiceSettings, with_table
 
 ROOT = Path(__file__).parents[2]
 SETTINGS = (ROOT / "service" / "settings.md").read_text(encoding="utf-8")

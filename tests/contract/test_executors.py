@@ -4,7 +4,7 @@ from collections.abc import Iterator
 import pytest
 
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import MakeExecutor, Program, executor_named
+from risk_sac.execution.executor import MakeExecutor, WorkerProgram, executor_named
 from risk_sac.execution.jobs import worker_program
 from risk_sac.execution.ray.executor import RayExecutor
 from tests.contract.executor_contract import ExecutorContract
@@ -26,7 +26,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 class Reused(RayExecutor):
     """One for all tests, since another client of Ray costs several seconds of a processor."""
 
-    def begin_anew(self, program: Program) -> "Reused":
+    def begin_anew(self, program: WorkerProgram) -> "Reused":
         self._program, self._messages, self._orders = program, queue.SimpleQueue(), {}
         return self
 

@@ -10,7 +10,7 @@ import yaml
 from pydantic import BaseModel
 
 from risk_sac.config import CampaignSpec, LearnerConfig, Odd
-from service.api.examples import CAMPAIGNS as EXAMPLES
+from service.api.description import CAMPAIGNS as EXAMPLES
 from service.api.routes import events
 from service.app import create_app, openapi
 from service.openapi import document

@@ -80,7 +80,7 @@ def test_the_server_loads_nothing_of_a_cluster_that_it_does_not_use(loaded: set[
 
 
 def test_the_server_reads_no_upload_itself(loaded: set[str]) -> None:
-    assert "service.networks.sandbox" in loaded
+    assert "service.networks.network_store" in loaded
     assert not [name for name in loaded if name.startswith("service.networks.checker")]
 
 

@@ -11,11 +11,11 @@ import pytest
 from risk_sac import __version__
 from risk_sac.cli.campaigns.output import COUNTS, RATES
 from risk_sac.config import Requirement, RunSpec
-from risk_sac.failures.map_picture import MARKS
-from risk_sac.problem import Problem
+from risk_sac.env.problem import Problem
+from risk_sac.failures.from_above import MARKS
+from risk_sac.maps.found import TITLES, Pattern
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.maps.found import TITLES, Pattern
 from service.api.routes.catalogue import list_families
 
 ROOT = Path(__file__).parents[2]

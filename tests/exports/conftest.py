@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from risk_sac.failures.bundle import read_bundle
-from risk_sac.failures.export.formats import FORMATS, FormatName, export
+from risk_sac.failures.export.formats import FORMATS, FormatName, export, write
 from risk_sac.failures.export.recorded import Recorded
-from risk_sac.failures.export.written import write
 from tests.exports.make_examples import FOLDER, played_here
 from tests.overlaps import overlaps_in
 from tests.server import ROOT

@@ -9,12 +9,11 @@ import tempfile
 from contextlib import closing
 from pathlib import Path
 
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import SimulationError
 from risk_sac.failures.bundle import Bundle, make_bundle, read_bundle, write_bundle
-from risk_sac.failures.export.formats import FORMATS, FormatName, export, names
+from risk_sac.failures.export.formats import FORMATS, FormatName, export, names, write
 from risk_sac.failures.export.recorded import Recorded
-from risk_sac.failures.export.written import write
 from risk_sac.failures.net import roads_of
 from risk_sac.failures.play import replay
 from risk_sac.failures.recording import Recording

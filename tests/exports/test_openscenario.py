@@ -13,7 +13,7 @@ from lxml import etree
 from shapely.affinity import rotate, translate
 
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.failures.export.recorded import Actor, Recorded
+from risk_sac.failures.export.recorded import ExportedActor, Recorded
 from risk_sac.failures.net import colour
 from tests.exports.conftest import CM, ask_checkers, checked
 from tests.exports.make_examples import FAMILIES
@@ -34,7 +34,7 @@ def test_asams_checkers_find_nothing(exported: Callable[..., Path]) -> None:
             assert findings == [], (file, check)
 
 
-def driven(file: Path, actor: Actor) -> np.ndarray:
+def driven(file: Path, actor: ExportedActor) -> np.ndarray:
     """Times and middles of a body, `frames x 3`, as a reader of the standard has them."""
     root = etree.parse(file).getroot()
     (trajectory,) = (each for each in root.iter("Trajectory") if each.get("name") == f"{actor.id} recorded")

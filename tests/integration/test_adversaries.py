@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig, FamilyName
-from risk_sac.env import RiskSacEnv, make_default
-from risk_sac.geometry import overlapping_pairs
+from risk_sac.env.env import RiskSacEnv, make_default
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import GRAVITY_MPS2, Limits, limits_from_odd
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import STEP_S, Floats, Frame
+from risk_sac.world.geometry import overlapping_pairs
+from risk_sac.world.types import STEP_S, Floats, Frame
 from tests.builders import moved
 
 ROUNDING = 0.02  # of SUMO's positions and speeds, divided by the step where a derivative is taken

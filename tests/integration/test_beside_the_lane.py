@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.geometry import relative_view
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.scenario.limits import limits_from_odd
-from risk_sac.scripts.motions import Genes, Seen, act, cue
+from risk_sac.search.scripts import Genes, Seen, act, cue
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.paths import HEADING, STATION, Along, X, Y, way_of
 from risk_sac.sim.pilot import Motion
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import STEP_S, Frame, Role, Signal
+from risk_sac.world.geometry import relative_view
+from risk_sac.world.types import STEP_S, Frame, Role, Signal
 
 
 class Told:

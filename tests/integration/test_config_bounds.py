@@ -12,15 +12,14 @@ import torch
 from pydantic import ValidationError
 
 from risk_sac.config import METHODS, CampaignSpec, Odd, RunSpec
+from risk_sac.env.problem import Problem
 from risk_sac.errors import OddError
-from risk_sac.guarded_env import GuardedEnv
-from risk_sac.loop import episode
-from risk_sac.problem import Problem
 from risk_sac.records import EpisodeRecord, RunMetrics
-from risk_sac.run import RunState
 from risk_sac.run_folder.arrays import read_series
-from risk_sac.run_folder.crashes import CrashGuard
+from risk_sac.run_folder.checkpoint import CrashGuard
 from risk_sac.scenario.odd import SENSIBLE
+from risk_sac.search.loop import GuardedEnv, episode
+from risk_sac.search.run import RunState
 
 SMALL = {  # what costs time or memory, and is bounded for that
     "seeds": [5],

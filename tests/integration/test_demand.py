@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from risk_sac.config import CampaignSpec, RunSpec
-from risk_sac.config.demand import MOST_BYTES, demand_bytes
+from risk_sac.config.campaign import MOST_BYTES, demand_bytes
+from risk_sac.env.problem import Problem, checked_campaign
 from risk_sac.errors import ConfigError
-from risk_sac.problem import Problem, checked_campaign
 
 OBSERVATION, ACTION, HORIZON = 300, 8, 200  # wide, so that few transitions fill much
 PROGRAM = f"""
@@ -18,8 +18,8 @@ import json, sys
 from pathlib import Path
 import numpy as np
 import torch
-from risk_sac.agents.learner import Learner
-from risk_sac.agents.replay import Transition
+from risk_sac.search.agents.learner import Learner
+from risk_sac.search.agents.replay import Transition
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.run_folder import checkpoint
 

@@ -13,7 +13,7 @@ import httpx
 import psutil
 import pytest
 
-from service.api.guards import connections
+from service.api import connections
 from service.api.routes import docs
 from service.keys.file import KeyFile, Scope
 from service.settings import ServiceSettings

@@ -7,16 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from risk_sac.benchmark.detection import Detection, first_detection
 from risk_sac.cli import main
 from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
-from risk_sac.env import RiskSacEnv
-from risk_sac.failures.detected import detected, without_defects
-from risk_sac.failures.play import play
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.failures.play import detected, play, without_defects
+from risk_sac.lab.benchmark.runs import Detection, first_detection
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, series_name
-from risk_sac.types import Scene
+from risk_sac.world.types import Scene
 
 SPEC = RunSpec(family="mixed", method="archive", seed=501, ego=read_ego("idm-aeb+kerb-waits"))
 STEPS = 4000

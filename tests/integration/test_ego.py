@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.geometry import relative_view
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, PedestrianStart, VehicleStart
-from risk_sac.sim.commands import VehicleCommand
+from risk_sac.sim.solid import VehicleCommand
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import Floats, Frame, Role
+from risk_sac.world.geometry import relative_view
+from risk_sac.world.types import Floats, Frame, Role
 from tests.builders import Told, belief_of
 
 LANE_Y_M = -1.65  # the ego's lane on the mixed road

@@ -11,18 +11,17 @@ import pytest
 from risk_sac import cli
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.egos.registry import card_of, cards, pinned
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import CheckpointError, ConfigError, InfeasibleScene
-from risk_sac.execution.runs import run
-from risk_sac.execution.verify import verify
+from risk_sac.execution.evaluate import run, verify
 from risk_sac.records import EpisodeRecord, Outcome
-from risk_sac.run_folder.results import Results
-from risk_sac.types import Frame
+from risk_sac.run_folder.results import RunResults
+from risk_sac.world.types import Frame
 from tests.ego_processes import CPP_COMPILES, served, served_by_cpp
 
 EXAMPLE = '''
 from risk_sac.egos import Control
-from risk_sac.egos.road import lane_keeping
+from risk_sac.egos.driving import lane_keeping
 
 class Example:
     """{summary}"""
@@ -89,7 +88,7 @@ def spec_of(driver: str, *, family: str = "low", episodes: int = 6, method: str 
     return RunSpec.model_validate_json(json.dumps(data))
 
 
-def play(spec: RunSpec, folder: Path) -> tuple[Results, list[EpisodeRecord]]:
+def play(spec: RunSpec, folder: Path) -> tuple[RunResults, list[EpisodeRecord]]:
     results = run(spec, folder, lambda done, metrics: None)
     lines = (folder / "episodes.jsonl").read_bytes().splitlines()
     return results, [EpisodeRecord.model_validate_json(line) for line in lines]

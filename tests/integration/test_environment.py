@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from risk_sac.config import Odd, RunSpec
-from risk_sac.env import RiskSacEnv, make_default
+from risk_sac.env.env import RiskSacEnv, make_default
 from risk_sac.errors import InfeasibleScene, OddError
-from risk_sac.scenario.environment import LOW_BEAM_M
+from risk_sac.scenario.limits import LOW_BEAM_M
 from risk_sac.scenario.odd import paths
-from risk_sac.types import STEP_S, Frame, Kind, Scene
+from risk_sac.world.types import STEP_S, Frame, Kind, Scene
 
 BRAKE, STEPS = -1.0, 60
 FOG_M, CLEAR_M = 40.0, 2000.0

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from risk_sac.config import EgoConfig, FamilyName, RunSpec
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.env.problem import Problem
 from risk_sac.errors import InfeasibleScene
-from risk_sac.problem import Problem
-from risk_sac.types import Scene
+from risk_sac.world.types import Scene
 
 ATTACK_FROM, ATTACK_STEPS = 12, 45  # after the release, and how long it lasts
 RUNGS = {

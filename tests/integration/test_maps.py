@@ -9,12 +9,12 @@ import pytest
 
 import sumo_nets
 from risk_sac.config import RunSpec
-from risk_sac.env import RiskSacEnv
-from risk_sac.problem import Problem
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.env.problem import Problem
+from risk_sac.maps.finder import Map
+from risk_sac.maps.found import Pattern
 from risk_sac.scenario import library
-from risk_sac.scenario.maps.finder import Map
-from risk_sac.scenario.maps.found import Pattern
-from risk_sac.types import Frame
+from risk_sac.world.types import Frame
 from tests.maps import osm_roundabout, osm_town, turned
 from tests.server import Service
 

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.geometry import relative_view
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, PedestrianStart, VehicleStart
-from risk_sac.sim.commands import Walker
 from risk_sac.sim.paths import STATION
+from risk_sac.sim.solid import Walker
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import STEP_S, Frame, Role
+from risk_sac.world.geometry import relative_view
+from risk_sac.world.types import STEP_S, Frame, Role
 
 LEFT, RIGHT = 1, -1
 CONDITIONS = ((5.0, 1.0), (9.5, 0.6), (13.8, 1.0))  # speed in m/s, friction

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.geometry import relative_view
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import Frame
+from risk_sac.world.geometry import relative_view
+from risk_sac.world.types import Frame
 from tests.builders import Told, belief_of
 
 LOW = FAMILIES["low"]

@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from risk_sac import searchers
-from risk_sac.agents.follower import ScriptFollower
 from risk_sac.config import AgentConfig, Budget, LearnerConfig, RunMethod, RunSpec
+from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
-from risk_sac.loop import execute_run
-from risk_sac.prior.learner import PretrainedLearner
-from risk_sac.prior.policy import Folded, Layout
-from risk_sac.problem import Problem
 from risk_sac.records import DrivenBy, EpisodeRecord
-from risk_sac.searchers import Searchers
+from risk_sac.search import searchers
+from risk_sac.search.agents.controls import ScriptFollower
+from risk_sac.search.loop import execute_run
+from risk_sac.search.prior.learner import PretrainedLearner
+from risk_sac.search.prior.policy import Folded, PolicyLayout
+from risk_sac.search.searchers import Searchers
 from tests.builders import pretrained_policy
 from tests.listener import Listener
 
@@ -27,12 +27,12 @@ def spec(method: RunMethod, episodes: int = 2) -> RunSpec:
 
 
 @pytest.fixture
-def layout() -> Layout:
-    return Layout.of(Problem.from_spec(spec("risk-sac-pretrained")))
+def layout() -> PolicyLayout:
+    return PolicyLayout.of(Problem.from_spec(spec("risk-sac-pretrained")))
 
 
 @pytest.fixture(autouse=True)
-def shipped(monkeypatch: pytest.MonkeyPatch, layout: Layout) -> None:
+def shipped(monkeypatch: pytest.MonkeyPatch, layout: PolicyLayout) -> None:
     """A small policy in the place of the shipped one."""
     monkeypatch.setattr(searchers, "pretrained_for", lambda family: pretrained_policy(layout, GOALS))
 
@@ -63,7 +63,7 @@ def test_an_interrupted_run_goes_on_as_if_it_had_not_been(tmp_path: Path) -> Non
     assert played(tmp_path / "parts", wanted) == whole
 
 
-def test_exploring_asks_for_kinds_and_evaluating_for_any(layout: Layout) -> None:
+def test_exploring_asks_for_kinds_and_evaluating_for_any(layout: PolicyLayout) -> None:
     learner = searchers_of(spec("risk-sac-pretrained")).agent
     assert isinstance(learner, PretrainedLearner)
     seen = np.full(layout.observation_size, 0.3, np.float32)

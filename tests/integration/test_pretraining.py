@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 import torch
 
-from risk_sac.agents.replay import Transition
 from risk_sac.config import EgoConfig, RunSpec
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
-from risk_sac.pretraining import episodes, policy
-from risk_sac.pretraining.episodes import Stream
-from risk_sac.pretraining.mirror import Mirror
-from risk_sac.pretraining.policy import PolicyTraining
-from risk_sac.pretraining.rollouts import PolicyEpisode
-from risk_sac.prior.policy import Layout
-from risk_sac.problem import Problem
-from risk_sac.types import Scene, Vector
+from risk_sac.lab.pretraining import episodes, policy
+from risk_sac.lab.pretraining.episodes import EpisodeStream
+from risk_sac.lab.pretraining.mirror import Mirror
+from risk_sac.lab.pretraining.policy import PolicyTraining
+from risk_sac.lab.pretraining.rollouts import PolicyEpisode
+from risk_sac.search.agents.replay import Transition
+from risk_sac.search.prior.policy import PolicyLayout
+from risk_sac.world.types import Scene, Vector
 
 
 def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,9 +32,9 @@ def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path: Path, mon
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     for folder in (whole, parts):
         folder.mkdir()
-    Stream("low", 5, 0).play(whole, 3)
-    Stream("low", 5, 0).play(parts, 2)
-    Stream("low", 5, 0).play(parts, 3)
+    EpisodeStream("low", 5, 0).play(whole, 3)
+    EpisodeStream("low", 5, 0).play(parts, 2)
+    EpisodeStream("low", 5, 0).play(parts, 3)
     names = sorted(path.name for path in whole.iterdir())
     assert names == [f"low-00-000{k}.npz" for k in range(3)]
     for name in names:
@@ -47,7 +47,7 @@ def trained(
     jobs: int,
     *,
     interrupted: bool = False,
-    stages: Sequence[policy.Stage] = policy.STAGES,
+    stages: Sequence[policy.TrainingStage] = policy.STAGES,
 ) -> PolicyTraining:
     """A trained policy; an interruption comes after the first point of its curve."""
     folder.mkdir()
@@ -158,7 +158,7 @@ def observations(env: RiskSacEnv, scene: dict[str, float], actions: list[Vector]
 
 def test_the_simulator_shows_a_mirrored_scene_as_the_mirror_does() -> None:
     spec = RunSpec(family="low", method="sac", seed=3, ego=EgoConfig(driver="idm-aeb"))  # SUMO's driver keeps right
-    mirror = Mirror.of(Layout.of(Problem.from_spec(spec)))
+    mirror = Mirror.of(PolicyLayout.of(Problem.from_spec(spec)))
     assert mirror is not None
     actions = [np.array([0.0, 0.0, 0.4, -0.5, -0.3, 0.2], np.float32)] * 8
     with closing(RiskSacEnv.of(spec)) as env:
@@ -172,4 +172,4 @@ def test_the_simulator_shows_a_mirrored_scene_as_the_mirror_does() -> None:
 
 def test_families_with_unlike_sides_have_no_mirror() -> None:
     for family in ("mixed", "dense"):
-        assert Mirror.of(Layout.of(Problem.from_spec(RunSpec(family=family, method="sac", seed=3)))) is None
+        assert Mirror.of(PolicyLayout.of(Problem.from_spec(RunSpec(family=family, method="sac", seed=3)))) is None

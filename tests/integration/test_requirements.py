@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from risk_sac.agents.controls import ScriptedAgent
 from risk_sac.config import FamilyName, RunSpec
-from risk_sac.env import Observation, RiskSacEnv
-from risk_sac.problem import Problem
+from risk_sac.env.env import Observation, RiskSacEnv
+from risk_sac.env.problem import Problem
 from risk_sac.records import ARTEFACT_RULES, Collision
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.run_folder.series import Trace
-from risk_sac.types import STEP_S, Floats, Scene
+from risk_sac.search.agents.controls import ScriptedAgent
+from risk_sac.world.types import STEP_S, Floats, Scene
 
 each_family = pytest.mark.parametrize("family", ["low", "mixed", "dense"])
 UNDISTURBED_SEEDS = range(9100, 9115)

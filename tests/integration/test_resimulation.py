@@ -13,21 +13,21 @@ import libsumo
 import numpy as np
 import pytest
 
-from risk_sac.agents.controls import RandomAgent
 from risk_sac.config import EgoConfig, FamilyName
-from risk_sac.env import RiskSacEnv, make_default
-from risk_sac.geometry import Size, contact_point, relative_view, touches, zone
+from risk_sac.env.env import RiskSacEnv, make_default
 from risk_sac.records import Collision
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.sim.placing import STEERED
+from risk_sac.search.agents.controls import RandomAgent
+from risk_sac.sim.roads import STEERED
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import STEP_S, Frame
 from risk_sac.verdicts.conflict import Conflict, find_conflict
 from risk_sac.verdicts.drivers import R157_PERCEIVES_S, full_braking, r157
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.reference import LEAD_M, reference_outcomes
 from risk_sac.verdicts.rollout import STANDING_MPS
+from risk_sac.world.geometry import Size, contact_point, relative_view, touches, zone
+from risk_sac.world.types import STEP_S, Frame
 from tests.builders import frame_of
 
 EPISODES: dict[FamilyName, int] = {"low": 30, "mixed": 60, "dense": 30}  # so that each has contacts

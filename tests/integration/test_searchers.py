@@ -4,15 +4,15 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.agents.follower import ScriptFollower
-from risk_sac.agents.learner import Learner
 from risk_sac.config import AgentConfig, Budget, FamilyName, LearnerConfig, RunMethod, RunSpec, WarmStartConfig
+from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
-from risk_sac.loop import execute_run
-from risk_sac.problem import Problem
 from risk_sac.records import DrivenBy, EpisodeRecord, Grade, Outcome
-from risk_sac.scene_optimizer import ArchiveOptimizer, Encounter
-from risk_sac.searchers import COLD, GUIDE, OWN, Searchers, Turns
+from risk_sac.search.agents.controls import ScriptFollower
+from risk_sac.search.agents.learner import Learner
+from risk_sac.search.loop import execute_run
+from risk_sac.search.scene_optimizer import ArchiveOptimizer, Encounter
+from risk_sac.search.searchers import COLD, GUIDE, OWN, Searchers, Turns
 from tests.builders import collision, episode_record, judgement
 from tests.listener import Listener
 

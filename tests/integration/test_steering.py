@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig, RunSpec
-from risk_sac.env import RiskSacEnv
-from risk_sac.execution.runs import run
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.execution.evaluate import run
 from risk_sac.records import EpisodeRecord, Outcome
-from risk_sac.types import Frame
+from risk_sac.world.types import Frame
 
 pytestmark = pytest.mark.usefixtures("steering_egos")
 LANES_Y_M = np.array([-3.3, 0.0, 3.3])  # middles of the lanes of low; the ego begins in the second

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from risk_sac.config import METHODS, Budget, EgoConfig, RunSpec
-from risk_sac.env import RiskSacEnv
-from risk_sac.loop import execute_run
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.records import EpisodeRecord, Grade, RunMetrics, SeriesFile, Violation
-from risk_sac.verdicts.keeping import History, placed
-from risk_sac.verdicts.recorded import ego_path
+from risk_sac.search.loop import execute_run
+from risk_sac.verdicts.evidence import ego_path
+from risk_sac.verdicts.reference import History, placed
 
 EPISODES = 12
 

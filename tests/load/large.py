@@ -22,13 +22,13 @@ from risk_sac.run_folder.results import (
     EPISODES,
     FAILURES,
     RESULTS,
+    VERIFIED,
     RecordedFailure,
     read_results,
     records_from_lines,
     series_name,
     write_results,
 )
-from risk_sac.run_folder.verified import VERIFIED
 from risk_sac.scenario.families import family_named
 from tests.load.promises import Promise, at_most
 from tests.server import LONG_S, Service, servers

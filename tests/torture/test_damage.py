@@ -189,7 +189,7 @@ def test_a_run_with_a_damaged_file_goes_on_from_the_last_good_one(data, tmp_path
 def go_on(spec: RunSpec, folder: Path, stop_after: int | None = None) -> str:
     """Digest of a run that is started or goes on in a process of its own, or why it cannot."""
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["risk_sac.execution.runs"])
+    context.set_forkserver_preload(["risk_sac.execution.evaluate"])
     receiver, sender = context.Pipe(duplex=False)
     with receiver, sender:
         process = context.Process(target=_run, args=(spec, folder, stop_after, sender))
@@ -204,7 +204,7 @@ def go_on(spec: RunSpec, folder: Path, stop_after: int | None = None) -> str:
 def _run(spec: RunSpec, folder: Path, stop_after: int | None, sender: Any) -> None:
     import os
 
-    from risk_sac.execution.runs import run
+    from risk_sac.execution.evaluate import run
 
     def progress(done: int, metrics: object) -> None:
         if done == stop_after:

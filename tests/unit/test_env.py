@@ -17,14 +17,14 @@ from shapely import box as shapely_box
 from shapely.affinity import rotate, translate
 
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
-from risk_sac.env import RiskSacEnv, make_default
+from risk_sac.env.env import RiskSacEnv, make_default
+from risk_sac.env.problem import Problem
 from risk_sac.errors import InfeasibleScene, SimulationError
-from risk_sac.geometry import relative_view
-from risk_sac.problem import Problem
 from risk_sac.records import Collision, Grade, Severity
-from risk_sac.risk.ttc import time_to_encounter
+from risk_sac.risk.rss import time_to_encounter
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.types import Frame, Kind, Scene
+from risk_sac.world.geometry import relative_view
+from risk_sac.world.types import Frame, Kind, Scene
 
 NAMES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
 LEAD_IN_STEPS = 15

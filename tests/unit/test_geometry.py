@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 
-from risk_sac.geometry import RelativeView, line_of_sight, overlapping_pairs, relative_view, time_to_contact
-from risk_sac.types import Bools, Floats, Frame
+from risk_sac.world.geometry import RelativeView, line_of_sight, overlapping_pairs, relative_view, time_to_contact
+from risk_sac.world.types import Bools, Floats, Frame
 from tests import builders
 
 TOUCHING_M = 1e-9

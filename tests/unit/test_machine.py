@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-import risk_sac.jit
-import risk_sac.machine
+import risk_sac.host.machine
+import risk_sac.world.jit
 from risk_sac.errors import ConfigError
-from risk_sac.machine import cores, user_cache
+from risk_sac.host.machine import cores, user_cache
 from risk_sac.scenario import library
 
 
@@ -72,7 +72,7 @@ def test_a_user_without_a_home_has_no_cache_and_the_library_says_so(monkeypatch)
 
 ASK = "from risk_sac.risk.outer import outer; print(outer(1.0))"
 OUTER = """
-from risk_sac.jit import compiled
+from risk_sac.world.jit import compiled
 from risk_sac.risk.inner import inner
 
 @compiled
@@ -80,7 +80,7 @@ def outer(x):
     return inner(x)
 """
 INNER = """
-from risk_sac.jit import compiled
+from risk_sac.world.jit import compiled
 from risk_sac.risk.constants import FACTOR
 
 @compiled
@@ -93,7 +93,7 @@ def inner(x):
 def test_a_change_in_a_called_function_or_a_constant_is_not_hidden_by_the_cache(tmp_path, read_only):
     package = tmp_path / "risk_sac"
     (package / "risk").mkdir(parents=True)
-    for module in (risk_sac.jit, risk_sac.machine):
+    for module in (risk_sac.world.jit, risk_sac.host.machine):
         shutil.copy(module.__file__, package)
     if read_only:  # to root, too
         (package / "__pycache__").touch()
@@ -118,8 +118,8 @@ def test_a_change_in_a_called_function_or_a_constant_is_not_hidden_by_the_cache(
 FIRST_CALL = """
 import time
 import numpy as np
-from risk_sac.geometry import overlapping_pairs
-from risk_sac.jit import cpu_s
+from risk_sac.world.geometry import overlapping_pairs
+from risk_sac.world.jit import cpu_s
 
 began_s, counted_s = time.process_time(), cpu_s()
 overlapping_pairs(np.ones((20, 3)))

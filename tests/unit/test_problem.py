@@ -4,7 +4,6 @@ from contextlib import closing
 
 import pytest
 
-from risk_sac.adjustments import adjustments
 from risk_sac.config import (
     CampaignSpec,
     EgoConfig,
@@ -12,10 +11,10 @@ from risk_sac.config import (
     Requirement,
     RunSpec,
 )
+from risk_sac.env.problem import Problem, adjustments, checked_campaign
 from risk_sac.errors import ConfigError, FormulaError, OddError
-from risk_sac.problem import Problem, checked_campaign
+from risk_sac.failures.tryout import ALIKE_M, LEFT, MET_M, RIGHT, meet
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.tryout import ALIKE_M, LEFT, MET_M, RIGHT, meet
 
 
 def problem(family: str = "mixed", **settings: object) -> Problem:
@@ -80,7 +79,7 @@ def test_rss_asks_the_same_of_any_ego_and_time_to_collision_the_more_the_slower_
 def test_a_method_whose_package_is_not_installed_is_refused_before_it_runs(monkeypatch):
     campaign = CampaignSpec(families=("low",), methods=("random", "sb3-sac"))
     checked_campaign(campaign)
-    monkeypatch.setattr("risk_sac.problem.find_spec", lambda name: None)
+    monkeypatch.setattr("risk_sac.env.problem.find_spec", lambda name: None)
     with pytest.raises(ConfigError, match=r"'sb3-sac', which needs stable_baselines3; pip install") as refusal:
         checked_campaign(campaign)
     assert refusal.value.field == "methods"

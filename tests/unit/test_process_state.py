@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import torch
 
-from risk_sac.process_state import TINY, Preserved, preserved
+from risk_sac.host.process_state import TINY, Preserved, preserved
 
 
 def reset_signal() -> None:
@@ -112,7 +112,7 @@ def test_a_process_that_foreign_code_forks_does_not_come_back():
 
 def test_a_thread_that_never_ends_does_not_keep_the_process():
     program = (
-        "import threading, time; from risk_sac.process_state import leave; "
+        "import threading, time; from risk_sac.host.process_state import leave; "
         "threading.Thread(target=time.sleep, args=(600,)).start(); print('done'); leave(3)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False)

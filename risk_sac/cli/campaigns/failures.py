@@ -11,13 +11,13 @@ from rich.table import Table
 
 from risk_sac.cli.campaigns.output import add_campaign_command, add_newest_command, chosen_id
 from risk_sac.cli.console import OK, OUTCOME, in_words, offences, or_dash, outcome, print_answer, write_out
-from risk_sac.cli.failure_filters import add_filter_flags, listed, wanted
+from risk_sac.cli.flags import add_filter_flags, listed, wanted
 from risk_sac.cli.parser import FAILURE_HELP, Commands, Parser
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
+from risk_sac.host.terminal import notes
 from risk_sac.records import Collision, EpisodeId, Violation
-from risk_sac.terminal import notes
 
 
 def add(commands: Commands) -> None:

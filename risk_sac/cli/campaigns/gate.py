@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, OK, counted
 from risk_sac.client import Results, Total
 from risk_sac.config import IID_METHODS
-from risk_sac.config.text import read_text
+from risk_sac.config.base import read_text
 from risk_sac.errors import ConfigError
 from risk_sac.records import RequirementCounts
 
@@ -34,7 +34,7 @@ def named_rate(text: str) -> tuple[str, float]:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Bounds:
+class GateBounds:
     """Bounds of every family and method, controls included; None sets no bound."""
 
     ecr: float | None = None
@@ -45,7 +45,7 @@ class Bounds:
     judged_by: JudgedBy = "interval"
 
     @classmethod
-    def of(cls, options: argparse.Namespace) -> "Bounds":
+    def of(cls, options: argparse.Namespace) -> "GateBounds":
         """Those of the command line.
 
         Raises:
@@ -89,7 +89,7 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
+class BoundCheck:
     """A rate of one family and method beside its bound."""
 
     name: str  # ECR | PCR | a requirement
@@ -114,7 +114,7 @@ class Comparison:
         return f"{self.rate:.3f}{interval} ({counts})"
 
 
-def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
+def comparisons(total: Total, bounds: GateBounds) -> Iterator[BoundCheck]:
     """ECR and PCR of a family and method, where they have a bound and have been measured."""
     rates = {
         "ECR": (total.ecr, total.ecr_high, total.collisions, "valid contact"),
@@ -124,7 +124,7 @@ def comparisons(total: Total, bounds: Bounds) -> Iterator[Comparison]:
         found, high, hits, what = rates[name]
         if found is None:
             continue
-        yield Comparison(
+        yield BoundCheck(
             name=name,
             bound=bound,
             judged_by=bounds.judged_by,
@@ -144,11 +144,11 @@ class Measured(NamedTuple):
     rated: int  # episodes
     requirements: Mapping[str, RequirementCounts]
 
-    def comparisons(self, bounds: Bounds) -> Iterator[Comparison]:
+    def comparisons(self, bounds: GateBounds) -> Iterator[BoundCheck]:
         """The rates that have a bound."""
         for name, found in self.requirements.items():
             if name in bounds.requirements:
-                yield Comparison(
+                yield BoundCheck(
                     name=name,
                     bound=bounds.requirements[name],
                     judged_by=bounds.judged_by,
@@ -169,7 +169,7 @@ def measured(results: Results) -> list[Measured]:
     ]
 
 
-def excesses(total: Total, bounds: Bounds) -> Iterator[str]:
+def excesses(total: Total, bounds: GateBounds) -> Iterator[str]:
     """In words, what a family and method has found more of than it may, as it was counted."""
     if bounds.preventable is not None and total.distinct_preventable > bounds.preventable:
         found = counted(total.distinct_preventable, "distinct preventable failure")
@@ -179,7 +179,7 @@ def excesses(total: Total, bounds: Bounds) -> Iterator[str]:
             yield f"a new kind of failure: {signature}"
 
 
-def verdict(results: Results, bounds: Bounds) -> tuple[int, str]:
+def verdict(results: Results, bounds: GateBounds) -> tuple[int, str]:
     """Judge a campaign, which counts as measured once it has succeeded: the exit status, and why.
 
     Raises:

@@ -11,16 +11,16 @@ from junitparser import Error, Failure, Skipped
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 
 from risk_sac.cli.campaigns.failures import look_command
-from risk_sac.cli.campaigns.gate import Bounds, Comparison, Measured, comparisons, excesses, measured
+from risk_sac.cli.campaigns.gate import BoundCheck, GateBounds, Measured, comparisons, excesses, measured
 from risk_sac.cli.console import counted, headline
 from risk_sac.client import Episode, Results, RunResult, Total
+from risk_sac.host.terminal import printable
 from risk_sac.metrics import COLUMNS, requirement_cells
 from risk_sac.records import State
-from risk_sac.terminal import printable
 
 
 def junit(
-    results: Results, service_url: str, url: str, bounds: Bounds, failures: Mapping[str, Sequence[Episode]]
+    results: Results, service_url: str, url: str, bounds: GateBounds, failures: Mapping[str, Sequence[Episode]]
 ) -> JUnitXml:
     """Write the report of a campaign; `failures` has the first failures of a run by its id.
 
@@ -69,7 +69,7 @@ def _case(run: RunResult, named: str) -> TestCase:
     return case
 
 
-def _requirements(group: Measured, bounds: Bounds, names: "Names") -> Iterator[TestCase]:
+def _requirements(group: Measured, bounds: GateBounds, names: "Names") -> Iterator[TestCase]:
     """A case for each requirement of a family and method that counts or has a bound."""
     compared = {each.name: each for each in group.comparisons(bounds)}
     for name, found in group.requirements.items():
@@ -83,7 +83,7 @@ def _requirements(group: Measured, bounds: Bounds, names: "Names") -> Iterator[T
         yield case
 
 
-def _gate(total: Total, bounds: Bounds, names: "Names") -> TestCase:
+def _gate(total: Total, bounds: GateBounds, names: "Names") -> TestCase:
     """Whether a family and method keeps the bounds that are of no single requirement, over all its runs."""
     case = TestCase("all seeds", printable(f"{total.family}.{total.method}"))
     named = names.of_method(total.family, total.method)
@@ -91,7 +91,7 @@ def _gate(total: Total, bounds: Bounds, names: "Names") -> TestCase:
     return case
 
 
-def _judge(case: TestCase, found: Sequence[Comparison], exceeded: Sequence[str], state: State, named: str) -> None:
+def _judge(case: TestCase, found: Sequence[BoundCheck], exceeded: Sequence[str], state: State, named: str) -> None:
     """Fails a case whose rate or count is beyond its bound; `named` has its failures."""
     broken = [each for each in found if each.verdict != "within"]
     said = "; ".join([*(f"{each.name} {each.verdict} {each.bound:g}: {each}" for each in broken or found), *exceeded])

@@ -5,7 +5,6 @@ import itertools
 import time
 from pathlib import Path
 
-from risk_sac.cli.campaign_flags import named_ego
 from risk_sac.cli.campaigns.output import (
     add_campaign_command,
     add_newest_command,
@@ -15,14 +14,13 @@ from risk_sac.cli.campaigns.output import (
 )
 from risk_sac.cli.campaigns.watch import shown
 from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, print_answer, write_out
-from risk_sac.cli.failure_filters import add_limit
+from risk_sac.cli.flags import add_limit, named_ego
 from risk_sac.cli.parser import Commands, add_command
-from risk_sac.cli.regress import cases_table, junit
-from risk_sac.cli.report import OUT, format_of
+from risk_sac.cli.regress import OUT, cases_table, format_of, junit
 from risk_sac.client import Client
 from risk_sac.failures.cases import Regression
+from risk_sac.host.terminal import complain, notes
 from risk_sac.records import State
-from risk_sac.terminal import complain, notes
 
 POLL_S = 0.5
 FILTERS = ("state", "family", "method", "label")

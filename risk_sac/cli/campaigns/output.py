@@ -8,15 +8,15 @@ from rich.console import Group
 from rich.markup import escape
 from rich.table import Table
 
-from risk_sac.cli.campaigns.gate import Bounds, Comparison, comparisons, measured
+from risk_sac.cli.campaigns.gate import BoundCheck, GateBounds, comparisons, measured
 from risk_sac.cli.console import counted, headline, on_one_line, or_dash, requirements_table
 from risk_sac.cli.parser import Commands, Parser, add_command
 from risk_sac.client import Campaign, CampaignSummary, Client, Results
 from risk_sac.config import IID_METHODS
 from risk_sac.errors import ConfigError
+from risk_sac.host.terminal import notes
 from risk_sac.metrics import pooled_requirements
 from risk_sac.records import DrivenBy, Total
-from risk_sac.terminal import notes
 
 COUNTS = ("head-\nline", "epi-\nsodes", "fail-\nures", "dis-\ntinct", "preven-\ntable")
 RATES = ("ECR\n95 %", "PCR\n95 %")
@@ -103,7 +103,7 @@ def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
     return table
 
 
-def results_tables(results: Results, bounds: Bounds) -> Group:
+def results_tables(results: Results, bounds: GateBounds) -> Group:
     """Returns the funnel and the requirements of each family and method; broken bounds are red."""
     groups = {f"{group.family} {group.method}": group for group in measured(results)}
     said = {
@@ -117,7 +117,7 @@ def results_tables(results: Results, bounds: Bounds) -> Group:
     return Group(*(table for table in tables if table is not None))
 
 
-def results_table(results: Results, bounds: Bounds) -> Table:
+def results_table(results: Results, bounds: GateBounds) -> Table:
     """Per family and method the funnel, and ECR and PCR over their intervals; 80 columns hold it.
 
     The title has the headline failures of the campaign: what several methods found alike counts once there.
@@ -165,7 +165,7 @@ def _driven_by(total: Total, what: DrivenBy) -> str:
     return f"{total.episodes_driven_by.get(what, 0)}{headline}"
 
 
-def _rate(rate: float | None, low: float | None, high: float | None, broken: Comparison | None) -> str:
+def _rate(rate: float | None, low: float | None, high: float | None, broken: BoundCheck | None) -> str:
     interval = f"{or_dash(low, '.2f')}-{or_dash(high, '.2f')}"
     said = "" if broken is None else "\nabove" if broken.verdict == "above" else f"\nup to {broken.upper:.2f}"
     return f"{or_dash(rate, '.2f')}\n{interval}{said}"

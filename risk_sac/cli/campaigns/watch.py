@@ -9,8 +9,11 @@ from pathlib import Path
 
 from rich.progress import BarColumn, Progress
 
-from risk_sac.adjustments import adjustments
-from risk_sac.cli.campaign_flags import (
+from risk_sac.cli.campaigns.gate import JUDGED_BY, GateBounds, named_rate, verdict
+from risk_sac.cli.campaigns.junit import junit
+from risk_sac.cli.campaigns.output import add_newest_command, chosen_id, figures, line, results_tables
+from risk_sac.cli.console import OK, Board, columns, number, print_answer, say_adjustments
+from risk_sac.cli.flags import (
     add_campaign_flags,
     add_ego_flag,
     add_place_flags,
@@ -18,17 +21,14 @@ from risk_sac.cli.campaign_flags import (
     campaign_flags,
     ego_flag,
 )
-from risk_sac.cli.campaigns.gate import JUDGED_BY, Bounds, named_rate, verdict
-from risk_sac.cli.campaigns.junit import junit
-from risk_sac.cli.campaigns.output import add_newest_command, chosen_id, figures, line, results_tables
-from risk_sac.cli.console import OK, Board, columns, number, print_answer, say_adjustments
 from risk_sac.cli.parser import Commands, Parser, add_command
 from risk_sac.client import Campaign, Client, Episode, Results
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import read_posted
+from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
+from risk_sac.host.terminal import complain, notes
 from risk_sac.records import Grade
-from risk_sac.terminal import complain, notes
 
 SEEDS = 1  # where none are named
 RATE = number(float, 0, 1)
@@ -74,15 +74,15 @@ def _add_watch_flags(parser: Parser) -> None:
     parser.group("service").add_argument("--timeout", type=number(float, 0.001), metavar="S", help=timeout)
 
 
-def _prepare(options: argparse.Namespace) -> Bounds:
+def _prepare(options: argparse.Namespace) -> GateBounds:
     """Checks the bounds and makes the report's folder, so that nothing is waited for in vain."""
-    bounds = Bounds.of(options)
+    bounds = GateBounds.of(options)
     if options.junit is not None:
         options.junit.parent.mkdir(parents=True, exist_ok=True)
     return bounds
 
 
-def _check_names(bounds: Bounds, spec: CampaignSpec) -> None:
+def _check_names(bounds: GateBounds, spec: CampaignSpec) -> None:
     """Refuses a bound of a requirement that no campaign ships and this one does not add."""
     if bounds.requirements:
         from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS  # here, because loading it takes a while
@@ -116,7 +116,7 @@ def _results(options: argparse.Namespace) -> int:
 
 
 def _conclude(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
-    results, bounds = client.results(campaign_id), Bounds.of(options)
+    results, bounds = client.results(campaign_id), GateBounds.of(options)
     if options.junit is not None:
         _report(client, results, bounds, options.junit)
     print_answer(options, results, results_tables(results, bounds))
@@ -132,7 +132,7 @@ def _conclude(client: Client, campaign_id: str, options: argparse.Namespace) -> 
     return status
 
 
-def _report(client: Client, results: Results, bounds: Bounds, file: Path) -> None:
+def _report(client: Client, results: Results, bounds: GateBounds, file: Path) -> None:
     failures = {
         run.id: _first_failures(client, results.campaign_id, run.id)
         for run in results.runs

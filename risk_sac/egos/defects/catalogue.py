@@ -7,12 +7,16 @@ causing collisions", for settings of its own driver. Choice: the values.
 
 import hashlib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
+from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from risk_sac.config import EgoConfig, Settings
+from risk_sac.egos.seam import Command, Ego, EpisodeStart, Perceived, Trajectory
 from risk_sac.errors import ConfigError
 
 HERE = Path(__file__).parent
@@ -20,7 +24,7 @@ HASH_DIGITS = 12
 DefectKind = Literal["perception", "memory", "prediction", "planning", "control", "sumo"]
 
 
-class Parameter(Settings):
+class DefectStrength(Settings):
     """The number that says how strong a defect is."""
 
     name: str
@@ -37,7 +41,7 @@ class Defect(Settings):
     """sumo: a setting of SUMO's own driver; the others are planted into registered Python egos."""
     sentence: str
     """What the ego does wrong."""
-    parameter: Parameter
+    parameter: DefectStrength
     families: tuple[str, ...]
     """In which it matters."""
     test_set: bool = False
@@ -45,7 +49,7 @@ class Defect(Settings):
     decorator: str = ""
     """Class in the module of its kind."""
     settings: Mapping[str, float] = {}
-    """Of SUMO's driver, see `risk_sac.sim.placing`."""
+    """Of SUMO's driver, see `risk_sac.sim.roads`."""
 
     @property
     def base(self) -> str:
@@ -102,3 +106,47 @@ def settings_of(ego: EgoConfig) -> dict[str, float]:
 def version_of(ego: EgoConfig) -> str:
     """Returns a hash of an ego's defects, their parameters and their code."""
     return hashlib.sha256(b"\0".join(defect.fingerprint for defect in planted(ego))).hexdigest()[:HASH_DIGITS]
+
+
+class Planted:
+    """Ego with defects, and the same ego without them until their commands differ.
+
+    Attributes:
+      reached_s: when a defect first changed a command, from the first frame on; None before.
+    """
+
+    reached_s: float | None
+    _began_s: float | None
+
+    def __init__(self, make: Callable[[], Ego], defects: Sequence[Defect]) -> None:
+        """Makes both egos; the first defect is the nearest to the ego."""
+        self._sound, self._ego = make(), make()
+        for defect in defects:
+            decorator = getattr(import_module(f"risk_sac.egos.defects.{defect.kind}"), defect.decorator)
+            self._ego = decorator(self._ego, defect.parameter.value)
+
+    def reset(self, episode: EpisodeStart) -> None:
+        """Begins an episode."""
+        self.reached_s = self._began_s = None
+        self._sound.reset(episode)
+        self._ego.reset(episode)
+
+    def act(self, perceived: Perceived) -> Command:
+        """Returns the command of the ego with the defects; the other one is asked until their commands differ."""
+        command = self._ego.act(perceived)
+        if self._began_s is None:
+            self._began_s = perceived.time_s
+        if self.reached_s is None and not _same(command, self._sound.act(perceived)):
+            self.reached_s = round(perceived.time_s - self._began_s, 6)
+        return command
+
+    def close(self) -> None:
+        """Closes both egos."""
+        self._sound.close()
+        self._ego.close()
+
+
+def _same(command: Command, other: Command) -> bool:
+    if isinstance(command, Trajectory) or isinstance(other, Trajectory):
+        return type(command) is type(other) and all(map(np.array_equal, command, other))
+    return tuple(command) == tuple(other)

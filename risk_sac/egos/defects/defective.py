@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from risk_sac.egos.bicycle import track
-from risk_sac.egos.seam import Command, Control, Ego, Episode, Perceived, Vehicle
+from risk_sac.egos.pilot import track
+from risk_sac.egos.seam import Command, Control, Ego, EpisodeStart, Perceived, Vehicle
 from risk_sac.sim.pilot import Motion
-from risk_sac.types import HEADING, SPEED, VX, VY, Bools, Floats, Kind, X, Y
+from risk_sac.world.types import HEADING, SPEED, VX, VY, Bools, Floats, Kind, X, Y
 
 VEHICLE, PEDESTRIAN = int(Kind.VEHICLE), int(Kind.PEDESTRIAN)
 
@@ -13,7 +13,7 @@ VEHICLE, PEDESTRIAN = int(Kind.VEHICLE), int(Kind.PEDESTRIAN)
 class Defective:
     """Ego with a defect. Subclasses override `sees` or `does`."""
 
-    episode: Episode
+    episode: EpisodeStart
     vehicle: Vehicle
     step_s: float
 
@@ -21,7 +21,7 @@ class Defective:
         """Wraps an ego; the value is the parameter of the defect."""
         self._ego, self.value = ego, value
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         """Begins an episode."""
         self.episode, self.vehicle, self.step_s = episode, episode.vehicle, episode.step_s
         self.begin()

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from risk_sac.egos.defects.defective import PEDESTRIAN, VEHICLE, Defective, moving, only
 from risk_sac.egos.seam import Perceived
-from risk_sac.geometry import Sight, frame_view, in_sight
-from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, X, Y
+from risk_sac.world.geometry import Sight, frame_view, in_sight
+from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, X, Y
 
 STANDING_MPS = 0.3
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from risk_sac.egos.defects.defective import PEDESTRIAN, VEHICLE, Defective, in_front, moving, only
 from risk_sac.egos.seam import Perceived
-from risk_sac.types import HEADING, LENGTH, VX, VY, X, Y
+from risk_sac.world.types import HEADING, LENGTH, VX, VY, X, Y
 
 BLIND_FROM_RAD = math.radians(20.0)  # where a blind sector begins, beside straight ahead
 

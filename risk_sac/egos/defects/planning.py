@@ -6,7 +6,7 @@ from risk_sac.egos.defects.defective import VEHICLE, Defective, in_front, only, 
 from risk_sac.egos.defects.prediction import SAME_WAY, offsets
 from risk_sac.egos.driving import Driver, idm, stop_at_signal, time_to_collision
 from risk_sac.egos.seam import Command, Control, Perceived
-from risk_sac.types import SPEED, WIDTH
+from risk_sac.world.types import SPEED, WIDTH
 
 EMERGENCY_MPS2, GENTLE_MPS2 = 3.5, 1.0
 ASIDE_M = 0.4  # room beside its body

@@ -8,7 +8,7 @@ import numpy as np
 from risk_sac.egos.defects.defective import PEDESTRIAN, VEHICLE, Defective, in_front, moving, turned
 from risk_sac.egos.seam import Perceived
 from risk_sac.sim.lookout import project
-from risk_sac.types import HEADING, VX, VY, Floats, X, Y
+from risk_sac.world.types import HEADING, VX, VY, Floats, X, Y
 
 SAME_WAY, CROSSING = 0.7, 0.7  # cosines of headings: above the one the same way, within the other across
 

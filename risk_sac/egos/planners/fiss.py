@@ -12,12 +12,12 @@ from typing import Any, ClassVar
 import fiss_planner as fp
 import numpy as np
 
-from risk_sac.egos.bicycle import track
+from risk_sac.egos.driving import lane_edges
+from risk_sac.egos.pilot import track
 from risk_sac.egos.planners.route import SignalStops, in_pieces, lanes_ahead, stops
-from risk_sac.egos.road import lane_edges
-from risk_sac.egos.seam import Control, Episode, Perceived, Trajectory, Vehicle
+from risk_sac.egos.seam import Control, EpisodeStart, Perceived, Trajectory, Vehicle
 from risk_sac.sim.pilot import Motion
-from risk_sac.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Road, X, Y
+from risk_sac.world.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Road, X, Y
 
 SPACING_M = 2.0  # of points along lanes
 PIECE_M = 50.0  # of a lane; the planner's step takes as long as the lanes near it are
@@ -38,7 +38,7 @@ class FrenetPlanner:
     kind: ClassVar[str]
     _told: Road | None = None
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         """Begins an episode; a ValueError if it has no road, as from a client that knows none."""
         if not episode.road.lanes:
             raise ValueError("the episode has no road, without which this planner cannot plan")

@@ -8,7 +8,7 @@ import numpy as np
 
 from risk_sac.egos.driving import LAST_STOP_MPS2
 from risk_sac.egos.seam import Perceived, Vehicle
-from risk_sac.types import HEADING, LENGTH, SPEED, WIDTH, Bools, Floats, Kind, Lane, Road, Signal, X, Y
+from risk_sac.world.types import HEADING, LENGTH, SPEED, WIDTH, Bools, Floats, Kind, Lane, Road, Signal, X, Y
 
 BEGINS_MPS2 = 2.5  # braking at which a planner without stop lines of its own begins to stop at one
 BEFORE_LINE_M = 1.0  # where it stops

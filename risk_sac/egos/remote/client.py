@@ -12,10 +12,10 @@ from google.protobuf.message import DecodeError
 from risk_sac.egos.guard import CRASH, DEADLINE, MALFORMED
 from risk_sac.egos.remote import ego_pb2
 from risk_sac.egos.remote.messages import METHODS, PROTOCOL, SERVICE, command_of, observation, start_request
-from risk_sac.egos.seam import Command, Episode, Perceived
+from risk_sac.egos.seam import Command, EpisodeStart, Perceived
 from risk_sac.errors import EgoFailed
-from risk_sac.loopback import is_loopback
-from risk_sac.types import Floats
+from risk_sac.host.machine import is_loopback
+from risk_sac.world.types import Floats
 
 VERSION = "ego_version"
 LONGEST = 1 << 20  # bytes of an answer
@@ -44,7 +44,7 @@ class RemoteEgo:
         self._stream: _Stream | None = None
         self._path: Floats | None = None
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         """Opens a session.
 
         Raises:

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from risk_sac.egos.remote import ego_pb2
-from risk_sac.egos.seam import Command, Control, Episode, Perceived, Trajectory, Vehicle
-from risk_sac.types import (
+from risk_sac.egos.seam import Command, Control, EpisodeStart, Perceived, Trajectory, Vehicle
+from risk_sac.world.types import (
     ACCEL,
     HEADING,
     LENGTH,
@@ -37,7 +37,7 @@ PATH = tuple(field.name for field in ego_pb2.Path.DESCRIPTOR.fields)  # in the o
 VEHICLE = tuple(field.name for field in ego_pb2.Vehicle.DESCRIPTOR.fields)
 
 
-def start_request(episode: Episode, session: str) -> Any:
+def start_request(episode: EpisodeStart, session: str) -> Any:
     """Returns the StartRequest of an episode."""
     return ego_pb2.StartRequest(
         protocol=PROTOCOL,
@@ -54,9 +54,9 @@ def start_request(episode: Episode, session: str) -> Any:
     )
 
 
-def episode_of(request: Any) -> Episode:
+def episode_of(request: Any) -> EpisodeStart:
     """Returns the episode of a StartRequest."""
-    return Episode(
+    return EpisodeStart(
         seed=request.seed,
         net=request.net,
         route=tuple(request.route),
@@ -124,7 +124,7 @@ def perceived_of(message: Any, path: Floats) -> Perceived:
 
 
 def path_of(message: Any) -> Floats:
-    """Returns the rows of `risk_sac.egos.road`, and below them cosine and sine of the heading."""
+    """Returns the rows of `risk_sac.egos.driving`, and below them cosine and sine of the heading."""
     heading = np.array(message.heading_rad)
     return np.array([*(getattr(message, name) for name in PATH), np.cos(heading), np.sin(heading)])
 

@@ -21,12 +21,12 @@ import ray
 from ray.exceptions import RayError, RayTaskError
 
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import Cause, Cluster, Exited
-from risk_sac.execution.postmortem import without_folders
+from risk_sac.execution.executor import Cause, ClusterState, Exited
+from risk_sac.execution.messages import without_folders
 from risk_sac.execution.ray.cluster import connect, nodes
 from risk_sac.execution.ray.node import Attendant, Files, Order, read, versions, write
 from risk_sac.execution.ray.settings import RaySettings, read_settings
-from risk_sac.logs import log_to_stderr
+from risk_sac.host.terminal import log_to_stderr
 
 logger = logging.getLogger("risk_sac.execution.ray.bridge")
 
@@ -154,7 +154,7 @@ class Bridge:
             for node in found:
                 silences = [each.silent_s for each in self._attempts.values() if each.node == node.id]
                 listed.append(replace(node, runs=len(silences), silent_s=min(silences, default=0.0)))
-            self.say("cluster", Cluster(tuple(listed)))
+            self.say("cluster", ClusterState(tuple(listed)))
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._over.wait(), NODES_S)
 

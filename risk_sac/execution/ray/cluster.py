@@ -15,7 +15,7 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from risk_sac import __version__
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import Node
+from risk_sac.execution.executor import ClusterNode
 from risk_sac.execution.ray.node import check, versions
 from risk_sac.execution.ray.settings import ADDRESS, RaySettings, variable
 
@@ -50,7 +50,7 @@ def connect(settings: RaySettings) -> None:
     _check_nodes(settings)
 
 
-def nodes(settings: RaySettings) -> list[Node]:
+def nodes(settings: RaySettings) -> list[ClusterNode]:
     """The machines of the cluster, with their room for runs."""
     listed = []
     for each in ray.nodes():
@@ -58,7 +58,9 @@ def nodes(settings: RaySettings) -> list[Node]:
         slots = int(resources.get("CPU", 0) / settings.ray_cpus_per_run + 1e-9)
         if settings.ray_memory_bytes_per_run:
             slots = min(slots, int(resources.get("memory", 0) / settings.ray_memory_bytes_per_run))
-        listed.append(Node(id=each["NodeID"], address=each["NodeManagerAddress"], alive=each["Alive"], slots=slots))
+        listed.append(
+            ClusterNode(id=each["NodeID"], address=each["NodeManagerAddress"], alive=each["Alive"], slots=slots)
+        )
     return listed
 
 

@@ -21,13 +21,13 @@ from typing import Any
 from risk_sac.config import SHIPPED, RunSpec
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import Cause, Cluster, Exited, Messages, Program, taken
+from risk_sac.execution.executor import Cause, ClusterState, Exited, Messages, WorkerProgram, taken
 from risk_sac.execution.messages import Event
 from risk_sac.execution.ray.node import Order
 from risk_sac.execution.ray.settings import ADDRESS, read_settings
-from risk_sac.prior.earlier import SHIPPED_OR_NONE, file_of
-from risk_sac.run_folder.scratch import scratch_name
+from risk_sac.run_folder.durable import scratch_name
 from risk_sac.scenario import library
+from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, file_of
 
 logger = logging.getLogger(__name__)
 
@@ -45,7 +45,7 @@ class RayExecutor:
       cluster: as it was a few seconds ago; without nodes while it is lost.
     """
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: WorkerProgram) -> None:
         """Reaches the cluster.
 
         Raises:
@@ -56,7 +56,7 @@ class RayExecutor:
             raise ConfigError(
                 "RISK_SAC_EXECUTOR", "'ray', which is not installed", "`local`, or `pip install risk-sac[ray]`"
             )
-        self.cluster = Cluster()
+        self.cluster = ClusterState()
         self._program = program
         self._scratch = read_settings().ray_scratch_dir
         self._messages: Messages = queue.SimpleQueue()
@@ -124,7 +124,7 @@ class RayExecutor:
             for kind, *content in self._bridge.messages():
                 self._hear(kind, *content)
             with self._lock:
-                self.cluster = Cluster()
+                self.cluster = ClusterState()
                 self._lose(*self._orders.values())
             while True:
                 logger.error("the cluster is lost; runs go on from their checkpoints once there is one again")

@@ -20,13 +20,11 @@ from pathlib import Path
 from risk_sac.config import RunSpec
 from risk_sac.egos.registry import installed
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import Exited, Program
+from risk_sac.execution.executor import Exited, WorkerProgram
 from risk_sac.execution.local import LocalExecutor
-from risk_sac.execution.messages import Event
-from risk_sac.execution.postmortem import without_folders
+from risk_sac.execution.messages import Event, without_folders
 from risk_sac.execution.ray.settings import ADDRESS, variable
-from risk_sac.run_folder.durable import replace_file
-from risk_sac.run_folder.scratch import claim
+from risk_sac.run_folder.durable import claim, replace_file
 
 GATHER_S = 0.25  # words within it are handed on at once
 GROWN_S = 2.0  # between two copies of files that only grow
@@ -45,7 +43,7 @@ class Order:
 
     number: int
     spec: RunSpec
-    program: Program
+    program: WorkerProgram
     folder: Path  # of the run, on the server's machine
     scratch: Path  # of this attempt and no other, on its node
     beside: Mapping[str, Path]  # what the worker reads beside the run's folder, by its path in `scratch`

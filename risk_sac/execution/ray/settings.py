@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import Field, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from risk_sac.config.invalid import field_error
+from risk_sac.config.base import field_error
 from risk_sac.errors import ConfigError
 
 

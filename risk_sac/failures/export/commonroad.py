@@ -12,11 +12,10 @@ from operator import itemgetter
 
 import numpy as np
 
-from risk_sac.failures.export.formats import Files
-from risk_sac.failures.export.recorded import Actor, Recorded, cycle, goal
-from risk_sac.failures.export.written import BESIDE, add, beside, document
+from risk_sac.failures.export.formats import BESIDE, Files, add, beside, document
+from risk_sac.failures.export.recorded import ExportedActor, Recorded, cycle, goal
 from risk_sac.failures.net import Head, Lane, boundaries, colour
-from risk_sac.types import STEP_S, Floats
+from risk_sac.world.types import STEP_S, Floats
 
 FREE, AS_RECORDED = "failure.xml", "failure-as-recorded.xml"
 LACKS = (
@@ -144,7 +143,7 @@ def _add_light(root: ET.Element, failure: Recorded, lane: Lane, head: Head, numb
     add(light, "active", "true")
 
 
-def _add_obstacle(root: ET.Element, actor: Actor, number: int) -> None:
+def _add_obstacle(root: ET.Element, actor: ExportedActor, number: int) -> None:
     obstacle = add(root, "dynamicObstacle", id=number)
     add(obstacle, "type", actor.type)
     box = add(add(obstacle, "shape"), "rectangle")
@@ -156,7 +155,7 @@ def _add_obstacle(root: ET.Element, actor: Actor, number: int) -> None:
         _add_state(add(trajectory, "state"), actor, frame)
 
 
-def _add_state(state: ET.Element, actor: Actor, frame: int) -> None:
+def _add_state(state: ET.Element, actor: ExportedActor, frame: int) -> None:
     values = {
         "orientation": np.remainder(actor.heading_rad[frame] + np.pi, 2 * np.pi) - np.pi,  # within ±π
         "velocity": actor.speed_mps[frame],

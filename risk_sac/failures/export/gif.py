@@ -28,7 +28,7 @@ from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.net import Surface, surfaces
 from risk_sac.failures.sentence import story
 from risk_sac.records import Collision
-from risk_sac.types import STEP_S, Floats
+from risk_sac.world.types import STEP_S, Floats
 
 LAST_S, AFTER_S, HOLD_MS = 7.0, 2.0, 2000  # before the violation and after it, and how long it stays
 EASE = 0.06  # how fast the view follows the ego, so that it does not tremble

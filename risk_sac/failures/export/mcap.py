@@ -13,13 +13,12 @@ from foxglove import Channel, Context, Schema
 from foxglove import messages as fox
 from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateChannel
 
-from risk_sac.failures.export.formats import Files
-from risk_sac.failures.export.recorded import Actor, Recorded
-from risk_sac.failures.export.written import BESIDE, beside
+from risk_sac.failures.export.formats import BESIDE, Files, beside
+from risk_sac.failures.export.recorded import ExportedActor, Recorded
 from risk_sac.failures.net import Lane, boundaries, colour
 from risk_sac.failures.sentence import story
 from risk_sac.records import Collision
-from risk_sac.types import Floats
+from risk_sac.world.types import Floats
 
 MAP, EGO = "map", "ego"  # frames of reference
 BLUE, ORANGE, GREY, WHITE = (0.0, 0.447, 0.698), (0.835, 0.369, 0.0), (0.5, 0.5, 0.5), (0.9, 0.9, 0.9)
@@ -104,7 +103,7 @@ def _actors(failure: Recorded, frame: int) -> fox.SceneUpdate:
     return fox.SceneUpdate(entities=[_body(failure, actor, frame) for actor in here], deletions=deletions)
 
 
-def _body(failure: Recorded, actor: Actor, frame: int) -> fox.SceneEntity:
+def _body(failure: Recorded, actor: ExportedActor, frame: int) -> fox.SceneEntity:
     column = failure.actors.index(actor)
     seen = column == 0 or bool(failure.series["visible"][frame, column])
     tone = BLUE if column == 0 else ORANGE if column == failure.striker else GREY

@@ -10,12 +10,11 @@ from datetime import datetime
 import numpy as np
 from scenariogeneration import xosc
 
-from risk_sac.failures.export.formats import Files
+from risk_sac.failures.export.formats import BESIDE, Files, beside, document
 from risk_sac.failures.export.opendrive import opendrive
-from risk_sac.failures.export.recorded import Actor, Recorded, cycle, goal
-from risk_sac.failures.export.written import BESIDE, beside, document
+from risk_sac.failures.export.recorded import ExportedActor, Recorded, cycle, goal
 from risk_sac.failures.net import colour
-from risk_sac.types import STEP_S
+from risk_sac.world.types import STEP_S
 
 VERSION = 2  # of OpenSCENARIO 1
 FREE, AS_RECORDED, ROADS = "failure.xosc", "failure-as-recorded.xosc", "roads.xodr"
@@ -90,7 +89,7 @@ def _roads(failure: Recorded, roads: bytes) -> xosc.RoadNetwork:
     return network
 
 
-def _body(actor: Actor) -> xosc.Vehicle | xosc.Pedestrian:
+def _body(actor: ExportedActor) -> xosc.Vehicle | xosc.Pedestrian:
     height = HEIGHTS_M[actor.type]
     if actor.pedestrian:
         box = xosc.BoundingBox(actor.width_m, actor.length_m, height, 0, 0, height / 2)
@@ -110,7 +109,7 @@ def _body(actor: Actor) -> xosc.Vehicle | xosc.Pedestrian:
     )
 
 
-def _place(actor: Actor, frame: int) -> xosc.WorldPosition:
+def _place(actor: ExportedActor, frame: int) -> xosc.WorldPosition:
     """Returns the place of the rear axle's middle; of a pedestrian, its own."""
     heading = float(actor.heading_rad[frame])
     back_m = 0.0 if actor.pedestrian else REAR_AXLE * actor.length_m
@@ -118,12 +117,12 @@ def _place(actor: Actor, frame: int) -> xosc.WorldPosition:
     return xosc.WorldPosition(float(x), float(y), float(actor.z_m[frame]), heading, 0, 0)
 
 
-def _speed(actor: Actor) -> xosc.AbsoluteSpeedAction:
+def _speed(actor: ExportedActor) -> xosc.AbsoluteSpeedAction:
     at_once = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0)
     return xosc.AbsoluteSpeedAction(float(actor.speed_mps[0]), at_once)
 
 
-def _group(actor: Actor, *, leaves: bool) -> xosc.ManeuverGroup:
+def _group(actor: ExportedActor, *, leaves: bool) -> xosc.ManeuverGroup:
     """An actor that follows its trajectory, and is taken away where it left the net."""
     trajectory = xosc.Trajectory(f"{actor.id} recorded", closed=False)
     times = [float(t) for t in actor.time_s]

@@ -19,8 +19,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures.export.formats import Files
 from risk_sac.metrics import results_digest
 from risk_sac.records import Collision, EpisodeRecord, Outcome
-from risk_sac.run_folder.results import EPISODES, Results, read_results, records_from_lines
-from risk_sac.run_folder.verified import read_verified
+from risk_sac.run_folder.results import EPISODES, RunResults, read_results, read_verified, records_from_lines
 
 NAME = "episodes.parquet"
 OF_THE_RUN = [pa.field(name, pa.string(), nullable=False) for name in ("id", "run_id", "family", "method", "ego")]
@@ -40,7 +39,7 @@ def files(runs: Sequence[Path]) -> Files:
 
     Two runs that differ in their specs and share an id get the digest of their specs behind it.
     """
-    results: dict[str, tuple[Path, Results]] = {}
+    results: dict[str, tuple[Path, RunResults]] = {}
     for folder in runs:
         found = read_results(folder)
         if found.finished or found.spec.digest not in results:  # the same spec gives the same rows
@@ -62,7 +61,7 @@ def files(runs: Sequence[Path]) -> Files:
     return {NAME: content.getvalue()}
 
 
-def _rows(folder: Path, results: Results, id_: str) -> list[dict[str, Any]]:
+def _rows(folder: Path, results: RunResults, id_: str) -> list[dict[str, Any]]:
     """Returns the rows of one run; failures that did not repeat are refused."""
     file = folder / EPISODES
     try:

@@ -12,14 +12,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.failures.bundle import WORLD, Bundle, Manifest, check_world
 from risk_sac.failures.net import Lane, Net, read_net
 from risk_sac.failures.recording import Series
-from risk_sac.problem import Problem
 from risk_sac.records import Collision, Violation
 from risk_sac.scenario.layout import Layout
-from risk_sac.types import STEP_S, Floats, Kind, Role
+from risk_sac.world.types import STEP_S, Floats, Kind, Role
 
 PER_FRAME = ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")
 PER_ACTOR = ("kind", "role", "length_m", "width_m")
@@ -28,7 +28,7 @@ BEYOND_M = 60.0  # into the last road, where a free ego has been through what th
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Actor:
+class ExportedActor:
     """A road user; its arrays have a row for each frame until it left the net."""
 
     id: str
@@ -62,7 +62,7 @@ class Recorded:
     layout: Layout
     net_file: Path
     net: Net
-    actors: tuple[Actor, ...]  # the ego first
+    actors: tuple[ExportedActor, ...]  # the ego first
 
     @classmethod
     def of(cls, bundle: Bundle) -> "Recorded":
@@ -101,7 +101,7 @@ class Recorded:
         return self.manifest.name
 
     @property
-    def ego(self) -> Actor:
+    def ego(self) -> ExportedActor:
         """The vehicle under test."""
         return self.actors[0]
 
@@ -162,11 +162,11 @@ class Recorded:
         return begins_s + float(self.series["time_s"][0]) + frame * STEP_S
 
 
-def _actor(series: Series, column: int, net: Net) -> Actor:
+def _actor(series: Series, column: int, net: Net) -> ExportedActor:
     last = int(np.flatnonzero(np.isfinite(series["x_m"][:, column]))[-1]) + 1
     per_frame = {name: np.asarray(series[name][:last, column], dtype=np.float64) for name in PER_FRAME}
     per_frame["heading_rad"] = np.unwrap(per_frame["heading_rad"])
-    return Actor(
+    return ExportedActor(
         id=str(series["ids"][column]),
         pedestrian=bool(series["kind"][column] == Kind.PEDESTRIAN),
         role=Role(int(series["role"][column])),

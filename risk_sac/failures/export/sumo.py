@@ -15,13 +15,12 @@ from typing import Any
 import libsumo
 import numpy as np
 
-from risk_sac.env import RiskSacEnv
+from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import SimulationError
-from risk_sac.failures.export.formats import Files
-from risk_sac.failures.export.recorded import Actor, Recorded
-from risk_sac.failures.export.written import BESIDE, beside, document
+from risk_sac.failures.export.formats import BESIDE, Files, beside, document
+from risk_sac.failures.export.recorded import ExportedActor, Recorded
 from risk_sac.failures.play import repeated
-from risk_sac.types import STEP_S
+from risk_sac.world.types import STEP_S
 
 DOMAINS = ("route", "trafficlight", "vehicle", "vehicletype")  # that `risk_sac.sim` commands
 QUESTIONS = ("get", "is", "subscribe")  # beginnings of functions that change nothing
@@ -164,7 +163,7 @@ def _fcd(failure: Recorded, log: SumoLog) -> bytes:
     return document(root)
 
 
-def _person(step: ET.Element, walker: Actor, frame: int) -> None:
+def _person(step: ET.Element, walker: ExportedActor, frame: int) -> None:
     state = {
         "x": walker.x_m[frame],
         "y": walker.y_m[frame],

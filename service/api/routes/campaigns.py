@@ -9,15 +9,14 @@ from fastapi.responses import PlainTextResponse
 from starlette.concurrency import run_in_threadpool
 
 from risk_sac import __version__
-from risk_sac.adjustments import adjustments
-from risk_sac.benchmark.power import power_of
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
-from risk_sac.prior.earlier import PriorContent
+from risk_sac.env.problem import adjustments
 from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Power, Record, Results, State, wire
+from risk_sac.report.power import power_of
+from risk_sac.search.prior.earlier import PriorContent
 from service.api.answer_cache import kept
-from service.api.answers.pages import TIERS, Cursor, Limit, Tier
-from service.api.answers.representations import cacheable, entity_tag, link
-from service.api.answers.responses import (
+from service.api.context import Caller, Context, CurrentCaller, Service
+from service.api.pages import (
     ACCEPTED,
     CROWDED,
     INVALID,
@@ -28,20 +27,21 @@ from service.api.answers.responses import (
     REUSED,
     STORAGE,
     TAGGED,
+    TIERS,
     UNKNOWN,
+    Cursor,
+    Limit,
+    Tier,
 )
-from service.api.context import Caller, Context, CurrentCaller, Service
 from service.api.posted import ON_MAP, PostedCampaign, documented
+from service.api.representations import cacheable, entity_tag, link
 from service.errors import NotFoundError
 from service.runs.manager import LOG
 from service.store.stored import StoredCampaign
-from service.views.curves import Curves
+from service.views.curves import Curves, played, results
 from service.views.failure_table import FailureTable
-from service.views.logs import log_tail
-from service.views.progress import campaign_body, summary_body
+from service.views.progress import campaign_body, log_tail, retry_after_s, summary_body
 from service.views.scenes import SceneEffects
-from service.views.time_left import retry_after_s
-from service.views.totals import played, results
 from service.views.whole import View, ViewName
 
 LISTED = "campaigns"

@@ -55,7 +55,7 @@ class SceneParameter(Record):
     """The field of the ODD that narrows it, such as `dynamic.ego_speed_mps`."""
 
 
-class Family(Record):
+class FamilyEntry(Record):
     """A scenario family: what is searched, and where."""
 
     name: FamilyName
@@ -73,7 +73,7 @@ class Family(Record):
     requirements come on top."""
 
 
-class Signal(Record):
+class SignalEntry(Record):
     """Signal that formulas may use, with a value in every step."""
 
     name: str
@@ -107,8 +107,8 @@ class ExportFormats(Record):
 class Families(Record):
     """All scenario families, and what requirements may speak of in each."""
 
-    items: list[Family]
-    signals: list[Signal]
+    items: list[FamilyEntry]
+    signals: list[SignalEntry]
 
 
 class NamedMethod(Method):
@@ -122,7 +122,7 @@ class NamedMethod(Method):
     learner, after its warm start. Null where it was not measured."""
 
 
-class Ego(Record):
+class EgoDrivers(Record):
     """Drivers of the ego."""
 
     name: str
@@ -138,7 +138,7 @@ class Ego(Record):
     summary: str
 
 
-class Defect(Record):
+class DefectEntry(Record):
     """A known fault that `ego.defects` of a campaign plants into its ego."""
 
     name: str
@@ -153,8 +153,8 @@ class Defect(Record):
 class Egos(Record):
     """All egos; the operator registers them."""
 
-    items: list[Ego]
-    defects: list[Defect]
+    items: list[EgoDrivers]
+    defects: list[DefectEntry]
 
 
 class Methods(Record):
@@ -178,7 +178,7 @@ router = APIRouter(prefix="/v1", tags=["catalogue"])
 def list_families() -> Families:
     """Scenario families with scene space, default ODD and requirements, and the signals that formulas speak of."""
     items = [
-        Family(
+        FamilyEntry(
             name=family.name,
             summary=family.summary,
             horizon_steps=family.horizon_steps,
@@ -190,7 +190,7 @@ def list_families() -> Families:
         )
         for family in FAMILIES.values()
     ]
-    return Families(items=items, signals=[_told(Signal, signal, name=name) for name, signal in SIGNALS.items()])
+    return Families(items=items, signals=[_told(SignalEntry, signal, name=name) for name, signal in SIGNALS.items()])
 
 
 @router.get("/formats")
@@ -203,7 +203,7 @@ def list_formats() -> ExportFormats:
 def list_egos() -> Egos:
     """Drivers of the ego: SUMO's models by profile, and egos that the operator has registered; and known faults."""
     models = [
-        Ego(
+        EgoDrivers(
             name=name,
             kind="sumo",
             version=None,
@@ -213,8 +213,8 @@ def list_egos() -> Egos:
         )
         for name, summary in PROFILES.items()
     ]
-    defects = [_told(Defect, defect) for defect in DEFECTS.values()]
-    return Egos(items=[*models, *(_told(Ego, card) for card in cards())], defects=defects)
+    defects = [_told(DefectEntry, defect) for defect in DEFECTS.values()]
+    return Egos(items=[*models, *(_told(EgoDrivers, card) for card in cards())], defects=defects)
 
 
 @router.get("/methods")

@@ -25,7 +25,7 @@ from starlette.types import Scope
 import service
 from risk_sac import __version__
 from risk_sac.records import Record
-from service.api.answers.representations import LEAST_BYTES, accepted, cacheable, link
+from service.api.representations import LEAST_BYTES, accepted, cacheable, link
 
 
 class Entrance(Record):

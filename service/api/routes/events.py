@@ -7,9 +7,9 @@ from fastapi import APIRouter, Header, Query, Response
 from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
-from service.api.answers.problems import invalid_field
-from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, Responses
 from service.api.context import CurrentCaller, Service
+from service.api.pages import INVALID, STORAGE, UNKNOWN, Responses
+from service.api.problems import invalid_field
 from service.api.stream import decode_position
 from service.store.reading import Store
 

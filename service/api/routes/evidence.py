@@ -9,8 +9,8 @@ from risk_sac.failures.cases import Regression
 from risk_sac.records import State
 from risk_sac.report.evidence import Evidence
 from risk_sac.report.rendering import POLICY
-from service.api.answers.responses import CROWDED, INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses, problem
 from service.api.context import AskedCampaign, Context, Service
+from service.api.pages import CROWDED, INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses, problem
 from service.api.routes.reports import BY_ACCEPT, FOR_BROWSERS, UNCHANGED, chosen, reported, text
 from service.errors import ConflictError, NotFoundError
 from service.runs.regressions import StoredRegression, campaign_of

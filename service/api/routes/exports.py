@@ -10,12 +10,12 @@ from starlette.concurrency import run_in_threadpool
 
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.formats import FORMATS, REMEDY, ZIP, FormatName, names
-from service.api.answers.problems import ProblemError, Reason
-from service.api.answers.responses import CROWDED, INVALID, STORAGE, UNKNOWN, problem
 from service.api.context import AskedCampaign, CurrentCaller, Service
-from service.api.routes.pictures import PLAYED, Asked, Headers, made
+from service.api.pages import CROWDED, INVALID, STORAGE, UNKNOWN, problem
+from service.api.problems import ProblemError, Reason
+from service.api.routes.episodes import PLAYED, Asked, Headers, made
 from service.errors import ConflictError
-from service.views.studies import Study, Table
+from service.views.studies import EpisodeTable, Study
 
 LACKING = problem(501, "The service lacks a package that makes this format")
 NOTHING_YET = problem(409, "No run has played an episode yet")
@@ -75,7 +75,7 @@ async def get_episodes_export(
 ) -> Response:
     """All episodes so far as a table in a format of `GET /v1/formats`."""
     folders = [service.settings.run_folder(campaign.id, run.id) for run in campaign.runs]
-    table = await run_in_threadpool(Table.of, folders, format)
+    table = await run_in_threadpool(EpisodeTable.of, folders, format)
     if not table.folders:
         raise ConflictError(f"no run of campaign {campaign.id} has results yet", reason="not_ended")
     content = await service.tables.get(table, caller.key_id)

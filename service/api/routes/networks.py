@@ -7,17 +7,13 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
-from risk_sac.scenario.maps.documents import MAX_ROADS
-from risk_sac.scenario.maps.unpack import MAX_BYTES, MAX_FILES
-from service.api.answers.pages import Cursor, Limit
-from service.api.answers.problems import ProblemError, Reason
-from service.api.answers.representations import link
-from service.api.answers.responses import INVALID, STORAGE, UNKNOWN, WAIT, Responses, header, problem
+from risk_sac.maps.documents import MAX_BYTES, MAX_FILES, MAX_ROADS
 from service.api.context import CurrentCaller, Service
+from service.api.pages import INVALID, STORAGE, UNKNOWN, WAIT, Cursor, Limit, Responses, header, problem
 from service.api.posted import media_type
-from service.networks.limits import WALL_S
-from service.networks.report import MEDIA_TYPES
-from service.networks.schemas import Network, NetworkPage, Places
+from service.api.problems import ProblemError, Reason
+from service.api.representations import link
+from service.networks.schemas import MEDIA_TYPES, WALL_S, Network, NetworkPage, Places
 from service.networks.surveys import RETRY_AFTER_S
 
 LISTED = "networks"

@@ -7,10 +7,10 @@ from fastapi import APIRouter, Depends, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from risk_sac.records import Record
-from service.api.answers.problems import ProblemError, Reason
-from service.api.answers.responses import STOPPED, UNREADY, Responses
 from service.api.context import Service, require_admin
-from service.store.statistics import check_readable
+from service.api.pages import STOPPED, UNREADY, Responses
+from service.api.problems import ProblemError, Reason
+from service.store.counting import check_readable
 
 
 class Health(Record):

@@ -10,11 +10,11 @@ from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
-from service.api.answers.representations import accepted, cacheable, link
-from service.api.answers.responses import CROWDED, INVALID, STORAGE, TAGGED, UNACCEPTABLE, UNKNOWN, Responses
 from service.api.context import AskedCampaign, Context, Service, caller_of
+from service.api.pages import CROWDED, INVALID, STORAGE, TAGGED, UNACCEPTABLE, UNKNOWN, Responses
+from service.api.representations import accepted, cacheable, link
 from service.store.stored import StoredCampaign
-from service.views.report_parts import MEDIA_TYPES, TABLES, Clusters, Figures
+from service.views.reports import MEDIA_TYPES, TABLES, Clusters, Figures
 from service.views.whole import View, ViewName
 
 TableFormat = Literal["json", "md", "csv"]

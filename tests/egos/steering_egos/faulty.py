@@ -1,7 +1,7 @@
 """Egos that break a rule: they enter on red, or leave the road."""
 
-from risk_sac.egos import Control, Episode, Perceived
-from risk_sac.types import HEADING, Signal
+from risk_sac.egos import Control, EpisodeStart, Perceived
+from risk_sac.world.types import HEADING, Signal
 from steering_egos.lqr import Lqr
 
 HARD_MPS2 = 4.0
@@ -27,7 +27,7 @@ class OffRoader(Lqr):
     version = "1.0"
     response_time_s = 0.3
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         super().reset(episode)
         self.leaving = False
 
@@ -46,7 +46,7 @@ class Runaway(Lqr):
     version = "1.0"
     response_time_s = 0.3
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         super().reset(episode)
         self.began_rad: float | None = None
 

@@ -2,7 +2,7 @@
 
 import math
 
-from risk_sac.egos import Episode, Perceived
+from risk_sac.egos import EpisodeStart, Perceived
 from steering_egos.lqr import Lqr
 
 LANE_M = 3.3  # as wide as the lanes of the shipped nets
@@ -18,7 +18,7 @@ class LaneChanger(Lqr):
 
     returns_s = math.inf
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         super().reset(episode)
         self.steps, self.aside_now_m = 0, 0.0
 

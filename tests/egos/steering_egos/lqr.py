@@ -6,11 +6,10 @@ from functools import lru_cache
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from risk_sac.egos import Control, Episode, Perceived
-from risk_sac.egos.driving import Driver, needed_braking
-from risk_sac.egos.road import PATH_HEADING, STATION
+from risk_sac.egos import Control, EpisodeStart, Perceived
+from risk_sac.egos.driving import PATH_HEADING, STATION, Driver, needed_braking
 from risk_sac.sim.lookout import project
-from risk_sac.types import HEADING, SPEED, X, Y
+from risk_sac.world.types import HEADING, SPEED, X, Y
 
 HEADWAY_S = 1.5
 EMERGENCY_MPS2 = 3.0  # braking that IDM alone would build up too late
@@ -24,7 +23,7 @@ class Lqr(Driver):
     version = "1.0"
     response_time_s = 0.3
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         super().reset(episode)
         self.step_s = episode.step_s
 

@@ -7,14 +7,14 @@ import pytest
 import torch
 from torch import Tensor
 
-from risk_sac.agents.ddpg import DdpgAgent
-from risk_sac.agents.learner import Learner
-from risk_sac.agents.replay import Batch
-from risk_sac.agents.sac import SacAgent
-from risk_sac.agents.sb3 import Sb3Agent
 from risk_sac.config import METHODS, DdpgConfig, LearnerConfig
 from risk_sac.config.learner import MOST_TEMPERATURE, AgentConfig, SacConfig
 from risk_sac.errors import ConfigError
+from risk_sac.search.agents.ddpg import DdpgAgent
+from risk_sac.search.agents.learner import Learner
+from risk_sac.search.agents.replay import Batch
+from risk_sac.search.agents.sac import SacAgent
+from risk_sac.search.agents.sb3 import Sb3Agent
 
 OBSERVATIONS, ACTIONS, ROWS = 5, 2, 16
 CONFIG = AgentConfig(hidden_sizes=(16, 16), batch_size=ROWS, critic_learning_rate=1e-3, target_rate=0.01)

@@ -5,13 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.agents.controls import RandomAgent, ScriptedAgent
-from risk_sac.agents.decisions import Decision, Held
-from risk_sac.agents.follower import ScriptFollower
-from risk_sac.observation_layout import PER_ADVERSARY, X_M, Y_M
+from risk_sac.env.observation_layout import PER_ADVERSARY, X_M, Y_M
 from risk_sac.risk.reward import shaped_reward
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scripts.motions import SIZE, Genes
+from risk_sac.search.agents.controls import Decision, Held, RandomAgent, ScriptedAgent, ScriptFollower
+from risk_sac.search.scripts import SIZE, Genes
 
 NOTHING = np.zeros(1, dtype=np.float32)
 ADVERSARIES = 3

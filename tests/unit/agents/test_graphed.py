@@ -2,10 +2,9 @@ import numpy as np
 import pytest
 import torch
 
-from risk_sac.agents.graphed import WARM_UP, GraphedUpdate
-from risk_sac.agents.replay import Batch, Transition, UniformReplay
-from risk_sac.agents.sac import SacAgent
 from risk_sac.config.learner import AgentConfig, ReplayConfig, SacConfig
+from risk_sac.search.agents.replay import Batch, Transition, UniformReplay
+from risk_sac.search.agents.sac import WARM_UP, GraphedUpdate, SacAgent
 
 SIZES = 7, 3  # of an observation and an action
 

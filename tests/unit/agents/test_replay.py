@@ -7,10 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from risk_sac.agents.priority import TERM_CAP, TermScales, importance_weights, priority
-from risk_sac.agents.replay import RiskPrioritizedReplay, Transition, UniformReplay
-from risk_sac.agents.sum_tree import SumTree
 from risk_sac.config import ReplayConfig
+from risk_sac.search.agents.priority import TERM_CAP, SumTree, TermScales, importance_weights, priority
+from risk_sac.search.agents.replay import RiskPrioritizedReplay, Transition, UniformReplay
 
 Make = Callable[..., Transition]
 Replay = UniformReplay | RiskPrioritizedReplay

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from risk_sac.benchmark.detection import ANSWER, Detection, answer_of, first_detection
-from risk_sac.benchmark.power import method_power, runs_of
-from risk_sac.benchmark.statistics import friedman, log_rank, summaries, survival
 from risk_sac.config import RunMethod, RunSpec
 from risk_sac.config.spec_file import read_ego
+from risk_sac.lab.benchmark.runs import ANSWER, Detection, answer_of, first_detection
+from risk_sac.lab.benchmark.statistics import friedman, log_rank, summaries, survival
 from risk_sac.records import DefectPower
+from risk_sac.report.power import method_power, runs_of
 
 BUDGET = 1000
 

@@ -1,7 +1,7 @@
 import pytest
 
 from risk_sac.config import Budget, RunSpec
-from risk_sac.execution.runs import run
+from risk_sac.execution.evaluate import run
 from risk_sac.records import RunMetrics
 
 SPEC = RunSpec(family="low", method="random", seed=11, budget=Budget(episodes=3))

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 
 from risk_sac import cli
-from risk_sac.execution.runs import run
-from risk_sac.run_folder.results import Results, read_results, write_results
+from risk_sac.execution.evaluate import run
+from risk_sac.run_folder.results import RunResults, read_results, write_results
 from tests.unit.cli.conftest import SPEC, ignore
 
 
-def untimed(results: Results) -> Results:
+def untimed(results: RunResults) -> RunResults:
     """Without what differs from one execution to the next."""
     return replace(results, wall_s=0.0, cpu_s=0.0, episode_cpu_s=())
 

@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from risk_sac.cli.campaigns.gate import Bounds, verdict
+from risk_sac.cli.campaigns.gate import GateBounds, verdict
 from risk_sac.client import Results
 from risk_sac.errors import ConfigError
 
@@ -64,12 +64,12 @@ LEADER, CUT_IN = "leader, ahead; ego brakes late", "cut-in, alongside; ego does 
 
 
 def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above():
-    status, reason = verdict(results("succeeded", FEW), Bounds(ecr=0.1))
+    status, reason = verdict(results("succeeded", FEW), GateBounds(ecr=0.1))
     assert status == 1
     assert reason == (
         "ECR may be above 0.1: low sac 0.050, 95 % interval up to 0.137 (3 valid contacts in 60 episodes)" + HINT
     )
-    assert verdict(results("succeeded", FEW), Bounds(ecr=0.14))[0] == 0
+    assert verdict(results("succeeded", FEW), GateBounds(ecr=0.14))[0] == 0
 
 
 @pytest.mark.parametrize(
@@ -79,16 +79,16 @@ def test_a_rate_below_its_bound_is_not_enough_where_its_interval_ends_above():
 def test_a_bound_that_no_interval_can_keep_is_refused_beforehand(field, bounds):
     options = argparse.Namespace(**UNBOUND | bounds)
     with pytest.raises(ConfigError, match="wanted more, or --judge-by rate") as error:
-        Bounds.of(options)
+        GateBounds.of(options)
     assert error.value.field == field
     options.judge_by = "rate"
-    assert Bounds.of(options)
+    assert GateBounds.of(options)
 
 
 @pytest.mark.parametrize(("bound", "status"), [(0, 1), (1, 0), (2, 0)])
 def test_more_distinct_preventable_failures_than_may_be_are_named(bound, status):
     found, reason = verdict(
-        results("succeeded", {}, {"method": "random", "distinct_preventable": 0}), Bounds(preventable=bound)
+        results("succeeded", {}, {"method": "random", "distinct_preventable": 0}), GateBounds(preventable=bound)
     )
     assert found == status
     assert ("low sac: 1 distinct preventable failure, where 0 may be" in reason) == bool(status)
@@ -99,7 +99,7 @@ def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_fou
     file = tmp_path / "known.json"
     earlier = results("succeeded", {"signatures": {LEADER: 2}}, {"method": "random", "signatures": {CUT_IN: 1}})
     file.write_text(earlier.model_dump_json())
-    bounds = Bounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file}))
+    bounds = GateBounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file}))
     assert verdict(results("succeeded", {"signatures": {LEADER: 9, CUT_IN: 1}}), bounds)[0] == 0
     status, reason = verdict(results("succeeded", {"family": "dense", "signatures": {LEADER: 1}}), bounds)
     assert (status, reason) == (1, f"dense sac: a new kind of failure: {LEADER}")
@@ -107,10 +107,10 @@ def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_fou
     violation = results("succeeded", {"signatures": {LEADER: 1, FAST: 3}})  # without a contact
     assert verdict(violation, bounds) == (1, f"low sac: a new kind of failure: {FAST}")
     file.write_text(violation.model_dump_json())
-    assert verdict(violation, Bounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file})))[0] == 0
+    assert verdict(violation, GateBounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file})))[0] == 0
 
 
-@pytest.mark.parametrize("bounds", [Bounds(), Bounds(ecr=0.5), Bounds(pcr=0.5)])
+@pytest.mark.parametrize("bounds", [GateBounds(), GateBounds(ecr=0.5), GateBounds(pcr=0.5)])
 @pytest.mark.parametrize("state", ["failed", "cancelled"])
 def test_a_campaign_that_was_not_measured_to_the_end_could_not_run(state, bounds):
     assert verdict(results(state, {"ecr": 0.9}), bounds)[0] == 2

@@ -45,7 +45,7 @@ def test_help_has_a_paragraph_an_example_that_parses_and_fits_80_columns(name, m
         ("run --family lwo --out x", "did you mean low?"),
         ("run --family low --method archve --out x", "did you mean archive?"),
         ("run --family low --ego my_egos:AccLka --out x", "--ego: "),
-        ("run --family low --ego risk_sac.egos.r157:R157 --out x", "--ego: "),
+        ("run --family low --ego risk_sac.egos.shipped:R157 --out x", "--ego: "),
         ("regress --failures x.npz --ego careful", "--failures: "),
         ("replay nowhere.npz", "BUNDLE: "),
         ("places nowhere.osm", "MAP: "),

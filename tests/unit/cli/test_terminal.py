@@ -19,14 +19,14 @@ from rich.text import Text
 
 from risk_sac import cli
 from risk_sac.cli.console import Board, columns, folded_table, on_one_line
-from risk_sac.terminal import complain, console, notes, prepare_streams, printable
+from risk_sac.host.terminal import complain, console, notes, prepare_streams, printable
 
 EGOS = f"{sys.executable} -m risk_sac egos list"
 KEYS = f"{sys.executable} -m service.keys list"
 COMMA = """
 import locale, sys
 from contextlib import closing
-from risk_sac.env import make_default
+from risk_sac.env.env import make_default
 
 locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
 with closing(make_default("low")) as env:

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from risk_sac.cli.campaigns.gate import Bounds
+from risk_sac.cli.campaigns.gate import GateBounds
 from risk_sac.cli.regress import read_baseline
-from risk_sac.client.address import api_key
+from risk_sac.client.transport import api_key
 from risk_sac.config import CampaignSpec, EgoConfig
 from risk_sac.config.spec_file import campaign_yaml, read_campaign, read_ego, read_spec
 from risk_sac.egos.registry import card_of
@@ -93,7 +93,7 @@ EGOS = '[far]\naddress = "127.0.0.1:9"\nversion = "ä"\nresponse_time_s = 0.3\n'
 
 def read_known(file: Path) -> object:
     names = ("max_ecr", "max_pcr", "max_preventable", "max_rate")
-    return Bounds.of(argparse.Namespace(**dict.fromkeys(names), no_new_failures=file, judge_by="rate")).known
+    return GateBounds.of(argparse.Namespace(**dict.fromkeys(names), no_new_failures=file, judge_by="rate")).known
 
 
 def read_egos(file: Path) -> object:

@@ -12,17 +12,16 @@ import pytest
 
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
-from risk_sac.egos.defects.catalogue import DEFECTS, planted, version_of
-from risk_sac.egos.defects.planted import Planted
-from risk_sac.egos.idm_aeb import IdmAeb
+from risk_sac.egos.defects.catalogue import DEFECTS, Planted, planted, version_of
 from risk_sac.egos.registry import pinned
-from risk_sac.egos.seam import Command, Control, Episode, Perceived, Vehicle
-from risk_sac.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Signal, X, Y
+from risk_sac.egos.seam import Command, Control, EpisodeStart, Perceived, Vehicle
+from risk_sac.egos.shipped import IdmAeb
+from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Signal, X, Y
 
 CAR, TRUCK, WALKER = (Kind.VEHICLE, 4.6, 1.85), (Kind.VEHICLE, 8.0, 2.4), (Kind.PEDESTRIAN, 0.5, 0.5)
 Actor = tuple[str, tuple[Kind, float, float], float, float, float, float]
 """Name, body, m ahead of the ego's centre, m to its left, velocity along and across, m/s."""
-ADMISSION = Path(__file__).parents[3] / "risk_sac/report/measured/admission.csv"  # of tests.acceptance.defects
+ADMISSION = Path(__file__).parents[3] / "risk_sac/report/measured/admission.csv"  # of risk_sac.lab.figures.defects
 LEAST_SCENES = 500
 PYTHON = [name for name, defect in DEFECTS.items() if defect.kind != "sumo"]
 
@@ -61,7 +60,7 @@ class Listener:
         self.commands = list(commands)
         self.seen: list[Perceived] = []
 
-    def reset(self, episode: Episode) -> None: ...
+    def reset(self, episode: EpisodeStart) -> None: ...
 
     def act(self, perceived: Perceived) -> Command:
         self.seen.append(perceived)
@@ -77,7 +76,7 @@ def decorator_of(name: str) -> Any:
 def begun(name: str, ego: Listener, grip: float = 9.81) -> Any:
     found = decorator_of(name)(ego, DEFECTS[name].parameter.value)
     vehicle = Vehicle(length_m=4.6, width_m=1.85, grip_mps2=grip)
-    found.reset(Episode(seed=0, net="", route=(), vehicle=vehicle, step_s=0.1))
+    found.reset(EpisodeStart(seed=0, net="", route=(), vehicle=vehicle, step_s=0.1))
     return found
 
 
@@ -241,7 +240,7 @@ def test_each_defect_composes_with_a_shipped_ego(name):
     ego = Planted(
         IdmAeb, planted(EgoConfig(driver="idm-aeb", defects=(name, "weak-brakes")[: 2 - (name == "weak-brakes")]))
     )
-    ego.reset(Episode(seed=0, net="", route=(), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=0.1))
+    ego.reset(EpisodeStart(seed=0, net="", route=(), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=0.1))
     for k in range(20):
         command = ego.act(seen(car(25 - k, 0.5, 4.0), walker(30, -6), time_s=1.5 + k / 10))
         assert isinstance(command, Control)
@@ -252,7 +251,7 @@ def test_each_defect_composes_with_a_shipped_ego(name):
 def test_a_defect_is_reached_when_it_first_changes_a_command():
     ego = Planted(IdmAeb, planted(EgoConfig(driver="idm-aeb", defects=("short-sight",))))
     for _ in range(2):  # and again in each episode
-        ego.reset(Episode(seed=0, net="", route=(), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=0.1))
+        ego.reset(EpisodeStart(seed=0, net="", route=(), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=0.1))
         assert ego.reached_s is None
         for k in range(5):
             ego.act(seen(car(24.0 if k < 3 else 26.0, along=5.0), time_s=1.5 + k / 10))

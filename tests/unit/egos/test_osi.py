@@ -9,12 +9,11 @@ import pytest
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.egos import Lane, StopLine
 from risk_sac.egos.registry import SHIPPED
-from risk_sac.egos.remote.osi import OsiEgo, ground_truth, trajectory_of
+from risk_sac.egos.remote.osi import OsiEgo, ground_truth, road_message, trajectory_of
 from risk_sac.egos.remote.osi_pb2 import GroundTruth, MotionRequest
-from risk_sac.egos.remote.osi_road import road_message
 from risk_sac.egos.seam import Perceived
-from risk_sac.env import RiskSacEnv
-from risk_sac.types import HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Kind, Road, Signal, X, Y
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.world.types import HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Kind, Road, Signal, X, Y
 
 AHEAD_S, STEP_S = 2.0, 0.5
 

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.egos import registry
-from risk_sac.egos.bicycle import advance
 from risk_sac.egos.guard import Guarded
+from risk_sac.egos.pilot import advance
 from risk_sac.egos.planners.route import SignalStops, stops
-from risk_sac.egos.seam import Episode, Perceived, Trajectory, Vehicle
+from risk_sac.egos.seam import EpisodeStart, Perceived, Trajectory, Vehicle
 from risk_sac.sim.pilot import Motion
-from risk_sac.types import (
+from risk_sac.world.types import (
     ACCEL,
     HEADING,
     LENGTH,
@@ -80,7 +80,7 @@ def drive(
     """Motions of an ego among others that nothing stops."""
     make, _ = registry.make(name, "ego")
     ego, motions = Guarded(make, math.inf), [start]
-    ego.reset(Episode(seed=0, net="", route=(), vehicle=VEHICLE, step_s=STEP_S, road=road))
+    ego.reset(EpisodeStart(seed=0, net="", route=(), vehicle=VEHICLE, step_s=STEP_S, road=road))
     for step in range(steps):
         seen = [other(step * STEP_S) for other in others]
         lit = signal if road.stop_lines else Signal.NONE

@@ -15,17 +15,17 @@ import grpc
 import numpy as np
 import pytest
 
-from risk_sac.egos import Control, Episode, Perceived, Trajectory
+from risk_sac.egos import Control, EpisodeStart, Perceived, Trajectory
 from risk_sac.egos.remote.client import RemoteEgo
 from risk_sac.egos.remote.ego_pb2 import CloseReply, Command, Observation, StartReply
 from risk_sac.egos.remote.messages import METHODS, SERVICE, command_message
 from risk_sac.egos.seam import Vehicle
 from risk_sac.egos.serve import Sessions, serve
 from risk_sac.errors import EgoFailed
-from risk_sac.types import WIDTH, Signal
+from risk_sac.world.types import WIDTH, Signal
 from tests.server import ROOT
 
-EPISODE = Episode(seed=0, net="", route=("a",), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=0.1)
+EPISODE = EpisodeStart(seed=0, net="", route=("a",), vehicle=Vehicle(length_m=4.6, width_m=1.85), step_s=0.1)
 PATIENT_S = 60.0
 Acts = Callable[[Iterator[Observation]], Iterator[Command]]
 
@@ -168,7 +168,7 @@ class Counting:
     def __init__(self, closed: threading.Semaphore) -> None:
         self._closed = closed
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         self._asked = 0
 
     def act(self, perceived: Perceived) -> Control:

@@ -10,10 +10,19 @@ import pytest
 from pydantic import ValidationError
 
 from risk_sac.config.campaign import Requirement
-from risk_sac.execution.executor import Cause, Exited, Program
+from risk_sac.execution.executor import Cause, Exited, WorkerProgram
 from risk_sac.execution.local import Lease, LocalExecutor, Signs
-from risk_sac.execution.messages import Failed, Finished, Heard, Heartbeat, Started, decode, encode
-from risk_sac.execution.postmortem import WorkerLog, without_folders
+from risk_sac.execution.messages import (
+    Failed,
+    Finished,
+    Heard,
+    Heartbeat,
+    Started,
+    WorkerLog,
+    decode,
+    encode,
+    without_folders,
+)
 from risk_sac.records import Outcome
 from tests.contract.executor_contract import ALIVE, SPEC, Runs, outcome
 
@@ -83,7 +92,7 @@ def large_run():
 
 
 def execute(code, folder, **program):
-    executor = LocalExecutor(Program(arguments=("-c", code), log="log", **program))
+    executor = LocalExecutor(WorkerProgram(arguments=("-c", code), log="log", **program))
     executor.submit(1, large_run(), folder)
     return executor
 

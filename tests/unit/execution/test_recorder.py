@@ -5,11 +5,10 @@ import pytest
 
 from risk_sac.config import Budget, LearnerConfig, RunSpec
 from risk_sac.errors import CheckpointError, ConfigError
-from risk_sac.execution.runs import run
+from risk_sac.execution.evaluate import run
 from risk_sac.records import Repetition
-from risk_sac.run import CHECKPOINT
-from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
-from risk_sac.run_folder.verified import Verified, distinct_failures, write_verified
+from risk_sac.run_folder.results import EPISODES, RESULTS, Verified, distinct_failures, read_results, write_verified
+from risk_sac.search.run import CHECKPOINT
 
 SPEC = RunSpec(
     family="low", method="random", seed=30, budget=Budget(episodes=8), learner=LearnerConfig(checkpoint_every=2)

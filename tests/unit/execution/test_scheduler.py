@@ -4,7 +4,7 @@ import psutil
 import pytest
 
 from risk_sac.config import RunSpec
-from risk_sac.execution.executor import FOLDER, Program
+from risk_sac.execution.executor import FOLDER, WorkerProgram
 from risk_sac.execution.jobs import LOG, Job, execute
 from risk_sac.execution.local import LocalExecutor
 
@@ -30,7 +30,7 @@ def job(tmp_path):
 
 
 def run(code, job, progress=lambda jobs: None, stopping=lambda: False):
-    program = Program(arguments=("-c", BEGIN + code, FOLDER), log=LOG)
+    program = WorkerProgram(arguments=("-c", BEGIN + code, FOLDER), log=LOG)
     execute([job], LocalExecutor(program), 1, progress, stopping)
 
 

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from risk_sac.config import RunSpec
-from risk_sac.pretraining import fit as fitting
-from risk_sac.pretraining.egos import training_egos
-from risk_sac.pretraining.fit import Dataset, auc, beliefs, fitted_prior
-from risk_sac.prior.shipped import inputs_of
-from risk_sac.problem import Problem
+from risk_sac.env.problem import Problem
+from risk_sac.lab.pretraining import fit as fitting
+from risk_sac.lab.pretraining.episodes import training_egos
+from risk_sac.lab.pretraining.fit import Dataset, auc, beliefs, fitted_prior
+from risk_sac.search.prior.shipped import inputs_of
 
 
 def data(count: int = 3000) -> Dataset:

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from risk_sac.config import RunSpec, SceneOptimizerConfig
+from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError, DamagedError
-from risk_sac.prior.earlier import EarlierScripts, FamilyScripts, kept, pinned_prior
-from risk_sac.prior.sampler import PriorOptimizer
-from risk_sac.prior.shipped import inputs_of, shipped_prior
-from risk_sac.prior.start import start_of
-from risk_sac.problem import Problem
 from risk_sac.run_folder.results import EPISODES
 from risk_sac.scenario import library
+from risk_sac.search.prior.earlier import EarlierScripts, FamilyScripts, kept, pinned_prior
+from risk_sac.search.prior.sampler import PriorOptimizer
+from risk_sac.search.prior.shipped import inputs_of, shipped_prior
+from risk_sac.search.prior.start import start_of
 from tests.earlier_runs import FAILURES, SAFE, run_folder
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from risk_sac.config import RunSpec
+from risk_sac.env.observation_layout import PER_ADVERSARY, PER_EGO
+from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
-from risk_sac.frozen_policy import respond
-from risk_sac.observation_layout import PER_ADVERSARY, PER_EGO
-from risk_sac.prior.policy import Folded, Layout, read_policy, with_goal, write_policy
-from risk_sac.problem import Problem
-from risk_sac.types import Vector
+from risk_sac.search.frozen_policy import respond
+from risk_sac.search.prior.policy import Folded, PolicyLayout, read_policy, with_goal, write_policy
+from risk_sac.world.types import Vector
 from tests.builders import pretrained_policy
 
 GOAL_NAMES = ("no_contact: cut-in, ahead, in a lane", "no_contact: leader, ahead, in a lane")
@@ -19,7 +19,7 @@ GOAL_NAMES = ("no_contact: cut-in, ahead, in a lane", "no_contact: leader, ahead
 
 @pytest.fixture
 def layout():
-    return Layout.of(Problem.from_spec(RunSpec(family="low", method="risk-sac", seed=0)))
+    return PolicyLayout.of(Problem.from_spec(RunSpec(family="low", method="risk-sac", seed=0)))
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def plain(layers: tuple[np.ndarray, ...], member: int = 0) -> list[np.ndarray]:
     return [layer[member] if layer.shape[1] > 1 else layer[member, 0] for layer in layers]
 
 
-def observed(layout: Layout) -> Vector:
+def observed(layout: PolicyLayout) -> Vector:
     return np.random.default_rng(4).random(layout.observation_size).astype(np.float32)
 
 
@@ -84,7 +84,7 @@ def test_networks_folded_into_their_own_layout_do_the_same(pretrained, layout):
 def test_another_layout_is_read_by_names_and_values(pretrained, layout):
     """The other problem has its adversaries in another order and one more, other bounds, and lacks a requirement."""
     (name, low, high), *others = layout.scene
-    own = Layout(
+    own = PolicyLayout(
         adversaries=("stranger", *reversed(layout.adversaries)),
         scene=((name, low - 1.0, high + 1.0), *others),
         requirements=layout.requirements[1:],

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from risk_sac.config import RunSpec, SceneOptimizerConfig
+from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
-from risk_sac.prior.files import DATA, MOST_BYTES
-from risk_sac.prior.sampler import Arm, PriorOptimizer, Yields
-from risk_sac.prior.shipped import Prior, inputs_of, read_prior, shipped_prior, write_prior
-from risk_sac.prior.start import start_of
-from risk_sac.problem import Problem
 from risk_sac.scenario.families import FAMILIES
+from risk_sac.search.prior.files import DATA, MOST_BYTES
+from risk_sac.search.prior.sampler import Arm, PriorOptimizer, Yields
+from risk_sac.search.prior.shipped import Prior, inputs_of, read_prior, shipped_prior, write_prior
+from risk_sac.search.prior.start import start_of
 
 FAMILY = "low"
 

@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from risk_sac.config import Interval, RunSpec
-from risk_sac.prior.shipped import inputs_of, shipped_prior
-from risk_sac.prior.start import start_of
-from risk_sac.prior.translation import Coordinates, Translation
-from risk_sac.problem import Problem
+from risk_sac.env.problem import Problem
 from risk_sac.scenario import car_following
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.place import PLACES, Stretch
-from risk_sac.scripts.motions import SIZE, Genes
+from risk_sac.search.prior.shipped import inputs_of, shipped_prior
+from risk_sac.search.prior.start import Coordinates, Translation, start_of
+from risk_sac.search.scripts import SIZE, Genes
 
 
 def low_with(*sides: str) -> Family:

@@ -14,7 +14,7 @@ from risk_sac.report.comparison import declared
 from risk_sac.report.figures import CURVES, window_ecr, window_pcr
 from risk_sac.report.paired import holm
 from risk_sac.report.runs import Limit, cpu_s, episodes, found_within
-from risk_sac.run_folder.results import EPISODES, RecordedFailure, Results, read_results, write_results
+from risk_sac.run_folder.results import EPISODES, RecordedFailure, RunResults, read_results, write_results
 from risk_sac.scenario.families import FAMILIES
 
 HORIZON = FAMILIES["low"].horizon_steps
@@ -177,7 +177,7 @@ def test_report_is_written_twice_alike(spec, runs, tmp_path):
 
 def test_a_run_in_which_nothing_was_ever_close_can_be_read(runs, tmp_path):
     records = [never_close(record) for record in runs[0].records]
-    results = Results(
+    results = RunResults(
         spec=runs[0].spec,
         spec_digest=runs[0].spec.digest,
         finished=True,

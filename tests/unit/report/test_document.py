@@ -4,7 +4,6 @@ from html.parser import HTMLParser
 
 import pytest
 
-from risk_sac.benchmark.power import played_by, power_of
 from risk_sac.config import CampaignSpec, EgoConfig, Iid
 from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.failures.cases import Case, Regression, Verdict
@@ -13,7 +12,8 @@ from risk_sac.report import compare
 from risk_sac.report.document import Origin, report_page
 from risk_sac.report.evidence import gathered
 from risk_sac.report.inputs import read_folders
-from risk_sac.run_folder.results import Results, write_results
+from risk_sac.report.power import played_by, power_of
+from risk_sac.run_folder.results import RunResults, write_results
 from risk_sac.scenario.families import FAMILIES
 
 HOSTILE = (
@@ -143,7 +143,7 @@ def test_a_campaigns_folder_is_told_with_what_is_unfinished_or_damaged_in_it(tmp
     (tmp_path / "spec.yaml").write_text(campaign_yaml(spec))
     for run in spec.runs()[:2]:
         (tmp_path / "runs" / run.id).mkdir(parents=True)
-        write_results(tmp_path / "runs" / run.id, Results(spec=run, spec_digest=run.digest, finished=False))
+        write_results(tmp_path / "runs" / run.id, RunResults(spec=run, spec_digest=run.digest, finished=False))
     damaged = tmp_path / "runs" / spec.runs()[1].id / "results.json"
     damaged.write_bytes(damaged.read_bytes()[:-9])
     found = read_folders([tmp_path]).comparison

@@ -10,16 +10,15 @@ from pydantic import ValidationError
 
 from risk_sac.config import Requirement
 from risk_sac.errors import FormulaError
-from risk_sac.geometry import RelativeView, relative_view
+from risk_sac.maps.carriageway import Carriageway
 from risk_sac.risk.measures import Gauge, Measures, soft_min
-from risk_sac.risk.own_motion import OwnMotionGauge
-from risk_sac.risk.publish import assess, publish
+from risk_sac.risk.publish import OwnMotionGauge, assess, publish
+from risk_sac.risk.rss import BEHIND_S_PER_M, DRIFT_MPS, SPEED_SHARE, WALK_MPS, time_to_encounter
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor
-from risk_sac.risk.ttc import BEHIND_S_PER_M, DRIFT_MPS, SPEED_SHARE, WALK_MPS, time_to_encounter
-from risk_sac.scenario.carriageway import Carriageway
-from risk_sac.types import Frame
+from risk_sac.world.geometry import RelativeView, relative_view
+from risk_sac.world.types import Frame
 from tests.builders import frame_of
 from tests.hostile_formulas import LONGEST, formulas
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from risk_sac.config import RunSpec
-from risk_sac.env import RiskSacEnv
-from risk_sac.risk.own_motion import HEADWAY_CAP_S, OwnMotion, OwnMotionGauge
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.maps.carriageway import carriageway_of
+from risk_sac.risk.publish import HEADWAY_CAP_S, OwnMotion, OwnMotionGauge
 from risk_sac.risk.signals import SIGNALS
-from risk_sac.scenario.carriageway import carriageway_of
-from risk_sac.types import Frame, Kind
+from risk_sac.world.types import Frame, Kind
 from tests.builders import frame_of
 
 EAST, NORTH, WEST = 0.0, math.pi / 2, math.pi

@@ -3,8 +3,6 @@ import math
 import numpy as np
 import pytest
 
-from risk_sac.geometry import relative_view
-from risk_sac.risk.own_motion import OwnMotion
 from risk_sac.risk.publish import (
     CROSSED_ON_RED_M,
     ENCOUNTER,
@@ -12,6 +10,7 @@ from risk_sac.risk.publish import (
     RSS_SCALED,
     TTC,
     LeastMargins,
+    OwnMotion,
     assess,
     in_charge,
     least_margins,
@@ -20,7 +19,8 @@ from risk_sac.risk.publish import (
     red_light_margin,
 )
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.types import Frame, Kind, Signal
+from risk_sac.world.geometry import relative_view
+from risk_sac.world.types import Frame, Kind, Signal
 from tests import builders
 
 VEHICLE, PEDESTRIAN = Kind.VEHICLE, Kind.PEDESTRIAN

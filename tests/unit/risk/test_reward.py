@@ -17,7 +17,7 @@ from risk_sac.risk.realism import (
     lateral_accel,
     soft_cost,
 )
-from risk_sac.types import ACCEL, LATERAL, STEP_S, WIDTH
+from risk_sac.world.types import ACCEL, LATERAL, STEP_S, WIDTH
 from tests.builders import collision, judgement
 
 CONFIG = RewardConfig(

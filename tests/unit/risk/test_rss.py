@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from risk_sac.geometry import RelativeView, relative_view
 from risk_sac.risk import rss
 from risk_sac.risk.rss import (
     LATERAL_CAP_M,
@@ -20,6 +19,7 @@ from risk_sac.risk.rss import (
     opposite_direction,
     same_direction,
 )
+from risk_sac.world.geometry import RelativeView, relative_view
 from tests.builders import frame_of
 
 # ρ = 1 s, a = 2, b_min = 4, b_max = 8, lateral a = 0.5 and b = 1, μ = 0.1: round enough for mental arithmetic.

@@ -14,7 +14,7 @@ from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import Episode, EpisodeId, EpisodeRecord, stored, wire
 from risk_sac.run_folder.durable import replace_file, seal, unseal
-from risk_sac.run_folder.results import RESULTS, Results, read_results, write_results
+from risk_sac.run_folder.results import RESULTS, RunResults, read_results, write_results
 from tests.builders import collision, episode_record, judgement
 
 
@@ -63,7 +63,7 @@ SPEC = RunSpec(family="low", method="random", seed=0)
 
 @pytest.fixture
 def folder(tmp_path):
-    write_results(tmp_path, Results(spec=SPEC, spec_digest=SPEC.digest, finished=False, wall_s=1.25))
+    write_results(tmp_path, RunResults(spec=SPEC, spec_digest=SPEC.digest, finished=False, wall_s=1.25))
     return tmp_path
 
 

@@ -9,12 +9,11 @@ import pytest
 
 from risk_sac.errors import ConfigError
 from risk_sac.run_folder import durable
-from risk_sac.run_folder.durable import held
-from risk_sac.run_folder.scratch import remove_temporaries, scratch_folder
+from risk_sac.run_folder.durable import held, remove_temporaries, scratch_folder
 
 HOLD = """
 import sys
-from risk_sac.run_folder.scratch import scratch_folder
+from risk_sac.run_folder.durable import scratch_folder
 with scratch_folder() as folder:
     (folder / "file").touch()
     print(folder, flush=True)

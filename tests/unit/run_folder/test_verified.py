@@ -2,8 +2,7 @@
 
 from risk_sac.config import RunSpec
 from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, Repetition, Severity
-from risk_sac.run_folder.results import RecordedFailure, Results
-from risk_sac.run_folder.verified import Verified, with_headline
+from risk_sac.run_folder.results import RecordedFailure, RunResults, Verified, with_headline
 from tests.builders import collision, episode_record, judgement, run_metrics, violation
 
 
@@ -56,10 +55,10 @@ def test_a_violation_is_refused_by_its_kind_and_what_else_the_episode_violates_s
     assert found[1].collision == contact
 
 
-def results_of(*episodes: EpisodeRecord) -> Results:
+def results_of(*episodes: EpisodeRecord) -> RunResults:
     spec = RunSpec(family="low", method="random", seed=0)
     failures = tuple(RecordedFailure.of(spec.id, each) for each in episodes)
-    return Results(spec=spec, spec_digest="", finished=True, metrics=run_metrics(), failures=failures)
+    return RunResults(spec=spec, spec_digest="", finished=True, metrics=run_metrics(), failures=failures)
 
 
 MINOR = judgement(severity=Severity.MINOR)

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import sumo_nets
 from risk_sac.errors import MapError
-from risk_sac.scenario.maps import unpack
-from risk_sac.scenario.maps.documents import rewritten
+from risk_sac.maps import documents
+from risk_sac.maps.documents import rewritten
 from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
 
 PBF = b"\0\0\0\x0d\n\tOSMHeader\x18\x7c" + bytes(90)
@@ -96,7 +96,7 @@ def test_damage_of_any_kind_is_refused_and_nothing_else_happens(packing, tmp_pat
 
 
 def test_all_files_of_an_archive_count_together(tmp_path, monkeypatch):
-    monkeypatch.setattr(unpack, "MAX_BYTES", len(NET) + len(ROUTES))
+    monkeypatch.setattr(documents, "MAX_BYTES", len(NET) + len(ROUTES))
     assert len(written(zipped(NET, ROUTES), tmp_path)) == 2
     with pytest.raises(MapError, match="what unpacks to more than"):
         written(zipped(NET, ROUTES, ADDITIONAL), tmp_path)

@@ -10,7 +10,7 @@ from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S, TRUCK_LENGTH_M, Layout
 from risk_sac.scenario.place import PLACES, JunctionPlace
 from risk_sac.sim.sumo import NETS, SumoSimulation
-from risk_sac.types import Kind, Scene
+from risk_sac.world.types import Kind, Scene
 
 LENGTHS_M = {"car": CAR_LENGTH_M, "truck": TRUCK_LENGTH_M}
 APPROACH_M = 230.4  # length of the roads to the intersection of dense

@@ -9,12 +9,12 @@ from hypothesis.extra.numpy import arrays
 
 from risk_sac.config import Interval
 from risk_sac.errors import SceneError
-from risk_sac.risk.own_motion import depth
-from risk_sac.scenario.carriageway import ANY_WAY, SECTORS, Carriageway, carriageway_of, sector_of
-from risk_sac.scenario.ground import areas, is_convex, ribbon, triangles
-from risk_sac.scenario.maps.net import Edge, Lane, Net
+from risk_sac.maps.carriageway import ANY_WAY, SECTORS, Carriageway, carriageway_of, sector_of
+from risk_sac.maps.net import Edge, Net, NetLane
+from risk_sac.risk.publish import depth
+from risk_sac.scenario.layout import areas, is_convex, ribbon, triangles
 from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.types import Scene
+from risk_sac.world.types import Scene
 
 ELL = [(0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)]
 BEND = [(0.0, 0.0), (10.0, 0.0), (17.0, 7.0), (17.0, 20.0)]
@@ -106,7 +106,7 @@ def bend(radius_m: float, width_m: float = 3.2) -> Carriageway:
     roads = []
     for name, r, order in (("on", radius_m, 1), ("back", radius_m + width_m, -1)):
         line = [(r * math.cos(a), r * math.sin(a)) for a in angles][::order]
-        lane = Lane(f"{name}_0", name, 0, r * math.pi / 2, width_m, 13.9, tuple(line), True)
+        lane = NetLane(f"{name}_0", name, 0, r * math.pi / 2, width_m, 13.9, tuple(line), True)
         roads.append(Edge(name, "a", "b", (lane,)))
     return Carriageway(Net(edges={edge.id: edge for edge in roads}))
 

@@ -15,18 +15,18 @@ from shapely.affinity import affine_transform
 import sumo_nets
 from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError, DamagedError, MapError
+from risk_sac.maps import convert
+from risk_sac.maps.clearance import too_near, truck_reaches, waits_in_the_way
+from risk_sac.maps.convert import present_net
+from risk_sac.maps.cut import walk_over
+from risk_sac.maps.find_junction import turn
+from risk_sac.maps.finder import Map, place_at, survey
+from risk_sac.maps.found import NoFit, lacking
+from risk_sac.maps.net import Crossing, Edge, Link, Net, NetLane
+from risk_sac.maps.read_net import read_net
+from risk_sac.maps.ways import way_back, way_on
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, family_at, family_named
-from risk_sac.scenario.maps import convert
-from risk_sac.scenario.maps.around import walk_over
-from risk_sac.scenario.maps.clearance import too_near, truck_reaches, waits_in_the_way
-from risk_sac.scenario.maps.convert import present_net
-from risk_sac.scenario.maps.find_junction import turn
-from risk_sac.scenario.maps.finder import Map, place_at, survey
-from risk_sac.scenario.maps.found import NoFit, lacking
-from risk_sac.scenario.maps.net import Crossing, Edge, Lane, Link, Net
-from risk_sac.scenario.maps.read_net import read_net
-from risk_sac.scenario.maps.ways import way_back, way_on
 from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace
 from risk_sac.sim.sumo import SumoSimulation
 from tests.maps import osm_town
@@ -204,7 +204,7 @@ def test_who_waits_askew_in_the_way_of_others_is_told_from_who_stands_clear(x_m,
     """The middle of its front is 1.6 m from the middle of the lane that it is to cross, as SUMO has it."""
 
     def lane(id_, *line):
-        return Lane(id_, id_, 0, 10.0, 3.2, 10.0, line, True)
+        return NetLane(id_, id_, 0, 10.0, 3.2, 10.0, line, True)
 
     before, behind = lane("i_0", (x_m, -5.6), (0.0, -1.6)), lane("i_1", (0.0, -1.6), (-3.0, 6.0))
     across, crossed_before = lane("across", (10.0, 0.0), (-10.0, 0.0)), lane("crossed", (9.0, -3.0), (-9.0, -3.0))
@@ -294,7 +294,7 @@ def test_a_truck_that_turns_sharply_beside_a_car_swings_its_tail_into_its_way(ra
     arc = [(radius_m * math.sin(a), -side * radius_m * (1.0 - math.cos(a))) for a in quarter]
 
     def link(id_, *lines):
-        source, middle, target = (Lane(id_, id_, 0, 1.0, 3.2, 10.0, tuple(line), True) for line in lines)
+        source, middle, target = (NetLane(id_, id_, 0, 1.0, 3.2, 10.0, tuple(line), True) for line in lines)
         return Link(source, target, (middle,), None, 0)
 
     away = (radius_m, -side * (radius_m + 90.0))
@@ -315,7 +315,7 @@ def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radiu
     arc = [(side * (-1.6 + radius_m * (1.0 - math.cos(a))), 2.0 + radius_m * math.sin(a)) for a in quarter]
     lines = [(-1.6 * side, -60.0), (-1.6 * side, 2.0)], arc, [arc[-1], (90.0 * side, arc[-1][1])]
     source, middle, target = (
-        Lane(id_, id_, 0, 1.0, 3.2, 10.0, tuple(line), True) for id_, line in zip("abc", lines, strict=True)
+        NetLane(id_, id_, 0, 1.0, 3.2, 10.0, tuple(line), True) for id_, line in zip("abc", lines, strict=True)
     )
     crossing = Crossing("crossing", "j", ("a",), ((0.0, 0.0), (-6.4 * side, 0.0)), 4.0, None)
     net = Net(edges={"a": Edge("a", "i", "j", (source,))}, crossings=[crossing])

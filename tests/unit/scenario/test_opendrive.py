@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from risk_sac.scenario.maps.convert import Converted, present_net
-from risk_sac.scenario.maps.finder import Map, survey
-from risk_sac.scenario.maps.net import Net
+from risk_sac.maps.convert import Converted, present_net
+from risk_sac.maps.finder import Map, survey
+from risk_sac.maps.net import Net
 
 LINE = '<geometry s="0" x="0" y="0" hdg="0" length="900"><line/></geometry>'
 

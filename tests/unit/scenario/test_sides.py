@@ -1,7 +1,7 @@
 import pytest
 
 from risk_sac.errors import MapError
-from risk_sac.scenario.maps.sides import UNKNOWN, side_remarks
+from risk_sac.maps.sides import UNKNOWN, side_remarks
 from tests.maps import osm_roundabout, osm_town
 
 STREET = (

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import Collision, Grade, ReferenceOutcome, Severity
-from risk_sac.scene_optimizer import ArchiveOptimizer, DiscountedBandit, Encounter
-from risk_sac.scene_optimizer.archive import INITIAL, NEW_CANDIDATE, Elites, mutated
+from risk_sac.search.scene_optimizer import ArchiveOptimizer, DiscountedBandit, Encounter
+from risk_sac.search.scene_optimizer.archive import INITIAL, NEW_CANDIDATE, Elites, mutated
 from tests.builders import collision, judgement, violation
 
 HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)

@@ -10,16 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.scene_optimizer import (
+from risk_sac.search.scene_optimizer import (
     ArchiveOptimizer,
     BotorchOptimizer,
     IidSampler,
     SceneOptimizer,
     SobolOptimizer,
-    surrogate,
+    bayesian,
 )
-from risk_sac.scene_optimizer.base import RunningMaximum, objective
-from risk_sac.types import Floats
+from risk_sac.search.scene_optimizer.base import RunningMaximum, objective
+from risk_sac.world.types import Floats
 
 QUICK = SceneOptimizerConfig(initial_scenes=6, window=24, refit_every=5, candidates=64)
 SCORING = (SobolOptimizer, BotorchOptimizer, ArchiveOptimizer)
@@ -174,7 +174,7 @@ def observations(count: int, dimension: int, seed: int) -> tuple[torch.Tensor, t
 def test_the_posterior_is_that_of_the_equations():
     """m(x) = k(x)ᵀ K⁻¹ (y - c) + c,  s²(x) = 1 - k(x)ᵀ K⁻¹ k(x): Rasmussen and Williams 2006, Alg. 2.1."""
     points, values = observations(40, 5, seed=0)
-    model = surrogate.condition(points, values, surrogate.fit(points, values, None, seed=0))
+    model = bayesian.condition(points, values, bayesian.fit(points, values, None, seed=0))
     lengthscales, constant = model.covar_module.lengthscale.detach(), model.mean_module.constant.detach()
 
     def kernel(a, b):

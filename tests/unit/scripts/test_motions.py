@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
-from risk_sac.scripts.motions import SIZE, Act, Genes, Seen, act, adversaries_seen, cue
+from risk_sac.env.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
+from risk_sac.search.scripts import SIZE, Act, Genes, Seen, act, adversaries_seen, cue
 
 MIDDLE = Genes(*[0.5] * SIZE)
 unit = st.floats(0, 1)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from risk_sac.sim.collision import Contact, find_contact
-from risk_sac.types import STEP_S, Frame, Kind
+from risk_sac.world.types import STEP_S, Frame, Kind
 from tests.builders import frame_of
 
 LENGTH_M, WIDTH_M = 4.6, 1.85

@@ -8,9 +8,9 @@ import shapely
 from shapely import box
 from shapely.affinity import rotate, translate
 
-from risk_sac.geometry import relative_view
 from risk_sac.sim.collision import find_contact
-from risk_sac.types import HEADING, STEP_S, Frame, X, Y
+from risk_sac.world.geometry import relative_view
+from risk_sac.world.types import HEADING, STEP_S, Frame, X, Y
 from tests.builders import frame_of, moved
 from tests.unit.sim.contacts import (
     CAR,

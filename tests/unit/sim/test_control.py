@@ -13,12 +13,12 @@ from risk_sac.config import DynamicElements, Interval, Odd
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import GRAVITY_MPS2, Limits, limits_from_odd
 from risk_sac.scenario.odd import intersect
-from risk_sac.sim.commands import VehicleCommand, Walker
 from risk_sac.sim.control import PedestrianControl
 from risk_sac.sim.paths import Along, Path
-from risk_sac.sim.roads import Room
+from risk_sac.sim.roads import LateralRoom
+from risk_sac.sim.solid import VehicleCommand, Walker
 from risk_sac.sim.vehicle_control import CORRECTION_PER_M, VehicleControl
-from risk_sac.types import STEP_S
+from risk_sac.world.types import STEP_S
 from tests.roads import STRAIGHT_M, arc_m, road
 
 LIMITS = Limits(
@@ -31,7 +31,7 @@ LIMITS = Limits(
     walk_brake_mps2=1.5,
 )
 EPS = 1e-9
-WIDE = Room(left_m=50.0, right_m=50.0)
+WIDE = LateralRoom(left_m=50.0, right_m=50.0)
 STRAIGHT = Along(road(), 0.0, 0.0)
 Actions = list[tuple[float, float]]
 
@@ -70,7 +70,7 @@ def drive(
     control = VehicleControl(limits, start_mps)
     commands, stations, offsets = [VehicleCommand(start_mps, 0.0)], [start_m], [0.0]
     for action in actions:
-        room = Room(left_m=half_m - offsets[-1], right_m=half_m + offsets[-1])
+        room = LateralRoom(left_m=half_m - offsets[-1], right_m=half_m + offsets[-1])
         commands.append(control.step(*action, room, Along(path, stations[-1], offsets[-1])))
         stations.append(stations[-1] + (commands[-2].speed_mps + commands[-1].speed_mps) / 2 * STEP_S)
         offsets.append(offsets[-1] + commands[-1].lateral_mps * STEP_S)

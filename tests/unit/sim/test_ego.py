@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from risk_sac.config import SensorConfig
-from risk_sac.geometry import Sight
 from risk_sac.sim.ego import MOTION, Belief, Perception, sight
-from risk_sac.types import Frame, X, Y
+from risk_sac.world.geometry import Sight
+from risk_sac.world.types import Frame, X, Y
 from tests.builders import moved
 from tests.unit.sim.contacts import CAR, WALKER, ego, frames
 

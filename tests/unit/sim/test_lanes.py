@@ -11,12 +11,12 @@ import pytest
 
 import sumo_nets
 from risk_sac.config import EgoConfig
-from risk_sac.egos.road import lane_edges
+from risk_sac.egos.driving import lane_edges
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, VehicleStart
-from risk_sac.sim.lanes import road_around, signals_at
+from risk_sac.sim.roads import road_around, signals_at
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.types import Lane, Road, Role, Signal
+from risk_sac.world.types import Lane, Road, Role, Signal
 
 ROUTES = {
     "low": [("road",)],

@@ -11,7 +11,7 @@ from shapely import LineString, Point
 
 from risk_sac.sim.lookout import MARGIN_M, project, targets
 from risk_sac.sim.paths import Path, path_along, path_through
-from risk_sac.types import Kind
+from risk_sac.world.types import Kind
 from tests.roads import road
 from tests.unit.sim.contacts import CAR, WALKER, WIDTH_M, Actor, frames
 

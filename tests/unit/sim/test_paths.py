@@ -22,7 +22,7 @@ from risk_sac.sim.lookout import project
 from risk_sac.sim.paths import AHEAD_M, STATION, X, Y, path_along, path_through
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.sim.vehicle_control import BODY_M, CAP, GRID_M, HERE, SOON, bends
-from risk_sac.types import Role
+from risk_sac.world.types import Role
 from tests.roads import arc_m, road
 
 LEGS = ("south", "east", "north", "west")  # counter-clockwise

@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.sim.commands import Walker
 from risk_sac.sim.control import PedestrianControl
 from risk_sac.sim.paths import Along
-from risk_sac.sim.roads import Room
+from risk_sac.sim.roads import LateralRoom
+from risk_sac.sim.solid import Walker
 from risk_sac.sim.vehicle_control import VehicleControl
-from risk_sac.types import HEADING, LENGTH, SPEED, STEP_S, VX, VY, WIDTH, Floats, X, Y
+from risk_sac.world.types import HEADING, LENGTH, SPEED, STEP_S, VX, VY, WIDTH, Floats, X, Y
 from tests.roads import road
 from tests.unit.sim.test_control import LIMITS
 
@@ -40,7 +40,7 @@ def driven(
     action: tuple[float, float], others: list[Pose], *, speed: float = 10.0, ego: Pose = EGO, keeps_clear: bool = True
 ) -> list[Pose]:
     """6 s of a vehicle that starts along x with its front at 0 and is told the same all the time."""
-    control, path, wide = VehicleControl(LIMITS, speed), road(), Room(50.0, 50.0)
+    control, path, wide = VehicleControl(LIMITS, speed), road(), LateralRoom(50.0, 50.0)
     station, offset, poses = 0.0, 0.0, [(-HALF_M, 0.0, 0.0, speed)]
     for step in range(60):
         state = frame_of(ego, poses[-1], *(moved(other, step * STEP_S) for other in others))

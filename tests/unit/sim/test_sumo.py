@@ -13,9 +13,9 @@ from risk_sac.config import EgoConfig
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
-from risk_sac.sim.commands import VehicleCommand
+from risk_sac.sim.solid import VehicleCommand
 from risk_sac.sim.sumo import NETS, SumoSimulation
-from risk_sac.types import Frame, Role
+from risk_sac.world.types import Frame, Role
 
 
 @pytest.fixture(scope="module")

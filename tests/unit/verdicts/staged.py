@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from risk_sac.geometry import Size, touches
 from risk_sac.records import Judgement
-from risk_sac.scenario.ground import Area
-from risk_sac.types import STEP_S, Floats, Kind, Role
+from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import judge
 from risk_sac.verdicts.validity import EpisodeFacts
+from risk_sac.world.geometry import Size, touches
+from risk_sac.world.types import STEP_S, Floats, Kind, Role
 
 CAR_M = (4.6, 1.85)
 PERSON_M = (0.5, 0.5)

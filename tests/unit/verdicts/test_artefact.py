@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ARTEFACT_RULES, REPEATS
-from risk_sac.types import Kind
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, inside_grip, used_grip
+from risk_sac.world.types import Kind
 from tests.unit.verdicts.staged import CLEAN, cut_in, hangs_over, leader_brakes, mirrored, sideways, stage, straight
 
 CAR = Kind.VEHICLE

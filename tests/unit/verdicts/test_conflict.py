@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.records import ConflictType
-from risk_sac.verdicts.along import towards
 from risk_sac.verdicts.conflict import find_conflict, unresponsive
-from risk_sac.verdicts.path import polyline, pose_at, project
+from risk_sac.verdicts.course import polyline, pose_at, project, towards
 from tests.unit.verdicts.staged import (
     LANE_M,
     crossing_car,

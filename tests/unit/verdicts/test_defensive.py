@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.types import STEP_S, Frame, Kind
 from risk_sac.verdicts.conflict import find_conflict
+from risk_sac.verdicts.course import Path, polyline
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.online import DefensiveReflex
-from risk_sac.verdicts.path import Path, polyline
 from risk_sac.verdicts.reference import reference_outcomes
+from risk_sac.world.types import STEP_S, Frame, Kind
 from tests.builders import frame_of
 from tests.unit.verdicts.staged import (
     CAR_M,

@@ -8,10 +8,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.records import Collision
-from risk_sac.verdicts.along import Along
+from risk_sac.verdicts.course import BodyOnPath
 from risk_sac.verdicts.distinct import DistinctFailures, FailureKind, distinct_failures, kind_of
-from risk_sac.verdicts.drivers import FULL_MPS2, Situation, full_braking, fuzzy, r157, rss, towards_command
-from risk_sac.verdicts.fuzzy import braking, critical, proactive
+from risk_sac.verdicts.drivers import (
+    FULL_MPS2,
+    Situation,
+    braking,
+    critical,
+    full_braking,
+    fuzzy,
+    proactive,
+    r157,
+    rss,
+    towards_command,
+)
 from tests.builders import collision, judgement
 
 DRY, WET = 9.81, 0.6 * 9.81
@@ -48,7 +58,7 @@ def test_a_command_builds_up_at_its_jerk():
 def situation(
     gap: float, across: float = 0.0, lateral: float = 0.0, speed: float = 20.0, other: float = 10.0
 ) -> Situation:
-    return Situation(Along(gap, -gap - 9.2, math.inf, across, 0.0, other, math.inf), speed, 0.0, 0.9, 0.9, lateral)
+    return Situation(BodyOnPath(gap, -gap - 9.2, math.inf, across, 0.0, other, math.inf), speed, 0.0, 0.9, 0.9, lateral)
 
 
 # RSS: after = 20 + 0.75·3 = 22.25; (20 + 22.25)·0.375 + 22.25²/12 − 100/12 = 15.844 + 41.255 − 8.333 = 48.765 m.

@@ -7,8 +7,8 @@ import pytest
 
 from risk_sac.records import EgoPart
 from risk_sac.verdicts.conflict import find_conflict
-from risk_sac.verdicts.ego_part import ego_part
 from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.fault import ego_part
 from tests.unit.verdicts.staged import (
     CAR_M,
     STREET,

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ConflictType, Fault, Grade
-from risk_sac.scenario.ground import Area
-from risk_sac.types import Kind
+from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.conflict import find_conflict
-from risk_sac.verdicts.endangering import endangered_ego
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.fault import Parts, fault, has_to_yield, parts_of_violation
+from risk_sac.verdicts.offences import endangered_ego
+from risk_sac.world.types import Kind
 from tests.unit.verdicts.staged import (
     CAR_M,
     LANE_M,

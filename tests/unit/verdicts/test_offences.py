@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ConflictType
-from risk_sac.scenario.ground import Area
-from risk_sac.types import Kind
+from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.offences import ego_offences, striker_offences
+from risk_sac.world.types import Kind
 from tests.unit.verdicts.staged import (
     STREET,
     WALKING,

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from risk_sac.types import Frame, Kind
 from risk_sac.verdicts.conflict import find_conflict
+from risk_sac.verdicts.course import polyline
 from risk_sac.verdicts.evidence import PER_ACTOR
 from risk_sac.verdicts.online import conflicts_now
-from risk_sac.verdicts.path import polyline
+from risk_sac.world.types import Frame, Kind
 from tests.builders import frame_of, moved
 from tests.unit.verdicts.staged import LANE_M, STREET, cut_in, leader_brakes, pedestrian_crosses
 

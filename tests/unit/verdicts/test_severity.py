@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from risk_sac.records import Fault, Grade, Judgement, Severity
-from risk_sac.types import Kind
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
 from risk_sac.verdicts.judge import judge
-from risk_sac.verdicts.overlap import Overlap, overlaps_before_contact
-from risk_sac.verdicts.severity import fatality_risk, severity
+from risk_sac.verdicts.labels import fatality_risk, severity
+from risk_sac.verdicts.validity import Overlap, overlaps_before_contact
+from risk_sac.world.types import Kind
 from tests.unit.verdicts.recorded import recorded
 from tests.unit.verdicts.staged import (
     STREET,

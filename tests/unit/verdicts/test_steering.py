@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ConflictType, Grade
-from risk_sac.types import Kind
-from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.recorded import keeps_lane, lane_path
+from risk_sac.verdicts.evidence import Evidence, keeps_lane, lane_path
+from risk_sac.world.types import Kind
 from tests.unit.verdicts.staged import (
     CAR_M,
     LANE_M,

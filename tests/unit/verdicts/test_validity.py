@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ARTEFACT_RULES
-from risk_sac.types import Frame
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence, Ground
 from risk_sac.verdicts.validity import validity_verdicts
+from risk_sac.world.types import Frame
 from tests.unit.sim.contacts import (
     CAR,
     CROSSING,

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from risk_sac.config import Requirement
+from risk_sac.maps.carriageway import Carriageway
 from risk_sac.records import Fault, Grade, Violation
 from risk_sac.risk.measures import Gauge
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.scenario.carriageway import Carriageway
-from risk_sac.types import Kind, Signal
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence
-from risk_sac.verdicts.keeping import History
-from risk_sac.verdicts.violation import requirement_results, violations_of
+from risk_sac.verdicts.judge import requirement_results, violations_of
+from risk_sac.verdicts.reference import History
+from risk_sac.world.types import Kind, Signal
 from tests.builders import frame_of
 from tests.unit.verdicts.staged import CAR_M, WALKING, Motion, mirrored, sideways, stage, straight
 

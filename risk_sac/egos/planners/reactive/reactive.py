@@ -14,12 +14,12 @@ from commonroad_rp.state import ReactivePlannerState
 from commonroad_rp.utility.config import ReactivePlannerConfiguration
 from commonroad_rp.utility.utils_coordinate_system import create_coordinate_system
 
-from risk_sac.egos.bicycle import track
+from risk_sac.egos.driving import LIMIT, STATION, point_at
+from risk_sac.egos.pilot import track
 from risk_sac.egos.planners.route import BEFORE_LINE_M, SignalStops, in_view, room_aside_m, way_to_stop_m
-from risk_sac.egos.road import LIMIT, STATION, point_at
-from risk_sac.egos.seam import Control, Episode, Perceived, Trajectory
+from risk_sac.egos.seam import Control, EpisodeStart, Perceived, Trajectory
 from risk_sac.sim.pilot import Motion
-from risk_sac.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Floats, X, Y
+from risk_sac.world.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Floats, X, Y
 
 SPACING_M = 2.0  # of points along the path, which the package's smoothing needs on straights too
 BEHIND_M, AHEAD_M = 20.0, 100.0  # by which the path goes on beyond its ends, where the package can project nothing
@@ -34,7 +34,7 @@ class Reactive:
     response_time_s = 0.5
     deadline_s = 60.0
 
-    def reset(self, episode: Episode) -> None:
+    def reset(self, episode: EpisodeStart) -> None:
         """Begins an episode."""
         config = ReactivePlannerConfiguration()
         car, half_m = episode.vehicle, episode.vehicle.wheelbase_m / 2

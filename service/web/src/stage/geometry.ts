@@ -52,7 +52,7 @@ function place(eyeX: number, eyeY: number, body: Float64Array, corner: number, r
 /**
  * Where the way from an eye to a point enters a body, as a share of the way; 1 if it does not.
  *
- * The slab test in the body's own axes, as `risk_sac.geometry` has it.
+ * The slab test in the body's own axes, as `risk_sac.world.geometry` has it.
  */
 export function entry(eyeX: number, eyeY: number, toX: number, toY: number, x: number, y: number, heading: number, length: number, width: number): number {
   const cos = Math.cos(heading);

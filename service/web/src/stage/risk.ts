@@ -4,7 +4,7 @@ import { velocityAt } from "./interpolate";
 import { PART_COLOURS, type Colour } from "./colours";
 import { pixelX, pixelY, present, type Scene } from "./scene";
 
-/** At this or later there is no collision course; `risk_sac.risk.ttc` caps it so. */
+/** At this or later there is no collision course; `risk_sac.risk.rss` caps it so. */
 export const TTC_CAP_S = 10;
 /** RSS margins are capped at it. */
 export const RSS_CAP_M = 50;

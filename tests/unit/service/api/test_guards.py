@@ -1,7 +1,7 @@
 import pytest
 
-from service.api.answers.problems import ProblemError
-from service.api.guards.gate import allowed_hosts, check_host, check_origin
+from service.api.gate import allowed_hosts, check_host, check_origin
+from service.api.problems import ProblemError
 from service.settings import ServiceSettings
 
 

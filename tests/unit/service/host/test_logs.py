@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 
 import pytest
 
-from risk_sac.logs import LogFormatter
+from risk_sac.host.terminal import LogFormatter
 from service.host.logs import TextFormatter, json_formatter
 
 

@@ -10,8 +10,8 @@ from service.keys.file import KeyFile, Scope
 from service.keys.made import AuthEnabledFlag, ever_made
 from service.keys.ring import KeyRing
 from service.settings import ServiceSettings
+from service.store.database import keys_were_made
 from service.store.reading import Store
-from service.store.server import keys_were_made
 
 CREATE = ["create", "--project", "maps"]
 

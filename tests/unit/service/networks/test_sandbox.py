@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.scenario.maps.convert import FILE_BYTES
+from risk_sac.maps.convert import FILE_BYTES
 from service.errors import StorageError, UploadError
-from service.networks import limits
-from service.networks.sandbox import inspect
+from service.networks import schemas
+from service.networks.network_store import inspect
 from tests.hostile_networks import NET
 from tests.server import LONG_S
 
-BOUND = "import os, sys; from service.networks.simulator import bind; bind();"
+BOUND = "import os, sys; from service.networks.checker import bind; bind();"
 
 
 def python(code: str) -> Sequence[str]:
@@ -130,11 +130,11 @@ def test_the_simulator_may_write_little_whatever_it_is_told(tmp_path):
     (tmp_path / "net.xml").write_text(NET)
     (tmp_path / "log").touch()
     code = (
-        "from service.networks.simulator import bind_simulator; import libsumo; os.chdir(sys.argv[1]);"
+        "from service.networks.checker import bind_simulator; import libsumo; os.chdir(sys.argv[1]);"
         "bind_simulator();"
         "libsumo.start(['sumo', '-n', 'net.xml', '--fcd-output', 'out.xml', '--netstate-dump', 'dump.xml']);"
         "[libsumo.simulationStep() for _ in range(20000)]; os._exit(0)"
     )
     subprocess.run([*python(BOUND + code), str(tmp_path)], capture_output=True, timeout=LONG_S, check=False)
     written = [path.stat().st_size for path in tmp_path.glob("*.xml") if path.name != "net.xml"]
-    assert max(written) == limits.LOG_BYTES
+    assert max(written) == schemas.LOG_BYTES

@@ -6,8 +6,7 @@ import pytest
 from service.errors import StorageError
 from service.networks import surveys
 from service.networks.network_store import NetworkStore
-from service.networks.report import PLACES
-from service.networks.schemas import Places
+from service.networks.schemas import PLACES, Places
 from service.networks.surveys import Surveys
 from tests.hostile_networks import NET
 from tests.server import LONG_S

@@ -8,8 +8,8 @@ from risk_sac.config import CampaignSpec
 from risk_sac.execution.executor import Cause, Exited
 from risk_sac.execution.messages import Failed, Finished
 from service.errors import OutdatedError, QuotaError
+from service.runs.cleanup import check_quota, exhausted
 from service.runs.manager import Manager
-from service.runs.quota import check_quota, exhausted
 from service.settings import ServiceSettings
 from service.store.stored import Usage
 

@@ -13,7 +13,7 @@ from risk_sac.execution.messages import Finished
 from risk_sac.records import Episode, Outcome, State, StateChange
 from service.errors import StorageError, TransitionError
 from service.store.revisions import Revisions
-from service.store.states import TRANSITIONS, advance, campaign_state
+from service.store.stored import TRANSITIONS, advance, campaign_state
 
 
 @pytest.fixture

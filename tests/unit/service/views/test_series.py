@@ -11,9 +11,8 @@ from risk_sac.config import CampaignSpec
 from risk_sac.records import State
 from risk_sac.run_folder.series import write_series
 from service.errors import StorageError
-from service.views.logs import MOST_BYTES, log_tail
+from service.views.progress import MOST_BYTES, eta_s, log_tail, retry_after_s
 from service.views.series import load_series
-from service.views.time_left import eta_s, retry_after_s
 from tests.begun import BEGUN
 from tests.contract.recorded_campaigns import series_arrays
 

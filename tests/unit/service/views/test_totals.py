@@ -14,11 +14,10 @@ from risk_sac.config import CampaignSpec
 from risk_sac.metrics import MetricsAccumulator
 from risk_sac.records import Grade, Outcome, Repetition, Severity, State, stored, wire
 from service.store.stored import PlainEpisode
-from service.views.curves import curves, spread
+from service.views.curves import curves, results, spread
 from service.views.failure_table import failure_table
 from service.views.progress import progress
 from service.views.scenes import scene_effects
-from service.views.totals import results
 from tests.begun import BEGUN as RUN
 from tests.builders import LOW_SCENE, collision, episode_record, judgement, violation
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from risk_sac.config import RunSpec
-from risk_sac.problem import Problem
+from risk_sac.env.problem import Problem
 from risk_sac.verdicts.evidence import Evidence, Ground
 
 

@@ -5,7 +5,7 @@ import pytest
 from starlette.requests import Request
 
 from risk_sac.errors import DamagedError
-from service.api.answers.problems import RETRY_S, ProblemError, Reason, problem_response
+from service.api.problems import RETRY_S, ProblemError, Reason, problem_response
 from service.app import create_app
 from service.errors import BusyError, OutdatedError, QuotaError, StorageError
 from service.settings import ServiceSettings

@@ -5,9 +5,9 @@ from fastapi import HTTPException
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.api.answers.pages import Cursors
-from service.api.answers.problems import ProblemError
-from service.api.answers.representations import accepted, takes
+from service.api.pages import Cursors
+from service.api.problems import ProblemError
+from service.api.representations import accepted, takes
 
 OFFERED = ("application/json", "text/markdown", "text/csv")
 BROWSER = "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,*/*;q=0.8"

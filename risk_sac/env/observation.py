@@ -1,0 +1,100 @@
+"""What the joint policy sees, in the ego's frame and scaled to about [-1, 1].
+
+Per adversary its motion relative to the ego, then the ego itself, its signal, the scene ξ, the
+robustness of every requirement and the time left. Robustness is part of the state because STL keeps
+history: without it the shaped reward would not be Markov.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.env.observation_layout import (
+    ACCEL_MPS2,
+    GAP_M,
+    LATERAL_MPS,
+    LIMIT,
+    PER_ADVERSARY,
+    PER_EGO,
+    SPEED_MPS,
+    X_M,
+    Y_M,
+    observation_size,
+)
+from risk_sac.risk.publish import AHEAD, ASIDE, CLOSING_X, CLOSING_Y, COS, GAP, SEEN, SIN, Assessment
+from risk_sac.risk.stl import ROBUSTNESS_CLIP
+from risk_sac.scenario.family import Family
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import ACCEL, LATERAL, SPEED, Floats, Frame
+
+
+class Encoder:
+    """Builds observations of a fixed size for one family."""
+
+    def __init__(self, family: Family, scene_size: int, requirements: int) -> None:
+        self._adversaries = family.adversaries
+        self.size = observation_size(len(family.adversaries), scene_size, requirements)
+        self._ids: tuple[str, ...] = ()
+
+    def encode(
+        self, frame: Frame, assessment: Assessment, robustness: Floats, unit_scene: Floats, time_left: float
+    ) -> NDArray[np.float32]:
+        """The observation, `size`, each entry in [-LIMIT, LIMIT]; an adversary that left the net is all zeros."""
+        if frame.ids is not self._ids:
+            self._ids = frame.ids
+            self._rows = np.array([frame.ids.index(a) if a in frame.ids else 0 for a in self._adversaries])
+        return _encoded(
+            self.size,
+            self._rows,
+            assessment.others,
+            frame.state,
+            frame.stop_line_m,
+            int(frame.signal),
+            unit_scene,
+            robustness,
+            time_left,
+        )
+
+
+@compiled
+def _encoded(
+    size: int,
+    rows: NDArray[np.int64],
+    others: Floats,
+    state: Floats,
+    stop_line_m: float,
+    signal: int,
+    unit_scene: Floats,
+    robustness: Floats,
+    time_left: float,
+) -> NDArray[np.float32]:
+    result = np.zeros(size)
+    for slot in range(len(rows)):
+        row = rows[slot]
+        if row == 0:  # left the net; 0 is the ego itself
+            continue
+        i, at = row - 1, slot * PER_ADVERSARY
+        result[at] = others[AHEAD, i] / X_M
+        result[at + 1] = others[ASIDE, i] / Y_M
+        result[at + 2] = others[CLOSING_X, i] / SPEED_MPS
+        result[at + 3] = others[CLOSING_Y, i] / LATERAL_MPS
+        result[at + 4] = others[COS, i]
+        result[at + 5] = others[SIN, i]
+        result[at + 6] = state[SPEED, row] / SPEED_MPS
+        result[at + 7] = state[ACCEL, row] / ACCEL_MPS2
+        result[at + 8] = others[GAP, i] / GAP_M
+        result[at + 9] = others[SEEN, i]
+    at = len(rows) * PER_ADVERSARY
+    result[at] = state[SPEED, 0] / SPEED_MPS
+    result[at + 1] = state[ACCEL, 0] / ACCEL_MPS2
+    result[at + 2] = state[LATERAL, 0] / LATERAL_MPS
+    result[at + 3] = stop_line_m / X_M
+    result[at + 4 + signal] = 1.0
+    at += PER_EGO
+    for value in unit_scene:
+        result[at] = value
+        at += 1
+    for value in robustness:
+        result[at] = value / ROBUSTNESS_CLIP
+        at += 1
+    result[at] = time_left
+    return np.minimum(np.maximum(result, -LIMIT), LIMIT).astype(np.float32)

@@ -1,0 +1,246 @@
+"""Names the settings that a family or an ego does not support as they are written."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any
+
+from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Interval, Odd, Requirement, RunSpec
+from risk_sac.config.campaign import check_demand
+from risk_sac.config.methods import MethodName
+from risk_sac.egos.registry import pinned
+from risk_sac.env.observation_layout import observation_size
+from risk_sac.errors import ConfigError, OddError
+from risk_sac.records import NO_CONTACT, Adjustment
+from risk_sac.risk.rss_parameters import RssParameters
+from risk_sac.risk.stl import parsed
+from risk_sac.scenario.families import family_named
+from risk_sac.scenario.family import Family
+from risk_sac.scenario.limits import GRAVITY_MPS2, VISIBILITY, limits_from_odd, with_environment
+from risk_sac.scenario.odd import (
+    SHIPPED_REQUIREMENTS,
+    TINY,
+    field,
+    intersect,
+    narrow,
+    paths,
+    requirements_from_odd,
+    text_of,
+    widest,
+)
+from risk_sac.scenario.space import SceneSpace
+from risk_sac.world.types import STEP_S
+
+
+def adjustments(spec: RunSpec | CampaignSpec) -> tuple[Adjustment, ...]:
+    """Compares what a spec asks of each family with what its episodes use.
+
+    A family that cannot be read any more, such as a place that the library has lost, is left out.
+    """
+    found: dict[Adjustment, list[str]] = {}
+    for name in (spec.family,) if isinstance(spec, RunSpec) else spec.families:
+        try:
+            for each in _of_family(family_named(name), spec):
+                found.setdefault(each, []).append(name)
+        except ConfigError:
+            continue
+    return tuple(each.model_copy(update={"families": tuple(names)}) for each, names in found.items())
+
+
+def _of_family(family: Family, spec: RunSpec | CampaignSpec) -> Iterator[Adjustment]:
+    odd, ego = spec.odd, spec.ego
+    whole, supported = intersect(family.odd, odd), widest(family.odd)
+    space = narrow(with_environment(family.space, odd, whole), whole)
+    for path in paths(odd):
+        asked, used = field(odd, path), field(whole, path)
+        if asked is None:
+            continue
+        if used != asked:
+            limit = field(supported, path)
+            why = f"the family supports {text_of(limit)}" if _beyond(asked, limit) else "other fields bound it"
+            yield _adjusted(path, asked, used, why)
+        for parameter in space.parameters:
+            bounds = Interval(low=parameter.low, high=parameter.high)
+            if parameter.odd == path and isinstance(used, Interval) and _beyond(used, bounds):
+                yield _adjusted(path, used, bounds, f"scenes begin with {parameter.name} in {text_of(bounds)}")
+    yield from _of_sensor(whole, ego, stated=VISIBILITY in space.names)
+    shipped = {each.name for each in requirements_from_odd(whole, ego.response_s)}
+    for i, requirement in enumerate(spec.requirements):
+        if not requirement.formula and requirement.name not in shipped:
+            why = f"there is no {requirement.name}"
+            yield Adjustment(families=(), field=f"requirements[{i}]", asked=requirement.counts, used="nothing", why=why)
+
+
+def _of_sensor(odd: Odd, ego: EgoConfig, *, stated: bool) -> Iterator[Adjustment]:
+    visibility = odd.environment.visibility_m
+    if ego.sensor is None or visibility is None:
+        return
+    range_m = ego.sensor.range_m
+    if stated and range_m < visibility.high:
+        effect = "nothing changes" if range_m <= visibility.low else f"nothing changes from {range_m:g} m on"
+        used = Interval(low=min(range_m, visibility.low), high=range_m)
+        yield _adjusted("environment.visibility_m", visibility, used, f"the ego's sensor sees {range_m:g} m: {effect}")
+    if not stated and range_m > visibility.low:
+        why = "the family's default visibility begins there; state odd.environment.visibility_m to change it"
+        got, used_m = f"{range_m:g}", f"{visibility.low:g}"
+        yield Adjustment(families=(), field="ego.sensor.range_m", asked=got, used=used_m, why=why)
+
+
+def _beyond(asked: Any, limit: Any) -> bool:
+    """Whether something is asked for outside the limit."""
+    if isinstance(asked, Interval):
+        return bool(asked.low < limit.low - TINY or asked.high > limit.high + TINY)
+    return bool(set(asked) - set(limit))
+
+
+def _adjusted(path: str, asked: Any, used: Any, why: str) -> Adjustment:
+    return Adjustment(families=(), field=f"odd.{path}", asked=text_of(asked), used=text_of(used), why=why)
+
+
+RSS_RESPONSE_S = 0.5  # of any ego: a scene is no less dangerous, nor fair, because a slower driver is in it
+RSS_BRAKING_MPS2 = 6.0  # a firm braking: a driver's whose car would stop by 8 and more
+SUMO_KEEPS = frozenset({"on_carriageway", "no_red_light_entry"})  # requirements that its own driver never violates
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What stays the same over all episodes of a run."""
+
+    family: Family
+    odd: Odd  # complete: the family's default narrowed by the user's
+    space: SceneSpace  # the family's, narrowed by the ODD, with the parameters of a user's environment
+    ego: EgoConfig
+    requirements: tuple[Requirement, ...]  # the ODD's, then the user's
+    rss: RssParameters
+
+    @classmethod
+    def from_spec(cls, spec: RunSpec) -> "Problem":
+        """Translates a run's settings.
+
+        Raises:
+          OddError: the ODD contradicts itself or leaves no scene.
+          FormulaError: a user's requirement cannot be monitored online.
+          ConfigError: a user's requirement has a shipped one's name and a formula, or neither; the ego is not
+            registered or in another version; or the run takes too much memory.
+        """
+        ego = pinned(spec.ego)
+        family = family_named(spec.family)
+        odd = intersect(family.odd, spec.odd, family.space)
+        if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
+            raise OddError(
+                "odd.dynamic.actor_kinds",
+                f"{list(odd.dynamic.actor_kinds or ())}",
+                f"{sorted(missing)} too, which every scene of the {family.name!r} family has",
+            )
+        shipped = {each.name: each for each in requirements_from_odd(odd, ego.response_s)}
+        own = {}
+        for i, requirement in enumerate(spec.requirements):
+            wanted = _own(f"requirements[{i}]", requirement, shipped)
+            if wanted is not None:
+                parsed(i, wanted, STEP_S, family.horizon_steps)
+                own[wanted.name] = wanted
+        problem = cls(
+            family=family,
+            odd=odd,
+            space=narrow(with_environment(family.space, spec.odd, odd), odd),
+            ego=ego,
+            requirements=tuple((shipped | own).values()),
+            rss=_rss_parameters(odd),
+        )
+        problem.check_demand(spec)
+        return problem
+
+    def check_demand(self, spec: RunSpec) -> None:
+        """Refuses a run of this problem that would take too much memory.
+
+        Raises:
+          ConfigError: naming the field that takes most of it.
+        """
+        check_demand(spec, self.observation_size, self.action_size, self.family.horizon_steps)
+
+    @property
+    def observation_size(self) -> int:
+        """Entries of an observation."""
+        return observation_size(len(self.family.adversaries), self.space.dimension, len(self.requirements))
+
+    @property
+    def action_size(self) -> int:
+        """Entries of a joint action: drive and steering of each adversary."""
+        return 2 * len(self.family.adversaries)
+
+    @property
+    def contact_alone_counts(self) -> bool:
+        """Whether the ego can fail by contacts alone: SUMO's driver leaves no road and enters no junction on red."""
+        counting = {each.name for each in self.requirements if each.counts == "failure"}
+        return self.ego.driver is None and not self.ego.defects and counting <= SUMO_KEEPS | {NO_CONTACT}
+
+    @property
+    def speed_limit_mps(self) -> float:
+        """The posted limit; all roads of a family have the same."""
+        limit = self.odd.scenery.speed_limit_mps
+        return float("inf") if limit is None else limit.high
+
+
+def _own(field: str, requirement: Requirement, shipped: Mapping[str, Requirement]) -> Requirement | None:
+    """Returns a user's requirement as a run monitors it.
+
+    One without a formula changes what the shipped requirement of its name counts as; None if this ODD has none.
+    """
+    name = requirement.name
+    if name not in shipped:
+        if not requirement.formula:
+            if name in SHIPPED_REQUIREMENTS:
+                return None
+            raise ConfigError(f"{field}.formula", "none", f"one, or a shipped requirement's name: {', '.join(shipped)}")
+        return requirement
+    if requirement.formula:
+        remedy = "leave its formula out to change what it counts as, or choose another name"
+        raise ConfigError(f"{field}.name", f"{name!r}, which a shipped requirement has", remedy=remedy)
+    if name == NO_CONTACT and requirement.counts == "report":
+        raise ConfigError(f"{field}.counts", "'report'", f"'failure': a contact ends the episode, so {name} counts")
+    return shipped[name].model_copy(update={"counts": requirement.counts})
+
+
+def _rss_parameters(odd: Odd) -> RssParameters:
+    """RSS under the ODD: a driver's delay, and the braking it can be relied on to do, and has to expect of others.
+
+    Choice: both are RSS_BRAKING_MPS2 or the worst grip of the road that all share. SUMO's drivers keep a headway of 1 s
+    and trust the one ahead to brake no harder than they do themselves; that they stop by 4.5 m/s² behind a
+    leader that brakes at 8 m/s² would make all of ordinary following dangerous.
+    """
+    friction = odd.environment.friction
+    limits = limits_from_odd(odd, friction.low if friction else 1.0)
+    grip = friction.low * GRAVITY_MPS2 if friction else GRAVITY_MPS2
+    return RssParameters(
+        response_s=RSS_RESPONSE_S,
+        brake_min_mps2=min(RSS_BRAKING_MPS2, grip),
+        brake_max_mps2=min(RSS_BRAKING_MPS2, limits.brake_mps2),
+    )
+
+
+def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
+    """The campaign as it is to be kept, with the version of its ego.
+
+    Refuses one that could not run; see `Problem.from_spec` and `check_installed` for the errors.
+    """
+    spec = spec.model_copy(update={"ego": pinned(spec.ego)})
+    for method in spec.methods:
+        check_installed(method)
+    alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()  # the i.i.d. phase's among them
+    for family in spec.families:
+        first, *others = (run for run in alike if run.family == family)
+        problem = Problem.from_spec(first)
+        for run in others:
+            problem.check_demand(run)
+    return spec
+
+
+def check_installed(method: MethodName) -> None:
+    """Refuses a method whose package is not there.
+
+    Raises:
+      ConfigError: naming it.
+    """
+    needed = METHODS[method].needs
+    if needed and find_spec(needed) is None:
+        raise ConfigError("methods", f"{method!r}, which needs {needed}", remedy="pip install 'risk-sac[dev]'")

@@ -1,0 +1,177 @@
+"""Plays a random sample of the places that were found on a map.
+
+At each place the same scenes are played without an attack and with random actions, and a pedestrian steps into the
+ego's way from the left and from the right.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.env.problem import Problem
+from risk_sac.errors import InfeasibleScene, SimulationError
+from risk_sac.failures.play import play
+from risk_sac.maps.found import Fit
+from risk_sac.scenario.families import family_named
+from risk_sac.scenario.layout import Layout, PedestrianStart
+from risk_sac.search.agents.controls import RandomAgent
+from risk_sac.sim.solid import Walker
+from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.world.geometry import relative_view
+from risk_sac.world.types import STEP_S, Role, Signal
+
+LEFT, RIGHT = 1, -1
+ASIDE_M, PACE_MPS = 6.0, 1.4  # where the pedestrian comes from, and how fast
+AHEAD_S = 6.0  # of driving to where it crosses
+WALKED_STEPS = round(ASIDE_M / PACE_MPS / STEP_S)
+DRIVING_MPS = 2.0  # a slower ego stops for the pedestrian in any case
+MET_STEPS = 120
+STANDING_MPS = 0.5
+OFFSETS = 41  # of a cycle that are looked at
+MET_M = 5.0  # an ego that stays farther from a pedestrian has not met it
+ALIKE_M = 1.0  # by which least distances may differ: lane changes and turns bring it nearer to one side
+
+
+@dataclass(slots=True)
+class Tried:
+    """Results of the episodes at one place."""
+
+    fit: Fit
+    played: int = 0
+    rejected: Counter[str] = field(default_factory=Counter)  # by the rule of C_hard that refused the scene
+    invalid: list[str] = field(default_factory=list)  # why episodes failed
+    touched_unattacked: int = 0  # contacts without an attack
+    sides: tuple[float, float] = (math.nan, math.nan)  # least distance of a pedestrian from the left and the right
+
+    @property
+    def runs(self) -> bool:
+        """Whether no episode was invalid, and some were played."""
+        return not self.invalid and self.played > 0
+
+    @property
+    def unlike(self) -> str | None:
+        """How pedestrians from the left and from the right come out differently; None: the ego lets both pass alike."""
+        left, right = self.sides
+        if math.isinf(min(left, right)):
+            return "the ego stands although nothing is in its way: no pedestrian can meet it"
+        if min(left, right) > MET_M:
+            within = f"within {MET_STEPS * STEP_S:.0f} s"
+            return f"the ego meets no pedestrian {within}: it comes no nearer than {min(left, right):.1f} m"
+        touched = [name for name, least_m in zip(("left", "right"), self.sides, strict=True) if least_m == 0.0]
+        if touched:
+            return f"a pedestrian from the {' and from the '.join(touched)} is touched"
+        if abs(left - right) > ALIKE_M:
+            return f"a pedestrian from the left is left {left:.1f} m, one from the right {right:.1f} m"
+        return None
+
+
+def sample(fits: Sequence[Fit], count: int, seed: int) -> list[Fit]:
+    """Draws so many places of each pattern, or all if there are fewer."""
+    draw = np.random.default_rng(seed)
+    chosen: list[Fit] = []
+    for pattern in dict.fromkeys(fit.spot.pattern for fit in fits):
+        own = [fit for fit in fits if fit.spot.pattern == pattern]
+        chosen += [own[i] for i in sorted(draw.permutation(len(own))[:count])]
+    return chosen
+
+
+def try_out(fit: Fit, family: str, episodes: int, seed: int) -> Tried:
+    """Plays at one place.
+
+    Args:
+      fit: the place.
+      family: its name in the library.
+      episodes: scenes, each without an attack and with random actions.
+      seed: of scenes, actions and SUMO.
+    """
+    tried = Tried(fit)
+    problem = Problem.from_spec(RunSpec(family=family, method="random", seed=0))
+    for controlled in (False, True):
+        with closing(RiskSacEnv(problem, RunSpec.model_fields["learner"].default.reward, controlled=controlled)) as env:
+            for index in range(episodes):
+                _episode(env, tried, np.random.default_rng((seed, index)), controlled=controlled)
+    with closing(SumoSimulation(EgoConfig())) as sim:
+        tried.sides = (meet(sim, family, LEFT), meet(sim, family, RIGHT))
+    return tried
+
+
+def _episode(env: RiskSacEnv, tried: Tried, draw: np.random.Generator, *, controlled: bool) -> None:
+    scene = env.problem.space.from_unit(draw.random(env.problem.space.dimension))
+    simulator_seed, action_seed = (int(value) for value in draw.integers(2**31 - 1, size=2))
+    agent, none = RandomAgent(env.action_size, action_seed), np.empty((0, env.action_size))
+    try:
+        touched = play(env, scene, simulator_seed, none, agent.act).collision is not None
+    except InfeasibleScene as infeasible:
+        tried.rejected[infeasible.reason] += 1
+        return
+    except SimulationError as error:
+        tried.invalid.append(str(error))
+        return
+    tried.played += 1
+    if not controlled:
+        tried.touched_unattacked += touched
+
+
+def meet(sim: SumoSimulation, family: str, side: int) -> float:
+    """Returns the least distance of an ego, alone on the road, to a pedestrian that would meet it; 0 if it touches it.
+
+    The pedestrian crosses where the ego drives on an empty road, and is in the middle of its way at that moment:
+    in bends, and where the ego changes lanes, as well as on a straight road.
+
+    Args:
+      sim: plays it.
+      family: of the place; the ego starts as in the middle of its scenes.
+      side: LEFT or RIGHT, from where the pedestrian comes.
+    """
+    found = family_named(family)
+    middle = found.layout(found.space.from_unit(np.full(found.space.dimension, 0.5)).values)
+    cycle_s = next((p.high for p in found.space.parameters if p.name == "signal_offset_s"), 0.0)
+    alone = _at_green(sim, replace(middle, vehicles=(), pedestrians=()), cycle_s)
+    there = _driven_to(sim, alone)
+    if there is None:
+        return math.inf
+    arrives, x, y, heading = there
+    x, y = x - side * ASIDE_M * math.sin(heading), y + side * ASIDE_M * math.cos(heading)
+    towards = heading - side * math.pi / 2
+    start = PedestrianStart(id="walker", role=Role.ADVERSARY, x_m=x, y_m=y, heading_rad=towards, speed_mps=0.0)
+    sim.reset(replace(alone, pedestrians=(start,)), 1)
+    least_m = math.inf
+    for step in range(1, MET_STEPS + 1):
+        pace = PACE_MPS if step > arrives - WALKED_STEPS else 0.0
+        x, y = x + pace * STEP_S * math.cos(towards), y + pace * STEP_S * math.sin(towards)
+        sim.apply({}, {"walker": Walker(x, y, towards, pace)})
+        frame = sim.step()
+        view = relative_view(frame)
+        if frame.ego_speed_mps >= STANDING_MPS:  # a standing ego is walked into in any case
+            least_m = min(least_m, 0.0 if view.overlap[0] else float(view.gap[0]))
+    return least_m
+
+
+def _driven_to(sim: SumoSimulation, alone: Layout) -> tuple[int, float, float, float] | None:
+    """Returns the first step after AHEAD_S in which the ego drives, with x, y and heading; None if it stands."""
+    sim.reset(alone, 1)
+    for step in range(1, MET_STEPS + 1):
+        frame = sim.step()
+        if step * STEP_S >= AHEAD_S and frame.ego_speed_mps >= DRIVING_MPS:
+            return step, float(frame.x_m[0]), float(frame.y_m[0]), float(frame.heading_rad[0])
+    return None
+
+
+def _at_green(sim: SumoSimulation, layout: Layout, cycle_s: float) -> Layout:
+    """The same at the beginning of the ego's green; unchanged where its signal is never seen to become green."""
+    if layout.signal is None:
+        return layout
+    before = Signal.GREEN
+    for offset_s in np.linspace(0.0, cycle_s, OFFSETS):
+        turned = replace(layout, signal_offset_s=float(offset_s))
+        now = sim.reset(turned, 1).signal
+        if now is Signal.GREEN and before is not Signal.GREEN:
+            return turned
+        before = now
+    return layout

@@ -1,0 +1,89 @@
+"""What this machine lends this process: processors, and a folder of its user's for caches."""
+
+import errno
+import ipaddress
+import math
+import os
+import re
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+UNWRITABLE = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR, errno.EEXIST)
+"""Errors of a folder that cannot be made or written, whatever room there is."""
+NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EBADF)
+"""Errors of a file system that locks nothing, or no folder, such as a network's."""
+
+
+def cores(process: Path = Path("/proc/self")) -> int:
+    """Counts the processors that this process may use, by its affinity and the CPU quotas of its control groups.
+
+    Args:
+      process: the process's folder in /proc.
+    """
+    able = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, min(able, math.ceil(min(_quotas(process), default=able))))
+
+
+def _quotas(process: Path) -> Iterator[float]:
+    """CPU quotas of this process's control groups and of all around them, in processors; v1 and v2."""
+    try:
+        groups = [line.split(":", 2)[1:] for line in (process / "cgroup").read_text("utf-8", "replace").splitlines()]
+        mounts = [line.split(" - ") for line in (process / "mountinfo").read_text("utf-8", "replace").splitlines()]
+    except OSError:  # no Linux
+        return
+    for place, kind in mounts:
+        fields, (type_, *_, options) = place.split(), kind.split()
+        if type_ == "cgroup2":
+            controller = ""
+        elif type_ == "cgroup" and "cpu" in options.split(","):
+            controller = "cpu"
+        else:
+            continue
+        root, folder = (Path(_unescaped(field)) for field in fields[3:5])
+        for controllers, path in groups:
+            if controller in controllers.split(","):
+                # In a container the group may be named as outside of it, where the mount does not show it.
+                below = PurePosixPath(path).relative_to(root) if PurePosixPath(path).is_relative_to(root) else ""
+                group = folder / below
+                for each in (group, *group.parents[: len(group.parts) - len(folder.parts)]):
+                    yield from _quota(each)
+
+
+def _quota(group: Path) -> Iterator[float]:
+    """The CPU quota of one control group, if it has one, in processors."""
+    try:
+        if (group / "cpu.max").exists():
+            quota, period = (group / "cpu.max").read_text().split()
+        else:
+            quota, period = ((group / f"cpu.cfs_{name}_us").read_text().strip() for name in ("quota", "period"))
+        if quota not in ("max", "-1"):
+            yield int(quota) / int(period)
+    except (OSError, ValueError, ZeroDivisionError):  # the root has none
+        return
+
+
+def _unescaped(field: str) -> str:
+    return re.sub(r"\\([0-7]{3})", lambda found: chr(int(found[1], 8)), field)
+
+
+def user_cache() -> Path | None:
+    """Returns the folder in which this user's programs keep what can be made again; None where there is no home."""
+    told = os.environ.get("XDG_CACHE_HOME", "")
+    if os.path.isabs(told):  # others are to be ignored, says the XDG specification
+        return Path(told)
+    try:
+        home = Path.home()
+    except RuntimeError:
+        return None
+    return home / ".cache" if home.is_absolute() else None
+
+
+def is_loopback(host: str) -> bool:
+    """Returns whether a host is a loopback address, such as `127.8.9.1`, `[::1]` or `localhost`."""
+    host = host.lower().removeprefix("[").removesuffix("]")
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return host == "localhost"
+    mapped = getattr(address, "ipv4_mapped", None)
+    return (mapped or address).is_loopback

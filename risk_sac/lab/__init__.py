@@ -1,0 +1,1 @@
+"""Training, benchmarks and measured figures; the product never imports it."""

@@ -1,0 +1,1 @@
+"""Commands that measure the figures and tables of the documents."""

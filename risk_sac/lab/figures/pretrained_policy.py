@@ -1,0 +1,67 @@
+"""What a family's policy finds in random scenes, frozen, beside random actions.
+
+    python -m risk_sac.lab.figures.pretrained_policy [--family low] [--policy FILE] [--seed 301] [--episodes 60] EGO ...
+
+FILE is what `risk-sac pretrain` has written; without it, the shipped policy plays. An ego is `default`, a driver, or a
+driver and a defect such as `idm-aeb+latency`. The policy is asked for any failure, and for each kind that it knows in
+turn.
+"""
+
+import argparse
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from risk_sac.config import SHIPPED, EgoConfig, RewardConfig
+from risk_sac.egos.registry import pinned
+from risk_sac.lab.pretraining.rollouts import PolicyEpisode, Turn, play_turn
+from risk_sac.search.frozen_policy import Layers
+from risk_sac.search.prior.policy import read_policy, shipped_policy
+
+EPISODES = 10  # of a turn
+
+
+def ego_of(name: str) -> EgoConfig:
+    """Returns the ego of a name as the command takes it."""
+    driver, *defects = name.split("+")
+    return pinned(EgoConfig() if name == "default" else EgoConfig(driver=driver, defects=tuple(defects)))
+
+
+def episodes(
+    name: str, layers: Layers | None, asked: Sequence[int], options: argparse.Namespace
+) -> Iterator[PolicyEpisode]:
+    """Plays an episode per goal before an ego, whole turns only; None as layers stands for random actions."""
+    for turn in range(len(asked) // EPISODES):
+        goals = tuple(asked[EPISODES * turn : EPISODES * (turn + 1)])
+        yield from play_turn(
+            Turn(options.family, ego_of(name), name, (options.seed, turn), goals, layers, RewardConfig())
+        )
+
+
+def main() -> None:
+    """Prints a row for each ego and driver."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("egos", nargs="+", metavar="EGO")
+    parser.add_argument("--family", choices=SHIPPED, default="low")
+    parser.add_argument("--policy", type=Path, metavar="FILE")
+    parser.add_argument("--seed", type=int, default=301)
+    parser.add_argument("--episodes", type=int, default=60)
+    options = parser.parse_args()
+    pretrained = read_policy(options.policy) if options.policy else shipped_policy(options.family)
+    if pretrained is None:
+        parser.error(f"--family: {options.family} has no shipped policy")
+    asked = [k % (len(pretrained.goals) + 1) for k in range(options.episodes)]
+    layers = [layer[0] if layer.shape[1] > 1 else layer[0, 0] for layer in pretrained.policy]
+    print("| ego | driven by | failures | distinct | candidates, distinct | steps |\n|---|---|---|---|---|---|")
+    for name in options.egos:
+        for driver, network in (("policy", layers), ("random", None)):
+            played = list(episodes(name, network, asked, options))
+            failed = [each for each in played if each.kind]
+            kinds, candidates = {each.kind for each in failed}, {each.kind for each in failed if each.candidate}
+            steps = sum(each.steps for each in played)
+            print(
+                f"| `{name}` | {driver} | {len(failed)} of {len(played)} | {len(kinds)} | {len(candidates)} | {steps} |"
+            )
+
+
+if __name__ == "__main__":
+    main()

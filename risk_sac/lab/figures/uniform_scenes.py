@@ -1,0 +1,118 @@
+"""What scripts find in uniformly drawn scenes: the model's choice, random ones, and the best of many.
+
+    python -m risk_sac.lab.figures.uniform_scenes OUT --egos NAME ... [--families NAME ...] [--drivers NAME ...]
+        [--scenes N] [--scripts N]
+
+plays each driver before each ego, and rewrites OUT/scenes.csv after each. All meet the same scenes, and nothing is
+learnt. `any` plays up to N scripts in a scene until one fails, half of them random and half mutated from the library.
+So its failures are the ceiling of what scripts can reach there.
+"""
+
+import argparse
+from collections.abc import Iterator
+from contextlib import closing
+from functools import partial
+from itertools import product
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from risk_sac.config import SHIPPED, RunSpec
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.errors import EgoFailed, InfeasibleScene
+from risk_sac.lab.figures.pretrained_policy import ego_of
+from risk_sac.lab.figures.side_by_side import Row, rows_of
+from risk_sac.lab.pretraining.episodes import ScriptEpisode, outcome_of, play
+from risk_sac.search.agents.controls import ScriptFollower
+from risk_sac.search.prior.start import Start, start_of
+from risk_sac.search.scene_optimizer.archive import mutated
+from risk_sac.world.types import Floats
+
+DRIVERS = ("model", "random", "any")
+SEED = 5
+CHOICE = 1024  # scripts among which the model chooses
+
+
+class Cell(NamedTuple):
+    """One driver of adversaries before one ego."""
+
+    family: str
+    ego: str
+    driver: str
+
+
+def script(random: np.random.Generator, start: Start, genes: int) -> Floats:
+    """Draws a script: random, or a row of the library mutated by another one."""
+    own, other = (start.library[random.integers(len(start.library))][-genes:] for _ in range(2))
+    return random.random(genes) if random.random() < 0.5 else mutated(own, other, random)
+
+
+def chosen(random: np.random.Generator, start: Start, scene: Floats, genes: int) -> Floats:
+    """Returns the script that the model holds to be worth most in a scene."""
+    points = np.array([np.concatenate([scene, script(random, start, genes)]) for _ in range(CHOICE)])
+    prediction = start.model.predict(start.translation.known(points), start.belief)
+    best: Floats = points[int((prediction.fails + 4.0 * prediction.candidate).argmax())][-genes:]
+    return best
+
+
+def found(cell: Cell, scenes: int, scripts: int) -> Iterator[ScriptEpisode]:
+    """Yields an episode per scene: the first that fails, or else the last; unplayable scenes are drawn again."""
+    spec = RunSpec(family=cell.family, method="archive", seed=SEED, ego=ego_of(cell.ego))
+    drawn, random = np.random.default_rng(SEED), np.random.default_rng((SEED, 1))
+    with closing(RiskSacEnv.of(spec)) as env:
+        space, horizon = env.problem.space, env.problem.family.horizon_steps
+        follower, start = ScriptFollower(env.problem.family), start_of(env.problem, "shipped")
+        while scenes:
+            scene, seed, episode = drawn.random(space.dimension), int(drawn.integers(1 << 30)), None
+            for _ in range(scripts if cell.driver == "any" else 1):
+                if cell.driver == "model":
+                    genes = chosen(random, start, scene, follower.genes)
+                elif cell.driver == "random":
+                    genes = random.random(follower.genes)
+                else:
+                    genes = script(random, start, follower.genes)
+                try:
+                    encounter, steps = play(env, follower, space.from_unit(scene), genes, seed, horizon)
+                except (InfeasibleScene, EgoFailed):
+                    break
+                episode = outcome_of(encounter, np.concatenate([scene, genes]), cell.ego, steps)
+                if episode.kind:
+                    break
+            if episode is not None:
+                scenes -= 1
+                yield episode
+
+
+def row(scenes: int, scripts: int, cell: Cell) -> Row:
+    """Returns the figures of a driver before an ego."""
+    episodes = list(found(cell, scenes, scripts))
+    failed = [each for each in episodes if each.kind]
+    return cell._asdict() | {
+        "scenes": len(episodes),
+        "failures": len(failed),
+        "distinct": len({each.kind for each in failed}),
+        "candidates": sum(each.candidate for each in failed),
+        "candidates_distinct": len({each.kind for each in failed if each.candidate}),
+        "steps": sum(each.steps for each in episodes),  # of the episodes that are counted
+    }
+
+
+def main() -> None:
+    """Plays, counts and writes."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--egos", nargs="+", required=True, metavar="EGO", help="as pretrained_policy takes them")
+    parser.add_argument("--families", nargs="+", choices=SHIPPED, default=list(SHIPPED))
+    parser.add_argument("--drivers", nargs="+", choices=DRIVERS, default=list(DRIVERS))
+    parser.add_argument("--scenes", type=int, default=60)
+    parser.add_argument("--scripts", type=int, default=500)
+    parser.add_argument("--jobs", type=int, default=2)
+    options = parser.parse_args()
+    cells = [Cell(*cell) for cell in product(options.families, options.egos, options.drivers)]
+    rows_of(partial(row, options.scenes, options.scripts), cells, options.jobs, options.out / "scenes.csv")
+    print((options.out / "scenes.csv").read_text())
+
+
+if __name__ == "__main__":
+    main()

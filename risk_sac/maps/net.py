@@ -1,0 +1,242 @@
+"""A SUMO net as the finders need it: lanes, how they lead on, and right of way."""
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Hashable, Mapping, Set
+from dataclasses import dataclass, field
+from functools import cached_property, wraps
+from typing import Concatenate, ParamSpec, TypeVar, cast
+
+from risk_sac.scenario.layout import Point
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NetLane:
+    """A lane, also one inside a junction."""
+
+    id: str
+    edge: str
+    index: int
+    length_m: float
+    width_m: float
+    limit_mps: float
+    line: tuple[Point, ...]
+    drivable: bool
+
+    @property
+    def way_in_rad(self) -> float:
+        """Direction in which it begins."""
+        return direction(self.line[0], self.line[1])
+
+    @property
+    def way_out_rad(self) -> float:
+        """Direction in which it ends."""
+        return direction(self.line[-2], self.line[-1])
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """A road in one direction; those inside junctions are kept by their lanes alone."""
+
+    id: str
+    start: str  # junctions
+    end: str
+    lanes: tuple[NetLane, ...]
+
+    @cached_property
+    def drivable(self) -> tuple[NetLane, ...]:
+        """Its lanes for cars, from right to left."""
+        return tuple(lane for lane in self.lanes if lane.drivable)
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """Connection of a lane to another, across a junction."""
+
+    source: NetLane
+    target: NetLane
+    inside: tuple[NetLane, ...]  # the lanes between them
+    signal: str | None
+    index: int | None  # among the links of its junction
+
+    @property
+    def inside_m(self) -> float:
+        """Length of the way across the junction."""
+        return sum(lane.length_m for lane in self.inside)
+
+    @cached_property
+    def line(self) -> list[Point]:
+        """Its way between the roads."""
+        return [point for lane in self.inside for point in lane.line]
+
+    @cached_property
+    def turn_rad(self) -> float:
+        """Angle by which it turns to the left."""
+        return math.remainder(self.target.way_in_rad - self.source.way_out_rad, math.tau)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Junction:
+    """A junction that is not one inside another."""
+
+    id: str
+    type: str
+    x_m: float
+    y_m: float
+    outline: tuple[Point, ...]
+    foes: Mapping[int, str]  # of each link by its index: SUMO's row of bits, the last is link 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Crossing:
+    """A pedestrian crossing."""
+
+    id: str
+    junction: str
+    edges: tuple[str, ...]  # that it crosses
+    line: tuple[Point, ...]
+    width_m: float
+    signal: str | None
+
+
+@dataclass(eq=False)
+class Net:
+    """All of it; edges, junctions and crossings by id."""
+
+    edges: dict[str, Edge] = field(default_factory=dict)
+    junctions: dict[str, Junction] = field(default_factory=dict)
+    crossings: list[Crossing] = field(default_factory=list)
+    onward: dict[str, list[Link]] = field(default_factory=lambda: defaultdict(list))  # by the lane they come from
+    back: dict[str, list[Link]] = field(default_factory=lambda: defaultdict(list))  # by the lane they lead to
+    cycles_s: dict[str, float] = field(default_factory=dict)  # of the signals
+    inside: dict[str, list[NetLane]] = field(default_factory=lambda: defaultdict(list))  # drivable, by junction
+    # Inside junctions, by a lane's id: the lanes that vehicles wait for before they drive onto it.
+    waits_for: dict[str, tuple[NetLane, ...]] = field(default_factory=dict)
+    walkways: dict[str, list[tuple[Point, ...]]] = field(default_factory=lambda: defaultdict(list))  # by junction
+    keeps_left: bool = False
+    known: dict[Hashable, object] = field(default_factory=dict)  # what was found out; see `once`
+
+    @cached_property
+    def arriving(self) -> Mapping[str, list[Edge]]:
+        """Edges with a lane for cars, by the junction at their end."""
+        found = defaultdict(list)
+        for edge in self.edges.values():
+            if edge.drivable:
+                found[edge.end].append(edge)
+        return found
+
+    @cached_property
+    def crossings_of(self) -> Mapping[tuple[str, str], list[Crossing]]:
+        """By junction and by an edge that they cross."""
+        found = defaultdict(list)
+        for crossing in self.crossings:
+            for edge in crossing.edges:
+                found[crossing.junction, edge].append(crossing)
+        return found
+
+    def are_foes(self, one: Link, other: Link) -> bool:
+        """Whether two links of a junction cross or meet, by what the net says."""
+        if one.index is None or other.index is None:
+            return False
+        foes = self.junctions[self.edges[one.source.edge].end].foes
+        pairs = ((one.index, other.index), (other.index, one.index))
+        return any(foes.get(row, "")[::-1][column : column + 1] == "1" for row, column in pairs)
+
+    def lane(self, id_: str) -> NetLane:
+        """A lane outside junctions."""
+        edge, _, index = id_.rpartition("_")
+        lanes = self.edges[edge].lanes
+        if not 0 <= int(index) < len(lanes):
+            raise ValueError(f"a connection names lane {index} of edge {edge!r}, which has {len(lanes)}")
+        return lanes[int(index)]
+
+
+def direction(a: Point, b: Point) -> float:
+    """Direction from one point to another."""
+    return math.atan2(b[1] - a[1], b[0] - a[0])
+
+
+def once(find: Callable[Concatenate[Net, P], T]) -> Callable[Concatenate[Net, P], T]:
+    """Remembers with a net what a function has found on it."""
+
+    @wraps(find)
+    def remembered(net: Net, /, *args: P.args, **kwargs: P.kwargs) -> T:
+        asked = (find, *args)
+        if asked not in net.known:
+            net.known[asked] = find(net, *args, **kwargs)
+        return cast(T, net.known[asked])
+
+    return remembered
+
+
+@dataclass(frozen=True, slots=True)
+class NetSummary:
+    """Contents of a net; edges and lanes are those outside junctions."""
+
+    edges: int
+    junctions: int
+    lanes: int
+    length_m: float  # of the edges, each counted once however many lanes it has
+    bounding_box: tuple[float, float, float, float]  # of the lanes: west, south, east, north, m
+
+
+def summary(net: Net) -> NetSummary:
+    """Counts and extent of a net that has an edge at least."""
+    lanes = [lane for edge in net.edges.values() for lane in edge.lanes]
+    x, y = zip(*(point for lane in lanes for point in lane.line), strict=True)
+    return NetSummary(
+        edges=len(net.edges),
+        junctions=len(net.junctions),
+        lanes=len(lanes),
+        length_m=round(sum(edge.lanes[0].length_m for edge in net.edges.values() if edge.lanes), 3),
+        bounding_box=(min(x), min(y), max(x), max(y)),
+    )
+
+
+def net_remarks(net: Net) -> list[str]:
+    """Reasons why no pattern fits on a net, or only few places can be found."""
+    found = []
+    driven = {edge.id for edge in net.edges.values() if edge.drivable}
+    if not driven:
+        found.append("no edge has a lane for passenger cars: no pattern will fit")
+    if net.keeps_left:
+        found.append("traffic keeps to the left: no pattern will fit")
+    if not net.cycles_s:
+        found.append("there are no traffic lights")
+    if not net.onward and _roads_meet(net):
+        found.append("there are no connections, although roads meet: no lane leads on to another")
+    elif (largest := _largest_part(driven, net)) < len(driven):
+        found.append(f"roads are disconnected: the largest part has {largest} of {len(driven)} edges for cars")
+    return found
+
+
+def _roads_meet(net: Net) -> bool:
+    """Tells whether any road leads to another, except back from a dead end."""
+    leaving = defaultdict(set)
+    for edge in net.edges.values():
+        if edge.drivable:
+            leaving[edge.start].add(edge.end)
+    return any(leaving[edge.end] - {edge.start} for edge in net.edges.values() if edge.drivable)
+
+
+def _largest_part(driven: Set[str], net: Net) -> int:
+    """Edges in the largest part whose edges are connected, whichever way, or are two directions of one road."""
+    pairs = [(link.source.edge, link.target.edge) for links in net.onward.values() for link in links]
+    directions = {(net.edges[id_].start, net.edges[id_].end): id_ for id_ in driven}
+    pairs += [(id_, directions[b, a]) for (a, b), id_ in directions.items() if (b, a) in directions]
+    beside = defaultdict(list)
+    for one, other in pairs:
+        beside[one].append(other)
+        beside[other].append(one)
+    largest, left = 0, set(driven)
+    while left:
+        part = [left.pop()]
+        for id_ in part:  # grows meanwhile
+            new = left.intersection(beside[id_])
+            left -= new
+            part += new
+        largest = max(largest, len(part))
+    return largest

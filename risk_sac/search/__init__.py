@@ -1,0 +1,1 @@
+"""The search for failures: Algorithm 1, its agents, samplers and priors."""

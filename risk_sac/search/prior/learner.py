@@ -1,0 +1,57 @@
+"""RISK-SAC that starts from the pretrained policy and goes on learning by Algorithm 1."""
+
+from typing import Any
+
+from risk_sac.config.learner import LearnerConfig
+from risk_sac.config.methods import Method
+from risk_sac.search.agents.learner import Learner
+from risk_sac.search.agents.sac import SacAgent
+from risk_sac.search.prior.policy import Folded, PolicyLayout, PretrainedPolicy
+from risk_sac.world.types import Floats, Vector
+
+FINE_TUNING = {
+    "actor_learning_rate": 3e-4,
+    "critic_learning_rate": 3e-4,
+    "warmup_steps": 0,
+    "updates_per_step": 0.14,  # fewer than one per decision, as in the pretraining
+}
+"""Settings of `learner.agent` in the place of the defaults for networks that begin from nothing."""
+
+
+class PretrainedLearner(Learner):
+    """Learner with pretrained networks.
+
+    Choice: what it learns is to reach any failure. If the policy knows kinds, one of them is asked for in each episode
+    to explore: a shift of its first bias. Its memory takes these actions like those of any other driver.
+    """
+
+    def __init__(
+        self, pretrained: PretrainedPolicy, layout: PolicyLayout, method: Method, config: LearnerConfig, seed: int
+    ) -> None:
+        """Takes over the networks; see `Learner`."""
+        start = Folded.of(pretrained, layout)
+        given = config.agent.model_fields_set
+        changed: dict[str, Any] = {name: value for name, value in FINE_TUNING.items() if name not in given}
+        hidden = tuple(weight.shape[-1] for weight in start.policy[:-2:2])
+        agent = config.agent.model_copy(update={**changed, "hidden_sizes": hidden})
+        config = config.model_copy(update={"agent": agent})
+        self._start = start
+        self._shift: Vector | None = None
+        super().__init__(layout.observation_size, layout.action_size, method, config, seed)
+
+    def begin(self, genes: Floats) -> None:
+        """See `Learner.begin`; draws what to ask for, any failure or one kind."""
+        super().begin(genes)
+        shifts = self._start.shifts
+        goal = int(self._generator.integers(len(shifts) + 1))
+        self._shift = shifts[goal - 1] if goal else None
+
+    def _make_agent(self, observation_size: int, action_size: int, seed: int) -> SacAgent:
+        agent, sac = self._config.agent, self._config.sac
+        made = SacAgent(observation_size, action_size, agent, sac, seed, self.device, normalised=True)
+        made.begin_from(self._start.policy, self._start.critics, self._start.temperature)
+        return made
+
+    def _drawn(self, observation: Vector, explore: bool) -> Vector:
+        assert isinstance(self._agent, SacAgent)
+        return self._agent.act(observation, explore, self._shift if explore else None)

@@ -1,0 +1,235 @@
+"""Run state between two episodes, and its checkpoint."""
+
+import hashlib
+import logging
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from risk_sac.config import RunSpec, method_of
+from risk_sac.egos.guard import DEAD_AFTER
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.errors import ConfigError
+from risk_sac.metrics import MetricsAccumulator, results_digest
+from risk_sac.records import EpisodeRecord, Outcome, Phase, RunMetrics, SeriesFile, stored
+from risk_sac.risk.reward import TrainingReward
+from risk_sac.run_folder import checkpoint
+from risk_sac.run_folder.durable import sha256
+from risk_sac.run_folder.results import EPISODES, FAILURES, records_from_lines, series_name
+from risk_sac.run_folder.series import write_series
+from risk_sac.search.searchers import Searchers
+from risk_sac.world.jit import cpu_s
+
+logger = logging.getLogger(__name__)
+
+CHECKPOINT = "checkpoint"
+LATEST = 200  # records in which the episodes of a dead ego are looked for
+PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
+
+
+@dataclass(frozen=True, slots=True)
+class RunOutcome:
+    """Results of a run."""
+
+    metrics: RunMetrics  # of the search, or of the i.i.d. phase that the run is
+    evaluation: RunMetrics | None  # of the frozen policy, if the budget has evaluation episodes
+    digest: str  # of all records: the same spec gives the same digest
+    finished: bool  # False when the observer ended it
+    versions: Mapping[str, str]
+    device: str
+    wall_s: float  # of this process; excludes what was done before a resume
+    cpu_s: float  # the same in processor time, which a busy machine does not lengthen
+    episode_cpu_s: tuple[float, ...]  # from the run's start to each episode's end, resumes included, compilation not
+
+
+class RunState:
+    """Parts of a run, and its episodes so far.
+
+    Records are appended to the folder's `episodes.jsonl`; a checkpoint holds the length and digest of that file.
+
+    Attributes:
+      spec: what to run.
+      problem: what to falsify.
+      env: the closed loop.
+      searchers: propose the scenes and drive the adversaries.
+      reward: what the agent is trained on, and the scenes are scored by.
+      records: one per episode.
+      series: time series by episode, where a requirement that counts was violated.
+    """
+
+    def __init__(self, spec: RunSpec, folder: Path) -> None:
+        """Begins a run; `resume` continues the one in the folder."""
+        self.spec = spec
+        self.env = RiskSacEnv.of(spec)
+        self.problem = self.env.problem
+        self.searchers = Searchers(spec, self.problem, self.env.observation_size, self.env.action_size)
+        self.reward = TrainingReward(method_of(spec.method), spec.learner)
+        self.records: list[EpisodeRecord] = []
+        self.series: dict[int, SeriesFile] = {}
+        self._episode_cpu_s: list[float] = []
+        self._folder = folder
+        self._saved = 0  # records in the newest checkpoint
+        self._written = 0  # bytes of `episodes.jsonl` that are of these records
+        self._digest = hashlib.sha256()  # of those bytes
+        self._search = MetricsAccumulator(self.problem.family.horizon_steps)
+        self._evaluation = MetricsAccumulator(self.problem.family.horizon_steps)
+        self._cpu_began_s = cpu_s()
+
+    @property
+    def finished(self) -> bool:
+        """Whether the budget is spent."""
+        budget = self.spec.budget
+        return not self.learning and len(self.records) - self._search.episodes >= budget.evaluation_episodes
+
+    @property
+    def learning(self) -> bool:
+        """Whether the next episode belongs to the search; in the evaluation the policy is frozen."""
+        budget, played = self.spec.budget, self._search.episodes
+        if played < budget.least_episodes or budget.cpu_s is None:
+            return played < budget.episodes
+        return played < budget.episodes and self._episode_cpu_s[played - 1] < budget.cpu_s
+
+    @property
+    def phase(self) -> Phase:
+        """Phase of the next episode."""
+        if self.spec.iid:
+            return "iid"
+        return "search" if self.learning else "evaluation"
+
+    @property
+    def environment_steps(self) -> int:
+        """Steps of all episodes so far."""
+        return self.records[-1].environment_steps if self.records else 0
+
+    def add(self, record: EpisodeRecord) -> RunMetrics:
+        """Adds the episode that `env` has just played, and writes its record and the time series of a violation.
+
+        Returns:
+          The metrics of its phase.
+        """
+        if record.worst_violation is not None:
+            file = self._folder / FAILURES / series_name(record.index)
+            self.series[record.index] = write_series(file, self.env.trace.series())
+        self.records.append(record)
+        self._append(record)
+        self.searchers.add(record)
+        self._episode_cpu_s.append(cpu_s() - self._cpu_began_s)
+        return self._count(record)
+
+    def refuse_dead_ego(self) -> None:
+        """Ends a run whose ego failed in each of the latest episodes.
+
+        A resumed run goes on from the latest checkpoint.
+
+        Raises:
+          ConfigError: with the reason of the latest failure.
+        """
+        driven = [record for record in self.records[-LATEST:] if record.outcome is not Outcome.REJECTED]
+        latest = driven[-DEAD_AFTER:]
+        if len(latest) == DEAD_AFTER and all(record.outcome is Outcome.INVALID for record in latest):
+            raise ConfigError(
+                "ego.driver",
+                f"{self.spec.ego.driver!r}, which failed in {DEAD_AFTER} episodes in a row, the last time with "
+                f"{latest[-1].reason}",
+                "one that drives",
+            )
+
+    def save(self) -> None:
+        """Writes the checkpoint if there is a new episode; called between episodes only."""
+        if self._saved == len(self.records):
+            return
+        with (self._folder / EPISODES).open("rb") as file:
+            os.fsync(file.fileno())
+        state = {
+            "episodes_bytes": self._written,
+            "episodes_sha256": self._digest.hexdigest(),
+            "series": {index: file.sha256 for index, file in self.series.items()},
+            "episode_cpu_s": self._episode_cpu_s,
+            **self.searchers.state(),
+        }
+        checkpoint.save(self._folder / CHECKPOINT, state, self.spec.digest)
+        self._saved = len(self.records)
+
+    def resume(self) -> list[tuple[EpisodeRecord, RunMetrics]]:
+        """Continues from the folder's newest intact checkpoint; without one the run starts from the beginning.
+
+        Either way the results are the same.
+
+        Returns:
+          The episodes of the checkpoint with the metrics after each.
+        """
+        state = checkpoint.load_newest(self._folder / CHECKPOINT, self.spec.digest)
+        if state is None:
+            return []
+        content = _beginning(self._folder / EPISODES, state["episodes_bytes"])
+        digest = hashlib.sha256(content)
+        if digest.hexdigest() != state["episodes_sha256"]:
+            logger.warning("%s is damaged or gone; the run starts from the beginning", self._folder / EPISODES)
+            return []
+        self._written, self._digest = len(content), digest
+        self.records = records_from_lines(content)
+        self.series = _series(self._folder, self.records, state["series"])
+        self.searchers.load(state, self.records)
+        self._episode_cpu_s = list(state["episode_cpu_s"])
+        self._cpu_began_s = cpu_s() - self._episode_cpu_s[-1]
+        self._saved = len(self.records)
+        logger.info("resumed after %d episodes", len(self.records))
+        return [(record, self._count(record)) for record in self.records]
+
+    def summary(self, *, wall_s: float, cpu_s: float) -> RunOutcome:
+        """Summarises the run so far; the times are of this process."""
+        return RunOutcome(
+            metrics=self._search.metrics(),
+            evaluation=self._evaluation.metrics() if self.spec.budget.evaluation_episodes else None,
+            digest=results_digest(self.records),
+            finished=self.finished,
+            versions={name: version(name) for name in PACKAGES},
+            device=self.searchers.agent.device,
+            wall_s=wall_s,
+            cpu_s=cpu_s,
+            episode_cpu_s=tuple(self._episode_cpu_s),
+        )
+
+    def close(self) -> None:
+        """Ends the simulation."""
+        self.env.close()
+
+    def _append(self, record: EpisodeRecord) -> None:
+        """Writes a record behind those of this run; what an interrupted run wrote there is cut off."""
+        line = stored(record).encode() + b"\n"
+        with (self._folder / EPISODES).open("r+b" if self._written else "wb") as file:
+            file.truncate(self._written)
+            file.seek(self._written)
+            file.write(line)
+        self._written += len(line)
+        self._digest.update(line)
+
+    def _count(self, record: EpisodeRecord) -> RunMetrics:
+        return (self._evaluation if record.evaluating else self._search).add(record)
+
+
+def _beginning(file: Path, length: int) -> bytes:
+    """Reads so many bytes of a file; fewer where it is shorter or missing."""
+    try:
+        with file.open("rb") as opened:
+            return opened.read(length)
+    except FileNotFoundError:
+        return b""
+
+
+def _series(folder: Path, records: list[EpisodeRecord], digests: Mapping[int, str]) -> dict[int, SeriesFile]:
+    """Time series by episode, with the digests they were written with; a damaged file is logged."""
+    found = {}
+    for record in records:
+        if record.worst_violation is None:
+            continue
+        file = folder / FAILURES / series_name(record.index)
+        actual = sha256(file)
+        digest = digests.get(record.index, actual)
+        if actual is None or actual != digest:
+            logger.warning("the time series %s is damaged or gone; only a new run can record it again", file)
+        if digest is not None:
+            found[record.index] = SeriesFile(file.name, digest)
+    return found

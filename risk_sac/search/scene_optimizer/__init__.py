@@ -1,0 +1,8 @@
+"""Searches initial scenes in the unit cube by ask and tell.
+
+Source: RISK-SAC, Eq. 11 and Alg. 1, l. 1, 4, 21-22.
+"""
+
+from risk_sac.search.scene_optimizer.archive import ArchiveOptimizer, DiscountedBandit
+from risk_sac.search.scene_optimizer.base import NO_ENCOUNTER, Encounter, IidSampler, SceneOptimizer, SobolOptimizer
+from risk_sac.search.scene_optimizer.bayesian import BotorchOptimizer

@@ -1,0 +1,272 @@
+"""Bandit that chooses between two ways to search by their recent yield per cost."""
+
+import math
+from collections import Counter
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from risk_sac.config import SceneOptimizerConfig
+from risk_sac.records import NO_CONTACT, Collision, DrivenBy, Severity, Violation
+from risk_sac.search.scene_optimizer.base import Encounter, SceneOptimizer, State
+from risk_sac.verdicts.distinct import niche_of
+from risk_sac.world.types import Floats
+
+
+class DiscountedBandit:
+    """Two arms; the chance of each goes by the square of its discounted yield.
+
+    yield_i = (prior_yield · prior_cost + Σ discount^k worth) / (prior_cost + Σ discount^k cost),  p_i ∝ yield_i²
+
+    k counts the later pulls of the same arm, so an arm that is not pulled keeps its yield.
+    """
+
+    def __init__(
+        self,
+        *,
+        discount: float,
+        prior_worth: float,
+        prior_cost: float,
+        least: float,
+        unit_costs: tuple[float, float] = (1.0, 1.0),
+    ) -> None:
+        """Begins without experience: both arms are as likely.
+
+        Args:
+          discount: weight of a pull after one more pull of the same arm.
+          prior_worth: worth that an untried arm is credited with.
+          prior_cost: cost that this worth is taken to have had.
+          least: smallest share of all costs that is spent on either arm.
+          unit_costs: cost of a unit of effort of each arm; only their ratio counts.
+        """
+        self._discount, self._prior_worth, self._prior_cost = discount, prior_worth, prior_cost
+        self._unit_costs = unit_costs
+        self._bounds = self._probability_of(least), self._probability_of(1.0 - least)
+        self._worth, self._spent = [0.0, 0.0], [0.0, 0.0]
+
+    @property
+    def probability(self) -> float:
+        """Returns the probability of pulling arm 1 next.
+
+        Both arms' pulls are taken to need equal effort.
+        """
+        first, second = (
+            ((worth + self._prior_worth) / (spent + self._prior_cost)) ** 2
+            for worth, spent in zip(self._worth, self._spent, strict=True)
+        )
+        low, high = self._bounds
+        return min(max(second / (first + second), low), high)
+
+    def tell(self, arm: int, worth: float, effort: float = 1.0) -> None:
+        """Counts a pull of arm 0 or 1, its worth and its effort."""
+        self._worth[arm] = self._discount * self._worth[arm] + worth
+        self._spent[arm] = self._discount * self._spent[arm] + self._unit_costs[arm] * effort
+
+    def state(self) -> dict[str, Any]:
+        """Plain values, to continue from."""
+        return {"worth": list(self._worth), "spent": list(self._spent)}
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Continues from `state()`."""
+        self._worth, self._spent = list(state["worth"]), list(state["spent"])
+
+    def _probability_of(self, share: float) -> float:
+        """Chance of arm 1 with which it spends this share of all costs."""
+        first, second = self._unit_costs
+        return share * first / (share * first + (1.0 - share) * second)
+
+
+INITIAL, RANDOM_SHARE = 12, 0.15  # points drawn at random: the first ones, and of the rest, where elites abound
+DEVIATIONS = (0.05, 0.15, 0.4)  # of a mutation
+SHARES = (0.2, 0.5, 1.0)  # of the coordinates that it changes
+CROSSED, CROSSING_DEVIATION = 0.5, 0.2  # how often, and how far, it also moves along the line to another elite
+PREVENTABLE_WORTH = 1.0
+ALMOST_WORTH, IMPACT_MPS = 0.4, 5.0  # where R157's driver only just touches; a third of it where at 5.5 m/s
+LEAST_WORTH = 0.02  # of a failure
+MINOR_SHARE = 0.25  # of its worth that a minor contact has
+NEAR_MISS_WORTH = 0.1
+NEAR_MARGIN = 0.3  # of a requirement, in scales: what undisturbed traffic keeps is about 1
+NEW, NEW_CANDIDATE = 0.5, 2.0  # credit of a parent for a distinct failure, and for a candidate for the headline
+
+
+@dataclass(slots=True, kw_only=True)
+class Elite:
+    """An episode worth building on."""
+
+    point: Floats  # its scene and its genes, in the unit cube
+    worth: float
+    target: str  # the adversary that struck, or the requirement that was violated without contact
+    kind: str  # elites of one kind share their chances
+    missed: float = 0.0  # of a near miss: its smallest time to encounter, s, or its least robustness, in scales
+    drawn: int = 0
+    credit: float = 0.0  # for what was new among its children
+
+
+class Elites:
+    """One elite for each distinct violation, and a near miss for each adversary or requirement without one."""
+
+    def __init__(self) -> None:
+        self._failures: dict[str, Elite] = {}  # by niche
+        self._misses: dict[str, Elite] = {}  # by target
+        self._candidates: set[str] = set()  # niches with a candidate for the headline
+
+    @property
+    def failures(self) -> int:
+        """Niches that were reached."""
+        return len(self._failures)
+
+    def pool(self) -> list[Elite]:
+        """Returns all failures, and the near misses of the targets that have none."""
+        hit = {elite.target for elite in self._failures.values()}
+        return [*self._failures.values(), *(miss for name, miss in self._misses.items() if name not in hit)]
+
+    def draw(self, pool: list[Elite], random: np.random.Generator) -> Elite:
+        """Draws one of the pool.
+
+        p ∝ worth · (1 + credit) / (1 + drawn) / √(elites of its kind)
+        """
+        alike = Counter(elite.kind for elite in pool)
+        weights = np.array([e.worth * (1 + e.credit) / (1 + e.drawn) / math.sqrt(alike[e.kind]) for e in pool])
+        elite = pool[random.choice(len(pool), p=weights / weights.sum())]
+        elite.drawn += 1
+        return elite
+
+    def add_failure(self, point: Floats, violation: Collision | Violation, parent: Elite | None) -> None:
+        """Adds a valid violation if it is the first in its niche, or worth more than that."""
+        niche, kind = " ".join(map(str, niche_of(violation))), violation.signature
+        known = self._failures.get(niche)
+        worth = _worth(violation)
+        if parent is not None:
+            new_candidate = violation.headline_candidate and niche not in self._candidates
+            parent.credit += NEW * (known is None) + NEW_CANDIDATE * new_candidate
+        if violation.headline_candidate:
+            self._candidates.add(niche)
+        if known is None or known.worth < worth:
+            target = violation.other_id if isinstance(violation, Collision) else violation.requirement
+            self._failures[niche] = Elite(point=point, worth=worth, target=target, kind=kind)
+
+    def add_misses(self, point: Floats, encounter: Encounter) -> None:
+        """Adds near misses by adversary and by requirement, where none was nearer.
+
+        Choice: of an adversary by the time to encounter, and not by the gap, which is small whenever something passes
+        by. A requirement whose margin nothing has touched is no aim, or a share of the search would go to what this
+        ego cannot do.
+        """
+        missed = dict(encounter.encounters_s)
+        missed |= {
+            name: margin for name, margin in encounter.margins.items() if name != NO_CONTACT and margin < NEAR_MARGIN
+        }
+        for name, nearest in missed.items():
+            known = self._misses.get(name)
+            if known is None or nearest <= known.missed:
+                kind = f"near miss of {name}"
+                self._misses[name] = Elite(point=point, worth=NEAR_MISS_WORTH, target=name, kind=kind, missed=nearest)
+
+    def state(self) -> State:
+        """Returns plain values to continue from."""
+        return {
+            "failures": {niche: _plain(elite) for niche, elite in self._failures.items()},
+            "misses": {name: _plain(elite) for name, elite in self._misses.items()},
+            "candidates": sorted(self._candidates),
+        }
+
+    def load(self, state: State) -> None:
+        """Continues from `state()`."""
+        self._failures = {niche: _elite(elite) for niche, elite in state["failures"].items()}
+        self._misses = {name: _elite(elite) for name, elite in state["misses"].items()}
+        self._candidates = set(state["candidates"])
+
+
+def _plain(elite: Elite) -> State:
+    return {**asdict(elite), "point": elite.point.tolist()}
+
+
+def _elite(plain: State) -> Elite:
+    return Elite(**{**plain, "point": np.array(plain["point"])})
+
+
+def _worth(violation: Collision | Violation) -> float:
+    """1 for what is preventable; of other contacts the more, the slower R157's driver would have touched.
+
+    Choice: a minor contact has a share of it, so that a niche prefers what the headline counts.
+    """
+    share = MINOR_SHARE if isinstance(violation, Collision) and violation.severity is Severity.MINOR else 1.0
+    return share * _worth_of_any(violation)
+
+
+def _worth_of_any(violation: Collision | Violation) -> float:
+    if violation.preventable:
+        return PREVENTABLE_WORTH
+    if isinstance(violation, Violation):
+        return ALMOST_WORTH * min(-violation.robustness, 1.0) + LEAST_WORTH
+    judged = violation.judgement
+    if judged is None or "r157" not in judged.drivers:
+        return LEAST_WORTH
+    return ALMOST_WORTH * math.exp(-judged.drivers["r157"].impact_speed_mps / IMPACT_MPS) + LEAST_WORTH
+
+
+class ArchiveOptimizer(SceneOptimizer):
+    """Breeds points from elites; scores them so that every method's records carry f_e."""
+
+    kind = "archive"
+    initial = INITIAL  # points that are drawn at random at first
+
+    def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:
+        super().__init__(dimension, config, seed)
+        self._random = np.random.default_rng(seed)
+        self._elites = Elites()
+        self._asked = 0
+        self._parent: Elite | None = None  # of the point that was asked for last
+
+    def ask(self) -> Floats:
+        """See `SceneOptimizer.ask`."""
+        self._asked += 1
+        pool = self._elites.pool()
+        random_share = max(RANDOM_SHARE, 1.0 / (2 + self._elites.failures))
+        if self._asked <= self.initial or not pool or self._random.random() < random_share:
+            self._parent, self.driven_by = None, DrivenBy.RANDOM
+            return self._random.random(self._dimension)
+        self._parent, self.driven_by = self._elites.draw(pool, self._random), DrivenBy.SCRIPT
+        return mutated(self._parent.point, pool[self._random.integers(len(pool))].point, self._random)
+
+    def _learn(self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter) -> None:
+        parent, self._parent = self._parent, None
+        if mean_return is None:
+            return
+        self._elites.add_misses(point, encounter)
+        for violation in encounter.valid_violations:
+            self._elites.add_failure(point, violation, parent)
+
+    def state(self) -> State:
+        """See `SceneOptimizer.state`; no point is out then."""
+        return {
+            **super().state(),
+            "random": self._random.bit_generator.state,
+            "elites": self._elites.state(),
+            "asked": self._asked,
+        }
+
+    def load(self, state: State) -> None:
+        """See `SceneOptimizer.load`."""
+        super().load(state)
+        self._random.bit_generator.state = state["random"]
+        self._elites.load(state["elites"])
+        self._asked = state["asked"]
+
+
+def mutated(parent: Floats, other: Floats, random: np.random.Generator) -> Floats:
+    """Returns a point near `parent`, perhaps on the way to `other`.
+
+    A point outside the unit cube is reflected into it.
+
+    Source: the line between two elites is that of Vassiliades and Mouret, "Discovering the elite hypervolume by
+    leveraging interspecies correlation" (arXiv 1804.03906).
+    """
+    step = random.choice(DEVIATIONS) * random.standard_normal(len(parent))
+    if random.random() < CROSSED:
+        step += CROSSING_DEVIATION * random.standard_normal() * (other - parent)
+    changed = random.random(len(parent)) < random.choice(SHARES)
+    moved = np.abs(parent + np.where(changed, step, 0.0))
+    reflected: Floats = np.where(moved > 1.0, 2.0 - moved, moved).clip(0.0, 1.0)
+    return reflected

@@ -1,0 +1,220 @@
+"""The Gaussian process over scenes and its acquisition functions, as BoTorch has them; higher values are better.
+
+Everything works in float64. What draws random numbers takes a seed, and leaves torch's global generator as it was.
+
+References:
+    Ament et al. 2023, Unexpected improvements to expected improvement (LogEI).
+    Hvarfner et al. 2024, Vanilla Bayesian optimization performs great in high dimensions (BoTorch's priors).
+"""
+
+import warnings
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from risk_sac.config import SceneOptimizerConfig
+from risk_sac.search.scene_optimizer.archive import DiscountedBandit
+from risk_sac.search.scene_optimizer.base import Encounter, SceneOptimizer, State, objective, sobol_points
+from risk_sac.world.types import Floats
+
+with warnings.catch_warnings():
+    # linear_operator compiles its helpers with torch.jit while it is imported.
+    warnings.filterwarnings("ignore", message=r"`torch\.jit\.script", category=DeprecationWarning)
+    from botorch.acquisition import LogExpectedImprovement, PosteriorMean
+    from botorch.fit import fit_gpytorch_mll
+    from botorch.models import SingleTaskGP
+    from botorch.optim import optimize_acqf, optimize_acqf_discrete
+    from botorch.utils.sampling import manual_seed
+    from gpytorch.mlls import ExactMarginalLogLikelihood
+    from gpytorch.settings import fast_pred_var, skip_posterior_variances
+
+Hyperparameters = dict[str, Tensor]
+"""Raw kernel, mean and noise parameters by their name in the model."""
+
+FIT_ITERATIONS = 20  # a warm start continues from here at the next fit
+ASCENT_ITERATIONS = 3  # within about half a nat of the maximum, which takes five times as long
+
+
+def condition(points: Tensor, values: Tensor, hyperparameters: Hyperparameters | None) -> SingleTaskGP:
+    """Returns a Gaussian process with inferred noise on standardised values.
+
+    Args:
+        points: `n x d`, in [0, 1].
+        values: `n`, not all equal.
+        hyperparameters: as `fit` returned them; None takes the priors' modes.
+
+    Returns:
+        A model in evaluation mode: ARD RBF kernel, BoTorch's dimension-scaled priors.
+    """
+    standardised = (values - values.mean()) / values.std()
+    model = SingleTaskGP(points, standardised.unsqueeze(-1), outcome_transform=None)
+    if hyperparameters is not None:
+        model.load_state_dict(hyperparameters, strict=False)  # the priors' buffers stay the model's
+    return model.eval()
+
+
+def fit(points: Tensor, values: Tensor, start: Hyperparameters | None, seed: int) -> Hyperparameters:
+    """Maximises the marginal likelihood from `start`; other arguments as for `condition`."""
+    model = condition(points, values, start)
+    with manual_seed(seed):  # a fit that fails starts again from a draw of the priors
+        fit_gpytorch_mll(
+            ExactMarginalLogLikelihood(model.likelihood, model),
+            optimizer_kwargs={"options": {"maxiter": FIT_ITERATIONS}},
+            warning_handler=lambda warning: True,  # a search that ends early leaves the best parameters so far
+        )
+    return {name: parameter.detach().clone() for name, parameter in model.named_parameters()}
+
+
+def maximise_expected_improvement(model: SingleTaskGP, choices: Tensor) -> Tensor:
+    """Returns the point of largest LogEI, `d`.
+
+    A short gradient ascent starts from the best of the choices, `k x d`.
+
+    Choice: the incumbent is the best posterior mean at the observed points. It is not fooled by one lucky noisy value
+    as the best observation would be, and costs one pass, where (q)LogNEI integrates over the incumbent by sampling.
+    """
+    model.requires_grad_(False)
+    bounds = torch.tensor([[0.0], [1.0]], dtype=choices.dtype).expand(2, choices.shape[1])
+    with skip_posterior_variances():
+        incumbent = model.posterior(model.train_inputs[0]).mean.max()
+    acquisition = LogExpectedImprovement(model, incumbent)
+    with fast_pred_var():
+        start, _ = optimize_acqf_discrete(acquisition, q=1, choices=choices)
+        ascent = {"maxiter": ASCENT_ITERATIONS}
+        point: Tensor
+        point, _ = optimize_acqf(
+            acquisition, bounds, q=1, num_restarts=1, batch_initial_conditions=start[None], options=ascent
+        )
+    return point[0]
+
+
+def best_by_mean(model: SingleTaskGP, choices: Tensor) -> Tensor:
+    """Returns the choice of largest posterior mean, `d`, of `k x d`."""
+    point: Tensor
+    with skip_posterior_variances():
+        point, _ = optimize_acqf_discrete(PosteriorMean(model), q=1, choices=choices)
+    return point[0]
+
+
+REFIT_SHARE = 5  # a new fit is due once this part of the kept observations is new
+ANYWHERE, NEAR = 0, 1  # arms of the bandit
+BEST = 8  # scenes that one is looked for near to
+NEAR_CANDIDATES, NEAR_DEVIATIONS = 64, (0.02, 0.05, 0.1)
+CHANGED = 10  # coordinates that differ from the best scene's, on average
+
+
+class BotorchOptimizer(SceneOptimizer):
+    """Sobol scenes first, then those of largest log expected improvement under a Gaussian process.
+
+    Choice: the policy changes under the optimiser, so only the newest `config.window` observations are kept, and a
+    share `config.exploration` of scenes is drawn at random.
+
+    Choice: in 18 dimensions a smooth model does not tell the few scenes around a failure from noise. So some scenes are
+    small steps from one of the best, the one of largest posterior mean. A bandit chooses between these and expected
+    improvement anywhere by the scores of each.
+    Source: Eriksson et al. 2019, Scalable global optimization via local Bayesian optimization; the bandit is ours.
+
+    Every random number of an ask derives from the seed and the number of asks, so the generator has no state to save.
+    """
+
+    kind = "botorch"
+
+    def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:  # Alg. 1, l. 1
+        super().__init__(dimension, config, seed)
+        self._points: Floats = np.empty((0, dimension))  # n x d, oldest first, n <= window
+        self._returns: Floats = np.empty(0)  # n, R̄_e; NaN = rejected
+        self._asked, self._told, self._filled = 0, 0, 0  # filled: Sobol scenes so far
+        self._fitted_at = 0  # value of _told at the last refit
+        self._hyperparameters: Hyperparameters | None = None
+        self._bandit = DiscountedBandit(discount=0.95, prior_worth=0.25, prior_cost=5.0, least=0.05)
+        self._arm: int | None = None  # that proposed the scene which is out
+
+    def ask(self) -> Floats:  # Alg. 1, l. 4
+        """See `SceneOptimizer.ask`."""
+        random = np.random.default_rng((self._seed, self._asked))
+        self._asked += 1
+        if self._told < self._config.initial_scenes:
+            return self._fill()
+        if random.random() < self._config.exploration:
+            return random.random(self._dimension)
+        values = -self.scores()  # f_e is minimised; this is the only change of its sign
+        if np.ptp(values) == 0:  # nothing tells the scenes apart yet, so keep filling the space
+            return self._fill()
+        return self._propose(values, random)
+
+    def _learn(  # Alg. 1, l. 21-22
+        self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter
+    ) -> None:
+        value = np.nan if mean_return is None else mean_return
+        self._points = np.concatenate((self._points, point[None]))[-self._config.window :]
+        self._returns = np.append(self._returns, value)[-self._config.window :]
+        self._told += 1
+        if self._arm is not None:
+            self._bandit.tell(self._arm, 0.0 if score is None else max(0.0, 1.0 - score))
+            self._arm = None
+
+    def scores(self) -> Floats:
+        """Returns f_e of every kept observation, oldest first, `n`.
+
+        M̄_e moves, so all are computed against the current one. Choice: a rejected scene counts as bad as the worst
+        scored one (1 if there is none). So the model learns to avoid C_hard without the cliff in f that a fixed large
+        penalty would fit.
+        """
+        scores = objective(self._returns, self._maximum.smoothed)
+        rejected = np.isnan(scores)
+        worst = scores[~rejected].max() if not rejected.all() else 1.0
+        return np.where(rejected, worst, scores)
+
+    def _fill(self) -> Floats:
+        self._filled += 1
+        return sobol_points(self._dimension, self._seed, self._filled - 1)[0].numpy()
+
+    def _propose(self, values: Floats, random: np.random.Generator) -> Floats:
+        pass  # here, because BoTorch is slow to load, and many runs need none
+
+        points, targets, seed = torch.from_numpy(self._points), torch.from_numpy(values), int(random.integers(2**31))
+        # Each observation changes the fit less as they accumulate, while a fit's price grows with them.
+        due = max(self._config.refit_every, len(values) // REFIT_SHARE)
+        if self._hyperparameters is None or self._told - self._fitted_at >= due:
+            self._hyperparameters = fit(points, targets, self._hyperparameters, seed)
+            self._fitted_at = self._told
+        model = condition(points, targets, self._hyperparameters)
+        self._arm = NEAR if random.random() < self._bandit.probability else ANYWHERE
+        near = torch.from_numpy(self._steps_from_one_of_the_best(values, random))
+        if self._arm == NEAR:
+            return best_by_mean(model, near).numpy()
+        anywhere = sobol_points(self._dimension, seed, count=self._config.candidates)
+        return maximise_expected_improvement(model, torch.cat((anywhere, near))).numpy()
+
+    def _steps_from_one_of_the_best(self, values: Floats, random: np.random.Generator) -> Floats:
+        """Takes Gaussian steps in some coordinates from one of the best scenes, `NEAR_CANDIDATES x d`."""
+        best = np.argsort(-values, kind="stable")[:BEST]
+        centre = self._points[best[random.integers(len(best), size=2).min()]]  # the better, the likelier
+        step = random.choice(NEAR_DEVIATIONS) * random.standard_normal((NEAR_CANDIDATES, self._dimension))
+        changed = random.random(step.shape) < CHANGED / self._dimension
+        nearby: Floats = np.clip(centre + np.where(changed, step, 0.0), 0.0, 1.0)
+        return nearby
+
+    def state(self) -> State:
+        """See `SceneOptimizer.state`."""
+        return {
+            **super().state(),
+            "points": torch.from_numpy(self._points.copy()),
+            "returns": torch.from_numpy(self._returns.copy()),
+            "asked": self._asked,
+            "told": self._told,
+            "filled": self._filled,
+            "fitted_at": self._fitted_at,
+            "hyperparameters": self._hyperparameters,
+            "bandit": self._bandit.state(),
+        }
+
+    def load(self, state: State) -> None:
+        """See `SceneOptimizer.load`."""
+        super().load(state)
+        self._points, self._returns = state["points"].numpy().copy(), state["returns"].numpy().copy()
+        self._asked, self._told, self._filled = state["asked"], state["told"], state["filled"]
+        self._fitted_at = state["fitted_at"]
+        self._hyperparameters = state["hyperparameters"]
+        self._bandit.load(state["bandit"])

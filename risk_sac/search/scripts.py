@@ -1,0 +1,178 @@
+"""The motions: what each kind of adversary does, given its genes.
+
+All have three parts. At first an adversary prepares: it takes up a place beside the ego, keeps the time at which it
+will be where their ways cross, or waits at the kerb. From its cue on it strikes, for as long as its genes say, and then
+it does something else: so it may show itself, pause, and let the ego come.
+
+What the motions can express follows from what a conflict is (`risk_sac.verdicts.conflict`) and what the ego is told
+(`risk_sac.sim.lookout`): a neighbour may hang on the edge of its lane before it cuts in, a leader may be followed for a
+while before it brakes, a pedestrian may hesitate.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.env.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
+from risk_sac.world.types import STEP_S
+
+EARLIEST_S = 0.5  # after the release: a contact within the first second counts against neither side
+LATEST_CUE_S = 6.0  # after that
+NEAREST_CUE_S, CUES_S = 0.3, 4.0  # from meeting the ego
+LONGEST_S = 4.0  # of a strike
+OVER_S = 3.0  # after which nothing more comes of a strike
+SAME_WAY_COS = 0.9
+CROSSING_SIN = 0.4
+
+IN_LANE_M = 1.2  # an actor nearer to the ego's axis is its leader
+NEAREST_M, FARTHEST_M = 1.9, 3.1  # from the ego's axis: touching it, and hardly off the middle of the next lane
+FOREMOST_M = 12.0  # along it, from the ego's middle: an actor farther back strikes its flank
+BEFORE_M = 5.0  # a leader's middle before the ego's, at least
+FASTER_MPS = 5.0  # than the ego, at most, to take up a place
+CATCHING_UP = 0.5  # 1/s, of the way to that place
+ANSWER = 0.5  # of full drive, for 1 m/s of difference
+LEAST_EFFORT = 0.4  # of an actor that is on time
+TURNING = 0.5  # of what is possible, at most
+
+
+class Genes(NamedTuple):
+    """Of one adversary, in [0, 1]; each motion says what they mean to it."""
+
+    active: float
+    place: float
+    aside: float
+    cue: float
+    drive: float
+    steer: float
+    lasts: float
+    after: float
+
+
+SIZE = len(Genes._fields)
+
+
+class Seen(NamedTuple):
+    """One adversary in the ego's frame, and the ego."""
+
+    time_s: float  # since the release
+    x_m: float  # between the centres
+    y_m: float
+    cos: float  # of the heading relative to the ego's
+    sin: float
+    speed_mps: float
+    ego_mps: float
+
+
+class Act(NamedTuple):
+    """An action in [-1, 1]: acceleration and, of a vehicle, lateral speed, or, of a pedestrian, heading rate."""
+
+    drive: float
+    steer: float
+
+
+def adversaries_seen(observation: NDArray[np.float32], adversaries: int, step: int) -> list[Seen | None]:
+    """Each adversary, in the family's order; None for one that has left the net.
+
+    Args:
+      observation: see `risk_sac.env.observation`.
+      adversaries: how many.
+      step: of the episode, from 0.
+    """
+    rows: list[list[float]] = observation[: adversaries * PER_ADVERSARY].reshape(-1, PER_ADVERSARY).tolist()
+    ego_mps = float(observation[adversaries * PER_ADVERSARY]) * SPEED_MPS
+    return [_seen(row, step * STEP_S, ego_mps) if any(row) else None for row in rows]
+
+
+def _seen(row: list[float], time_s: float, ego_mps: float) -> Seen:
+    x, y, _, _, cos, sin, speed, *_ = row
+    return Seen(time_s, x * X_M, y * Y_M, cos, sin, speed * SPEED_MPS, ego_mps)
+
+
+def act(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:
+    """What an adversary does now.
+
+    Args:
+      genes: its own.
+      seen: itself and the ego.
+      since_cue_s: negative before its cue.
+      pedestrian: whether it is one.
+    """
+    same_way = seen.cos > SAME_WAY_COS and not pedestrian
+    return (alongside if same_way else crossing)(genes, seen, since_cue_s)
+
+
+def cue(genes: Genes, seen: Seen, pedestrian: bool) -> bool:
+    """Whether it is time to strike.
+
+    A vehicle in the ego's direction strikes at a time of its genes, all others as the ego nears: 0.3 to 4.3 s from
+    meeting, as both approach along the ego's axis.
+    """
+    if not pedestrian and seen.cos > SAME_WAY_COS:
+        return seen.time_s >= EARLIEST_S + LATEST_CUE_S * genes.cue
+    closing_mps = seen.ego_mps - seen.cos * seen.speed_mps
+    return 0.0 < seen.x_m < (NEAREST_CUE_S + CUES_S * genes.cue) * closing_mps
+
+
+def is_over(genes: Genes, since_cue_s: float) -> bool:
+    """Whether the strike has been over for a while."""
+    return since_cue_s > LONGEST_S * genes.lasts + OVER_S
+
+
+def alongside(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
+    """A vehicle that drives the ego's way: keeps a place beside or ahead of it, then comes over, brakes or both.
+
+    `place` is where along the ego it waits and `aside` how far from the ego's axis; a leader keeps its lane. `drive`
+    and `steer`, towards the ego, are those of the strike, `after` is the drive that follows.
+    """
+    if since_cue_s < 0.0:
+        return _taking_place(genes, seen)
+    return _strike(genes, since_cue_s, genes.steer * _clip(-seen.y_m))
+
+
+def _taking_place(genes: Genes, seen: Seen) -> Act:
+    leads = abs(seen.y_m) < IN_LANE_M
+    place_m = FOREMOST_M * genes.place + (BEFORE_M if leads else 0.0)
+    aside_m = 0.0 if leads else NEAREST_M + (FARTHEST_M - NEAREST_M) * genes.aside
+    wanted_mps = seen.ego_mps + _clip(CATCHING_UP * (place_m - seen.x_m), FASTER_MPS)
+    waits_s = EARLIEST_S + LATEST_CUE_S * genes.cue / 4  # for most of the time to its cue it is beside the ego
+    steer = _clip(math.copysign(aside_m, seen.y_m) - seen.y_m) if seen.time_s >= waits_s else 0.0
+    return Act(_clip(ANSWER * (wanted_mps - seen.speed_mps)), steer)
+
+
+def crossing(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
+    """A vehicle from across or opposite, or a pedestrian: keeps its time to where the ways cross, then goes for it.
+
+    `place` is how much later than the ego it means to be there, 2 s at most, or how it moves where the ways do not
+    cross; `aside` is how hard it works at that, against what a driver would do at a red light. So it waits for the ego,
+    slows down as the ego does, and sets off when the ego does. `drive` and `steer`, to the left or the right, are those
+    of the strike, `after` is the drive that follows.
+    """
+    if since_cue_s < 0.0:
+        return Act((LEAST_EFFORT + (1.0 - LEAST_EFFORT) * genes.aside) * _keeping_time(genes, seen), 0.0)
+    return _strike(genes, since_cue_s, TURNING * _signed(genes.steer))
+
+
+def _strike(genes: Genes, since_cue_s: float, steer: float) -> Act:
+    if since_cue_s < LONGEST_S * genes.lasts:
+        return Act(_signed(genes.drive), steer)
+    return Act(_signed(genes.after), 0.0)
+
+
+def _keeping_time(genes: Genes, seen: Seen) -> float:
+    if abs(seen.sin) < CROSSING_SIN:
+        return _signed(genes.place)
+    own_m = -seen.y_m / seen.sin  # to the ego's axis
+    ego_m = seen.x_m + own_m * seen.cos
+    own_s, ego_s = own_m / max(seen.speed_mps, 1.0), ego_m / max(seen.ego_mps, 1.0)
+    return _clip(own_s - ego_s + 2.0 * _signed(genes.place))
+
+
+def _signed(gene: float) -> float:
+    """From [0, 1] to [-1, 1]."""
+    return 2.0 * gene - 1.0
+
+
+def _clip(value: float, limit: float = 1.0) -> float:
+    return min(max(value, -limit), limit)

@@ -1,0 +1,215 @@
+"""Pairs each method's scene sampler with its agent, and a learner with the archive search that warms it.
+
+Source: RISK-SAC, Algorithm 1, l. 1-2. Choice: warm start and turns are ours.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from risk_sac.config import RunSpec, method_of
+from risk_sac.env.problem import Problem
+from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Outcome, Violation
+from risk_sac.search.agents.controls import IdleAgent, RandomAgent, ScriptedAgent, ScriptFollower
+from risk_sac.search.agents.learner import Learner
+from risk_sac.search.prior.learner import PretrainedLearner
+from risk_sac.search.prior.policy import PolicyLayout, check_prior, pretrained_for
+from risk_sac.search.prior.sampler import PriorOptimizer, ReplayOptimizer
+from risk_sac.search.prior.start import start_of
+from risk_sac.search.scene_optimizer import (
+    NO_ENCOUNTER,
+    ArchiveOptimizer,
+    BotorchOptimizer,
+    DiscountedBandit,
+    Encounter,
+    IidSampler,
+    SceneOptimizer,
+    SobolOptimizer,
+)
+from risk_sac.verdicts.distinct import Finds
+from risk_sac.world.types import Floats, Scene
+
+CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
+    "scripted": ScriptedAgent,
+    "random": RandomAgent,
+    "none": IdleAgent,
+}
+OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
+    each.kind: each for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler)
+}
+Actor = Learner | IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
+"""A joint policy that drives all adversaries."""
+GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
+# Scripts that find a failure in one episode of thirty may find none in fifty and still be worth their time.
+DISCOUNT, PRIOR_STEPS = 0.995, 1000.0
+
+
+class Terms(NamedTuple):
+    """On which guide and policy take turns."""
+
+    policy_step: float  # processor time of a policy's step and its updates, as a multiple of the guide's
+    prior_worth: float  # of PRIOR_STEPS that either is credited with at first
+    least: float  # share of the processor time for either
+
+
+COLD = Terms(3.0, 0.05, 0.01)  # more would be lost on a policy that yields nothing
+# Choice: between 1.5 with a planner under test and 6 with SUMO's driver. Both are credited with much: neither is to be
+# given up for the first find of the other.
+PRETRAINED = Terms(2.0, 10.0, 0.1)
+
+
+class Searcher(NamedTuple):
+    """A scene sampler and the actor that plays its scenes."""
+
+    sampler: SceneOptimizer
+    actor: Actor
+
+
+class Searchers:
+    """A method's own searcher and, beside a learner, its guide: an archive search.
+
+    Choice: a learner's memory is filled by an archive search until that has found failures enough, because uniform
+    actions hardly find any. All learners are warmed alike.
+
+    Attributes:
+      agent: the method's own actor, which learns from all episodes of the search.
+    """
+
+    def __init__(self, spec: RunSpec, problem: Problem, observation_size: int, action_size: int) -> None:
+        method = method_of(spec.method)
+        check_prior(spec.method, spec.family, spec.prior)
+        self._space = problem.space
+        self._spec = spec
+        self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
+        pretrained = None if self._start is None or not method.learns else pretrained_for(problem.family)
+        self.agent: Actor  # Alg. 1, l. 2
+        if method.agent in CONTROLS:
+            self.agent = CONTROLS[method.agent](action_size, spec.stream)
+        elif method.agent == "scripts":
+            self.agent = ScriptFollower(problem.family)
+        elif pretrained is not None:
+            self.agent = PretrainedLearner(pretrained, PolicyLayout.of(problem), method, spec.learner, spec.stream)
+        else:
+            self.agent = Learner(observation_size, action_size, method, spec.learner, spec.stream)
+        self._own = self._searcher(self.agent, OPTIMIZERS[method.scenes])  # Alg. 1, l. 1
+        guided = method.takes_turns or (method.learns and pretrained is None)
+        self._guide = self._searcher(ScriptFollower(problem.family), ArchiveOptimizer) if guided else None
+        terms = COLD if pretrained is None else PRETRAINED
+        self._turns = Turns(spec.stream, terms) if method.takes_turns else None
+        self._next = self._own
+        self._episodes, self._failures = 0, 0  # of the search
+
+    def next(self, *, learning: bool) -> Searcher:
+        """Chooses the searcher of the next episode.
+
+        Args:
+          learning: whether the episode is one of the search; in the evaluation the guide takes no part.
+        """
+        if self._guide is None or not learning:
+            self._next = self._own
+        elif not self._warm:
+            self._next = self._guide
+        else:
+            self._next = (self._guide, self._own)[self._turns.draw()] if self._turns else self._own
+        return self._next
+
+    @property
+    def _warm(self) -> bool:
+        """Whether the guide has done its part; one that takes turns goes on until it has found enough."""
+        if isinstance(self.agent, PretrainedLearner):
+            return True  # it needs none
+        warm_start = self._spec.learner.warm_start
+        spent = self._episodes >= warm_start.episodes and not (self._turns and warm_start.episodes)
+        return spent or self._failures >= warm_start.failures
+
+    def driven_by(self, *, learning: bool) -> DrivenBy | None:
+        """Returns what drives the adversaries of the point that was proposed last; None: nothing does."""
+        sampler, actor = self._next
+        if actor.genes:
+            return sampler.driven_by
+        frozen = isinstance(actor, Learner) and not learning
+        return DrivenBy.POLICY if frozen else actor.driven_by
+
+    def split(self, point: Floats) -> tuple[Scene, Floats]:
+        """Splits a proposed point into its scene and the actor's genes."""
+        size = self._space.dimension
+        return self._space.from_unit(point[:size]), point[size:]
+
+    def begin(self, genes: Floats) -> None:
+        """Begins an episode for its actor and for the learner that observes it."""
+        self._next.actor.begin(genes)
+        if self._next is not self._own:
+            self.agent.begin(genes)
+
+    def tell(self, point: Floats, mean_return: float | None, encounter: Encounter = NO_ENCOUNTER) -> float | None:
+        """Scores the scene of the episode; see `SceneOptimizer.tell`. The method's sampler also gets its guide's."""
+        if self._next is not self._own:
+            self._own.sampler.tell(point[: self._space.dimension], mean_return, encounter)
+        return self._next.sampler.tell(point, mean_return, encounter)
+
+    def add(self, record: EpisodeRecord) -> None:
+        """Counts the episode that the searcher chosen last has made."""
+        if not record.searching:
+            return
+        self._episodes += 1
+        self._failures += record.outcome is Outcome.FAILURE
+        if self._turns:
+            self._turns.tell(OWN if self._next is self._own else GUIDE, record.steps, record.valid_violations)
+
+    def state(self) -> dict[str, Any]:
+        """Returns all that the next episode depends on, except the records so far; see `load`."""
+        return {
+            "optimizer": self._own.sampler.state(),
+            "agent": self.agent.state(),
+            "guide": self._guide.sampler.state() if self._guide else None,
+        }
+
+    def load(self, state: dict[str, Any], records: list[EpisodeRecord]) -> None:
+        """Continues from `state()` and the records at that time.
+
+        Raises:
+          CheckpointError: the state is of another run.
+        """
+        self._own.sampler.load(state["optimizer"])
+        self.agent.load(state["agent"])
+        if self._guide:
+            self._guide.sampler.load(state["guide"])
+        for record in records:
+            self.next(learning=record.searching)
+            self.add(record)
+
+    def _searcher(self, actor: Actor, sampler: type[SceneOptimizer]) -> Searcher:
+        dimension = self._space.dimension + actor.genes
+        arguments = dimension, self._spec.learner.scenes, self._spec.stream
+        if self._start is None or not actor.genes:
+            return Searcher(sampler(*arguments), actor)
+        whole = method_of(self._spec.method).prior == "all"
+        return Searcher((PriorOptimizer if whole else ReplayOptimizer)(*arguments, self._start), actor)
+
+
+class Turns:
+    """Chooses between guide and policy by what each has found lately for its processor time.
+
+    So a policy acts often once the scripts' failures run out, and not before. The same episodes in the same order lead
+    to the same turns.
+    """
+
+    def __init__(self, seed: int, terms: Terms) -> None:
+        self._random = np.random.default_rng(seed)
+        self._bandit = DiscountedBandit(
+            discount=DISCOUNT,
+            prior_worth=terms.prior_worth,
+            prior_cost=PRIOR_STEPS,
+            least=terms.least,
+            unit_costs=(1.0, terms.policy_step),
+        )
+        self._finds = Finds()
+
+    def draw(self) -> int:
+        """Draws the arm of the next episode."""
+        return int(self._random.random() < self._bandit.probability)
+
+    def tell(self, arm: int, steps: int, violations: Sequence[Collision | Violation]) -> None:
+        """Counts an episode and its valid violations; what either arm has found is new to neither."""
+        self._bandit.tell(arm, self._finds.add(violations), steps)

@@ -1,0 +1,1 @@
+"""Types, geometry and compiled code that all layers share."""

@@ -1,1 +1,0 @@
-"""Parts of answers: problems, pages, media types and tags."""

@@ -1,1 +1,0 @@
-"""Guards before all routes: authorisation, rates and slow clients."""
