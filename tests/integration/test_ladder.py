@@ -26,13 +26,13 @@ PHASES = 10  # of the ego's reaction in which attacks begin: an ego about to dec
 def scenes(family: FamilyName, space_middle: Scene) -> Iterator[Scene]:
     """A neighbour at several distances ahead; a walker that stands at the kerb, at several distances of the ego."""
     if family == "low":
-        for offset_m in np.linspace(4.0, 16.0, 7):
+        for offset_m in np.linspace(4.0, 16.0, 13):
             for speed_mps in (10.0, 13.0, 16.0):
                 changes = {"ego_speed_mps": speed_mps, "left_speed_mps": speed_mps, "left_offset_m": float(offset_m)}
                 far = {"lead_gap_m": 50.0, "lead_speed_mps": speed_mps, "right_offset_m": -15.0, "right_speed_mps": 6.0}
                 yield replace(space_middle, values=dict(space_middle.values) | changes | far)
     else:
-        for distance_m in np.linspace(40.0, 75.0, 9):
+        for distance_m in np.linspace(40.0, 75.0, 18):
             for offset_m in (-1.5, 0.0):
                 changes = {"ego_distance_m": float(distance_m), "ego_speed_mps": 12.0, "pedestrian_offset_m": offset_m}
                 still = {"pedestrian_speed_mps": 0.0, "pedestrian_setback_m": 0.3, "crossing": 0.0}
