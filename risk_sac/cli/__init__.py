@@ -92,7 +92,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"risk-sac {__version__}")
     parser.set_defaults(on_error=FAILED)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    first = (run, places, egos, show, replay, understand, replay, regress)
-    for module in (*first, regress, benchmark, pretrain, serve, campaigns):
-        module.add(commands)
+    first = (run.add, places.add, egos.add, show.add, replay.add, understand.add, replay.add_export, regress.add)
+    for add in (*first, regress.add_report, benchmark.add, pretrain.add, serve.add, campaigns.add):
+        add(commands)
     return parser

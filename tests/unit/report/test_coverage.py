@@ -1,7 +1,7 @@
 from dataclasses import replace
 
-from risk_sac.report.evidence.coverage import axis_of, coverage, kinds
-from risk_sac.report.evidence.gathered import drawn
+from risk_sac.report.coverage import axis_of, coverage, kinds
+from risk_sac.report.evidence import drawn
 
 from risk_sac.config import Interval, Odd, RunSpec
 from risk_sac.metrics import clopper_pearson
