@@ -2,23 +2,30 @@
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 GENERATED = "_pb2"
+LAB = "risk_sac/lab/"  # training, benchmarks and measured figures: the product never imports it
 
 
 def counts() -> Iterator[tuple[str, int, int]]:
     """Yield what is counted, the count of the tracked files, and the limit."""
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     python = [name for name in tracked if name.endswith(".py") and GENERATED not in name and (ROOT / name).exists()]
-    product = [name for name in python if name.startswith(("risk_sac/", "service/"))]
+    lab = [name for name in python if name.startswith(LAB)]
+    product = [name for name in python if name.startswith(("risk_sac/", "service/")) and name not in lab]
     markdown = [name for name in tracked if name.endswith(".md") and (ROOT / name).exists()]
-    yield "product lines", sum(len(_text(name).splitlines()) for name in product), 36_000
-    yield "product files", len(product), 400
-    yield "test lines", sum(len(_text(name).splitlines()) for name in python if name.startswith("tests/")), 30_000
+    yield "product lines", _lines(product), 44_000
+    yield "product files", len(product), 260
+    yield "lab lines", _lines(lab), 3_500
+    yield "test lines", _lines([name for name in python if name.startswith("tests/")]), 34_000
     yield "Markdown words", sum(len(_text(name).split()) for name in markdown), 30_000
+
+
+def _lines(names: Sequence[str]) -> int:
+    return sum(len(_text(name).splitlines()) for name in names)
 
 
 def _text(name: str) -> str:
