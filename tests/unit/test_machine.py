@@ -94,10 +94,12 @@ def test_a_change_in_a_called_function_or_a_constant_is_not_hidden_by_the_cache(
     package = tmp_path / "risk_sac"
     (package / "risk").mkdir(parents=True)
     for module in (risk_sac.world.jit, risk_sac.host.machine):
-        shutil.copy(module.__file__, package)
+        folder = package / Path(module.__file__).parent.name
+        folder.mkdir()
+        shutil.copy(module.__file__, folder)
     if read_only:  # to root, too
         (package / "__pycache__").touch()
-    for module in ("__init__.py", "risk/__init__.py"):
+    for module in ("__init__.py", "risk/__init__.py", "world/__init__.py", "host/__init__.py"):
         (package / module).touch()
     (package / "risk" / "outer.py").write_text(OUTER)
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}

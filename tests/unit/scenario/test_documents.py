@@ -122,6 +122,7 @@ def test_an_output_that_is_switched_off_is_left_out(name: str, tmp_path: Path) -
         (gzip.compress(PBF), "the map, which is OpenStreetMap's PBF"),
         (b"\xff\xe0\x04o5m2" + bytes(90), "the map, which is OpenStreetMap's o5m"),
     ],
+    ids=["bzip2", "xz", "pbf", "packed pbf", "o5m"],
 )
 def test_a_map_in_another_packing_is_told_the_command_that_converts_it(
     content: bytes, says: str, tmp_path: Path
