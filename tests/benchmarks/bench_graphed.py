@@ -10,7 +10,7 @@ import torch
 from risk_sac.lab.pretraining.policy import AGENT, REPLAY, SAC
 from risk_sac.search.agents.replay import UniformReplay
 from risk_sac.search.agents.sac import GraphedUpdate, SacAgent
-from tests.unit.agents.test_graphed import transition
+from tests.unit.search.agents.test_graphed import transition
 
 SIZES, STORED, UPDATES, WANTED = (62, 4), 20_000, 400, 3.0
 
