@@ -201,11 +201,11 @@ SORTED_BY = "found (the order of the search), severity (the worst first) or spee
 def add_filter_flags(parser: Parser) -> None:
     """Adds the flags of a list of failures."""
     group = parser.group("choice of failures")
-    for name, each in FILTERS.items():
-        choices = f": {', '.join(each.choices)}" if each.choices else ""
-        what = f"only those {each.what}{choices}"
+    for name, filter_ in FILTERS.items():
+        choices = f": {', '.join(filter_.choices)}" if filter_.choices else ""
+        what = f"only those {filter_.what}{choices}"
         flag = f"--{name.replace('_', '-')}"
-        group.add_argument(flag, choices=each.choices, metavar=name.upper(), help=what)
+        group.add_argument(flag, choices=filter_.choices, metavar=name.upper(), help=what)
     group.add_argument(
         "--preventable", dest="grade", action="store_const", const=str(Grade.PREVENTABLE), help="--grade preventable"
     )

@@ -267,11 +267,11 @@ class Client:
 
     def _items(self, page: type[Page[R]], path: str, query: Query) -> Iterator[R]:
         while True:
-            found = read(page, self._transport.ask("GET", path, query=query))
-            yield from found.items
-            if found.next is None:
+            answer = read(page, self._transport.ask("GET", path, query=query))
+            yield from answer.items
+            if answer.next is None:
                 return
-            query = query | {"cursor": found.next}
+            query = query | {"cursor": answer.next}
 
 
 def _path(campaign_id: str) -> str:

@@ -108,7 +108,7 @@ def leaders(path: Floats, station_m: float, offset_m: float, state: Floats, vehi
     Returns:
       `leaders x 3`: column, distance from the front bumper to the body, m, and speed along the path, m/s.
     """
-    found, count = np.empty((len(vehicle), 3)), 0
+    rows, count = np.empty((len(vehicle), 3)), 0
     for i in range(1, len(vehicle)):
         station, across, way = project(path, state[X, i], state[Y, i])
         cos, sin = abs(math.cos(state[HEADING, i] - way)), abs(math.sin(state[HEADING, i] - way))
@@ -118,9 +118,9 @@ def leaders(path: Floats, station_m: float, offset_m: float, state: Floats, vehi
             continue
         gap = max(station - half_length * cos - half_width * sin - station_m, 0.0)
         along = state[VX, i] * math.cos(way) + state[VY, i] * math.sin(way)
-        found[count, 0], found[count, 1], found[count, 2] = i, gap, max(along, 0.0)
+        rows[count, 0], rows[count, 1], rows[count, 2] = i, gap, max(along, 0.0)
         count += 1
-    return found[:count]
+    return rows[:count]
 
 
 VEHICLE = int(Kind.VEHICLE)
@@ -156,11 +156,14 @@ class Driver:
     def ahead(self, perceived: Perceived) -> list[Ahead]:
         """Returns what is on a collision course at constant velocity, see `risk_sac.sim.lookout`, and what leads."""
         p, everybody = perceived, np.ones(len(perceived.ids), dtype=np.bool_)
-        found = targets(
+        conflicts = targets(
             p.path, p.station_m, p.offset_m, 0, self.vehicle.accel_mps2, p.state, p.kind == VEHICLE, everybody
         )
         before, self._speeds = self._speeds, dict(zip(p.ids, p.state[SPEED].tolist(), strict=True))
-        everything = (*found.tolist(), *leaders(p.path, p.station_m, p.offset_m, p.state, p.kind == VEHICLE).tolist())
+        everything = (
+            *conflicts.tolist(),
+            *leaders(p.path, p.station_m, p.offset_m, p.state, p.kind == VEHICLE).tolist(),
+        )
         return [Ahead(gap_m, lead_mps, self._braking(before, p.ids[int(i)])) for i, gap_m, lead_mps in everything]
 
     def _braking(self, before: dict[str, float], id_: str) -> float:

@@ -181,15 +181,15 @@ class EgoPilot:
 @compiled
 def shown(state: Floats, known: Bools) -> Floats:
     """Returns the columns of known actors, with the rows that a sensor measures."""
-    found = np.empty((state.shape[0], int(known.sum())))
+    measured = np.empty((state.shape[0], int(known.sum())))
     column = 0
     for i in range(state.shape[1]):
         if not known[i]:
             continue
         for row in range(state.shape[0]):
-            found[row, column] = state[row, i]
+            measured[row, column] = state[row, i]
         if i > 0:
-            found[SPEED, column] = math.hypot(state[VX, i], state[VY, i])
-            found[LATERAL, column] = found[ACCEL, column] = found[OFFSET, column] = np.nan
+            measured[SPEED, column] = math.hypot(state[VX, i], state[VY, i])
+            measured[LATERAL, column] = measured[ACCEL, column] = measured[OFFSET, column] = np.nan
         column += 1
-    return found
+    return measured

@@ -92,13 +92,13 @@ def cards() -> tuple[EgoCard, ...]:
 
 def installed() -> dict[str, str]:
     """Returns the versions of this machine's Python egos by name; for one that cannot be used, the reason."""
-    found = {}
+    versions = {}
     for name, point in _points().items():
         try:
-            found[name] = python_card(point).version
+            versions[name] = python_card(point).version
         except ConfigError as error:
-            found[name] = str(error)
-    return found
+            versions[name] = str(error)
+    return versions
 
 
 def card_of(name: str) -> EgoCard:
@@ -205,11 +205,11 @@ def make(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
 
 def _points() -> Mapping[str, EntryPoint]:
     shipped = SHIPPED | (PLANNERS if find_spec(PLANNERS_PACKAGE) else {})
-    found = {name: EntryPoint(name=name, value=value, group=GROUP) for name, value in shipped.items()}
+    points = {name: EntryPoint(name=name, value=value, group=GROUP) for name, value in shipped.items()}
     for point in entry_points(group=GROUP):
-        if found.setdefault(point.name, point).value != point.value:
+        if points.setdefault(point.name, point).value != point.value:
             raise ConfigError(GROUP, f"two egos as {point.name!r}", "names of their own")
-    return found
+    return points
 
 
 def _remotes() -> Mapping[str, RemoteCard]:
@@ -227,12 +227,12 @@ def _remotes() -> Mapping[str, RemoteCard]:
 
 def _source(point: EntryPoint) -> Path:
     try:
-        found = find_spec(point.module)
+        module_spec = find_spec(point.module)
     except ImportError as error:
         raise _wrong(point, str(error)) from error
-    if found is None or not found.origin or not found.origin.endswith(".py"):
+    if module_spec is None or not module_spec.origin or not module_spec.origin.endswith(".py"):
         raise _wrong(point, f"there is no module {point.module!r} with a source")
-    return Path(found.origin)
+    return Path(module_spec.origin)
 
 
 def _declared(source: bytes, name: str) -> dict[str, Any]:

@@ -37,14 +37,14 @@ def adjustments(spec: RunSpec | CampaignSpec) -> tuple[Adjustment, ...]:
 
     A family that cannot be read any more, such as a place that the library has lost, is left out.
     """
-    found: dict[Adjustment, list[str]] = {}
+    families_by_adjustment: dict[Adjustment, list[str]] = {}
     for name in (spec.family,) if isinstance(spec, RunSpec) else spec.families:
         try:
             for each in _of_family(family_named(name), spec):
-                found.setdefault(each, []).append(name)
+                families_by_adjustment.setdefault(each, []).append(name)
         except ConfigError:
             continue
-    return tuple(each.model_copy(update={"families": tuple(names)}) for each, names in found.items())
+    return tuple(each.model_copy(update={"families": tuple(names)}) for each, names in families_by_adjustment.items())
 
 
 def _of_family(family: Family, spec: RunSpec | CampaignSpec) -> Iterator[Adjustment]:

@@ -126,14 +126,14 @@ Messages = queue.SimpleQueue[tuple[int, Event | Exited] | None]
 
 def taken(messages: Messages, timeout_s: float) -> list[tuple[int, Event | Exited]]:
     """Takes all messages out of a queue, waiting up to `timeout_s` for one."""
-    found = []
+    batch = []
     with contextlib.suppress(queue.Empty):
         message = messages.get(timeout=timeout_s)
         while True:
             if message is not None:
-                found.append(message)
+                batch.append(message)
             message = messages.get_nowait()
-    return found
+    return batch
 
 
 ExecutorName = Literal["local", "ray"]

@@ -161,15 +161,15 @@ def code_digest() -> str:
 def world_of(spec: RunSpec, episode: EpisodeRecord) -> dict[str, str]:
     """Returns the SHA-256 of the files that SUMO reads for an episode; a ConfigError if one is gone."""
     net = Problem.from_spec(spec).family.layout(episode.scene).net
-    found = {}
+    digests = {}
     for name in (net, "vtypes.add.xml"):
         try:
             content = (Path(str(files(WORLD))) / name).read_bytes()
         except FileNotFoundError as error:
             message = f"{name}, which {episode.id_in(spec.id)} was found on, is gone"
             raise ConfigError("BUNDLE", message) from error
-        found[_portable(name, spec)] = hashlib.sha256(content).hexdigest()
-    return found
+        digests[_portable(name, spec)] = hashlib.sha256(content).hexdigest()
+    return digests
 
 
 def _portable(name: str, spec: RunSpec) -> str:

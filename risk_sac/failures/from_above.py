@@ -241,28 +241,28 @@ HEIGHT_IN = (4.5, 12.0)  # the least and the most; in between it goes by the map
 NAMED = 60  # so many names can be told apart
 
 
-def map_png(net: Net, found: Survey) -> bytes:
+def map_png(net: Net, survey: Survey) -> bytes:
     """The picture of a whole map."""
-    (content,) = picture(partial(_figure, net, found), ["png"], DPI, {})
+    (content,) = picture(partial(_figure, net, survey), ["png"], DPI, {})
     return content
 
 
-def _figure(net: Net, found: Survey) -> Figure:
+def _figure(net: Net, survey: Survey) -> Figure:
     ground = _ground(net)
     figure = canvas((WIDTH_IN, _height_in(ground)))
     axis = figure.subplots()
     for use, colour in SURFACE_COLOURS.items():
         axis.add_collection(PolyCollection(ground[use], facecolors=colour, edgecolors="0.6", linewidths=0.2))
-    x = [misfit.spot.x_m for misfit in found.misfits]
-    y = [misfit.spot.y_m for misfit in found.misfits]
+    x = [misfit.spot.x_m for misfit in survey.misfits]
+    y = [misfit.spot.y_m for misfit in survey.misfits]
     axis.scatter(x, y, s=5, color="0.5", marker="x", linewidths=0.5, label=f"does not fit ({len(x)})")
     for pattern, (marker, colour) in MARKS.items():
-        spots = [fit.spot for fit in found.fits if fit.spot.pattern == pattern]
+        spots = [fit.spot for fit in survey.fits if fit.spot.pattern == pattern]
         x, y = [spot.x_m for spot in spots], [spot.y_m for spot in spots]
         label = f"{TITLES[pattern]} ({len(spots)})"
         axis.scatter(x, y, s=16, color=colour, marker=marker, alpha=0.8, label=label, zorder=3)
-    if len(found.fits) <= NAMED:
-        for id_, spot in {fit.spot.id: fit.spot for fit in found.fits}.items():  # once where several patterns fit
+    if len(survey.fits) <= NAMED:
+        for id_, spot in {fit.spot.id: fit.spot for fit in survey.fits}.items():  # once where several patterns fit
             if np.isfinite((spot.x_m, spot.y_m)).all():
                 axis.annotate(id_, (spot.x_m, spot.y_m), (3, 3), textcoords="offset points", fontsize=5, zorder=4)
     axis.autoscale()

@@ -88,8 +88,8 @@ class _MinimalSearch:
         # Other copies than those that it was chosen by.
         held = sum(stage.fails(copy) for copy in stage.copies(left, SHARE, COPIES, self._random))
         played = play(stage.env, stage.scene(left), left.seed, left.actions)
-        found = alike(played.found, stage.failure)
-        assert found is not None  # or it would not have been taken
+        violation = alike(played.found, stage.failure)
+        assert violation is not None  # or it would not have been taken
         # A script would do all that was taken away.
         changes = {"scene": dict(stage.scene(left).values), "script": None}
         episode = played.record(origin.manifest.episode).model_copy(update=changes)
@@ -101,7 +101,7 @@ class _MinimalSearch:
             episodes=stage.played + 1,
             held=held,
             copies=COPIES,
-            sentence=story(played.series, found),
+            sentence=story(played.series, violation),
         )
         return make_bundle(origin.manifest.spec, episode, played.series, played.signal_heads, origin.policy, core)
 

@@ -217,20 +217,20 @@ def draw_recording(family: FamilyName, recording: Recording, twin: Recording | N
     figure = canvas((WIDTH_IN * len(columns), sum(heights) + 1.2))
     grid = figure.subplots(len(heights), len(columns), height_ratios=heights, squeeze=False)
     figure.suptitle(caption(family, recording), fontsize=11)
-    for each, (view, *axes) in zip(columns, grid.T, strict=True):
-        draw_from_above(view, family, each, (low, high), m_per_in=(high - low)[0] / PANEL_WIDTH_IN)
+    for column, (view, *axes) in zip(columns, grid.T, strict=True):
+        draw_from_above(view, family, column, (low, high), m_per_in=(high - low)[0] / PANEL_WIDTH_IN)
         view.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         if twin is not None:
-            view.set_title(each.twin or "the failure", fontsize=10)
+            view.set_title(column.twin or "the failure", fontsize=10)
         for axis, panel, first in zip(axes, PANELS, grid[1:, 0], strict=True):
             axis.sharex(grid[1, 0])
             if axis is not first:
                 axis.sharey(first)  # before anything is drawn, so that there is room for both
-            panel(axis, each)
-            _mark_instants(axis, each)
+            panel(axis, column)
+            _mark_instants(axis, column)
             axis.label_outer()
-        _name_instants(axes[0], each)
-        axes[-1].set_xlabel(f"time from the {'contact' if each.collision else 'violation'}, s")
+        _name_instants(axes[0], column)
+        axes[-1].set_xlabel(f"time from the {'contact' if column.collision else 'violation'}, s")
     after_s = max(0.15, *(min(each.time_s[-1], AFTER_S) for each in columns))
     grid[1, 0].set_xlim(max(recording.time_s[0], -PANELS_S), after_s)
     return figure

@@ -103,14 +103,14 @@ def load(path: Path, run_digest: str) -> State:
         )
     try:
         stored = torch.load(io.BytesIO(archive), map_location="cpu", weights_only=True)
-        found, state = stored["run_digest"], stored["state"]
+        owner, state = stored["run_digest"], stored["state"]
     except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError, TypeError) as error:
         raise CheckpointError(
             f"checkpoint {path} is undamaged but holds something else than a run's state; delete it"
         ) from error
-    if found != run_digest:
+    if owner != run_digest:
         raise CheckpointError(
-            f"checkpoint {path} belongs to the run {found}; wanted {run_digest}. Its specification has changed since: "
+            f"checkpoint {path} belongs to the run {owner}; wanted {run_digest}. Its specification has changed since: "
             "give the new run another folder"
         )
     decoded: State = _decode(state)

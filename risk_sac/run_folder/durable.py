@@ -232,11 +232,11 @@ def seal(document: Any) -> bytes:
 
 def unseal(content: bytes, kind: type[T]) -> T:
     """The document that was sealed; raises `DamagedError` if the content is not as it was sealed."""
-    found = _SEAL.search(content)
-    if found is None:
+    seal_match = _SEAL.search(content)
+    if seal_match is None:
         raise DamagedError("it does not end in its SHA-256: it was cut short, or something else wrote it")
-    text = content[: found.start()] + _END
-    actual, wanted = hashlib.sha256(text).hexdigest(), found[1].decode()
+    text = content[: seal_match.start()] + _END
+    actual, wanted = hashlib.sha256(text).hexdigest(), seal_match[1].decode()
     if actual != wanted:
         raise DamagedError(f"its SHA-256 is {actual}, wanted {wanted}")
     try:

@@ -85,13 +85,13 @@ def _farthest_m(site: Site, lead_m: float) -> float:
 
 
 def _oncoming(site: Site) -> list[VehicleStart]:
-    found = []
+    starts = []
     for i in range(ONCOMING if site.oncoming else 0):
         track = site.oncoming[i % len(site.oncoming)]
         if track.room_m >= ONCOMING_M + SPACING_M * i + TRUCK_LENGTH_M:
             id_, lead_m = f"oncoming_{i}", SPACING_M * i
-            found.append(vehicle(id_, Role.BACKGROUND, track, ONCOMING_M, ONCOMING_MPS, lead_m))
-    return found
+            starts.append(vehicle(id_, Role.BACKGROUND, track, ONCOMING_M, ONCOMING_MPS, lead_m))
+    return starts
 
 
 def _parameters(place: CrossingPlace) -> tuple[Parameter, ...]:

@@ -88,11 +88,11 @@ class SumoDriver:
     ) -> float | None:
         """The acceleration that its model wants for the nearest of its `targets`; None where none binds."""
         path, station_m, offset_m = along
-        found = targets(path, station_m, offset_m, own, self._accel, state, vehicle, candidate)
-        if not len(found):
+        obstacles = targets(path, station_m, offset_m, own, self._accel, state, vehicle, candidate)
+        if not len(obstacles):
             return None
         wanted = math.inf
-        for _, gap_m, lead_mps in found.tolist():
+        for _, gap_m, lead_mps in obstacles.tolist():
             room_m = gap_m - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0)
             wanted = min(wanted, self._worth(speed, room_m, lead_mps))
         if wanted >= speed + self._accel * STEP_S or 0.0 <= self.cruise_mps <= wanted:
@@ -180,7 +180,7 @@ class Drivers:
         They keep the speed they started with, or drive slower for SUMO's models or a pedestrian. SUMO's wish is that of
         the step before, the newest it tells.
         """
-        found, candidates = {}, _with_ego(reading.walks) if self._outside else reading.walks
+        accel_by_id, candidates = {}, _with_ego(reading.walks) if self._outside else reading.walks
         for id_, driver in self._released.items():
             row = reading.row.get(id_)
             if row is None:  # left the net
@@ -191,8 +191,8 @@ class Drivers:
             told = None
             if self._outside or reading.near[row]:
                 told = self._decide(driver, row, reading, reading.frame.state, candidates)
-            found[id_] = wanted if told is None else min(wanted, told)
-        return found
+            accel_by_id[id_] = wanted if told is None else min(wanted, told)
+        return accel_by_id
 
     def _decide(self, driver: SumoDriver, row: int, reading: Reading, state: Floats, candidates: Bools) -> float | None:
         along = self._roads.along(reading.vehicles[row])

@@ -148,7 +148,7 @@ def targets(
     """
     x, y, heading, vx, vy = state[X], state[Y], state[HEADING], state[VX], state[VY]
     n = len(x)
-    found, count = np.empty((n, 3)), 0
+    rows, count = np.empty((n, 3)), 0
     speed_mps, length_m, width_m = state[SPEED, own], state[LENGTH, own], state[WIDTH, own]
     corridor = width_m / 2 + MARGIN_M
     kept, fastest = foreseen(points, front_m, speed_mps, 0.0), foreseen(points, front_m, speed_mps, accel_mps2)
@@ -191,6 +191,6 @@ def targets(
         if same_way:
             extent = half_length * cos + half_width * sin
             gap, lead = max(s_now - extent - front_m, 0.0), v_along
-        found[count, 0], found[count, 1], found[count, 2] = i, gap, lead
+        rows[count, 0], rows[count, 1], rows[count, 2] = i, gap, lead
         count += 1
-    return found[:count]
+    return rows[:count]

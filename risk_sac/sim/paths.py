@@ -212,10 +212,10 @@ def joined(lines: Sequence[Floats]) -> list[Floats]:
     before. That step would be a segment of the path in any direction, across it or back; actors near it would be on the
     path for a moment. So the last `TAPER_M` of a lane that leads to such a step are left out.
     """
-    found = list(lines)
+    tapered = list(lines)
     for i, (line, following) in enumerate(pairwise(lines)):
         if SAME_POINT_M < math.dist(line[-1], following[0]) <= SHIFT_M:
             last_m = math.dist(line[-2], line[-1])
             off = [line[-1] + (line[-2] - line[-1]) * TAPER_M / last_m] if last_m > TAPER_M else []
-            found[i] = np.array([*line[:-1], *off])
-    return found
+            tapered[i] = np.array([*line[:-1], *off])
+    return tapered

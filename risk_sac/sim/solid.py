@@ -106,7 +106,7 @@ def drives_into(
     segment = _segment(path, 0, station_m)
     tilt = state[HEADING, own] - path[PATH_HEADING, segment]
     side = RIGHT if lateral < -ACROSS_MPS else LEFT if lateral > ACROSS_MPS else CLEAR  # that it moves to
-    found = CLEAR
+    worst = CLEAR
     for step in range(1, LONGEST_STEPS):
         station_m += (before + speed) / 2 * STEP_S
         offset_m += lateral * STEP_S
@@ -118,13 +118,13 @@ def drives_into(
         where = _meets(state, foreseen, (x, y, heading), size, step * STEP_S, hardest_mps2, side)
         if where == AHEAD:
             return AHEAD
-        found = max(found, where)
+        worst = max(worst, where)
         if speed <= 0.0:
             break
         accel = max(accel - jerk * STEP_S, -brake, -taper(speed, jerk))
         before, speed = speed, max(speed + accel * STEP_S, 0.0)
         lateral = math.copysign(max(abs(lateral) - lateral_accel * STEP_S, 0.0), lateral)
-    return found
+    return worst
 
 
 @compiled

@@ -220,8 +220,8 @@ def index(bends: Floats, station_m: float) -> int:
 @compiled
 def _profile(station: Floats, heading: Floats, cornering: float, braking: float) -> Floats:
     n = int(station[-1] / GRID_M) + 1
-    found = np.zeros((3, n))
-    curvature, ahead, cap = found[HERE], found[SOON], found[CAP]
+    profile = np.zeros((3, n))
+    curvature, ahead, cap = profile[HERE], profile[SOON], profile[CAP]
     for i in range(1, len(station)):
         turn = (heading[i] - heading[i - 1] + math.pi) % (2 * math.pi) - math.pi
         for k in range(math.ceil(station[i] / GRID_M), min(math.ceil((station[i] + BODY_M) / GRID_M), n)):
@@ -233,4 +233,4 @@ def _profile(station: Floats, heading: Floats, cornering: float, braking: float)
         square = min(cornering / max(ahead[k], NO_BEND_PER_M), reachable)
         cap[k] = math.sqrt(square)
         reachable = square + 2 * braking * GRID_M
-    return found
+    return profile

@@ -48,13 +48,13 @@ def main() -> None:
 
 def _survey() -> dict[str, object]:
     net = read_net(NET)
-    found = survey(net, tell=SurveyProgress())
+    map_survey = survey(net, tell=SurveyProgress())
     places = Places(
-        items=[FoundPlace.model_validate(fit.told()) for fit in found.fits],
-        elsewhere=[Elsewhere.model_validate(misfit.told()) for misfit in found.misfits],
-        nowhere=dict(found.nowhere),
+        items=[FoundPlace.model_validate(fit.told()) for fit in map_survey.fits],
+        elsewhere=[Elsewhere.model_validate(misfit.told()) for misfit in map_survey.misfits],
+        nowhere=dict(map_survey.nowhere),
     )
-    replace_file(Path(PICTURE), map_png(net, found))
+    replace_file(Path(PICTURE), map_png(net, map_survey))
     write_sealed(Path(PLACES), places)
     return {}
 

@@ -202,11 +202,11 @@ class _Lines:
 
 def _network_id(client: Client, called: object) -> object:
     """Returns the id of the uploaded network with a label; the service refuses unknown ones."""
-    found = [network for network in client.networks() if called in (network.id, network.label)]
-    if len(found) > 1:
-        ids = ", ".join(network.id for network in found)
-        raise ConfigError("network", f"{called!r}, the label of {len(found)} networks", "the id of one", f"of {ids}")
-    return found[0].id if found else called
+    matches = [network for network in client.networks() if called in (network.id, network.label)]
+    if len(matches) > 1:
+        ids = ", ".join(network.id for network in matches)
+        raise ConfigError("network", f"{called!r}, the label of {len(matches)} networks", "the id of one", f"of {ids}")
+    return matches[0].id if matches else called
 
 
 def _submit(options: argparse.Namespace) -> int:

@@ -46,7 +46,7 @@ def road_message(road: Road) -> bytes:
 def lights(road: Road, signals: tuple[Signal, ...]) -> list[Mapping[str, Any]]:
     """Returns a light for each stop line, at its lane's end, assigned to the lane behind."""
     lanes = {lane.id: (number, lane) for number, lane in enumerate(road.lanes)}
-    found: list[Mapping[str, Any]] = []
+    messages: list[Mapping[str, Any]] = []
     for number, (line, signal) in enumerate(zip(road.stop_lines, signals, strict=True)):
         assigned, _ = lanes[line.leads_to]
         _, before = lanes[line.lane]
@@ -56,8 +56,8 @@ def lights(road: Road, signals: tuple[Signal, ...]) -> list[Mapping[str, Any]]:
             "assigned_lane_id": [_id(LANE_ID + assigned)],
         }
         place = {"position": _road_point(before.line[:, -1])}
-        found.append({"id": _id(LIGHT_ID + number), "base": place, "classification": classification})
-    return found
+        messages.append({"id": _id(LIGHT_ID + number), "base": place, "classification": classification})
+    return messages
 
 
 def _lane(lane: Lane, numbers: Mapping[str, int], road: Road) -> Mapping[str, Any]:

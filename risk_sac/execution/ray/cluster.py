@@ -53,13 +53,13 @@ def connect(settings: RaySettings) -> None:
 def nodes(settings: RaySettings) -> list[ClusterNode]:
     """The machines of the cluster, with their room for runs."""
     listed = []
-    for each in ray.nodes():
-        resources = each.get("Resources", {}) if each["Alive"] else {}
+    for node in ray.nodes():
+        resources = node.get("Resources", {}) if node["Alive"] else {}
         slots = int(resources.get("CPU", 0) / settings.ray_cpus_per_run + 1e-9)
         if settings.ray_memory_bytes_per_run:
             slots = min(slots, int(resources.get("memory", 0) / settings.ray_memory_bytes_per_run))
         listed.append(
-            ClusterNode(id=each["NodeID"], address=each["NodeManagerAddress"], alive=each["Alive"], slots=slots)
+            ClusterNode(id=node["NodeID"], address=node["NodeManagerAddress"], alive=node["Alive"], slots=slots)
         )
     return listed
 

@@ -78,12 +78,12 @@ def _middles(failure: Recorded, first: int, last: int) -> list[Floats]:
     """Returns the middle of each picture: at last the ego's place, before it its surroundings."""
     path = np.column_stack((failure.ego.x_m, failure.ego.y_m))[: last + 1]
     middle = path[-1]
-    found: list[Floats] = []
+    middles: list[Floats] = []
     reach = np.array((WIDTH, HEIGHT)) / WIDTH * VIEW_M / 4  # the ego stays within the middle half
     for place in path[: first - 1 if first else None : -1]:
         middle = np.clip(middle + EASE * (place - middle), place - reach, place + reach)
-        found.append(middle)
-    return found[::-1]
+        middles.append(middle)
+    return middles[::-1]
 
 
 def _picture(failure: Recorded, ground: Sequence[Surface], frame: int, middle: Floats) -> Image.Image:

@@ -49,11 +49,11 @@ def rows(options: argparse.Namespace) -> Iterator[tuple[object, ...]]:
     """Yields a row of admission.csv for each defect."""
     for name in options.defects:
         try:
-            clean, found = undisturbed(name, options), search(name, options)
+            clean, detection = undisturbed(name, options), search(name, options)
         except RiskSacError as error:
             print(f"{name}: {error}", file=sys.stderr)
             continue
-        hit = (found.method, found.seed, found.detected) if found else ("", "", "")
+        hit = (detection.method, detection.seed, detection.detected) if detection else ("", "", "")
         version = version_of(ego_with(name))
         yield name, version, clean.family, clean.episodes, int(clean.detected is not None), *hit
 
@@ -67,11 +67,11 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=60_000, help="of each search (default: %(default)s)")
     parser.add_argument("--seeds", type=int, default=1, help="of each search (default: %(default)s)")
     options = parser.parse_args()
-    found: list[tuple[object, ...]] = []
+    admission_rows: list[tuple[object, ...]] = []
     for row in rows(options):
-        found.append(row)
+        admission_rows.append(row)
         text = io.StringIO()
-        csv.writer(text, lineterminator="\n").writerows([COLUMNS, *found])
+        csv.writer(text, lineterminator="\n").writerows([COLUMNS, *admission_rows])
         replace_file(options.out / "admission.csv", text.getvalue().encode())
 
 
