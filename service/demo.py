@@ -27,7 +27,7 @@ from service.settings import ServiceSettings
 
 START_S = 60.0
 STOP_S = 60.0
-AWAY_S = 10.0  # the service is not restarted
+AWAY_S = 10.0  # short, since the service is not restarted
 DEFECT = "tailgates"  # within the demo's budget archive search mostly finds it, and random search mostly does not
 
 

@@ -1,4 +1,4 @@
-"""Flags that describe a campaign or a run, and those that name places of a map."""
+"""Flags of campaigns, runs, egos, places and lists of failures."""
 
 import argparse
 import re
@@ -21,7 +21,7 @@ from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Fault, Grade, S
 from risk_sac.run_folder.durable import scratch_folder
 from risk_sac.verdicts.distinct import DistinctFailures
 
-CLASS = re.compile(r"[\w.]+:\w+")  # module:Class, which `risk_sac.egos.serve` takes and no campaign
+CLASS = re.compile(r"[\w.]+:\w+")  # matches module:Class, which `risk_sac.egos.serve` takes and no campaign
 # Field of a budget → its flag's type, metavar and help.
 BUDGET: Mapping[str, tuple[type, str, str]] = {
     "episodes": (int, "N", "search episodes of a run (default: 300)"),

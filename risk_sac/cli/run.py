@@ -48,7 +48,7 @@ from risk_sac.run_folder.results import TIMES, RunResults
 if TYPE_CHECKING:
     from risk_sac.execution.jobs import Job
 
-SEEDS = 5  # of a comparison that names none
+SEEDS = 5  # number of seeds of a comparison that names none
 
 
 def add(commands: Commands) -> None:

@@ -28,10 +28,10 @@ from risk_sac.records import (
     Severity,
 )
 
-TIMEOUT_S = 30.0  # of silence within one answer
-PATIENCE_S = 10.0  # with a service that does not answer
-MAKING_S = 300.0  # with one that has something to play for its answer
-PAGE = 100  # items that are asked for at a time
+TIMEOUT_S = 30.0  # longest silence within one answer
+PATIENCE_S = 10.0  # longest wait for a service that does not answer
+MAKING_S = 300.0  # the same where the service has to play something for its answer
+PAGE = 100  # number of items that one request asks for
 PNG, BUNDLE = "image/png", "application/zip"
 
 Query = dict[str, str | int | None]

@@ -1,4 +1,4 @@
-"""Base of all settings."""
+"""Base class of all settings, and readable errors about them."""
 
 import codecs
 import json
@@ -44,7 +44,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Weight = Annotated[float, Field(ge=0, le=1000)]
 
 FIELDS = "fields and their values, such as `family: low`"
-MARKS = {  # the longer ones first
+MARKS = {  # longer marks come first
     codecs.BOM_UTF32_LE: "UTF-32",
     codecs.BOM_UTF32_BE: "UTF-32",
     codecs.BOM_UTF8: "UTF-8-sig",

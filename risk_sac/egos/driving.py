@@ -1,4 +1,4 @@
-"""Rows of a perceived path, a driver's way of staying on it, and the edges of lanes."""
+"""Driving along a perceived path: lane keeping, leaders, IDM and braking."""
 
 import math
 from typing import NamedTuple
@@ -13,12 +13,12 @@ from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, F
 # Rows of a path, as in `risk_sac.sim.paths`.
 PATH_X, PATH_Y = 0, 1
 STATION = 2  # length of the line up to each point, m
-PATH_HEADING = 3  # of the segment that begins at the point, rad
-LIMIT = 4  # the fastest to take it, m/s; bends are slow
+PATH_HEADING = 3  # heading of the segment that begins at the point, rad
+LIMIT = 4  # highest speed at the point, m/s; low in bends
 
 LOOKAHEAD_S, LEAST_LOOKAHEAD_M = 0.6, 5.0
 BEND_M = 5.0
-ASIDE_M = 0.3  # beside the ego's body: who is in there is in its way
+ASIDE_M = 0.3  # free width on each side of the ego's body; a vehicle within it is in the way
 
 
 def lane_edges(lane: Lane) -> tuple[Floats, Floats]:
@@ -125,11 +125,11 @@ def leaders(path: Floats, station_m: float, offset_m: float, state: Floats, vehi
 
 VEHICLE = int(Kind.VEHICLE)
 COMFORT_MPS2 = 2.0  # comfortable braking
-SIDEWAYS_MPS2 = 3.0  # in a bend
+SIDEWAYS_MPS2 = 3.0  # lateral acceleration in a bend
 STANDSTILL_M = 2.5
 SETTLE_S = 0.5
-STOP_LINE_M = 1.0  # how far before it to stop
-LAST_STOP_MPS2 = 4.5  # a yellow signal that takes more braking than that is passed
+STOP_LINE_M = 1.0  # distance from the stop line at which to stop
+LAST_STOP_MPS2 = 4.5  # a yellow signal that takes more braking than this is passed
 
 
 class Ahead(NamedTuple):

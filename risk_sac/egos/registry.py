@@ -32,14 +32,14 @@ SHIPPED = {
     "idm-aeb": "risk_sac.egos.shipped:IdmAeb",
     "broken": "risk_sac.egos.shipped:Broken",
 }
-PLANNERS = {  # shipped too, where the extra `planners` is installed
+PLANNERS = {  # shipped only where the extra `planners` is installed
     "fop": "risk_sac.egos.planners.fiss:Fop",
     "fiss": "risk_sac.egos.planners.fiss:Fiss",
     "fiss-plus": "risk_sac.egos.planners.fiss:FissPlus",
 }
 PLANNERS_PACKAGE = "fiss_planner"
 HASH_DIGITS = 12
-PYTHON_DEADLINE_S = 60.0  # generous: in our own process the first answer waits for a compiler, on whatever machine
+PYTHON_DEADLINE_S = 60.0  # generous: in our own process the first answer waits for a compiler
 
 
 class EgoCard(Settings):

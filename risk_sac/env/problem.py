@@ -97,9 +97,9 @@ def _adjusted(path: str, asked: Any, used: Any, why: str) -> Adjustment:
     return Adjustment(families=(), field=f"odd.{path}", asked=text_of(asked), used=text_of(used), why=why)
 
 
-RSS_RESPONSE_S = 0.5  # of any ego: a scene is no less dangerous, nor fair, because a slower driver is in it
-RSS_BRAKING_MPS2 = 6.0  # a firm braking: a driver's whose car would stop by 8 and more
-SUMO_KEEPS = frozenset({"on_carriageway", "no_red_light_entry"})  # requirements that its own driver never violates
+RSS_RESPONSE_S = 0.5  # response time of any ego: a slower driver makes a scene neither less dangerous nor less fair
+RSS_BRAKING_MPS2 = 6.0  # firm braking of a driver whose car could brake with 8 m/s² and more
+SUMO_KEEPS = frozenset({"on_carriageway", "no_red_light_entry"})  # requirements that SUMO's own driver never violates
 
 
 @dataclass(frozen=True, slots=True)

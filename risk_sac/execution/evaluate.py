@@ -1,6 +1,6 @@
-"""Executes one run without a server, in a folder.
+"""Executes and verifies runs and evaluates campaigns, without a server.
 
-The run is started or resumed, written to the folder as it goes, and stopped by Ctrl-C.
+A run is started or resumed, written to its folder as it goes, and stopped by Ctrl-C.
 """
 
 import json

@@ -47,8 +47,8 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 BEAT_S = 1.0
-PATIENCE_S = 5.0  # a worker leaves as soon as its scheduler is gone, but one that was stopped cannot
-GIVE_UP_S = 60.0  # after which what holds the folder is no such worker
+PATIENCE_S = 5.0  # time for an orphaned worker to leave before it is killed; a suspended one cannot leave
+GIVE_UP_S = 60.0  # a process that holds the folder for longer is no such worker
 POLL_S = 0.05
 # Torch, C++ and the loader of libraries have no class of errors for it.
 _OUT_OF_MEMORY = (

@@ -13,7 +13,7 @@ from risk_sac.verdicts.distinct import CELLS, distinct_failures, kind_of
 from risk_sac.world.types import Floats
 
 SPEED_MPS, LEAST = 20.0, -3.0  # the same ranges for a violation without contact: of the ego's speed, and of robustness
-WIDTH = 0.25  # of the outcome features' ranges: failures farther apart than that are not much alike
+WIDTH = 0.25  # kernel width as a share of the outcome features' ranges; failures farther apart are not much alike
 
 
 class _Member(NamedTuple):

@@ -18,10 +18,10 @@ from risk_sac.failures.studied import Core, Extent
 from risk_sac.failures.variants import Variant, VariantPlayer, alike
 from risk_sac.world.types import STEP_S, Bools, Floats
 
-MOST = 150  # episodes that are played for one failure
+MOST = 150  # most episodes that are played for one failure
 COPIES, HELD, SHARE = 10, 8, 0.01  # a reduction counts if so many copies, perturbed by that much, still fail
-SEGMENT = round(0.5 / STEP_S)  # steps
-AMPLITUDES = (0.5, 0.7, 0.85)  # of the remaining actions, the least first
+SEGMENT = round(0.5 / STEP_S)  # length of a segment of actions, in steps
+AMPLITUDES = (0.5, 0.7, 0.85)  # factors by which the remaining actions are weakened, the smallest first
 
 Unit = TypeVar("Unit")
 Cell = tuple[slice, slice]  # steps and columns of the actions

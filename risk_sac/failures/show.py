@@ -20,14 +20,14 @@ from risk_sac.risk.rss import TTC_CAP_S
 from risk_sac.verdicts.words import began, ego_did, known, prevented_by
 from risk_sac.world.types import STEP_S, Floats
 
-CAPTION_WIDTH = 120  # characters
+CAPTION_WIDTH = 120  # width of a caption's lines, in characters
 SEEN_COLOUR, RELEASE_COLOUR, HIDDEN_COLOUR, ALSO_COLOUR = "tab:green", "tab:purple", "0.9", "tab:brown"
 VIEW_S, PANELS_S = 3.0, 8.0  # before the violation: what the view from above holds, and the panels
-AFTER_S = 3.0  # after a violation without contact, in the panels
+AFTER_S = 3.0  # time that panels show after a violation without contact
 MARGIN_M = 5.0
-LEAST_M = 5.0  # that a scale of distances reaches
+LEAST_M = 5.0  # least range of a scale of distances
 WIDTH_IN, PANEL_IN, DPI = 11.0, 1.5, 110
-PANEL_WIDTH_IN = 8.7  # what legends and labels leave of the width
+PANEL_WIDTH_IN = 8.7  # width of a panel without its legend and labels
 VIEW_IN = (2.2, 6.0)  # least and greatest height of the view from above
 
 

@@ -20,7 +20,7 @@ from risk_sac.scenario.space import SceneSpace
 from risk_sac.world.types import STEP_S, Floats, Scene
 
 SCENES, COPIES = (0.01, 0.02, 0.05), 40  # of a region: shares of the scene parameters' ranges, and copies at each
-SEEDS = 10  # of the traffic
+SEEDS = 10  # number of other traffic seeds that are played
 ACTIONS = 0.05
 TAIL_S = (
     3.0  # of no action after the failure, in which a variant may fail: what is done less, or elsewhere, takes longer

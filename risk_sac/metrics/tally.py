@@ -1,4 +1,4 @@
-"""The funnel of each requirement: counted over a run's episodes, and pooled over runs."""
+"""Counts the episodes of a run by outcome and requirement."""
 
 import math
 from collections import Counter, deque
@@ -64,7 +64,7 @@ def _funnel(counts: str, steps: Sequence[int], rated: int) -> RequirementCounts:
 
 
 STEPS_PER_S = round(1 / STEP_S)
-WINDOW = 100  # episodes of the sliding ECR and PCR
+WINDOW = 100  # number of episodes of the sliding ECR and PCR
 
 
 def preventable(record: EpisodeRecord) -> bool:

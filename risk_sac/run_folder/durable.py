@@ -1,4 +1,4 @@
-"""Temporary folders and files of ours, and the removal of those that killed processes left."""
+"""Files that survive crashes: replaced in one step, locked and sealed."""
 
 import contextlib
 import fcntl
@@ -107,7 +107,7 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 _SEAL = re.compile(rb',\n  "sha256": "([0-9a-f]{64})"\n}\n\Z')
 _END = b"\n}"
-LOCK = ".lock"  # in a folder that one process at a time may work in
+LOCK = ".lock"  # lock file of a folder that one process at a time may work in
 
 
 def replace_file(path: Path, content: bytes | memoryview, *, keep: Path | None = None, mode: int = 0o666) -> None:

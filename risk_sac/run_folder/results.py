@@ -101,7 +101,7 @@ def records_from_lines(content: bytes) -> list[EpisodeRecord]:
 
 
 VERIFIED = "verified.json"
-TIMES = 3  # that a failure is replayed by default
+TIMES = 3  # default number of replays of a failure
 
 
 @dataclass(frozen=True, kw_only=True)

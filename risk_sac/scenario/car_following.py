@@ -13,10 +13,10 @@ from risk_sac.scenario.place import Stretch, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.world.types import Role
 
-BEHIND_M, AHEAD_M = 15.0, 25.0  # of the neighbours' fronts from the ego's
-LEAST_FOLLOWING_M, MOST_FOLLOWING_M = 10.0, 40.0  # gap behind the ego
-CLEAR_M = 1.0  # that a track has left behind the last vehicle on it
-DISTANT_M = 60.0  # beyond the leader
+BEHIND_M, AHEAD_M = 15.0, 25.0  # range of the neighbours' fronts relative to the ego's
+LEAST_FOLLOWING_M, MOST_FOLLOWING_M = 10.0, 40.0  # range of the gap behind the ego
+CLEAR_M = 1.0  # length that a track has left behind the last vehicle on it
+DISTANT_M = 60.0  # distance of the distant vehicle beyond the leader
 LEAST_BEHIND_M = 8.0  # room that a place must have behind the ego
 
 

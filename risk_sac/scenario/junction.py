@@ -21,11 +21,11 @@ from risk_sac.scenario.place import JunctionPlace, Leg, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.world.types import Role
 
-NEAREST_M, FARTHEST_M = 10.0, 90.0  # attacker and ego, from the stop line
-LEAST_RANGE_M = 10.0  # of those distances at a place
+NEAREST_M, FARTHEST_M = 10.0, 90.0  # range of the distance of attacker and ego from the stop line
+LEAST_RANGE_M = 10.0  # least range of those distances at a place
 STREAM_MPS, STREAM_M = 9.0, 30.0
-WIDEST_GAP_M = 40.0  # of the background
-LEAST_GAP_M = 10.0  # from a background vehicle to the others on its lane, as behind the ego in car following
+WIDEST_GAP_M = 40.0  # widest gap between background vehicles
+LEAST_GAP_M = 10.0  # least gap from a background vehicle to others on its lane, as behind the ego in car following
 WHO = {
     "ego": "the ego",
     "oncoming": "the oncoming vehicle",

@@ -25,7 +25,7 @@ from risk_sac.world.jit import cpu_s
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
-LATEST = 200  # records in which the episodes of a dead ego are looked for
+LATEST = 200  # number of latest records in which the episodes of a dead ego are looked for
 PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
 
 

@@ -18,14 +18,14 @@ from risk_sac.sim.reading import Reading
 from risk_sac.sim.roads import Roads
 from risk_sac.world.types import STEP_S, Bools, Floats, Role
 
-ASKEW_M = 0.1  # by which a corner of the ego may be beside where SUMO's models have it
+ASKEW_M = 0.1  # distance of the ego's corner from where SUMO's models have it above which it is askew
 
-NORMAL_DECEL_MPS2 = 4.5  # what SUMO assumes of a leader, and its default for passenger cars
-JERK_MPS3 = 12.65  # at which a braking builds up (UN R157's driver)
-BUILD_UP_S = NORMAL_DECEL_MPS2 / JERK_MPS3  # which its model, whose braking steps, does not reckon with
-OWN_CHOICE_MPS = -1.0  # SUMO's word for the speed that its models choose
-SAFE_MODE = 31  # all of SUMO's checks; told speeds are then held to the normal deceleration
-EMERGENCY_MODE = 26  # without those of safe speed and of deceleration
+NORMAL_DECEL_MPS2 = 4.5  # deceleration that SUMO assumes of a leader, and its default for passenger cars
+JERK_MPS3 = 12.65  # jerk with which a braking builds up (UN R157's driver)
+BUILD_UP_S = NORMAL_DECEL_MPS2 / JERK_MPS3  # time that braking takes to build up; the model leaves it out
+OWN_CHOICE_MPS = -1.0  # value by which SUMO's models choose the speed
+SAFE_MODE = 31  # all checks of SUMO; commanded speeds are then held to the normal deceleration
+EMERGENCY_MODE = 26  # SUMO's checks without those of safe speed and of deceleration
 
 
 class SumoDriver:

@@ -18,15 +18,15 @@ from risk_sac.sim import paths
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
 
-LOOK_S = 4.0  # how far ahead a collision course counts
-CUT_IN_LOOK_S = 2.0  # the same in the vehicle's own direction, where sideways motion is soon over
+LOOK_S = 4.0  # time ahead within which a collision course counts
+CUT_IN_LOOK_S = 2.0  # the same for vehicles of the same direction, whose sideways motion is soon over
 TICK_S = 0.1
-MARGIN_M = 0.375  # on either side of the vehicle's body: the room in which a lane keeper wanders (UN R157)
-YIELDING_MPS2 = 2.5  # of crossing traffic; SUMO's drivers, which stop well before the junction, never need more
+MARGIN_M = 0.375  # free width on either side of the body, in which a lane keeper wanders (UN R157)
+YIELDING_MPS2 = 2.5  # braking with which crossing traffic yields; SUMO's drivers never need more
 SAME_WAY_COS = 0.5
 MOVING_MPS = 0.5
-BEHIND_M, BEYOND_M = 60.0, 10.0  # of a path beside what is driven meanwhile, on which others are looked for
-NEAR_M = 40.0  # beyond it no vehicle has to brake for a pedestrian yet
+BEHIND_M, BEYOND_M = 60.0, 10.0  # path before and beyond the driven stretch on which others are looked for
+NEAR_M = 40.0  # distance beyond which no vehicle has to brake for a pedestrian yet
 
 
 @compiled

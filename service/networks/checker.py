@@ -30,7 +30,7 @@ from service.networks.schemas import (
     NetworkFile,
 )
 
-LOG = Path("log")  # where the file descriptors 1 and 2 lead to
+LOG = Path("log")  # file that the file descriptors 1 and 2 write to
 _FLAGS: Mapping[DocumentKind, str] = {DocumentKind.NET: "-n", DocumentKind.ADDITIONAL: "-a", DocumentKind.ROUTES: "-r"}
 _OPTIONS = (
     "--xml-validation never --xml-validation.net never --xml-validation.routes never --route-steps 0 "

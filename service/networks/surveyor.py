@@ -1,7 +1,7 @@
-"""`service.networks.surveyor REPORT survey|keep …`: find places of a network, or store some in the library.
+"""Finds places of a network, or stores some in the library.
 
-Started by `service.networks.surveys` in the folder of a checked network, with limits on time and memory, since a search
-takes seconds that would block the server.
+`service.networks.surveys` starts `service.networks.surveyor REPORT survey|keep …` in the folder of a checked network,
+with limits on time and memory, since a search takes seconds that would block the server.
 
     survey                 writes `places.json` and `places.png` beside the net
     keep PATTERN [PLACE]   keeps that place, or all of the pattern, and reports the names of the families that they are

@@ -32,8 +32,8 @@ from service.store.writing import Ledger
 
 logger = logging.getLogger(__name__)
 
-AT_ONCE = 200  # episodes in one transaction
-TELL_S = 10.0  # between two lines of progress in the log
+AT_ONCE = 200  # number of episodes in one transaction
+TELL_S = 10.0  # time between two lines of progress in the log
 SPECIAL = {
     stat.S_IFLNK: "a symbolic link",
     stat.S_IFIFO: "a FIFO",

@@ -1,4 +1,4 @@
-"""Updates row, run counts and project hours for an episode."""
+"""Counts of runs, project hours, statistics and events in the database."""
 
 import time
 from collections.abc import Collection, Iterable, Sequence
@@ -20,8 +20,8 @@ from service.store.stored import StoredPage, read_episode
 from service.store.tables import TALLIED, CampaignRow, ChangeRow, EpisodeRow, RequirementRow, RunRow, UsageRow
 
 HOUR_S = 3600
-NEWEST = 40  # episodes that tell the pace of a run
-STALL = 10.0  # times the median: compilation, or a machine that stood still
+NEWEST = 40  # number of episodes that tell the pace of a run
+STALL = 10.0  # an episode that takes this many medians is left out: compilation, or a machine that stood still
 TOUCHED = f",{NO_CONTACT},"
 
 

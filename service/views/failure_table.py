@@ -1,4 +1,4 @@
-"""The table of a campaign's failures. Pure.
+"""Table of a campaign's failures. Pure.
 
 Records are taken from their JSON without validation, because a table may have ten thousand of them.
 """

@@ -1,4 +1,4 @@
-"""Report of a campaign from the folders of its finished runs, as `risk-sac evaluate` makes it."""
+"""Reports, figures and evidence from the folders of finished runs."""
 
 import hashlib
 import shlex

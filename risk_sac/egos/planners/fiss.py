@@ -19,13 +19,13 @@ from risk_sac.egos.seam import Control, EpisodeStart, Perceived, Trajectory, Veh
 from risk_sac.sim.pilot import Motion
 from risk_sac.world.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Road, X, Y
 
-SPACING_M = 2.0  # of points along lanes
-PIECE_M = 50.0  # of a lane; the planner's step takes as long as the lanes near it are
-GROWN_M = 0.2  # by which others are longer and wider
-MOVING_MPS = 0.5  # from which another's heading is that of its velocity
-MOST_BRAKING_MPS2 = 8.0  # that a plan may have; in an emergency the car brakes as it can
-BEYOND_M = 20.0  # by which the lanes it looks at reach beyond the longest plan; more of them only take time
-BEYOND_S = 0.5  # by which predictions reach beyond the longest plan
+SPACING_M = 2.0  # distance between points along lanes
+PIECE_M = 50.0  # length of a piece of a lane; the planner's step takes as long as the lanes near it are
+GROWN_M = 0.2  # margin added to the length and width of other actors
+MOVING_MPS = 0.5  # speed from which the velocity gives an actor's heading
+MOST_BRAKING_MPS2 = 8.0  # hardest braking of a plan; in an emergency the car brakes as hard as it can
+BEYOND_M = 20.0  # length of the lanes known to the planner beyond its longest plan; more only costs time
+BEYOND_S = 0.5  # time that predictions reach beyond the longest plan
 
 
 class FrenetPlanner:

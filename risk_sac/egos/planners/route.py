@@ -11,8 +11,8 @@ from risk_sac.egos.seam import Perceived, Vehicle
 from risk_sac.world.types import HEADING, LENGTH, SPEED, WIDTH, Bools, Floats, Kind, Lane, Road, Signal, X, Y
 
 BEGINS_MPS2 = 2.5  # braking at which a planner without stop lines of its own begins to stop at one
-BEFORE_LINE_M = 1.0  # where it stops
-BESIDE_M = 0.1  # between its body and the lane's edge
+BEFORE_LINE_M = 1.0  # distance from the stop line at which it stops
+BESIDE_M = 0.1  # distance between the ego's body and the lane's edge
 
 
 def lanes_ahead(road: Road, start: str) -> list[str]:

@@ -1,6 +1,6 @@
-"""Converts the road to ASAM OSI 3.
+"""Converts road, signals and perceived actors to ASAM OSI 3.
 
-That is lanes, their boundaries and speed limits, and the lights at stop lines.
+A road has lanes, their boundaries and speed limits, and the lights at stop lines.
 
 Source: ASAM OSI 3.8, osi_lane.proto, osi_logicallane.proto and osi_trafficlight.proto.
 """
@@ -133,7 +133,7 @@ TRAJECTORY = 1
 # Choice: what nothing of ours has. Heights are usual ones, and a long body is a truck.
 CAR_HEIGHT_M, TRUCK_HEIGHT_M, WALKER_HEIGHT_M = 1.5, 3.0, 1.75
 TRUCK_FROM_M = 6.5
-SIGNAL_ID = 1 << 32  # of the one signal ahead; beyond the ids of actors
+SIGNAL_ID = 1 << 32  # id of the one signal ahead; beyond the ids of actors
 
 
 class OsiEgo(ABC):

@@ -21,7 +21,7 @@ from risk_sac.execution.ray.settings import ADDRESS, RaySettings, variable
 
 logger = logging.getLogger(__name__)
 
-TOKEN_MODE = "RAY_AUTH_MODE"  # Ray's own
+TOKEN_MODE = "RAY_AUTH_MODE"  # environment variable that Ray reads
 HEAD_S = 10.0
 PROBE_S = 60.0
 

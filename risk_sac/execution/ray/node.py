@@ -26,9 +26,9 @@ from risk_sac.execution.messages import Event, without_folders
 from risk_sac.execution.ray.settings import ADDRESS, variable
 from risk_sac.run_folder.durable import claim, replace_file
 
-GATHER_S = 0.25  # words within it are handed on at once
-GROWN_S = 2.0  # between two copies of files that only grow
-GROWN_BYTES_PER_S = 1 << 20  # that such copies may take on average
+GATHER_S = 0.25  # messages within this time are sent together
+GROWN_S = 2.0  # least time between two copies of files that only grow
+GROWN_BYTES_PER_S = 1 << 20  # average rate that such copies may reach
 Files = Mapping[str, bytes]  # by their paths in a folder, the oldest first
 # What results depend on, besides Python and egos: the same on the server's machine and on all nodes.
 PACKAGES = ("risk-sac", "ray", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")

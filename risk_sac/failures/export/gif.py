@@ -31,7 +31,7 @@ from risk_sac.records import Collision
 from risk_sac.world.types import STEP_S, Floats
 
 LAST_S, AFTER_S, HOLD_MS = 7.0, 2.0, 2000  # before the violation and after it, and how long it stays
-EASE = 0.06  # how fast the view follows the ego, so that it does not tremble
+EASE = 0.06  # share of the way to the ego that the view moves per picture, so that it does not tremble
 
 
 def files(failure: Recorded) -> Files:

@@ -1,4 +1,4 @@
-"""Lays reference lines of OpenDRIVE roads along polylines: straight sides, and cubics around the corners."""
+"""Writes OpenDRIVE: reference lines, lanes, signals and crossings of a net."""
 
 import math
 import xml.etree.ElementTree as ET
@@ -13,9 +13,9 @@ from risk_sac.failures.export.formats import BESIDE, add, document
 from risk_sac.failures.net import Lane, Net, moved, ribbon
 from risk_sac.world.types import Floats
 
-LEAST_ROUND_M = 0.5  # so far before and behind a corner the line bends at least, where its sides are long enough
-KNOTS = np.arange(8) / 8  # of a cubic beside a corner
-ROOM = 1.2  # of the way that the innermost lane loses at a corner
+LEAST_ROUND_M = 0.5  # least length of the bend before and behind a corner, where its sides are long enough
+KNOTS = np.arange(8) / 8  # parameters at which a cubic beside a corner is sampled
+ROOM = 1.2  # length of a bend as a multiple of what the innermost lane loses at the corner
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +140,7 @@ def _length_m(cubic: Floats) -> float:
     return float(np.linalg.norm(slopes, axis=1) @ weights / 2.0)
 
 
-SIGNAL_M = 5.0  # height above the road
+SIGNAL_M = 5.0  # height of a signal above the road
 LANE_TYPES = {"lane": "driving", "inside": "driving", "sidewalk": "sidewalk"}
 
 

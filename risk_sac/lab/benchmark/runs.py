@@ -22,7 +22,7 @@ from risk_sac.run_folder.results import FAILURES
 from risk_sac.search.loop import execute_run
 
 ANSWER = "detection.json"
-MOST_EPISODES = 20_000  # scenes that are refused cost no steps
+MOST_EPISODES = 20_000  # bounds the episodes, since refused scenes cost no steps
 
 
 class Detection(Record):

@@ -1,4 +1,4 @@
-"""Draws the critical-difference diagram of methods over defects.
+"""Tables and critical-difference diagrams of the benchmark.
 
 Methods that a bar connects do not differ significantly (Nemenyi test at 5 % after a Friedman test).
 Source: Demšar 2006, "Statistical comparisons of classifiers over multiple data sets".

@@ -1,4 +1,4 @@
-"""Failures by requirement: three methods against three egos, a figure for each family.
+"""Draws failures by requirement: three methods against three egos.
 
     python -m risk_sac.lab.figures.by_requirement OUT [--seeds N] [--episodes N]
 

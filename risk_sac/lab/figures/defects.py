@@ -1,4 +1,4 @@
-"""Which defects of the catalogue are admitted, by runs that this command repeats.
+"""Measures which defects of the catalogue are admitted.
 
     python -m risk_sac.lab.figures.defects OUT [--defects NAME ...] [--scenes N] [--steps N] [--seeds N]
 
@@ -24,7 +24,7 @@ from risk_sac.run_folder.durable import replace_file
 UNDISTURBED = "iid-undisturbed"
 METHODS: tuple[MethodName, ...] = ("archive", "random")
 FIRST_SEED = 1
-SCENE_STEPS = 150  # of a whole scene; shorter ones make it more scenes
+SCENE_STEPS = 150  # steps of a whole scene; shorter scenes make it more scenes
 COLUMNS = ("defect", "version", "family", "undisturbed_scenes", "undisturbed_detected", "method", "seed", "detected")
 
 

@@ -1,4 +1,4 @@
-"""What archive and random search find in a planner: equal environment steps, several seeds.
+"""Compares what archive and random search find in a planner.
 
     python -m risk_sac.lab.figures.planner_table OUT [--ego NAME] [--families NAME ...] [--methods NAME ...] [--seeds N]
         [--steps N] [--finished DIR]
@@ -37,7 +37,7 @@ from risk_sac.scenario.families import family_named
 from risk_sac.search.run import CHECKPOINT, PACKAGES
 
 FIRST_SEED = 1
-MOST_EPISODES = 10_000  # of a run, which ends by its steps; fixed, so that it can go on with more of them
+MOST_EPISODES = 10_000  # most episodes of a run, which ends by its steps; fixed, so that it can go on with more steps
 COUNTS = ("distinct_failures", "distinct_preventable", "headline_candidates")
 COLUMNS = ("family", "method", "seed", "episodes", "environment_steps", *COUNTS)
 Row = dict[str, str | int]

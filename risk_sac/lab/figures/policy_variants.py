@@ -1,4 +1,4 @@
-"""Variants of the pretrained policy: what it is asked for, its γ, and n-step returns.
+"""Trains and compares variants of the pretrained policy.
 
     python -m risk_sac.lab.figures.policy_variants OUT [--variants shipped kinds ...] [--family low] [--episodes 1500]
       [--seed 21] [--jobs 2]

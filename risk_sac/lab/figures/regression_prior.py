@@ -1,4 +1,4 @@
-"""Steps to a new fault's first detection, from the campaign of the version before, from the shipped prior, and cold.
+"""Measures steps to a new fault's detection from three priors.
 
     python -m risk_sac.lab.figures.regression_prior OUT [--jobs N]
 

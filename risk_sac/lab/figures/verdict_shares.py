@@ -1,4 +1,4 @@
-"""Shares of valid contacts by fault, severity, grade and reference driver: as they were recorded, and judged again.
+"""Judges valid contacts again and compares the shares of verdicts.
 
     python -m risk_sac.lab.figures.verdict_shares OUT [--egos NAME ...] [--episodes N] [--seed N]
 

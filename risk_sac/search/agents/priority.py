@@ -1,4 +1,4 @@
-"""Exact sum tree for drawing indices in proportion to their priorities."""
+"""Risk-prioritised replay: priorities, a sum tree and importance weights."""
 
 from dataclasses import dataclass
 from typing import Self

@@ -1,4 +1,4 @@
-"""Translates points between two families of one pattern, by the names of scene parameters and adversaries.
+"""Start of a search from the shipped prior and earlier runs.
 
 A point is a scene in the unit cube of a space, and behind it the genes of each adversary's script.
 """
@@ -19,8 +19,8 @@ from risk_sac.search.prior.shipped import shipped_prior
 from risk_sac.search.scripts import SIZE, Genes
 from risk_sac.world.types import Floats
 
-MIDDLE = 0.5  # of a scene parameter or gene that the source lacks
-PASSIVE = Genes(*[MIDDLE] * SIZE)._replace(active=0.0)  # an adversary that the source lacks does nothing
+MIDDLE = 0.5  # value of a scene parameter or gene that the source lacks
+PASSIVE = Genes(*[MIDDLE] * SIZE)._replace(active=0.0)  # genes of an adversary that the source lacks: it does nothing
 STEER = Genes._fields.index("steer")
 OTHER_SIDE = {"left": "right", "right": "left"}
 
@@ -126,7 +126,7 @@ def _unit(values: Floats, low: Floats, width: Floats) -> Floats:
     return np.clip(np.divide(offset, width, out=np.zeros_like(offset), where=width > 0), 0.0, 1.0)
 
 
-DOUBT = 0.5  # share of the uniform belief beside what an earlier run showed: its ego may have been another
+DOUBT = 0.5  # share of the uniform belief beside an earlier run's, whose ego may have been another
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
