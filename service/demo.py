@@ -27,7 +27,7 @@ from service.settings import ServiceSettings
 
 START_S = 60.0
 STOP_S = 60.0
-AWAY_S = 10.0  # the service is not restarted
+AWAY_S = 10.0  # short, since the service is not restarted
 DEFECT = "tailgates"  # within the demo's budget archive search mostly finds it, and random search mostly does not
 
 
@@ -148,7 +148,7 @@ def _wait_until_up(url: str, process: subprocess.Popen[bytes], log: Path) -> Non
 
 def _write(out: Path, campaign: Campaign, results: Results, failures: Sequence[Episode]) -> None:
     """Writes everything that was found as JSON; `series` is a failure's file below the data folder."""
-    found = {
+    document = {
         "campaign": campaign.model_dump(mode="json"),
         "results": results.model_dump(mode="json"),
         "failures": [
@@ -156,21 +156,21 @@ def _write(out: Path, campaign: Campaign, results: Results, failures: Sequence[E
         ],
     }
     out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(json.dumps(found, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    out.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def first_detections(campaign: Campaign, failures: Sequence[Episode], data_dir: Path) -> Mapping[str, Episode | None]:
     """Returns of each search, by id, the first failure that detects the defect; see `detected`."""
     from risk_sac.failures.play import detected  # here, because loading the simulator takes seconds
 
-    found: dict[str, Episode | None] = {}
+    detections: dict[str, Episode | None] = {}
     for spec in campaign.spec.searches():
         folder = ServiceSettings(data_dir=data_dir).run_folder(campaign.id, spec.id) / FAILURES
         of_run = sorted((each for each in failures if each.run_id == spec.id), key=lambda each: each.index)
-        found[spec.id] = next(
+        detections[spec.id] = next(
             (each for each in of_run if detected(spec, each, read_series(folder / series_name(each.index)))), None
         )
-    return found
+    return detections
 
 
 def in_words(defect: str, campaign: Campaign, first: Mapping[str, Episode | None]) -> str:

@@ -1,4 +1,4 @@
-"""Settings of the server process: RISK_SAC_* variables, or files in a folder of secrets."""
+"""Settings of the server: environment variables or files of secrets."""
 
 import json
 import os

@@ -88,19 +88,19 @@ def _benchmark(options: argparse.Namespace) -> int:
         seeds=tuple(range(options.first_seed, options.first_seed + options.seeds)),
         budget_steps=options.steps,
     )
-    found, written_s = ended(benchmark, options.out), -math.inf
+    detections, written_s = ended(benchmark, options.out), -math.inf
     if not options.tables_only:
         with Progress(console=console) as bar:
-            task = bar.add_task("runs", total=len(list(benchmark.specs())), completed=len(found))
+            task = bar.add_task("runs", total=len(list(benchmark.specs())), completed=len(detections))
             for detection in play(benchmark, options.out, options.jobs or cores()):
-                found.append(detection)
+                detections.append(detection)
                 bar.advance(task)
                 if time.monotonic() - written_s > WRITTEN_EVERY_S:
-                    write(found, options.out, options.typed)
+                    write(detections, options.out, options.typed)
                     written_s = time.monotonic()
-    write(found, options.out, options.typed)
+    write(detections, options.out, options.typed)
     places = [COLUMNS.index(name) for name in SHOWN]
-    say(folded_table(SHOWN, ([row[place] for place in places] for row in methods_rows(balanced(found)))))
+    say(folded_table(SHOWN, ([row[place] for place in places] for row in methods_rows(balanced(detections)))))
     say(f"All tables and figures: {options.out / 'benchmark.md'}")
     return OK
 
@@ -110,15 +110,15 @@ def _power(options: argparse.Namespace) -> int:
     if options.runs:
         return _power_of_folders(options, runs)
     method, families = options.method or "archive", options.families or SHIPPED
-    found = method_power(method, dict.fromkeys(families, (options.steps or STEPS, 1)), runs)
-    if not found.defects:
+    power = method_power(method, dict.fromkeys(families, (options.steps or STEPS, 1)), runs)
+    if not power.defects:
         known = ", ".join(sorted({run.method for run in runs if run.family in families}))
         raise ConfigError("--method", f"{method!r}, of which nothing was measured in {', '.join(families)}", known)
     table = Table("defect", "family", "detected", "runs", box=SIMPLE_HEAD)
-    for each in found.defects:
+    for each in power.defects:
         table.add_row(each.defect, each.family, str(each.detected), str(each.runs))
     console.print(table)
-    say(" ".join(found.sentences))
+    say(" ".join(power.sentences))
     return OK
 
 

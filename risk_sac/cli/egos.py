@@ -97,7 +97,7 @@ def _ladder(options: argparse.Namespace) -> int:
     from risk_sac.execution.evaluate import evaluate
     from risk_sac.report.rendering import table
 
-    found: dict[str, Sequence[FinishedRun]] = {}
+    runs_by_ego: dict[str, Sequence[FinishedRun]] = {}
     jobs, executor = options.jobs or cores(), os.environ.get("RISK_SAC_EXECUTOR", "local")
     for name, ego in egos.items():
         with progress_bar() as bar:
@@ -107,16 +107,16 @@ def _ladder(options: argparse.Namespace) -> int:
             complain(f"{name}: {job.name}: {job.reason}")
         if evaluation.stopped:
             return INTERRUPTED
-        found[name] = evaluation.comparison.runs
-    rows = [row for family in spec.families for row in _rows(family, found)]
+        runs_by_ego[name] = evaluation.comparison.runs
+    rows = [row for family in spec.families for row in _rows(family, runs_by_ego)]
     text = table(COLUMNS, rows, left=2)
-    if requirements := [row for family in spec.families for row in _requirements(family, found)]:
+    if requirements := [row for family in spec.families for row in _requirements(family, runs_by_ego)]:
         text += "\n" + table(["family", "ego", *REQUIREMENT_COLUMNS], requirements, left=4)
     (options.out / "ladder.md").write_text(f"`{options.typed}`\n\n{text}", encoding="utf-8")
     say(folded_table(COLUMNS, rows))
     if requirements:
         say(folded_table(("family", "ego", *REQUIREMENT_COLUMNS), requirements))
-    return OK if all(found.values()) else FAILED
+    return OK if all(runs_by_ego.values()) else FAILED
 
 
 def _rows(family: str, found: "dict[str, Sequence[FinishedRun]]") -> list[list[str]]:

@@ -1,4 +1,4 @@
-"""Flags that describe a campaign or a run, and those that name places of a map."""
+"""Flags of campaigns, runs, egos, places and lists of failures."""
 
 import argparse
 import re
@@ -21,7 +21,7 @@ from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Fault, Grade, S
 from risk_sac.run_folder.durable import scratch_folder
 from risk_sac.verdicts.distinct import DistinctFailures
 
-CLASS = re.compile(r"[\w.]+:\w+")  # module:Class, which `risk_sac.egos.serve` takes and no campaign
+CLASS = re.compile(r"[\w.]+:\w+")  # matches module:Class, which `risk_sac.egos.serve` takes and no campaign
 # Field of a budget → its flag's type, metavar and help.
 BUDGET: Mapping[str, tuple[type, str, str]] = {
     "episodes": (int, "N", "search episodes of a run (default: 300)"),
@@ -201,11 +201,11 @@ SORTED_BY = "found (the order of the search), severity (the worst first) or spee
 def add_filter_flags(parser: Parser) -> None:
     """Adds the flags of a list of failures."""
     group = parser.group("choice of failures")
-    for name, each in FILTERS.items():
-        choices = f": {', '.join(each.choices)}" if each.choices else ""
-        what = f"only those {each.what}{choices}"
+    for name, filter_ in FILTERS.items():
+        choices = f": {', '.join(filter_.choices)}" if filter_.choices else ""
+        what = f"only those {filter_.what}{choices}"
         flag = f"--{name.replace('_', '-')}"
-        group.add_argument(flag, choices=each.choices, metavar=name.upper(), help=what)
+        group.add_argument(flag, choices=filter_.choices, metavar=name.upper(), help=what)
     group.add_argument(
         "--preventable", dest="grade", action="store_const", const=str(Grade.PREVENTABLE), help="--grade preventable"
     )

@@ -54,35 +54,35 @@ def _places(options: argparse.Namespace) -> int:
     with scratch_folder() as folder:
         converted = present_net(options.network, folder)
         chosen = Map(converted.file)
-        found = survey(chosen.net, patterns)
+        map_survey = survey(chosen.net, patterns)
         warnings = [*converted.warnings, *net_remarks(chosen.net)]
         if options.out is not None:
             from risk_sac.failures.from_above import map_png  # here, because loading matplotlib takes a second
 
-            options.out.write_bytes(map_png(chosen.net, found))
+            options.out.write_bytes(map_png(chosen.net, map_survey))
         if options.tries is not None:
-            return _try_places(chosen, found, options)
+            return _try_places(chosen, map_survey, options)
     if options.json:
-        fits, misfits = [fit.told() for fit in found.fits], [misfit.told() for misfit in found.misfits]
-        said = {"places": fits, "elsewhere": misfits, "nowhere": found.nowhere, "warnings": warnings}
+        fits, misfits = [fit.told() for fit in map_survey.fits], [misfit.told() for misfit in map_survey.misfits]
+        said = {"places": fits, "elsewhere": misfits, "nowhere": map_survey.nowhere, "warnings": warnings}
         console.out(json.dumps(said), highlight=False)
         return OK
     for warning in warnings:
         console.print(f"warning: {warning}", soft_wrap=True, markup=False)
     for pattern in patterns:
-        _tell(pattern, found, most=len(found.fits) if options.all else SHOWN, why=options.why)
+        _tell(pattern, map_survey, most=len(map_survey.fits) if options.all else SHOWN, why=options.why)
     if options.out is not None:
         console.print(f"Drawn: {options.out}", soft_wrap=True)
     return OK
 
 
-def _tell(pattern: Pattern, found: Survey, most: int, *, why: bool) -> None:
-    fits = [fit for fit in found.fits if fit.spot.pattern == pattern]
-    misfits = [misfit for misfit in found.misfits if misfit.spot.pattern == pattern]
+def _tell(pattern: Pattern, map_survey: Survey, most: int, *, why: bool) -> None:
+    fits = [fit for fit in map_survey.fits if fit.spot.pattern == pattern]
+    misfits = [misfit for misfit in map_survey.misfits if misfit.spot.pattern == pattern]
     rare = sum(fit.rare for fit in fits)
     marked = f", contacts are rare at {rare} of them" if rare else ""
     counts = f"{counted(len(fits), 'place')}{marked}; does not fit at {len(misfits)}"
-    nowhere = f": {found.nowhere[pattern]}" if pattern in found.nowhere else ""
+    nowhere = f": {map_survey.nowhere[pattern]}" if pattern in map_survey.nowhere else ""
     console.print(f"{TITLES[pattern]} ({pattern}): {counts}{nowhere}", highlight=False)
     if fits:
         console.print(_table("what", [(fit.spot.id, fit.summary) for fit in fits], most))
@@ -99,7 +99,7 @@ def _table(heading: str, rows: Sequence[tuple[str, str]], most: int) -> Table:
     return table
 
 
-def _try_places(chosen: Map, found: Survey, options: argparse.Namespace) -> int:
+def _try_places(chosen: Map, map_survey: Survey, options: argparse.Namespace) -> int:
     """Plays at some places and prints a row per pattern.
 
     Fails if a place does not run, or if the ego is touched without an attack.
@@ -107,11 +107,11 @@ def _try_places(chosen: Map, found: Survey, options: argparse.Namespace) -> int:
     from risk_sac.failures.tryout import sample, try_out  # here, because loading the simulator takes a second
 
     tried = []
-    for fit in sample(found.fits, options.tries, options.seed):
+    for fit in sample(map_survey.fits, options.tries, options.seed):
         tried.append(try_out(fit, chosen.keep(fit), options.episodes, options.seed))
         for why in _wrong(tried[-1]):
             console.print(f"{fit.spot.pattern} at {fit.spot.id}: {why}", markup=False, soft_wrap=True)
-    console.print(_tried(found, tried))
+    console.print(_tried(map_survey, tried))
     return FAILED if any(not each.runs or each.touched_unattacked for each in tried) else OK
 
 
@@ -126,13 +126,13 @@ def _wrong(tried: "Tried") -> list[str]:
     return whys
 
 
-def _tried(found: Survey, tried: Sequence["Tried"]) -> Table:
+def _tried(map_survey: Survey, tried: Sequence["Tried"]) -> Table:
     names = ("pattern", "places", "tried", "run", "played", "refused", "invalid", "touched, unattacked", "mirrored")
     table = Table(*names, box=SIMPLE_HEAD)
     for pattern in dict.fromkeys(each.fit.spot.pattern for each in tried):
         own = [each for each in tried if each.fit.spot.pattern == pattern]
         row = (
-            found.counts[pattern],
+            map_survey.counts[pattern],
             len(own),
             sum(each.runs for each in own),
             sum(each.played for each in own),

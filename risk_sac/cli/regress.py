@@ -71,25 +71,25 @@ def _regress(options: argparse.Namespace) -> int:
         file.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
     baseline = read_baseline(options.baseline) if options.baseline else None
     regressed = list(_cases(options.failures, ego))
-    found = Regression(ego=ego, cases=tuple(each.case for each in regressed))
+    regression = Regression(ego=ego, cases=tuple(each.case for each in regressed))
     if baseline is not None:
-        found = found.beside(baseline)
-    console.print(cases_table(found))
+        regression = regression.beside(baseline)
+    console.print(cases_table(regression))
     if options.out is not None:
-        replace_file(options.out, found.model_dump_json(indent=2).encode())
+        replace_file(options.out, regression.model_dump_json(indent=2).encode())
     if options.junit is not None:
-        replace_file(options.junit, junit(found))
+        replace_file(options.junit, junit(regression))
     if options.exports is not None:
-        bundles = [each.bundle for each, case in zip(regressed, found.cases, strict=True) if not case.passed]
+        bundles = [each.bundle for each, case in zip(regressed, regression.cases, strict=True) if not case.passed]
         _export(options.exports, [*map(FormatName, options.format)], bundles)
-    return OK if found.passed else FAILED
+    return OK if regression.passed else FAILED
 
 
-def cases_table(found: Regression) -> Table:
+def cases_table(regression: Regression) -> Table:
     """The cases, and below them how many there are of each verdict."""
-    caption = f"{counted(len(found.cases), 'failure')}: {found.counts_in_words}"
+    caption = f"{counted(len(regression.cases), 'failure')}: {regression.counts_in_words}"
     table = narrow_table("verdict", "failure, and what happens now", caption=caption, caption_justify="left")
-    for case in found.cases:
+    for case in regression.cases:
         table.add_row(case.verdict_in_words, escape(f"{case.id}: {case.name}\n  {case.reason}"))
     return table
 
@@ -154,17 +154,17 @@ def junit(regression: Regression) -> bytes:
 
 
 def _case(case: Case) -> TestCase:
-    found = TestCase(printable(case.id), printable(case.name))
+    test_case = TestCase(printable(case.id), printable(case.name))
     if case.grade is not None:
-        found.add_property("grade", case.grade)
+        test_case.add_property("grade", case.grade)
     said = printable(f"{case.verdict.replace('_', ' ')}: {case.reason}")
     if case.verdict is Verdict.FIXED:
-        found.system_out = said
+        test_case.system_out = said
     elif case.known:
-        found.append(Skipped(f"known; {said}"))
+        test_case.append(Skipped(f"known; {said}"))
     else:
-        found.append((Failure if case.verdict in FAILS else Error)(said, case.verdict))
-    return found
+        test_case.append((Failure if case.verdict in FAILS else Error)(said, case.verdict))
+    return test_case
 
 
 Format = Literal["html", "md", "json"]

@@ -99,12 +99,12 @@ def _verify(options: argparse.Namespace) -> int:
 
     for folder in options.runs:
         read_results(folder)  # refuses what is no run before anything is played
-    found = verify(options.runs, options.times, cores())
-    if missing := [folder for folder in options.runs if folder not in found]:
+    outcomes = verify(options.runs, options.times, cores())
+    if missing := [folder for folder in options.runs if folder not in outcomes]:
         raise SimulationError(f"{missing[0]} was not verified: its run is unfinished, or cannot be replayed")
     answer: list[dict[str, Any]] = []
     lines = []
-    for folder, verified in found.items():
+    for folder, verified in outcomes.items():
         results = read_results(folder)
         headline = pooled_headline(each for each in (results.metrics, results.evaluation) if each is not None) or 0
         answer.append({"id": results.spec.id, "headline": headline, "episodes": verified.episodes})
@@ -115,7 +115,7 @@ def _verify(options: argparse.Namespace) -> int:
             repetition = verified.episodes[index]
             lines.append(f"  flaky: episode {index}, {repetition.same} of {repetition.times} times the same")
     print_answer(options, answer, "\n".join(lines))
-    return FAILED if any(verified.flaky for verified in found.values()) else OK
+    return FAILED if any(verified.flaky for verified in outcomes.values()) else OK
 
 
 def add_export(commands: Commands) -> None:
@@ -170,9 +170,9 @@ def _failure(name: FormatName, bundle: Path) -> Files:
 def _runs(folders: list[Path]) -> Iterator[Path]:
     """Finds the folders of runs among the given ones and directly below them."""
     for folder in folders:
-        found = [folder] if (folder / RESULTS).exists() else sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
-        if not found:
+        runs = [folder] if (folder / RESULTS).exists() else sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
+        if not runs:
             raise ConfigError(
                 "BUNDLE", f"{folder}, which holds no run", "the folder of a run, or one that contains some"
             )
-        yield from found
+        yield from runs

@@ -48,7 +48,7 @@ from risk_sac.run_folder.results import TIMES, RunResults
 if TYPE_CHECKING:
     from risk_sac.execution.jobs import Job
 
-SEEDS = 5  # of a comparison that names none
+SEEDS = 5  # number of seeds of a comparison that names none
 
 
 def add(commands: Commands) -> None:
@@ -126,14 +126,14 @@ def _run(options: argparse.Namespace) -> int:
         notes.print(f"Stopped after {done} of {counted(total, 'episode')}. {again}", soft_wrap=True)
         return INTERRUPTED
     phases = {"i.i.d." if spec.iid else "search": results.metrics, "evaluation": results.evaluation}
-    found = {name: metrics for name, metrics in phases.items() if metrics is not None}
-    requirements = requirements_table({name: metrics.requirements for name, metrics in found.items()})
-    answer = {"id": spec.id, "folder": str(options.out), "wall_s": results.wall_s, "device": results.device, **found}
-    print_answer(options, answer, _summary(spec, results, found), *([requirements] if requirements else []))
+    played = {name: metrics for name, metrics in phases.items() if metrics is not None}
+    requirements = requirements_table({name: metrics.requirements for name, metrics in played.items()})
+    answer = {"id": spec.id, "folder": str(options.out), "wall_s": results.wall_s, "device": results.device, **played}
+    print_answer(options, answer, _summary(spec, results, played), *([requirements] if requirements else []))
     if options.json:
         return OK
     console.print(f"Results: {options.out}/results.json", soft_wrap=True)
-    if any(metrics.headline is None and metrics.headline_candidates for metrics in found.values()):
+    if any(metrics.headline is None and metrics.headline_candidates for metrics in played.values()):
         console.print(f"Count its headline failures: risk-sac verify {options.out}", soft_wrap=True)
     return OK
 

@@ -122,17 +122,17 @@ def _region(options: argparse.Namespace) -> int:
     asked = _asked(options.path, options.failure)
     if options.out is not None:
         options.out.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
-    found = region(asked.bundle)
+    failing_region = region(asked.bundle)
     title = escape(asked.bundle.manifest.id)
     table = narrow_table("changed", "fail", "of", "share", "95 % interval", title=title)
-    for share in found.shares:
+    for share in failing_region.shares:
         rate, interval = f"{share.failed / share.played:.2f}", f"{share.low:.2f} - {share.high:.2f}"
         table.add_row(share.what, str(share.failed), str(share.played), rate, interval)
     console.print(table)
-    console.print("a needle: most scenes right beside it do not fail" if found.needle else "no needle")
+    console.print("a needle: most scenes right beside it do not fail" if failing_region.needle else "no needle")
     if options.out is not None:
-        replace_file(options.out, found.model_dump_json(indent=2).encode())
-    _note(asked, Studied(region=found))
+        replace_file(options.out, failing_region.model_dump_json(indent=2).encode())
+    _note(asked, Studied(region=failing_region))
     return OK
 
 
@@ -148,14 +148,14 @@ def _failures(path: Path) -> Iterator[tuple[str, EpisodeRecord]]:
 def _clusters(options: argparse.Namespace) -> int:
     from risk_sac.failures.clusters import overview
 
-    found = overview(episode for run in options.runs for episode in _failures(run))
+    summary = overview(episode for run in options.runs for episode in _failures(run))
     table = narrow_table("failures", "distinct", "preventable", "kind; look first at")
-    for cluster in found.clusters:
+    for cluster in summary.clusters:
         first = f"{cluster.name}\n  {cluster.representative} ({cluster.grade})"
         table.add_row(str(cluster.failures), str(cluster.distinct), str(cluster.preventable), escape(first))
-    kinds = f"{counted(len(found.clusters), 'kind')}; effective number of kinds (Vendi score): {found.vendi:.1f}"
-    covered = f"cells of the taxonomy with a contact: {found.covered} of {found.cells}"
-    print_answer(options, found, table, f"{kinds}\n{covered}")
+    kinds = f"{counted(len(summary.clusters), 'kind')}; effective number of kinds (Vendi score): {summary.vendi:.1f}"
+    covered = f"cells of the taxonomy with a contact: {summary.covered} of {summary.cells}"
+    print_answer(options, summary, table, f"{kinds}\n{covered}")
     if options.out is not None:
-        replace_file(options.out, found.model_dump_json(indent=2).encode())
+        replace_file(options.out, summary.model_dump_json(indent=2).encode())
     return OK

@@ -28,10 +28,10 @@ from risk_sac.records import (
     Severity,
 )
 
-TIMEOUT_S = 30.0  # of silence within one answer
-PATIENCE_S = 10.0  # with a service that does not answer
-MAKING_S = 300.0  # with one that has something to play for its answer
-PAGE = 100  # items that are asked for at a time
+TIMEOUT_S = 30.0  # longest silence within one answer
+PATIENCE_S = 10.0  # longest wait for a service that does not answer
+MAKING_S = 300.0  # the same where the service has to play something for its answer
+PAGE = 100  # number of items that one request asks for
 PNG, BUNDLE = "image/png", "application/zip"
 
 Query = dict[str, str | int | None]
@@ -267,11 +267,11 @@ class Client:
 
     def _items(self, page: type[Page[R]], path: str, query: Query) -> Iterator[R]:
         while True:
-            found = read(page, self._transport.ask("GET", path, query=query))
-            yield from found.items
-            if found.next is None:
+            answer = read(page, self._transport.ask("GET", path, query=query))
+            yield from answer.items
+            if answer.next is None:
                 return
-            query = query | {"cursor": found.next}
+            query = query | {"cursor": answer.next}
 
 
 def _path(campaign_id: str) -> str:

@@ -1,4 +1,4 @@
-"""Errors of the client."""
+"""HTTP transport of the client, and its errors."""
 
 import logging
 import math

@@ -1,4 +1,4 @@
-"""Base of all settings."""
+"""Base class of all settings, and readable errors about them."""
 
 import codecs
 import json
@@ -44,7 +44,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Weight = Annotated[float, Field(ge=0, le=1000)]
 
 FIELDS = "fields and their values, such as `family: low`"
-MARKS = {  # the longer ones first
+MARKS = {  # longer marks come first
     codecs.BOM_UTF32_LE: "UTF-32",
     codecs.BOM_UTF32_BE: "UTF-32",
     codecs.BOM_UTF8: "UTF-8-sig",
@@ -147,14 +147,14 @@ def field_errors(error: ValidationError, model: type[BaseModel]) -> ConfigError:
     return first
 
 
-def causes(found: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def causes(errors: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Drops errors that repeat one inside them: a list is "too short" once its bad entries are dropped."""
-    locations = [item["loc"] for item in found]
+    locations = [item["loc"] for item in errors]
 
     def repeats(location: Location) -> bool:
         return any(len(other) > len(location) and other[: len(location)] == location for other in locations)
 
-    return [item for item in found if not repeats(item["loc"])]
+    return [item for item in errors if not repeats(item["loc"])]
 
 
 def field_error(item: Mapping[str, Any], model: type[BaseModel] | None = None) -> ConfigError:

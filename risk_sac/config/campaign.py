@@ -1,4 +1,4 @@
-"""Campaigns as users post them, and the runs that they expand to.
+"""Campaigns as users post them, their runs, and their demand.
 
 The same `CampaignSpec` is the REST body, the CLI's YAML and the stored record.
 """

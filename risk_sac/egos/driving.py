@@ -1,4 +1,4 @@
-"""Rows of a perceived path, a driver's way of staying on it, and the edges of lanes."""
+"""Driving along a perceived path: lane keeping, leaders, IDM and braking."""
 
 import math
 from typing import NamedTuple
@@ -13,12 +13,12 @@ from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, F
 # Rows of a path, as in `risk_sac.sim.paths`.
 PATH_X, PATH_Y = 0, 1
 STATION = 2  # length of the line up to each point, m
-PATH_HEADING = 3  # of the segment that begins at the point, rad
-LIMIT = 4  # the fastest to take it, m/s; bends are slow
+PATH_HEADING = 3  # heading of the segment that begins at the point, rad
+LIMIT = 4  # highest speed at the point, m/s; low in bends
 
 LOOKAHEAD_S, LEAST_LOOKAHEAD_M = 0.6, 5.0
 BEND_M = 5.0
-ASIDE_M = 0.3  # beside the ego's body: who is in there is in its way
+ASIDE_M = 0.3  # free width on each side of the ego's body; a vehicle within it is in the way
 
 
 def lane_edges(lane: Lane) -> tuple[Floats, Floats]:
@@ -108,7 +108,7 @@ def leaders(path: Floats, station_m: float, offset_m: float, state: Floats, vehi
     Returns:
       `leaders x 3`: column, distance from the front bumper to the body, m, and speed along the path, m/s.
     """
-    found, count = np.empty((len(vehicle), 3)), 0
+    rows, count = np.empty((len(vehicle), 3)), 0
     for i in range(1, len(vehicle)):
         station, across, way = project(path, state[X, i], state[Y, i])
         cos, sin = abs(math.cos(state[HEADING, i] - way)), abs(math.sin(state[HEADING, i] - way))
@@ -118,18 +118,18 @@ def leaders(path: Floats, station_m: float, offset_m: float, state: Floats, vehi
             continue
         gap = max(station - half_length * cos - half_width * sin - station_m, 0.0)
         along = state[VX, i] * math.cos(way) + state[VY, i] * math.sin(way)
-        found[count, 0], found[count, 1], found[count, 2] = i, gap, max(along, 0.0)
+        rows[count, 0], rows[count, 1], rows[count, 2] = i, gap, max(along, 0.0)
         count += 1
-    return found[:count]
+    return rows[:count]
 
 
 VEHICLE = int(Kind.VEHICLE)
 COMFORT_MPS2 = 2.0  # comfortable braking
-SIDEWAYS_MPS2 = 3.0  # in a bend
+SIDEWAYS_MPS2 = 3.0  # lateral acceleration in a bend
 STANDSTILL_M = 2.5
 SETTLE_S = 0.5
-STOP_LINE_M = 1.0  # how far before it to stop
-LAST_STOP_MPS2 = 4.5  # a yellow signal that takes more braking than that is passed
+STOP_LINE_M = 1.0  # distance from the stop line at which to stop
+LAST_STOP_MPS2 = 4.5  # a yellow signal that takes more braking than this is passed
 
 
 class Ahead(NamedTuple):
@@ -156,11 +156,14 @@ class Driver:
     def ahead(self, perceived: Perceived) -> list[Ahead]:
         """Returns what is on a collision course at constant velocity, see `risk_sac.sim.lookout`, and what leads."""
         p, everybody = perceived, np.ones(len(perceived.ids), dtype=np.bool_)
-        found = targets(
+        conflicts = targets(
             p.path, p.station_m, p.offset_m, 0, self.vehicle.accel_mps2, p.state, p.kind == VEHICLE, everybody
         )
         before, self._speeds = self._speeds, dict(zip(p.ids, p.state[SPEED].tolist(), strict=True))
-        everything = (*found.tolist(), *leaders(p.path, p.station_m, p.offset_m, p.state, p.kind == VEHICLE).tolist())
+        everything = (
+            *conflicts.tolist(),
+            *leaders(p.path, p.station_m, p.offset_m, p.state, p.kind == VEHICLE).tolist(),
+        )
         return [Ahead(gap_m, lead_mps, self._braking(before, p.ids[int(i)])) for i, gap_m, lead_mps in everything]
 
     def _braking(self, before: dict[str, float], id_: str) -> float:

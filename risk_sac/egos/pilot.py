@@ -1,4 +1,4 @@
-"""Moves an ego's car: a kinematic bicycle that does as much of a command as its limits allow.
+"""Moves and steers an ego's car, a kinematic bicycle with limits.
 
 Source: Kong et al. 2015, "Kinematic and dynamic vehicle models for autonomous driving control design", Eq. 1.
 """
@@ -88,8 +88,8 @@ def _advanced(
     )
 
 
-AHEAD_S = 0.5  # of the place that it steers for
-FOLLOW_S = 0.2  # within which the car reaches its plan's speed
+AHEAD_S = 0.5  # time from now of the place that steering aims at
+FOLLOW_S = 0.2  # time within which the car reaches its plan's speed
 
 
 def track(trajectory: Trajectory, motion: Motion, vehicle: Vehicle) -> Control:
@@ -111,7 +111,7 @@ def track(trajectory: Trajectory, motion: Motion, vehicle: Vehicle) -> Control:
     return Control(accel, float(steering))
 
 
-BRAKE_MPS2 = 9.0  # as SUMO's driver can, on dry asphalt
+BRAKE_MPS2 = 9.0  # hardest braking, that of SUMO's driver on dry asphalt
 
 
 def perceive(frame: Frame, belief: Belief, along: Along, signals: tuple[Signal, ...]) -> Perceived:
@@ -181,15 +181,15 @@ class EgoPilot:
 @compiled
 def shown(state: Floats, known: Bools) -> Floats:
     """Returns the columns of known actors, with the rows that a sensor measures."""
-    found = np.empty((state.shape[0], int(known.sum())))
+    measured = np.empty((state.shape[0], int(known.sum())))
     column = 0
     for i in range(state.shape[1]):
         if not known[i]:
             continue
         for row in range(state.shape[0]):
-            found[row, column] = state[row, i]
+            measured[row, column] = state[row, i]
         if i > 0:
-            found[SPEED, column] = math.hypot(state[VX, i], state[VY, i])
-            found[LATERAL, column] = found[ACCEL, column] = found[OFFSET, column] = np.nan
+            measured[SPEED, column] = math.hypot(state[VX, i], state[VY, i])
+            measured[LATERAL, column] = measured[ACCEL, column] = measured[OFFSET, column] = np.nan
         column += 1
-    return found
+    return measured

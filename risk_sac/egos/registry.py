@@ -32,14 +32,14 @@ SHIPPED = {
     "idm-aeb": "risk_sac.egos.shipped:IdmAeb",
     "broken": "risk_sac.egos.shipped:Broken",
 }
-PLANNERS = {  # shipped too, where the extra `planners` is installed
+PLANNERS = {  # shipped only where the extra `planners` is installed
     "fop": "risk_sac.egos.planners.fiss:Fop",
     "fiss": "risk_sac.egos.planners.fiss:Fiss",
     "fiss-plus": "risk_sac.egos.planners.fiss:FissPlus",
 }
 PLANNERS_PACKAGE = "fiss_planner"
 HASH_DIGITS = 12
-PYTHON_DEADLINE_S = 60.0  # generous: in our own process the first answer waits for a compiler, on whatever machine
+PYTHON_DEADLINE_S = 60.0  # generous: in our own process the first answer waits for a compiler
 
 
 class EgoCard(Settings):
@@ -92,13 +92,13 @@ def cards() -> tuple[EgoCard, ...]:
 
 def installed() -> dict[str, str]:
     """Returns the versions of this machine's Python egos by name; for one that cannot be used, the reason."""
-    found = {}
+    versions = {}
     for name, point in _points().items():
         try:
-            found[name] = python_card(point).version
+            versions[name] = python_card(point).version
         except ConfigError as error:
-            found[name] = str(error)
-    return found
+            versions[name] = str(error)
+    return versions
 
 
 def card_of(name: str) -> EgoCard:
@@ -205,11 +205,11 @@ def make(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:
 
 def _points() -> Mapping[str, EntryPoint]:
     shipped = SHIPPED | (PLANNERS if find_spec(PLANNERS_PACKAGE) else {})
-    found = {name: EntryPoint(name=name, value=value, group=GROUP) for name, value in shipped.items()}
+    points = {name: EntryPoint(name=name, value=value, group=GROUP) for name, value in shipped.items()}
     for point in entry_points(group=GROUP):
-        if found.setdefault(point.name, point).value != point.value:
+        if points.setdefault(point.name, point).value != point.value:
             raise ConfigError(GROUP, f"two egos as {point.name!r}", "names of their own")
-    return found
+    return points
 
 
 def _remotes() -> Mapping[str, RemoteCard]:
@@ -227,12 +227,12 @@ def _remotes() -> Mapping[str, RemoteCard]:
 
 def _source(point: EntryPoint) -> Path:
     try:
-        found = find_spec(point.module)
+        module_spec = find_spec(point.module)
     except ImportError as error:
         raise _wrong(point, str(error)) from error
-    if found is None or not found.origin or not found.origin.endswith(".py"):
+    if module_spec is None or not module_spec.origin or not module_spec.origin.endswith(".py"):
         raise _wrong(point, f"there is no module {point.module!r} with a source")
-    return Path(found.origin)
+    return Path(module_spec.origin)
 
 
 def _declared(source: bytes, name: str) -> dict[str, Any]:

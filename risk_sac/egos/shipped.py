@@ -1,4 +1,4 @@
-"""An adaptive cruise control with the emergency braking of UN Regulation 152."""
+"""Shipped egos: IDM with emergency braking, UN R157, RSS, and broken."""
 
 import math
 from collections import deque

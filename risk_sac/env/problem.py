@@ -37,14 +37,14 @@ def adjustments(spec: RunSpec | CampaignSpec) -> tuple[Adjustment, ...]:
 
     A family that cannot be read any more, such as a place that the library has lost, is left out.
     """
-    found: dict[Adjustment, list[str]] = {}
+    families_by_adjustment: dict[Adjustment, list[str]] = {}
     for name in (spec.family,) if isinstance(spec, RunSpec) else spec.families:
         try:
             for each in _of_family(family_named(name), spec):
-                found.setdefault(each, []).append(name)
+                families_by_adjustment.setdefault(each, []).append(name)
         except ConfigError:
             continue
-    return tuple(each.model_copy(update={"families": tuple(names)}) for each, names in found.items())
+    return tuple(each.model_copy(update={"families": tuple(names)}) for each, names in families_by_adjustment.items())
 
 
 def _of_family(family: Family, spec: RunSpec | CampaignSpec) -> Iterator[Adjustment]:
@@ -97,9 +97,9 @@ def _adjusted(path: str, asked: Any, used: Any, why: str) -> Adjustment:
     return Adjustment(families=(), field=f"odd.{path}", asked=text_of(asked), used=text_of(used), why=why)
 
 
-RSS_RESPONSE_S = 0.5  # of any ego: a scene is no less dangerous, nor fair, because a slower driver is in it
-RSS_BRAKING_MPS2 = 6.0  # a firm braking: a driver's whose car would stop by 8 and more
-SUMO_KEEPS = frozenset({"on_carriageway", "no_red_light_entry"})  # requirements that its own driver never violates
+RSS_RESPONSE_S = 0.5  # response time of any ego: a slower driver makes a scene neither less dangerous nor less fair
+RSS_BRAKING_MPS2 = 6.0  # firm braking of a driver whose car could brake with 8 m/s² and more
+SUMO_KEEPS = frozenset({"on_carriageway", "no_red_light_entry"})  # requirements that SUMO's own driver never violates
 
 
 @dataclass(frozen=True, slots=True)

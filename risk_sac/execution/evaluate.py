@@ -1,6 +1,6 @@
-"""Executes one run without a server, in a folder.
+"""Executes and verifies runs and evaluates campaigns, without a server.
 
-The run is started or resumed, written to the folder as it goes, and stopped by Ctrl-C.
+A run is started or resumed, written to its folder as it goes, and stopped by Ctrl-C.
 """
 
 import json
@@ -116,7 +116,7 @@ def verify(
     """
     if times < 1:
         raise ConfigError("times", f"{times}", "at least 1")
-    code, found, runs = code_digest(), dict[Path, Verified](), dict[Path, RunResults]()
+    code, up_to_date, runs = code_digest(), dict[Path, Verified](), dict[Path, RunResults]()
     missing: dict[Path, Verified] = {}  # with nothing replayed yet
     for folder in folders:
         results = runs[folder] = read_results(folder)
@@ -125,7 +125,7 @@ def verify(
         known = read_verified(folder, results.digest)
         enough = known is not None and all(repetition.times >= times for repetition in known.episodes.values())
         if known is not None and enough and known.code == code and known.versions == versions():
-            found[folder] = known
+            up_to_date[folder] = known
         else:
             episodes = {episode.index: Repetition(times=0, same=0) for episode in distinct_failures(results)}
             missing[folder] = Verified(digest=results.digest, code=code, versions=versions(), episodes=episodes)
@@ -142,11 +142,11 @@ def verify(
             del missing[folder]
     for folder, verified in missing.items():
         write_verified(folder, verified)
-    for folder, verified in (found | missing).items():
+    for folder, verified in (up_to_date | missing).items():
         results = with_headline(runs[folder], verified)
         if results != runs[folder]:
             write_results(folder, results)
-    return found | missing
+    return up_to_date | missing
 
 
 def _replayed(

@@ -21,11 +21,11 @@ WORDS = "RISK_SAC_WORDS"
 class Cause(StrEnum):
     """Why a worker is gone."""
 
-    ENDED = "ended"  # it said its last word or was asked to stop
-    KILLED = "killed"  # by the kernel for want of memory, or by an operator
-    STOPPED = "stopped"  # it gave no sign of life or finished nothing, and was killed for that
-    CRASHED = "crashed"  # by itself, without a last word
-    LOST = "lost"  # with the whole cluster that it ran on, which says nothing about the run
+    ENDED = "ended"  # the worker sent its last message or was asked to stop
+    KILLED = "killed"  # the kernel, for want of memory, or an operator killed it
+    STOPPED = "stopped"  # it sent no heartbeat or finished nothing, and was killed for that
+    CRASHED = "crashed"  # it ended by itself without a last message
+    LOST = "lost"  # the whole cluster was lost, which says nothing about the run
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,14 +126,14 @@ Messages = queue.SimpleQueue[tuple[int, Event | Exited] | None]
 
 def taken(messages: Messages, timeout_s: float) -> list[tuple[int, Event | Exited]]:
     """Takes all messages out of a queue, waiting up to `timeout_s` for one."""
-    found = []
+    batch = []
     with contextlib.suppress(queue.Empty):
         message = messages.get(timeout=timeout_s)
         while True:
             if message is not None:
-                found.append(message)
+                batch.append(message)
             message = messages.get_nowait()
-    return found
+    return batch
 
 
 ExecutorName = Literal["local", "ray"]

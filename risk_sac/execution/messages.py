@@ -1,4 +1,4 @@
-"""Messages of a worker: one JSON object per line, over a pipe of its own.
+"""Messages and logs of a worker: one JSON object per line.
 
 Every line is strict JSON from which nothing is lost: words are written as `risk_sac.records.Record` writes them.
 """

@@ -47,8 +47,8 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 
 BEAT_S = 1.0
-PATIENCE_S = 5.0  # a worker leaves as soon as its scheduler is gone, but one that was stopped cannot
-GIVE_UP_S = 60.0  # after which what holds the folder is no such worker
+PATIENCE_S = 5.0  # time for an orphaned worker to leave before it is killed; a suspended one cannot leave
+GIVE_UP_S = 60.0  # a process that holds the folder for longer is no such worker
 POLL_S = 0.05
 # Torch, C++ and the loader of libraries have no class of errors for it.
 _OUT_OF_MEMORY = (
@@ -181,13 +181,13 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int,
     recorder = Recorder(spec, folder, reporter)
     summary = execute_run(spec, folder, recorder)
     results = recorder.finish(summary)
-    found, finished = dict[Path, Verified](), summary.finished
+    verified, finished = dict[Path, Verified](), summary.finished
     if finished and replays:
         reporter.keep_going()
-        found |= verify([folder], replays, stopping=lambda: reporter.stopping)
-        finished = not reporter.stopping or folder in found  # else the next worker finds all played, and replays it
-    if folder in found:
-        results = with_headline(results, found[folder])
+        verified |= verify([folder], replays, stopping=lambda: reporter.stopping)
+        finished = not reporter.stopping or folder in verified  # else the next worker finds all played, and replays it
+    if folder in verified:
+        results = with_headline(results, verified[folder])
     last = Finished(
         finished=finished,
         metrics=results.metrics or summary.metrics,
@@ -195,9 +195,9 @@ def _execute(spec: RunSpec, folder: Path, reporter: Reporter, memory_bytes: int,
         digest=summary.digest,
         versions=summary.versions,
         wall_s=summary.wall_s,
-        repetitions=found[folder].episodes if folder in found else {},
+        repetitions=verified[folder].episodes if folder in verified else {},
     )
-    if folder not in found or not found[folder].flaky:
+    if folder not in verified or not verified[folder].flaky:
         return last
     judged = read_run(folder)
     flaky = {each.index: each.refused_by(REPEATS) for each in judged.records if each.refused_by(REPEATS)}

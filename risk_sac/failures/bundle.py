@@ -1,7 +1,7 @@
-"""Packs and unpacks the place that a bundle carries, so that it can be played without the map.
+"""Bundles of failures: packed, checked and unpacked with their places.
 
-It reaches the simulator only if it has the elements that `risk_sac.maps.cut` writes and no others: SUMO writes
-files that a parameter of a signal names, and reads those that XML includes.
+A bundled net reaches the simulator only if it has the elements that `risk_sac.maps.cut` writes and no others: SUMO
+writes files that a parameter of a signal names, and reads those that XML includes.
 """
 
 import hashlib
@@ -72,11 +72,11 @@ def check_net(net: bytes) -> None:
             raise ValueError(f"a <{element.tag}> of its net says $; wanted none")
 
 
-PACKAGES = ("libsumo", "numpy")  # that decide how an episode goes, its scene and its actions given
+PACKAGES = ("libsumo", "numpy")  # packages that decide how an episode goes, given its scene and actions
 CODE, WORLD = "risk_sac", "sumo_nets"
 MOST_POLICY_BYTES = 2**23
 MANIFEST, HEADS, LAYER = "manifest", "signal_heads", "policy_layer_"  # the layers are numbered
-NORMALISED = "policy_normalised"  # there if the policy is
+NORMALISED = "policy_normalised"  # array that is present if the policy normalises
 
 
 class Manifest(Record):
@@ -161,15 +161,15 @@ def code_digest() -> str:
 def world_of(spec: RunSpec, episode: EpisodeRecord) -> dict[str, str]:
     """Returns the SHA-256 of the files that SUMO reads for an episode; a ConfigError if one is gone."""
     net = Problem.from_spec(spec).family.layout(episode.scene).net
-    found = {}
+    digests = {}
     for name in (net, "vtypes.add.xml"):
         try:
             content = (Path(str(files(WORLD))) / name).read_bytes()
         except FileNotFoundError as error:
             message = f"{name}, which {episode.id_in(spec.id)} was found on, is gone"
             raise ConfigError("BUNDLE", message) from error
-        found[_portable(name, spec)] = hashlib.sha256(content).hexdigest()
-    return found
+        digests[_portable(name, spec)] = hashlib.sha256(content).hexdigest()
+    return digests
 
 
 def _portable(name: str, spec: RunSpec) -> str:

@@ -13,7 +13,7 @@ from risk_sac.verdicts.distinct import CELLS, distinct_failures, kind_of
 from risk_sac.world.types import Floats
 
 SPEED_MPS, LEAST = 20.0, -3.0  # the same ranges for a violation without contact: of the ego's speed, and of robustness
-WIDTH = 0.25  # of the outcome features' ranges: failures farther apart than that are not much alike
+WIDTH = 0.25  # kernel width as a share of the outcome features' ranges; failures farther apart are not much alike
 
 
 class _Member(NamedTuple):
@@ -53,7 +53,7 @@ class Overview(Record):
 
 def overview(episodes: Iterable[tuple[str, EpisodeRecord]]) -> Overview:
     """Sorts valid violations into clusters; contacts that were not judged are left out."""
-    found: defaultdict[str, list[_Member]] = defaultdict(list)
+    members_by_signature: defaultdict[str, list[_Member]] = defaultdict(list)
     kinds = set()
     for name, episode in episodes:
         for violation in episode.valid_violations:
@@ -61,12 +61,12 @@ def overview(episodes: Iterable[tuple[str, EpisodeRecord]]) -> Overview:
                 if violation.judgement is None:
                     continue
                 kinds.add(kind_of(violation, violation.judgement))
-            found[violation.signature].append(_Member(name, episode, violation))
+            members_by_signature[violation.signature].append(_Member(name, episode, violation))
     distinct = {}
-    for name, members in found.items():
+    for name, members in members_by_signature.items():
         violations = [member.violation for member in members]
         distinct[name] = [violations[position] for position in distinct_failures(violations)]
-    clusters = [_cluster(name, members, len(distinct[name])) for name, members in found.items()]
+    clusters = [_cluster(name, members, len(distinct[name])) for name, members in members_by_signature.items()]
     clusters.sort(key=lambda cluster: (-cluster.preventable, -cluster.failures, cluster.name))
     score = vendi(list(distinct.values()))
     return Overview(clusters=tuple(clusters), vendi=score, covered=len(kinds), cells=CELLS)

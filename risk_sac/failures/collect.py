@@ -60,11 +60,11 @@ def policy_of(folder: Path, results: RunResults) -> FrozenPolicy | None:
         return None
     with closing(RunState(spec, folder)) as run:
         try:
-            found = run.resume()
+            resumed = run.resume()
         except CheckpointError as error:
             logger.warning("the policy of %s is left out: %s", spec.id, error)
             return None
-        if not found:
+        if not resumed:
             return None
         learner = run.searchers.agent
         assert isinstance(learner, Learner)  # since the method learns

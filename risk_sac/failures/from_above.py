@@ -1,4 +1,4 @@
-"""Draws the view from above: roads, signals, paths, and the bodies at the violation and before it."""
+"""Draws failures and maps from above."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ from risk_sac.world.types import Floats, Kind, Role
 
 ASIDE: Floats = np.array([(0, 1), (0, -1), (1, 0), (-1, 0)], dtype=np.float64)  # above, below, right, left
 GAPS_PT = (3.0, 12.0, 24.0)
-CHARACTER = (0.65, 1.3)  # width and height of one, in font sizes
+CHARACTER = (0.65, 1.3)  # width and height of a character, in font sizes
 HALO = [withStroke(linewidth=2, foreground="white")]
 
 
@@ -89,7 +89,7 @@ def legend(axis: Axes, title: str | None = None) -> None:
 
 SURFACE_COLOURS: Mapping[SurfaceUse, str] = {"junction": "0.95", "lane": "0.95", "sidewalk": "0.98", "crossing": "0.87"}
 APART_IN = 0.25  # earlier places of a body that are nearer on the page are drawn as one
-GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # before the violation, where the two bodies are drawn as well
+GHOSTS_S = (0.5, 1.0, 2.0, 3.0)  # times before the violation at which the two bodies are drawn as well
 OUTLINE: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.3", "linewidth": 0.8}
 CONFLICT: dict[str, Any] = {"facecolor": "none", "edgecolor": CONFLICT_COLOUR, "linewidth": 1.4, "linestyle": "--"}
 
@@ -237,32 +237,32 @@ MARKS: dict[Pattern, tuple[str, str]] = {
     "junction": ("^", "tab:green"),
 }
 WIDTH_IN, DPI = 9.0, 130
-HEIGHT_IN = (4.5, 12.0)  # the least and the most; in between it goes by the map's
-NAMED = 60  # so many names can be told apart
+HEIGHT_IN = (4.5, 12.0)  # least and greatest height; in between it follows from the map's
+NAMED = 60  # most places that are labelled with their names
 
 
-def map_png(net: Net, found: Survey) -> bytes:
+def map_png(net: Net, survey: Survey) -> bytes:
     """The picture of a whole map."""
-    (content,) = picture(partial(_figure, net, found), ["png"], DPI, {})
+    (content,) = picture(partial(_figure, net, survey), ["png"], DPI, {})
     return content
 
 
-def _figure(net: Net, found: Survey) -> Figure:
+def _figure(net: Net, survey: Survey) -> Figure:
     ground = _ground(net)
     figure = canvas((WIDTH_IN, _height_in(ground)))
     axis = figure.subplots()
     for use, colour in SURFACE_COLOURS.items():
         axis.add_collection(PolyCollection(ground[use], facecolors=colour, edgecolors="0.6", linewidths=0.2))
-    x = [misfit.spot.x_m for misfit in found.misfits]
-    y = [misfit.spot.y_m for misfit in found.misfits]
+    x = [misfit.spot.x_m for misfit in survey.misfits]
+    y = [misfit.spot.y_m for misfit in survey.misfits]
     axis.scatter(x, y, s=5, color="0.5", marker="x", linewidths=0.5, label=f"does not fit ({len(x)})")
     for pattern, (marker, colour) in MARKS.items():
-        spots = [fit.spot for fit in found.fits if fit.spot.pattern == pattern]
+        spots = [fit.spot for fit in survey.fits if fit.spot.pattern == pattern]
         x, y = [spot.x_m for spot in spots], [spot.y_m for spot in spots]
         label = f"{TITLES[pattern]} ({len(spots)})"
         axis.scatter(x, y, s=16, color=colour, marker=marker, alpha=0.8, label=label, zorder=3)
-    if len(found.fits) <= NAMED:
-        for id_, spot in {fit.spot.id: fit.spot for fit in found.fits}.items():  # once where several patterns fit
+    if len(survey.fits) <= NAMED:
+        for id_, spot in {fit.spot.id: fit.spot for fit in survey.fits}.items():  # once where several patterns fit
             if np.isfinite((spot.x_m, spot.y_m)).all():
                 axis.annotate(id_, (spot.x_m, spot.y_m), (3, 3), textcoords="offset points", fontsize=5, zorder=4)
     axis.autoscale()

@@ -18,10 +18,10 @@ from risk_sac.failures.studied import Core, Extent
 from risk_sac.failures.variants import Variant, VariantPlayer, alike
 from risk_sac.world.types import STEP_S, Bools, Floats
 
-MOST = 150  # episodes that are played for one failure
+MOST = 150  # most episodes that are played for one failure
 COPIES, HELD, SHARE = 10, 8, 0.01  # a reduction counts if so many copies, perturbed by that much, still fail
-SEGMENT = round(0.5 / STEP_S)  # steps
-AMPLITUDES = (0.5, 0.7, 0.85)  # of the remaining actions, the least first
+SEGMENT = round(0.5 / STEP_S)  # length of a segment of actions, in steps
+AMPLITUDES = (0.5, 0.7, 0.85)  # factors by which the remaining actions are weakened, the smallest first
 
 Unit = TypeVar("Unit")
 Cell = tuple[slice, slice]  # steps and columns of the actions
@@ -88,8 +88,8 @@ class _MinimalSearch:
         # Other copies than those that it was chosen by.
         held = sum(stage.fails(copy) for copy in stage.copies(left, SHARE, COPIES, self._random))
         played = play(stage.env, stage.scene(left), left.seed, left.actions)
-        found = alike(played.found, stage.failure)
-        assert found is not None  # or it would not have been taken
+        violation = alike(played.found, stage.failure)
+        assert violation is not None  # or it would not have been taken
         # A script would do all that was taken away.
         changes = {"scene": dict(stage.scene(left).values), "script": None}
         episode = played.record(origin.manifest.episode).model_copy(update=changes)
@@ -101,7 +101,7 @@ class _MinimalSearch:
             episodes=stage.played + 1,
             held=held,
             copies=COPIES,
-            sentence=story(played.series, found),
+            sentence=story(played.series, violation),
         )
         return make_bundle(origin.manifest.spec, episode, played.series, played.signal_heads, origin.policy, core)
 

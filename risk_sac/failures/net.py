@@ -1,4 +1,4 @@
-"""Reads of a SUMO net what pictures and formats need: surfaces, lanes with successors, and the signals' programs."""
+"""Reads of a SUMO net what pictures and formats need."""
 
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Plays an episode with given actions: as it was recorded, or as its twin."""
+"""Plays failures again, as recorded or as twins with one change."""
 
 from collections.abc import Callable, Mapping
 from contextlib import closing

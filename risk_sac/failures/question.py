@@ -50,7 +50,7 @@ class TwinPlay(Record):
         cls,
         ego: EgoConfig | None,
         failure: Collision | Violation,
-        found: Sequence[Collision | Violation],
+        violations: Sequence[Collision | Violation],
         name: str = "",
     ) -> Self:
         """Describes a twin with another ego, or with None: without an attack.
@@ -58,14 +58,14 @@ class TwinPlay(Record):
         Args:
           ego: the other one.
           failure: what it is the twin of.
-          found: what was violated in the twin.
+          violations: what was violated in the twin.
           name: of the other ego.
         """
         changed = "no attack" if ego is None else f"ego: {name or ego.driver or ego.profile}"
         kept = "no contact" if failure.requirement == NO_CONTACT else f"keeps {failure.requirement}"
-        violated = {each.requirement: each.event for each in found}
+        violated = {each.requirement: each.event for each in violations}
         told = dict.fromkeys([failure.requirement, *violated], kept) | violated
-        collision = next((each for each in found if isinstance(each, Collision)), None)
+        collision = next((each for each in violations if isinstance(each, Collision)), None)
         return cls(changed=changed, outcome=", ".join(told.values()), collision=collision)
 
     @property

@@ -127,21 +127,21 @@ def _judge(bundle: Bundle, ego: EgoConfig) -> _Ending:
     return worst._replace(reason="; ".join(reasons))
 
 
-def compared(found: Sequence[Collision | Violation], wanted: Sequence[Collision | Violation]) -> _Ending:
+def compared(violations: Sequence[Collision | Violation], wanted: Sequence[Collision | Violation]) -> _Ending:
     """Compares the violations of an old failure with another ego's."""
-    if still := [each for each in found if any(alike([each], old) for old in wanted)]:
+    if still := [each for each in violations if any(alike([each], old) for old in wanted)]:
         return _Ending(Verdict.STILL_FAILING, _events(still), still[0].signature)
-    if valid := [each for each in found if each.valid]:
+    if valid := [each for each in violations if each.valid]:
         return _Ending(Verdict.NEW_KIND, f"{_events(valid)}: {valid[0].signature}", valid[0].signature)
-    if not found:
+    if not violations:
         kept = (f"{old.requirement} is kept" if isinstance(old, Violation) else "nothing is touched" for old in wanted)
         return _Ending(Verdict.FIXED, " and ".join(kept))
-    events, broken = _events(found), {rule for each in found for rule in each.broken}
+    events, broken = _events(violations), {rule for each in violations for rule in each.broken}
     said = f"{events}, which is not its failure: {', '.join(sorted(broken))}"
-    if any(each.artefact for each in found):  # and it may have ended the episode before the failure
+    if any(each.artefact for each in violations):  # and it may have ended the episode before the failure
         return _Ending(Verdict.NOT_COMPARABLE, said)
     if BLIND in broken:
-        return _Ending(Verdict.NEW_KIND, f"{events}, which it never saw", found[0].signature)
+        return _Ending(Verdict.NEW_KIND, f"{events}, which it never saw", violations[0].signature)
     return _Ending(Verdict.FIXED, said)
 
 

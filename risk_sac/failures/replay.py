@@ -32,14 +32,14 @@ def _prepared(file: Path, folders: Sequence[Path]) -> Prepared:
 
     For each other run a line states why not, such as an ego that is not installed.
     """
-    found = {}
+    prepared = {}
     for folder in folders:
         results = read_results(folder)
         try:
-            found[folder] = results, RiskSacEnv.of(results.spec)
+            prepared[folder] = results, RiskSacEnv.of(results.spec)
         except RiskSacError as error:
             _say(file, {"folder": str(folder), "error": f"{type(error).__name__}: {error}"})
-    return found
+    return prepared
 
 
 def _say(file: Path, *lines: dict[str, object]) -> None:

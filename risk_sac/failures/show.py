@@ -20,14 +20,14 @@ from risk_sac.risk.rss import TTC_CAP_S
 from risk_sac.verdicts.words import began, ego_did, known, prevented_by
 from risk_sac.world.types import STEP_S, Floats
 
-CAPTION_WIDTH = 120  # characters
+CAPTION_WIDTH = 120  # width of a caption's lines, in characters
 SEEN_COLOUR, RELEASE_COLOUR, HIDDEN_COLOUR, ALSO_COLOUR = "tab:green", "tab:purple", "0.9", "tab:brown"
 VIEW_S, PANELS_S = 3.0, 8.0  # before the violation: what the view from above holds, and the panels
-AFTER_S = 3.0  # after a violation without contact, in the panels
+AFTER_S = 3.0  # time that panels show after a violation without contact
 MARGIN_M = 5.0
-LEAST_M = 5.0  # that a scale of distances reaches
+LEAST_M = 5.0  # least range of a scale of distances
 WIDTH_IN, PANEL_IN, DPI = 11.0, 1.5, 110
-PANEL_WIDTH_IN = 8.7  # what legends and labels leave of the width
+PANEL_WIDTH_IN = 8.7  # width of a panel without its legend and labels
 VIEW_IN = (2.2, 6.0)  # least and greatest height of the view from above
 
 
@@ -217,20 +217,20 @@ def draw_recording(family: FamilyName, recording: Recording, twin: Recording | N
     figure = canvas((WIDTH_IN * len(columns), sum(heights) + 1.2))
     grid = figure.subplots(len(heights), len(columns), height_ratios=heights, squeeze=False)
     figure.suptitle(caption(family, recording), fontsize=11)
-    for each, (view, *axes) in zip(columns, grid.T, strict=True):
-        draw_from_above(view, family, each, (low, high), m_per_in=(high - low)[0] / PANEL_WIDTH_IN)
+    for column, (view, *axes) in zip(columns, grid.T, strict=True):
+        draw_from_above(view, family, column, (low, high), m_per_in=(high - low)[0] / PANEL_WIDTH_IN)
         view.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         if twin is not None:
-            view.set_title(each.twin or "the failure", fontsize=10)
+            view.set_title(column.twin or "the failure", fontsize=10)
         for axis, panel, first in zip(axes, PANELS, grid[1:, 0], strict=True):
             axis.sharex(grid[1, 0])
             if axis is not first:
                 axis.sharey(first)  # before anything is drawn, so that there is room for both
-            panel(axis, each)
-            _mark_instants(axis, each)
+            panel(axis, column)
+            _mark_instants(axis, column)
             axis.label_outer()
-        _name_instants(axes[0], each)
-        axes[-1].set_xlabel(f"time from the {'contact' if each.collision else 'violation'}, s")
+        _name_instants(axes[0], column)
+        axes[-1].set_xlabel(f"time from the {'contact' if column.collision else 'violation'}, s")
     after_s = max(0.15, *(min(each.time_s[-1], AFTER_S) for each in columns))
     grid[1, 0].set_xlim(max(recording.time_s[0], -PANELS_S), after_s)
     return figure

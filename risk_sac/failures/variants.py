@@ -20,7 +20,7 @@ from risk_sac.scenario.space import SceneSpace
 from risk_sac.world.types import STEP_S, Floats, Scene
 
 SCENES, COPIES = (0.01, 0.02, 0.05), 40  # of a region: shares of the scene parameters' ranges, and copies at each
-SEEDS = 10  # of the traffic
+SEEDS = 10  # number of other traffic seeds that are played
 ACTIONS = 0.05
 TAIL_S = (
     3.0  # of no action after the failure, in which a variant may fail: what is done less, or elsewhere, takes longer
@@ -69,11 +69,11 @@ class VariantPlayer:
             seed=episode.seed,
         )
         self.played = 0  # episodes so far
-        found = alike(self.play(self.original), self.failure)
-        if found is None:
+        violation = alike(self.play(self.original), self.failure)
+        if violation is None:
             self.env.close()
             raise SimulationError(f"{bundle.manifest.id} does not happen here")
-        self.grade = found.graded
+        self.grade = violation.graded
 
     def scene(self, variant: Variant) -> Scene:
         """Returns the scene of a variant."""
@@ -102,23 +102,23 @@ class VariantPlayer:
             yield variant.perturbed(self.space, share, share, random)
 
 
-def alike(found: Sequence[Collision | Violation], wanted: Collision | Violation) -> Collision | Violation | None:
+def alike(violations: Sequence[Collision | Violation], wanted: Collision | Violation) -> Collision | Violation | None:
     """Returns a valid violation that is like another one; None if there is none.
 
     Contacts that are alike have the same striker and came about in the same type of conflict. Violations without
     contact are of the same requirement. Choice: whatever is near, since that changes from copy to copy where no actor
     makes the ego fail; where one does, the violation goes with what that actor does.
     """
-    return next((each for each in found if each.valid and _alike(each, wanted)), None)
+    return next((each for each in violations if each.valid and _alike(each, wanted)), None)
 
 
-def _alike(found: Collision | Violation, wanted: Collision | Violation) -> bool:
-    if not isinstance(found, Collision) or not isinstance(wanted, Collision):
-        return found.requirement == wanted.requirement
-    if found.judgement is None or wanted.judgement is None:
+def _alike(violation: Collision | Violation, wanted: Collision | Violation) -> bool:
+    if not isinstance(violation, Collision) or not isinstance(wanted, Collision):
+        return violation.requirement == wanted.requirement
+    if violation.judgement is None or wanted.judgement is None:
         return False
-    same_type = found.judgement.conflict_type is wanted.judgement.conflict_type
-    return same_type and found.other_id == wanted.other_id
+    same_type = violation.judgement.conflict_type is wanted.judgement.conflict_type
+    return same_type and violation.other_id == wanted.other_id
 
 
 def _up_to(failure: Collision | Violation, actions: Floats, horizon_steps: int) -> Floats:

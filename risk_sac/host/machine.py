@@ -1,4 +1,4 @@
-"""What this machine lends this process: processors, and a folder of its user's for caches."""
+"""Processors, cache folder and loopback addresses of this machine."""
 
 import errno
 import ipaddress

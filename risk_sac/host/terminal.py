@@ -1,4 +1,4 @@
-"""Output of commands, on whatever terminal, in whatever encoding, read or not."""
+"""Output and log of commands on any terminal and encoding."""
 
 import codecs
 import contextlib

@@ -59,14 +59,17 @@ class MetricsAccumulator:
 
 def _figures(tally: Tally) -> dict[str, Any]:
     """Field of `RunMetrics` -> its value, for all metrics that have one."""
-    found: dict[str, float | None] = {}
+    figures: dict[str, float | None] = {}
     for metric in METRICS:
         if not metric.field:
             continue
-        value = found[metric.field] = metric.formula(tally)
+        value = figures[metric.field] = metric.formula(tally)
         if value is not None and f"{metric.field}_low" in RunMetrics.model_fields:
-            found[f"{metric.field}_low"], found[f"{metric.field}_high"] = metric.interval(value, tally) or (None, None)
-    return found
+            figures[f"{metric.field}_low"], figures[f"{metric.field}_high"] = metric.interval(value, tally) or (
+                None,
+                None,
+            )
+    return figures
 
 
 def results_digest(records: Sequence[EpisodeRecord]) -> str:

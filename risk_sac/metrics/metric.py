@@ -1,4 +1,4 @@
-"""A row of the metrics: names, formula, and pooling of runs. Pure."""
+"""Metrics of runs: formulas, pooling, intervals and outcome features. Pure."""
 
 import math
 from collections import Counter

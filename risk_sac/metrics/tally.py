@@ -1,4 +1,4 @@
-"""The funnel of each requirement: counted over a run's episodes, and pooled over runs."""
+"""Counts the episodes of a run by outcome and requirement."""
 
 import math
 from collections import Counter, deque
@@ -48,12 +48,12 @@ def pooled_requirements(metrics: Sequence[RunMetrics]) -> dict[str, RequirementC
     return pooled
 
 
-def requirement_cells(name: str, found: RequirementCounts) -> list[str]:
+def requirement_cells(name: str, requirement: RequirementCounts) -> list[str]:
     """The cells of a requirement's row, under `COLUMNS`; a dash where nothing is judged."""
-    judged = (found.valid, found.distinct, found.preventable)
-    steps = map(str, judged) if found.counts == "failure" else "–––"
-    rate = f"{found.rate:.3f} [{found.rate_low:.3f}, {found.rate_high:.3f}]"
-    return [name, found.counts, str(found.violated), *steps, rate]
+    judged = (requirement.valid, requirement.distinct, requirement.preventable)
+    steps = map(str, judged) if requirement.counts == "failure" else "–––"
+    rate = f"{requirement.rate:.3f} [{requirement.rate_low:.3f}, {requirement.rate_high:.3f}]"
+    return [name, requirement.counts, str(requirement.violated), *steps, rate]
 
 
 def _funnel(counts: str, steps: Sequence[int], rated: int) -> RequirementCounts:
@@ -64,7 +64,7 @@ def _funnel(counts: str, steps: Sequence[int], rated: int) -> RequirementCounts:
 
 
 STEPS_PER_S = round(1 / STEP_S)
-WINDOW = 100  # episodes of the sliding ECR and PCR
+WINDOW = 100  # number of episodes of the sliding ECR and PCR
 
 
 def preventable(record: EpisodeRecord) -> bool:

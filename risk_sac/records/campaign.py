@@ -1,6 +1,6 @@
-"""Number of known defects that a campaign's budget detects.
+"""Campaigns as the API returns them: state, progress, results and power.
 
-It comes from benchmark runs, and says what finding nothing is worth.
+Power comes from benchmark runs, and says what finding nothing is worth.
 """
 
 from collections.abc import Mapping

@@ -218,7 +218,7 @@ def compare(
     """
     reference = REFERENCE if REFERENCE in spec.methods else spec.methods[0]
     methods = (reference, *(method for method in spec.methods if method != reference))
-    found = {run.spec.digest: run for run in runs}
+    run_by_digest = {run.spec.digest: run for run in runs}
 
     def missing(wanted: Sequence[RunSpec]) -> tuple[MissingRun, ...]:
         return tuple(
@@ -229,12 +229,12 @@ def compare(
                 reason=(reasons or {}).get(run.digest, "not finished"),
             )
             for run in wanted
-            if run.digest not in found
+            if run.digest not in run_by_digest
         )
 
     searches = spec.searches()
     wanted = sorted(searches, key=lambda run: (spec.families.index(run.family), methods.index(run.method), run.seed))
-    kept = tuple(found[run.digest] for run in wanted if run.digest in found)
+    kept = tuple(run_by_digest[run.digest] for run in wanted if run.digest in run_by_digest)
     families = dict.fromkeys(run.spec.family for run in kept)
     return Comparison(
         spec=spec,
@@ -247,7 +247,7 @@ def compare(
         cells=tuple(_cells(kept)),
         tests=tuple(_tests(spec, methods, kept)),
         overviews={family: overview(_failures(family, kept)) for family in families},
-        drawn=tuple(found[run.digest] for run in spec.drawn() if run.digest in found),
+        drawn=tuple(run_by_digest[run.digest] for run in spec.drawn() if run.digest in run_by_digest),
         undrawn=missing(spec.drawn()),
         paid_tests=tuple(_paid_tests(spec, methods, kept)),
     )

@@ -226,17 +226,17 @@ def _beyond(odd: Odd, space: SceneSpace) -> Iterator[str]:
 
 def kinds(collisions: Iterable[Collision | None]) -> Kinds:
     """Counts valid contacts by cell of the taxonomy; those without a judgement are left out."""
-    found = Counter(
+    counts = Counter(
         kind_of(each, each.judgement) for each in collisions if each is not None and each.valid and each.judgement
     )
     values = {
         respect: {
-            words: sum(count for kind, count in found.items() if getattr(kind, respect) == value)
+            words: sum(count for kind, count in counts.items() if getattr(kind, respect) == value)
             for value, words in every.items()
         }
         for respect, every in VALUES.items()
     }
-    return Kinds(cells=CELLS, hit={_in_words(kind): count for kind, count in found.most_common()}, values=values)
+    return Kinds(cells=CELLS, hit={_in_words(kind): count for kind, count in counts.most_common()}, values=values)
 
 
 def _in_words(kind: FailureKind) -> str:

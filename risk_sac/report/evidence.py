@@ -105,18 +105,18 @@ class Evidence(Record):
 def gathered(comparison: Comparison) -> Evidence:
     """Gather the evidence of the runs that have finished."""
     spec = comparison.spec
-    found: dict[FamilyName, FamilyCoverage] = {}
+    coverage_by_family: dict[FamilyName, FamilyCoverage] = {}
     for family in spec.families:
         searched, fresh = _records(comparison.runs, family), _records(comparison.drawn, family)
         if searched or fresh:
-            found[family] = FamilyCoverage(
+            coverage_by_family[family] = FamilyCoverage(
                 search=coverage(family_named(family), spec.odd, searched),
                 iid=coverage(family_named(family), spec.odd, fresh) if fresh else None,
             )
     return Evidence(
         complete=not comparison.missing and not comparison.undrawn,
         bounds=tuple(map(drawn, comparison.drawn)),
-        coverage=found,
+        coverage=coverage_by_family,
     )
 
 

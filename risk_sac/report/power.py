@@ -83,27 +83,27 @@ def power_of(spec: CampaignSpec, played: Collection[PlayedCounts], runs: Sequenc
     for method in spec.methods:
         known = {run.family for run in runs if run.method == method}
         budgets = tuple(_budget(spec, family, method, played, runs) for family in spec.families if family in known)
-        found = method_power(method, {each.family: (each.steps, each.runs) for each in budgets}, runs)
-        sentences = [*(found.sentences if budgets else ()), *map(_in_words, budgets)]
+        power = method_power(method, {each.family: (each.steps, each.runs) for each in budgets}, runs)
+        sentences = [*(power.sentences if budgets else ()), *map(_in_words, budgets)]
         if lacking := [family for family in spec.families if family not in known]:
             sentences.append(f"Nothing was measured of {method} in {', '.join(lacking)}.")
-        methods.append(found.model_copy(update={"budgets": budgets, "sentences": tuple(sentences)}))
+        methods.append(power.model_copy(update={"budgets": budgets, "sentences": tuple(sentences)}))
     return Power(note=NOTE, comparison=_comparison(methods, runs), methods=tuple(methods))
 
 
 def _comparison(methods: Sequence[MethodPower], runs: Sequence[BenchmarkRun]) -> str:
     """Compares methods on equal terms: the defects and environment steps that all of them were measured with."""
-    found = [each for each in methods if each.budgets]
-    if len(found) < 2:
+    budgeted = [each for each in methods if each.budgets]
+    if len(budgeted) < 2:
         return ""
-    shared = set.intersection(*({(each.defect, each.family) for each in method.defects} for method in found))
+    shared = set.intersection(*({(each.defect, each.family) for each in method.defects} for method in budgeted))
     if not shared:
         return "No known defect was measured with all of these methods: do not compare the counts below."
-    names = {each.method for each in found}
+    names = {each.method for each in budgeted}
     runs = [run for run in runs if run.method in names and (run.defect, run.family) in shared]
-    limits = {family: _shared_steps(family, found, runs) for family in sorted({family for _, family in shared})}
+    limits = {family: _shared_steps(family, budgeted, runs) for family in sorted({family for _, family in shared})}
     expected = {}
-    for method in found:
+    for method in budgeted:
         budgets = {each.family: (limits[each.family], each.runs) for each in method.budgets if each.family in limits}
         expected[method.method] = method_power(method.method, budgets, runs).expected
     spent = " and ".join(f"{steps:,} environment steps in {family}" for family, steps in limits.items())
@@ -114,14 +114,16 @@ def _comparison(methods: Sequence[MethodPower], runs: Sequence[BenchmarkRun]) ->
     )
 
 
-def _shared_steps(family: str, found: Sequence[MethodPower], runs: Sequence[BenchmarkRun]) -> int:
+def _shared_steps(family: str, methods: Sequence[MethodPower], runs: Sequence[BenchmarkRun]) -> int:
     """Returns the most steps of a run that all methods may spend and were measured for."""
     measured_for: dict[tuple[str, str], int] = {}
     for run in runs:
         if run.family == family:
             cell = run.defect, run.method
             measured_for[cell] = max(measured_for.get(cell, 0), run.budget_steps)
-    return min(*measured_for.values(), *(each.steps for one in found for each in one.budgets if each.family == family))
+    return min(
+        *measured_for.values(), *(each.steps for one in methods for each in one.budgets if each.family == family)
+    )
 
 
 def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequence[BenchmarkRun]) -> MethodPower:
@@ -132,7 +134,7 @@ def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequ
       budgets: family → environment steps of a run, and how many runs there are, each with a seed of its own.
       runs: of the benchmark.
     """
-    found, at_least = [], False
+    defects, at_least = [], False
     of_method = [run for run in runs if run.method == method and run.family in budgets]
     for defect, family in dict.fromkeys((run.defect, run.family) for run in of_method):
         of_defect = [run for run in of_method if (run.defect, run.family) == (defect, family)]
@@ -140,37 +142,37 @@ def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequ
         at_least |= limit < budgets[family][0]
         long_enough = [run for run in of_defect if run.budget_steps >= limit]
         detected = sum(run.detected is not None and run.detected <= limit for run in long_enough)
-        found.append(DefectPower(defect=defect, family=family, detected=detected, runs=len(long_enough)))
-    expected = sum(_chance(each, budgets[each.family][1]) for each in found)
-    once = tuple(each.defect for each in found if each.detected)
-    most = tuple(each.defect for each in found if 2 * each.detected > each.runs)
-    never = tuple(each.defect for each in found if not each.detected)
-    families = ", ".join(family for family in budgets if any(each.family == family for each in found))
+        defects.append(DefectPower(defect=defect, family=family, detected=detected, runs=len(long_enough)))
+    expected = sum(_chance(each, budgets[each.family][1]) for each in defects)
+    once = tuple(each.defect for each in defects if each.detected)
+    most = tuple(each.defect for each in defects if 2 * each.detected > each.runs)
+    never = tuple(each.defect for each in defects if not each.detected)
+    families = ", ".join(family for family in budgets if any(each.family == family for each in defects))
     about = f"{'at least ' if at_least else ''}{expected:.3g} on average"
     sentence = (
-        f"Of {len(found)} known defects that it was measured with in {families}, this budget detects {about}; "
+        f"Of {len(defects)} known defects that it was measured with in {families}, this budget detects {about}; "
         f"never found: {', '.join(never) or 'none'}."
     )
     return MethodPower(
         method=method,
         budgets=(),
-        defects=tuple(found),
+        defects=tuple(defects),
         expected=expected,
         at_least=at_least,
         in_most_seeds=most,
         at_least_once=once,
         never=never,
-        sentences=(sentence, *_basis(found)),
+        sentences=(sentence, *_basis(defects)),
     )
 
 
-def _chance(each: DefectPower, seeds: int) -> float:
+def _chance(defect: DefectPower, seeds: int) -> float:
     """Returns the chance that one of so many seeds detects the defect.
 
     It is the share of all choices of that many measured runs, or of all runs, in which at least one detected it.
     """
-    chosen = min(seeds, each.runs)
-    return 1 - comb(each.runs - each.detected, chosen) / comb(each.runs, chosen)
+    chosen = min(seeds, defect.runs)
+    return 1 - comb(defect.runs - defect.detected, chosen) / comb(defect.runs, chosen)
 
 
 def _basis(found: Sequence[DefectPower]) -> Iterator[str]:

@@ -52,7 +52,7 @@ class FinishedRun:
     @cached_property
     def metrics(self) -> Mapping[Phase, RunMetrics]:
         """The metrics of each phase that has episodes."""
-        found: dict[Phase, RunMetrics] = {}
+        metrics_by_phase: dict[Phase, RunMetrics] = {}
         for phase in PHASES:
             accumulator = MetricsAccumulator(family_named(self.spec.family).horizon_steps)
             records = self.phase(phase)
@@ -60,18 +60,18 @@ class FinishedRun:
                 accumulator.add(record)
             if records:
                 metrics = accumulator.metrics()
-                found[phase] = self.verified.headlined(metrics, records) if self.verified else metrics
-        return found
+                metrics_by_phase[phase] = self.verified.headlined(metrics, records) if self.verified else metrics
+        return metrics_by_phase
 
     @cached_property
     def found(self) -> tuple[Found, ...]:
         """Counts of the search's findings after each of its episodes."""
-        tally, found = Tally(horizon_steps=family_named(self.spec.family).horizon_steps), []
+        tally, findings = Tally(horizon_steps=family_named(self.spec.family).horizon_steps), []
         for record in self.phase("search"):
             tally.add(record)
             kinds = tally.headline_candidates, tally.distinct_preventable, tally.distinct_failures
-            found.append(Found(*kinds, len(tally.kinds)))
-        return tuple(found)
+            findings.append(Found(*kinds, len(tally.kinds)))
+        return tuple(findings)
 
 
 def read_run(folder: Path) -> FinishedRun:

@@ -1,4 +1,4 @@
-"""The ego's own motion, its place on the carriageway and its headway; one compiled call per frame."""
+"""Measures the ego and its actors, and publishes the signals of requirements."""
 
 import math
 from collections import deque

@@ -1,4 +1,4 @@
-"""Responsibility-Sensitive Safety distances, and one margin for each actor.
+"""Responsibility-Sensitive Safety margins and times to encounter, for each actor.
 
 Choice: RSS gives two distances along a lane; here they are taken along the ego's axes, whatever the other's heading.
 Braking and acceleration are blended by the angle between the bodies: cross traffic stops by its brakes.

@@ -1,4 +1,4 @@
-"""A run's state on disk.
+"""Checkpoints of a run, and its guard against repeated crashes.
 
 A checkpoint is a `torch.save` archive that `weights_only=True` reads, so it can run no code, followed by its
 SHA-256. The last but one is kept beside it, for the case that the last one is damaged.
@@ -103,14 +103,14 @@ def load(path: Path, run_digest: str) -> State:
         )
     try:
         stored = torch.load(io.BytesIO(archive), map_location="cpu", weights_only=True)
-        found, state = stored["run_digest"], stored["state"]
+        owner, state = stored["run_digest"], stored["state"]
     except (pickle.UnpicklingError, RuntimeError, EOFError, KeyError, TypeError) as error:
         raise CheckpointError(
             f"checkpoint {path} is undamaged but holds something else than a run's state; delete it"
         ) from error
-    if found != run_digest:
+    if owner != run_digest:
         raise CheckpointError(
-            f"checkpoint {path} belongs to the run {found}; wanted {run_digest}. Its specification has changed since: "
+            f"checkpoint {path} belongs to the run {owner}; wanted {run_digest}. Its specification has changed since: "
             "give the new run another folder"
         )
     decoded: State = _decode(state)
@@ -155,10 +155,10 @@ def _decode(value: Any) -> Any:
 
 
 LOG, COUNTS, CURRENT = "crash.log", "crashes.json", ".episode"
-FATAL = 2  # crashes at one place: the second time rules out that something else was to blame
-PATIENCE = 4  # crashes at several places
+FATAL = 2  # number of crashes at one place that rules out another cause
+PATIENCE = 4  # number of crashes at several places that ends the run
 EGO, BY_EGO = "ego, ", b"/egos/guard.py"  # of a place where the ego's code ran, whose stack has this file in it
-RESET = -1  # the step while the scene is chosen and set up
+RESET = -1  # number of the step while the scene is chosen and set up
 
 
 class Crashes(BaseModel):

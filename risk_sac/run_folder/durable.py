@@ -1,4 +1,4 @@
-"""Temporary folders and files of ours, and the removal of those that killed processes left."""
+"""Files that survive crashes: replaced in one step, locked and sealed."""
 
 import contextlib
 import fcntl
@@ -107,7 +107,7 @@ logger = logging.getLogger(__name__)
 T = TypeVar("T")
 _SEAL = re.compile(rb',\n  "sha256": "([0-9a-f]{64})"\n}\n\Z')
 _END = b"\n}"
-LOCK = ".lock"  # in a folder that one process at a time may work in
+LOCK = ".lock"  # lock file of a folder that one process at a time may work in
 
 
 def replace_file(path: Path, content: bytes | memoryview, *, keep: Path | None = None, mode: int = 0o666) -> None:
@@ -232,11 +232,11 @@ def seal(document: Any) -> bytes:
 
 def unseal(content: bytes, kind: type[T]) -> T:
     """The document that was sealed; raises `DamagedError` if the content is not as it was sealed."""
-    found = _SEAL.search(content)
-    if found is None:
+    seal_match = _SEAL.search(content)
+    if seal_match is None:
         raise DamagedError("it does not end in its SHA-256: it was cut short, or something else wrote it")
-    text = content[: found.start()] + _END
-    actual, wanted = hashlib.sha256(text).hexdigest(), found[1].decode()
+    text = content[: seal_match.start()] + _END
+    actual, wanted = hashlib.sha256(text).hexdigest(), seal_match[1].decode()
     if actual != wanted:
         raise DamagedError(f"its SHA-256 is {actual}, wanted {wanted}")
     try:

@@ -101,7 +101,7 @@ def records_from_lines(content: bytes) -> list[EpisodeRecord]:
 
 
 VERIFIED = "verified.json"
-TIMES = 3  # that a failure is replayed by default
+TIMES = 3  # default number of replays of a failure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,10 +128,10 @@ class Verified:
         flaky = {kind for each in records if each.index in self.flaky for kind in _kinds(each)}
         repeating = self.episodes.keys() - self.flaky
         return tuple(
-            each
-            if each.index in repeating
-            else each.refused(REPEATS, {name for kind, name in _kinds(each).items() if kind in flaky})
-            for each in records
+            record
+            if record.index in repeating
+            else record.refused(REPEATS, {name for kind, name in _kinds(record).items() if kind in flaky})
+            for record in records
         )
 
     def headlined(self, metrics: RunMetrics, judged: Sequence[EpisodeRecord]) -> RunMetrics:
@@ -173,13 +173,13 @@ def distinct_failures(results: RunResults) -> list[EpisodeRecord]:
 
     A candidate is one for the headline. The episodes come in their order.
     """
-    found: defaultdict[tuple[str, str], DistinctFailures] = defaultdict(DistinctFailures)
+    distinct: defaultdict[tuple[str, str], DistinctFailures] = defaultdict(DistinctFailures)
     episodes = []
     for episode in (failure.episode for failure in results.failures):
         valid = episode.valid_violations
-        new = [found[episode.phase, "valid"].add(each) for each in valid]
-        new += [found[episode.phase, "preventable"].add(each) for each in valid if each.preventable]
-        new += [found[episode.phase, "candidate"].add(each) for each in valid if each.headline_candidate]
+        new = [distinct[episode.phase, "valid"].add(each) for each in valid]
+        new += [distinct[episode.phase, "preventable"].add(each) for each in valid if each.preventable]
+        new += [distinct[episode.phase, "candidate"].add(each) for each in valid if each.headline_candidate]
         if any(new):
             episodes.append(episode)
     return episodes

@@ -13,10 +13,10 @@ from risk_sac.scenario.place import Stretch, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.world.types import Role
 
-BEHIND_M, AHEAD_M = 15.0, 25.0  # of the neighbours' fronts from the ego's
-LEAST_FOLLOWING_M, MOST_FOLLOWING_M = 10.0, 40.0  # gap behind the ego
-CLEAR_M = 1.0  # that a track has left behind the last vehicle on it
-DISTANT_M = 60.0  # beyond the leader
+BEHIND_M, AHEAD_M = 15.0, 25.0  # range of the neighbours' fronts relative to the ego's
+LEAST_FOLLOWING_M, MOST_FOLLOWING_M = 10.0, 40.0  # range of the gap behind the ego
+CLEAR_M = 1.0  # length that a track has left behind the last vehicle on it
+DISTANT_M = 60.0  # distance of the distant vehicle beyond the leader
 LEAST_BEHIND_M = 8.0  # room that a place must have behind the ego
 
 
@@ -56,7 +56,7 @@ def family(name: str, place: Stretch) -> Family:
 
 def _parameters(place: Stretch, beside: Mapping[str, Track], *, followed: bool) -> tuple[Parameter, ...]:
     limit = place.speed_limit_mps
-    found = [
+    parameters = [
         initial_speed("ego_speed_mps", 8, limit, "initial speed of the ego"),
         Parameter("lead_gap_m", "m", 8, 50, "gap from the ego's front to the leader's rear"),
         initial_speed("lead_speed_mps", 6, limit, "initial speed of the leader"),
@@ -64,12 +64,12 @@ def _parameters(place: Stretch, beside: Mapping[str, Track], *, followed: bool) 
     for side, track in beside.items():
         low_m = -at_most(BEHIND_M, track.room_m - CAR_LENGTH_M - CLEAR_M)
         meaning = f"{side} neighbour's front relative to the ego's"
-        found += [
+        parameters += [
             Parameter(f"{side}_offset_m", "m", low_m, AHEAD_M, meaning),
             initial_speed(f"{side}_speed_mps", 6, limit, f"initial speed of the {side} neighbour"),
         ]
     if followed:
         high_m = at_most(MOST_FOLLOWING_M, place.ego.room_m - 2 * CAR_LENGTH_M - CLEAR_M)
         meaning = "gap from the follower's front to the ego's rear"
-        found.append(Parameter("follower_gap_m", "m", LEAST_FOLLOWING_M, high_m, meaning))
-    return (*found, *offset_of(place.signal), friction())
+        parameters.append(Parameter("follower_gap_m", "m", LEAST_FOLLOWING_M, high_m, meaning))
+    return (*parameters, *offset_of(place.signal), friction())

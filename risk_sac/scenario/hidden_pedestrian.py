@@ -26,12 +26,12 @@ from risk_sac.scenario.place import CrossingPlace, Site
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.world.types import Role
 
-NEAREST_M, FARTHEST_M = 25.0, 90.0  # the ego from the crossing
-FOLLOWING_M = 25.0  # from the ego's front to its follower's
+NEAREST_M, FARTHEST_M = 25.0, 90.0  # range of the ego's distance from the crossing
+FOLLOWING_M = 25.0  # distance from the ego's front to its follower's
 OCCLUDER_MPS = 12.0
-OCCLUDER_M = 25  # the farthest from the crossing
+OCCLUDER_M = 25  # greatest distance of the occluder from the crossing
 ONCOMING, ONCOMING_MPS = 4, 10.0
-ONCOMING_M, SPACING_M = 60.0, 30.0  # the first of them from the crossing, and the others from one another
+ONCOMING_M, SPACING_M = 60.0, 30.0  # distance of the first oncoming vehicle from the crossing, and between them
 
 
 def family(name: str, place: CrossingPlace) -> Family:
@@ -85,13 +85,13 @@ def _farthest_m(site: Site, lead_m: float) -> float:
 
 
 def _oncoming(site: Site) -> list[VehicleStart]:
-    found = []
+    starts = []
     for i in range(ONCOMING if site.oncoming else 0):
         track = site.oncoming[i % len(site.oncoming)]
         if track.room_m >= ONCOMING_M + SPACING_M * i + TRUCK_LENGTH_M:
             id_, lead_m = f"oncoming_{i}", SPACING_M * i
-            found.append(vehicle(id_, Role.BACKGROUND, track, ONCOMING_M, ONCOMING_MPS, lead_m))
-    return found
+            starts.append(vehicle(id_, Role.BACKGROUND, track, ONCOMING_M, ONCOMING_MPS, lead_m))
+    return starts
 
 
 def _parameters(place: CrossingPlace) -> tuple[Parameter, ...]:

@@ -21,11 +21,11 @@ from risk_sac.scenario.place import JunctionPlace, Leg, Track
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.world.types import Role
 
-NEAREST_M, FARTHEST_M = 10.0, 90.0  # attacker and ego, from the stop line
-LEAST_RANGE_M = 10.0  # of those distances at a place
+NEAREST_M, FARTHEST_M = 10.0, 90.0  # range of the distance of attacker and ego from the stop line
+LEAST_RANGE_M = 10.0  # least range of those distances at a place
 STREAM_MPS, STREAM_M = 9.0, 30.0
-WIDEST_GAP_M = 40.0  # of the background
-LEAST_GAP_M = 10.0  # from a background vehicle to the others on its lane, as behind the ego in car following
+WIDEST_GAP_M = 40.0  # widest gap between background vehicles
+LEAST_GAP_M = 10.0  # least gap from a background vehicle to others on its lane, as behind the ego in car following
 WHO = {
     "ego": "the ego",
     "oncoming": "the oncoming vehicle",
@@ -107,41 +107,43 @@ def _background(place: JunctionPlace, xi: Mapping[str, float], others: Sequence[
 
     One that would be too close to another on its lane starts behind that, or is left out where the road is too short.
     """
-    found: list[_Approach] = []
+    background: list[_Approach] = []
     for stream in place.streams:
         track = stream.track
         for i in (0, 1):
             before_m = STREAM_M + (i + 1) * xi["background_gap_m"]
-            taken = [each.taken_m() for each in (*others, *found) if each.shares_lane(track)]
+            taken = [each.taken_m() for each in (*others, *background) if each.shares_lane(track)]
             while crowded := [last_m for first_m, last_m in taken if first_m < before_m < last_m]:
                 before_m = max(crowded)
             if before_m + CAR_LENGTH_M + LEAD_IN_S * STREAM_MPS <= track.room_m:
-                found.append(_Approach(f"{stream.name}_{i}", track, before_m, STREAM_MPS))
-    return found
+                background.append(_Approach(f"{stream.name}_{i}", track, before_m, STREAM_MPS))
+    return background
 
 
 def _parameters(place: JunctionPlace) -> tuple[Parameter, ...]:
-    found = [parameter for leg in (place.ego, *place.others) for parameter in _leg_parameters(leg)]
+    parameters = [parameter for leg in (place.ego, *place.others) for parameter in _leg_parameters(leg)]
     if place.walk is not None:
-        found += walking("pedestrian across the near crossing's axis")
+        parameters += walking("pedestrian across the near crossing's axis")
     if place.streams:
         meaning = "spacing of the background vehicles"
-        found.append(Parameter("background_gap_m", "m", 15, WIDEST_GAP_M, meaning))
-    return (*found, *offset_of(place.signal), friction())
+        parameters.append(Parameter("background_gap_m", "m", 15, WIDEST_GAP_M, meaning))
+    return (*parameters, *offset_of(place.signal), friction())
 
 
 def _leg_parameters(leg: Leg) -> list[Parameter]:
     who, options = WHO.get(leg.name, leg.name.replace("_", " ")), len(leg.turns)
-    found = []
+    parameters = []
     if options == 3:
         meaning = f"{who} turns left below 1/3, right above 2/3, else goes straight"
-        found.append(Parameter(f"{leg.name}_turn", "1", 0, 1, meaning))
+        parameters.append(Parameter(f"{leg.name}_turn", "1", 0, 1, meaning))
     elif options > 1:
-        found.append(Parameter(f"{leg.name}_turn", "1", 0, 1, f"which of {options} ways {who} goes, from the left"))
+        parameters.append(
+            Parameter(f"{leg.name}_turn", "1", 0, 1, f"which of {options} ways {who} goes, from the left")
+        )
     room_m = min(track.room_m for track in leg.turns)
     high_m = at_most(FARTHEST_M, room_m - CAR_LENGTH_M - LEAD_IN_S * top_speed(leg.speed_limit_mps))
     return [
-        *found,
+        *parameters,
         Parameter(f"{leg.name}_distance_m", "m", NEAREST_M, high_m, f"{who}'s front to its stop line"),
         initial_speed(f"{leg.name}_speed_mps", 5, leg.speed_limit_mps, f"initial speed of {who}"),
     ]

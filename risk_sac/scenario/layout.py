@@ -1,4 +1,4 @@
-"""Convex polygons on the ground; a bent or hollow shape is made of several."""
+"""Start of an episode: vehicles, pedestrians, and areas of the ground."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

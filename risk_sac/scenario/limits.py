@@ -1,4 +1,4 @@
-"""Kinematic limits of the adversaries, as the ODD and the road surface allow."""
+"""Kinematic limits and visibility, as ODD and road surface allow."""
 
 import math
 from collections.abc import Mapping

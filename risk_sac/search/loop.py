@@ -1,4 +1,4 @@
-"""The environment as the loop of Algorithm 1 sees it: whatever ends an episode unplayed is one exception."""
+"""Runs episodes by Algorithm 1, and rejects those that cannot be played."""
 
 import logging
 import time

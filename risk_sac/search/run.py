@@ -25,7 +25,7 @@ from risk_sac.world.jit import cpu_s
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
-LATEST = 200  # records in which the episodes of a dead ego are looked for
+LATEST = 200  # number of latest records in which the episodes of a dead ego are looked for
 PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
 
 
@@ -221,7 +221,7 @@ def _beginning(file: Path, length: int) -> bytes:
 
 def _series(folder: Path, records: list[EpisodeRecord], digests: Mapping[int, str]) -> dict[int, SeriesFile]:
     """Time series by episode, with the digests they were written with; a damaged file is logged."""
-    found = {}
+    series = {}
     for record in records:
         if record.worst_violation is None:
             continue
@@ -231,5 +231,5 @@ def _series(folder: Path, records: list[EpisodeRecord], digests: Mapping[int, st
         if actual is None or actual != digest:
             logger.warning("the time series %s is damaged or gone; only a new run can record it again", file)
         if digest is not None:
-            found[record.index] = SeriesFile(file.name, digest)
-    return found
+            series[record.index] = SeriesFile(file.name, digest)
+    return series

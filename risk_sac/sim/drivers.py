@@ -18,14 +18,14 @@ from risk_sac.sim.reading import Reading
 from risk_sac.sim.roads import Roads
 from risk_sac.world.types import STEP_S, Bools, Floats, Role
 
-ASKEW_M = 0.1  # by which a corner of the ego may be beside where SUMO's models have it
+ASKEW_M = 0.1  # distance of the ego's corner from where SUMO's models have it above which it is askew
 
-NORMAL_DECEL_MPS2 = 4.5  # what SUMO assumes of a leader, and its default for passenger cars
-JERK_MPS3 = 12.65  # at which a braking builds up (UN R157's driver)
-BUILD_UP_S = NORMAL_DECEL_MPS2 / JERK_MPS3  # which its model, whose braking steps, does not reckon with
-OWN_CHOICE_MPS = -1.0  # SUMO's word for the speed that its models choose
-SAFE_MODE = 31  # all of SUMO's checks; told speeds are then held to the normal deceleration
-EMERGENCY_MODE = 26  # without those of safe speed and of deceleration
+NORMAL_DECEL_MPS2 = 4.5  # deceleration that SUMO assumes of a leader, and its default for passenger cars
+JERK_MPS3 = 12.65  # jerk with which a braking builds up (UN R157's driver)
+BUILD_UP_S = NORMAL_DECEL_MPS2 / JERK_MPS3  # time that braking takes to build up; the model leaves it out
+OWN_CHOICE_MPS = -1.0  # value by which SUMO's models choose the speed
+SAFE_MODE = 31  # all checks of SUMO; commanded speeds are then held to the normal deceleration
+EMERGENCY_MODE = 26  # SUMO's checks without those of safe speed and of deceleration
 
 
 class SumoDriver:
@@ -88,11 +88,11 @@ class SumoDriver:
     ) -> float | None:
         """The acceleration that its model wants for the nearest of its `targets`; None where none binds."""
         path, station_m, offset_m = along
-        found = targets(path, station_m, offset_m, own, self._accel, state, vehicle, candidate)
-        if not len(found):
+        obstacles = targets(path, station_m, offset_m, own, self._accel, state, vehicle, candidate)
+        if not len(obstacles):
             return None
         wanted = math.inf
-        for _, gap_m, lead_mps in found.tolist():
+        for _, gap_m, lead_mps in obstacles.tolist():
             room_m = gap_m - self._min_gap - BUILD_UP_S * max(speed - lead_mps, 0.0)
             wanted = min(wanted, self._worth(speed, room_m, lead_mps))
         if wanted >= speed + self._accel * STEP_S or 0.0 <= self.cruise_mps <= wanted:
@@ -180,7 +180,7 @@ class Drivers:
         They keep the speed they started with, or drive slower for SUMO's models or a pedestrian. SUMO's wish is that of
         the step before, the newest it tells.
         """
-        found, candidates = {}, _with_ego(reading.walks) if self._outside else reading.walks
+        accel_by_id, candidates = {}, _with_ego(reading.walks) if self._outside else reading.walks
         for id_, driver in self._released.items():
             row = reading.row.get(id_)
             if row is None:  # left the net
@@ -191,8 +191,8 @@ class Drivers:
             told = None
             if self._outside or reading.near[row]:
                 told = self._decide(driver, row, reading, reading.frame.state, candidates)
-            found[id_] = wanted if told is None else min(wanted, told)
-        return found
+            accel_by_id[id_] = wanted if told is None else min(wanted, told)
+        return accel_by_id
 
     def _decide(self, driver: SumoDriver, row: int, reading: Reading, state: Floats, candidates: Bools) -> float | None:
         along = self._roads.along(reading.vehicles[row])

@@ -18,15 +18,15 @@ from risk_sac.sim import paths
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
 
-LOOK_S = 4.0  # how far ahead a collision course counts
-CUT_IN_LOOK_S = 2.0  # the same in the vehicle's own direction, where sideways motion is soon over
+LOOK_S = 4.0  # time ahead within which a collision course counts
+CUT_IN_LOOK_S = 2.0  # the same for vehicles of the same direction, whose sideways motion is soon over
 TICK_S = 0.1
-MARGIN_M = 0.375  # on either side of the vehicle's body: the room in which a lane keeper wanders (UN R157)
-YIELDING_MPS2 = 2.5  # of crossing traffic; SUMO's drivers, which stop well before the junction, never need more
+MARGIN_M = 0.375  # free width on either side of the body, in which a lane keeper wanders (UN R157)
+YIELDING_MPS2 = 2.5  # braking with which crossing traffic yields; SUMO's drivers never need more
 SAME_WAY_COS = 0.5
 MOVING_MPS = 0.5
-BEHIND_M, BEYOND_M = 60.0, 10.0  # of a path beside what is driven meanwhile, on which others are looked for
-NEAR_M = 40.0  # beyond it no vehicle has to brake for a pedestrian yet
+BEHIND_M, BEYOND_M = 60.0, 10.0  # path before and beyond the driven stretch on which others are looked for
+NEAR_M = 40.0  # distance beyond which no vehicle has to brake for a pedestrian yet
 
 
 @compiled
@@ -148,7 +148,7 @@ def targets(
     """
     x, y, heading, vx, vy = state[X], state[Y], state[HEADING], state[VX], state[VY]
     n = len(x)
-    found, count = np.empty((n, 3)), 0
+    rows, count = np.empty((n, 3)), 0
     speed_mps, length_m, width_m = state[SPEED, own], state[LENGTH, own], state[WIDTH, own]
     corridor = width_m / 2 + MARGIN_M
     kept, fastest = foreseen(points, front_m, speed_mps, 0.0), foreseen(points, front_m, speed_mps, accel_mps2)
@@ -191,6 +191,6 @@ def targets(
         if same_way:
             extent = half_length * cos + half_width * sin
             gap, lead = max(s_now - extent - front_m, 0.0), v_along
-        found[count, 0], found[count, 1], found[count, 2] = i, gap, lead
+        rows[count, 0], rows[count, 1], rows[count, 2] = i, gap, lead
         count += 1
-    return found[:count]
+    return rows[:count]

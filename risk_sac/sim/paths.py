@@ -14,21 +14,21 @@ import numpy as np
 
 from risk_sac.world.types import Floats
 
-AHEAD_M = 120.0  # of road beyond a lane's own end: at 16 m/s more than any driver looks ahead
+AHEAD_M = 120.0  # length of path beyond a lane's end: at 16 m/s more than any driver looks ahead
 SAME_POINT_M = 1e-3
-SHIFT_M = 1.0  # by which a lane may begin beside or before the end of the one that leads to it
-TAPER_M = 5.0  # of the way to that lane on which the path makes up for it
-CHANGE_M = 50.0  # before the end of a lane that leads elsewhere, the path leads over to the next lane
-CHANGED = 0.6  # of that way until it has
-CAR = "passenger"  # the class of all vehicles of ours
+SHIFT_M = 1.0  # largest step from the end of one lane to the beginning of the next
+TAPER_M = 5.0  # length of the path on which it makes up for that step
+CHANGE_M = 50.0  # length before the end of a lane that leads elsewhere on which the path changes lanes
+CHANGED = 0.6  # share of that length after which the path has changed
+CAR = "passenger"  # vehicle class of all our vehicles
 
 
 # A polyline from the start of a lane on; one column for each point, and these rows.
 Path = Floats
 X, Y = 0, 1
 STATION = 2  # length of the line up to each point, m; 0 at the first
-HEADING = 3  # of the segment that begins at the point, rad; the last point repeats the one before
-LIMIT = 4  # the fastest that SUMO's drivers take it, m/s; bends are slow
+HEADING = 3  # heading of the segment that begins at the point, rad; the last point repeats the one before
+LIMIT = 4  # highest speed that SUMO's drivers drive there, m/s; low in bends
 COS, SIN = 5, 6  # of the heading
 
 
@@ -212,10 +212,10 @@ def joined(lines: Sequence[Floats]) -> list[Floats]:
     before. That step would be a segment of the path in any direction, across it or back; actors near it would be on the
     path for a moment. So the last `TAPER_M` of a lane that leads to such a step are left out.
     """
-    found = list(lines)
+    tapered = list(lines)
     for i, (line, following) in enumerate(pairwise(lines)):
         if SAME_POINT_M < math.dist(line[-1], following[0]) <= SHIFT_M:
             last_m = math.dist(line[-2], line[-1])
             off = [line[-1] + (line[-2] - line[-1]) * TAPER_M / last_m] if last_m > TAPER_M else []
-            found[i] = np.array([*line[:-1], *off])
-    return found
+            tapered[i] = np.array([*line[:-1], *off])
+    return tapered

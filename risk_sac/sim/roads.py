@@ -1,4 +1,4 @@
-"""The lanes around the ego's route, as the loaded net has them, and what their signals show."""
+"""Lanes, signals and lateral room around the route; placing of vehicles."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache

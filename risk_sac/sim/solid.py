@@ -1,4 +1,4 @@
-"""Commands of adversaries for the next step, and how fast they may change before a bound."""
+"""Commands of adversaries, kept clear of bodies other than the ego's."""
 
 import math
 from dataclasses import dataclass
@@ -53,21 +53,21 @@ def clip(value: float, low: float, high: float) -> float:
     return low if value < low else high if value > high else value
 
 
-MARGIN_M = 0.15  # that is kept on every side: the foreseen poses are those of a body that follows its path exactly
-WALKER_MARGIN_M = 0.05  # the same of a pedestrian
+MARGIN_M = 0.15  # margin on every side, since foreseen poses assume that a body follows its path exactly
+WALKER_MARGIN_M = 0.05  # the same margin for a pedestrian
 SAME_WAY_COS = 0.7  # headings less than 45 degrees apart
-SAME_LANE_M = 0.5  # a follower's offset, at most
+SAME_LANE_M = 0.5  # greatest offset of a follower
 ACROSS_MPS = 0.05  # lateral speed from which a vehicle moves into what is beside it
-REACTION_S = 0.5  # of what is behind
-BUILD_UP_S = 0.5  # of a braking, and a step
-LONGEST_STEPS = 40  # of a braking
+REACTION_S = 0.5  # reaction time of vehicles behind
+BUILD_UP_S = 0.5  # time in which a braking builds up, and a step
+LONGEST_STEPS = 40  # most steps of a braking
 
 Others = tuple[Floats, int]  # a frame's state, and the own column in it
 CLEAR, AHEAD, LEFT, RIGHT = 0, 1, 2, 3
 # Rows of what is foreseen of the others.
-SPEED_MPS = 0  # NaN of those that need no look
-BRAKES_S = 1  # after which time it brakes; infinite if it keeps its velocity
-ACROSS_M = 2  # how far to the left of the adversary it is
+SPEED_MPS = 0  # speed; NaN of actors that need no look
+BRAKES_S = 1  # time until it brakes; infinite if it keeps its velocity
+ACROSS_M = 2  # distance to the left of the adversary
 
 
 @compiled
@@ -106,7 +106,7 @@ def drives_into(
     segment = _segment(path, 0, station_m)
     tilt = state[HEADING, own] - path[PATH_HEADING, segment]
     side = RIGHT if lateral < -ACROSS_MPS else LEFT if lateral > ACROSS_MPS else CLEAR  # that it moves to
-    found = CLEAR
+    worst = CLEAR
     for step in range(1, LONGEST_STEPS):
         station_m += (before + speed) / 2 * STEP_S
         offset_m += lateral * STEP_S
@@ -118,13 +118,13 @@ def drives_into(
         where = _meets(state, foreseen, (x, y, heading), size, step * STEP_S, hardest_mps2, side)
         if where == AHEAD:
             return AHEAD
-        found = max(found, where)
+        worst = max(worst, where)
         if speed <= 0.0:
             break
         accel = max(accel - jerk * STEP_S, -brake, -taper(speed, jerk))
         before, speed = speed, max(speed + accel * STEP_S, 0.0)
         lateral = math.copysign(max(abs(lateral) - lateral_accel * STEP_S, 0.0), lateral)
-    return found
+    return worst
 
 
 @compiled

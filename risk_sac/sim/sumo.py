@@ -1,4 +1,4 @@
-"""The one simulation that libsumo can run in a process, and the object that it runs for."""
+"""The one simulation that libsumo can run in a process."""
 
 import gc
 import math

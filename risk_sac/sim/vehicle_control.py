@@ -18,20 +18,20 @@ from risk_sac.sim.solid import AHEAD, CLEAR, Others, VehicleCommand, clip, drive
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import STEP_S, Floats
 
-CORRECTION_PER_M = 0.05  # curvature that is left for steering in the tightest bend, and so before a road's edge
+CORRECTION_PER_M = 0.05  # curvature left for steering in the tightest bend, and so before a road's edge
 TURNING_BACK = 0.85  # share of the heading that leaves just enough room; a step of 0.1 s resolves no more
-EDGE_M = 0.03  # of the road that is kept free: what a car overshoots by that brakes while it straightens
+EDGE_M = 0.03  # width kept free at the road's edge, which a car overshoots that brakes while it straightens
 SKID = 0.98  # a vehicle too fast for a curve keeps a fifth of its grip for braking, or it would never slow down
 
 GRID_M = 0.5
 BODY_M = CAR_LENGTH_M  # SUMO turns a body while it passes a corner of the lane, over the body's own length
-AHEAD_M = 5.0  # so early braking makes way for a bend; more than BODY_M, or a bend is not seen whole as it begins
+AHEAD_M = 5.0  # distance at which braking for a bend begins; more than BODY_M, or a bend is not seen whole as it begins
 NO_BEND_PER_M = 1e-6
 
 # Rows of the bends of a path.
-HERE = 0  # amount of the curvature, 1/m
-SOON = 1  # the largest from there until AHEAD_M on
-CAP = 2  # speed from which all bends ahead can be driven as planned, m/s
+HERE = 0  # absolute curvature, 1/m
+SOON = 1  # largest curvature up to AHEAD_M ahead, 1/m
+CAP = 2  # highest speed from which all bends ahead can be driven as planned, m/s
 
 
 class Bounds(NamedTuple):
@@ -220,8 +220,8 @@ def index(bends: Floats, station_m: float) -> int:
 @compiled
 def _profile(station: Floats, heading: Floats, cornering: float, braking: float) -> Floats:
     n = int(station[-1] / GRID_M) + 1
-    found = np.zeros((3, n))
-    curvature, ahead, cap = found[HERE], found[SOON], found[CAP]
+    profile = np.zeros((3, n))
+    curvature, ahead, cap = profile[HERE], profile[SOON], profile[CAP]
     for i in range(1, len(station)):
         turn = (heading[i] - heading[i - 1] + math.pi) % (2 * math.pi) - math.pi
         for k in range(math.ceil(station[i] / GRID_M), min(math.ceil((station[i] + BODY_M) / GRID_M), n)):
@@ -233,4 +233,4 @@ def _profile(station: Floats, heading: Floats, cornering: float, braking: float)
         square = min(cornering / max(ahead[k], NO_BEND_PER_M), reachable)
         cap[k] = math.sqrt(square)
         reachable = square + 2 * braking * GRID_M
-    return found
+    return profile

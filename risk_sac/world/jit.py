@@ -26,17 +26,17 @@ IMPORT = re.compile(r"^ *from risk_sac\.([\w.]+) import", re.MULTILINE)
 def _sources() -> dict[Path, str]:
     """The files with compiled functions, and all that these import: functions and constants are compiled into them."""
     texts = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
-    found: dict[Path, str] = {}
+    sources: dict[Path, str] = {}
     pending = [path for path, text in texts.items() if "@compiled" in text]
     while pending:
         path = pending.pop()
-        if path in found or path not in texts:
+        if path in sources or path not in texts:
             continue
-        found[path] = texts[path]
+        sources[path] = texts[path]
         for name in IMPORT.findall(texts[path]):
             module = PACKAGE.joinpath(*name.split("."))
             pending += [module.with_suffix(".py"), module / "__init__.py"]
-    return found
+    return sources
 
 
 def _cache_folder() -> str:

@@ -30,7 +30,7 @@ from service.networks.schemas import (
     NetworkFile,
 )
 
-LOG = Path("log")  # where the file descriptors 1 and 2 lead to
+LOG = Path("log")  # file that the file descriptors 1 and 2 write to
 _FLAGS: Mapping[DocumentKind, str] = {DocumentKind.NET: "-n", DocumentKind.ADDITIONAL: "-a", DocumentKind.ROUTES: "-r"}
 _OPTIONS = (
     "--xml-validation never --xml-validation.net never --xml-validation.routes never --route-steps 0 "
@@ -94,12 +94,12 @@ def check(upload: Path) -> CheckReport:
         raise UploadError("the net has no edge outside junctions; wanted roads")
     if len(net.edges) > MAX_ROADS:
         raise UploadError(f"the net has {len(net.edges)} edges; wanted at most {MAX_ROADS}: cut the map")
-    found, remarks = summary(net), net_remarks(net)
+    net_summary, remarks = summary(net), net_remarks(net)
     del root, net  # makes room for the simulator's
     bind_simulator()
     said = load({kind: [file.name for file in files if file.kind is kind] for kind in DocumentKind})
     warnings = (*remarks, *converted.warnings, *said)
-    return CheckReport(summary=found, files=tuple(files), warnings=warnings[:MOST_WARNINGS])
+    return CheckReport(summary=net_summary, files=tuple(files), warnings=warnings[:MOST_WARNINGS])
 
 
 def _kept(converted: Converted, elements: int) -> Iterator[NetworkFile]:

@@ -1,4 +1,4 @@
-"""Receives uploads and starts the checker; this process parses reports, never uploads."""
+"""Receives uploads and stores the networks that the checker accepts."""
 
 import hashlib
 import logging

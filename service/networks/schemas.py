@@ -1,4 +1,4 @@
-"""Limits on checking an uploaded network and searching its places."""
+"""Networks and places in requests and answers, and their limits."""
 
 from dataclasses import dataclass
 from datetime import datetime

@@ -1,7 +1,7 @@
-"""`service.networks.surveyor REPORT survey|keep …`: find places of a network, or store some in the library.
+"""Finds places of a network, or stores some in the library.
 
-Started by `service.networks.surveys` in the folder of a checked network, with limits on time and memory, since a search
-takes seconds that would block the server.
+`service.networks.surveys` starts `service.networks.surveyor REPORT survey|keep …` in the folder of a checked network,
+with limits on time and memory, since a search takes seconds that would block the server.
 
     survey                 writes `places.json` and `places.png` beside the net
     keep PATTERN [PLACE]   keeps that place, or all of the pattern, and reports the names of the families that they are
@@ -48,13 +48,13 @@ def main() -> None:
 
 def _survey() -> dict[str, object]:
     net = read_net(NET)
-    found = survey(net, tell=SurveyProgress())
+    map_survey = survey(net, tell=SurveyProgress())
     places = Places(
-        items=[FoundPlace.model_validate(fit.told()) for fit in found.fits],
-        elsewhere=[Elsewhere.model_validate(misfit.told()) for misfit in found.misfits],
-        nowhere=dict(found.nowhere),
+        items=[FoundPlace.model_validate(fit.told()) for fit in map_survey.fits],
+        elsewhere=[Elsewhere.model_validate(misfit.told()) for misfit in map_survey.misfits],
+        nowhere=dict(map_survey.nowhere),
     )
-    replace_file(Path(PICTURE), map_png(net, found))
+    replace_file(Path(PICTURE), map_png(net, map_survey))
     write_sealed(Path(PLACES), places)
     return {}
 

@@ -1,4 +1,4 @@
-"""Searches places of networks once, in a separate process, and stores them beside the network."""
+"""Searches places of networks in a separate process, and keeps them."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Quotas of a project. Pure functions."""
+"""Quotas, storage pauses, and removal of campaigns and places."""
 
 import logging
 import shutil

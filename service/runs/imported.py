@@ -32,8 +32,8 @@ from service.store.writing import Ledger
 
 logger = logging.getLogger(__name__)
 
-AT_ONCE = 200  # episodes in one transaction
-TELL_S = 10.0  # between two lines of progress in the log
+AT_ONCE = 200  # number of episodes in one transaction
+TELL_S = 10.0  # time between two lines of progress in the log
 SPECIAL = {
     stat.S_IFLNK: "a symbolic link",
     stat.S_IFIFO: "a FIFO",
@@ -211,14 +211,14 @@ def _events(folder: Path) -> Iterator[EpisodeDone]:
     """Yields the messages that a worker would have sent of the run in a folder."""
     results = read_results(folder)
     records = read_records(folder / EPISODES)
-    found: dict[str, MetricsAccumulator] = {}
+    accumulators: dict[str, MetricsAccumulator] = {}
     for record in records:
-        if record.phase not in found:
-            found[record.phase] = MetricsAccumulator(family_named(results.spec.family).horizon_steps)
+        if record.phase not in accumulators:
+            accumulators[record.phase] = MetricsAccumulator(family_named(results.spec.family).horizon_steps)
         name = None if record.worst_violation is None else series_name(record.index)
         yield EpisodeDone(
             record=record,
-            metrics=found[record.phase].add(record),
+            metrics=accumulators[record.phase].add(record),
             series=name,
             series_sha256=name and _sha256(folder / FAILURES / name),
             wall_s=results.wall_s / len(records),

@@ -101,15 +101,15 @@ class Regressions:
         """Takes up what an earlier server left."""
         for file in sorted((self._settings.data_dir / "campaigns").glob(f"*/{FOLDER}/*.json")):
             try:
-                found = _read(file)
-                if found.state.final:
+                regression = _read(file)
+                if regression.state.final:
                     continue
-                if found.state is not State.QUEUED:  # the server before died while it played it
-                    _write(file, found.model_copy(update={"state": State.QUEUED}))
+                if regression.state is not State.QUEUED:  # the server before died while it played it
+                    _write(file, regression.model_copy(update={"state": State.QUEUED}))
             except StorageError as error:
                 logger.warning("%s", error)
                 continue
-            self._queue.put(Waiting(file, found.key_id))
+            self._queue.put(Waiting(file, regression.key_id))
         self._thread.start()
 
     def stop(self) -> None:

@@ -1,4 +1,4 @@
-"""Updates row, run counts and project hours for an episode."""
+"""Counts of runs, project hours, statistics and events in the database."""
 
 import time
 from collections.abc import Collection, Iterable, Sequence
@@ -20,8 +20,8 @@ from service.store.stored import StoredPage, read_episode
 from service.store.tables import TALLIED, CampaignRow, ChangeRow, EpisodeRow, RequirementRow, RunRow, UsageRow
 
 HOUR_S = 3600
-NEWEST = 40  # episodes that tell the pace of a run
-STALL = 10.0  # times the median: compilation, or a machine that stood still
+NEWEST = 40  # number of episodes that tell the pace of a run
+STALL = 10.0  # an episode that takes this many medians is left out: compilation, or a machine that stood still
 TOUCHED = f",{NO_CONTACT},"
 
 
@@ -158,12 +158,12 @@ def event_page(session: Session, campaign: CampaignRow, limit: int, after: int) 
         return StoredPage(items=(), last=None)
     episodes = select(EpisodeRow).where(EpisodeRow.sequence.between(after + 1, last))
     changes = select(ChangeRow).where(ChangeRow.sequence.between(after + 1, last))
-    found: list[tuple[int, Episode | StateChange]] = []
+    events: list[tuple[int, Episode | StateChange]] = []
     for episode in session.scalars(episodes.filter_by(campaign_number=campaign.number)):
-        found.append((episode.sequence, read_episode(episode)))
+        events.append((episode.sequence, read_episode(episode)))
     for change in session.scalars(changes.filter_by(campaign_number=campaign.number)):
-        found.append((change.sequence, StateChange.model_validate(change, from_attributes=True)))
-    if len(found) != last - after:
-        raise StorageError(f"events {after + 1} to {last} of campaign {campaign.id} are {len(found)}; restore a copy")
-    items = tuple(event for _, event in sorted(found, key=itemgetter(0)))
+        events.append((change.sequence, StateChange.model_validate(change, from_attributes=True)))
+    if len(events) != last - after:
+        raise StorageError(f"events {after + 1} to {last} of campaign {campaign.id} are {len(events)}; restore a copy")
+    items = tuple(event for _, event in sorted(events, key=itemgetter(0)))
     return StoredPage(items=items, last=last if last < campaign.events else None)

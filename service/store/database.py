@@ -1,4 +1,4 @@
-"""Server state in the database: the cursor secret, and whether API keys were made."""
+"""Connection and migration of the database, and the server state in it."""
 
 import secrets
 import time

@@ -1,4 +1,4 @@
-"""States of campaigns and runs and their transitions. Pure.
+"""Stored campaigns, runs and failures, and their states. Pure.
 
 queued ──> running ──> succeeded | failed
    │ ^        │ └────> cancelling ──> cancelled (or the end it had already reached)

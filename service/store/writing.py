@@ -46,11 +46,11 @@ class Ledger:
             row = session.scalars(select(CampaignRow).filter_by(project=project, idempotency_key=key)).one_or_none()
             if row is None:
                 return None
-            found = StoredCampaign.from_row(row, self._store.revision(row.id))
-        if found.spec != spec:
-            message = f"Idempotency-Key {key!r} belongs to campaign {found.id}, which differs; wanted another key"
+            campaign = StoredCampaign.from_row(row, self._store.revision(row.id))
+        if campaign.spec != spec:
+            message = f"Idempotency-Key {key!r} belongs to campaign {campaign.id}, which differs; wanted another key"
             raise ConflictError(message, reason="idempotency_key_reused")
-        return found
+        return campaign
 
     def create(self, spec: CampaignSpec, project: str = "default", key: str | None = None) -> StoredCampaign:
         """Stores a new campaign with its runs, all queued."""

@@ -202,9 +202,9 @@ def _curves(run: StoredRun, search: _RunningSums, points: int) -> RunCurves:
     named = {name: getattr(run, name) for name in ("family", "method", "seed", "state")}
     values = {name: line.tolist() for name, line in lines.items()}
     drove = {
-        each: _summed([found == each for found in search.driven_by])[at].tolist()
-        for each in DrivenBy
-        if each in search.driven_by
+        driver: _summed([name == driver for name in search.driven_by])[at].tolist()
+        for driver in DrivenBy
+        if driver in search.driven_by
     }
     return RunCurves.model_validate(named | values | {"run_id": run.id, "episodes": at.tolist(), "driven_by": drove})
 

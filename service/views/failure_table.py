@@ -1,4 +1,4 @@
-"""The table of a campaign's failures. Pure.
+"""Table of a campaign's failures. Pure.
 
 Records are taken from their JSON without validation, because a table may have ten thousand of them.
 """
@@ -241,14 +241,14 @@ def failure_table(
 ) -> FailureTable:
     """Returns the table of these failures in their order; one without a triage is new."""
     runs = {run.number: run for run in campaign.runs}
-    found: defaultdict[tuple[int, str], KindIndex] = defaultdict(KindIndex)
+    kinds_by_phase: defaultdict[tuple[int, str], KindIndex] = defaultdict(KindIndex)
     headline, niches = KindIndex(), dict[Niche, int]()
     failures, naming, rows = list(failures), [], []
-    for each in failures:
-        valid, every = violations_of(each.outcome, each.record)
+    for failure in failures:
+        valid, every = violations_of(failure.outcome, failure.record)
         naming.append(next(iter(valid or every)))
-        kinds = found[each.run_number, each.phase]
-        row = _row(runs[each.run_number], each, naming[-1])
+        kinds = kinds_by_phase[failure.run_number, failure.phase]
+        row = _row(runs[failure.run_number], failure, naming[-1])
         candidates = filter(is_headline_candidate, valid if row["repeats"] == "verified" else [])
         rows.append(
             row

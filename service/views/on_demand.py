@@ -1,4 +1,4 @@
-"""Cache of content that takes seconds to make: made on demand, one at a time, the newest kept."""
+"""Cache of slow content and the helper processes that make it."""
 
 import asyncio
 import threading

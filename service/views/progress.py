@@ -1,4 +1,4 @@
-"""The end of a worker's log, without what must not be shown."""
+"""Progress of campaigns, times left, and ends of worker logs."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""Report of a campaign from the folders of its finished runs, as `risk-sac evaluate` makes it."""
+"""Reports, figures and evidence from the folders of finished runs."""
 
 import hashlib
 import shlex
@@ -97,7 +97,7 @@ class Reports:
             return self._newest[1]
 
     def _make(self, campaign: StoredCampaign) -> CampaignReport:
-        found: list[FinishedRun] = []
+        finished_runs: list[FinishedRun] = []
         reasons: dict[str, str] = {}
         lasting = True
         for run in campaign.runs:
@@ -106,12 +106,12 @@ class Reports:
                 continue
             try:
                 family_named(run.family)  # raises where its place on a map is gone
-                found.append(read_run(self._settings.run_folder(campaign.id, run.id)))
+                finished_runs.append(read_run(self._settings.run_folder(campaign.id, run.id)))
             except (ConfigError, OSError) as error:
                 problem = error.got if isinstance(error, ConfigError) else error
                 reasons[run.spec_digest] = f"it succeeded, but its results are lost: {problem}"
                 lasting = False
-        comparison = compare(campaign.spec, found, command="", reasons=reasons)
+        comparison = compare(campaign.spec, finished_runs, command="", reasons=reasons)
         folders = {run.spec_digest: self._settings.run_folder(campaign.id, run.id) for run in campaign.runs}
         return CampaignReport(campaign.id, comparison, folders, lasting)
 
@@ -207,9 +207,9 @@ def drawn(made: CampaignReport, format_: Format) -> bytes:
 def evidence(made: CampaignReport, format_: str, base_url: str, regression: Regression | None) -> str:
     """Returns bounds and coverage as JSON; as a page or Markdown with failures, limits and commands."""
     comparison = _with_commands(made, base_url)
-    found = gathered(comparison)
+    campaign_evidence = gathered(comparison)
     if format_ == "json":
-        return found.model_dump_json()
+        return campaign_evidence.model_dump_json()
     here = f"{base_url}v1/campaigns/{made.campaign_id}"
 
     def show(run: FinishedRun, failure: str) -> str:
@@ -225,7 +225,7 @@ def evidence(made: CampaignReport, format_: str, base_url: str, regression: Regr
         regression=regression,
     )
     power = power_of(comparison.spec, played_by(comparison.runs))
-    return report_page(comparison, found, origin, power, "html" if format_ == "html" else "markdown")
+    return report_page(comparison, campaign_evidence, origin, power, "html" if format_ == "html" else "markdown")
 
 
 def _files(path: str) -> list[FigureFile]:

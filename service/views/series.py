@@ -1,4 +1,4 @@
-"""Response body of a failure, with the time series that a worker wrote."""
+"""Time series, pictures, roads and twins of a failure."""
 
 import hashlib
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Studies of a failure and tables of episodes, which helper processes make.
+"""Studies of a failure and tables of episodes from helper processes.
 
 A study needs the simulator; a table needs packages of 150 MB.
 """

@@ -1,4 +1,4 @@
-"""Views that read all episodes of a campaign; those of a large campaign are made in a helper process.
+"""Views of all episodes of a campaign; large ones in helpers.
 
 `python -m service.views.whole QUESTION ANSWER` answers one question. It shares the server's database and folders.
 """

@@ -75,12 +75,14 @@ def _id_of(client: Client, campaign_id: str, named: str) -> str:
     if not named.isdecimal() and (wanted is None or wanted.run_id):
         return named
     ids = [failure.id for failure in client.failures(campaign_id, tier="raw")]
-    found = [id_ for id_ in ids if id_.rpartition("-")[2] == named or id_.endswith(str(wanted))]
-    if len(found) != 1:
+    matches = [id_ for id_ in ids if id_.rpartition("-")[2] == named or id_.endswith(str(wanted))]
+    if len(matches) != 1:
         listing = f"`risk-sac campaigns failures list {campaign_id} --raw` lists them"
-        got = f"{named}, which {len(found)} failures are called" if found else f"{named}, which no failure is called"
-        raise ConfigError("FAILURE", got, f"one of {', '.join(found)}" if found else "the id of one", listing)
-    return found[0]
+        got = (
+            f"{named}, which {len(matches)} failures are called" if matches else f"{named}, which no failure is called"
+        )
+        raise ConfigError("FAILURE", got, f"one of {', '.join(matches)}" if matches else "the id of one", listing)
+    return matches[0]
 
 
 def look_command(service_url: str, campaign_id: str, failure_id: str) -> str:

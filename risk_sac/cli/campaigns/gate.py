@@ -121,14 +121,14 @@ def comparisons(total: Total, bounds: GateBounds) -> Iterator[BoundCheck]:
         "PCR": (total.pcr, total.pcr_high, total.preventable_collisions, "preventable contact"),
     }
     for name, bound in bounds.rates():
-        found, high, hits, what = rates[name]
-        if found is None:
+        rate, high, hits, what = rates[name]
+        if rate is None:
             continue
         yield BoundCheck(
             name=name,
             bound=bound,
             judged_by=bounds.judged_by,
-            rate=found,
+            rate=rate,
             upper=high if high is not None else 1.0,
             hits=hits,
             what=what,
@@ -146,16 +146,16 @@ class Measured(NamedTuple):
 
     def comparisons(self, bounds: GateBounds) -> Iterator[BoundCheck]:
         """The rates that have a bound."""
-        for name, found in self.requirements.items():
+        for name, requirement in self.requirements.items():
             if name in bounds.requirements:
                 yield BoundCheck(
                     name=name,
                     bound=bounds.requirements[name],
                     judged_by=bounds.judged_by,
-                    rate=found.rate,
-                    upper=found.rate_high,
-                    hits=found.in_rate,
-                    what="valid violation" if found.counts == "failure" else "violation",
+                    rate=requirement.rate,
+                    upper=requirement.rate_high,
+                    hits=requirement.in_rate,
+                    what="valid violation" if requirement.counts == "failure" else "violation",
                     episodes=self.rated,
                 )
 
@@ -194,12 +194,12 @@ def verdict(results: Results, bounds: GateBounds) -> tuple[int, str]:
         return COULD_NOT_RUN, f"the campaign is {results.state}, and what it finds can still change; wait with `watch`"
     groups = measured(results)
     bounds.check_names(list(dict.fromkeys(name for group in groups for name in group.requirements)))
-    found = [(total.family, total.method, each) for total in results.totals for each in comparisons(total, bounds)]
-    found += [(group.family, group.method, each) for group in groups for each in group.comparisons(bounds)]
+    checks = [(total.family, total.method, each) for total in results.totals for each in comparisons(total, bounds)]
+    checks += [(group.family, group.method, each) for group in groups for each in group.comparisons(bounds)]
     reasons: dict[str, list[str]] = {}
-    for family, method, each in found:
+    for family, method, each in checks:
         reasons.setdefault(f"{each.name} {each.verdict} {each.bound:g}", []).append(f"{family} {method} {each}")
-    verdicts = {each.verdict for *_, each in found}
+    verdicts = {each.verdict for *_, each in checks}
     exceeded = [
         f"{total.family} {total.method}: {said}" for total in results.totals for said in excesses(total, bounds)
     ]

@@ -28,11 +28,16 @@ def junit(
     """
     names = Names(results, service_url, url, failures)
     report = JUnitXml("risk-sac")
-    found = headline(results.headline, sum(total.headline_candidates for total in results.totals))
+    headline_failures = headline(results.headline, sum(total.headline_candidates for total in results.totals))
     for family in dict.fromkeys(run.family for run in results.runs):
         suite = TestSuite(family)
         runs = [run for run in results.runs if run.family == family]
-        properties = {"headline failures": found, "campaign": results.campaign_id, "url": url, **_versions(runs)}
+        properties = {
+            "headline failures": headline_failures,
+            "campaign": results.campaign_id,
+            "url": url,
+            **_versions(runs),
+        }
         for name, value in properties.items():
             suite.add_property(printable(name), printable(value))
         suite.add_testcases([_case(run, names.of_run(run)) for run in runs])
@@ -52,12 +57,12 @@ def _case(run: RunResult, named: str) -> TestCase:
     for name, value in (("run", run.id), ("spec_digest", run.spec_digest), ("digest", run.digest)):
         if value is not None:
             case.add_property(name, printable(value))
-    if (found := run.metrics) is not None:
+    if (metrics := run.metrics) is not None:
         funnel = (
-            f"headline failures: {headline(found.headline, found.headline_candidates)}; "
-            f"{counted(found.raw_collisions, 'contact')}, {found.collisions} valid; "
-            f"{counted(found.failures, 'failure')}; {counted(found.distinct_failures, 'distinct violation')}, "
-            f"{found.distinct_preventable} preventable, {found.headline_candidates} of them not minor"
+            f"headline failures: {headline(metrics.headline, metrics.headline_candidates)}; "
+            f"{counted(metrics.raw_collisions, 'contact')}, {metrics.collisions} valid; "
+            f"{counted(metrics.failures, 'failure')}; {counted(metrics.distinct_failures, 'distinct violation')}, "
+            f"{metrics.distinct_preventable} preventable, {metrics.headline_candidates} of them not minor"
         )
         case.add_property("funnel", funnel)
     if named:
@@ -72,11 +77,11 @@ def _case(run: RunResult, named: str) -> TestCase:
 def _requirements(group: Measured, bounds: GateBounds, names: "Names") -> Iterator[TestCase]:
     """A case for each requirement of a family and method that counts or has a bound."""
     compared = {each.name: each for each in group.comparisons(bounds)}
-    for name, found in group.requirements.items():
-        if found.counts != "failure" and name not in compared:
+    for name, requirement in group.requirements.items():
+        if requirement.counts != "failure" and name not in compared:
             continue
         case = TestCase(name, printable(f"{group.family}.{group.method}"))
-        steps = zip(COLUMNS[2:], requirement_cells(name, found)[2:], strict=True)
+        steps = zip(COLUMNS[2:], requirement_cells(name, requirement)[2:], strict=True)
         case.add_property("funnel", ", ".join(f"{step} {count}" for step, count in steps))
         own = [compared[name]] if name in compared else []
         _judge(case, own, [], names.state, names.of_requirement(group, name))
@@ -158,8 +163,8 @@ class Names:
 
 def _versions(runs: Sequence[RunResult]) -> dict[str, str]:
     """Software that produced the results; more than one version of it where it was changed in between."""
-    found: dict[str, dict[str, None]] = {}
+    versions_by_name: dict[str, dict[str, None]] = {}
     for run in runs:
         for name, version in run.versions.items():
-            found.setdefault(f"version.{name}", {})[version] = None
-    return {name: ", ".join(versions) for name, versions in found.items()}
+            versions_by_name.setdefault(f"version.{name}", {})[version] = None
+    return {name: ", ".join(versions) for name, versions in versions_by_name.items()}

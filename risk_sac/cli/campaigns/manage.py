@@ -114,8 +114,8 @@ def _regress(options: argparse.Namespace) -> int:
     if regression.state is not State.SUCCEEDED:
         complain(f"{regression.id} {regression.state}: {regression.reason}")
         return COULD_NOT_RUN
-    found = Regression(ego=regression.ego, cases=regression.cases)
+    record = Regression(ego=regression.ego, cases=regression.cases)
     if options.junit is not None:
-        write_out(options.junit, junit(found))
-    print_answer(options, regression, cases_table(found))
-    return OK if found.passed else ABOVE
+        write_out(options.junit, junit(record))
+    print_answer(options, regression, cases_table(record))
+    return OK if record.passed else ABOVE

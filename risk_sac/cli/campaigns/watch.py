@@ -30,10 +30,10 @@ from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import complain, notes
 from risk_sac.records import Grade
 
-SEEDS = 1  # where none are named
+SEEDS = 1  # number of seeds if neither the file nor a flag names any
 RATE = number(float, 0, 1)
 MAP_UPLOADED = "in place of families: id or label of an uploaded map"
-NAMED_FAILURES = 5  # of a run, in a JUnit report
+NAMED_FAILURES = 5  # most failures that a JUnit report names per run
 
 
 def add(commands: Commands) -> None:
@@ -167,7 +167,7 @@ def _add_gate_flags(parser: Parser) -> None:
     parser.group("output").add_argument("--junit", type=Path, metavar="FILE.xml", help=cases)
 
 
-LINE_S = 10.0  # between two lines, unless the state changes
+LINE_S = 10.0  # least time between two lines while the state does not change
 AT_WORK = ("running", "cancelling")
 
 
@@ -202,11 +202,11 @@ class _Lines:
 
 def _network_id(client: Client, called: object) -> object:
     """Returns the id of the uploaded network with a label; the service refuses unknown ones."""
-    found = [network for network in client.networks() if called in (network.id, network.label)]
-    if len(found) > 1:
-        ids = ", ".join(network.id for network in found)
-        raise ConfigError("network", f"{called!r}, the label of {len(found)} networks", "the id of one", f"of {ids}")
-    return found[0].id if found else called
+    matches = [network for network in client.networks() if called in (network.id, network.label)]
+    if len(matches) > 1:
+        ids = ", ".join(network.id for network in matches)
+        raise ConfigError("network", f"{called!r}, the label of {len(matches)} networks", "the id of one", f"of {ids}")
+    return matches[0].id if matches else called
 
 
 def _submit(options: argparse.Namespace) -> int:

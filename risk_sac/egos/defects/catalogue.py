@@ -78,7 +78,7 @@ def planted(ego: EgoConfig) -> tuple[Defect, ...]:
     Raises:
       ConfigError: one does not exist, or does not fit the ego.
     """
-    found = []
+    defects = []
     for name in ego.defects:
         if name not in DEFECTS:
             alike = get_close_matches(name, DEFECTS, cutoff=0.0)
@@ -94,8 +94,8 @@ def planted(ego: EgoConfig) -> tuple[Defect, ...]:
             got = f"{name!r}, which SUMO's driver cannot have"
             remedy = f"name a driver, such as {DEFECTS[name].base}, or choose a defect of the kind sumo"
             raise ConfigError("ego.defects", got, remedy=remedy)
-        found.append(DEFECTS[name])
-    return tuple(found)
+        defects.append(DEFECTS[name])
+    return tuple(defects)
 
 
 def settings_of(ego: EgoConfig) -> dict[str, float]:

@@ -19,13 +19,13 @@ from risk_sac.egos.seam import Control, EpisodeStart, Perceived, Trajectory, Veh
 from risk_sac.sim.pilot import Motion
 from risk_sac.world.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Kind, Road, X, Y
 
-SPACING_M = 2.0  # of points along lanes
-PIECE_M = 50.0  # of a lane; the planner's step takes as long as the lanes near it are
-GROWN_M = 0.2  # by which others are longer and wider
-MOVING_MPS = 0.5  # from which another's heading is that of its velocity
-MOST_BRAKING_MPS2 = 8.0  # that a plan may have; in an emergency the car brakes as it can
-BEYOND_M = 20.0  # by which the lanes it looks at reach beyond the longest plan; more of them only take time
-BEYOND_S = 0.5  # by which predictions reach beyond the longest plan
+SPACING_M = 2.0  # distance between points along lanes
+PIECE_M = 50.0  # length of a piece of a lane; the planner's step takes as long as the lanes near it are
+GROWN_M = 0.2  # margin added to the length and width of other actors
+MOVING_MPS = 0.5  # speed from which the velocity gives an actor's heading
+MOST_BRAKING_MPS2 = 8.0  # hardest braking of a plan; in an emergency the car brakes as hard as it can
+BEYOND_M = 20.0  # length of the lanes known to the planner beyond its longest plan; more only costs time
+BEYOND_S = 0.5  # time that predictions reach beyond the longest plan
 
 
 class FrenetPlanner:
@@ -97,7 +97,7 @@ class FrenetPlanner:
     def _obstacles(self, perceived: Perceived) -> list[Any]:
         """Predicts vehicles along their lanes, and all else at its velocity."""
         rows = perceived.state[[X, Y, HEADING, VX, VY, LENGTH, WIDTH], 1:].T.tolist()
-        found = []
+        obstacles = []
         for id_, kind, (x, y, heading, vx, vy, length, width) in zip(
             perceived.ids[1:], perceived.kind[1:].tolist(), rows, strict=True
         ):
@@ -106,40 +106,42 @@ class FrenetPlanner:
             number = self._ids.setdefault(id_, len(self._ids))
             told = (number, x, y, yaw, speed, length + GROWN_M, width + GROWN_M, self._reach_s, self._step_s)
             if kind == Kind.VEHICLE:
-                found.append(fp.predict_lane_following(self._map, *told))
+                obstacles.append(fp.predict_lane_following(self._map, *told))
             else:
-                found.append(fp.predict_constant_velocity(*told))
-        return found
+                obstacles.append(fp.predict_constant_velocity(*told))
+        return obstacles
 
 
 def road_map(road: Road, numbers: Mapping[str, int]) -> Any:
     """Returns the package's map of a road; its lanes have these numbers, its stop lines their places in the road."""
-    found = fp.RoadMap()
-    for each in road.lanes:
-        lane, (left, right) = fp.MapLane(), lane_edges(each)
-        lane.id, lane.speed_limit = numbers[each.id], each.limit_mps
-        lane.centerline, lane.left, lane.right = (np.ascontiguousarray(line.T) for line in (each.line, left, right))
-        if each.left:
-            lane.left_neighbor, lane.can_change_left = numbers[each.left], each.may_change_left
-        if each.right:
-            lane.right_neighbor, lane.can_change_right = numbers[each.right], each.may_change_right
-        lane.successors = [numbers[id_] for id_ in each.successors]
-        found.add_lane(lane)
+    planner_map = fp.RoadMap()
+    for road_lane in road.lanes:
+        lane, (left, right) = fp.MapLane(), lane_edges(road_lane)
+        lane.id, lane.speed_limit = numbers[road_lane.id], road_lane.limit_mps
+        lane.centerline, lane.left, lane.right = (
+            np.ascontiguousarray(line.T) for line in (road_lane.line, left, right)
+        )
+        if road_lane.left:
+            lane.left_neighbor, lane.can_change_left = numbers[road_lane.left], road_lane.may_change_left
+        if road_lane.right:
+            lane.right_neighbor, lane.can_change_right = numbers[road_lane.right], road_lane.may_change_right
+        lane.successors = [numbers[id_] for id_ in road_lane.successors]
+        planner_map.add_lane(lane)
     for number, line in enumerate(road.stop_lines):
-        lane = found.lane(numbers[line.lane])
-        found.add_stop_line(fp.StopLine(number, lane.id, lane.length(), False))
-    found.finalize()
-    return found
+        lane = planner_map.lane(numbers[line.lane])
+        planner_map.add_stop_line(fp.StopLine(number, lane.id, lane.length(), False))
+    planner_map.finalize()
+    return planner_map
 
 
 def vehicle_params(car: Vehicle) -> Any:
     """Returns the package's parameters of the car; the limits that are not given here are the package's."""
-    found = fp.VehicleParams()
-    found.length, found.width, found.wheelbase = car.length_m, car.width_m, car.wheelbase_m
-    found.rear_axle_to_center = car.wheelbase_m / 2
-    found.max_accel, found.max_decel = car.accel_mps2, min(car.brake_mps2, MOST_BRAKING_MPS2)
-    found.max_steer, found.max_steer_rate = car.steering_rad, car.steering_rate_rad_s
-    return found
+    params = fp.VehicleParams()
+    params.length, params.width, params.wheelbase = car.length_m, car.width_m, car.wheelbase_m
+    params.rear_axle_to_center = car.wheelbase_m / 2
+    params.max_accel, params.max_decel = car.accel_mps2, min(car.brake_mps2, MOST_BRAKING_MPS2)
+    params.max_steer, params.max_steer_rate = car.steering_rad, car.steering_rate_rad_s
+    return params
 
 
 class Fop(FrenetPlanner):

@@ -11,8 +11,8 @@ from risk_sac.egos.seam import Perceived, Vehicle
 from risk_sac.world.types import HEADING, LENGTH, SPEED, WIDTH, Bools, Floats, Kind, Lane, Road, Signal, X, Y
 
 BEGINS_MPS2 = 2.5  # braking at which a planner without stop lines of its own begins to stop at one
-BEFORE_LINE_M = 1.0  # where it stops
-BESIDE_M = 0.1  # between its body and the lane's edge
+BEFORE_LINE_M = 1.0  # distance from the stop line at which it stops
+BESIDE_M = 0.1  # distance between the ego's body and the lane's edge
 
 
 def lanes_ahead(road: Road, start: str) -> list[str]:
@@ -66,12 +66,12 @@ def stops(road: Road, perceived: Perceived, signals: SignalStops) -> list[bool]:
     p, lanes = perceived, {lane.id: lane for lane in road.lanes}
     x_m, y_m, heading, speed, half_m = p.state[[X, Y, HEADING, SPEED, LENGTH], 0].tolist()
     front = x_m + half_m / 2 * math.cos(heading), y_m + half_m / 2 * math.sin(heading)
-    found = []
+    stopping = []
     for number, (line, signal) in enumerate(zip(road.stop_lines, p.signals, strict=True)):
         holds = lanes[line.leads_to].on_route or not lanes[line.lane].on_route
         way_m = math.dist(front, lanes[line.lane].line[:, -1])
-        found.append(holds and signals.at(number, signal, speed, way_m))
-    return found
+        stopping.append(holds and signals.at(number, signal, speed, way_m))
+    return stopping
 
 
 def way_to_stop_m(p: Perceived, signals: SignalStops) -> float | None:

@@ -1,6 +1,6 @@
-"""Converts the road to ASAM OSI 3.
+"""Converts road, signals and perceived actors to ASAM OSI 3.
 
-That is lanes, their boundaries and speed limits, and the lights at stop lines.
+A road has lanes, their boundaries and speed limits, and the lights at stop lines.
 
 Source: ASAM OSI 3.8, osi_lane.proto, osi_logicallane.proto and osi_trafficlight.proto.
 """
@@ -46,7 +46,7 @@ def road_message(road: Road) -> bytes:
 def lights(road: Road, signals: tuple[Signal, ...]) -> list[Mapping[str, Any]]:
     """Returns a light for each stop line, at its lane's end, assigned to the lane behind."""
     lanes = {lane.id: (number, lane) for number, lane in enumerate(road.lanes)}
-    found: list[Mapping[str, Any]] = []
+    messages: list[Mapping[str, Any]] = []
     for number, (line, signal) in enumerate(zip(road.stop_lines, signals, strict=True)):
         assigned, _ = lanes[line.leads_to]
         _, before = lanes[line.lane]
@@ -56,8 +56,8 @@ def lights(road: Road, signals: tuple[Signal, ...]) -> list[Mapping[str, Any]]:
             "assigned_lane_id": [_id(LANE_ID + assigned)],
         }
         place = {"position": _road_point(before.line[:, -1])}
-        found.append({"id": _id(LIGHT_ID + number), "base": place, "classification": classification})
-    return found
+        messages.append({"id": _id(LIGHT_ID + number), "base": place, "classification": classification})
+    return messages
 
 
 def _lane(lane: Lane, numbers: Mapping[str, int], road: Road) -> Mapping[str, Any]:
@@ -133,7 +133,7 @@ TRAJECTORY = 1
 # Choice: what nothing of ours has. Heights are usual ones, and a long body is a truck.
 CAR_HEIGHT_M, TRUCK_HEIGHT_M, WALKER_HEIGHT_M = 1.5, 3.0, 1.75
 TRUCK_FROM_M = 6.5
-SIGNAL_ID = 1 << 32  # of the one signal ahead; beyond the ids of actors
+SIGNAL_ID = 1 << 32  # id of the one signal ahead; beyond the ids of actors
 
 
 class OsiEgo(ABC):

@@ -21,7 +21,7 @@ from risk_sac.execution.ray.settings import ADDRESS, RaySettings, variable
 
 logger = logging.getLogger(__name__)
 
-TOKEN_MODE = "RAY_AUTH_MODE"  # Ray's own
+TOKEN_MODE = "RAY_AUTH_MODE"  # environment variable that Ray reads
 HEAD_S = 10.0
 PROBE_S = 60.0
 
@@ -53,13 +53,13 @@ def connect(settings: RaySettings) -> None:
 def nodes(settings: RaySettings) -> list[ClusterNode]:
     """The machines of the cluster, with their room for runs."""
     listed = []
-    for each in ray.nodes():
-        resources = each.get("Resources", {}) if each["Alive"] else {}
+    for node in ray.nodes():
+        resources = node.get("Resources", {}) if node["Alive"] else {}
         slots = int(resources.get("CPU", 0) / settings.ray_cpus_per_run + 1e-9)
         if settings.ray_memory_bytes_per_run:
             slots = min(slots, int(resources.get("memory", 0) / settings.ray_memory_bytes_per_run))
         listed.append(
-            ClusterNode(id=each["NodeID"], address=each["NodeManagerAddress"], alive=each["Alive"], slots=slots)
+            ClusterNode(id=node["NodeID"], address=node["NodeManagerAddress"], alive=node["Alive"], slots=slots)
         )
     return listed
 

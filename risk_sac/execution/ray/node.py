@@ -26,9 +26,9 @@ from risk_sac.execution.messages import Event, without_folders
 from risk_sac.execution.ray.settings import ADDRESS, variable
 from risk_sac.run_folder.durable import claim, replace_file
 
-GATHER_S = 0.25  # words within it are handed on at once
-GROWN_S = 2.0  # between two copies of files that only grow
-GROWN_BYTES_PER_S = 1 << 20  # that such copies may take on average
+GATHER_S = 0.25  # messages within this time are sent together
+GROWN_S = 2.0  # least time between two copies of files that only grow
+GROWN_BYTES_PER_S = 1 << 20  # average rate that such copies may reach
 Files = Mapping[str, bytes]  # by their paths in a folder, the oldest first
 # What results depend on, besides Python and egos: the same on the server's machine and on all nodes.
 PACKAGES = ("risk-sac", "ray", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
@@ -103,7 +103,7 @@ class Attendant:
         It looks again after reading, so that a checkpoint comes with every file that was written before it.
         """
         grown = final or time.monotonic() >= self._grown_due
-        found: dict[str, bytes] = {}
+        content_by_path: dict[str, bytes] = {}
         size = 0
         while True:
             there, new = signatures(self._folder), []
@@ -113,12 +113,12 @@ class Attendant:
                     new.append(name)
             for name in sorted(new, key=lambda name: there[name][2]):
                 with contextlib.suppress(FileNotFoundError):  # replaced or removed just now
-                    found.pop(name, None)
-                    found[name] = (self._folder / name).read_bytes()
-                    size += grown * len(found[name])
+                    content_by_path.pop(name, None)
+                    content_by_path[name] = (self._folder / name).read_bytes()
+                    size += grown * len(content_by_path[name])
                 self._seen[name] = there[name]
             if not new:
-                return found
+                return content_by_path
             if grown:
                 self._grown_due = time.monotonic() + max(GROWN_S, size / GROWN_BYTES_PER_S)
                 grown = False
@@ -147,15 +147,15 @@ def check(scratch: Path, expected: Versions) -> None:
 
 def signatures(folder: Path) -> dict[str, tuple[int, int, int]]:
     """Inode, size and time of each file of a folder, by its path in it."""
-    found = {}
+    signature_by_path = {}
     for parent, _, names in os.walk(folder):
         for name in names:
             path = Path(parent, name)
             if not name.endswith(".tmp") and name != ".lock":
                 with contextlib.suppress(FileNotFoundError):
                     status = path.stat()
-                    found[str(path.relative_to(folder))] = status.st_ino, status.st_size, status.st_mtime_ns
-    return found
+                    signature_by_path[str(path.relative_to(folder))] = status.st_ino, status.st_size, status.st_mtime_ns
+    return signature_by_path
 
 
 def read(folder: Path) -> Files:
@@ -173,16 +173,16 @@ def write(folder: Path, files: Files) -> None:
 
 def versions() -> Versions:
     """Of Python, of packages, and of the egos that are installed, on this machine."""
-    found = {"python": ".".join(map(str, sys.version_info[:3]))}
+    version_by_name = {"python": ".".join(map(str, sys.version_info[:3]))}
     for name in PACKAGES:
         try:
-            found[name] = version(name)
+            version_by_name[name] = version(name)
         except PackageNotFoundError:
-            found[name] = MISSING
-    return found | {f"the ego {name}": version for name, version in installed().items()}
+            version_by_name[name] = MISSING
+    return version_by_name | {f"the ego {name}": version for name, version in installed().items()}
 
 
-def differing(found: Versions, expected: Versions) -> str:
+def differing(actual: Versions, expected: Versions) -> str:
     """Lists the versions that differ from the server's machine, in words.
 
     Returns "" if none differs.
@@ -190,8 +190,8 @@ def differing(found: Versions, expected: Versions) -> str:
     An ego that is installed here alone is no difference: no campaign can name it.
     """
     other = [
-        f"{name} is {found.get(name, MISSING)}; wanted {wanted}"
+        f"{name} is {actual.get(name, MISSING)}; wanted {wanted}"
         for name, wanted in expected.items()
-        if found.get(name, MISSING) != wanted
+        if actual.get(name, MISSING) != wanted
     ]
     return f"{', '.join(other)}, as on the server's machine" if other else ""

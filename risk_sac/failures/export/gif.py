@@ -31,7 +31,7 @@ from risk_sac.records import Collision
 from risk_sac.world.types import STEP_S, Floats
 
 LAST_S, AFTER_S, HOLD_MS = 7.0, 2.0, 2000  # before the violation and after it, and how long it stays
-EASE = 0.06  # how fast the view follows the ego, so that it does not tremble
+EASE = 0.06  # share of the way to the ego that the view moves per picture, so that it does not tremble
 
 
 def files(failure: Recorded) -> Files:
@@ -78,12 +78,12 @@ def _middles(failure: Recorded, first: int, last: int) -> list[Floats]:
     """Returns the middle of each picture: at last the ego's place, before it its surroundings."""
     path = np.column_stack((failure.ego.x_m, failure.ego.y_m))[: last + 1]
     middle = path[-1]
-    found: list[Floats] = []
+    middles: list[Floats] = []
     reach = np.array((WIDTH, HEIGHT)) / WIDTH * VIEW_M / 4  # the ego stays within the middle half
     for place in path[: first - 1 if first else None : -1]:
         middle = np.clip(middle + EASE * (place - middle), place - reach, place + reach)
-        found.append(middle)
-    return found[::-1]
+        middles.append(middle)
+    return middles[::-1]
 
 
 def _picture(failure: Recorded, ground: Sequence[Surface], frame: int, middle: Floats) -> Image.Image:

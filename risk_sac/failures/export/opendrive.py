@@ -1,4 +1,4 @@
-"""Lays reference lines of OpenDRIVE roads along polylines: straight sides, and cubics around the corners."""
+"""Writes OpenDRIVE: reference lines, lanes, signals and crossings of a net."""
 
 import math
 import xml.etree.ElementTree as ET
@@ -13,9 +13,9 @@ from risk_sac.failures.export.formats import BESIDE, add, document
 from risk_sac.failures.net import Lane, Net, moved, ribbon
 from risk_sac.world.types import Floats
 
-LEAST_ROUND_M = 0.5  # so far before and behind a corner the line bends at least, where its sides are long enough
-KNOTS = np.arange(8) / 8  # of a cubic beside a corner
-ROOM = 1.2  # of the way that the innermost lane loses at a corner
+LEAST_ROUND_M = 0.5  # least length of the bend before and behind a corner, where its sides are long enough
+KNOTS = np.arange(8) / 8  # parameters at which a cubic beside a corner is sampled
+ROOM = 1.2  # length of a bend as a multiple of what the innermost lane loses at the corner
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class ReferenceLine:
         Returns:
           Stations, shifts in m and stretches, `k` each; linear in between.
         """
-        found = []
+        knots = []
         for (start, end), station in zip(pairwise(self.stops), self.stations_m.tolist(), strict=False):
             curve = _cubic(start, end)
             frame = np.array([start.direction, (-start.direction[1], start.direction[0])])
@@ -57,8 +57,8 @@ class ReferenceLine:
                 way = np.array((1.0, 2.0 * p, 3.0 * p**2)) @ curve @ frame
                 shift_m = (place - side.place) @ (-side.direction[1], side.direction[0])
                 reached_m = _length_m(curve * np.array([(p,), (p**2,), (p**3,)]))
-                found.append((station + reached_m, shift_m, np.hypot(*way) / (way @ side.direction)))
-        stations_m, shift_m, stretch = np.array([*found, (self.length_m, 0.0, 1.0)]).T
+                knots.append((station + reached_m, shift_m, np.hypot(*way) / (way @ side.direction)))
+        stations_m, shift_m, stretch = np.array([*knots, (self.length_m, 0.0, 1.0)]).T
         return stations_m, shift_m, stretch
 
     def write(self, parent: ET.Element) -> None:
@@ -140,7 +140,7 @@ def _length_m(cubic: Floats) -> float:
     return float(np.linalg.norm(slopes, axis=1) @ weights / 2.0)
 
 
-SIGNAL_M = 5.0  # height above the road
+SIGNAL_M = 5.0  # height of a signal above the road
 LANE_TYPES = {"lane": "driving", "inside": "driving", "sidewalk": "sidewalk"}
 
 
@@ -332,12 +332,12 @@ def _write_signal(signals: ET.Element, road: ExportedRoad, lane: Lane, id_: str)
 
 def _crossings(net: Net, roads: Mapping[str, ExportedRoad]) -> Mapping[str, Sequence[Lane]]:
     """Returns the pedestrian crossings by the road whose end is nearest."""
-    found: defaultdict[str, list[Lane]] = defaultdict(list)
+    crossings: defaultdict[str, list[Lane]] = defaultdict(list)
     for lane in net.lanes.values():
         if lane.use == "crossing" and roads:
             middle = lane.centre.mean(axis=0)
-            found[min(roads, key=lambda edge: np.hypot(*(roads[edge].line.stops[-1].place - middle)))].append(lane)
-    return found
+            crossings[min(roads, key=lambda edge: np.hypot(*(roads[edge].line.stops[-1].place - middle)))].append(lane)
+    return crossings
 
 
 def _write_crossing(objects: ET.Element, road: ExportedRoad, crossing: Lane) -> None:

@@ -22,7 +22,7 @@ from risk_sac.run_folder.results import FAILURES
 from risk_sac.search.loop import execute_run
 
 ANSWER = "detection.json"
-MOST_EPISODES = 20_000  # scenes that are refused cost no steps
+MOST_EPISODES = 20_000  # bounds the episodes, since refused scenes cost no steps
 
 
 class Detection(Record):
@@ -123,15 +123,15 @@ def first_detection(spec: RunSpec, folder: Path, budget_steps: int) -> Detection
 def _play(spec: RunSpec, folder: Path, budget_steps: int, before: Detection | None) -> Detection:
     spec = spec.model_copy(update={"budget": Budget(episodes=MOST_EPISODES)})
     seen = _Candidates(budget_steps, judged=before.episodes if before else 0)
-    found, refuted, failure = None, before.refuted if before else 0, None
-    while found is None:
+    episode, refuted, failure = None, before.refuted if before else 0, None
+    while episode is None:
         execute_run(spec, folder, seen)  # goes on where it stopped; libsumo is free in between
         if not seen.waiting:
             break
-        while seen.waiting and found is None:
+        while seen.waiting and episode is None:
             record, series = seen.waiting.pop(0)
             failure = detected(spec, record, read_series(folder / FAILURES / series.name))
-            found, refuted = (record, refuted) if failure else (None, refuted + 1)
+            episode, refuted = (record, refuted) if failure else (None, refuted + 1)
         if seen.spent:
             break
     return Detection(
@@ -144,10 +144,10 @@ def _play(spec: RunSpec, folder: Path, budget_steps: int, before: Detection | No
         episodes=len(seen.records),
         reached=_first(each for each in seen.records if each.defect_reached_s is not None),
         triggered=_first(each for each in seen.records if each.failed),
-        detected=None if found is None else found.environment_steps,
+        detected=None if episode is None else episode.environment_steps,
         refuted=refuted,
         signature="" if failure is None else failure.signature,
-        episode=found,
+        episode=episode,
     )
 
 

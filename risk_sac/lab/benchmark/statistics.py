@@ -1,4 +1,4 @@
-"""Statistics of times to detection, which the budget cuts off (right-censored). Pure.
+"""Statistics of right-censored times to detection. Pure.
 
 Sources: Hazimeh et al. 2020, "Magma: a ground-truth fuzzing benchmark" (survival analysis); ARCH-COMP, category
 falsification (falsification rate); Klees et al. 2018, "Evaluating fuzz testing" (A12, tests over trials);

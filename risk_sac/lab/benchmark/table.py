@@ -1,4 +1,4 @@
-"""Draws the critical-difference diagram of methods over defects.
+"""Tables and critical-difference diagrams of the benchmark.
 
 Methods that a bar connects do not differ significantly (Nemenyi test at 5 % after a Friedman test).
 Source: Demšar 2006, "Statistical comparisons of classifiers over multiple data sets".
@@ -87,13 +87,13 @@ def methods_rows(detections: Sequence[Detection]) -> list[list[str]]:
     return [_row(each) for each in summaries(detections)]
 
 
-def _row(each: MethodSummary) -> list[str]:
-    rate = f"{each.detected} of {each.runs}{interval(*wilson_interval(each.detected, each.runs), '.2f')}"
-    restricted = f"{each.restricted_mean:.0f}{interval(each.low, each.high, '.0f')}"
-    told = (number(each.mean_steps, ".0f"), number(each.median_steps, ".0f"), restricted)
-    tests = (number(each.a12, ".2f"), number(each.p, ".3g"))
-    counts = map(str, (each.always, each.once, each.never))
-    return [each.method, str(each.runs), rate, *told, *tests, *counts]
+def _row(summary: MethodSummary) -> list[str]:
+    rate = f"{summary.detected} of {summary.runs}{interval(*wilson_interval(summary.detected, summary.runs), '.2f')}"
+    restricted = f"{summary.restricted_mean:.0f}{interval(summary.low, summary.high, '.0f')}"
+    told = (number(summary.mean_steps, ".0f"), number(summary.median_steps, ".0f"), restricted)
+    tests = (number(summary.a12, ".2f"), number(summary.p, ".3g"))
+    counts = map(str, (summary.always, summary.once, summary.never))
+    return [summary.method, str(summary.runs), rate, *told, *tests, *counts]
 
 
 def defects_table(detections: Sequence[Detection]) -> str:

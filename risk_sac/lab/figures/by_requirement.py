@@ -1,4 +1,4 @@
-"""Failures by requirement: three methods against three egos, a figure for each family.
+"""Draws failures by requirement: three methods against three egos.
 
     python -m risk_sac.lab.figures.by_requirement OUT [--seeds N] [--episodes N]
 
@@ -57,15 +57,15 @@ def rows(out: Path) -> Iterator[dict[str, object]]:
                     yield dict(zip(COLUMNS, (*head, *steps), strict=True))
 
 
-def draw(out: Path, found: list[dict[str, object]], family: str) -> None:
+def draw(out: Path, requirement_rows: list[dict[str, object]], family: str) -> None:
     """Draws mean failures per 100 episodes by requirement; a dot is a seed."""
     figure = Figure(figsize=(10, 3.6), layout="constrained")
     axes = figure.subplots(1, len(EGOS), sharey=True)
-    names = list(dict.fromkeys(str(row["requirement"]) for row in found if row["family"] == family))
+    names = list(dict.fromkeys(str(row["requirement"]) for row in requirement_rows if row["family"] == family))
     for axis, ego in zip(axes, EGOS, strict=True):
         for i, name in enumerate(names):
             shares = defaultdict(list)
-            for row in found:
+            for row in requirement_rows:
                 if (row["family"], row["ego"], row["requirement"]) == (family, ego, name):
                     shares[row["method"]].append(100 * int(str(row["valid"])) / max(1, int(str(row["episodes"]))))
             at = [m + (i - (len(names) - 1) / 2) * 0.8 / len(names) for m in range(len(METHODS))]
@@ -88,13 +88,13 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=300)
     given = parser.parse_args()
     play(given.out, given.seeds, given.episodes)
-    found = list(rows(given.out))
+    requirement_rows = list(rows(given.out))
     with (given.out / "by_requirement.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, COLUMNS)
         table.writeheader()
-        table.writerows(found)
+        table.writerows(requirement_rows)
     for family in FAMILIES:
-        draw(given.out, found, family)
+        draw(given.out, requirement_rows, family)
 
 
 if __name__ == "__main__":

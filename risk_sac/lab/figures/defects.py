@@ -1,4 +1,4 @@
-"""Which defects of the catalogue are admitted, by runs that this command repeats.
+"""Measures which defects of the catalogue are admitted.
 
     python -m risk_sac.lab.figures.defects OUT [--defects NAME ...] [--scenes N] [--steps N] [--seeds N]
 
@@ -24,7 +24,7 @@ from risk_sac.run_folder.durable import replace_file
 UNDISTURBED = "iid-undisturbed"
 METHODS: tuple[MethodName, ...] = ("archive", "random")
 FIRST_SEED = 1
-SCENE_STEPS = 150  # of a whole scene; shorter ones make it more scenes
+SCENE_STEPS = 150  # steps of a whole scene; shorter scenes make it more scenes
 COLUMNS = ("defect", "version", "family", "undisturbed_scenes", "undisturbed_detected", "method", "seed", "detected")
 
 
@@ -49,11 +49,11 @@ def rows(options: argparse.Namespace) -> Iterator[tuple[object, ...]]:
     """Yields a row of admission.csv for each defect."""
     for name in options.defects:
         try:
-            clean, found = undisturbed(name, options), search(name, options)
+            clean, detection = undisturbed(name, options), search(name, options)
         except RiskSacError as error:
             print(f"{name}: {error}", file=sys.stderr)
             continue
-        hit = (found.method, found.seed, found.detected) if found else ("", "", "")
+        hit = (detection.method, detection.seed, detection.detected) if detection else ("", "", "")
         version = version_of(ego_with(name))
         yield name, version, clean.family, clean.episodes, int(clean.detected is not None), *hit
 
@@ -67,11 +67,11 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=60_000, help="of each search (default: %(default)s)")
     parser.add_argument("--seeds", type=int, default=1, help="of each search (default: %(default)s)")
     options = parser.parse_args()
-    found: list[tuple[object, ...]] = []
+    admission_rows: list[tuple[object, ...]] = []
     for row in rows(options):
-        found.append(row)
+        admission_rows.append(row)
         text = io.StringIO()
-        csv.writer(text, lineterminator="\n").writerows([COLUMNS, *found])
+        csv.writer(text, lineterminator="\n").writerows([COLUMNS, *admission_rows])
         replace_file(options.out / "admission.csv", text.getvalue().encode())
 
 

@@ -1,4 +1,4 @@
-"""How the defensive driver fares in undisturbed traffic: contacts, standing for ever, and travel time beside SUMO's.
+"""Plays the defensive driver in undisturbed traffic beside SUMO's own.
 
     python -m risk_sac.lab.figures.defensive_driver OUT [--scenes 500] [--family mixed]
 

@@ -1,4 +1,4 @@
-"""Headline failures of better and worse egos: the same search, equal environment steps, several seeds.
+"""Counts headline failures of better and worse egos.
 
     python -m risk_sac.lab.figures.ego_ladder OUT [--families NAME ...] [--seeds N] [--steps N]
 

@@ -1,4 +1,4 @@
-"""What archive and random search find in a planner: equal environment steps, several seeds.
+"""Compares what archive and random search find in a planner.
 
     python -m risk_sac.lab.figures.planner_table OUT [--ego NAME] [--families NAME ...] [--methods NAME ...] [--seeds N]
         [--steps N] [--finished DIR]
@@ -37,7 +37,7 @@ from risk_sac.scenario.families import family_named
 from risk_sac.search.run import CHECKPOINT, PACKAGES
 
 FIRST_SEED = 1
-MOST_EPISODES = 10_000  # of a run, which ends by its steps; fixed, so that it can go on with more of them
+MOST_EPISODES = 10_000  # most episodes of a run, which ends by its steps; fixed, so that it can go on with more steps
 COUNTS = ("distinct_failures", "distinct_preventable", "headline_candidates")
 COLUMNS = ("family", "method", "seed", "episodes", "environment_steps", *COUNTS)
 Row = dict[str, str | int]
@@ -57,11 +57,11 @@ def spent(folder: Path, steps: int) -> bool:
 
 def counted(spec: RunSpec, folder: Path, steps: int) -> Row:
     """Returns the counts of a run's episodes that end within the steps."""
-    found = MetricsAccumulator(family_named(spec.family).horizon_steps)
+    accumulator = MetricsAccumulator(family_named(spec.family).horizon_steps)
     for record in records_from_lines((folder / EPISODES).read_bytes()):
         if record.environment_steps <= steps:
-            found.add(record)
-    metrics = found.metrics()
+            accumulator.add(record)
+    metrics = accumulator.metrics()
     return {name: getattr(spec, name) if hasattr(spec, name) else getattr(metrics, name) for name in COLUMNS}
 
 
@@ -70,9 +70,9 @@ def finish(spec: RunSpec, folder: Path, steps: int, out: Path) -> None:
     records = [each for each in records_from_lines((folder / EPISODES).read_bytes()) if each.environment_steps <= steps]
     state = checkpoint.load_newest(folder / CHECKPOINT, spec.digest) or {}
     cpu_s = tuple(state.get("episode_cpu_s", ()))[: len(records)]
-    found = MetricsAccumulator(family_named(spec.family).horizon_steps)
+    accumulator = MetricsAccumulator(family_named(spec.family).horizon_steps)
     for record in records:
-        found.add(record)
+        accumulator.add(record)
     shutil.copytree(folder / FAILURES, out / FAILURES, dirs_exist_ok=True)
     (out / EPISODES).write_bytes(b"".join(record.model_dump_json().encode() + b"\n" for record in records))
     results = RunResults(
@@ -80,7 +80,7 @@ def finish(spec: RunSpec, folder: Path, steps: int, out: Path) -> None:
         spec_digest=spec.digest,
         adjustments=adjustments(spec),
         finished=True,
-        metrics=found.metrics(),
+        metrics=accumulator.metrics(),
         digest=results_digest(records),
         versions={name: version(name) for name in PACKAGES},
         device="cpu",

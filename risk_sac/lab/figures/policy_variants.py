@@ -1,4 +1,4 @@
-"""Variants of the pretrained policy: what it is asked for, its γ, and n-step returns.
+"""Trains and compares variants of the pretrained policy.
 
     python -m risk_sac.lab.figures.policy_variants OUT [--variants shipped kinds ...] [--family low] [--episodes 1500]
       [--seed 21] [--jobs 2]
@@ -165,9 +165,9 @@ def main() -> None:
                 goals = OneKind(sum((Counter(each["goals"]) for each in reached), Counter[str]()).most_common(1)[0][0])
             rows += rows_of(label, goals, options, pool)
             text = [
-                f"| {each['variant']} | `{each['ego']}` | {each['failures']} | {each['distinct']} |"
-                f" {each['candidates']} | {each['reached']} | {max(each['goals'].values(), default=0)} |"
-                for each in rows
+                f"| {counts['variant']} | `{counts['ego']}` | {counts['failures']} | {counts['distinct']} |"
+                f" {counts['candidates']} | {counts['reached']} | {max(counts['goals'].values(), default=0)} |"
+                for counts in rows
             ]
             (options.out / "table.md").write_text("\n".join([HEAD, *text]) + "\n")
     print((options.out / "table.md").read_text())

@@ -1,4 +1,4 @@
-"""What a family's policy finds in random scenes, frozen, beside random actions.
+"""Plays a family's frozen policy in random scenes, beside random actions.
 
     python -m risk_sac.lab.figures.pretrained_policy [--family low] [--policy FILE] [--seed 301] [--episodes 60] EGO ...
 

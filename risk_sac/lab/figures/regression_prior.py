@@ -1,4 +1,4 @@
-"""Steps to a new fault's first detection, from the campaign of the version before, from the shipped prior, and cold.
+"""Measures steps to a new fault's detection from three priors.
 
     python -m risk_sac.lab.figures.regression_prior OUT [--jobs N]
 
@@ -80,20 +80,20 @@ def detection(out: Path, case: Case) -> Detection:
     return first_detection(spec_of(family, after, seed, prior), folder, MOST_STEPS)
 
 
-def rows(cases: Sequence[Case], found: Sequence[Detection]) -> Iterator[dict[str, object]]:
+def rows(cases: Sequence[Case], detections: Sequence[Detection]) -> Iterator[dict[str, object]]:
     """Yields a row for each case."""
-    for (family, before, after, seed, arm), each in zip(cases, found, strict=True):
+    for (family, before, after, seed, arm), case_detection in zip(cases, detections, strict=True):
         yield {
             "family": family,
             "version_1": before,
             "version_2": after,
             "seed": seed,
             "prior": arm,
-            "detected": each.detected,
-            "triggered": each.triggered,
-            "steps": each.steps,
-            "driven_by": each.episode.driven_by if each.episode else None,
-            "signature": each.signature,
+            "detected": case_detection.detected,
+            "triggered": case_detection.triggered,
+            "steps": case_detection.steps,
+            "driven_by": case_detection.episode.driven_by if case_detection.episode else None,
+            "signature": case_detection.signature,
         }
 
 
@@ -114,16 +114,18 @@ def main() -> None:
     write(options.out / "runs.csv", cases, found)
 
 
-def write(file: Path, cases: Sequence[Case], found: Sequence[Detection]) -> None:
+def write(file: Path, cases: Sequence[Case], detections: Sequence[Detection]) -> None:
     """Writes the runs, and prints what they come to."""
-    told = list(rows(cases, found))
+    told = list(rows(cases, detections))
     with file.open("w", newline="") as stream:
         writer = csv.DictWriter(stream, told[0])
         writer.writeheader()
         writer.writerows(told)
     for arm in ARMS:
-        times = [each.detected or MOST_STEPS for case, each in zip(cases, found, strict=True) if case[-1] == arm]
-        detected = sum(each.detected is not None for case, each in zip(cases, found, strict=True) if case[-1] == arm)
+        times = [each.detected or MOST_STEPS for case, each in zip(cases, detections, strict=True) if case[-1] == arm]
+        detected = sum(
+            each.detected is not None for case, each in zip(cases, detections, strict=True) if case[-1] == arm
+        )
         print(f"prior {arm}: detected {detected} of {len(times)}, restricted mean {mean(times):.0f} steps", flush=True)
 
 

@@ -1,4 +1,4 @@
-"""Plays runs side by side, and writes a row for each as soon as it has ended."""
+"""Plays runs side by side and writes a row for each."""
 
 import csv
 import multiprocessing

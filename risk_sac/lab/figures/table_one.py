@@ -1,4 +1,4 @@
-"""Table I of the paper: its methods to convergence, while they search and frozen.
+"""Measures Table I of the paper, while methods search and frozen.
 
     python -m risk_sac.lab.figures.table_one OUT [--families NAME …] [--seeds N] [--episodes N] [--uniform N] [--jobs N]
 

@@ -1,4 +1,4 @@
-"""What scripts find in uniformly drawn scenes: the model's choice, random ones, and the best of many.
+"""Compares scripts in uniformly drawn scenes: chosen, random and best.
 
     python -m risk_sac.lab.figures.uniform_scenes OUT --egos NAME ... [--families NAME ...] [--drivers NAME ...]
         [--scenes N] [--scripts N]

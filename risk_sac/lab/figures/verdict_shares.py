@@ -1,4 +1,4 @@
-"""Shares of valid contacts by fault, severity, grade and reference driver: as they were recorded, and judged again.
+"""Judges valid contacts again and compares the shares of verdicts.
 
     python -m risk_sac.lab.figures.verdict_shares OUT [--egos NAME ...] [--episodes N] [--seed N]
 
@@ -103,13 +103,13 @@ def rows(out: Path, egos: Sequence[str]) -> Iterator[dict[str, object]]:
                     yield dict(zip(COLUMNS, (family, ego, name, *share, len(contacts)), strict=True))
 
 
-def markdown(found: Sequence[dict[str, object]]) -> str:
+def markdown(share_rows: Sequence[dict[str, object]]) -> str:
     """A table: a row per share, a column per ego and family, before → now."""
-    columns = list(dict.fromkeys((row["ego"], row["family"], row["valid"]) for row in found))
+    columns = list(dict.fromkeys((row["ego"], row["family"], row["valid"]) for row in share_rows))
     lines = ["| | " + " | ".join(f"{ego}, {family} ({valid})" for ego, family, valid in columns) + " |"]
     lines.append("|---|" + "---|" * len(columns))
-    cells = {(r["ego"], r["family"], r["rules"], r["by"], r["name"]): r["contacts"] for r in found}
-    for by, name in dict.fromkeys((row["by"], row["name"]) for row in found):
+    cells = {(r["ego"], r["family"], r["rules"], r["by"], r["name"]): r["contacts"] for r in share_rows}
+    for by, name in dict.fromkeys((row["by"], row["name"]) for row in share_rows):
         shown = []
         for ego, family, _ in columns:
             before, now = (cells.get((ego, family, rules, by, name), "–") for rules in ("before", "now"))
@@ -130,12 +130,12 @@ def main() -> None:
         for ego in given.egos:
             for family in FAMILIES:
                 play(given.out / f"{ego}-{family}", ego, family, given.seed, given.episodes)
-    found = list(rows(given.out, given.egos))
+    share_rows = list(rows(given.out, given.egos))
     with (given.out / "verdicts.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, COLUMNS)
         table.writeheader()
-        table.writerows(found)
-    (given.out / "verdicts.md").write_text(markdown(found))
+        table.writerows(share_rows)
+    (given.out / "verdicts.md").write_text(markdown(share_rows))
 
 
 if __name__ == "__main__":

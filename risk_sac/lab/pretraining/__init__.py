@@ -1,1 +1,1 @@
-"""Trains what is shipped as the prior: script episodes before many egos, and what is learnt from them."""
+"""Trains the shipped prior from script episodes before many egos."""

@@ -1,6 +1,7 @@
-"""The egos that the prior is trained on. Planners and the catalogue's test set are not among them.
+"""Plays script episodes before the egos that the prior trains on.
 
-Choice: weak ones are among them, since they give the first failures, and what is learnt on them carries over.
+Planners and the test set of the catalogue are not among these egos. Choice: weak egos are, since they give the first
+failures, and what is learnt on them carries over.
 """
 
 import io

@@ -1,4 +1,4 @@
-"""Controls that learn nothing: random actions, and one fixed rule for searches over scenes alone."""
+"""Agents that learn nothing: idle, random and scripted ones."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace

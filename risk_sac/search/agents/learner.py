@@ -1,4 +1,4 @@
-"""The step of the dual variable λ, which prices the realism cost.
+"""Learner between environment steps, with the dual variable λ of realism.
 
 Source: RISK-SAC, Sec. III-B, Eq. 1-2, and Alg. 1, l. 15-16.
 """

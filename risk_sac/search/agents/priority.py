@@ -1,4 +1,4 @@
-"""Exact sum tree for drawing indices in proportion to their priorities."""
+"""Risk-prioritised replay: priorities, a sum tree and importance weights."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -86,17 +86,17 @@ def _sum(nodes: Floats, first: int) -> None:
 def _find(nodes: Floats, first: int, fractions: Floats) -> Indices:
     # All descend together, level by level: the processor waits for many nodes of the tree at once.
     prefix = fractions * nodes[1]
-    found = np.ones(len(fractions), np.int64)
+    positions = np.ones(len(fractions), np.int64)
     level = 1
     while level < first:
-        for i in range(len(found)):
-            left = 2 * found[i]
+        for i in range(len(positions)):
+            left = 2 * positions[i]
             # Rounding may lift the prefix to the end of both children: an empty one is never entered.
             goes_right = np.int64((prefix[i] >= nodes[left]) & (nodes[left + 1] > 0.0))
             prefix[i] -= goes_right * nodes[left]
-            found[i] = left + goes_right
+            positions[i] = left + goes_right
         level *= 2
-    return found - first
+    return positions - first
 
 
 # No term counts for more than ten average ones, so that one outlier cannot fill the batch.

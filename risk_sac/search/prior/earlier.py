@@ -219,7 +219,7 @@ def _runs(folder: Path) -> Iterator[Path]:
             yield file.parent
 
 
-def keep(prior: str, found: PriorContent) -> str:
+def keep(prior: str, prior_content: PriorContent) -> str:
     """Copies what a prior names into the library; returns the copy's name.
 
     Raises:
@@ -229,7 +229,7 @@ def keep(prior: str, found: PriorContent) -> str:
     if is_kept(prior):
         _path(prior).touch()  # it is wanted again: see `prune`
         return prior
-    content = found.sealed.encode()
+    content = prior_content.sealed.encode()
     label = re.sub("[^a-z0-9]+", "_", Path(prior).name.lower()).strip("_")
     name = "_".join(filter(None, (label[:40].strip("_"), _digest(content))))
     path = _path(name)

@@ -1,4 +1,4 @@
-"""Translates points between two families of one pattern, by the names of scene parameters and adversaries.
+"""Start of a search from the shipped prior and earlier runs.
 
 A point is a scene in the unit cube of a space, and behind it the genes of each adversary's script.
 """
@@ -19,8 +19,8 @@ from risk_sac.search.prior.shipped import shipped_prior
 from risk_sac.search.scripts import SIZE, Genes
 from risk_sac.world.types import Floats
 
-MIDDLE = 0.5  # of a scene parameter or gene that the source lacks
-PASSIVE = Genes(*[MIDDLE] * SIZE)._replace(active=0.0)  # an adversary that the source lacks does nothing
+MIDDLE = 0.5  # value of a scene parameter or gene that the source lacks
+PASSIVE = Genes(*[MIDDLE] * SIZE)._replace(active=0.0)  # genes of an adversary that the source lacks: it does nothing
 STEER = Genes._fields.index("steer")
 OTHER_SIDE = {"left": "right", "right": "left"}
 
@@ -74,23 +74,23 @@ class Coordinates(NamedTuple):
         values = low + points[:, :size] * (high - low)
         return Scripted(self.space.names, values, self.adversaries, points[:, size:], self.mirrored)
 
-    def placed(self, found: Scripted) -> Floats:
+    def placed(self, scripted: Scripted) -> Floats:
         """Returns the points of scenes and scripts of any family of the pattern, `n x dimension`.
 
         Values are clipped to the bounds. A missing parameter is put to its middle, and a missing adversary is passive.
         """
-        if found.mirrored != self.mirrored:
-            found = found.reflected()
-        points = np.full((len(found.values), self.dimension), MIDDLE)
+        if scripted.mirrored != self.mirrored:
+            scripted = scripted.reflected()
+        points = np.full((len(scripted.values), self.dimension), MIDDLE)
         low, width, size = self.space.low, self.space.high - self.space.low, self.space.dimension
-        shared = [(i, found.parameters.index(n)) for i, n in enumerate(self.space.names) if n in found.parameters]
+        shared = [(i, scripted.parameters.index(n)) for i, n in enumerate(self.space.names) if n in scripted.parameters]
         own, other = [i for i, _ in shared], [j for _, j in shared]
-        points[:, own] = _unit(found.values[:, other], low[own], width[own])
+        points[:, own] = _unit(scripted.values[:, other], low[own], width[own])
         for i, adversary in enumerate(self.adversaries):
             genes: Floats | Genes = PASSIVE
-            if adversary in found.adversaries:
-                first = SIZE * found.adversaries.index(adversary)
-                genes = found.genes[:, first : first + SIZE]
+            if adversary in scripted.adversaries:
+                first = SIZE * scripted.adversaries.index(adversary)
+                genes = scripted.genes[:, first : first + SIZE]
             points[:, size + SIZE * i : size + SIZE * (i + 1)] = genes
         return points
 
@@ -126,7 +126,7 @@ def _unit(values: Floats, low: Floats, width: Floats) -> Floats:
     return np.clip(np.divide(offset, width, out=np.zeros_like(offset), where=width > 0), 0.0, 1.0)
 
 
-DOUBT = 0.5  # share of the uniform belief beside what an earlier run showed: its ego may have been another
+DOUBT = 0.5  # share of the uniform belief beside an earlier run's, whose ego may have been another
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,15 +172,15 @@ def start_of(problem: Problem, prior: str) -> Start:
     return start if prior in SHIPPED_OR_NONE else _after(start, own, kept(prior).alike(problem.family.name))
 
 
-def _after(start: Start, own: Coordinates, found: tuple[FamilyScripts, ...]) -> Start:
+def _after(start: Start, own: Coordinates, earlier: tuple[FamilyScripts, ...]) -> Start:
     """Puts what earlier runs found before the shipped library, and believes in what their egos did."""
     model, belief = start.model, start.belief
-    for each in found:
+    for each in earlier:
         known = start.translation.known(_points(own, each, each.latest))
         for point, script in zip(known, each.latest, strict=True):
             belief = model.believe(belief, point, failed=bool(script.kind))
-    failures = np.concatenate([_points(own, each, each.failures) for each in found])
-    kinds = tuple(script.kind for each in found for script in each.failures)
+    failures = np.concatenate([_points(own, each, each.failures) for each in earlier])
+    kinds = tuple(script.kind for each in earlier for script in each.failures)
     return Start(
         model=model,
         translation=start.translation,
@@ -193,8 +193,8 @@ def _after(start: Start, own: Coordinates, found: tuple[FamilyScripts, ...]) -> 
 
 
 def _points(own: Coordinates, family: FamilyScripts, scripts: Iterable[PlayedScript]) -> Floats:
-    found = [np.empty((0, own.dimension))]
+    points = [np.empty((0, own.dimension))]
     for each in scripts:
         values, genes = np.array([list(each.scene.values())]), np.array([each.genes])
-        found.append(own.placed(Scripted(tuple(each.scene), values, family.adversaries, genes, family.mirrored)))
-    return np.concatenate(found)
+        points.append(own.placed(Scripted(tuple(each.scene), values, family.adversaries, genes, family.mirrored)))
+    return np.concatenate(points)

@@ -1,4 +1,4 @@
-"""Bandit that chooses between two ways to search by their recent yield per cost."""
+"""Archive of elites that a bandit mutates or leaves for the prior."""
 
 import math
 from collections import Counter

@@ -1,4 +1,4 @@
-"""The seam between Algorithm 1 and what proposes its scenes, and the score that all of them share.
+"""Interface and objective of scene optimizers; Sobol and i.i.d. sampling.
 
 Source: RISK-SAC, Sec. III-E.
 """

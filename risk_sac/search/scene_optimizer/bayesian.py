@@ -1,4 +1,4 @@
-"""The Gaussian process over scenes and its acquisition functions, as BoTorch has them; higher values are better.
+"""Bayesian optimisation of scenes with BoTorch; higher values are better.
 
 Everything works in float64. What draws random numbers takes a seed, and leaves torch's global generator as it was.
 
