@@ -115,8 +115,6 @@ def alike(found: Sequence[Collision | Violation], wanted: Collision | Violation)
 def _alike(found: Collision | Violation, wanted: Collision | Violation) -> bool:
     if not isinstance(found, Collision) or not isinstance(wanted, Collision):
         return found.requirement == wanted.requirement
-    if found.judgement is None or wanted.judgement is None:
-        return False
     same_type = found.judgement.conflict_type is wanted.judgement.conflict_type
     return same_type and found.other_id == wanted.other_id
 

@@ -27,7 +27,7 @@ def test_run_literals():
     assert metrics.efficiency == pytest.approx(1 - (30 + 150 + 150 + 150 + 50) / (5 * 150))
     assert metrics.cost_rate == pytest.approx((0.2 * 30 + 0.1 * 150 + 0.4 * 50) / 300)
     assert metrics.dispersion == pytest.approx(0.5)  # one feature of four differs, by its whole range: 1/√4
-    assert (metrics.distinct_failures, metrics.steps_per_distinct_failure) == (1, 300)  # unjudged, alike
+    assert (metrics.distinct_failures, metrics.steps_per_distinct_failure) == (1, 300)  # alike
     assert (metrics.dual_variable, metrics.temperature) == (0.7, 0.1)
 
 
@@ -103,11 +103,10 @@ def test_incremental_equals_batch(records):
     assert metrics.pcr == preventable_collision_rate(counted(records))
     assert metrics.window_pcr == preventable_collision_rate(counted(records[-WINDOW:]))
     assert metrics.distinct_preventable == len(distinct_failures([hit for hit in hits if hit.preventable]))
-    judged = [hit for hit in hits if hit.judgement is not None]
-    assert metrics.avoidable == sum(hit.judgement.grade in (Grade.PREVENTABLE, Grade.FULL_BRAKING) for hit in judged)
-    assert sum(metrics.conflicts_by_second) == sum(metrics.contacts_by_second) == len(judged)
+    assert metrics.avoidable == sum(hit.judgement.grade in (Grade.PREVENTABLE, Grade.FULL_BRAKING) for hit in hits)
+    assert sum(metrics.conflicts_by_second) == sum(metrics.contacts_by_second) == len(hits)
     assert sum(metrics.signatures.values()) == len(hits)
-    assert metrics.covered == len({kind_of(hit, hit.judgement) for hit in judged})
+    assert metrics.covered == len({kind_of(hit) for hit in hits})
     assert metrics.efficiency == pytest.approx(efficiency_score(counted(records)), abs=1e-12)
     assert metrics.cost_rate == pytest.approx(cost_rate(counted(records)), abs=1e-12)
     assert metrics.distinct_failures == len(distinct_failures(hits))
