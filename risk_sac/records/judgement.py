@@ -107,7 +107,7 @@ class Judgement(Record):
     """How the striker came into the ego's way."""
     conflict_s: Real
     """When the conflict began; negative before the release."""
-    noticed_s: float
+    noticed_s: Real
     """The same for a wary driver, for which an actor that hangs over its line or could not stop gently is in conflict;
     `conflict_after_release` goes by it."""
     conflict_x_m: Real

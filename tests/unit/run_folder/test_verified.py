@@ -72,10 +72,9 @@ def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repe
         failure(2),  # like it
         failure(3, judgement=judgement(Grade.FULL_BRAKING, signature="leader")),
         failure(4, judgement=judgement(signature="merge")),  # does not repeat
-        failure(5, judgement=judgement(signature="crossing", severity=None)),  # of an older version
         episode_record(6, Outcome.FAILURE, violations=(violation(grade=Grade.PREVENTABLE),)),
         failure(7, phase="evaluation"),
     )
-    found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e5=2, e6=2, e7=2)).metrics
+    found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e6=2, e7=2)).metrics
     assert (found.headline, found.headline_kinds) == (2, HEADLINE)
     assert results.metrics.headline is None, "before a replay"

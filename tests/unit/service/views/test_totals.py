@@ -148,12 +148,10 @@ GAPS = ((F, 12.0), (F, 14.0), (S, 13.0), (S, 30.0), (S, 40.0), (R, 11.0))
 def found(ledger):
     """Makes the answer about low of episodes with these outcomes and gaps to the leader."""
 
-    def effects(gaps, **others):
+    def effects(gaps):
         campaign = ledger.create(SCENES_SPEC)
         episodes = [
-            StoredRecord(
-                i, campaign.runs[0].number, episode_record(i, each, scene=LOW_SCENE | {"lead_gap_m": gap} | others)
-            )
+            StoredRecord(i, campaign.runs[0].number, episode_record(i, each, scene=LOW_SCENE | {"lead_gap_m": gap}))
             for i, (each, gap) in enumerate(gaps)
         ]
         families = scene_effects(campaign, episodes).families
