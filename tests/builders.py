@@ -123,6 +123,7 @@ def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, 
     values: dict[str, Any] = {
         "definitions": 1,
         "conflict_type": ConflictType.CUT_IN,
+        "noticed_s": conflict_s,
         "conflict_x_m": 301.0,
         "conflict_y_m": -2.5,
         "position": "ahead",
@@ -131,20 +132,25 @@ def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, 
         "ego_response": "late_braking",
         "ground": "lane",
         "broke": ("red_light", "speeding"),
+        "ego_broke": (),
         "severity": Severity.MODERATE,
         "injury_risk": 0.005,
         "unresponsive": False,
-        "drivers": {
+        "drivers": {}
+        if grade is None
+        else {
             "r157": AVOIDS if grade is Grade.PREVENTABLE else TOUCHES,
             "bound": TOUCHES if grade is Grade.UNAVOIDABLE else AVOIDS,
         },
+        "ego_part": None,
+        "fault": None,
         "signature": "cut-in, straight",
     }
     return Judgement(grade=grade, conflict_s=conflict_s, **(values | changes))
 
 
 def collision(**changes: Any) -> Collision:
-    """The ego's front against the rear of the car before it; not judged, and by no rule refused."""
+    """The ego's front against the rear of the car before it; not graded, and by no rule refused."""
     values: dict[str, Any] = {
         "time_s": 3.2,
         "other_id": "lead",
@@ -165,6 +171,7 @@ def collision(**changes: Any) -> Collision:
         "early_min_robustness": -1.0,
         "simulator_agrees": True,
         "verdicts": {"inside_limits": True, "ego_moving": True},
+        "judgement": judgement(None),
     }
     return Collision(**(values | changes))
 
@@ -185,6 +192,7 @@ def violation(**changes: Any) -> Violation:
         "verdicts": {"no_teleport": True, "inside_limits": True},
         "grade": None,
         "drivers": {},
+        "fault": None,
         "signature": "never_fast violated; straight",
         "definitions": 1,
     }

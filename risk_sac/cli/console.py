@@ -196,8 +196,7 @@ def offences(violation: Collision | Violation) -> Iterator[str]:
     if isinstance(violation, Violation):
         broken = {"ego": violation.broke}
     else:
-        judged = violation.judgement
-        broken = {"ego": judged.ego_broke, "other": judged.broke} if judged else {}
+        broken = {"ego": violation.judgement.ego_broke, "other": violation.judgement.broke}
     yield from (f"{actor}: {in_words(broke)}" for actor, broke in broken.items() if broke)
 
 

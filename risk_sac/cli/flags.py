@@ -167,7 +167,7 @@ def _severity(worst: Worst) -> Severity | None:
 def _broke(worst: Worst) -> Sequence[str]:
     if isinstance(worst, Violation):
         return worst.broke
-    return worst.judgement.broke if worst.judgement else ()
+    return worst.judgement.broke
 
 
 FILTERS: Mapping[str, Filter] = {

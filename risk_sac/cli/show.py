@@ -188,7 +188,7 @@ def _of_contact(collision: Collision) -> tuple[str, ...]:
     return (
         f"{collision.ego_speed_mps:.1f}\n{collision.other_speed_mps:.1f}",
         f"{collision.ego_zone}\n{collision.other_zone}",
-        "" if collision.judgement is None else _conflict(collision.judgement),
+        _conflict(collision.judgement),
     )
 
 

@@ -52,15 +52,13 @@ class Overview(Record):
 
 
 def overview(episodes: Iterable[tuple[str, EpisodeRecord]]) -> Overview:
-    """Sorts valid violations into clusters; contacts that were not judged are left out."""
+    """Sorts valid violations into clusters."""
     members_by_signature: defaultdict[str, list[_Member]] = defaultdict(list)
     kinds = set()
     for name, episode in episodes:
         for violation in episode.valid_violations:
             if isinstance(violation, Collision):
-                if violation.judgement is None:
-                    continue
-                kinds.add(kind_of(violation, violation.judgement))
+                kinds.add(kind_of(violation))
             members_by_signature[violation.signature].append(_Member(name, episode, violation))
     distinct = {}
     for name, members in members_by_signature.items():

@@ -218,14 +218,14 @@ def _draw_contact_point(axis: Axes, recording: Recording, collision: Collision) 
 
 def _draw_conflict(axis: Axes, recording: Recording) -> None:
     """Draws both bodies when the conflict began, and where the striker was then."""
-    judgement = recording.collision.judgement if recording.collision is not None else None
     begin_s = recording.conflict_s
-    if judgement is None or begin_s is None:
+    if recording.collision is None or begin_s is None:
         return
     for actor in recording.involved:
         if np.isfinite(recording.pose(actor, begin_s)).all():
             label = "as the conflict began" if actor == 0 else None
             _draw_body(axis, recording, actor, begin_s, label=label, **CONFLICT)
+    judgement = recording.collision.judgement
     place = judgement.conflict_x_m, judgement.conflict_y_m
     style: dict[str, Any] = {"marker": "D", "color": CONFLICT_COLOUR, "markersize": 5, "linestyle": "none", "zorder": 5}
     axis.plot(*place, label="striker then", **style)

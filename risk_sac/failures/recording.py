@@ -76,9 +76,9 @@ class Recording:
     def conflict_s(self) -> float | None:
         """Time when the conflict began; None if not recorded.
 
-        It is None in a twin, without a judged contact, or if it was before the recording.
+        It is None in a twin, without a contact, or if it was before the recording.
         """
-        if self.twin or self.collision is None or self.collision.judgement is None:
+        if self.twin or self.collision is None:
             return None
         began_s = self.collision.judgement.conflict_s - self.collision.time_s
         return began_s if began_s >= self.time_s[0] else None

@@ -24,7 +24,6 @@ def sentence(series: Series, collision: Collision) -> str:
     E.g. "left neighbour, 4 m ahead, moves right at 1.1 m/s for 1.5 s; ego at 14 m/s brakes 0.5 s late".
     """
     judged = collision.judgement
-    assert judged is not None
     since = series["time_s"] - series["released_s"]
     striker = [str(name) for name in series["ids"]].index(collision.other_id)
     began = min(int(np.searchsorted(since, judged.conflict_s - 1e-6)), len(since) - 1)
@@ -38,9 +37,9 @@ def sentence(series: Series, collision: Collision) -> str:
 
 
 def story(series: Series, violation: Collision | Violation) -> str:
-    """Returns a sentence about any violation; see `sentence` for a contact that was judged."""
+    """Returns a sentence about any violation; see `sentence` for a contact."""
     if isinstance(violation, Collision):
-        return sentence(series, violation) if violation.judgement else f"contact with {violation.other_id}"
+        return sentence(series, violation)
     ego = f"ego at {violation.ego_speed_mps:.0f} m/s{_broke(violation.broke)} violates {violation.requirement}"
     if violation.other_id is None:
         return f"no other road user near; {ego}"

@@ -51,17 +51,15 @@ def _contact(collision: Collision) -> Iterator[str]:
         f"the ego's {collision.ego_zone}, at {collision.ego_speed_mps:.1f} m/s, touched the {collision.other_zone} of "
         f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {known(collision)}"
     )
-    if judgement is not None:
-        yield judgement.signature
-        if collision.severity_in_words:
-            yield collision.severity_in_words
-        yield f"{began(collision, judgement)}{_grade(collision)}"
-        if judgement.fault is not None and judgement.ego_part is not None:
-            yield f"fault: {judgement.fault} · the ego {ego_did(judgement.ego_part)}"
-        yield (
-            f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'} · "
-            f"by the ego: {_words(', '.join(judgement.ego_broke)) or 'nothing'}"
-        )
+    yield judgement.signature
+    yield collision.severity_in_words
+    yield f"{began(collision)}{_grade(collision)}"
+    if judgement.ego_part is not None:
+        yield f"fault: {judgement.fault} · the ego {ego_did(judgement.ego_part)}"
+    yield (
+        f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'} · "
+        f"by the ego: {_words(', '.join(judgement.ego_broke)) or 'nothing'}"
+    )
 
 
 def _violation(violation: Violation) -> Iterator[str]:

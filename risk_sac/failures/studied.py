@@ -49,8 +49,7 @@ class Core(Record):
 def valid_failure(id_: str, episode: EpisodeRecord) -> Collision | Violation:
     """Returns the violation that names a valid failure; a ConfigError for others, which have no core or region."""
     violation = episode.worst_violation
-    unjudged = isinstance(violation, Collision) and violation.judgement is None
-    if violation is None or not violation.valid or unjudged:
+    if violation is None or not violation.valid:
         why = f": it breaks {episode.reason.replace('_', ' ')}" if episode.reason else ""
         raise ConfigError("FAILURE", f"{id_} is no valid failure{why}", remedy="choose one that is")
     return violation

@@ -115,8 +115,6 @@ def alike(violations: Sequence[Collision | Violation], wanted: Collision | Viola
 def _alike(violation: Collision | Violation, wanted: Collision | Violation) -> bool:
     if not isinstance(violation, Collision) or not isinstance(wanted, Collision):
         return violation.requirement == wanted.requirement
-    if violation.judgement is None or wanted.judgement is None:
-        return False
     same_type = violation.judgement.conflict_type is wanted.judgement.conflict_type
     return same_type and violation.other_id == wanted.other_id
 

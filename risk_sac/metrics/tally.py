@@ -68,10 +68,7 @@ WINDOW = 100  # number of episodes of the sliding ECR and PCR
 
 
 def preventable(record: EpisodeRecord) -> bool:
-    """Whether the episode has a valid violation that a reference driver would have prevented.
-
-    A violation that was never judged counts as not preventable.
-    """
+    """Whether the episode has a valid violation that a reference driver would have prevented."""
     return any(violation.preventable for violation in record.valid_violations)
 
 
@@ -188,7 +185,7 @@ class Tally(Counts):
     def _add_collision(self, collision: Collision) -> None:
         features = outcome_features(collision)
         judged = collision.judgement
-        times_s = [collision.time_s, *([judged.conflict_s] if judged else [])]
+        times_s = [collision.time_s, judged.conflict_s]
         if not all(map(math.isfinite, times_s)):
             striker = collision.other_id
             raise NotFinite(f"collision with {striker!r} and its conflict are at {times_s} s; wanted finite times")
@@ -198,13 +195,11 @@ class Tally(Counts):
         self.preventable_collisions += collision.preventable
         self.avoidable += collision.avoidable
         self.prevented_by.update({name: int(prevents) for name, prevents in collision.prevention.items()})
-        if collision.severity is not None:
-            self.by_severity[collision.severity] += 1
-        if judged is not None:
-            self.kinds.add(kind_of(collision, judged))
-            self.unresponsive += judged.unresponsive
-            self.conflicts_by_second[self._second(judged.conflict_s)] += 1
-            self.contacts_by_second[self._second(collision.time_s)] += 1
+        self.by_severity[judged.severity] += 1
+        self.kinds.add(kind_of(collision))
+        self.unresponsive += judged.unresponsive
+        self.conflicts_by_second[self._second(judged.conflict_s)] += 1
+        self.contacts_by_second[self._second(collision.time_s)] += 1
 
     def _second(self, time_s: float) -> int:
         """Returns the bin of a time.

@@ -64,4 +64,6 @@ from risk_sac.records.violation import (
     Collision,
     RequirementResult,
     Violation,
+    valid_violations,
+    worst_of,
 )

@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, get_args
 
 from risk_sac.records.base import Least, Page, Real, Record
 from risk_sac.records.run import DrivenBy, Funnel
-from risk_sac.records.violation import Collision, RequirementResult, Violation
+from risk_sac.records.violation import Collision, RequirementResult, Violation, valid_violations, worst_of
 from risk_sac.world.types import Series
 
 
@@ -98,13 +98,12 @@ class EpisodeRecord(Record):
 
         They make the episode a failure.
         """
-        contact = () if self.collision is None else (self.collision,)
-        return tuple(each for each in (*contact, *self.violations) if each.valid)
+        return valid_violations(self.collision, self.violations)
 
     @property
     def worst_violation(self) -> Collision | Violation | None:
-        """The violation that names the episode: a valid contact, the first valid violation, a refused contact."""
-        return next(iter(self.valid_violations), None) or self.collision or next(iter(self.violations), None)
+        """The violation that names the episode: see `worst_of`; without a valid one the contact, or the first."""
+        return worst_of(self.valid_violations) or self.collision or next(iter(self.violations), None)
 
     def refused_by(self, rule: str) -> tuple[str, ...]:
         """Requirements whose violations fail a rule."""
@@ -141,7 +140,7 @@ class EpisodeRecord(Record):
         )
         collision = self.collision
         if collision is not None and collision.requirement in requirements:
-            judgement = collision.judgement and collision.judgement.model_copy(update=ungraded)
+            judgement = collision.judgement.model_copy(update=ungraded)
             verdicts = {**collision.verdicts, rule: False}
             collision = collision.model_copy(update={"verdicts": verdicts, "judgement": judgement})
         told = {"collision": collision, "violations": violations}

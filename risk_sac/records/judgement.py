@@ -107,7 +107,7 @@ class Judgement(Record):
     """How the striker came into the ego's way."""
     conflict_s: Real
     """When the conflict began; negative before the release."""
-    noticed_s: float | None = None
+    noticed_s: Real
     """The same for a wary driver, for which an actor that hangs over its line or could not stop gently is in conflict;
     `conflict_after_release` goes by it."""
     conflict_x_m: Real
@@ -126,11 +126,11 @@ class Judgement(Record):
     broke: tuple[str, ...]
     """What the striker broke: red_light, priority, wrong_direction, speeding, pedestrian_on_red, unsafe_lane_change,
     brake_check, turned_into_path."""
-    ego_broke: tuple[str, ...] = ()
+    ego_broke: tuple[str, ...]
     """What the ego broke: red_light, priority, wrong_direction, speeding, off_road."""
-    severity: Severity | None = None
+    severity: Severity
     """minor | moderate | severe."""
-    injury_risk: float | None = None
+    injury_risk: float
     """Risk that the pedestrian dies, or an occupant is seriously injured (MAIS 3 or more)."""
     unresponsive: bool
     """A visible collision course of 1.5 s or more during which the ego never braked."""
@@ -138,9 +138,9 @@ class Judgement(Record):
     """preventable | full_braking (by that only) | unavoidable; null where it is not valid."""
     drivers: Mapping[str, ReferenceOutcome]
     """Reference driver → how it fares; empty where the contact is not valid."""
-    ego_part: EgoPart | None = None
+    ego_part: EgoPart | None
     """What the ego did about the striker. Null where the contact is not valid."""
-    fault: Fault | None = None
+    fault: Fault | None
     """ego | shared | other. Null where the contact is not valid."""
     signature: str
     """The class of failures it belongs to, in words; what differs in it is distinct."""

@@ -1,7 +1,7 @@
 """Violations of requirements, with and without contact."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from risk_sac.records.base import Least, Real, Record
 from risk_sac.records.judgement import Fault, Grade, Judgement, Severity
@@ -28,7 +28,7 @@ NO_CONTACT = "no_contact"  # the requirement that a contact violates
 class Violated(Record, ABC):
     """Base of violations, with and without contact: the rules they are valid by, and their verdict."""
 
-    verdicts: Mapping[str, bool] = {}
+    verdicts: Mapping[str, bool]
     """Validity rule → passed."""
 
     @property
@@ -49,12 +49,12 @@ class Violated(Record, ABC):
     @property
     @abstractmethod
     def graded(self) -> Grade | None:
-        """Its grade; None where it is not valid, or was never judged."""
+        """Its grade; None where it is not valid."""
 
     @property
     @abstractmethod
     def blamed(self) -> Fault | None:
-        """Party that caused it; None where it is not valid or not judged."""
+        """Party that caused it; None where it is not valid."""
 
     @property
     @abstractmethod
@@ -103,7 +103,7 @@ class Violation(Violated):
     """preventable | full_braking | unavoidable; null where it is not valid."""
     drivers: Mapping[str, bool]
     """Reference driver → whether it keeps the requirement in the same encounter; empty where it is not valid."""
-    fault: Fault | None = None
+    fault: Fault | None
     """ego | shared | other. Null where it is not valid."""
     signature: str
     """Its class of failures, in words."""
@@ -178,8 +178,7 @@ class Collision(Violated):
     simulator_agrees: bool | None
     """Whether SUMO lists it within 0.3 s; null for pedestrians, bodies that part within the step, and an ego that SUMO
     does not drive."""
-    judgement: Judgement | None = None
-    """Null in what was stored before contacts were judged."""
+    judgement: Judgement
 
     @property
     def requirement(self) -> str:
@@ -189,37 +188,35 @@ class Collision(Violated):
     @property
     def graded(self) -> Grade | None:
         """See `Violated.graded`."""
-        return None if self.judgement is None else self.judgement.grade
+        return self.judgement.grade
 
     @property
     def blamed(self) -> Fault | None:
         """See `Violated.blamed`."""
-        return None if self.judgement is None else self.judgement.fault
+        return self.judgement.fault
 
     @property
     def prevention(self) -> Mapping[str, bool]:
         """See `Violated.prevention`."""
-        return {name: each.avoids for name, each in self.judgement.drivers.items()} if self.judgement else {}
+        return {name: driver.avoids for name, driver in self.judgement.drivers.items()}
 
     @property
-    def severity(self) -> Severity | None:
+    def severity(self) -> Severity:
         """Its severity."""
-        return None if self.judgement is None else self.judgement.severity
+        return self.judgement.severity
 
     @property
     def headline_candidate(self) -> bool:
         """See `Violated.headline_candidate`."""
-        return self.preventable and self.severity in (Severity.MODERATE, Severity.SEVERE)
+        return self.preventable and self.severity is not Severity.MINOR
 
     @property
     def severity_in_words(self) -> str:
         """Such as "severe: closing speed 11.0 m/s, risk of death 3.5 %"."""
-        if self.judgement is None or self.judgement.severity is None:
-            return ""
         risk = "death" if self.other_kind == "pedestrian" else "serious injury"
         return (
             f"{self.judgement.severity}: closing speed {self.relative_speed_mps:.1f} m/s, "
-            f"risk of {risk} {100 * (self.judgement.injury_risk or 0.0):.1f} %"
+            f"risk of {risk} {100 * self.judgement.injury_risk:.1f} %"
         )
 
     @property
@@ -229,7 +226,16 @@ class Collision(Violated):
 
     @property
     def signature(self) -> str:
-        """Its judgement's; of a contact stored before contacts were judged, its striker."""
-        if self.judgement is None:
-            return f"unjudged {self.other_role} {self.other_kind}"
+        """Its class of failures, in words."""
         return self.judgement.signature
+
+
+def valid_violations(collision: Collision | None, violations: Sequence[Violation]) -> tuple[Collision | Violation, ...]:
+    """Lists the violations that make an episode a failure, a contact first."""
+    contact = () if collision is None else (collision,)
+    return tuple(violation for violation in (*contact, *violations) if violation.valid)
+
+
+def worst_of(violations: Sequence[Collision | Violation]) -> Collision | Violation | None:
+    """Returns the valid violation that counts most: for the headline, then a preventable one, then the first."""
+    return max(violations, key=lambda violation: (violation.headline_candidate, violation.preventable), default=None)

@@ -225,10 +225,8 @@ def _beyond(odd: Odd, space: SceneSpace) -> Iterator[str]:
 
 
 def kinds(collisions: Iterable[Collision | None]) -> Kinds:
-    """Counts valid contacts by cell of the taxonomy; those without a judgement are left out."""
-    counts = Counter(
-        kind_of(each, each.judgement) for each in collisions if each is not None and each.valid and each.judgement
-    )
+    """Counts valid contacts by cell of the taxonomy."""
+    counts = Counter(kind_of(collision) for collision in collisions if collision is not None and collision.valid)
     values = {
         respect: {
             words: sum(count for kind, count in counts.items() if getattr(kind, respect) == value)

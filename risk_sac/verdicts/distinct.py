@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from risk_sac.errors import NotFinite
-from risk_sac.records import Collision, ConflictType, Judgement, Violation
+from risk_sac.records import Collision, ConflictType, Violation
 
 KMH = 1 / 3.6
 # The edges between the cells of each feature.
@@ -46,8 +46,7 @@ def cell_of(violation: Collision | Violation) -> Cell:
     """
     values = [violation.ego_speed_mps]
     if isinstance(violation, Collision):
-        judged = violation.judgement
-        values += [violation.other_speed_mps, violation.time_s - judged.conflict_s if judged else 0.0]
+        values += [violation.other_speed_mps, violation.time_s - violation.judgement.conflict_s]
     if any(value != value for value in values):
         named = dict(zip(EDGES, values, strict=False))
         raise NotFinite(f"{violation.requirement} violated at {violation.time_s:g} s has {named}; wanted no NaN")
@@ -146,12 +145,12 @@ class FailureKind(NamedTuple):
     closing_speed: int  # which of the three bins that `CLOSING_MPS` parts
 
 
-def kind_of(collision: Collision, judged: Judgement) -> FailureKind:
+def kind_of(collision: Collision) -> FailureKind:
     """The cell that a contact lies in, by what was judged of it."""
     return FailureKind(
         striker=f"{collision.other_role} {collision.other_kind}",
-        ego_manoeuvre=judged.ego_manoeuvre,
-        conflict_type=judged.conflict_type,
+        ego_manoeuvre=collision.judgement.ego_manoeuvre,
+        conflict_type=collision.judgement.conflict_type,
         ego_zone="" if collision.other_kind == "pedestrian" else collision.ego_zone,
         visible=bisect_right(VISIBLE_S, collision.visible_for_s),
         ego_braked=collision.ego_peak_braking_mps2 >= BRAKED_MPS2,

@@ -1,6 +1,6 @@
 """Makes the sentences of a verdict from its record; the page's `ui/verdicts.ts` says the same."""
 
-from risk_sac.records import Collision, EgoPart, Judgement, Violation
+from risk_sac.records import Collision, EgoPart, Violation
 
 FULL_BRAKING, TTC_RULE = "full_braking", "r157_ttc"
 DRIVERS = {
@@ -32,20 +32,20 @@ def known(collision: Collision) -> str:
 
     It follows the striker's name: "of which it had known for 1.0 s".
     """
-    seen_s, judged = collision.visible_for_s, collision.judgement
-    if judged is not None and judged.hidden:
+    seen_s = collision.visible_for_s
+    if collision.judgement.hidden:
         if seen_s > 0.0:
             return f"of which it came to know only {seen_s:.1f} s before"
         return "of which it did not know when the conflict began, nor then"
     if seen_s > 0.0:
         return f"of which it had known for {seen_s:.1f} s"
-    return "of which it did not know then" + (", but when the conflict began" if judged else "")
+    return "of which it did not know then, but when the conflict began"
 
 
-def began(collision: Collision, judged: Judgement) -> str:
+def began(collision: Collision) -> str:
     """Returns when the conflict began; one that began hidden counts from when the ego could know of it."""
-    before_s = collision.time_s - judged.conflict_s
-    if not judged.hidden:
+    before_s = collision.time_s - collision.judgement.conflict_s
+    if not collision.judgement.hidden:
         return f"the conflict began {before_s:.1f} s before the contact"
     if collision.visible_for_s <= 0.0:
         return "the conflict was hidden until the contact"

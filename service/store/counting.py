@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from risk_sac.execution.messages import EpisodeDone
 from risk_sac.metrics.tally import STEPS
-from risk_sac.records import NO_CONTACT, Collision, Episode, EpisodeRecord, Funnel, Outcome, State, StateChange, stored
+from risk_sac.records import NO_CONTACT, Episode, EpisodeRecord, Funnel, Outcome, State, StateChange, stored
 from service.errors import StorageError
 from service.store.database import storage_errors
 from service.store.stored import StoredPage, read_episode
@@ -84,13 +84,11 @@ def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
     row.violated = listed(dict.fromkeys([*violated, *([] if contact is None else [NO_CONTACT])]))
     failed = record.outcome is Outcome.FAILURE
     row.failed = listed(each.requirement for each in record.valid_violations) if failed else None
-    judgement = contact.judgement if contact is not None else None
-    unjudged = worst is None or (isinstance(worst, Collision) and judgement is None)
     row.grade = None if worst is None or not failed else worst.graded
     row.severity = None if contact is None or not failed else contact.severity
     row.fault = None if worst is None or not failed else worst.blamed
-    row.signature = None if worst is None or unjudged else worst.signature
-    row.broke = None if judgement is None else listed(judgement.broke)
+    row.signature = None if worst is None else worst.signature
+    row.broke = None if contact is None else listed(contact.judgement.broke)
 
 
 def listed(names: Iterable[str]) -> str | None:

@@ -9,13 +9,13 @@ from pydantic_core import from_json
 from sqlalchemy import func, or_, select
 from sqlalchemy.orm import Session, selectinload
 
-from risk_sac.records import FINAL, Episode, Outcome, State, StateChange, Triage, TriageState
+from risk_sac.records import FINAL, Episode, EpisodeRecord, Outcome, State, StateChange, Triage, TriageState
 from service.errors import StorageError
 from service.store.counting import HOUR_S, event_page
 from service.store.database import connect, open_database, storage_errors
 from service.store.finding import Judged, episode_page, find_campaign, find_failure, find_run, find_triage
 from service.store.revisions import Revisions
-from service.store.stored import PlainEpisode, StoredCampaign, StoredFailure, StoredPage, Usage, read_episode
+from service.store.stored import StoredCampaign, StoredFailure, StoredPage, StoredRecord, Usage, read_episode
 from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
 
 DAY_HOURS = 24
@@ -130,16 +130,16 @@ class Store:
             query = query if judged is None else query.where(*judged.conditions())
             return episode_page(session, query, outcomes, limit, after or 0)
 
-    def plain_episodes(self, number: int, outcomes: Collection[Outcome] = ()) -> Iterator[PlainEpisode]:
+    def records(self, number: int, outcomes: Collection[Outcome] = ()) -> Iterator[StoredRecord]:
         """Yields the campaign's search episodes in order of arrival; no outcomes means all."""
         row = EpisodeRow
-        query = select(row.number, row.run_number, row.phase, row.index, row.outcome, row.record)
+        query = select(row.number, row.run_number, row.record)
         query = query.where(row.campaign_number == number, *Judged(iid=False).conditions()).order_by(row.number)
         if outcomes:
             query = query.where(row.outcome.in_(outcomes))
         with self._reading() as session:
-            for found in session.execute(query.execution_options(yield_per=BATCH)):
-                yield PlainEpisode(*found[:-1], from_json(found.record))
+            for number, run_number, record in session.execute(query.execution_options(yield_per=BATCH)):
+                yield StoredRecord(number, run_number, EpisodeRecord.model_validate_json(record))
 
     def failure(self, campaign_id: str, failure_id: str, project: str | None = None) -> StoredFailure:
         """Returns the failure with this id."""

@@ -17,7 +17,7 @@ from pydantic_core import from_json
 
 from risk_sac.config import IID_METHODS, CampaignSpec, RunSpec
 from risk_sac.metrics import pooled_headline
-from risk_sac.records import CampaignHead, Episode, Repetition, Run, RunMetrics, RunResult, State
+from risk_sac.records import CampaignHead, Episode, EpisodeRecord, Repetition, Run, RunMetrics, RunResult, State
 from service.errors import OutdatedError, TransitionError
 from service.store.tables import Base, CampaignRow, EpisodeRow, RunRow
 
@@ -202,15 +202,12 @@ class StoredFailure:
 
 
 @dataclass(frozen=True, slots=True)
-class PlainEpisode:
-    """Episode with an unvalidated record, since validation costs most of reading many."""
+class StoredRecord:
+    """Record of an episode, and its place in the database."""
 
     number: int  # in the order of arrival, over all campaigns
     run_number: int
-    phase: str
-    index: int
-    outcome: str
-    record: Mapping[str, Any]  # as it is stored, see `risk_sac.records.stored`
+    record: EpisodeRecord
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,12 +26,24 @@ from risk_sac.metrics import (
     pooled_names,
     pooled_requirements,
 )
-from risk_sac.records import Adjustment, Counts, DrivenBy, Outcome, Real, Record, Results, RunMetrics, State, Total
+from risk_sac.records import (
+    Adjustment,
+    Counts,
+    DrivenBy,
+    EpisodeRecord,
+    Outcome,
+    Real,
+    Record,
+    Results,
+    RunMetrics,
+    State,
+    Total,
+)
 from risk_sac.report.power import PlayedCounts
+from risk_sac.verdicts.distinct import DistinctFailures
 from risk_sac.world.types import Floats
 from service.errors import OutdatedError
-from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
-from service.views.failure_table import KindIndex, Plain, is_preventable, violations_of
+from service.store.stored import StoredCampaign, StoredRecord, StoredRun
 
 
 def results(campaign: StoredCampaign) -> Results:
@@ -145,12 +157,12 @@ class Curves(Record):
     runs: list[RunCurves]
 
 
-def curves(campaign: StoredCampaign, episodes: Iterable[PlainEpisode], points: int) -> Curves:
+def curves(campaign: StoredCampaign, episodes: Iterable[StoredRecord], points: int) -> Curves:
     """Returns curves of all searches with at most `points` points; a run's episodes come in order."""
     searches = {run.number: _RunningSums() for run in campaign.searches}
     for each in episodes:
-        if each.phase == "search":
-            searches[each.run_number].add(each.outcome, each.record)
+        if each.record.searching:
+            searches[each.run_number].add(each.record)
     return Curves(runs=[_curves(run, searches[run.number], points) for run in campaign.searches])
 
 
@@ -168,24 +180,24 @@ class _RunningSums:
     steps: list[int] = field(default_factory=list)
     cost: list[float] = field(default_factory=list)  # summed over the steps
     dual_variable: list[float] = field(default_factory=list)
-    _kinds: KindIndex = field(default_factory=KindIndex)
-    _preventable_kinds: KindIndex = field(default_factory=KindIndex)
+    _kinds: DistinctFailures = field(default_factory=DistinctFailures)
+    _preventable_kinds: DistinctFailures = field(default_factory=DistinctFailures)
 
-    def add(self, outcome: str, record: Plain) -> None:
-        valid, _ = violations_of(outcome, record)
-        preventable = [violation for violation in valid if is_preventable(violation)]
-        if outcome != Outcome.INVALID:
-            contact = record["collision"]
-            self.contacts.append(contact is not None and contact in valid)
-            self.preventable_contacts.append(contact is not None and contact in preventable)
+    def add(self, record: EpisodeRecord) -> None:
+        valid = record.valid_violations
+        preventable = [violation for violation in valid if violation.preventable]
+        if record.outcome is not Outcome.INVALID:
+            contact = record.collision
+            self.contacts.append(contact is not None and contact.valid)
+            self.preventable_contacts.append(contact is not None and contact.preventable)
         self.rated.append(len(self.contacts))
         self.preventable.append(bool(preventable))
         self.distinct.append(sum(map(self._kinds.add, valid)))
         self.distinct_preventable.append(sum(map(self._preventable_kinds.add, preventable)))
-        self.driven_by.append(record.get("driven_by"))
-        self.steps.append(record["steps"])
-        self.cost.append(float(record["mean_cost"]) * record["steps"] if record["steps"] else 0.0)
-        self.dual_variable.append(float(record["dual_variable"]))
+        self.driven_by.append(record.driven_by)
+        self.steps.append(record.steps)
+        self.cost.append(record.mean_cost * record.steps if record.steps else 0.0)
+        self.dual_variable.append(record.dual_variable)
 
 
 def _curves(run: StoredRun, search: _RunningSums, points: int) -> RunCurves:

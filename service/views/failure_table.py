@@ -1,7 +1,4 @@
-"""Table of a campaign's failures. Pure.
-
-Records are taken from their JSON without validation, because a table may have ten thousand of them.
-"""
+"""The table of a campaign's failures. Pure."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,23 +8,22 @@ import numpy as np
 
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.records import (
-    NO_CONTACT,
+    Collision,
     ConflictType,
     DrivenBy,
+    EpisodeRecord,
     Fault,
     Grade,
-    Outcome,
     Phase,
     Real,
     Record,
     Severity,
     TriageState,
+    Violation,
 )
-from risk_sac.verdicts.distinct import Niche, cell
-from service.store.stored import PlainEpisode, StoredCampaign, StoredRun
+from risk_sac.verdicts.distinct import DistinctFailures, Niche, niche_of
+from service.store.stored import StoredCampaign, StoredRecord, StoredRun
 
-Plain = Mapping[str, Any]
-"""A JSON object as it is stored, see `risk_sac.records.stored`."""
 Repeats = Literal["verified", "flaky"]
 DECIMALS = 4
 OF_ANY = ("time_s", "ego_speed_mps")
@@ -53,14 +49,13 @@ OF_JUDGEMENT = (
     "ego_broke",
 )
 COUNTED = ("failures", "distinct", "preventable")
-UNJUDGED: Plain = dict.fromkeys((*OF_JUDGEMENT, "signature")) | {"broke": [], "ego_broke": []}
 
 
 class KindRow(Record):
     """The failures of one signature."""
 
-    signature: str | None
-    """What `signature=` of the failures takes; null in what was stored before contacts were judged."""
+    signature: str
+    """What `signature=` of the failures takes."""
     requirement: str
     """That is violated; `no_contact` by a contact."""
     name: str
@@ -87,7 +82,8 @@ class FamilyScenes(Record):
 class FailureTable(Record):
     """Failures by columns: each list has an entry per failure, in order of arrival.
 
-    An episode that violates several requirements is one failure; a contact names it, or else the first violation.
+    An episode that violates several requirements is one failure. A violation for the headline names it, else a
+    preventable one, else a contact, else the first.
     Numbers are rounded to four decimals; the failure itself has all of them. Times count from the adversaries' release.
     """
 
@@ -108,9 +104,9 @@ class FailureTable(Record):
     failed: list[list[str]]
     """All requirements that count and were validly violated."""
     grade: list[Grade | None]
-    """Null where it is not valid, or was never judged."""
+    """Null where it is not valid."""
     severity: list[Severity | None]
-    """Null without contact, or where it was never judged."""
+    """Null without contact."""
     injury_risk: list[Real]
     """As in Judgement; null like `severity`."""
     fault: list[Fault | None]
@@ -130,7 +126,7 @@ class FailureTable(Record):
     striker_kind: list[str | None]
     """vehicle | pedestrian"""
     conflict_type: list[ConflictType | None]
-    """Null without contact, and where that was never judged."""
+    """Null without contact."""
     conflict_s: list[Real]
     """When the conflict began; negative before the release."""
     time_s: list[Real]
@@ -171,99 +167,32 @@ class FailureTable(Record):
     """By family, of those with a failure."""
 
 
-class KindIndex:
-    """Finds the first failure of each kind, as `risk_sac.verdicts.distinct.DistinctFailures` does."""
-
-    def __init__(self) -> None:
-        self._found: set[Niche] = set()
-
-    def add(self, violation: Plain) -> bool:
-        """Adds a violation; returns whether it is the first of its kind."""
-        niche = _niche(violation)
-        new = niche not in self._found
-        self._found.add(niche)
-        return new
-
-
-def violations_of(outcome: str, record: Plain) -> tuple[list[Plain], list[Plain]]:
-    """Returns the valid violations of an episode, and all; a contact first."""
-    contact = record["collision"]
-    every = [*([] if contact is None else [contact]), *record.get("violations", [])]
-    if outcome != Outcome.FAILURE:
-        return [], every
-    return [each for each in every if all(each.get("verdicts", {}).values())], every
-
-
-def is_preventable(violation: Plain) -> bool:
-    """Whether a reference driver would have prevented a valid violation."""
-    return bool(_judged(violation)["grade"] == Grade.PREVENTABLE)
-
-
-def prevented_by(violation: Plain) -> list[str]:
-    """The reference drivers that would have prevented it."""
-    drivers: Plain = _judged(violation).get("drivers", {})
-    return [name for name, each in drivers.items() if (each["avoids"] if isinstance(each, Mapping) else each)]
-
-
-def is_headline_candidate(violation: Plain) -> bool:
-    """Whether a valid violation is preventable, and no minor contact."""
-    grave = "requirement" in violation or _judged(violation).get("severity") in (Severity.MODERATE, Severity.SEVERE)
-    return grave and is_preventable(violation)
-
-
-def _judged(violation: Plain) -> Plain:
-    """Returns the verdicts of a violation; those of a contact are nested."""
-    if "requirement" in violation:
-        return violation
-    return violation.get("judgement") or UNJUDGED
-
-
-def _requirement(violation: Plain) -> str:
-    return str(violation.get("requirement", NO_CONTACT))
-
-
-def _name(violation: Plain) -> str:
-    """Its signature; of a contact stored before contacts were judged, its striker."""
-    return _judged(violation)["signature"] or f"unjudged {violation['other_role']} {violation['other_kind']}"
-
-
-def _niche(violation: Plain) -> Niche:
-    values = [violation["ego_speed_mps"]]
-    if "requirement" not in violation:
-        judged = violation.get("judgement")
-        from_conflict_s = float(violation["time_s"]) - float(judged["conflict_s"]) if judged else 0.0
-        values += [violation["other_speed_mps"], from_conflict_s]
-    return _requirement(violation), _name(violation), cell([float(value) for value in values])
-
-
 def failure_table(
-    campaign: StoredCampaign, failures: Iterable[PlainEpisode], triages: Mapping[int, TriageState]
+    campaign: StoredCampaign, failures: Iterable[StoredRecord], triages: Mapping[int, TriageState]
 ) -> FailureTable:
     """Returns the table of these failures in their order; one without a triage is new."""
     runs = {run.number: run for run in campaign.runs}
-    kinds_by_phase: defaultdict[tuple[int, str], KindIndex] = defaultdict(KindIndex)
-    headline, niches = KindIndex(), dict[Niche, int]()
-    failures, naming, rows = list(failures), [], []
+    distinct: defaultdict[tuple[int, str], DistinctFailures] = defaultdict(DistinctFailures)
+    headline, niches = DistinctFailures(), dict[Niche, int]()
+    failures, naming, rows = list(failures), list[Collision | Violation](), list[dict[str, Any]]()
     for failure in failures:
-        valid, every = violations_of(failure.outcome, failure.record)
-        naming.append(next(iter(valid or every)))
-        kinds = kinds_by_phase[failure.run_number, failure.phase]
-        row = _row(runs[failure.run_number], failure, naming[-1])
-        candidates = filter(is_headline_candidate, valid if row["repeats"] == "verified" else [])
-        rows.append(
-            row
-            | {"failed": [_requirement(violation) for violation in valid]}
-            | {"headline": sum(map(headline.add, candidates)) > 0}
-            | {"distinct": sum(map(kinds.add, valid)) > 0}
-            | {"niche": niches.setdefault(_niche(naming[-1]), len(niches)) if valid else None}
-        )
-    kinds_found = _kinds(naming, rows)
-    places = {(kind.requirement, kind.name): place for place, kind in enumerate(kinds_found)}
+        worst, valid = failure.record.worst_violation, failure.record.valid_violations
+        assert worst is not None  # else it would be no failure
+        row = _row(runs[failure.run_number], failure.record, worst)
+        kinds = distinct[failure.run_number, failure.record.phase]
+        candidates = [each for each in valid if each.headline_candidate and row["repeats"] == "verified"]
+        row["headline"] = sum(map(headline.add, candidates)) > 0
+        row["distinct"] = sum(map(kinds.add, valid)) > 0
+        row["niche"] = niches.setdefault(niche_of(worst), len(niches)) if valid else None
+        naming.append(worst)
+        rows.append(row)
+    kind_rows = _kinds(naming, rows)
+    places = {(kind.requirement, kind.signature): place for place, kind in enumerate(kind_rows)}
     table: dict[str, Any] = {
-        "kind": [places[_requirement(each), _name(each)] for each in naming],
-        "kinds": kinds_found,
-        "triage": [triages.get(each.number, TriageState.NEW) for each in failures],
-        "scenes": _scenes([row["families"] for row in rows], [each.record["scene"] for each in failures]),
+        "kind": [places[worst.requirement, worst.signature] for worst in naming],
+        "kinds": kind_rows,
+        "triage": [triages.get(failure.number, TriageState.NEW) for failure in failures],
+        "scenes": _scenes([row["families"] for row in rows], [failure.record.scene for failure in failures]),
     }
     for column in FailureTable.model_fields.keys() - table.keys():
         values = [row[column] for row in rows]
@@ -271,59 +200,59 @@ def failure_table(
     return FailureTable.model_validate(table)
 
 
-def _row(run: StoredRun, failure: PlainEpisode, violation: Plain) -> dict[str, Any]:
+def _row(run: StoredRun, record: EpisodeRecord, worst: Collision | Violation) -> dict[str, Any]:
     """A failure's entries of most columns, by the violation that names it."""
-    judged = {**UNJUDGED, **_judged(violation)}
-    repetition = run.repetitions.get(failure.index)
-    row = {name: judged.get(name) for name in OF_JUDGEMENT}
-    if "requirement" in violation:  # whose offences are the ego's own
-        row |= {"broke": [], "ego_broke": violation["broke"]}
-        row |= {"min_ttc_s": None, "min_robustness": violation["robustness"]}
+    judged = worst.judgement if isinstance(worst, Collision) else worst
+    repetition = run.repetitions.get(record.index)
+    row = {name: getattr(judged, name, None) for name in OF_JUDGEMENT}
+    if isinstance(worst, Violation):  # whose offences are the ego's own
+        row |= {"broke": [], "ego_broke": worst.broke, "min_ttc_s": None, "min_robustness": worst.robustness}
     else:
-        row |= {name: violation.get(f"early_{name}") for name in ("min_ttc_s", "min_robustness")}
-    row |= {name: violation[name] for name in OF_ANY} | {name: violation.get(name) for name in OF_CONTACT}
+        row |= {"min_ttc_s": worst.early_min_ttc_s, "min_robustness": worst.early_min_robustness}
+    row |= {name: getattr(worst, name, None) for name in (*OF_ANY, *OF_CONTACT)}
     return row | {
-        "ids": f"{run.id}-{failure.phase}-{failure.index}",
+        "ids": record.id_in(run.id),
         "run_ids": run.id,
         "families": run.family,
         "methods": run.method,
         "seeds": run.seed,
-        "indices": failure.index,
-        "phases": failure.phase,
-        "driven_by": failure.record.get("driven_by"),
-        "valid": failure.outcome == Outcome.FAILURE,
-        "requirement": _requirement(violation),
-        "striker": violation["other_id"],
-        "striker_kind": violation["other_kind"],
-        "prevented_by": prevented_by(violation),
-        "refused_by": [rule for rule, passed in violation.get("verdicts", {}).items() if not passed],
+        "indices": record.index,
+        "phases": record.phase,
+        "driven_by": record.driven_by,
+        "valid": bool(record.valid_violations),
+        "requirement": worst.requirement,
+        "failed": [violation.requirement for violation in record.valid_violations],
+        "striker": worst.other_id,
+        "striker_kind": worst.other_kind,
+        "prevented_by": [name for name, prevents in worst.prevention.items() if prevents],
+        "refused_by": worst.broken,
         "repeats": None if repetition is None else "verified" if repetition.verified else "flaky",
     }
 
 
-def _kinds(naming: Sequence[Plain], rows: Sequence[Plain]) -> list[KindRow]:
+def _kinds(naming: Sequence[Collision | Violation], rows: Sequence[Mapping[str, Any]]) -> list[KindRow]:
     """Of the signatures, the most preventable failures first."""
     kinds: dict[tuple[str, str], dict[str, Any]] = {}
-    for violation, row in zip(naming, rows, strict=True):
-        key = requirement, name = row["requirement"], _name(violation)
-        said = {"signature": _judged(violation)["signature"], "requirement": requirement, "name": name}
-        kind = kinds.setdefault(key, said | dict.fromkeys(COUNTED, 0))
+    for worst, row in zip(naming, rows, strict=True):
+        requirement, name = worst.requirement, worst.signature
+        said = {"signature": name, "requirement": requirement, "name": name}
+        kind = kinds.setdefault((requirement, name), said | dict.fromkeys(COUNTED, 0))
         kind["failures"] += row["valid"]
         kind["distinct"] += row["distinct"]
-        kind["preventable"] += row["valid"] and row["grade"] == Grade.PREVENTABLE
+        kind["preventable"] += worst.preventable
     ordered = sorted(kinds.values(), key=lambda kind: (-kind["preventable"], -kind["failures"], kind["name"]))
     return [KindRow(**kind) for kind in ordered]
 
 
-def _scenes(families: Sequence[str], scenes: Sequence[Plain]) -> dict[str, FamilyScenes]:
+def _scenes(families: Sequence[str], scenes: Sequence[Mapping[str, float]]) -> dict[str, FamilyScenes]:
     places: defaultdict[str, list[int]] = defaultdict(list)
     for place, family in enumerate(families):
         places[family].append(place)
     return {family: _family_scenes([scenes[place] for place in of], of) for family, of in places.items()}
 
 
-def _family_scenes(scenes: Sequence[Plain], of: list[int]) -> FamilyScenes:
-    names = list(dict.fromkeys(name for scene in scenes for name in scene))  # those of an earlier version too
+def _family_scenes(scenes: Sequence[Mapping[str, float]], of: list[int]) -> FamilyScenes:
+    names = list(dict.fromkeys(name for scene in scenes for name in scene))
     parameters = [_rounded([scene.get(name) for scene in scenes]) for name in names]
     rows = list(zip(*parameters, strict=True)) or [()] * len(of)
     return FamilyScenes(names=names, rows=rows, of=of)

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, Odd
-from risk_sac.records import Outcome, Real, Record
+from risk_sac.records import EpisodeRecord, Outcome, Real, Record
 from risk_sac.report.coverage import NOT_PLAYED, Axis, axes_of
 from risk_sac.scenario.families import family_named
 from risk_sac.world.types import Bools, Floats
-from service.store.stored import PlainEpisode, StoredCampaign
+from service.store.stored import StoredCampaign, StoredRecord
 
 BINS = 6  # of each parameter, so that a matrix of two can be read
 Counts = NDArray[np.int64]
@@ -70,29 +70,27 @@ class SceneEffects(Record):
     """Those in which an episode was played."""
 
 
-def scene_effects(campaign: StoredCampaign, episodes: Iterable[PlainEpisode]) -> SceneEffects:
+def scene_effects(campaign: StoredCampaign, episodes: Iterable[StoredRecord]) -> SceneEffects:
     """Compares failing with safe scenes, and counts what was played."""
     families = {run.number: run.family for run in campaign.searches}
-    scenes: dict[str, list[PlainEpisode]] = {}
+    records: dict[str, list[EpisodeRecord]] = {}
     for each in episodes:
-        if each.outcome not in NOT_PLAYED:
-            scenes.setdefault(families[each.run_number], []).append(each)
-    return SceneEffects(families=[_family(name, campaign.spec.odd, played) for name, played in scenes.items()])
+        if each.record.outcome not in NOT_PLAYED:
+            records.setdefault(families[each.run_number], []).append(each.record)
+    return SceneEffects(families=[_family(name, campaign.spec.odd, played) for name, played in records.items()])
 
 
-def _family(name: str, odd: Odd, played: Sequence[PlainEpisode]) -> FamilySceneEffects:
+def _family(name: str, odd: Odd, played: Sequence[EpisodeRecord]) -> FamilySceneEffects:
     axes = axes_of(family_named(name), odd, BINS)
-    names = {axis.parameter.name for axis in axes}
-    known = [each for each in played if names <= each.record["scene"].keys()]  # others are of an earlier version
-    failed = np.array([each.outcome == Outcome.FAILURE for each in known], dtype=bool)
-    columns = [np.array([each.record["scene"][axis.parameter.name] for each in known], dtype=float) for axis in axes]
+    failed = np.array([record.outcome is Outcome.FAILURE for record in played], dtype=bool)
+    columns = [np.array([record.scene[axis.parameter.name] for record in played]) for axis in axes]
     placed = [(axis, axis.places(column)) for axis, column in zip(axes, columns, strict=True)]
     effects = [
         _effect(axis, column, places, failed, len(axes)) for (axis, places), column in zip(placed, columns, strict=True)
     ]
     return FamilySceneEffects(
         family=name,
-        episodes=len(known),
+        episodes=len(played),
         failures=int(failed.sum()),
         parameters=sorted(effects, key=lambda each: -abs((0.5 if each.effect is None else each.effect) - 0.5)),
         pairs=[_pair(*both, failed) for both in combinations(placed, 2)],

@@ -89,12 +89,12 @@ def content_of(view: View, sources: Sources) -> Content:
         return Content(_PRIOR.dump_json(PriorContent.read(view.prior, folder)))
     assert campaign is not None
     if view.name == "failure_table":
-        failures = store.plain_episodes(campaign.number, view.outcomes)
+        failures = store.records(campaign.number, view.outcomes)
         return Content(wire(failure_table(campaign, failures, store.triages(campaign.number))))
     if view.name == "curves":
-        return Content(wire(curves(campaign, store.plain_episodes(campaign.number), view.points)))
+        return Content(wire(curves(campaign, store.records(campaign.number), view.points)))
     if view.name == "scenes":
-        return Content(wire(scene_effects(campaign, store.plain_episodes(campaign.number))))
+        return Content(wire(scene_effects(campaign, store.records(campaign.number))))
     made = sources.reports.report(campaign)
     return Content(_OF_REPORT[view.name](made, view), made.lasting)
 

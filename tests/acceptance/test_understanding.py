@@ -62,7 +62,6 @@ def failure(failures: Path) -> Path:
 def struck(bundle: Bundle) -> tuple[object, ...]:
     collision = bundle.manifest.episode.collision
     assert collision is not None
-    assert collision.judgement is not None
     return collision.valid, collision.other_id, collision.judgement.conflict_type, collision.judgement.grade
 
 

@@ -40,7 +40,10 @@ VERSIONS = {"numpy": "2.4", "sumo": "1.28"}
 FOUND, NOTHING = ".fF.drv", ".a.r.."  # a letter for each episode, see `OUTCOMES`
 
 
-def hit(judged: Judgement | None = None, broken: str = "", least_ttc_s: float = 0.3) -> Collision:
+NOT_GRADED = judgement(None)
+
+
+def hit(judged: Judgement = NOT_GRADED, broken: str = "", least_ttc_s: float = 0.3) -> Collision:
     verdicts = {rule: rule != broken for rule in ("inside_limits", "ego_moving")}
     return collision(early_min_ttc_s=least_ttc_s, verdicts=verdicts, judgement=judged)
 

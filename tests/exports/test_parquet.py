@@ -63,7 +63,6 @@ def test_every_episode_of_every_run_is_a_row_with_its_fields(runs: Path, tmp_pat
             assert row["prevented_by"] == ([name for name, kept in worst.prevention.items() if kept] if worst else None)
             assert row["fault"] == (worst.blamed if worst else None)
             if worst is not None and worst is record.collision:
-                assert worst.judgement is not None
                 assert row["severity"] == worst.judgement.severity in ("minor", "moderate", "severe")
                 assert row["injury_risk"] == worst.judgement.injury_risk
             if record.collision is not None:

@@ -46,7 +46,7 @@ def test_it_ends_with_the_defect_that_was_found_and_a_command_that_draws_the_fai
 
 def test_it_offers_to_draw_a_preventable_failure_where_there_is_one():
     def failure(index, grade):
-        contact = collision(judgement=None if grade is None else judgement(grade))
+        contact = collision(judgement=judgement(grade))
         record = episode_record(index, collision=contact).model_dump()
         return Episode.model_validate(record | {"id": f"r-search-{index}", "run_id": "r", "wall_s": 1.0})
 

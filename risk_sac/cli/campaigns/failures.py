@@ -169,7 +169,7 @@ def _violation(violation: Violation) -> Iterator[str]:
 
 
 def _grade(violation: Collision | Violation) -> str:
-    return violation.graded or ("none: not judged" if violation.valid else "none: it is not valid")
+    return violation.graded or "none: it is not valid"
 
 
 def _contact(collision: Collision) -> Iterator[str]:
@@ -178,12 +178,11 @@ def _contact(collision: Collision) -> Iterator[str]:
         f"{collision.ego_zone} at {or_dash(collision.ego_speed_mps, '.1f')} m/s, the {collision.other_zone} of "
         f"{collision.other_role} {collision.other_id!r} at {or_dash(collision.other_speed_mps, '.1f')} m/s"
     )
-    if (judgement := collision.judgement) is not None:
-        yield f"  kind       {judgement.signature}"
-        yield f"  grade      {_grade(collision)}"
-        if collision.severity_in_words:
-            yield f"  severity   {collision.severity_in_words}"
-        if judgement.fault:
-            yield f"  fault      {judgement.fault}"
-        yield f"  the ego    broke {in_words(judgement.ego_broke) or 'nothing'}"
-        yield f"  the other  broke {in_words(judgement.broke) or 'nothing'}"
+    judgement = collision.judgement
+    yield f"  kind       {judgement.signature}"
+    yield f"  grade      {_grade(collision)}"
+    yield f"  severity   {collision.severity_in_words}"
+    if judgement.fault:
+        yield f"  fault      {judgement.fault}"
+    yield f"  the ego    broke {in_words(judgement.ego_broke) or 'nothing'}"
+    yield f"  the other  broke {in_words(judgement.broke) or 'nothing'}"

@@ -157,7 +157,7 @@ class Names:
 
     def _of_failure(self, failure: Episode) -> list[str]:
         worst = failure.worst_violation
-        kind = "not judged" if worst is None or worst.graded is None else f"{worst.signature}; grade {worst.graded}"
+        kind = "no violation" if worst is None else f"{worst.signature}; grade {worst.graded}"
         return [f"{failure.id}: {kind}", f"  {look_command(self.service_url, self.results.campaign_id, failure.id)}"]
 
 

@@ -190,7 +190,7 @@ def _moments(failure: Recorded) -> Iterator[tuple[int, str]]:
     """Frames and what happens in them."""
     released = round(failure.released_s * 10)
     yield released, "the adversaries are released"
-    if isinstance(failure.violation, Collision) and failure.violation.judgement is not None:
+    if isinstance(failure.violation, Collision):
         began = released + round(failure.violation.judgement.conflict_s * 10)
         if 0 <= began < failure.moment:
             yield began, f"the conflict begins: {failure.violation.signature}"

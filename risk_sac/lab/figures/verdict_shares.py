@@ -72,7 +72,7 @@ def judged_again(folder: Path) -> Iterator[Judged]:
     results = read_results(folder)
     for failure in results.failures:
         hit = failure.episode.collision
-        if hit is None or hit.judgement is None or not hit.valid:
+        if hit is None or not hit.valid:
             continue
         series = read_series(folder / failure.series)
         now = judge(evidence_of(results.spec, failure.episode, series), hit.other_id, valid=True)

@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.host.machine import UNWRITABLE
-from risk_sac.records import EpisodeRecord, Outcome
+from risk_sac.records import EpisodeRecord, Outcome, worst_of
 from risk_sac.run_folder.durable import LOCK, lock, read_sealed, replace_file, seal
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
 from risk_sac.scenario.families import family_named, shipped_alike
@@ -44,8 +44,7 @@ class PlayedScript:
     @classmethod
     def of(cls, record: EpisodeRecord) -> Self:
         """Returns the script of an episode that followed one."""
-        valid = sorted(record.valid_violations, key=lambda each: each.headline_candidate)
-        worst = valid[-1] if valid else None
+        worst = worst_of(record.valid_violations)
         return cls(
             scene=record.scene,
             genes=record.script or (),

@@ -200,10 +200,8 @@ def _worth_of_any(violation: Collision | Violation) -> float:
         return PREVENTABLE_WORTH
     if isinstance(violation, Violation):
         return ALMOST_WORTH * min(-violation.robustness, 1.0) + LEAST_WORTH
-    judged = violation.judgement
-    if judged is None or "r157" not in judged.drivers:
-        return LEAST_WORTH
-    return ALMOST_WORTH * math.exp(-judged.drivers["r157"].impact_speed_mps / IMPACT_MPS) + LEAST_WORTH
+    impact_speed_mps = violation.judgement.drivers["r157"].impact_speed_mps
+    return ALMOST_WORTH * math.exp(-impact_speed_mps / IMPACT_MPS) + LEAST_WORTH
 
 
 class ArchiveOptimizer(SceneOptimizer):

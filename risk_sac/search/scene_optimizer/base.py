@@ -15,7 +15,7 @@ from torch.quasirandom import SobolEngine
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
-from risk_sac.records import Collision, DrivenBy, Violation
+from risk_sac.records import Collision, DrivenBy, Violation, valid_violations, worst_of
 from risk_sac.world.types import Floats
 
 State = dict[str, Any]
@@ -44,13 +44,12 @@ class Encounter:
     @property
     def valid_violations(self) -> tuple[Collision | Violation, ...]:
         """Lists the violations that make the episode a failure."""
-        contact = () if self.collision is None else (self.collision,)
-        return tuple(each for each in (*contact, *self.violations) if each.valid)
+        return valid_violations(self.collision, self.violations)
 
     @property
     def worst(self) -> Collision | Violation | None:
-        """Returns the valid violation that counts most: for the headline, then a preventable one, then the first."""
-        return max(self.valid_violations, key=lambda each: (each.headline_candidate, each.preventable), default=None)
+        """Returns the valid violation that counts most, see `worst_of`."""
+        return worst_of(self.valid_violations)
 
 
 NO_ENCOUNTER = Encounter()

@@ -19,7 +19,7 @@ JUDGED = judgement(
 )
 
 
-def synthetic_contact(judged: Judgement | None = JUDGED) -> RecordedFailure:
+def synthetic_contact(judged: Judgement = JUDGED) -> RecordedFailure:
     """The ego drives east at 10 m/s into a pedestrian that walks north; the contact is 1.95 s after the release."""
     space: SceneSpace = FAMILIES["mixed"].space
     hit = collision(

@@ -141,7 +141,6 @@ def test_these_are_alike(wanted, found):
         (HIT, BY_LEAD),
         (HIT, collision(other_id="left", judgement=judgement())),
         (HIT, collision(other_id="lead", judgement=judgement(conflict_type=ConflictType.LEADER))),
-        (HIT, collision(other_id="lead", judgement=None)),
         (BY_LEAD, HIT),
         (BY_LEAD, violation(requirement="gentle", other_id="lead")),
         (BY_LEAD, BY_LEAD.model_copy(update={"verdicts": {"no_teleport": False}})),

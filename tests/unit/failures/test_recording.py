@@ -43,7 +43,6 @@ def test_the_conflict_begins_as_long_before_the_contact_as_its_judgement_says():
     early = JUDGED.model_copy(update={"conflict_s": -1.0})  # before the release
     assert Recording(synthetic_contact(early), with_release()).conflict_s == pytest.approx(-2.95)
     assert Recording(synthetic_contact(early), synthetic_series()).conflict_s is None  # which began at the release
-    assert Recording(synthetic_contact(None), synthetic_series()).conflict_s is None
 
 
 def test_hidden_span_ends_where_the_other_comes_into_view():

@@ -76,7 +76,7 @@ any_judgement = st.builds(
 )
 any_collision = st.builds(
     contact,
-    judgement=st.none() | any_judgement,
+    judgement=any_judgement,
     time_s=st.floats(0, 15),
     ttc=st.floats(0, math.inf),
     speed=st.floats(0, 60),
@@ -113,8 +113,10 @@ JUDGED = [
             judgement=judgement(Grade.PREVENTABLE, -0.4, signature="pedestrian, straight", unresponsive=True),
         ),
     ),
-    episode(Outcome.FAILURE, 20, hit=contact(time_s=2.0, other_id="adv_3")),  # from before contacts were judged
-    # Its striker left the grip of its tyres: an artefact, which is not judged and whose grade would not count.
+    episode(
+        Outcome.FAILURE, 20, hit=contact(time_s=2.0, judgement=judgement(Grade.UNAVOIDABLE, 1.5, signature="leader"))
+    ),
+    # Its striker left the grip of its tyres: an artefact, whose grade would not count.
     episode(
         Outcome.DEGENERATE, 30, hit=contact(verdicts={"inside_grip": False}, judgement=judgement(unresponsive=True))
     ),

@@ -27,7 +27,7 @@ def test_run_literals():
     assert metrics.efficiency == pytest.approx(1 - (30 + 150 + 150 + 150 + 50) / (5 * 150))
     assert metrics.cost_rate == pytest.approx((0.2 * 30 + 0.1 * 150 + 0.4 * 50) / 300)
     assert metrics.dispersion == pytest.approx(0.5)  # one feature of four differs, by its whole range: 1/√4
-    assert (metrics.distinct_failures, metrics.steps_per_distinct_failure) == (1, 300)  # unjudged, alike
+    assert (metrics.distinct_failures, metrics.steps_per_distinct_failure) == (1, 300)  # alike
     assert (metrics.dual_variable, metrics.temperature) == (0.7, 0.1)
 
 
@@ -41,10 +41,10 @@ def test_funnel_literals():
 
 
 def test_histogram_literals():
-    """2.5 s twice, 3.0 s, and one conflict from before the release; contacts at 3.9 s twice, at 6 and 15 s."""
+    """Conflicts at 2.5 s twice, 3.0 s, 1.5 s and before the release; contacts at 3.9 s twice, at 6, 15 and 2 s."""
     metrics = feed(JUDGED)
-    assert metrics.conflicts_by_second == (1, 0, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-    assert metrics.contacts_by_second == (0, 0, 0, 2, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1)
+    assert metrics.conflicts_by_second == (1, 1, 2, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+    assert metrics.contacts_by_second == (0, 0, 1, 2, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1)
 
 
 def test_windows_forget_all_but_the_newest_100_episodes():
@@ -61,9 +61,8 @@ def test_bad_records_are_refused_and_leave_the_figures_alone():
     before = accumulator.metrics()
     with pytest.raises(NotFinite, match="outcome features"):
         accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(ttc=math.nan)))
-    for times in ({"time_s": math.nan}, {"judgement": judgement(conflict_s=-math.inf)}):
-        with pytest.raises(NotFinite, match="finite times"):
-            accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(**times)))
+    with pytest.raises(NotFinite, match="finite times"):
+        accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(judgement=judgement(conflict_s=-math.inf))))
     with pytest.raises(NotFinite, match="no NaN"):  # of what tells distinct failures apart
         accumulator.add(episode(Outcome.FAILURE, 10, hit=contact().model_copy(update={"ego_speed_mps": math.nan})))
     with pytest.raises(NotFinite, match="mean_cost"):
@@ -103,11 +102,10 @@ def test_incremental_equals_batch(records):
     assert metrics.pcr == preventable_collision_rate(counted(records))
     assert metrics.window_pcr == preventable_collision_rate(counted(records[-WINDOW:]))
     assert metrics.distinct_preventable == len(distinct_failures([hit for hit in hits if hit.preventable]))
-    judged = [hit for hit in hits if hit.judgement is not None]
-    assert metrics.avoidable == sum(hit.judgement.grade in (Grade.PREVENTABLE, Grade.FULL_BRAKING) for hit in judged)
-    assert sum(metrics.conflicts_by_second) == sum(metrics.contacts_by_second) == len(judged)
+    assert metrics.avoidable == sum(hit.judgement.grade in (Grade.PREVENTABLE, Grade.FULL_BRAKING) for hit in hits)
+    assert sum(metrics.conflicts_by_second) == sum(metrics.contacts_by_second) == len(hits)
     assert sum(metrics.signatures.values()) == len(hits)
-    assert metrics.covered == len({kind_of(hit, hit.judgement) for hit in judged})
+    assert metrics.covered == len({kind_of(hit) for hit in hits})
     assert metrics.efficiency == pytest.approx(efficiency_score(counted(records)), abs=1e-12)
     assert metrics.cost_rate == pytest.approx(cost_rate(counted(records)), abs=1e-12)
     assert metrics.distinct_failures == len(distinct_failures(hits))

@@ -6,8 +6,10 @@ from risk_sac.records import Collision, DrivenBy, Fault, Grade, Judgement, Outco
 from risk_sac.report import FinishedRun
 from tests.builders import collision, episode_record, judgement, violation
 
+NOT_GRADED = judgement(None)
 
-def hit(speed: float = 10.0, broken: str = "", judged: Judgement | None = None) -> Collision:
+
+def hit(speed: float = 10.0, broken: str = "", judged: Judgement = NOT_GRADED) -> Collision:
     verdicts = {rule: rule != broken for rule in ("inside_limits", "ego_moving")}
     return collision(relative_speed_mps=speed, verdicts=verdicts, judgement=judged)
 

@@ -103,7 +103,6 @@ def test_the_training_reward_takes_equation_8_to_the_letter_if_told():
     ("grade", "severity", "share"),
     [
         (Grade.PREVENTABLE, Severity.SEVERE, 1.0),
-        (Grade.PREVENTABLE, None, 1.0),
         (Grade.PREVENTABLE, Severity.MINOR, 0.5),
         (Grade.FULL_BRAKING, Severity.MODERATE, 0.5),
         (Grade.UNAVOIDABLE, Severity.MINOR, 0.125),

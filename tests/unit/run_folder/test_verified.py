@@ -1,5 +1,7 @@
 """Which failures are refused because one of them does not repeat."""
 
+import pytest
+
 from risk_sac.config import RunSpec
 from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, Repetition, Severity
 from risk_sac.run_folder.results import RecordedFailure, RunResults, Verified, with_headline
@@ -72,10 +74,31 @@ def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repe
         failure(2),  # like it
         failure(3, judgement=judgement(Grade.FULL_BRAKING, signature="leader")),
         failure(4, judgement=judgement(signature="merge")),  # does not repeat
-        failure(5, judgement=judgement(signature="crossing", severity=None)),  # of an older version
         episode_record(6, Outcome.FAILURE, violations=(violation(grade=Grade.PREVENTABLE),)),
         failure(7, phase="evaluation"),
     )
-    found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e5=2, e6=2, e7=2)).metrics
+    found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e6=2, e7=2)).metrics
     assert (found.headline, found.headline_kinds) == (2, HEADLINE)
     assert results.metrics.headline is None, "before a replay"
+
+
+MINOR_CONTACT = collision(judgement=MINOR)
+UNAVOIDABLE = collision(judgement=judgement(Grade.UNAVOIDABLE))
+REFUSED = collision(verdicts={"inside_limits": False})
+KEPT, PREVENTED = violation(grade=Grade.UNAVOIDABLE), violation(grade=Grade.PREVENTABLE)
+
+
+@pytest.mark.parametrize(
+    ("contact", "violations", "worst"),
+    [
+        (MINOR_CONTACT, (PREVENTED,), PREVENTED),  # the headline counts it
+        (MINOR_CONTACT, (KEPT,), MINOR_CONTACT),
+        (UNAVOIDABLE, (KEPT,), UNAVOIDABLE),
+        (None, (KEPT, PREVENTED), PREVENTED),
+        (REFUSED, (KEPT,), KEPT),
+        (REFUSED, (), REFUSED),
+        (None, (), None),
+    ],
+)
+def test_the_violation_that_counts_most_names_the_episode(contact, violations, worst):
+    assert episode_record(collision=contact, violations=violations).worst_violation is worst

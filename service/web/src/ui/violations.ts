@@ -26,16 +26,19 @@ export function validOf({ outcome, collision, violations }: Recorded): (Collisio
   return [...(collision ? [collision] : []), ...violations].filter(isValid);
 }
 
-/** The violation that names the episode: a valid contact, the first valid violation, a refused contact. */
+/** The violation that names the episode, as `worst_of` in risk_sac/records/violation.py; without a valid one the contact, or the first. */
 export function worstOf(episode: Recorded): Collision | Violation | null {
-  return validOf(episode)[0] ?? episode.collision ?? episode.violations[0] ?? null;
+  const valid = validOf(episode);
+  const preventable = valid.filter((violation) => gradeOf(violation) === "preventable");
+  const candidate = preventable.find((violation) => severityOf(violation) !== "minor");
+  return candidate ?? preventable[0] ?? valid[0] ?? episode.collision ?? episode.violations[0] ?? null;
 }
 
 export function gradeOf(violation: Collision | Violation): Body<"Grade"> | null {
-  return isContact(violation) ? (violation.judgement?.grade ?? null) : violation.grade;
+  return isContact(violation) ? violation.judgement.grade : violation.grade;
 }
 
-/** Null without contact, and of a contact that was stored before it was judged. */
+/** Null without contact. */
 export function severityOf(violation: Collision | Violation): Body<"Severity"> | null {
   return isContact(violation) ? (violation.judgement?.severity ?? null) : null;
 }

@@ -74,7 +74,7 @@ def test_a_record_that_cannot_be_read_is_a_storage_error(store, ledger, episode)
     with pytest.raises(StorageError, match="a row is damaged"):
         store.episodes(campaign.id, limit=1)
     with pytest.raises(StorageError, match="a row is damaged"):
-        list(store.plain_episodes(campaign.number))
+        list(store.records(campaign.number))
 
 
 @pytest.fixture

@@ -7,13 +7,12 @@ import random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic_core import from_json
 from scipy.stats import mannwhitneyu
 
 from risk_sac.config import CampaignSpec
 from risk_sac.metrics import MetricsAccumulator
-from risk_sac.records import Grade, Outcome, Repetition, Severity, State, stored, wire
-from service.store.stored import PlainEpisode
+from risk_sac.records import Grade, Outcome, Repetition, Severity, State, wire
+from service.store.stored import StoredRecord
 from service.views.curves import curves, results, spread
 from service.views.failure_table import failure_table
 from service.views.progress import progress
@@ -50,7 +49,7 @@ SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
 
 
 def plain(run, record):
-    return PlainEpisode(1, run.number, record.phase, record.index, record.outcome, from_json(stored(record)))
+    return StoredRecord(1, run.number, record)
 
 
 def drawn(count):
@@ -105,7 +104,7 @@ FAILURE = Outcome.FAILURE
 
 def plain_failure(run, index, hit, outcome=FAILURE, phase="search", **changes):
     record = episode_record(index, outcome, phase=phase, collision=hit, **changes)
-    return PlainEpisode(1, run.number, phase, index, outcome, from_json(stored(record)))
+    return StoredRecord(1, run.number, record)
 
 
 def told(table):
@@ -149,12 +148,10 @@ GAPS = ((F, 12.0), (F, 14.0), (S, 13.0), (S, 30.0), (S, 40.0), (R, 11.0))
 def found(ledger):
     """Makes the answer about low of episodes with these outcomes and gaps to the leader."""
 
-    def effects(gaps, **others):
+    def effects(gaps):
         campaign = ledger.create(SCENES_SPEC)
         episodes = [
-            PlainEpisode(
-                i, campaign.runs[0].number, "search", i, each, {"scene": LOW_SCENE | {"lead_gap_m": gap} | others}
-            )
+            StoredRecord(i, campaign.runs[0].number, episode_record(i, each, scene=LOW_SCENE | {"lead_gap_m": gap}))
             for i, (each, gap) in enumerate(gaps)
         ]
         families = scene_effects(campaign, episodes).families
