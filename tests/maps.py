@@ -59,17 +59,6 @@ def _node(id_: int, x_m: float, y_m: float, tags: str) -> str:
     return f'<node id="{id_}" lat="{lat:.7f}" lon="{lon:.7f}" version="1">{tags}</node>'
 
 
-def osm_roundabout(clockwise: bool, pieces: int = 1, **tags: str) -> str:
-    """A roundabout that no street leads to, as elements of an extract, drawn in one way or in several."""
-    angles = [math.radians(60.0 * i * (-1 if clockwise else 1)) for i in range(6)]
-    nodes = [_node(901 + i, 80.0 + 20.0 * math.cos(a), 90.0 + 20.0 * math.sin(a), "") for i, a in enumerate(angles)]
-    refs = [*range(901, 907), 901]
-    tags = {"highway": "residential", "junction": "roundabout"} | tags
-    step = 6 // pieces
-    ways = (_way(99 - i, refs[i * step : (i + 1) * step + 1], tags) for i in range(pieces))
-    return "".join(nodes) + "".join(ways)
-
-
 def _way(id_: int, refs: list[int], tags: dict[str, str]) -> str:
     inside = "".join(f'<nd ref="{ref}"/>' for ref in refs)
     for key, value in tags.items():
