@@ -9,12 +9,8 @@ SPACING_M, SIDE = 300.0, 5
 TURNED_RAD = math.radians(23.0)
 
 
-def osm_town(more: str = "") -> str:
-    """An OpenStreetMap extract: crooked streets at 23° to the north, some with two lanes a way, signals, crossings.
-
-    Args:
-      more: elements behind them.
-    """
+def osm_town() -> str:
+    """An OpenStreetMap extract: crooked streets at 23° to the north, some with two lanes a way, signals, crossings."""
     nodes, ways, number = [], [], 1000
     for i in range(SIDE):
         for j in range(SIDE):
@@ -38,7 +34,7 @@ def osm_town(more: str = "") -> str:
             tags = {"highway": "primary" if big else "residential", "name": "A & B <street>"}
             tags |= {"lanes": "4", "maxspeed": "50"} if big else {"maxspeed": "30"}
             ways.append(_way(len(ways) + 1, refs, tags))
-    return f'<?xml version="1.0"?><osm version="0.6">{"".join(nodes)}{"".join(ways)}{more}</osm>'
+    return f'<?xml version="1.0"?><osm version="0.6">{"".join(nodes)}{"".join(ways)}</osm>'
 
 
 _CROSSING = '<tag k="highway" v="crossing"/><tag k="crossing" v="uncontrolled"/>'
