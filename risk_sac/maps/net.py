@@ -51,7 +51,7 @@ class Program:
         return self.phases[-1][1]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class NetLane:
     """A lane of a road, inside a junction, for walking, or a crossing."""
 
@@ -68,7 +68,7 @@ class NetLane:
     next: list[str] = field(default_factory=list)  # lanes that follow
     heads: list[Head] = field(default_factory=list)  # at its end
 
-    @cached_property
+    @property
     def centre(self) -> Floats:
         """Its line, `k x 2`, m."""
         return np.array(self.line)
