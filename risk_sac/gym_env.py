@@ -68,7 +68,7 @@ class NamedEnv(RiskSacEnv):
         canvas = Canvas(np.array((frame.x_m[0], frame.y_m[0])))
         canvas.ground(shipped_surfaces(self.layout.net))
         if self._sim.running:
-            canvas.heads(net, net.by_signal(self.signal_heads()))
+            canvas.heads(net, net.letters_by_signal(self.signal_heads()))
         for actor in reversed(range(len(frame.ids))):
             driven = frame.role[actor] == Role.ADVERSARY
             canvas.body(

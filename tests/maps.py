@@ -9,12 +9,8 @@ SPACING_M, SIDE = 300.0, 5
 TURNED_RAD = math.radians(23.0)
 
 
-def osm_town(more: str = "") -> str:
-    """An OpenStreetMap extract: crooked streets at 23° to the north, some with two lanes a way, signals, crossings.
-
-    Args:
-      more: elements behind them.
-    """
+def osm_town() -> str:
+    """An OpenStreetMap extract: crooked streets at 23° to the north, some with two lanes a way, signals, crossings."""
     nodes, ways, number = [], [], 1000
     for i in range(SIDE):
         for j in range(SIDE):
@@ -38,7 +34,7 @@ def osm_town(more: str = "") -> str:
             tags = {"highway": "primary" if big else "residential", "name": "A & B <street>"}
             tags |= {"lanes": "4", "maxspeed": "50"} if big else {"maxspeed": "30"}
             ways.append(_way(len(ways) + 1, refs, tags))
-    return f'<?xml version="1.0"?><osm version="0.6">{"".join(nodes)}{"".join(ways)}{more}</osm>'
+    return f'<?xml version="1.0"?><osm version="0.6">{"".join(nodes)}{"".join(ways)}</osm>'
 
 
 _CROSSING = '<tag k="highway" v="crossing"/><tag k="crossing" v="uncontrolled"/>'
@@ -57,17 +53,6 @@ def _place(x_m: float, y_m: float) -> tuple[float, float]:
 def _node(id_: int, x_m: float, y_m: float, tags: str) -> str:
     lat, lon = _place(x_m, y_m)
     return f'<node id="{id_}" lat="{lat:.7f}" lon="{lon:.7f}" version="1">{tags}</node>'
-
-
-def osm_roundabout(clockwise: bool, pieces: int = 1, **tags: str) -> str:
-    """A roundabout that no street leads to, as elements of an extract, drawn in one way or in several."""
-    angles = [math.radians(60.0 * i * (-1 if clockwise else 1)) for i in range(6)]
-    nodes = [_node(901 + i, 80.0 + 20.0 * math.cos(a), 90.0 + 20.0 * math.sin(a), "") for i, a in enumerate(angles)]
-    refs = [*range(901, 907), 901]
-    tags = {"highway": "residential", "junction": "roundabout"} | tags
-    step = 6 // pieces
-    ways = (_way(99 - i, refs[i * step : (i + 1) * step + 1], tags) for i in range(pieces))
-    return "".join(nodes) + "".join(ways)
 
 
 def _way(id_: int, refs: list[int], tags: dict[str, str]) -> str:

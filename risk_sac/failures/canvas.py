@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from PIL import Image, ImageDraw
 
-from risk_sac.failures.net import Net, Surface, colour
+from risk_sac.failures.net import Surface, colour
 from risk_sac.failures.recording import BOX, on_body
+from risk_sac.maps.net import Net
 from risk_sac.world.types import Floats
 
 WIDTH, HEIGHT, FINE = 560, 340, 2  # px; drawn larger by `FINE`, and then made smooth

@@ -13,7 +13,7 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
 
 from risk_sac.config import FamilyName
-from risk_sac.failures.net import LAMPS, SurfaceUse, ribbon, roads_of, signal_heads
+from risk_sac.failures.net import LAMPS, Surface, SurfaceUse, roads_of, signal_heads, surfaces
 from risk_sac.failures.recording import BOX, Recording, on_body
 from risk_sac.host.canvas import canvas, picture
 from risk_sac.maps.found import TITLES, Pattern, Survey
@@ -248,11 +248,12 @@ def map_png(net: Net, survey: Survey) -> bytes:
 
 
 def _figure(net: Net, survey: Survey) -> Figure:
-    ground = _ground(net)
+    ground = surfaces(net)
     figure = canvas((WIDTH_IN, _height_in(ground)))
     axis = figure.subplots()
     for use, colour in SURFACE_COLOURS.items():
-        axis.add_collection(PolyCollection(ground[use], facecolors=colour, edgecolors="0.6", linewidths=0.2))
+        outlines = [surface.outline for surface in ground if surface.use == use]
+        axis.add_collection(PolyCollection(outlines, facecolors=colour, edgecolors="0.6", linewidths=0.2))
     x = [misfit.spot.x_m for misfit in survey.misfits]
     y = [misfit.spot.y_m for misfit in survey.misfits]
     axis.scatter(x, y, s=5, color="0.5", marker="x", linewidths=0.5, label=f"does not fit ({len(x)})")
@@ -272,18 +273,7 @@ def _figure(net: Net, survey: Survey) -> Figure:
     return figure
 
 
-def _ground(net: Net) -> Mapping[SurfaceUse, Sequence[Floats]]:
-    """Returns the outlines of all surfaces; a lane that is closed to cars is drawn as a sidewalk."""
-    lanes = [lane for edge in net.edges.values() for lane in edge.lanes]
-    return {
-        "junction": [np.array(each.outline) for each in net.junctions.values() if each.outline],
-        "lane": [ribbon(np.array(lane.line), lane.width_m) for lane in lanes if lane.drivable],
-        "sidewalk": [ribbon(np.array(lane.line), lane.width_m) for lane in lanes if not lane.drivable],
-        "crossing": [ribbon(np.array(each.line), each.width_m) for each in net.crossings],
-    }
-
-
-def _height_in(ground: Mapping[SurfaceUse, Sequence[Floats]]) -> float:
-    points = np.concatenate([outline for outlines in ground.values() for outline in outlines])
+def _height_in(ground: Sequence[Surface]) -> float:
+    points = np.concatenate([surface.outline for surface in ground])
     wide_m, high_m = np.maximum(np.ptp(points, axis=0), 1.0)
     return float(np.clip(WIDTH_IN * high_m / wide_m, *HEIGHT_IN))

@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from risk_sac.errors import MapError
-from risk_sac.maps.documents import FOREIGN_ROOTS, MAP_ROOTS, MAX_BYTES, SMALLER, Document, rewritten
+from risk_sac.maps.documents import MAP_ROOTS, MAX_BYTES, SMALLER, Document, rewritten
 from risk_sac.maps.opendrive import crossing_options, find_crosswalks, ready, sidewalk_options
 from risk_sac.maps.read_net import parse_net, read_tree
-from risk_sac.maps.sides import side_remarks
 
 PRESENT = (1, 16)  # nets since then say all that is read
 WALL_S = 120
@@ -73,8 +72,6 @@ def present_net(file: Path, folder: Path, name: str = "") -> Converted:
     if found.root == "net" and _version(found.attributes) >= PRESENT:
         return Converted(found.file, tuple(left_out), others)
     net = folder / "converted.net.xml"
-    if found.root in FOREIGN_ROOTS:
-        left_out += side_remarks(found.file)
     if found.root == "OpenDRIVE":
         return Converted(net, (*left_out, *_from_opendrive(found, net, name)), others)
     said = _convert(found, net, name)

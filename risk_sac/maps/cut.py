@@ -79,8 +79,8 @@ def _turned_over_m(net: Net, junction: str, kerb: Walk) -> float:
 
 def signal_of(net: Net, ids: Iterable[str | None]) -> FixedSignal | None:
     """The first of the signals that are there."""
-    found = (FixedSignal(id=id_, cycle_s=net.cycles_s[id_]) for id_ in ids if id_ and net.cycles_s.get(id_, 0.0) > 0.0)
-    return next(found, None)
+    cycles_s = ((id_, net.programs[id_].cycle_s) for id_ in ids if id_ in net.programs)
+    return next((FixedSignal(id=id_, cycle_s=cycle_s) for id_, cycle_s in cycles_s if id_ and cycle_s > 0.0), None)
 
 
 def _rounded(polygons: Iterable[Sequence[Point]]) -> tuple[tuple[Point, ...], ...]:

@@ -111,6 +111,7 @@ _LEFT_OUT = ("include", "userData", "dataQuality", "geoReference", "offset", "li
 _NAMES_FILE = re.compile("(?<!pro)file|output|^href$|^dest$", re.IGNORECASE)
 _NO_FILE = ("", "nul", "null", "/dev/null")  # SUMO's names for no output
 _SWITCHES_DEVICE = re.compile(r"^(has|device)\.")  # of a vehicle; some write files
+SIDE_UNKNOWN = "the map does not say on which side people drive: it is read as right-hand traffic"
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,9 +161,13 @@ def _copied(content: bytes, file: Path, name: str) -> Document:
             raise MapError("network", f"{name} is no well-formed XML: {error}") from error
     if not copy.roads and copy.root in MAP_ROOTS:
         raise MapError("network", f"{name} without roads", "a map with one at least")
+    if copy.keeps_left and copy.sides["left"] >= copy.sides["right"]:
+        raise copy.keeps_left
     left_out = ", ".join(f"<{tag[:40]}> ({count})" for tag, count in copy.left_out.most_common(10))
-    remarks = (f"left out, because they are no part of a map: {left_out}",) if left_out else ()
-    return Document(file, copy.root, copy.attributes, copy.elements, remarks)
+    remarks = [f"left out, because they are no part of a map: {left_out}"] if left_out else []
+    if copy.root in FOREIGN_ROOTS and not copy.sides:
+        remarks.append(SIDE_UNKNOWN)
+    return Document(file, copy.root, copy.attributes, copy.elements, tuple(remarks))
 
 
 class _Copy:
@@ -174,6 +179,8 @@ class _Copy:
         self.elements = 0
         self.left_out = Counter[str]()
         self.roads = 0
+        self.sides = Counter[str]()  # of traffic, by what the map states
+        self.keeps_left: MapError | None = None  # names the first place that states it
         self._name = name
         self._path: list[str] = []
         self._skipped = 0  # elements that are open and left out
@@ -189,6 +196,7 @@ class _Copy:
         self.elements += 1
         self._check_sizes(tag, attributes)
         self._count_road(tag, attributes)
+        self._note_side(tag, attributes)
         self._path.append(tag)
         if self._skipped or not self._is_copied(tag, attributes):
             self._skipped += 1
@@ -229,6 +237,22 @@ class _Copy:
         self.roads += is_way or is_edge or (tag == "road" and self.root == "OpenDRIVE" and len(self._path) == 1)
         if self.roads > MAX_ROADS:
             raise self._refusal(f"more than {MAX_ROADS} roads", "at most that", SMALLER)
+
+    def _note_side(self, tag: str, attributes: Mapping[str, str]) -> None:
+        """Counts the sides of traffic that `driving_side` in OpenStreetMap, or a road's `rule` in OpenDRIVE, states.
+
+        Choice: where they contradict each other, the more frequent one decides.
+        """
+        side = None
+        if self.root == "osm" and tag == "tag" and attributes.get("k") == "driving_side":
+            side = attributes.get("v")
+        elif self.root == "OpenDRIVE" and tag == "road" and len(self._path) == 1:
+            side = "left" if attributes.get("rule") == "LHT" else "right"
+        if side in ("left", "right"):
+            self.sides[side] += 1
+        if side == "left" and self.keeps_left is None:
+            said = "driving_side=left" if tag == "tag" else "rule=LHT"
+            self.keeps_left = self._refusal(f"left-hand traffic ({said})", "right-hand traffic")
 
     def _is_copied(self, tag: str, attributes: Mapping[str, str]) -> bool:
         if self.root in FOREIGN_ROOTS:

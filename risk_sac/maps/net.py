@@ -1,30 +1,77 @@
-"""A SUMO net as the finders need it: lanes, how they lead on, and right of way."""
+"""A SUMO net as finders, pictures and exports need it: lanes, how they lead on, right of way and signals."""
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Mapping, Set
+from collections.abc import Callable, Hashable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
-from typing import Concatenate, ParamSpec, TypeVar, cast
+from typing import Concatenate, Literal, ParamSpec, TypeVar, cast
+
+import numpy as np
 
 from risk_sac.scenario.layout import Point
+from risk_sac.world.types import Floats
 
 P = ParamSpec("P")
 T = TypeVar("T")
+LaneUse = Literal["lane", "inside", "sidewalk", "crossing"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Head:
+    """A link's place in the letters of a signal."""
+
+    signal: str
+    index: int
+    turn: str  # SUMO's letter of where the link goes: s, l, r and others
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A signal that shows fixed letters for fixed times."""
+
+    phases: Sequence[tuple[float, str]]  # s, SUMO's letters of all links
+    offset_s: float
+
+    @property
+    def cycle_s(self) -> float:
+        """Length of the cycle."""
+        return sum(duration for duration, _ in self.phases)
+
+    def letters(self, time_s: float) -> str:
+        """Returns the letters just before a time of the cycle.
+
+        So SUMO shows them in its own step.
+        """
+        left = (time_s - 1e-6 - self.offset_s) % self.cycle_s
+        for duration, letters in self.phases:
+            if left < duration:
+                return letters
+            left -= duration
+        return self.phases[-1][1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NetLane:
-    """A lane, also one inside a junction."""
+    """A lane of a road, inside a junction, for walking, or a crossing."""
 
     id: str
     edge: str
-    index: int
+    index: int  # 0 is the rightmost
     length_m: float
     width_m: float
     limit_mps: float
     line: tuple[Point, ...]
     drivable: bool
+    use: LaneUse = "lane"
+    height_m: tuple[float, ...] = ()  # of the ground, at each point of the line
+    next: list[str] = field(default_factory=list)  # lanes that follow
+    heads: list[Head] = field(default_factory=list)  # at its end
+
+    @property
+    def centre(self) -> Floats:
+        """Its line, `k x 2`, m."""
+        return np.array(self.line)
 
     @property
     def way_in_rad(self) -> float:
@@ -104,14 +151,15 @@ class Crossing:
 
 @dataclass(eq=False)
 class Net:
-    """All of it; edges, junctions and crossings by id."""
+    """All of it, by id."""
 
+    lanes: dict[str, NetLane] = field(default_factory=dict)  # also those inside junctions, and crossings
     edges: dict[str, Edge] = field(default_factory=dict)
     junctions: dict[str, Junction] = field(default_factory=dict)
     crossings: list[Crossing] = field(default_factory=list)
     onward: dict[str, list[Link]] = field(default_factory=lambda: defaultdict(list))  # by the lane they come from
     back: dict[str, list[Link]] = field(default_factory=lambda: defaultdict(list))  # by the lane they lead to
-    cycles_s: dict[str, float] = field(default_factory=dict)  # of the signals
+    programs: dict[str, Program] = field(default_factory=dict)  # by signal
     inside: dict[str, list[NetLane]] = field(default_factory=lambda: defaultdict(list))  # drivable, by junction
     # Inside junctions, by a lane's id: the lanes that vehicles wait for before they drive onto it.
     waits_for: dict[str, tuple[NetLane, ...]] = field(default_factory=dict)
@@ -152,6 +200,32 @@ class Net:
         if not 0 <= int(index) < len(lanes):
             raise ValueError(f"a connection names lane {index} of edge {edge!r}, which has {len(lanes)}")
         return lanes[int(index)]
+
+    def neighbours(self, lane: NetLane) -> tuple[NetLane | None, NetLane | None]:
+        """The lanes of the same edge to its right and to its left."""
+        right, left = (self.lanes.get(f"{lane.edge}_{lane.index + step}") for step in (-1, 1))
+        return right, left
+
+    def letters_by_signal(self, letters: bytes) -> Mapping[str, bytes]:
+        """Splits the letters of all signals, which are in the order of the signals' names."""
+        by_signal, begin = {}, 0
+        for name, program in sorted(self.programs.items()):
+            end = begin + len(program.phases[0][1])
+            by_signal[name] = letters[begin:end]
+            begin = end
+        return by_signal
+
+    def heights_m(self, places: Floats) -> Floats:
+        """Returns the heights at places, `n x 2`: those of the nearest lanes' middles, `n`."""
+        lines = [np.column_stack((lane.centre, lane.height_m)) for lane in self.lanes.values()]
+        starts, ends = (np.concatenate([line[cut] for line in lines]) for cut in (np.s_[:-1], np.s_[1:]))
+        sides = ends - starts
+        reach = places[:, None] - starts[:, :2]
+        share = ((reach * sides[:, :2]).sum(axis=2) / (sides[:, :2] ** 2).sum(axis=1)).clip(0.0, 1.0)
+        apart = np.linalg.norm(reach - share[:, :, None] * sides[:, :2], axis=2)
+        rows, nearest = np.arange(len(places)), apart.argmin(axis=1)
+        heights: Floats = starts[nearest, 2] + share[rows, nearest] * sides[nearest, 2]
+        return heights
 
 
 def direction(a: Point, b: Point) -> float:
@@ -204,7 +278,7 @@ def net_remarks(net: Net) -> list[str]:
         found.append("no edge has a lane for passenger cars: no pattern will fit")
     if net.keeps_left:
         found.append("traffic keeps to the left: no pattern will fit")
-    if not net.cycles_s:
+    if not net.programs:
         found.append("there are no traffic lights")
     if not net.onward and _roads_meet(net):
         found.append("there are no connections, although roads meet: no lane leads on to another")

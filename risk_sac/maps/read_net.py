@@ -4,16 +4,16 @@ Source: https://sumo.dlr.de/docs/Networks/SUMO_Road_Networks.html
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 from risk_sac.errors import MapError
-from risk_sac.maps.net import Crossing, Edge, Junction, Link, Net, NetLane
-from risk_sac.scenario.layout import Point
+from risk_sac.maps.net import Crossing, Edge, Head, Junction, LaneUse, Link, Net, NetLane, Program
 
 DRIVER = "passenger"  # the class of every vehicle of ours
 TURNAROUND = "t"
 STOP = "rRyYu"  # red, yellow, and red with yellow: the colours that stop all traffic
+USES: Mapping[str, LaneUse] = {"normal": "lane", "internal": "inside", "crossing": "crossing"}  # by an edge's function
 DEFAULT_WIDTH_M = 3.2
 LEAST_LIMIT_MPS = 0.01  # of a closed lane, so that driving it takes a finite time
 FARTHEST = 1e8  # m; the Earth's circumference is 4e7
@@ -57,85 +57,80 @@ def parse_net(root: ET.Element) -> Net:
 
 def _net(root: ET.Element) -> Net:
     net = Net(keeps_left=root.get("lefthand", "false").lower() in ("true", "1"))
-    inner = dict[str, NetLane]()
     crossings = []
     for edge in root.iter("edge"):
-        function = edge.get("function", "normal")
-        lanes = tuple(_lane(edge.attrib["id"], i, lane.attrib) for i, lane in enumerate(edge.iter("lane")))
+        id_, function = edge.attrib["id"], edge.get("function", "normal")
+        junction = id_.rpartition("_")[0][1:]  # of an edge inside one
+        lanes = tuple(_lane(id_, i, lane.attrib, function) for i, lane in enumerate(edge.iter("lane")))
+        if function in USES:
+            net.lanes |= {lane.id: lane for lane in lanes}
         if function == "internal":
-            inner |= {lane.id: lane for lane in lanes}
-            net.inside[edge.attrib["id"].rpartition("_")[0][1:]] += [lane for lane in lanes if lane.drivable]
+            net.inside[junction] += [lane for lane in lanes if lane.drivable]
         elif function == "crossing" and lanes:
-            crossings.append((edge, lanes[0]))
+            crossings.append((edge, junction, lanes[0]))
         elif function == "walkingarea":
-            net.walkways[edge.attrib["id"].rpartition("_")[0][1:]] += [lane.line for lane in lanes]
+            net.walkways[junction] += [lane.line for lane in lanes]
         elif function == "normal":
-            net.edges[edge.attrib["id"]] = _edge(edge, lanes)
+            net.edges[id_] = _edge(edge, lanes)
     index_of: dict[str, int] = {}
-    for junction in root.iter("junction"):
-        if junction.get("type") == "internal":
-            foes = [inner[lane] for lane in junction.get("intLanes", "").split() if lane in inner]
-            net.waits_for[junction.attrib["id"]] = tuple(lane for lane in foes if lane.drivable)
+    for element in root.iter("junction"):
+        inside = element.get("intLanes", "").split()
+        if element.get("type") == "internal":
+            foes = [net.lanes[lane] for lane in inside if lane in net.lanes]
+            net.waits_for[element.attrib["id"]] = tuple(lane for lane in foes if lane.drivable)
         else:
-            net.junctions[junction.attrib["id"]] = _junction(junction)
-            index_of |= {lane: i for i, lane in enumerate(junction.get("intLanes", "").split())}
-    states: dict[str, list[str]] = {}
+            net.junctions[element.attrib["id"]] = _junction(element)
+            index_of |= {lane: i for i, lane in enumerate(inside)}
     for light in root.iter("tlLogic"):  # of several programmes, SUMO runs the last
-        phases = list(light.iter("phase"))
-        states[light.attrib["id"]] = [phase.attrib["state"] for phase in phases]
-        net.cycles_s[light.attrib["id"]] = sum(_number(phase.attrib["duration"]) for phase in phases)
-    lights = _link(net, root, inner, index_of, states)
-    for edge, lane in crossings:
-        id_ = edge.attrib["id"]
-        at = id_.rpartition("_")[0][1:]
-        net.crossings.append(
-            Crossing(id_, at, tuple(edge.get("crossingEdges", "").split()), lane.line, lane.width_m, lights.get(id_))
-        )
+        phases = [(_number(phase.attrib["duration"]), phase.attrib["state"]) for phase in light.iter("phase")]
+        net.programs[light.attrib["id"]] = Program(phases, _number(light.get("offset", 0.0)))
+    _link(net, root, index_of)
+    for edge, junction, lane in crossings:
+        crossed, signal = tuple(edge.get("crossingEdges", "").split()), next((h.signal for h in lane.heads), None)
+        net.crossings.append(Crossing(lane.edge, junction, crossed, lane.line, lane.width_m, signal))
     return net
 
 
-def _link(
-    net: Net,
-    root: ET.Element,
-    inner: Mapping[str, NetLane],
-    index_of: Mapping[str, int],
-    states: Mapping[str, Sequence[str]],
-) -> dict[str, str]:
-    """Notes the connections of lanes; returns the signal of each crossing.
+def _link(net: Net, root: ET.Element, index_of: Mapping[str, int]) -> None:
+    """Notes the connections of lanes and their signals.
 
-    A connection whose signal never opens is left out.
+    A link is left out where its signal never opens.
     """
-    lights, follows, outer = dict[str, str](), dict[str, str](), []
-    for c in root.iter("connection"):
-        a, source = c.attrib, f"{c.attrib['from']}_{c.attrib['fromLane']}"
-        if source in inner:
-            follows[source] = a.get("via", "")
-        elif a["from"] in net.edges and a["to"] in net.edges:
-            outer.append((a, source))
-        elif "tl" in a:
-            lights[a["to"]] = a["tl"]
-    for a, source in outer:
-        one, other = net.lane(source), net.lane(f"{a['to']}_{a['toLane']}")
-        if a.get("dir") == TURNAROUND or not (one.drivable and other.drivable) or _is_closed(a, states):
+    outer = []
+    for connection in root.iter("connection"):
+        a = connection.attrib
+        target_id = f"{a['to']}_{a['toLane']}"
+        source, target = net.lanes.get(f"{a['from']}_{a['fromLane']}"), net.lanes.get(target_id)
+        after = a.get("via") or target_id
+        if source is not None and after in net.lanes and after not in source.next:
+            source.next.append(after)
+        signalled = target if target is not None and target.use == "crossing" else source
+        if a.get("tl") and signalled is not None:
+            signalled.heads.append(Head(signal=a["tl"], index=int(a["linkIndex"]), turn=a.get("dir", "").lower()))
+        if a["from"] in net.edges and a["to"] in net.edges:
+            outer.append((a, net.lane(f"{a['from']}_{a['fromLane']}"), net.lane(target_id)))
+    for a, one, other in outer:
+        if a.get("dir") == TURNAROUND or not (one.drivable and other.drivable) or _is_closed(a, net.programs):
             continue
-        inside, via = [], a.get("via", "")
-        while via in inner and via not in inside:
-            inside.append(via)
-            via = follows.get(via, "")
-        index = next((index_of[lane] for lane in inside if lane in index_of), None)
-        link = Link(one, other, tuple(inner[lane] for lane in inside), a.get("tl"), index)
+        inside, lane = list[NetLane](), net.lanes.get(a.get("via", ""))
+        while lane is not None and lane.use == "inside" and lane not in inside:
+            inside.append(lane)
+            lane = net.lanes.get(next(iter(lane.next), ""))
+        index = next((index_of[lane.id] for lane in inside if lane.id in index_of), None)
+        link = Link(one, other, tuple(inside), a.get("tl"), index)
         net.onward[one.id].append(link)
         net.back[other.id].append(link)
-    return lights
 
 
-def _is_closed(connection: Mapping[str, str], states: Mapping[str, Sequence[str]]) -> bool:
+def _is_closed(connection: Mapping[str, str], programs: Mapping[str, Program]) -> bool:
     """Tells whether a connection's signal stays red.
 
     Such programmes are made to be switched by hand.
     """
-    phases = states.get(connection.get("tl", ""), ())
-    return bool(phases) and all(state[int(connection["linkIndex"])] in STOP for state in phases)
+    program = programs.get(connection.get("tl", ""))
+    if program is None or not program.phases:
+        return False
+    return all(letters[int(connection["linkIndex"])] in STOP for _, letters in program.phases)
 
 
 def _edge(edge: ET.Element, lanes: tuple[NetLane, ...]) -> Edge:
@@ -146,10 +141,14 @@ def _edge(edge: ET.Element, lanes: tuple[NetLane, ...]) -> Edge:
     return Edge(id_, edge.attrib["from"], edge.attrib["to"], lanes)
 
 
-def _lane(edge: str, index: int, a: Mapping[str, str]) -> NetLane:
-    line = _line(a["shape"])
-    if not line:
+def _lane(edge: str, index: int, a: Mapping[str, str], function: str) -> NetLane:
+    points = _points(a["shape"])
+    if not points:
         raise ValueError(f"lane {a['id']!r} has no shape")
+    if len(points) == 1:
+        ((x, y, z),) = points
+        points = [(x, y, z), (x + 1e-3, y, z)]
+    walks = function != "crossing" and set(a.get("allow", "").split()) == {"pedestrian"}
     return NetLane(
         id=a["id"],
         edge=edge,
@@ -157,8 +156,10 @@ def _lane(edge: str, index: int, a: Mapping[str, str]) -> NetLane:
         length_m=_positive(a["length"]),
         width_m=_positive(a.get("width", DEFAULT_WIDTH_M)),
         limit_mps=max(_number(a["speed"]), LEAST_LIMIT_MPS),
-        line=line if len(line) > 1 else (line[0], (line[0][0] + 1e-3, line[0][1])),
+        line=tuple((x, y) for x, y, _ in points),
         drivable=_admits(a.get("allow"), a.get("disallow")),
+        use="sidewalk" if walks else USES.get(function, "lane"),
+        height_m=tuple(z for _, _, z in points),
     )
 
 
@@ -171,14 +172,15 @@ def _admits(allow: str | None, disallow: str | None) -> bool:
 def _junction(junction: ET.Element) -> Junction:
     a = junction.attrib
     foes = {int(request.attrib["index"]): request.attrib["foes"] for request in junction.iter("request")}
-    return Junction(a["id"], a.get("type", ""), _number(a["x"]), _number(a["y"]), _line(a.get("shape", "")), foes)
+    outline = tuple((x, y) for x, y, _ in _points(a.get("shape", "")))
+    return Junction(a["id"], a.get("type", ""), _number(a["x"]), _number(a["y"]), outline, foes)
 
 
-def _line(shape: str) -> tuple[Point, ...]:
-    points = [[_number(each) for each in point.split(",")] for point in shape.split()]
+def _points(shape: str) -> list[tuple[float, float, float]]:
+    points = [[_number(value) for value in point.split(",")] for point in shape.split()]
     if any(len(point) not in (2, 3) for point in points):
         raise ValueError(f"{shape[:60]!r} is no shape; wanted points x,y or x,y,z")
-    return tuple((x, y) for x, y, *_ in points)
+    return [(x, y, z[0] if z else 0.0) for x, y, *z in points]
 
 
 def _number(text: str | float) -> float:

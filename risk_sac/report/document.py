@@ -152,5 +152,5 @@ def _draw(run: FinishedRun, folder: Path | None, record: EpisodeRecord) -> Drawi
         return Drawing(None, f"{lost} is gone")
     except OSError as error:
         return Drawing(None, f"it cannot be read: {error.strerror}")
-    except (ValueError, LookupError, SyntaxError):  # the last: of the net's XML
+    except (ValueError, LookupError):
         return DAMAGED

@@ -14,7 +14,8 @@ import shapely
 from risk_sac.failures.export.formats import FormatName, export
 from risk_sac.failures.export.opendrive import opendrive
 from risk_sac.failures.export.recorded import Recorded
-from risk_sac.failures.net import Net, read_net
+from risk_sac.maps.net import Net
+from risk_sac.maps.read_net import read_net
 from tests.exports.read_opendrive import dangling, middles
 from tests.exports.test_mcap import read
 
@@ -62,7 +63,7 @@ def test_lanes_lie_where_sumos_do_at_their_height_and_links_lead_somewhere(tmp_p
 
 def test_bodies_stand_on_the_ground_of_a_slope(failure: Callable[[str], Recorded]) -> None:
     flat = failure("low")
-    lanes = {id_: replace(lane, height_m=lane.centre[:, 0] / 50) for id_, lane in flat.net.lanes.items()}
+    lanes = {id_: replace(lane, height_m=tuple(x / 50 for x, _ in lane.line)) for id_, lane in flat.net.lanes.items()}
     net = replace(flat.net, lanes=lanes)
     actors = tuple(replace(actor, z_m=net.heights_m(np.column_stack((actor.x_m, actor.y_m)))) for actor in flat.actors)
     hill = replace(flat, net=net, actors=actors)

@@ -14,7 +14,8 @@ import numpy as np
 
 from risk_sac.failures.export.formats import BESIDE, Files, add, beside, document
 from risk_sac.failures.export.recorded import ExportedActor, Recorded, cycle, goal
-from risk_sac.failures.net import Head, Lane, boundaries, colour
+from risk_sac.failures.net import boundaries, colour
+from risk_sac.maps.net import Head, NetLane
 from risk_sac.world.types import STEP_S, Floats
 
 FREE, AS_RECORDED = "failure.xml", "failure-as-recorded.xml"
@@ -89,10 +90,10 @@ def _add_roads(root: ET.Element, failure: Recorded) -> None:
 
 def _add_lanelet(
     root: ET.Element,
-    lane: Lane,
+    lane: NetLane,
     numbers: Numbers,
     links: Mapping[str, Sequence[str]],
-    sides: Mapping[str, Lane | None],
+    sides: Mapping[str, NetLane | None],
 ) -> None:
     lanelet = add(root, "lanelet", id=numbers[lane.id])
     edges = boundaries(lane.centre, lane.width_m)
@@ -119,7 +120,7 @@ def _add_lanelet(
     _refer_to_lights(lanelet, lane, numbers)
 
 
-def _refer_to_lights(parent: ET.Element, lane: Lane, numbers: Numbers) -> None:
+def _refer_to_lights(parent: ET.Element, lane: NetLane, numbers: Numbers) -> None:
     for head in lane.heads:
         add(parent, "trafficLightRef", ref=numbers[head])
 
@@ -130,7 +131,7 @@ def _add_point(parent: ET.Element, place: Floats) -> None:
         add(point, axis, value)
 
 
-def _add_light(root: ET.Element, failure: Recorded, lane: Lane, head: Head, number: int) -> None:
+def _add_light(root: ET.Element, failure: Recorded, lane: NetLane, head: Head, number: int) -> None:
     light = add(root, "trafficLight", id=number)
     phases = add(light, "cycle")
     shown = [(steps, STATES[colour(letters[head.index])]) for steps, letters in cycle(failure, head.signal)]

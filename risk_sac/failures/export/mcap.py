@@ -15,8 +15,9 @@ from foxglove.channels import FrameTransformsChannel, LogChannel, SceneUpdateCha
 
 from risk_sac.failures.export.formats import BESIDE, Files, beside
 from risk_sac.failures.export.recorded import ExportedActor, Recorded
-from risk_sac.failures.net import Lane, boundaries, colour
+from risk_sac.failures.net import boundaries, colour
 from risk_sac.failures.sentence import story
+from risk_sac.maps.net import NetLane
 from risk_sac.records import Collision
 from risk_sac.world.types import Floats
 
@@ -74,10 +75,10 @@ def _turned(heading_rad: float) -> fox.Quaternion:
     return fox.Quaternion(x=0, y=0, z=math.sin(heading_rad / 2), w=math.cos(heading_rad / 2))
 
 
-def _surface(lane: Lane) -> fox.SceneEntity:
+def _surface(lane: NetLane) -> fox.SceneEntity:
     """A lane as a strip of triangles, with lines along a road's edges."""
     raised_m = {"lane": 0.0, "inside": 0.01, "sidewalk": 0.0, "crossing": 0.02}[lane.use]
-    left, right = (_points(edge, lane.height_m + raised_m) for edge in boundaries(lane.centre, lane.width_m))
+    left, right = (_points(edge, np.array(lane.height_m) + raised_m) for edge in boundaries(lane.centre, lane.width_m))
     strip = [corner for pair in zip(left, right, strict=True) for corner in pair]
     corners = [strip[k + step] for k in range(len(strip) - 2) for step in (0, 1, 2)]
     area = fox.TriangleListPrimitive(points=corners, color=_paint(GROUND[lane.use]))

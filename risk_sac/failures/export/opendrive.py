@@ -10,7 +10,8 @@ from itertools import count, pairwise
 import numpy as np
 
 from risk_sac.failures.export.formats import BESIDE, add, document
-from risk_sac.failures.net import Lane, Net, moved, ribbon
+from risk_sac.failures.net import moved, ribbon
+from risk_sac.maps.net import Net, NetLane
 from risk_sac.world.types import Floats
 
 LEAST_ROUND_M = 0.5  # least length of the bend before and behind a corner, where its sides are long enough
@@ -149,15 +150,15 @@ class ExportedRoad:
     """Lanes side by side; those inside a junction lead from one lane to another."""
 
     name: str
-    lanes: Sequence[Lane]  # from left to right
+    lanes: Sequence[NetLane]  # from left to right
     line: ReferenceLine
     height_m: Floats  # at the corners of the line
     number: int
-    start: Lane | None = None
-    end: Lane | None = None
+    start: NetLane | None = None
+    end: NetLane | None = None
     junction: str = ""  # of a road inside one
 
-    def lane_number(self, lane: Lane) -> int:
+    def lane_number(self, lane: NetLane) -> int:
         """Returns OpenDRIVE's number of a lane."""
         return -1 - self.lanes.index(lane)
 
@@ -165,7 +166,7 @@ class ExportedRoad:
 def opendrive(net: Net, name: str) -> bytes:
     """Returns the roads of a net."""
     numbers = count(1)
-    edges: defaultdict[str, list[Lane]] = defaultdict(list)
+    edges: defaultdict[str, list[NetLane]] = defaultdict(list)
     for lane in net.lanes.values():
         if lane.use in ("lane", "sidewalk") and not lane.edge.startswith(":"):
             edges[lane.edge].append(lane)
@@ -206,13 +207,13 @@ def opendrive(net: Net, name: str) -> bytes:
     return document(root)
 
 
-def _turns(net: Net) -> Iterator[tuple[Lane, Sequence[Lane], Lane | None]]:
+def _turns(net: Net) -> Iterator[tuple[NetLane, Sequence[NetLane], NetLane | None]]:
     """Yields each way across a junction: the lane before it, those inside it, and the lane after it."""
     for start in net.lanes.values():
         if start.use == "inside":
             continue
         for name in start.next:
-            inside, lane = list[Lane](), net.lanes[name]
+            inside, lane = list[NetLane](), net.lanes[name]
             while lane.use == "inside" and lane not in inside:  # SUMO divides a turn where vehicles wait
                 inside.append(lane)
                 lane = next((net.lanes[after] for after in lane.next), lane)
@@ -220,15 +221,15 @@ def _turns(net: Net) -> Iterator[tuple[Lane, Sequence[Lane], Lane | None]]:
                 yield start, inside, None if lane in inside else lane
 
 
-def _road(lanes: Sequence[Lane], number: int) -> ExportedRoad:
+def _road(lanes: Sequence[NetLane], number: int) -> ExportedRoad:
     """Lays a road along the middle of an edge."""
     left, half_m = lanes[0], sum(lane.width_m for lane in lanes) / 2
     points = moved(left.centre, left.width_m / 2 - half_m)
     line = reference_line(points, half_m)
-    return ExportedRoad(left.edge, lanes, line, left.height_m, number)
+    return ExportedRoad(left.edge, lanes, line, np.array(left.height_m), number)
 
 
-def _turn(number: int, start: Lane, inside: Sequence[Lane], end: Lane | None) -> ExportedRoad:
+def _turn(number: int, start: NetLane, inside: Sequence[NetLane], end: NetLane | None) -> ExportedRoad:
     """Lays a road along lanes inside a junction.
 
     It keeps the directions of the roads before and after it.
@@ -251,7 +252,7 @@ def _write(
     road: ExportedRoad,
     junction: int,
     ends: Mapping[str, tuple[str, int]],
-    crossings: Sequence[Lane],
+    crossings: Sequence[NetLane],
     roads: Mapping[str, ExportedRoad] | None = None,
 ) -> None:
     written = add(
@@ -309,7 +310,7 @@ def _add_linear(parent: ET.Element, name: str, stations_m: Floats, values: Float
             add(parent, name, **{along: station}, a=value, b=slope, c=0, d=0)
 
 
-def _write_signal(signals: ET.Element, road: ExportedRoad, lane: Lane, id_: str) -> None:
+def _write_signal(signals: ET.Element, road: ExportedRoad, lane: NetLane, id_: str) -> None:
     place = road.lanes.index(lane)
     left_m = sum(each.width_m for each in road.lanes) / 2 - sum(each.width_m for each in road.lanes[:place])
     signal = add(
@@ -330,9 +331,9 @@ def _write_signal(signals: ET.Element, road: ExportedRoad, lane: Lane, id_: str)
     add(signal, "validity", fromLane=road.lane_number(lane), toLane=road.lane_number(lane))
 
 
-def _crossings(net: Net, roads: Mapping[str, ExportedRoad]) -> Mapping[str, Sequence[Lane]]:
+def _crossings(net: Net, roads: Mapping[str, ExportedRoad]) -> Mapping[str, Sequence[NetLane]]:
     """Returns the pedestrian crossings by the road whose end is nearest."""
-    crossings: defaultdict[str, list[Lane]] = defaultdict(list)
+    crossings: defaultdict[str, list[NetLane]] = defaultdict(list)
     for lane in net.lanes.values():
         if lane.use == "crossing" and roads:
             middle = lane.centre.mean(axis=0)
@@ -340,7 +341,7 @@ def _crossings(net: Net, roads: Mapping[str, ExportedRoad]) -> Mapping[str, Sequ
     return crossings
 
 
-def _write_crossing(objects: ET.Element, road: ExportedRoad, crossing: Lane) -> None:
+def _write_crossing(objects: ET.Element, road: ExportedRoad, crossing: NetLane) -> None:
     """Adds a crossing as an outline beside the end of a road, in the frame of that end."""
     end = road.line.stops[-1]
     cos, sin = end.direction

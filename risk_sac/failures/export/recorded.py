@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.failures.bundle import WORLD, Bundle, Manifest, check_world
-from risk_sac.failures.net import Lane, Net, read_net
 from risk_sac.failures.recording import Series
+from risk_sac.maps.net import Net, NetLane
+from risk_sac.maps.read_net import read_net
 from risk_sac.records import Collision, Violation
 from risk_sac.scenario.layout import Layout
 from risk_sac.world.types import STEP_S, Floats, Kind, Role
@@ -143,7 +144,7 @@ class Recorded:
         """
         letters: dict[str, NDArray[np.uint8]] = {}
         recorded, column = self.signal_heads, 0
-        for id_, program in sorted(self.net.signals.items()):
+        for id_, program in sorted(self.net.programs.items()):
             shown = [program.letters(self.offset_s(id_, frame)) for frame in range(self.frames)]
             rows = np.array([list(text.encode()) for text in shown], dtype=np.uint8)
             if recorded.size:
@@ -190,7 +191,7 @@ def _check(manifest: Manifest, series: Series) -> None:
         raise ConfigError("BUNDLE", f"{manifest.id} does not begin with everybody in place")
 
 
-def goal(failure: Recorded) -> tuple[Lane, Floats]:
+def goal(failure: Recorded) -> tuple[NetLane, Floats]:
     """Returns the goal of a free ego: a lane and a place on it.
 
     The lane is one of its last road; the place is x, y and heading.
@@ -229,7 +230,7 @@ def cycle(failure: Recorded, signal: str) -> list[tuple[int, str]]:
     These are of its program, or of the recording where that differs.
     """
     shown = [bytes(row).decode() for row in failure.heads[signal]]
-    program = failure.net.signals[signal]
+    program = failure.net.programs[signal]
     steps = round(program.cycle_s / STEP_S)
     turning = [program.letters(failure.offset_s(signal, frame)) for frame in range(max(steps, len(shown)))]
     letters = turning[:steps] if turning[: len(shown)] == shown else shown

@@ -11,11 +11,12 @@ from shapely import Polygon, box
 
 import sumo_nets
 from risk_sac.config import FamilyName
-from risk_sac.failures.net import LETTERS, read_net, roads_of, signal_heads
+from risk_sac.failures.net import LETTERS, roads_of, signal_heads
 from risk_sac.failures.recording import Recording, trajectory_digest
 from risk_sac.failures.sentence import sentence, story
 from risk_sac.failures.show import draw_recording
 from risk_sac.failures.thumbnail import EGO, HEIGHT, STRIKER, WIDTH, thumbnail
+from risk_sac.maps.read_net import read_net
 from risk_sac.run_folder.results import RecordedFailure
 from risk_sac.scenario.families import FAMILIES
 from tests.builders import collision, judgement, violation
@@ -99,7 +100,7 @@ def test_heads_show_what_the_program_shows_from_where_the_scene_puts_it(family, 
             continue  # the other end of a crossing
         link = next(each for each in lane.heads if each.turn == "s")
         for time_s in np.arange(0.1, 25.0, 0.1):
-            letters = net.signals[link.signal].letters(offset_s + time_s)
+            letters = net.programs[link.signal].letters(offset_s + time_s)
             assert head.colour(time_s) == LETTERS[letters[link.index].lower()]
         compared += 1
     assert compared == len(ends)

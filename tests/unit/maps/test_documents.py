@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import sumo_nets
 from risk_sac.errors import MapError
 from risk_sac.maps import documents
-from risk_sac.maps.documents import rewritten
+from risk_sac.maps.documents import SIDE_UNKNOWN, rewritten
 from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
 
 PBF = b"\0\0\0\x0d\n\tOSMHeader\x18\x7c" + bytes(90)
@@ -129,3 +129,47 @@ def test_a_map_in_another_packing_is_told_the_command_that_converts_it(
 ) -> None:
     with pytest.raises(MapError, match=says):
         written(content, tmp_path)
+
+
+def osm_sides(*sides: str) -> str:
+    ways = (f'<way><tag k="highway" v="service"/><tag k="driving_side" v="{side}"/></way>' for side in sides)
+    return f"<osm>{''.join(ways)}</osm>"
+
+
+def opendrive_rules(*rules: str) -> str:
+    return f"<OpenDRIVE>{''.join(f'<road {rule}/>' for rule in rules)}</OpenDRIVE>"
+
+
+LHT, RHT = 'rule="LHT"', 'rule="RHT"'
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (osm_sides("left"), "driving_side=left"),
+        (osm_sides("left", "right"), "driving_side=left"),
+        (osm_sides("none").replace("</osm>", '<relation><tag k="driving_side" v="left"/></relation></osm>'), "line 1"),
+        (opendrive_rules(LHT), "rule=LHT"),
+        (opendrive_rules(RHT, LHT), "rule=LHT"),
+    ],
+)
+def test_a_map_that_states_left_hand_traffic_is_refused_with_its_reason(text, reason, tmp_path):
+    with pytest.raises(MapError) as refused:
+        written(text.encode(), tmp_path)
+    assert refused.value.field == "network"
+    assert reason in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "remarks"),
+    [
+        (osm_sides("right", "left", "right"), ()),
+        (osm_sides("none"), (SIDE_UNKNOWN,)),
+        (opendrive_rules("", LHT, RHT), ()),
+        (NET, ()),
+    ],
+)
+def test_any_other_map_is_read_as_right_hand_and_says_if_it_states_no_side(text, remarks, tmp_path):
+    (tmp_path / "upload").write_text(text)
+    (document,) = rewritten(tmp_path / "upload", tmp_path, "the map")
+    assert document.remarks == remarks
