@@ -11,7 +11,7 @@ from risk_sac.execution.executor import executor_named
 from service.api.connections import Server
 from service.app import create_app
 from service.host.logs import set_up_logs
-from service.keys.ring import check_exposure
+from service.keys import check_exposure
 from service.runs.manager import worker_program
 from service.settings import MISUSED, read_settings
 

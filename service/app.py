@@ -3,7 +3,6 @@
 import os
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, closing, contextmanager
-from functools import partial
 
 from anyio import to_thread
 from fastapi import FastAPI
@@ -33,9 +32,7 @@ from service.api.routes import (
 )
 from service.api.stream import Streams
 from service.host.data_folder import hold_data_folder
-from service.keys.file import KeyFile
-from service.keys.made import AuthEnabledFlag
-from service.keys.ring import check_exposure
+from service.keys import check_exposure
 from service.networks.network_store import NetworkStore
 from service.networks.surveys import Surveys
 from service.runs.manager import Manager, worker_program
@@ -57,14 +54,14 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
       settings: the environment's settings.
       executor: where runs execute; by default as the settings say.
     """
-    latencies, made = request_latencies(), AuthEnabledFlag()
+    latencies = request_latencies()
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         to_thread.current_default_thread_limiter().total_tokens = READERS
         with (
             closing(executor or executor_named(settings.executor)(worker_program(settings))) as chosen,
-            opened(settings, chosen, latencies, made) as context,
+            opened(settings, chosen, latencies) as context,
         ):
             app.state.context = context
             yield
@@ -85,15 +82,13 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
         app.include_router(routes.router)
     app.router.routes += docs.page_routes()
     add_problem_handlers(app)
-    add_middleware(app, settings, made, latencies)
+    add_middleware(app, settings, latencies)
     app.openapi = lambda: openapi(app)  # type: ignore[method-assign]  # FastAPI's documented way
     return app
 
 
 @contextmanager
-def opened(
-    settings: ServiceSettings, executor: Executor, latencies: Histogram, made: AuthEnabledFlag
-) -> Iterator[Context]:
+def opened(settings: ServiceSettings, executor: Executor, latencies: Histogram) -> Iterator[Context]:
     """Holds the data folder exclusively, opens its database and runs its queue.
 
     Raises:
@@ -109,9 +104,7 @@ def opened(
     ):
         # Everything that plays or draws an episode, here or in a helper process, finds its place in our library.
         os.environ[VARIABLE] = str(settings.places_dir.absolute())
-        settle_keys = partial(made.settle, store.engine, KeyFile(settings.keys_file))
-        settle_keys()
-        manager = Manager(settings, store, executor, settle_keys)
+        manager = Manager(settings, store, executor)
         regression_queue, helper = Regressions(settings), Helper(settings)
         reports = Reports(settings)
         views, priors = (Views(settings, store, reports, helper, kept) for kept in (VIEWS_KEPT, KEPT))

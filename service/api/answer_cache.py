@@ -13,7 +13,7 @@ from fastapi import Request, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.context import CALLER
-from service.api.representations import has
+from service.api.pages import has
 from service.store.reading import Store
 
 MOST_BYTES = 16 << 20  # of all kept answers

@@ -10,7 +10,7 @@ from prometheus_client import CollectorRegistry
 from service.api.pages import Cursors
 from service.api.problems import ProblemError, Reason
 from service.api.stream import Streams
-from service.keys.file import Scope
+from service.keys import Scope
 from service.networks.network_store import NetworkStore
 from service.networks.surveys import Surveys
 from service.runs.manager import Manager

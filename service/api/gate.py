@@ -17,10 +17,8 @@ from service.api.connections import most_connections
 from service.api.context import CALLER, LOCAL, Caller, check_scope
 from service.api.problems import ProblemError, Reason, problem_response, route_path
 from service.errors import KeysError
-from service.keys.file import REMEDY
-from service.keys.file import Scope as KeyScope
-from service.keys.made import AuthEnabledFlag
-from service.keys.ring import KeyRing, fair_share
+from service.keys import REMEDY, KeyRing, fair_share
+from service.keys import Scope as KeyScope
 from service.settings import ServiceSettings
 
 CREATE = "which `risk-sac keys create` makes"
@@ -37,12 +35,12 @@ RequestHeaders = Mapping[bytes, bytes]
 class Gate:
     """ASGI middleware: host, origin, key, rate, scope and share of the connections, in this order."""
 
-    def __init__(self, app: ASGIApp, settings: ServiceSettings, made: AuthEnabledFlag) -> None:
+    def __init__(self, app: ASGIApp, settings: ServiceSettings) -> None:
         self._app = app
         self._hosts = allowed_hosts([*settings.allowed_hosts, settings.host])
         self._origins = frozenset(origin.lower() for origin in settings.cors_origins)
         self._rate = RateLimit(settings.rate_limit)
-        self._keys = KeyRing(settings.keys_file, made)
+        self._keys = KeyRing(settings.keys_file)
         self._shares = Shares(most_connections(settings))
         self._keyless = is_loopback(settings.host)
 

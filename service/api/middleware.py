@@ -1,4 +1,4 @@
-"""Records every request: duration, log line and request id."""
+"""Middleware: records requests, adds headers, compresses, and answers HEAD."""
 
 import logging
 import random
@@ -10,28 +10,23 @@ from prometheus_client import Histogram
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.middleware.cors import CORSMiddleware
 from starlette.middleware.gzip import GZipMiddleware
-from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from risk_sac.host.machine import is_loopback
 from service.api.answer_cache import FROM_CACHE, AnswerCache
 from service.api.connections import BodyLimit
 from service.api.context import CALLER, Caller
 from service.api.gate import Gate
-from service.api.representations import LEAST_BYTES, takes
-from service.keys.made import AuthEnabledFlag
-from service.settings import ROOT_PATH, ServiceSettings
+from service.settings import ServiceSettings
 
 logger = logging.getLogger("service.access")
 
-REQUEST_ID = b"x-request-id"
-_SANE = re.compile(rb"[\x21-\x7e]{1,100}")
+_SANE = re.compile(r"[\x21-\x7e]{1,100}")
 _UNKNOWN = "unknown"  # one label for all paths that no route answers, or anybody could make thousands
 _METHODS = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 
 
 class Observe:
-    """ASGI middleware, outermost, so that refused requests count as well."""
+    """ASGI middleware, outermost: counts and logs refused requests too, and adds headers that every answer has."""
 
     def __init__(self, app: ASGIApp, latencies: Histogram) -> None:
         self._app = app
@@ -50,7 +45,10 @@ class Observe:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
-                message["headers"] = [*message.get("headers", ()), (REQUEST_ID, request_id)]
+                headers = MutableHeaders(scope=message)
+                headers["x-request-id"] = request_id
+                headers["x-content-type-options"] = "nosniff"
+                headers.setdefault("cache-control", "no-cache" if "etag" in headers else "no-store")
                 self._observe(scope, status, time.perf_counter() - began)
             await send(message)
 
@@ -60,7 +58,7 @@ class Observe:
             if not status:  # an exception on its way to the handler of last resort
                 status = 500
                 self._observe(scope, status, time.perf_counter() - began)
-            _log(scope, status, time.perf_counter() - began, request_id.decode())
+            _log(scope, status, time.perf_counter() - began, request_id)
 
     def _observe(self, scope: Scope, status: int, seconds: float) -> None:
         method = scope["method"] if scope["method"] in _METHODS else _UNKNOWN
@@ -72,9 +70,9 @@ def _route(scope: Scope) -> str:
     return getattr(scope.get("route"), "path", _UNKNOWN)
 
 
-def _request_id(scope: Scope) -> bytes:
-    given = next((value for name, value in scope["headers"] if name == REQUEST_ID), b"")
-    return given if _SANE.fullmatch(given) else b"%016x" % random.getrandbits(64)
+def _request_id(scope: Scope) -> str:
+    given = Headers(scope=scope).get("x-request-id", "")
+    return given if _SANE.fullmatch(given) else f"{random.getrandbits(64):016x}"
 
 
 def _log(scope: Scope, status: int, seconds: float, request_id: str) -> None:
@@ -93,102 +91,26 @@ def _log(scope: Scope, status: int, seconds: float, request_id: str) -> None:
     logger.log(level, "%s %s %d %.2f ms", scope["method"], fields["route"], status, ms, extra=fields)
 
 
+LEAST_BYTES = 2000  # of what is compressed
 GZIP_LEVEL = 4  # of 9; higher levels take several times as long and save a few per cent
 
 
-def add_middleware(app: FastAPI, settings: ServiceSettings, made: AuthEnabledFlag, latencies: Histogram) -> None:
+def add_middleware(app: FastAPI, settings: ServiceSettings, latencies: Histogram) -> None:
     """Puts the middleware in place; the last one sees a request first."""
     app.add_middleware(AnswerCache)
-    app.add_middleware(Compression, minimum_size=LEAST_BYTES, compresslevel=GZIP_LEVEL)
+    app.add_middleware(GZipMiddleware, minimum_size=LEAST_BYTES, compresslevel=GZIP_LEVEL)
     app.add_middleware(BodyLimit, settings=settings)
-    app.add_middleware(Gate, settings=settings, made=made)
+    app.add_middleware(Gate, settings=settings)
     if settings.cors_origins:  # keys travel in a header, never in cookies, so credentials are not allowed
         app.add_middleware(
-            Cors,
+            CORSMiddleware,
             allow_origins=settings.cors_origins,
             allow_methods=("GET", "POST", "PUT", "DELETE"),
             allow_headers=("Authorization", "Content-Type", "Idempotency-Key", "If-None-Match", "Last-Event-ID"),
             expose_headers=("ETag", "Location", "Retry-After"),
         )
-    app.add_middleware(SecurityHeaders)
     app.add_middleware(HeadRequests)
     app.add_middleware(Observe, latencies=latencies)
-    app.add_middleware(ForwardedPrefix)
-
-
-class Compression(GZipMiddleware):
-    """Starlette's gzip middleware that also honours `gzip;q=0` and sets Vary.
-
-    It skips pictures, files and event streams. ETags are made weak, so they hold for both forms.
-    """
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forwards the request and compresses the answer."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-
-        async def send_with_vary(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                headers = MutableHeaders(raw=message["headers"])
-                if "etag" in headers and "Accept-Encoding" not in headers.get("vary", ""):  # a 304, too
-                    headers.add_vary_header("Accept-Encoding")
-                if headers.get("content-encoding") == "gzip" and headers.get("etag", "W/")[:2] != "W/":
-                    headers["etag"] = f"W/{headers['etag']}"  # a file's own tag is that of its bytes
-            await send(message)
-
-        packs = takes(", ".join(Headers(scope=scope).getlist("accept-encoding")), "gzip")
-        others = [each for each in scope["headers"] if each[0] != b"accept-encoding"]
-        scope["headers"] = [*others, (b"accept-encoding", b"gzip")] if packs else others
-        await super().__call__(scope, receive, send_with_vary)
-
-
-class Cors(CORSMiddleware):
-    """Starlette's CORS middleware, with preflight answers without a body."""
-
-    def preflight_response(self, request_headers: Headers) -> Response:
-        """Answers a browser's preflight request."""
-        answer = super().preflight_response(request_headers)
-        status = 204 if answer.status_code == 200 else 403
-        named = {name: value for name, value in answer.headers.items() if not name.startswith("content-")}
-        return Response(status_code=status, headers=named)
-
-
-class SecurityHeaders:
-    """ASGI middleware: forbids type sniffing, and caching by default."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forwards the request and adds headers to the answer."""
-
-        async def send_with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                headers["x-content-type-options"] = "nosniff"
-                headers.setdefault("cache-control", "no-store")
-            await send(message)
-
-        await self._app(scope, receive, send_with_headers)
-
-
-class ForwardedPrefix:
-    """ASGI middleware: links begin with the prefix that a local proxy stripped.
-
-    The header is trusted, because only the links of its own answer depend on it.
-    """
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forwards the request with the prefix as root path, unless the settings have one."""
-        if scope["type"] == "http" and not scope.get("root_path") and is_loopback((scope.get("client") or [""])[0]):
-            prefix = Headers(scope=scope).get("x-forwarded-prefix", "").rstrip("/")
-            if prefix and ROOT_PATH.fullmatch(prefix):
-                scope.update(root_path=prefix, path=prefix + scope["path"])
-        await self._app(scope, receive, send)
 
 
 class HeadRequests:

@@ -1,4 +1,4 @@
-"""Query parameters that lists share: limit, cursor and filters.
+"""Parameters, headers and declared responses that routes share.
 
 A cursor holds a row's number, which would reveal the number of rows of all projects. So it is encrypted with
 deterministic authentication: the same page has the same body.
@@ -6,14 +6,16 @@ deterministic authentication: the same page has the same body.
 
 import base64
 import binascii
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from cryptography.exceptions import InvalidTag
 from cryptography.hazmat.primitives.ciphers.aead import AESSIV
-from fastapi import Query
+from fastapi import Query, Request, Response
+from pydantic import BaseModel
 
-from risk_sac.records import Outcome
-from service.api.problems import RETRIED, ProblemDetails, invalid_field
+from risk_sac.records import Outcome, wire
+from service.api.problems import RETRIED, NotModified, ProblemDetails, invalid_field
 
 Limit = Annotated[int, Query(ge=1, le=500, description="Most items on a page.")]
 Cursor = Annotated[
@@ -54,6 +56,44 @@ def _bound(listed: str, project: str | None) -> list[bytes]:
     return [repr((listed, project)).encode()]
 
 
+def entity_tag(*parts: str) -> str:
+    """Returns a weak tag, since it identifies the content and not the bytes."""
+    return f'W/"{"-".join(parts)}"'
+
+
+def has(request: Request, tag: str) -> bool:
+    """Whether the client says that it has the representation with this tag."""
+    given = [value.strip().removeprefix("W/") for value in request.headers.get("if-none-match", "").split(",")]
+    return "*" in given or tag.removeprefix("W/") in given
+
+
+def cacheable(request: Request, *parts: str, others: Mapping[str, str] = {}) -> dict[str, str]:
+    """Returns headers of an answer that clients may store but must revalidate.
+
+    Args:
+      request: of the answer.
+      parts: of the tag; they change whenever the representation does.
+      others: headers beside those.
+
+    Raises:
+      NotModified: the client's copy is current.
+    """
+    headers = {"Cache-Control": "no-cache", "ETag": entity_tag(*parts), **others}
+    if has(request, headers["ETag"]):
+        raise NotModified(headers)
+    return headers
+
+
+def link(request: Request, path: str) -> str:
+    """Returns the path of a route with the proxy's prefix."""
+    return str(request.scope.get("root_path", "")) + path
+
+
+def as_json(record: BaseModel) -> Response:
+    """Returns a record as JSON; FastAPI would write numbers that are not finite as strings."""
+    return Response(wire(record), media_type="application/json")
+
+
 Responses = dict[int | str, dict[str, Any]]
 
 
@@ -74,7 +114,6 @@ def problem(status: int, description: str) -> Responses:
 
 MALFORMED = problem(400, "The body is no JSON")
 UNKNOWN = problem(404, "Nothing has this id")
-UNACCEPTABLE = problem(406, "The Accept header names none of the media types there are")
 REUSED = problem(409, "The idempotency key has queued another campaign")
 NOT_ENDED = problem(409, "The campaign has not ended")
 NOT_JSON = problem(415, "The body is declared as something else than application/json, or carries a Content-Encoding")

@@ -19,7 +19,6 @@ from starlette.types import Scope
 from risk_sac.config.base import LONGEST_VALUE, causes, field_error, shown
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import FieldProblem, Record
-from service.api.representations import NotModified
 from service.errors import (
     BusyError,
     ConflictError,
@@ -46,7 +45,6 @@ class Reason(StrEnum):
     UNKNOWN_ROUTE = "unknown_route"
     UNKNOWN_ID = "unknown_id"
     METHOD_NOT_ALLOWED = "method_not_allowed"
-    NOT_ACCEPTABLE = "not_acceptable"
     IDEMPOTENCY_KEY_REUSED = "idempotency_key_reused"
     NOT_ENDED = "not_ended"
     TOO_LARGE = "too_large"
@@ -86,7 +84,6 @@ CLIENT_LEFT = 499  # during its request; no client gets this answer, but log and
 _REASONS = {
     HTTPStatus.NOT_FOUND: Reason.UNKNOWN_ROUTE,
     HTTPStatus.METHOD_NOT_ALLOWED: Reason.METHOD_NOT_ALLOWED,
-    HTTPStatus.NOT_ACCEPTABLE: Reason.NOT_ACCEPTABLE,
     HTTPStatus.UNSUPPORTED_MEDIA_TYPE: Reason.UNSUPPORTED_MEDIA_TYPE,
 }
 
@@ -115,6 +112,14 @@ class ProblemError(Exception):
         self.reason = reason
         self.errors = errors
         self.headers = {**headers, "Retry-After": str(math.ceil(retry_s))} if status in RETRIED else dict(headers)
+
+
+class NotModified(Exception):
+    """The client has the representation; the answer is a 304 with `headers`."""
+
+    def __init__(self, headers: Mapping[str, str]) -> None:
+        super().__init__(headers)
+        self.headers = headers
 
 
 def invalid_field(field: str, got: object, wanted: str) -> ProblemError:
@@ -236,7 +241,7 @@ def _http_error(request: Request, error: HTTPException) -> ProblemError:
         detail = f"nothing is at {request.url.path}; /docs lists all routes"
     headers = dict(error.headers or {})
     if status is HTTPStatus.METHOD_NOT_ALLOWED:
-        headers["Allow"] = allowed = ", ".join(sorted(_methods(request, headers["Allow"])))
+        headers["Allow"] = allowed = ", ".join(sorted(_methods(request, headers.get("Allow", "GET"))))
         detail = f"{request.url.path} does not answer {request.method}; it answers {allowed}"
     return ProblemError(status, _REASONS[status], detail, headers=headers)
 

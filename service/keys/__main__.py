@@ -13,9 +13,8 @@ from rich.table import Table
 
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.host.terminal import Output, complain, errors, run_command
-from service.keys.file import PROJECT, Key, KeyFile, Scope, missing
-from service.keys.made import ever_made, noting
-from service.settings import MISUSED, ServiceSettings, read_settings
+from service.keys import PROJECT, KeyFile, Scope
+from service.settings import MISUSED, read_settings
 
 console = Output(highlight=False, soft_wrap=True)
 
@@ -27,13 +26,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         settings = read_settings()
         if options.data_dir is not None:
             settings = settings.model_copy(update={"data_dir": options.data_dir})
-        options.command(settings, options)
-    except ConfigError as error:
-        complain(str(error))
-        return MISUSED
+        options.command(KeyFile(settings.keys_file), options)
     except RiskSacError as error:
         complain(str(error))
-        return 1
+        return MISUSED if isinstance(error, ConfigError) else 1
     return 0
 
 
@@ -60,56 +56,32 @@ def _parser() -> argparse.ArgumentParser:
         metavar="read|run|admin",
         help="read; also post, cancel and delete; also all of that in every project, and the metrics (default: run)",
     )
-    create.add_argument(
-        "--replace-file", action="store_true", help="replace a lost or damaged file of keys; its keys become invalid"
-    )
     list_ = commands.add_parser("list", help="list all keys, without their secrets", parents=[folder])
     list_.set_defaults(command=_list)
     revoke = commands.add_parser("revoke", help="make a key invalid", parents=[folder])
     revoke.set_defaults(command=_revoke)
     revoke.add_argument("id", help="as `list` shows it")
-    open_ = commands.add_parser(
-        "open", help="delete all keys; on a loopback address, every process then has all rights", parents=[folder]
-    )
-    open_.set_defaults(command=_open)
-    open_.add_argument("--yes", action="store_true", required=True, help="confirm it")
     return parser
 
 
-def _create(settings: ServiceSettings, options: argparse.Namespace) -> None:
-    file = KeyFile(settings.keys_file) if options.replace_file else _file(settings)
-    make = file.replace if options.replace_file else file.create
-    with noting(settings):
-        key, token = make(options.project, options.name, options.scope)
+def _create(file: KeyFile, options: argparse.Namespace) -> None:
+    key, token = file.create(options.project, options.name, options.scope)
     console.print(token, markup=False)  # alone on standard output, for scripts
     errors.print(f"Key {key.id} may {key.scope} in project {key.project}. It is not stored: keep it now.", markup=False)
 
 
-def _list(settings: ServiceSettings, options: argparse.Namespace) -> None:
+def _list(file: KeyFile, options: argparse.Namespace) -> None:
     table = Table(box=SIMPLE_HEAD)
     for name in ("id", "project", "scope", "created", "revoked", "name"):
         table.add_column(name, no_wrap=True)
-    for key in _file(settings).read():
+    for key in file.read() or ():
         table.add_row(key.id, key.project, key.scope, _date(key.created_at), _date(key.revoked_at), escape(key.name))
     console.print(table)
 
 
-def _revoke(settings: ServiceSettings, options: argparse.Namespace) -> None:
-    key: Key = _file(settings).revoke(options.id)
+def _revoke(file: KeyFile, options: argparse.Namespace) -> None:
+    key = file.revoke(options.id)
     console.print(f"Key {key.id} of project {key.project} is revoked.", markup=False)
-
-
-def _open(settings: ServiceSettings, options: argparse.Namespace) -> None:
-    KeyFile(settings.keys_file).open_all()
-    console.print("All keys are deleted. On a loopback address no key is needed until the next one is created.")
-
-
-def _file(settings: ServiceSettings) -> KeyFile:
-    """Returns the key file; raises KeysError if it is missing although keys were made."""
-    file = KeyFile(settings.keys_file)
-    if not file.path.exists() and ever_made(settings):
-        raise missing(file.path)
-    return file
 
 
 def _project(text: str) -> str:
@@ -119,8 +91,8 @@ def _project(text: str) -> str:
 
 
 def _name(text: str) -> str:
-    if len(text) > 100 or not text.isprintable():
-        raise argparse.ArgumentTypeError(f"got {len(text)} characters; wanted at most 100, all printable")
+    if len(text) > 100:
+        raise argparse.ArgumentTypeError(f"got {len(text)} characters; wanted at most 100")
     return text
 
 

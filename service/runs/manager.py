@@ -5,7 +5,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
@@ -44,15 +44,11 @@ class Manager:
     Requests call `submit`, `cancel`, `triage` and `delete` from their own threads; the lock makes every step whole.
     """
 
-    def __init__(
-        self, settings: ServiceSettings, store: Store, executor: Executor, tick: Callable[[], None] = lambda: None
-    ) -> None:
-        """Does nothing yet; `tick` is called about once a second."""
+    def __init__(self, settings: ServiceSettings, store: Store, executor: Executor) -> None:
         self._settings = settings
         self._store = store
         self._ledger = Ledger(store)
         self._executor = executor
-        self._tick = tick
         self._scheduler = Scheduler(executor, self, settings.attempts)
         self._lock = threading.RLock()
         self._storage = StoragePause(store, self._ledger, settings.data_dir)
@@ -206,7 +202,6 @@ class Manager:
 
     def _tend(self) -> None:
         with self._pausing():
-            self._tick()
             self._scheduler.fill(self.workers)
             self._retention.retire(self._dispose)
             self._retention.remove_unused_places()

@@ -25,7 +25,7 @@ from risk_sac.failures.cases import Regression as Cases
 from risk_sac.records import State
 from risk_sac.run_folder.durable import replace_file
 from service.errors import ConflictError, NotFoundError, QuotaError, StorageError
-from service.keys.ring import fair_share
+from service.keys import fair_share
 from service.settings import ServiceSettings
 from service.store.stored import StoredCampaign
 

@@ -1,7 +1,6 @@
-"""Connection and migration of the database, and the server state in it."""
+"""Connections to the database, its tables and the secret of its cursors."""
 
 import secrets
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +9,6 @@ from sqlite3 import Connection as SqliteConnection
 from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
 from alembic.util import CommandError
 from sqlalchemy import Connection, Engine, create_engine, event, insert, inspect, make_url, text
 from sqlalchemy.exc import ArgumentError, DatabaseError, IntegrityError, NoSuchModuleError, ProgrammingError
@@ -38,7 +36,7 @@ def open_database(url: str) -> Engine:
     try:
         with storage_errors("opening the database"):
             _check(engine)
-            step_forward(engine)
+            _step_forward(engine)
     except BaseException:
         engine.dispose()
         raise
@@ -138,22 +136,15 @@ def _check(engine: Engine) -> None:
         raise StorageError(f"database {engine.url.database!r} is damaged ({orphan[0]!r} lacks its {orphan[2]!r} row)")
 
 
-def present_step(engine: Engine) -> str | None:
+def _present_step(engine: Engine) -> str | None:
     """Returns the migration step of the database; None for a new one."""
     with engine.connect() as connection:
         return MigrationContext.configure(connection).get_current_revision()
 
 
-def newest_step() -> str:
-    """The step that this version of the service works with."""
-    newest = ScriptDirectory.from_config(_config()).get_current_head()
-    assert newest is not None
-    return newest
-
-
-def step_forward(engine: Engine) -> None:
+def _step_forward(engine: Engine) -> None:
     """Creates the tables of a new database, or applies all missing steps in one transaction."""
-    if present_step(engine) is None and not inspect(engine).has_table(ServerRow.__tablename__):
+    if _present_step(engine) is None and not inspect(engine).has_table(ServerRow.__tablename__):
         _take(engine, _create)
     else:
         _take(engine, lambda config: command.upgrade(config, "head"))
@@ -190,25 +181,3 @@ def cursor_secret(engine: Engine) -> bytes:
     """Returns the key that encrypts cursors."""
     with storage_errors("reading"), Session(engine) as session:
         return bytes.fromhex(session.get_one(ServerRow, ONLY).cursor_secret)
-
-
-def keys_were_made(engine: Engine) -> bool:
-    """Whether an API key was ever made; this never becomes false again."""
-    with storage_errors("reading"), Session(engine) as session:
-        return session.get_one(ServerRow, ONLY).keys_made_at is not None
-
-
-@contextmanager
-def noting_keys(engine: Engine) -> Iterator[None]:
-    """Notes that keys were made, if what is done meanwhile succeeds."""
-    doing = "noting that there are API keys"
-    with (
-        storage_errors(doing),
-        Session(engine.execution_options(**WRITING)) as session,
-        session.begin(),
-    ):
-        row = session.get_one(ServerRow, ONLY, with_for_update=True)
-        if row.keys_made_at is None:
-            row.keys_made_at = time.time()
-            session.flush()  # so that a database that refuses does so first
-        yield

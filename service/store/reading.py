@@ -1,9 +1,11 @@
 """Reads the database; only the manager writes, in `service.store.writing`."""
 
+import threading
 import time
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from typing import NamedTuple
 
 from pydantic_core import from_json
 from sqlalchemy import func, or_, select
@@ -14,12 +16,55 @@ from service.errors import StorageError
 from service.store.counting import HOUR_S, event_page
 from service.store.database import connect, open_database, storage_errors
 from service.store.finding import Judged, episode_page, find_campaign, find_failure, find_run, find_triage
-from service.store.revisions import Revisions
 from service.store.stored import StoredCampaign, StoredFailure, StoredPage, StoredRecord, Usage, read_episode
 from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
 
 DAY_HOURS = 24
 BATCH = 1000  # rows in memory at once
+
+
+class Known(NamedTuple):
+    """A campaign that was read or written."""
+
+    project: str
+    revision: int
+
+
+class Revisions:
+    """Campaigns' revisions in memory, noted on each write and first read, so that a poll needs no database.
+
+    Attributes:
+      all: how often any campaign was written since the start.
+    """
+
+    def __init__(self) -> None:
+        self.all = 0
+        self._known: dict[str, Known] = {}
+        self._lock = threading.Lock()
+
+    def get(self, campaign_id: str) -> Known | None:
+        """The revision of one campaign; None before its first read or write."""
+        return self._known.get(campaign_id)
+
+    def learn(self, campaign_id: str, project: str, revision: int) -> int:
+        """Stores and returns a revision, or the newer one that is known."""
+        with self._lock:
+            known = self._known.get(campaign_id)
+            if known is None or known.revision < revision:
+                known = self._known[campaign_id] = Known(project, revision)
+            return known.revision
+
+    def note(self, campaign_id: str, project: str, revision: int) -> None:
+        """Notes the revision that was written."""
+        with self._lock:
+            self._known[campaign_id] = Known(project, revision)
+            self.all += 1
+
+    def forget(self, campaign_id: str) -> None:
+        """Drops a campaign that was deleted."""
+        with self._lock:
+            self._known.pop(campaign_id, None)
+            self.all += 1
 
 
 class Store:

@@ -214,4 +214,3 @@ class ServerRow(Base):
 
     number: Mapped[int] = mapped_column(primary_key=True)
     cursor_secret: Mapped[str]  # 32 bytes, hexadecimal
-    keys_made_at: Mapped[float | None]  # when the first API key was made, or seen; seconds since the epoch

@@ -13,7 +13,7 @@ from async_lru import alru_cache
 
 from risk_sac.execution.helper import HelperResult, run_helper
 from service.errors import BusyError, QuotaError, StorageError
-from service.keys.ring import fair_share
+from service.keys import fair_share
 from service.settings import ServiceSettings
 
 MOST_WAITING = 16

@@ -19,7 +19,7 @@ from risk_sac.failures import show
 from risk_sac.failures.question import Question, TwinPlay, twin_bytes
 from risk_sac.records import wire
 from risk_sac.run_folder.results import FAILURES, series_name
-from service.keys.file import KeyFile, Scope
+from service.keys import KeyFile, Scope
 from service.settings import ServiceSettings
 from service.store.database import READERS
 from service.views import on_demand

@@ -9,7 +9,7 @@ import httpx
 import pytest
 
 from risk_sac.execution.helper import HelperResult
-from service.keys.file import KeyFile, Scope
+from service.keys import KeyFile, Scope
 from service.runs import regressions
 from service.settings import ServiceSettings
 from tests.contract.recorded_campaigns import ENDED_ID, Recorded, known_times_and_ids

@@ -18,7 +18,7 @@ import pytest
 import sumo_nets
 from risk_sac import cli
 from risk_sac.client import Client
-from service.keys.file import KeyFile, Scope
+from service.keys import KeyFile, Scope
 from tests.server import LONG_S, Service
 
 SUBMIT = ["submit", "--families", "low", "--methods", "random", "--seeds", "2", "--episodes", "6"]

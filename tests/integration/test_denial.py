@@ -15,7 +15,7 @@ import pytest
 
 from service.api import connections
 from service.api.routes import docs
-from service.keys.file import KeyFile, Scope
+from service.keys import KeyFile, Scope
 from service.settings import ServiceSettings
 from tests.contract.serving import serving
 from tests.server import LONG_S, ROOT

@@ -13,7 +13,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from service.keys.file import KeyFile, Scope
+from service.keys import KeyFile, Scope
 from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
 from tests.server import Service
 

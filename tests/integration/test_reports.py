@@ -58,10 +58,10 @@ def comparison(service, campaign):
 
 @pytest.mark.parametrize(("name", "made"), [("json", table_json), ("md", table_markdown), ("csv", table_csv)])
 def test_table_is_what_the_report_makes_of_the_same_folders(get, comparison, name, made):
-    by_query, by_header = get("/table", params={"format": name}), get("/table", headers={"accept": TYPES[name]})
-    assert by_query.status_code == by_header.status_code == 200
-    assert by_query.headers["content-type"] == by_header.headers["content-type"] == TYPES[name]
-    assert by_query.text == by_header.text == made(comparison)
+    answer = get("/table", params={"format": name})
+    assert answer.status_code == 200
+    assert answer.headers["content-type"] == TYPES[name]
+    assert answer.text == made(comparison)
 
 
 def test_commands_on_the_page_repeat_a_run_and_the_campaign(get, service, campaign, tmp_path, monkeypatch):
@@ -108,20 +108,10 @@ def listed_at(file):
     return "/".join(file["href"].split("/")[:4])
 
 
-@pytest.mark.parametrize(
-    ("part", "accept", "status", "said"),
-    [
-        ("/figures/ecr_dense.png", "*/*", 404, "has no figure 'ecr_dense'"),
-        ("/table", "image/png", 406, "wanted one of application/json, text/markdown, text/csv"),
-        ("/spec", "text/csv", 406, "wanted one of application/json, application/yaml"),
-    ],
-)
-def test_what_there_is_not_is_a_problem_that_says_what_there_is(get, part, accept, status, said):
-    response = get(part, headers={"accept": accept})
-    assert response.status_code == status
+def test_a_figure_that_there_is_not_is_a_problem(get):
+    response = get("/figures/ecr_dense.png")
+    assert response.status_code == 404
     assert response.headers["content-type"] == "application/problem+json"
-    assert said in response.json()["detail"]
-    assert (response.json()["reason"] == "not_acceptable") == (status == 406)
 
 
 def test_table_grows_with_the_runs_and_names_those_that_are_missing(service):

@@ -3,14 +3,15 @@
 import csv
 import json
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Locator, Page, Route, expect
+from playwright.sync_api import Locator, Page, expect
 
-from tests.server import Service
+from tests.server import Service, servers
 from tests.web.conftest import CAMPAIGN, PHONE, count
 
 
@@ -108,28 +109,26 @@ def test_a_report_and_its_figures_can_be_taken_away(
 
 
 def test_the_page_works_below_the_path_that_a_proxy_has_the_service_at(
-    new_page: Callable[..., Page], service: Service, methods: str
+    new_page: Callable[..., Page], played: tuple[Path, str], tmp_path: Path
 ) -> None:
-    page, base = new_page(), str(service.client.base_url)
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
-
-    def forward(route: Route) -> None:
-        url, headers = (
-            route.request.url.replace("/sim/", "/", 1),
-            route.request.headers | {"x-forwarded-prefix": "/sim"},
+    shutil.copytree(played[0] / "data", tmp_path / "data")
+    with servers(tmp_path) as start:
+        page, base = new_page(), str(start("risk_sac.execution.worker", root_path="/sim").client.base_url)
+        asked: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+        page.route(
+            f"{base}/sim/**",
+            lambda route: route.fulfill(response=route.fetch(url=route.request.url.replace("/sim/", "/", 1))),
         )
-        route.fulfill(response=route.fetch(url=url, headers=headers))
-
-    page.route(f"{base}/sim/**", forward)
-    page.goto(f"{base}/sim/page/#/campaigns/{methods}/compare")
-    page.get_by_text("All figures").click()
-    image = page.locator("details figure img").first
-    expect(image).to_be_visible()
-    assert image.evaluate("image => image.decode().then(() => image.naturalWidth)") > 100
-    assert [url for url in asked if not url.startswith((f"{base}/sim/", "blob:"))] == []
-    page.goto(f"{base}/sim/docs")
-    expect(page.locator(".servers select")).to_have_value("/sim")
+        page.goto(f"{base}/sim/page/#/campaigns/{played[1]}/compare")
+        page.get_by_text("All figures").click()
+        image = page.locator("details figure img").first
+        expect(image).to_be_visible()
+        assert image.evaluate("image => image.decode().then(() => image.naturalWidth)") > 100
+        assert [url for url in asked if not url.startswith((f"{base}/sim/", "blob:"))] == []
+        page.goto(f"{base}/sim/docs")
+        expect(page.locator(".servers select")).to_have_value("/sim")
+        page.close()
 
 
 def test_two_campaigns_stand_beside_each_other(

@@ -32,9 +32,11 @@ from service.api.pages import (
     Cursor,
     Limit,
     Tier,
+    cacheable,
+    entity_tag,
+    link,
 )
 from service.api.posted import ON_MAP, PostedCampaign, documented
-from service.api.representations import cacheable, entity_tag, link
 from service.errors import NotFoundError
 from service.runs.manager import LOG
 from service.store.stored import StoredCampaign

@@ -36,10 +36,11 @@ from service.api.pages import (
     Limit,
     Responses,
     Tier,
+    as_json,
+    cacheable,
     problem,
 )
 from service.api.posted import AskedRequirement, documented, read_posted
-from service.api.representations import as_json, cacheable
 from service.store.finding import Judged
 from service.store.stored import StoredPage
 from service.views.series import (

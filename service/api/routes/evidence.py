@@ -10,26 +10,25 @@ from risk_sac.records import State
 from risk_sac.report.evidence import Evidence
 from risk_sac.report.rendering import POLICY
 from service.api.context import AskedCampaign, Context, Service
-from service.api.pages import CROWDED, INVALID, STORAGE, UNACCEPTABLE, UNKNOWN, Responses, problem
-from service.api.routes.reports import BY_ACCEPT, FOR_BROWSERS, UNCHANGED, chosen, reported, text
+from service.api.pages import CROWDED, INVALID, STORAGE, UNKNOWN, Responses, problem
+from service.api.routes.reports import UNCHANGED, reported, text
 from service.errors import ConflictError, NotFoundError
 from service.runs.regressions import StoredRegression, campaign_of
 from service.store.stored import StoredCampaign
 
 ReportFormat = Literal["json", "html", "md"]
-OFFERED = ("json", "html", "md")
 REPORT: Responses = {200: text(html="<!doctype html>…", md="# Failures of an ego: low\n\n> **Search…")}
 NOT_PLAYED = problem(409, "The regression has not ended, or has failed")
 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
 
 
-@router.get("/report", response_model=Evidence, responses=REPORT | UNCHANGED | UNACCEPTABLE | NOT_PLAYED | CROWDED)
+@router.get("/report", response_model=Evidence, responses=REPORT | UNCHANGED | NOT_PLAYED | CROWDED)
 async def get_report(
     request: Request,
     service: Service,
     campaign: AskedCampaign,
-    format_: Annotated[ReportFormat | None, FOR_BROWSERS] = None,
+    format_: Annotated[ReportFormat, Query(alias="format")] = "json",
     regression: Annotated[
         str | None, Query(max_length=200, description="Id of a regression of this campaign, to be told of in it.")
     ] = None,
@@ -38,20 +37,18 @@ async def get_report(
 
     Search results are no crash rate: bounds come from the i.i.d. phase alone, and there are none without one.
     """
-    name = chosen(request, format_, OFFERED)
     played = None if regression is None else await run_in_threadpool(_played, service, campaign, regression)
     answer = await reported(
         request,
         service,
         campaign,
         "report",
-        *("report", name, *([played.id] if played else [])),
-        others=BY_ACCEPT,
-        format=name,
+        *("report", format_, *([played.id] if played else [])),
+        format=format_,
         address=str(request.base_url),
         regression=Regression(ego=played.ego, cases=played.cases) if played else None,
     )
-    if name == "html":
+    if format_ == "html":
         answer.headers["Content-Security-Policy"] = f"{POLICY}; frame-ancestors 'none'"
     return answer
 

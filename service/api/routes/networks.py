@@ -9,10 +9,9 @@ from fastapi.concurrency import run_in_threadpool
 
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES, MAX_ROADS
 from service.api.context import CurrentCaller, Service
-from service.api.pages import INVALID, STORAGE, UNKNOWN, WAIT, Cursor, Limit, Responses, header, problem
+from service.api.pages import INVALID, STORAGE, UNKNOWN, WAIT, Cursor, Limit, Responses, header, link, problem
 from service.api.posted import media_type
 from service.api.problems import ProblemError, Reason
-from service.api.representations import link
 from service.networks.schemas import MEDIA_TYPES, WALL_S, Network, NetworkPage, Places
 from service.networks.surveys import RETRY_AFTER_S
 

@@ -10,9 +10,8 @@ from risk_sac.config import EgoConfig
 from risk_sac.config.base import Settings
 from risk_sac.failures.cases import CampaignRegression
 from service.api.context import CurrentCaller, Service
-from service.api.pages import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN, Responses, header, problem
+from service.api.pages import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN, Responses, header, link, problem
 from service.api.posted import documented, read_posted
-from service.api.representations import link
 from service.runs.regressions import campaign_of
 
 

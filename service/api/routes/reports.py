@@ -1,6 +1,6 @@
 """/v1/campaigns/{id}/table, figures, clusters and spec: the report of `risk-sac evaluate`."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
@@ -11,17 +11,14 @@ from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
 from service.api.context import AskedCampaign, Context, Service, caller_of
-from service.api.pages import CROWDED, INVALID, STORAGE, TAGGED, UNACCEPTABLE, UNKNOWN, Responses
-from service.api.representations import accepted, cacheable, link
+from service.api.pages import CROWDED, INVALID, STORAGE, TAGGED, UNKNOWN, Responses, cacheable, link
 from service.store.stored import StoredCampaign
-from service.views.reports import MEDIA_TYPES, TABLES, Clusters, Figures
+from service.views.reports import MEDIA_TYPES, Clusters, Figures
 from service.views.whole import View, ViewName
 
 TableFormat = Literal["json", "md", "csv"]
 SpecFormat = Literal["json", "yaml"]
-FOR_BROWSERS = Query(alias="format", description="Instead of the Accept header, for a browser.")
 SPECS: dict[str, Callable[[CampaignSpec], str]] = {"json": CampaignSpec.model_dump_json, "yaml": campaign_yaml}
-BY_ACCEPT = {"Vary": "Accept"}
 
 CACHED = {
     "ETag": {
@@ -61,16 +58,16 @@ FIGURE: Responses = {200: {"headers": CACHED, "content": {MEDIA_TYPES[each]: {} 
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
 
 
-@router.get("/table", response_model=Table, responses=TABLE | UNCHANGED | UNACCEPTABLE | CROWDED)
+@router.get("/table", response_model=Table, responses=TABLE | UNCHANGED | CROWDED)
 async def get_table(
     request: Request,
     service: Service,
     campaign: AskedCampaign,
-    format_: Annotated[TableFormat | None, FOR_BROWSERS] = None,
+    format_: Annotated[TableFormat, Query(alias="format")] = "json",
 ) -> Response:
     """Comparison of methods over the seeds of finished runs; names the missing runs."""
-    name, address = chosen(request, format_, TABLES), str(request.base_url)
-    return await reported(request, service, campaign, "table", name, others=BY_ACCEPT, format=name, address=address)
+    address = str(request.base_url)
+    return await reported(request, service, campaign, "table", format_, format=format_, address=address)
 
 
 @router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED | CROWDED)
@@ -93,19 +90,10 @@ async def get_figure(
     return await reported(request, service, campaign, "drawn", name, format, figure=name, format=format)
 
 
-@router.get("/spec", response_model=CampaignSpec, responses=SPEC | UNACCEPTABLE)
-def get_spec(
-    request: Request, campaign: AskedCampaign, format_: Annotated[SpecFormat | None, FOR_BROWSERS] = None
-) -> Response:
+@router.get("/spec", response_model=CampaignSpec, responses=SPEC)
+def get_spec(campaign: AskedCampaign, format_: Annotated[SpecFormat, Query(alias="format")] = "json") -> Response:
     """Spec of the campaign: JSON to post again, or YAML for `risk-sac run --spec` and `risk-sac evaluate --spec`."""
-    name = chosen(request, format_, SPECS)
-    return Response(SPECS[name](campaign.spec), headers=BY_ACCEPT, media_type=MEDIA_TYPES[name])
-
-
-def chosen(request: Request, given: str | None, offered: Iterable[str]) -> str:
-    """Returns the format of the query, or else of the Accept header; raises as `accepted`."""
-    names = {MEDIA_TYPES[name]: name for name in offered}
-    return given or names[accepted(", ".join(request.headers.getlist("accept")), list(names))]
+    return Response(SPECS[format_](campaign.spec), media_type=MEDIA_TYPES[format_])
 
 
 async def reported(
@@ -114,14 +102,13 @@ async def reported(
     campaign: StoredCampaign,
     view: ViewName,
     *parts: str,
-    others: Mapping[str, str] = {},
     figure: str | None = None,
     format: str = "json",
     **fields: Any,
 ) -> Response:
-    """Answers with a view of the report, or one of its figures; `parts` and `others` as in `cacheable`."""
+    """Answers with a view of the report, or one of its figures; `parts` as in `cacheable`."""
     edition = await run_in_threadpool(service.reports.edition, campaign)
-    headers = cacheable(request, edition, *parts, others=others)
+    headers = cacheable(request, edition, *parts)
     asked = View(name=view, campaign_id=campaign.id, edition=edition, format=format, **fields)
     key_id = (await caller_of(request)).key_id
     if figure is None:

@@ -9,9 +9,9 @@ from fastapi import FastAPI, Request, Response
 
 from service.api.answer_cache import MOST_BYTES, AnswerCache, kept
 from service.api.context import CALLER, Caller
-from service.api.representations import entity_tag
+from service.api.pages import entity_tag
 from service.errors import StorageError
-from service.keys.file import Scope
+from service.keys import Scope
 
 ADMIN = "admin"  # a caller that sees all projects
 

@@ -9,10 +9,8 @@ import pytest
 
 from risk_sac.errors import ConfigError
 from service.errors import KeysError
+from service.keys import KeyFile, KeyRing, Scope, check_exposure
 from service.keys.__main__ import main
-from service.keys.file import KeyFile, Scope
-from service.keys.made import AuthEnabledFlag
-from service.keys.ring import KeyRing, check_exposure
 from service.settings import ServiceSettings
 
 
@@ -23,7 +21,7 @@ def file(tmp_path):
 
 @pytest.fixture
 def ring(file):
-    return KeyRing(file.path, AuthEnabledFlag())
+    return KeyRing(file.path)
 
 
 def test_of_a_key_only_the_hash_of_its_secret_is_kept(file):
@@ -78,7 +76,7 @@ def test_ring_finds_a_key_by_its_token_only(file, ring):
 
 
 def test_ring_notices_new_and_revoked_keys_at_the_next_look(file, ring):
-    assert ring.keys() == {}
+    assert ring.open
     for _ in range(20):
         key, token = file.create("maps", "", Scope.READ)
         assert ring.find(token) == key
@@ -94,7 +92,7 @@ def test_ring_takes_a_damaged_file_never_for_an_empty_one(file, ring, caplog):
         file.path.write_bytes(damaged)
         for _ in range(3):
             with pytest.raises(KeysError):
-                ring.keys()
+                _ = ring.open
             with pytest.raises(KeysError):
                 ring.find(token)
     assert len([record for record in caplog.records if record.levelno == logging.ERROR]) == 1, "said once"
@@ -117,7 +115,7 @@ def test_other_addresses_need_a_key_that_counts(tmp_path, host):
 
 def test_command_creates_lists_and_revokes(tmp_path, capsys):
     folder = ["--data-dir", str(tmp_path)]
-    ring = KeyRing(tmp_path / "keys.json", AuthEnabledFlag())
+    ring = KeyRing(tmp_path / "keys.json")
     assert main(["create", *folder, "--project", "maps", "--name", "Ann [b]", "--scope", "read"]) == 0
     token = capsys.readouterr().out.strip()
     key = ring.find(token)
@@ -131,3 +129,31 @@ def test_command_creates_lists_and_revokes(tmp_path, capsys):
     assert ring.find(token) is None
     assert main(["revoke", *folder, "nobody"]) == 1
     assert "wanted one that" in capsys.readouterr().err
+
+
+def test_a_lost_file_opens_nothing_until_a_key_is_made(file, ring):
+    with pytest.raises(KeysError):
+        file.revoke("0" * 8)
+    assert ring.open
+    _, token = file.create("maps", "", Scope.RUN)
+    file.path.unlink()
+    for seen in (ring, KeyRing(file.path)):  # of a server that ran, and of one that starts
+        with pytest.raises(KeysError, match="keys create"):
+            seen.find(token)
+        with pytest.raises(KeysError):
+            _ = seen.open
+    _, new = file.create("maps", "", Scope.RUN)
+    assert ring.find(new) is not None
+    assert ring.find(token) is None
+    assert not ring.open
+
+
+def test_a_file_that_is_replaced_is_never_missing_nor_open(file, ring):
+    _, token = file.create("maps", "", Scope.RUN)
+    with ThreadPoolExecutor(2) as pool:
+        changes = [pool.submit(file.create, "maps", "", Scope.READ) for _ in range(100)]
+        while not all(change.done() for change in changes):
+            assert ring.find(token) is not None
+            assert not ring.open
+        for change in changes:
+            change.result()

@@ -12,7 +12,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import Finished
 from risk_sac.records import Episode, Outcome, State, StateChange
 from service.errors import StorageError, TransitionError
-from service.store.revisions import Revisions
+from service.store.reading import Revisions
 from service.store.stored import TRANSITIONS, advance, campaign_state
 
 
