@@ -20,6 +20,7 @@ from risk_sac.records import StateChange
 from service.api.gate import HEALTH, PUBLIC
 from service.api.pages import WAIT, header
 from service.api.posted import campaign_schemas, input_schemas
+from service.api.problems import ProblemDetails
 from service.api.routes.episodes import PostedTriage
 from service.api.routes.regressions import PostedRegression
 
@@ -207,7 +208,7 @@ def _describe_guards(document: dict[str, Any]) -> None:
 
 
 def _problem(description: str, headers: dict[str, Any]) -> dict[str, Any]:
-    content = {"application/problem+json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
+    content = {"application/problem+json": {"schema": {"$ref": f"#/components/schemas/{ProblemDetails.__name__}"}}}
     return {"description": description, **({"headers": headers} if headers else {}), "content": content}
 
 

@@ -82,6 +82,7 @@ def scene_effects(campaign: StoredCampaign, episodes: Iterable[StoredRecord]) ->
 
 def _family(name: str, odd: Odd, played: Sequence[EpisodeRecord]) -> FamilySceneEffects:
     axes = axes_of(family_named(name), odd, BINS)
+    played = [record for record in played if {axis.parameter.name for axis in axes} <= record.scene.keys()]
     failed = np.array([record.outcome is Outcome.FAILURE for record in played], dtype=bool)
     columns = [np.array([record.scene[axis.parameter.name] for record in played]) for axis in axes]
     placed = [(axis, axis.places(column)) for axis, column in zip(axes, columns, strict=True)]

@@ -50,6 +50,13 @@ def client(settings) -> Iterator[httpx.Client]:
         yield client
 
 
+@pytest.fixture
+def fresh(tmp_path) -> Iterator[httpx.Client]:
+    """Of a service that has drawn nothing yet."""
+    with recorded(ServiceSettings(data_dir=tmp_path, max_workers=1)) as client:
+        yield client
+
+
 @pytest.fixture(scope="module")
 def stubbed_folder(tmp_path_factory):
     return tmp_path_factory.mktemp("stubbed")

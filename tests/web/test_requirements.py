@@ -57,7 +57,7 @@ def test_failures_are_filtered_by_requirement(page_at: Callable[..., Page], fast
     page = page_at(f"campaigns/{fast}/failures?every=1")
     expect(page.locator(".found-head p b")).to_have_text("12")
     card = page.locator(".cards li").first
-    expect(card).to_contain_text("never fast")
+    expect(card).to_contain_text("violated")
     expect(card).to_contain_text("after release")
     expect(card.locator("img.thumbnail")).to_have_count(1)
     page.get_by_role("button", name="More filters").click()

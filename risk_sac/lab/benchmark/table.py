@@ -20,7 +20,7 @@ from risk_sac.host.canvas import canvas, picture
 from risk_sac.lab.benchmark.runs import Detection
 from risk_sac.lab.benchmark.statistics import MethodSummary, balanced, friedman, restricted_means, summaries, survival
 from risk_sac.metrics.metric import wilson_interval
-from risk_sac.report.figures import CURVE_IN, DPI, LOOKS, STYLE
+from risk_sac.report.drawing import CURVE_IN, DPI, LOOKS, STYLE
 from risk_sac.report.rendering import interval, number, platform_in_words, table
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.world.types import Floats

@@ -26,7 +26,7 @@ from risk_sac.execution.evaluate import run
 from risk_sac.failures.collect import policy_of
 from risk_sac.host.canvas import canvas, picture
 from risk_sac.lab.figures.side_by_side import Row, rows_of
-from risk_sac.report.figures import LOOKS, STYLE
+from risk_sac.report.drawing import LOOKS, STYLE
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
 from risk_sac.search.agents.controls import Held
 from risk_sac.search.frozen_policy import FrozenPolicy

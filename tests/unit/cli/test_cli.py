@@ -17,9 +17,7 @@ def untimed(results: RunResults) -> RunResults:
     return replace(results, wall_s=0.0, cpu_s=0.0, episode_cpu_s=())
 
 
-@pytest.mark.parametrize(
-    "form", ["{run}-search-{index}", "search-{index}", "{run}-train-{index}", "{index:06d}", "{index}"]
-)
+@pytest.mark.parametrize("form", ["{run}-search-{index}", "search-{index}", "{index:06d}", "{index}"])
 def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder, tmp_path, form):
     results = read_results(folder)
     index = results.failures[0].episode.index

@@ -37,7 +37,7 @@ TOTAL = {
     "conflicts_by_second": [],
     "contacts_by_second": [],
 }
-FEW = {"episodes": 60, "failures": 3, "ecr": 0.05, "ecr_low": 0.017, "ecr_high": 0.137}
+FEW = {"episodes": 60, "collisions": 3, "failures": 3, "ecr": 0.05, "ecr_low": 0.017, "ecr_high": 0.137}
 HINT = "\nMore episodes narrow an interval; --judge-by rate ignores it."
 
 

@@ -72,7 +72,7 @@ PROGRAMS = {
     "service": [sys.executable, "-m", "service"],
     "serve": [*RISK_SAC, "serve"],
     "keys": [*RISK_SAC, "keys", "list"],
-    "database": [sys.executable, "-m", "service.store", "back"],
+    "database": [sys.executable, "-m", "service.store", "copy", "copy.db"],
 }
 
 

@@ -108,19 +108,19 @@ def bounded(code: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     ("code", "says"),
     [
-        ("bytearray(simulator.MEMORY_BYTES)", "MemoryError"),
-        ("[open(os.devnull) for _ in range(limits.OPEN_FILES)]", "Too many open files"),
-        ("open('big', 'wb').truncate(simulator.FILE_BYTES + 1)", "File too large"),
+        ("bytearray(checker.MEMORY_BYTES)", "MemoryError"),
+        ("[open(os.devnull) for _ in range(schemas.OPEN_FILES)]", "Too many open files"),
+        ("open('big', 'wb').truncate(checker.FILE_BYTES + 1)", "File too large"),
     ],
 )
 def test_the_checker_binds_itself(code, says, tmp_path):
-    ended = bounded(f"from service.networks import limits, simulator; os.chdir({str(tmp_path)!r}); {code}")
+    ended = bounded(f"from service.networks import checker, schemas; os.chdir({str(tmp_path)!r}); {code}")
     assert ended.returncode == 1
     assert says in ended.stderr
 
 
 def test_the_checker_ends_itself_when_nobody_watches():
-    code = f"from service.networks import simulator; simulator.WALL_S = 1; {BOUND} import time; time.sleep(30)"
+    code = f"from service.networks import checker; checker.WALL_S = 1; {BOUND} import time; time.sleep(30)"
     ended = subprocess.run(python(code), timeout=LONG_S, check=False)
     assert ended.returncode == -signal.SIGALRM
 

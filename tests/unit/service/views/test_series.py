@@ -148,15 +148,10 @@ def test_more_workers_never_take_longer(done, workers):
 
 # Recorded runs in `low` or dense: episodes; processor time until the first, a tenth of them and the end, s.
 RECORDED = {
-    "risk-sac in dense": (120, 4.3, 5.26, 18.3),
     "random": (100, 30.9, 31.5, 37.0),  # compiles first
     "archive": (100, 3.1, 3.49, 6.9),
     "bo-only": (100, 3.0, 3.61, 10.8),
     "no-adversary": (100, 2.9, 3.34, 6.9),
-    "risk-sac": (200, 4.5, 5.16, 67.4),
-    "risk-sac-diverse": (250, 4.4, 5.28, 14.3),
-    "sac-lag": (100, 4.4, 4.78, 16.4),
-    "ddpg-lag": (170, 4.4, 5.03, 49.4),
 }
 
 
