@@ -3,8 +3,8 @@
 import type { Body } from "../api/types";
 import { pixelX, pixelY, type Scene } from "./scene";
 
-type Roads = Body<"Roads">;
-type Surface = Body<"Surface">;
+type Roads = Body<"RoadsBody">;
+type Surface = Body<"SurfaceBody">;
 
 interface Zebra {
   along: Path2D;

@@ -3,7 +3,7 @@
 import type { Body } from "../api/types";
 import { pixelX, pixelY, type Scene } from "./scene";
 
-export type Signal = Body<"SignalHead">;
+export type Signal = Body<"SignalHeadBody">;
 export type Lamp = Signal["changes"][number][1];
 
 /** As style.css has them for legends. */

@@ -44,7 +44,7 @@ export function seconds(value: number | null | undefined): string {
 }
 
 /** What drives the ego: a registered driver, or a profile of SUMO's with its model. */
-export function egoWords({ profile, car_following, driver }: Body<"Driver">): string {
+export function egoWords({ profile, car_following, driver }: Body<"EgoDriver">): string {
   return driver ?? `${profile}, ${car_following}`;
 }
 

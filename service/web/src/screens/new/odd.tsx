@@ -8,7 +8,7 @@ import type { Field, Shape } from "./schema";
 import type { Body } from "../../api/types";
 import { pathText, type Path } from "./values";
 
-type Family = Body<"Family">;
+type Family = Body<"FamilyEntry">;
 type Which = "odd" | "odd_limits";
 
 export function OddFields({ shape, families }: { shape: Shape; families: readonly Family[] }) {

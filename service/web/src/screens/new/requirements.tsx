@@ -10,8 +10,8 @@ import { useField } from "./form";
 import type { Shape, Values } from "./schema";
 import { filled } from "./values";
 
-type Signal = Body<"Signal">;
-type Family = Body<"Family">;
+type Signal = Body<"SignalEntry">;
+type Family = Body<"FamilyEntry">;
 interface Requirement extends Values {
   name: string;
   formula: string;

@@ -79,8 +79,8 @@ interface PairProps {
 }
 
 function Pair({ campaign, path, twin, known, series, violation, query }: PairProps) {
-  const asked = useAsked<Body<"TwinPlay">>(`${path}/twins/${twin}`);
-  const roads = useAsked<Body<"Roads">>(`${path}/roads`).value;
+  const asked = useAsked<Body<"TwinBody">>(`${path}/twins/${twin}`);
+  const roads = useAsked<Body<"RoadsBody">>(`${path}/roads`).value;
   const sensor = useAsked<Body<"Campaign">>(`v1/campaigns/${encodeURIComponent(campaign)}`).value?.spec.ego?.sensor ?? null;
   const played = asked.value;
   const failure = useMemo(() => recordingOf(series, violation), [series, violation]);

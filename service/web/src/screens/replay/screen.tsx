@@ -97,7 +97,7 @@ interface Played {
 }
 
 function Replay({ campaign, path, known, series, violation, query }: Played) {
-  const roads = useAsked<Body<"Roads">>(`${path}/roads`).value;
+  const roads = useAsked<Body<"RoadsBody">>(`${path}/roads`).value;
   const spec = useAsked<Body<"Campaign">>(`v1/campaigns/${encodeURIComponent(campaign)}`).value?.spec;
   const recording = useMemo(() => recordingOf(series, violation), [series, violation]);
   const clock = useMemo(() => new Clock(recording.time_s, askedTime(query) ?? opening(recording)), [recording]);
