@@ -96,6 +96,11 @@ def test_an_answer_that_goes_on_is_no_late_head(serve):
     assert told.count("event: episode") == 60
 
 
+def answered(connection):
+    """All that the server sends until it closes the connection."""
+    return b"".join(iter(lambda: connection.recv(1 << 16), b""))
+
+
 def test_with_all_connections_at_work_one_more_is_refused(serve_inside):
     service = serve_inside(max_connections=3)
     campaign = service.post(budget={"episodes": 100_000})
@@ -114,11 +119,6 @@ def test_with_all_connections_at_work_one_more_is_refused(serve_inside):
 GET = b"GET %s HTTP/1.1\r\nHost: localhost\r\n"
 CHUNKED = b"POST /v1/campaigns HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n"
 JSON = b"Content-Type: application/json\r\n\r\n"
-
-
-def answered(connection):
-    """All that the server sends until it closes the connection."""
-    return b"".join(iter(lambda: connection.recv(1 << 16), b""))
 
 
 @pytest.mark.parametrize(

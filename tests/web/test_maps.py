@@ -77,7 +77,7 @@ def test_all_places_of_a_pattern_are_counted_before_they_are_started(
     card = page.get_by_role("region", name="Junction", exact=True)
     card.get_by_role("link", name="Start a campaign at all 4").click()
     expect(page.get_by_text("4 places × 2 methods × 1 seed")).to_be_visible()
-    expect(page.get_by_role("status")).to_contain_text("The service would take it")
+    expect(page.get_by_role("status").filter(has_text="The service would take it")).to_be_visible()
 
 
 def test_a_map_that_is_refused_says_why(page_at: Callable[..., Page], tmp_path: Path) -> None:

@@ -122,7 +122,7 @@ def test_a_formula_is_checked_while_it_is_written_and_the_fault_has_a_caret(page
     expect(formula).to_be_focused()
     page.keyboard.type(" >= 1")
     expect(formula).to_have_value("rss_margin >= 1")
-    expect(page.get_by_role("status")).to_contain_text("The service would take it")
+    expect(page.get_by_role("status").filter(has_text="The service would take it")).to_be_visible()
     expect(page.locator(".fault")).to_have_count(0)
     assert curl_body(page)["requirements"] == [{"name": "mine_1", "formula": "rss_margin >= 1"}]
 

@@ -89,7 +89,7 @@ def test_the_form_says_what_shipped_requirements_count_as(page_at: Callable[...,
     expect(page.get_by_label("safe ttc")).to_have_value("report")
     page.get_by_label("safe ttc").select_option("failure")
     page.get_by_label("on carriageway").select_option("report")
-    expect(page.get_by_role("status")).to_contain_text("The service would take it")
+    expect(page.get_by_role("status").filter(has_text="The service would take it")).to_be_visible()
     shown = page.get_by_role("region", name="The campaign as curl").inner_text()
     assert json.loads(shown[shown.index("'{") + 1 : shown.rindex("}'") + 1])["requirements"] == [
         {"name": "safe_ttc"},
