@@ -195,11 +195,10 @@ def time_to_touch(path: Path, s: float, speed: float, size: Size, other: MovingB
 def time_to_meet(path: Path, s: float, speed: float, size: Size, walker: MovingBox[float]) -> float:
     """Computes the time until the ego reaches a pedestrian's way, s; inf if it could stop later.
 
-    The pedestrian keeps its velocity, and is at the place no more than 1 s before or after the ego: one that has just
-    left may stop or turn back, and one that comes may run. Later than the time to stop at leisure, 1.15 s + v / 3.4 m/s²
-    and 4 s at most, a driver has no need to act.
+    The pedestrian keeps its velocity, and is at the place no more than 1 s before or after the ego: it may stop, turn
+    back or run. A driver need not act earlier than its time to stop at leisure, 1.15 s + v / 3.4 m/s² and 4 s at most.
 
-    Choice: 1 s of time between the two. See `time_to_touch` for the arguments.
+    Choice: 1 s between the two. See `time_to_touch` for the arguments.
     """
     walks_mps = math.hypot(walker.vx, walker.vy)
     heading = math.atan2(walker.vy, walker.vx) if walks_mps > 0.0 else walker.heading
@@ -320,11 +319,11 @@ def lane_conflict(
     A vehicle comes over if its body is beyond the marking of the ego's lane, or if it is more than 0.375 m off its own
     lane's centre towards the ego and reaches that marking within 1 s. The conflict begins when it does so alongside the
     ego or less than 2 s ahead. One with a leader begins when it brakes harder than 5 m/s², or is less than 2 s ahead.
-    Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s. A vehicle
-    that keeps its lane is in no conflict, however near its centre is to the marking.
+    Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s.
+    A vehicle that keeps its lane is in no conflict.
 
-    `speed_mps` is the ego's, `accel_mps2` the vehicle's. A wary driver takes any vehicle for one that comes over that is
-    more than 0.375 m off its lane's centre.
+    `speed_mps` is the ego's, `accel_mps2` the vehicle's. To a wary driver a vehicle comes over whenever it is more than
+    0.375 m off its lane's centre.
     """
     in_lane = abs(other.across_m) <= lane_width_m / 2
     off_m = towards(other.across_m, offset_m, lane_width_m)

@@ -110,8 +110,8 @@ class Evidence:
 
     @property
     def released(self) -> int:
-        """The frame of the adversaries' release."""
-        return int(np.searchsorted(self.time_s, -self.step_s / 2))
+        """The frame of the adversaries' release; the last one if that comes later."""
+        return min(int(np.searchsorted(self.time_s, -self.step_s / 2)), len(self.time_s) - 1)
 
     def since(self, before_s: float) -> int:
         """The first frame of the last `before_s` seconds."""

@@ -14,6 +14,7 @@ from risk_sac.risk.publish import depths, overtakes
 from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.course import (
     HORIZON_S,
+    MARKING_S,
     RESPONDS_S,
     WANDER_M,
     YIELDING_MPS2,
@@ -27,6 +28,7 @@ from risk_sac.verdicts.evidence import Evidence, Letters, ego_path, inside, reco
 from risk_sac.world.types import HEADING, LENGTH, SPEED, WIDTH, Bools, Floats, Kind, Role, X, Y
 
 EGO = 0
+JUNCTION_S = 6.0  # the longest way through a junction
 LEAVES_S = 1.0  # a vehicle that has been out of the junction for no longer is still in it
 STOPS = b"ruy"  # signals at which a vehicle has to stop if it can
 EASES_MPS2 = 2.0  # how a driver that is too fast slows down to the limit
@@ -168,7 +170,8 @@ def took_crossing(evidence: Evidence, striker: int) -> bool:
 def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
     """Whether a vehicle is in a junction that it entered on one of these letters.
 
-    It is until its whole body has left the junction, however long that takes.
+    It is until its whole body has left the junction, however long that takes; where the record does not say where the
+    junction ends, for 6 s.
     """
     entered = _entry(evidence, actor, letters)
     if entered is None:
@@ -179,7 +182,9 @@ def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
     within = np.zeros(len(x), dtype=np.bool_)
     for share in (-1.0, 0.0, 1.0):  # rear, middle and front
         within |= inside(areas, x + share * reach_m * np.cos(heading), y + share * reach_m * np.sin(heading))
-    return bool(np.count_nonzero(~within) * evidence.step_s <= LEAVES_S + 1e-6)
+    reached = int(within.argmax())  # the junction begins behind the stop line
+    allowed_s = LEAVES_S if areas else JUNCTION_S
+    return bool(np.count_nonzero(~within[reached:]) * evidence.step_s <= allowed_s + 1e-6)
 
 
 def on_inherited_red(evidence: Evidence) -> bool:
@@ -258,19 +263,22 @@ def endangered_ego(evidence: Evidence, striker: int, conflict: Conflict) -> tupl
         return ()
     seen = seen_along(ego_path(evidence), evidence, striker)
     rules = {
-        "unsafe_lane_change": conflict.type is ConflictType.CUT_IN and changes_lane_unsafely(evidence, striker, seen),
+        "unsafe_lane_change": conflict.type is ConflictType.CUT_IN
+        and changes_lane_unsafely(evidence, striker, seen, conflict.frame),
         "brake_check": evidence.role[striker] == Role.ADVERSARY
         and checks_brakes(evidence, striker, seen, conflict.frame),
     }
     return tuple(name for name, did in rules.items() if did)
 
 
-def changes_lane_unsafely(evidence: Evidence, striker: int, seen: BodyOnPath[Floats]) -> bool:
+def changes_lane_unsafely(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], began: int) -> bool:
     """Tells whether a vehicle entered the ego's lane without enough room.
 
-    Beside the ego there is none; ahead of it UN R157 says how much.
+    Beside the ego there is none; ahead of it UN R157 says how much. It moved across within the last 3 s, or from 1 s
+    before the conflict on, which began in frame `began`.
     """
-    if np.ptp(seen.across_m[evidence.since(RECENT_S) :]) <= WANDER_M:  # it kept its place
+    first = min(evidence.since(RECENT_S), max(began - round(MARKING_S / evidence.step_s), 0))
+    if np.ptp(seen.across_m[first:]) <= WANDER_M:  # it kept its place
         return False
     return not enters_safely(evidence, striker, seen, R157_GAP_M)
 

@@ -37,10 +37,11 @@ JUNCTION = (Area.box(50.0, 70.0, -10.0, 10.0),)
 @pytest.mark.parametrize(
     ("parts", "expected"),
     [
-        (Parts(drove_into=True, other_erred=True), Fault.EGO),
-        (Parts(other_erred=True, ego_erred=True), Fault.SHARED),
-        (Parts(other_erred=True), Fault.OTHER),
-        (Parts(other_erred=True, ego_yields=True, left_rss=True), Fault.OTHER),
+        (Parts(other_broke=True, drove_into=True, ego_erred=True), Fault.SHARED),
+        (Parts(drove_into=True, other_yields=True), Fault.EGO),
+        (Parts(other_yields=True, ego_erred=True), Fault.SHARED),
+        (Parts(other_broke=True), Fault.OTHER),
+        (Parts(other_broke=True, ego_yields=True, left_rss=True), Fault.OTHER),
         (Parts(ego_erred=True), Fault.EGO),
         (Parts(ego_yields=True), Fault.EGO),
         (Parts(left_rss=True), Fault.EGO),
