@@ -132,3 +132,31 @@ def test_a_reference_driver_stops_at_red_where_it_can(yellow_m, red_m, grade):
     assert found.signature == "red light entered; ego goes straight"
     assert found.broke == ("red_light",)
     assert found.fault is (Fault.EGO if grade is Grade.PREVENTABLE else Fault.OTHER)
+
+
+@pytest.mark.parametrize(("red_m", "valid"), [(38.0, True), (25.0, False)])
+def test_a_red_light_that_the_ego_could_not_stop_at_when_it_was_handed_over_is_inherited(red_m, valid):
+    """It takes 30 m at 12 m/s to stop at leisure."""
+    ego, far = straight(0.0, 0.0, 0.0, 12.0), straight(500.0, 0.0, 0.0, 12.0)
+    evidence = staged(ego, far)
+    shown = to_line(evidence, 1.5 * 12.0 + CAR_M[0] / 2 + red_m, 200.0, 200.0)
+    found = violated(evidence, NO_RED, shown)
+    assert (found.valid, found.verdicts["conflict_after_release"]) == (valid, valid)
+    assert (found.other_id, found.grade) == (None, Grade.PREVENTABLE if valid else None)
+
+
+SLOW = own("ego_speed_mps <= 10")
+
+
+@pytest.mark.parametrize(
+    ("changes", "valid", "time_s"),
+    [
+        (((0.0, -2.0),), False, 0.0),  # it slows down at once
+        (((0.0, -2.0), (3.0, 2.0)), True, 5.0),  # at 3 s it has 6 m/s, and speeds up again
+        ((), True, 5.0),  # it never slows down
+    ],
+)
+def test_a_speed_that_was_inherited_counts_once_it_is_the_egos_own(changes, valid, time_s):
+    found = violated(staged(straight(0.0, 0.0, 0.0, 12.0, *changes), straight(500.0, 0.0, 0.0, 12.0)), SLOW)
+    assert (found.valid, found.other_id) == (valid, None)
+    assert found.time_s == pytest.approx(time_s, abs=0.2)
