@@ -134,6 +134,7 @@ def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, 
         "broke": ("red_light", "speeding"),
         "ego_broke": (),
         "severity": Severity.MODERATE,
+        "impact_mps": 7.0,
         "injury_risk": 0.005,
         "unresponsive": False,
         "drivers": {}

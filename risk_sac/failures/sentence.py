@@ -42,7 +42,7 @@ def story(series: Series, violation: Collision | Violation) -> str:
         return sentence(series, violation)
     ego = f"ego at {violation.ego_speed_mps:.0f} m/s{_broke(violation.broke)} violates {violation.requirement}"
     if violation.other_id is None:
-        return f"no other road user near; {ego}"
+        return ego
     since = series["time_s"] - series["released_s"]
     at, begins = (int(np.searchsorted(since, time_s - 1e-6)) for time_s in (violation.time_s, 0.0))
     other = [str(name) for name in series["ids"]].index(violation.other_id)

@@ -63,11 +63,11 @@ def _contact(collision: Collision) -> Iterator[str]:
 
 
 def _violation(violation: Violation) -> Iterator[str]:
-    met = "nothing was in its way"
+    met = ""
     if violation.other_id is not None:
         unseen = ", of which it did not know" if violation.hidden else ""
-        met = f"it would have met {violation.other_role} {violation.other_id!r} first{unseen}"
-    yield f"the ego, at {violation.ego_speed_mps:.1f} m/s, violated {violation.requirement}; {met}"
+        met = f"; it would have met {violation.other_role} {violation.other_id!r} first{unseen}"
+    yield f"the ego, at {violation.ego_speed_mps:.1f} m/s, violated {violation.requirement}{met}"
     yield violation.signature
     yield f"least robustness: {violation.robustness:.2f}{_grade(violation)}"
     fault = f" · fault: {violation.fault}" if violation.fault is not None else ""

@@ -38,12 +38,12 @@ class Fault(StrEnum):
 
 
 class Severity(StrEnum):
-    """Severity of a contact, by closing speed and risk of injury.
+    """Severity of a contact, by impact speed and risk of injury.
 
     See `risk_sac.verdicts.labels`.
     """
 
-    MINOR = "minor"  # between vehicles that close at less than 2 m/s
+    MINOR = "minor"  # an impact speed below 2 m/s
     MODERATE = "moderate"
     SEVERE = "severe"  # a risk of 1 % or more that a pedestrian dies, or an occupant is seriously injured
 
@@ -130,6 +130,9 @@ class Judgement(Record):
     """What the ego broke: red_light, priority, wrong_direction, speeding, off_road."""
     severity: Severity
     """minor | moderate | severe."""
+    impact_mps: Real
+    """Speed that the severity follows: across the surface where the bodies touch, that at which two vehicles close, or
+    the ego's own towards a pedestrian."""
     injury_risk: float
     """Risk that the pedestrian dies, or an occupant is seriously injured (MAIS 3 or more)."""
     unresponsive: bool

@@ -20,8 +20,9 @@ ARTEFACT_RULES = frozenset(
         "ego_model_saw",
     }
 )
-
-
+# Reference drivers that react to the conflict. A defensive one slows before it, which the ego owes only where it could
+# not see.
+REACTING = frozenset({"r157", "fsm", "rss"})
 NO_CONTACT = "no_contact"  # the requirement that a contact violates
 
 
@@ -68,8 +69,12 @@ class Violated(Record, ABC):
 
     @property
     def headline_candidate(self) -> bool:
-        """Whether it is preventable and not minor: a headline failure once its replay is the same."""
-        return self.preventable
+        """Whether it is preventable and not minor: a headline failure once its replay is the same.
+
+        One that others caused has to be preventable by a driver that reacts, not by a defensive one alone.
+        """
+        reacted = any(self.prevention.get(name, False) for name in REACTING)
+        return self.preventable and (reacted or self.blamed is not Fault.OTHER)
 
     @property
     def avoidable(self) -> bool:
@@ -82,11 +87,12 @@ class Violation(Violated):
 
     requirement: str
     time_s: Real
-    """When it was first violated."""
+    """When it was first violated; what the ego inherited at the release does not count if another violation follows."""
     robustness: Real
     """The least since the release, in scales."""
     other_id: str | None
-    """The actor that mattered most: the one the ego would have met soonest at that time; null without one."""
+    """The actor that the ego would have met soonest at that time. Null without one, and where the requirement concerns
+    the ego's own driving only."""
     other_kind: str | None
     """vehicle | pedestrian"""
     other_role: str | None
@@ -208,14 +214,15 @@ class Collision(Violated):
     @property
     def headline_candidate(self) -> bool:
         """See `Violated.headline_candidate`."""
-        return self.preventable and self.severity is not Severity.MINOR
+        return super().headline_candidate and self.severity is not Severity.MINOR
 
     @property
     def severity_in_words(self) -> str:
-        """Such as "severe: closing speed 11.0 m/s, risk of death 3.5 %"."""
+        """Such as "severe: closing speed 11.0 m/s, impact speed 10.8 m/s, risk of death 3.5 %"."""
         risk = "death" if self.other_kind == "pedestrian" else "serious injury"
         return (
             f"{self.judgement.severity}: closing speed {self.relative_speed_mps:.1f} m/s, "
+            f"impact speed {self.judgement.impact_mps:.1f} m/s, "
             f"risk of {risk} {100 * self.judgement.injury_risk:.1f} %"
         )
 

@@ -39,6 +39,8 @@ class Contact:
     closing_lateral_ego_mps: float  # the ego's own speed across its axis towards the other
     closing_lateral_other_mps: float
     relative_speed_mps: float
+    closing_normal_mps: float  # along the normal of the contact, the axis of least penetration; positive if they close
+    closing_normal_ego_mps: float  # the ego's own part of it
 
 
 def find_contact(before: Frame | None, frame: Frame, view: RelativeView | None = None) -> Contact | None:
@@ -48,12 +50,27 @@ def find_contact(before: Frame | None, frame: Frame, view: RelativeView | None =
     """
     if before is None:
         touching = np.flatnonzero((view or relative_view(frame)).overlap)
-        return _describe(frame.state, int(touching[0]) + 1, frame, 0.0, 1.0) if len(touching) else None
+        if not len(touching):
+            return None
+        first = int(touching[0]) + 1
+        return _describe(frame.state[:, [0, first]], first, frame.time_s)
     state = before.state
     if before.ids != frame.ids:  # actors have left
         state = np.ascontiguousarray(state[:, [before.ids.index(id_) for id_ in frame.ids]])
     share, other = _first_contact(state, frame.state)
-    return _describe(state, other, frame, frame.time_s - before.time_s, share) if other else None
+    if not other:
+        return None
+    touch_s = frame.time_s - (1.0 - share) * (frame.time_s - before.time_s)
+    return _describe(_between(state, frame.state, other, share), other, touch_s)
+
+
+def contact_with(before: Floats, now: Floats, other: int, time_s: float, step_s: float) -> Contact:
+    """Describes the contact with one actor in the step between two states, which ends at `time_s`.
+
+    Bodies that do not touch in it are described at its end.
+    """
+    share = min(_first_touch(before, now, other), 1.0)
+    return _describe(_between(before, now, other, share), other, time_s - (1.0 - share) * step_s)
 
 
 @compiled
@@ -124,16 +141,19 @@ def _between(before: Floats, now: Floats, other: int, share: float) -> Floats:
     return pair
 
 
-def _describe(before: Floats, other: int, frame: Frame, step_s: float, share: float) -> Contact:
-    view = frame_view(_between(before, frame.state, other, share))
+def _describe(pair: Floats, other: int, time_s: float) -> Contact:
+    """Describes the contact of the ego and another actor, the two columns of `pair`; `other` is its index."""
+    view = frame_view(pair)
     x, y = contact_point(view)
     cos, sin = float(view.cos[0]), float(view.sin[0])
     dx, dy = x - float(view.x[0]), y - float(view.y[0])
     other_lateral = view.ego_vy + float(view.vy[0])
     side = math.copysign(1.0, float(view.y[0]))
+    normal = int((np.abs(view.separation[:, 0]) - view.reach[:, 0]).argmax())  # the axis of least penetration
+    towards = math.copysign(1.0, float(view.separation[normal, 0]))
     return Contact(
         other=other,
-        time_s=frame.time_s - (1.0 - share) * step_s,
+        time_s=time_s,
         x_m=x,
         y_m=y,
         ego_zone=zone(x, y, view.ego_half_length, view.ego_half_width),
@@ -145,4 +165,6 @@ def _describe(before: Floats, other: int, frame: Frame, step_s: float, share: fl
         closing_lateral_ego_mps=side * view.ego_vy,
         closing_lateral_other_mps=-side * other_lateral,
         relative_speed_mps=float(math.hypot(view.vx[0], view.vy[0])),
+        closing_normal_mps=-towards * along_axes(float(view.vx[0]), float(view.vy[0]), cos, sin)[normal],
+        closing_normal_ego_mps=towards * along_axes(view.ego_vx, view.ego_vy, cos, sin)[normal],
     )

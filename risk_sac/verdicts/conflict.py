@@ -13,12 +13,14 @@ from risk_sac.records import ConflictType
 from risk_sac.verdicts.course import (
     HORIZON_S,
     WANDER_M,
+    YIELDING_MPS2,
     BodyOnPath,
     MovingBox,
     Path,
     at,
     entry_distance,
     lane_conflicts,
+    time_to_meet,
     time_to_touch,
     with_margin,
 )
@@ -40,7 +42,6 @@ from risk_sac.world.types import Bools, Floats, Kind
 
 BODY_M = 0.5  # from a pedestrian's centre: what a body on the kerb reaches of the carriageway
 KERB_S = 1.0  # a pedestrian this near to the carriageway is about to step onto it
-YIELDING_MPS2 = 3.4  # what a driver brakes with to stop at leisure
 FIRM_MPS2 = 6.0  # what a driver that brakes already can go up to, without an emergency
 SAME_WAY_COS = math.cos(math.radians(30.0))
 TURNING_COS = math.cos(math.radians(60.0))
@@ -83,11 +84,13 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     path = ego_path(evidence)
     known = evidence.known[:, striker]
     seen = seen_along(path, evidence, striker)
-    size, motion = recorded_size(evidence, 0), recorded_motion(evidence, striker)
-    course = collision_courses(path, column(evidence.speed_mps, 0), with_margin(size), motion)
+    corridor, motion = with_margin(recorded_size(evidence, 0)), recorded_motion(evidence, striker)
+    speed = column(evidence.speed_mps, 0)
+    course = collision_courses(path, speed, corridor, motion, to_meet=False)
     same_way = _drives_the_same_way(evidence, striker, seen.turn_rad)
     if evidence.kind[striker] == Kind.PEDESTRIAN:
-        begins = lasts = begins_if_wary = lasts_if_wary = course & _at_the_carriageway(evidence, striker)
+        meets = collision_courses(path, speed, corridor, motion, to_meet=True)
+        begins = lasts = begins_if_wary = lasts_if_wary = meets & _at_the_carriageway(evidence, striker)
     elif same_way:
         begins, lasts = _lane_conflicts(evidence, striker, seen, wary=False)
         begins_if_wary, lasts_if_wary = _lane_conflicts(evidence, striker, seen, wary=True)
@@ -198,16 +201,23 @@ def lasting_since(begins: Bools, lasts: Bools) -> int:
 
 
 @compiled
-def collision_courses(path: Path, speed: Floats, size: Size, motion: MovingBox[Floats]) -> Bools:
-    """Whether each frame is on a collision course, `T`; looked for backwards, False before it was first interrupted."""
-    found = np.zeros(len(speed), dtype=np.bool_)
+def collision_courses(path: Path, speed: Floats, size: Size, motion: MovingBox[Floats], to_meet: bool) -> Bools:
+    """Tells whether each frame is on a collision course, `T`.
+
+    With `to_meet` it is one if the ways meet, see `time_to_meet`; else if the bodies would touch within 4 s. It looks
+    backwards; False before the course was first interrupted.
+    """
+    on_course = np.zeros(len(speed), dtype=np.bool_)
     missing = 0
     for t in range(len(speed) - 1, -1, -1):
-        found[t] = time_to_touch(path, path.s[t], speed[t], size, at(motion, t), HORIZON_S) <= HORIZON_S
-        missing = 0 if found[t] else missing + 1
+        if to_meet:
+            on_course[t] = time_to_meet(path, path.s[t], speed[t], size, at(motion, t)) < math.inf
+        else:
+            on_course[t] = time_to_touch(path, path.s[t], speed[t], size, at(motion, t), HORIZON_S) <= HORIZON_S
+        missing = 0 if on_course[t] else missing + 1
         if missing > BRIDGE + 1:  # the last frame may be beyond the contact
             break
-    return found
+    return on_course
 
 
 def _at_the_carriageway(evidence: Evidence, striker: int) -> Bools:

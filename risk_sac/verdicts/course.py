@@ -133,6 +133,9 @@ def project(path: Path, first: int, x: float, y: float) -> tuple[float, float, f
 HORIZON_S = 4.0  # look-ahead of every driver
 LOOK_S = 0.05  # between two looks at what is foreseen; at 30 m/s of closing 1.5 m, less than a car is long
 CORRIDOR_M = 0.375  # the ego's corridor is this much wider than itself to either side
+NEAR_S = 1.0  # two that pass a place no further apart in time are in each other's way
+RESPONDS_S = 1.15  # UN R157, Annex 3: 0.4 s to perceive, 0.75 s to react
+YIELDING_MPS2 = 3.4  # what a driver brakes with to stop at leisure
 
 
 F = TypeVar("F", float, Floats)  # one number, or one for each frame
@@ -189,6 +192,22 @@ def time_to_touch(path: Path, s: float, speed: float, size: Size, other: MovingB
 
 
 @compiled
+def time_to_meet(path: Path, s: float, speed: float, size: Size, walker: MovingBox[float]) -> float:
+    """Computes the time until the ego reaches a pedestrian's way, s; inf if it could stop later.
+
+    The pedestrian keeps its velocity, and is at the place no more than 1 s before or after the ego: it may stop, turn
+    back or run. A driver need not act earlier than its time to stop at leisure, 1.15 s + v / 3.4 m/s² and 4 s at most.
+
+    Choice: 1 s between the two. See `time_to_touch` for the arguments.
+    """
+    walks_mps = math.hypot(walker.vx, walker.vy)
+    heading = math.atan2(walker.vy, walker.vx) if walks_mps > 0.0 else walker.heading
+    way = Size(walker.size.half_length + walks_mps * NEAR_S, walker.size.half_width)
+    swept = MovingBox(walker.x, walker.y, heading, walker.vx, walker.vy, way)
+    return time_to_touch(path, s, speed, size, swept, min(RESPONDS_S + speed / YIELDING_MPS2, HORIZON_S))
+
+
+@compiled
 def entry_distance(
     path: Path, first: int, reach_s: float, size: Size, x: Floats, y: Floats, heading: Floats, other_size: Size
 ) -> tuple[float, float]:
@@ -224,6 +243,7 @@ def entry_distance(
 
 
 WANDER_M = 0.375  # what a vehicle strays from its lane's centre without meaning anything
+MARKING_S = 1.0  # a vehicle that strays further and reaches the ego's marking within this time is coming over
 DANGER_TTC_S = 2.0
 LEADER_BRAKES_MPS2 = 5.0
 
@@ -237,7 +257,8 @@ class BodyOnPath(NamedTuple, Generic[F]):
     across_m: F  # of its centre from the ego's path, positive to the left
     turn_rad: F  # its heading relative to the path, full turns not taken off
     speed_mps: F  # along the path
-    aside_s: F  # until the sides touch, as the two move across now; inf if they do not come nearer
+    reach_m: F  # of its body to either side of its centre, across the path
+    nearing_mps: F  # its speed across, positive towards the path
 
 
 @compiled
@@ -254,11 +275,8 @@ def along(path: Path, first: int, s: float, speed: float, size: Size, other: Mov
     speed_along = other.vx * math.cos(heading) + other.vy * math.sin(heading)
     closing = speed - speed_along
     ttc = gap / closing if gap > 0.0 and closing > 0.0 else math.inf
-    beside = size.half_width + cos * half_width + sin * half_length
-    room = max(abs(across) - beside, 0.0)
-    coming = math.copysign(1.0, across) * (other.vx * math.sin(heading) - other.vy * math.cos(heading))
-    aside = room / coming if coming > 0.0 else math.inf
-    return BodyOnPath(gap, behind, ttc, across, turn, speed_along, aside)
+    nearing = math.copysign(1.0, across) * (other.vx * math.sin(heading) - other.vy * math.cos(heading))
+    return BodyOnPath(gap, behind, ttc, across, turn, speed_along, cos * half_width + sin * half_length, nearing)
 
 
 def along_series(path: Path, speed: Floats, size: Size, other: MovingBox[Floats]) -> BodyOnPath[Floats]:
@@ -268,7 +286,7 @@ def along_series(path: Path, speed: Floats, size: Size, other: MovingBox[Floats]
 
 @compiled
 def _along_rows(path: Path, speed: Floats, size: Size, other: MovingBox[Floats]) -> Floats:
-    rows = np.empty((7, len(speed)))
+    rows = np.empty((8, len(speed)))
     for t in range(len(speed)):
         for row, value in enumerate(along(path, t, path.s[t], speed[t], size, at(other, t))):
             rows[row, t] = value
@@ -298,23 +316,25 @@ def lane_conflict(
 ) -> tuple[bool, bool]:
     """Detects the beginning and the continuation of a conflict with a same-direction vehicle.
 
-    A cut-in begins when the vehicle is more than 0.375 m off its lane's centre towards the ego, and less than 2 s
-    ahead, or alongside and coming nearer; a conflict with a leader when it brakes harder than 5 m/s², or is less than
-    2 s ahead.
-    Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s; one
-    alongside comes nearer if the sides would touch within 4 s, or it is half in the ego's lane. One that merely hangs
-    over the line does not.
+    A vehicle comes over if its body is beyond the marking of the ego's lane, or if it is more than 0.375 m off its own
+    lane's centre towards the ego and reaches that marking within 1 s. The conflict begins when it does so alongside the
+    ego or less than 2 s ahead. One with a leader begins when it brakes harder than 5 m/s², or is less than 2 s ahead.
+    Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s.
+    A vehicle that keeps its lane is in no conflict.
 
-    `speed_mps` is the ego's, `accel_mps2` the vehicle's. For a wary driver a vehicle alongside counts if it comes
-    nearer or not.
+    `speed_mps` is the ego's, `accel_mps2` the vehicle's. To a wary driver a vehicle comes over whenever it is more than
+    0.375 m off its lane's centre.
     """
     in_lane = abs(other.across_m) <= lane_width_m / 2
-    coming = in_lane or towards(other.across_m, offset_m, lane_width_m) > WANDER_M
-    alongside = other.gap_m <= 0.0 and other.behind_m <= 0.0 and (wary or in_lane or other.aside_s < HORIZON_S)
+    off_m = towards(other.across_m, offset_m, lane_width_m)
+    to_marking_m = lane_width_m / 2 - off_m - other.reach_m
+    strays = in_lane or off_m > WANDER_M
+    comes = in_lane or to_marking_m < 0.0 or (strays and (wary or to_marking_m <= MARKING_S * other.nearing_mps))
+    alongside = other.gap_m <= 0.0 and other.behind_m <= 0.0
     near = 0.0 < other.gap_m <= HORIZON_S * speed_mps
     brakes = in_lane and near and accel_mps2 < -LEADER_BRAKES_MPS2
-    begins = brakes or (coming and (alongside or other.ttc_s < DANGER_TTC_S))
-    return begins, begins or (coming and other.ttc_s < HORIZON_S)
+    begins = brakes or (comes and (alongside or other.ttc_s < DANGER_TTC_S))
+    return begins, begins or (strays and other.ttc_s < HORIZON_S)
 
 
 @compiled
@@ -326,7 +346,14 @@ def lane_conflicts(
     for t in range(len(speed_mps)):
         o = others
         other = BodyOnPath(
-            o.gap_m[t], o.behind_m[t], o.ttc_s[t], o.across_m[t], o.turn_rad[t], o.speed_mps[t], o.aside_s[t]
+            o.gap_m[t],
+            o.behind_m[t],
+            o.ttc_s[t],
+            o.across_m[t],
+            o.turn_rad[t],
+            o.speed_mps[t],
+            o.reach_m[t],
+            o.nearing_mps[t],
         )
         begins[t], lasts[t] = lane_conflict(other, speed_mps[t], offset_m[t], accel_mps2[t], lane_width_m, wary)
     return begins, lasts

@@ -27,8 +27,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, YIELDING_MPS2
-from risk_sac.verdicts.course import CORRIDOR_M, entry_distance, pose_at, project, with_margin
+from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2
+from risk_sac.verdicts.course import CORRIDOR_M, YIELDING_MPS2, entry_distance, pose_at, project, with_margin
 from risk_sac.verdicts.drivers import JERK_MPS3, R157_PERCEIVES_S, r157
 from risk_sac.verdicts.present import RED, OnPath, Street, body_of, conflict_in, must_yield, within
 from risk_sac.verdicts.unseen import Crossings, is_hidden, walls_of

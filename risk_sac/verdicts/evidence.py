@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.scenario.layout import Area, Layout
+from risk_sac.sim.collision import Contact, contact_with
 from risk_sac.verdicts.course import WANDER_M, BodyOnPath, MovingBox, Path, along_series, recorded_path
 from risk_sac.world.geometry import Size
-from risk_sac.world.types import STEP_S, Bools, Floats
+from risk_sac.world.types import HEADING, LENGTH, STEP_S, VX, VY, WIDTH, Bools, Floats, X, Y
 
 Letters = NDArray[Any]  # as numbers
 KERB_STEPS = 10  # looks within the time ahead
@@ -107,6 +108,11 @@ class Evidence:
             raise ValueError(f"striker {id_!r} has left before the contact; wanted one that is there in the last frame")
         return column
 
+    @property
+    def released(self) -> int:
+        """The frame of the adversaries' release; the last one if that comes later."""
+        return min(int(np.searchsorted(self.time_s, -self.step_s / 2)), len(self.time_s) - 1)
+
     def since(self, before_s: float) -> int:
         """The first frame of the last `before_s` seconds."""
         return int(np.searchsorted(self.time_s, self.time_s[-1] - before_s - 1e-6))
@@ -157,6 +163,15 @@ def recorded_motion(evidence: Evidence, actor: int) -> MovingBox[Floats]:
     e = evidence
     x, y, heading, vx, vy = (column(each, actor) for each in (e.x_m, e.y_m, e.heading_rad, e.vx_mps, e.vy_mps))
     return MovingBox(x, y, heading, vx, vy, recorded_size(e, actor))
+
+
+def recorded_contact(evidence: Evidence, striker: int) -> Contact:
+    """Returns how the striker touches the ego in the last step; its `other` is 1."""
+    e, both, steps = evidence, [0, striker], np.zeros((2, WIDTH + 1, 2))
+    for state, t in zip(steps, (-2 if len(e.time_s) > 1 else -1, -1), strict=True):
+        state[[X, Y, HEADING]] = e.x_m[t, both], e.y_m[t, both], e.heading_rad[t, both]
+        state[[VX, VY, LENGTH, WIDTH]] = e.vx_mps[t, both], e.vy_mps[t, both], e.length_m[both], e.width_m[both]
+    return contact_with(steps[0], steps[1], 1, float(e.time_s[-1]), e.step_s)
 
 
 def ego_path(evidence: Evidence) -> Path:

@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.records import GAINS_MPS, ConflictType, EgoPart, Fault, Grade
+from risk_sac.records import GAINS_MPS, REACTING, ConflictType, EgoPart, Fault, Grade
 from risk_sac.risk.rss import margins
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.scenario.limits import emergency_decel_mps2
 from risk_sac.sim.ego import FLICKER_S
-from risk_sac.verdicts.conflict import BODY_M, BRAKES_MPS2, YIELDING_MPS2, Conflict, lasting_since
-from risk_sac.verdicts.course import CORRIDOR_M, HORIZON_S, BodyOnPath, MovingBox
-from risk_sac.verdicts.drivers import JERK_MPS3, R157_DELAY_S, R157_PERCEIVES_S
+from risk_sac.verdicts.conflict import BODY_M, BRAKES_MPS2, Conflict, lasting_since
+from risk_sac.verdicts.course import CORRIDOR_M, HORIZON_S, RESPONDS_S, YIELDING_MPS2, BodyOnPath, MovingBox
+from risk_sac.verdicts.drivers import JERK_MPS3, R157_DELAY_S
 from risk_sac.verdicts.evidence import Evidence, column, ego_path, inside, recorded_motion, seen_along
 from risk_sac.verdicts.offences import STANDING_MPS
 from risk_sac.world.geometry import frame_view
@@ -133,7 +133,6 @@ def _margins(
     return along, across
 
 
-RESPONDS_S = R157_PERCEIVES_S + R157_DELAY_S  # what the ego does earlier is no answer yet
 NEAR_M = 1.5  # of the ego's corridor: a pedestrian on the carriageway that may step into it
 SLOW_MPS = 3.0  # an ego that stands looks as far ahead as at this speed
 
@@ -239,8 +238,6 @@ def _sight_speed(sighted: int, seen: BodyOnPath[Floats]) -> float | None:
     return math.sqrt(lost * lost + 2 * YIELDING_MPS2 * room) - lost
 
 
-# They react to the conflict. A defensive one slows before, which the ego owes only where it could not see.
-REACTING = frozenset({"r157", "fsm", "rss"})
 YIELDS = frozenset({"red_light", "priority", "pedestrian_on_red", "wrong_direction"})  # its breaker has to yield
 LATE_S = 0.5  # after which an answer comes later than R157's driver gives it
 HARD = 0.8  # of the braking that car and road allow
@@ -250,18 +247,19 @@ CROSSINGS = ("crossing", "beside_crossing")
 class Parts(NamedTuple):
     """Behaviour of both parties that the fault depends on."""
 
+    other_broke: bool = False  # the other broke a rule of the road
     drove_into: bool = False  # the ego drove on into a road user that it saw in its way
     ego_erred: bool = False
-    other_erred: bool = False
+    other_yields: bool = False  # the other had to yield
     ego_yields: bool = False  # the ego had to yield, or to keep its distance
     left_rss: bool = False  # the ego left RSS's proper response first, and did not brake at once either
 
 
 def fault(parts: Parts) -> Fault:
     """Applies the rule; its first line that holds decides."""
-    if parts.drove_into:
+    if parts.drove_into and not parts.other_broke:
         return Fault.EGO
-    if parts.other_erred:
+    if parts.other_broke or parts.other_yields:
         return Fault.SHARED if parts.ego_erred else Fault.OTHER
     return Fault.EGO if parts.ego_erred or parts.ego_yields or parts.left_rss else Fault.OTHER
 
@@ -293,8 +291,11 @@ def parts_of_contact(
     avoids: Mapping[str, bool],
     grade: Grade,
     lasted_s: float,
+    contact_x_m: float,
 ) -> Parts:
     """Sums up a contact.
+
+    A crossing vehicle that runs into the ego behind its front half is the ego's fault only if the ego had to yield.
 
     Args:
       part: what the ego did about the striker.
@@ -305,10 +306,16 @@ def parts_of_contact(
       avoids: reference driver → whether it avoids the contact.
       grade: of the contact.
       lasted_s: from the beginning of the conflict to the contact.
+      contact_x_m: of the contact point ahead of the ego's centre.
     """
+    other_broke, other_yields = bool(broke), yields == "striker"
+    if conflict_type is ConflictType.CROSSING and contact_x_m < 0.0 and yields != "ego":
+        return Parts(other_broke=other_broke, other_yields=other_yields)
     walks, crosses = (conflict_type is each for each in (ConflictType.PEDESTRIAN, ConflictType.CROSSING))
     braked_after_s = math.inf if part.braked_after_s is None else part.braked_after_s
     return Parts(
+        other_broke=other_broke,
+        other_yields=other_yields,
         drove_into=(walks and part.sped_up) or ((walks or crosses) and part.started),
         ego_erred=bool(ego_broke)
         or conflict_type is ConflictType.MERGE
@@ -317,7 +324,6 @@ def parts_of_contact(
         or min(braked_after_s, lasted_s) >= RESPONDS_S + LATE_S
         or any(avoids.get(name, False) for name in REACTING)
         or (part.too_fast and grade is Grade.PREVENTABLE and YIELDS.isdisjoint(broke)),
-        other_erred=bool(broke) or yields == "striker",
         ego_yields=yields == "ego",
         left_rss=part.left_first == "ego"
         and not (braked_after_s <= RESPONDS_S and part.braking_mps2 >= HARD * part.possible_mps2),
@@ -340,6 +346,6 @@ def parts_of_violation(
         return Parts(ego_erred=grade is Grade.PREVENTABLE)
     return Parts(
         ego_erred=bool(broke) or grade is Grade.PREVENTABLE,
-        other_erred=bool(other_broke),
+        other_broke=bool(other_broke),
         ego_yields=yields == "ego",
     )

@@ -8,15 +8,15 @@ import numpy as np
 from risk_sac.config import Requirement
 from risk_sac.records import NO_CONTACT, Collision, ConflictType, Fault, Grade, Judgement, RequirementResult, Violation
 from risk_sac.risk.measures import Gauge, Measures
-from risk_sac.risk.publish import AHEAD, ASIDE, ENCOUNTER, worst_rss_margin
+from risk_sac.risk.publish import ENCOUNTER, worst_rss_margin
 from risk_sac.risk.rss import ENCOUNTER_CAP_S, TTC_CAP_S
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.sim.collision import Contact
-from risk_sac.verdicts.conflict import SAME_WAY_COS, Conflict, find_conflict, unresponsive
-from risk_sac.verdicts.evidence import Evidence, lane_heading
+from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
+from risk_sac.verdicts.evidence import Evidence, recorded_contact
 from risk_sac.verdicts.fault import ego_part, fault, has_to_yield, parts_of_contact, parts_of_violation
-from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, ground, manoeuvre, response, severity_of, signature
-from risk_sac.verdicts.offences import ego_offences, endangered_ego, striker_offences
+from risk_sac.verdicts.labels import ego_in_words, ground, impact, manoeuvre, response, severity, signature
+from risk_sac.verdicts.offences import ego_offences, endangered_ego, inherits_stop, striker_offences
 from risk_sac.verdicts.reference import (
     NO_RED_LIGHT_ENTRY,
     ON_CARRIAGEWAY,
@@ -26,8 +26,15 @@ from risk_sac.verdicts.reference import (
     kept_by,
     reference_outcomes,
 )
-from risk_sac.verdicts.validity import EpisodeFacts, artefact_verdicts, overlaps_before_contact, validity_verdicts
-from risk_sac.world.types import STEP_S, Frame, Kind, Role
+from risk_sac.verdicts.validity import (
+    AFTER_RELEASE_S,
+    EpisodeFacts,
+    artefact_verdicts,
+    begins_after_release,
+    overlaps_before_contact,
+    validity_verdicts,
+)
+from risk_sac.world.types import STEP_S, Frame, Kind, Role, Signal
 
 DEFINITIONS = 7  # raise it with whatever changes a verdict; what was judged before says by which it was
 
@@ -96,7 +103,8 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
     graded = grade(avoids) if valid else None
     yields = has_to_yield(conflict.type, where, broke, ego_broke)
     part = ego_part(evidence, striker, conflict, yields)
-    severity, injury_risk = severity_of(evidence, striker)
+    contact = recorded_contact(evidence, striker)
+    impact_mps, injury_risk = impact(evidence, striker, contact)
     return Judgement(
         definitions=DEFINITIONS,
         conflict_type=conflict.type,
@@ -111,7 +119,8 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
         ground=where,
         broke=broke,
         ego_broke=ego_broke,
-        severity=severity,
+        severity=severity(impact_mps, injury_risk),
+        impact_mps=impact_mps,
         injury_risk=injury_risk,
         unresponsive=unresponsive(evidence, conflict),
         grade=graded,
@@ -128,6 +137,7 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
                 avoids=avoids,
                 grade=graded,
                 lasted_s=float(evidence.time_s[-1]) - conflict.time_s,
+                contact_x_m=contact.x_m,
             )
         ),
         signature=signature(
@@ -159,6 +169,8 @@ OF_OTHERS = frozenset(
         "ego_jerk_mps3",
     }
 )
+INHERITED_S = 5.0  # Choice: a violation that the ego inherits and has not ended by then is its own
+ONSETS = 4  # of one requirement that are judged
 SAME_OFFENCES = {NO_RED_LIGHT_ENTRY: ("red_light",), ON_CARRIAGEWAY: ("off_road", "wrong_direction")}
 
 
@@ -203,18 +215,37 @@ def violations_of(
       artefacts: rules of `ARTEFACT_RULES` that the episode broke, and when it first did, s of the simulator.
     """
     counting = [each for each in requirements if each.name != NO_CONTACT and each.counts == "failure"]
-    violated = [(each, time_s) for each in counting if (time_s := results[each.name].violated_s) is not None]
+    violated = [requirement for requirement in counting if results[requirement.name].violated_s is not None]
     if not violated:
         return ()
-    history, found = gather(), []
-    overlap_s = min((each.time_s for each in overlaps_before_contact(history.evidence)), default=math.inf)
-    released = int(np.searchsorted(history.evidence.time_s, -STEP_S / 2))
-    for requirement, time_s in violated:
-        index = released + round(time_s / STEP_S)
-        verdicts = {rule: artefacts.get(rule, math.inf) > history.frames[index].time_s for rule in RULES}
-        verdicts["solid_bodies"] = time_s < overlap_s
-        found.append(_violation(requirement, results[requirement.name], history, gauge, index, verdicts))
-    return tuple(sorted(found, key=lambda violation: violation.time_s))
+    history, violations = gather(), []
+    overlap_s = min((overlap.time_s for overlap in overlaps_before_contact(history.evidence)), default=math.inf)
+    for requirement in violated:
+        result, frames = results[requirement.name], []
+        for index in _onsets(history, requirements.index(requirement)):
+            time_s = (index - history.evidence.released) * STEP_S
+            verdicts = {rule: artefacts.get(rule, math.inf) > history.frames[index].time_s for rule in RULES}
+            verdicts["solid_bodies"] = time_s < overlap_s
+            frames.append(_violation(requirement, result, history, gauge, index, verdicts))
+            if frames[-1].valid:
+                break
+        violations.append(next((violation for violation in frames if violation.valid), frames[0]))
+    return tuple(sorted(violations, key=lambda violation: violation.time_s))
+
+
+def _onsets(history: History, column: int) -> list[int]:
+    """Lists the frames in which a requirement begins to be violated, at most four.
+
+    One that has lasted since the first second begins once more after 5 s.
+    """
+    released = history.evidence.released
+    violated = np.array([measures.robustness[column] < 0.0 for measures in history.measures])
+    violated[:released] = False
+    begins = violated & ~np.concatenate(([False], violated[:-1]))
+    inherited, ended = (released + round(after_s / STEP_S) for after_s in (AFTER_RELEASE_S, INHERITED_S))
+    if ended < len(violated) and violated[inherited - 1 : ended + 1].all():
+        begins[ended] = True
+    return [int(frame) for frame in np.flatnonzero(begins)[:ONSETS]]
 
 
 def _violation(
@@ -227,46 +258,62 @@ def _violation(
 ) -> Violation:
     """The record of a violation that began in frame `index`."""
     frame, measures, evidence = history.frames[index], history.measures[index], history.evidence.until(index)
+    own_gauge = gauge.of(requirement)
     nearest = _soonest_met(measures)
     met = None
     if nearest is not None:
         column = evidence.column(frame.ids[nearest])
         met = MetActor(column, find_conflict(evidence, column))
+    by_others = met if OF_OTHERS.intersection(own_gauge.signals) else None
+    time_s = float(evidence.time_s[-1])
+    verdicts = {**verdicts, "conflict_after_release": not _inherited(requirement, history, time_s, by_others)}
     driven, broke = manoeuvre(evidence), ego_offences(evidence)
     if requirement.name == NO_RED_LIGHT_ENTRY:  # it may be violated before the line, when the ego cannot stop any more
         broke = tuple(dict.fromkeys(("red_light", *broke)))
-    hidden = met is not None and met.conflict.hidden
-    own_gauge = gauge.of(requirement)
     drivers = kept_by(requirement, own_gauge, history, index, met) if all(verdicts.values()) else {}
     graded = grade(drivers) if drivers else None
-    actor = "nobody near" if nearest is None else _actor(frame, measures, nearest, evidence) + ", hidden" * hidden
     violated = VIOLATED.get(requirement.name, f"{requirement.name} violated")
     others = tuple(name for name in broke if name not in SAME_OFFENCES.get(requirement.name, ()))
+    named = None if by_others is None else nearest
     return Violation(
         requirement=requirement.name,
-        time_s=result.violated_s,
+        time_s=round(time_s, 6),
         robustness=result.robustness,
-        other_id=None if nearest is None else frame.ids[nearest],
-        other_kind=None if nearest is None else Kind(int(frame.kind[nearest])).name.lower(),
-        other_role=None if nearest is None else Role(int(frame.role[nearest])).name.lower(),
+        other_id=None if named is None else frame.ids[named],
+        other_kind=None if named is None else Kind(int(frame.kind[named])).name.lower(),
+        other_role=None if named is None else Role(int(frame.role[named])).name.lower(),
         ego_speed_mps=frame.ego_speed_mps,
         ego_manoeuvre=driven,
-        hidden=hidden,
+        hidden=by_others is not None and by_others.conflict.hidden,
         broke=broke,
         verdicts=verdicts,
         grade=graded,
         drivers=drivers,
-        fault=None if graded is None else _fault(own_gauge.signals, evidence, met, broke, graded),
-        signature=f"{violated}; {ego_in_words(driven, others)}, {actor}",
+        fault=None if graded is None else _fault(evidence, by_others, broke, graded),
+        signature=f"{violated}; {ego_in_words(driven, others)}",
         definitions=DEFINITIONS,
     )
 
 
-def _fault(
-    signals: Sequence[str], evidence: Evidence, met: MetActor | None, broke: Sequence[str], graded: Grade
-) -> Fault:
-    """Judges a violation of a requirement on `signals`; one on the ego's own driving is the ego's."""
-    if met is None or OF_OTHERS.isdisjoint(signals):
+def _inherited(requirement: Requirement, history: History, time_s: float, met: MetActor | None) -> bool:
+    """Whether the ego inherited a violation at the release.
+
+    It did if it was violated within 1 s, if the conflict with the actor that brought it about began within 1 s, or if
+    the signal ahead was yellow or red then and the ego could not stop at leisure any more.
+    """
+    if not begins_after_release(time_s) or (met is not None and not begins_after_release(met.conflict.noticed_s)):
+        return True
+    if requirement.name != NO_RED_LIGHT_ENTRY:
+        return False
+    released = history.evidence.released
+    frames = history.frames[released : released + round(time_s / STEP_S)]
+    stopped = all(frame.signal in (Signal.YELLOW, Signal.RED) for frame in frames)
+    return stopped and inherits_stop(frames[0].ego_speed_mps, frames[0].stop_line_m)
+
+
+def _fault(evidence: Evidence, met: MetActor | None, broke: Sequence[str], graded: Grade) -> Fault:
+    """Judges a violation that `met` brought about; None: one of the ego's own driving, which is the ego's."""
+    if met is None:
         return fault(parts_of_violation(own=True, yields=None, other_broke=(), broke=broke, grade=graded))
     conflict, other = met.conflict, met.column
     other_broke = striker_offences(evidence, other, crossing=conflict.type is ConflictType.CROSSING)
@@ -280,19 +327,3 @@ def _soonest_met(measures: Measures) -> int | None:
     encounter_s = measures.assessment.others[ENCOUNTER]
     nearest = int(encounter_s.argmin())
     return nearest + 1 if encounter_s[nearest] < ENCOUNTER_CAP_S else None
-
-
-def _actor(frame: Frame, measures: Measures, actor: int, evidence: Evidence) -> str:
-    """Names an actor by where it is and drives, the same in the mirror but for crossing traffic."""
-    ahead, aside = (float(measures.assessment.others[row, actor - 1]) for row in (AHEAD, ASIDE))
-    if frame.kind[actor] == Kind.PEDESTRIAN:
-        return "pedestrian near"
-    # From the lane's heading: an ego that leaves the road turns away from it.
-    turn = float(frame.heading_rad[actor] - lane_heading(evidence)[-1])
-    if math.cos(turn) < ONCOMING_COS:
-        return "oncoming vehicle"
-    if math.cos(turn) < SAME_WAY_COS:
-        return f"vehicle from the {'right' if math.sin(turn) > 0.0 else 'left'}"
-    if abs(aside) > (frame.width_m[0] + frame.width_m[actor]) / 2:
-        return "vehicle beside it"
-    return "vehicle ahead" if ahead > 0.0 else "vehicle behind"

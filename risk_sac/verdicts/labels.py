@@ -1,4 +1,7 @@
-"""Severity of a contact: the risk of injury at its closing speed, and the class that follows.
+"""Severity of a contact: the risk of injury at its impact speed, and the class that follows.
+
+The impact speed is taken along the normal of the contact, so that bodies that slide along each other hardly collide.
+Between vehicles it is the speed at which they close; a pedestrian is struck with the vehicle's own speed.
 
 Both curves are logistic, P = 1 / (1 + exp(a - b v)). They hold for a population, not for the one contact, and neither
 knows where the body was struck.
@@ -16,6 +19,7 @@ import math
 import numpy as np
 
 from risk_sac.records import ConflictType, Severity
+from risk_sac.sim.collision import Contact
 from risk_sac.verdicts.conflict import BRAKES_MPS2, Conflict
 from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence, front_moved_across, inside
@@ -29,14 +33,14 @@ MAIS3 = (6.9540, 0.1637)
 # Choice: kerb mass and a load. The types in sumo_nets/vtypes.add.xml have none; one of more than 6 m is a truck.
 CAR_KG, TRUCK_KG, TRUCK_FROM_M = 1500.0, 7500.0, 6.0
 MINOR_MPS = 2.0
-# Choice: one in a hundred. It is reached by a pedestrian at 26 km/h, a car struck by a car at a closing speed of
+# Choice: one in a hundred. It is reached by a pedestrian at 26 km/h, a car struck by a car at an impact speed of
 # 46 km/h, and one struck by a truck at 28 km/h.
 SEVERE_RISK = 0.01
 
 
-def fatality_risk(closing_mps: float) -> float:
+def fatality_risk(impact_mps: float) -> float:
     """Returns the risk that a pedestrian dies of being struck at this speed."""
-    return _logistic(FATALITY, closing_mps * KMH)
+    return _logistic(FATALITY, impact_mps * KMH)
 
 
 def serious_injury_risk(delta_v_mps: float) -> float:
@@ -54,28 +58,26 @@ def delta_v_mps(closing_mps: float, own_kg: float, other_kg: float) -> float:
     return closing_mps * other_kg / (own_kg + other_kg)
 
 
-def severity(closing_mps: float, risk: float, *, pedestrian: bool) -> Severity:
-    """Returns the class of a contact; one with a pedestrian is never minor."""
+def severity(impact_mps: float, risk: float) -> Severity:
+    """Returns the class of a contact."""
     if risk >= SEVERE_RISK:
         return Severity.SEVERE
-    return Severity.MINOR if closing_mps < MINOR_MPS and not pedestrian else Severity.MODERATE
+    return Severity.MINOR if impact_mps < MINOR_MPS else Severity.MODERATE
 
 
-def severity_of(evidence: Evidence, striker: int) -> tuple[Severity, float]:
-    """Returns the class and the risk of injury of the contact in the last frame.
+def impact(evidence: Evidence, striker: int, contact: Contact) -> tuple[float, float]:
+    """Returns the impact speed of a contact, m/s, and the risk of injury.
 
-    Between vehicles it is the risk of whichever is worse off. The closing speed is the whole relative velocity, so the
-    risk is an upper bound where the bodies slide along each other.
+    Between vehicles it is the risk of whichever is worse off. Their masses follow from their lengths: two cars weigh
+    the same.
     """
-    e = evidence
-    closing = math.hypot(*(float(each[-1, striker] - each[-1, 0]) for each in (e.vx_mps, e.vy_mps)))
-    pedestrian = bool(e.kind[striker] == Kind.PEDESTRIAN)
-    if pedestrian:
-        risk = fatality_risk(closing)
-    else:
-        ego_kg, other_kg = (mass_kg(float(e.length_m[actor])) for actor in (0, striker))
-        risk = serious_injury_risk(delta_v_mps(closing, min(ego_kg, other_kg), max(ego_kg, other_kg)))
-    return severity(closing, risk, pedestrian=pedestrian), risk
+    if evidence.kind[striker] == Kind.PEDESTRIAN:
+        own_mps = max(contact.closing_normal_ego_mps, 0.0)
+        return own_mps, fatality_risk(own_mps)
+    closing_mps = max(contact.closing_normal_mps, 0.0)
+    ego_kg, other_kg = (mass_kg(float(evidence.length_m[actor])) for actor in (0, striker))
+    worse_off_mps = delta_v_mps(closing_mps, min(ego_kg, other_kg), max(ego_kg, other_kg))
+    return closing_mps, serious_injury_risk(worse_off_mps)
 
 
 def _logistic(curve: tuple[float, float], speed: float) -> float:

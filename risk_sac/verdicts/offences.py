@@ -12,12 +12,26 @@ from risk_sac.maps.carriageway import ANY_WAY, carriageway_of, sector_of
 from risk_sac.records import ConflictType
 from risk_sac.risk.publish import depths, overtakes
 from risk_sac.verdicts.conflict import Conflict
-from risk_sac.verdicts.course import HORIZON_S, WANDER_M, BodyOnPath, at, time_to_touch, with_margin
+from risk_sac.verdicts.course import (
+    HORIZON_S,
+    MARKING_S,
+    RESPONDS_S,
+    WANDER_M,
+    YIELDING_MPS2,
+    BodyOnPath,
+    at,
+    time_to_touch,
+    with_margin,
+)
+from risk_sac.verdicts.drivers import R157_DELAY_S
 from risk_sac.verdicts.evidence import Evidence, Letters, ego_path, inside, recorded_motion, recorded_size, seen_along
 from risk_sac.world.types import HEADING, LENGTH, SPEED, WIDTH, Bools, Floats, Kind, Role, X, Y
 
 EGO = 0
 JUNCTION_S = 6.0  # the longest way through a junction
+LEAVES_S = 1.0  # a vehicle that has been out of the junction for no longer is still in it
+STOPS = b"ruy"  # signals at which a vehicle has to stop if it can
+EASES_MPS2 = 2.0  # how a driver that is too fast slows down to the limit
 RECENT_S = 3.0
 LOOK_STEPS = 2  # frames between two checks of the ego's position
 SPEEDING_FACTOR = 1.1
@@ -56,9 +70,10 @@ def striker_offences(evidence: Evidence, striker: int, *, crossing: bool) -> tup
 def ego_offences(evidence: Evidence, striker: int | None = None, *, crossing: bool = False) -> tuple[str, ...]:
     """Lists what the ego broke: red_light, priority, wrong_direction, speeding, off_road.
 
-    Priority counts against a striker only; an ego on red had none anyway.
+    Priority counts against a striker only; an ego on red had none anyway. What the ego inherited at the release is no
+    offence: a red light before which it could not stop any more, or a speed that it is reducing.
     """
-    red_light = entered_on(evidence, EGO, RED)
+    red_light = entered_on(evidence, EGO, RED) and not on_inherited_red(evidence)
     priority = False
     if striker is not None and not red_light:
         walks = evidence.kind[striker] == Kind.PEDESTRIAN
@@ -107,8 +122,8 @@ def took_priority(evidence: Evidence, taker: int, other: int) -> bool:
         return False
     if evidence.role[other] == Role.BACKGROUND:
         return True
-    ahead = evidence.link[evidence.since(JUNCTION_S) :, other]
-    shown = ahead[ahead != 0]
+    link = evidence.link[:, other]
+    shown = link[link > 0]
     return bool(len(shown) and int(shown[-1]) in MAJOR)
 
 
@@ -121,9 +136,16 @@ def reverses(evidence: Evidence, striker: int) -> bool:
 
 
 def speeds(evidence: Evidence, actor: int) -> bool:
-    """Whether the vehicle was more than 10 % over the limit in the last 3 s."""
-    fastest = evidence.speed_mps[evidence.since(RECENT_S) :, actor].max()
-    return bool(fastest > SPEEDING_FACTOR * evidence.ground.speed_limit_mps + 1e-6)
+    """Whether the vehicle was more than 10 % over the limit in the last 3 s.
+
+    The ego may be as fast as at the release, less 2 m/s² from 1.15 s after it on.
+    """
+    e, first = evidence, evidence.since(RECENT_S)
+    allowed = np.full(len(e.time_s) - first, SPEEDING_FACTOR * e.ground.speed_limit_mps)
+    if actor == EGO:
+        inherited = e.speed_mps[e.released, EGO] - EASES_MPS2 * np.maximum(e.time_s[first:] - RESPONDS_S, 0.0)
+        allowed = np.maximum(allowed, inherited)
+    return bool((e.speed_mps[first:, actor] > allowed + 1e-6).any())
 
 
 def pedestrian_on_red(evidence: Evidence, striker: int) -> bool:
@@ -146,18 +168,59 @@ def took_crossing(evidence: Evidence, striker: int) -> bool:
 
 
 def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
-    """Whether a vehicle entered a junction on one of these letters in the last 6 s.
+    """Whether a vehicle is in a junction that it entered on one of these letters.
+
+    It is until its whole body has left the junction, however long that takes; where the record does not say where the
+    junction ends, for 6 s.
+    """
+    entered = _entry(evidence, actor, letters)
+    if entered is None:
+        return False
+    x, y, areas = evidence.x_m[entered:, actor], evidence.y_m[entered:, actor], evidence.ground.junctions
+    reach_m = float(evidence.length_m[actor]) / 2
+    heading = evidence.heading_rad[entered:, actor]
+    within = np.zeros(len(x), dtype=np.bool_)
+    for share in (-1.0, 0.0, 1.0):  # rear, middle and front
+        within |= inside(areas, x + share * reach_m * np.cos(heading), y + share * reach_m * np.sin(heading))
+    reached = int(within.argmax())  # the junction begins behind the stop line
+    allowed_s = LEAVES_S if areas else JUNCTION_S
+    return bool(np.count_nonzero(~within[reached:]) * evidence.step_s <= allowed_s + 1e-6)
+
+
+def on_inherited_red(evidence: Evidence) -> bool:
+    """Whether the ego entered on red at a signal that stopped it at the release already, too late to stop.
+
+    It could not stop at leisure any more: with 3.4 m/s² after 0.75 s, from where it was at the release.
+    """
+    e, entered = evidence, _entry(evidence, EGO, RED)
+    if entered is None or entered <= e.released:
+        return False
+    to_line_m = float(
+        np.hypot(np.diff(e.x_m[e.released : entered + 1, EGO]), np.diff(e.y_m[e.released : entered + 1, EGO])).sum()
+    )
+    stopped = np.isin(e.link[e.released : entered, EGO], list(STOPS)).all()
+    return bool(stopped) and inherits_stop(float(e.speed_mps[e.released, EGO]), to_line_m)
+
+
+def inherits_stop(speed_mps: float, to_line_m: float) -> bool:
+    """Whether the way to a stop line is too short to stop at leisure."""
+    return speed_mps * R157_DELAY_S + speed_mps**2 / (2 * YIELDING_MPS2) > to_line_m
+
+
+def _entry(evidence: Evidence, actor: int, letters: bytes) -> int | None:
+    """Finds the frame in which a vehicle last came into a junction on one of these letters; None if in none.
 
     On entry the signal goes from one of these letters to none. A change to another letter is a change of the signal,
     unless the vehicle came into a junction in that step: the letter is then the next junction's.
     """
-    e, first = evidence, evidence.since(JUNCTION_S)
-    link = e.link[first:, actor]
+    e = evidence
+    link = e.link[:, actor]
     shown = _is_any(link[:-1], letters)
     passed = shown & (link[1:] == 0)
-    in_junction = inside(e.ground.junctions, *_front(e, first, actor))
+    in_junction = inside(e.ground.junctions, *_front(e, 0, actor))
     passed |= shown & ~_is_any(link[1:], letters) & in_junction[1:] & ~in_junction[:-1]
-    return bool((passed & (e.speed_mps[first + 1 :, actor] > STANDING_MPS)).any())
+    frames = np.flatnonzero(passed & (e.speed_mps[1:, actor] > STANDING_MPS))
+    return int(frames[-1]) + 1 if len(frames) else None
 
 
 def _stepped_onto_crossing(evidence: Evidence, striker: int) -> int | None:
@@ -181,7 +244,7 @@ def _front(evidence: Evidence, first: int, actor: int) -> tuple[Floats, Floats]:
 
 
 INTRUSION_M = 0.3  # into the ego's lane, from which a cut-in counts
-R157_BRAKES_MPS2, R157_DELAY_S = 6.0, 0.35
+R157_BRAKES_MPS2, R157_CUT_IN_S = 6.0, 0.35
 R157_GAP_M = 2.0  # 5.2.3.3: the least distance to a vehicle ahead at any speed
 CHECKS_MPS2, CHECKS_STEPS = 4.0, 5  # 0.5 s: longer than it takes to come over in front of the ego
 CLEAR_M = 30.0  # a vehicle without any other this near ahead, from its front, brakes for none
@@ -200,19 +263,22 @@ def endangered_ego(evidence: Evidence, striker: int, conflict: Conflict) -> tupl
         return ()
     seen = seen_along(ego_path(evidence), evidence, striker)
     rules = {
-        "unsafe_lane_change": conflict.type is ConflictType.CUT_IN and changes_lane_unsafely(evidence, striker, seen),
+        "unsafe_lane_change": conflict.type is ConflictType.CUT_IN
+        and changes_lane_unsafely(evidence, striker, seen, conflict.frame),
         "brake_check": evidence.role[striker] == Role.ADVERSARY
         and checks_brakes(evidence, striker, seen, conflict.frame),
     }
     return tuple(name for name, did in rules.items() if did)
 
 
-def changes_lane_unsafely(evidence: Evidence, striker: int, seen: BodyOnPath[Floats]) -> bool:
+def changes_lane_unsafely(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], began: int) -> bool:
     """Tells whether a vehicle entered the ego's lane without enough room.
 
-    Beside the ego there is none; ahead of it UN R157 says how much.
+    Beside the ego there is none; ahead of it UN R157 says how much. It moved across within the last 3 s, or from 1 s
+    before the conflict on, which began in frame `began`.
     """
-    if np.ptp(seen.across_m[evidence.since(RECENT_S) :]) <= WANDER_M:  # it kept its place
+    first = min(evidence.since(RECENT_S), max(began - round(MARKING_S / evidence.step_s), 0))
+    if np.ptp(seen.across_m[first:]) <= WANDER_M:  # it kept its place
         return False
     return not enters_safely(evidence, striker, seen, R157_GAP_M)
 
@@ -224,7 +290,7 @@ def enters_safely(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], le
     """
     t = _intrusion(evidence, striker, seen)
     closing = evidence.speed_mps[t, 0] - seen.speed_mps[t]
-    needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_DELAY_S
+    needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_CUT_IN_S
     return bool(seen.gap_m[t] > least_gap_m and seen.ttc_s[t] > needed_s)
 
 

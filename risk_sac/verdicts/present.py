@@ -12,9 +12,11 @@ import numpy as np
 
 from risk_sac.scenario.layout import Area
 from risk_sac.scenario.limits import GRAVITY_MPS2
-from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, KERB_S, SAME_WAY_COS, YIELDING_MPS2
+from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2, KERB_S, SAME_WAY_COS
 from risk_sac.verdicts.course import (
     HORIZON_S,
+    NEAR_S,
+    YIELDING_MPS2,
     MovingBox,
     Path,
     Sides,
@@ -22,6 +24,7 @@ from risk_sac.verdicts.course import (
     entry_distance,
     lane_conflict,
     sides_of,
+    time_to_meet,
     time_to_touch,
     with_margin,
     within,
@@ -32,7 +35,6 @@ from risk_sac.world.geometry import Size
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import ACCEL, HEADING, LENGTH, OFFSET, SPEED, VX, VY, WIDTH, Floats, X, Y
 
-NEAR_S = 1.0  # two vehicles that pass a place no further apart in time are in each other's way
 AHEAD_M = 1.0  # between two foreseen poses
 STANDING_MPS = 0.1
 RED, UNCONTROLLED, YELLOW, GREEN_MINOR = b"ruyg"  # signals at which a driver is expected to stop, or to yield
@@ -98,7 +100,7 @@ def conflict_in(ego: OnPath, state: Floats, i: int, vehicle: bool, link: int, st
     if not vehicle:
         if not soon_walked(street, other):
             return math.inf
-        return time_to_touch(ego.path, ego.s, speed, corridor, other, HORIZON_S)
+        return time_to_meet(ego.path, ego.s, speed, corridor, other)
     seen = along(ego.path, ego.first, ego.s, speed, ego.size, other)
     if math.cos(seen.turn_rad) > SAME_WAY_COS:
         begins, _ = lane_conflict(seen, speed, state[OFFSET, i], state[ACCEL, i], street.lane_width_m, wary)

@@ -26,7 +26,7 @@ from risk_sac.verdicts.evidence import (
     recorded_size,
     seen_along,
 )
-from risk_sac.verdicts.offences import enters_safely
+from risk_sac.verdicts.offences import EASES_MPS2, enters_safely
 from risk_sac.verdicts.rollout import (
     DEFENSIVE,
     FULL_BRAKING,
@@ -186,7 +186,6 @@ def _by_ttc(evidence: Evidence, path: Path, striker: int) -> ReferenceOutcome:
 
 
 NO_RED_LIGHT_ENTRY, ON_CARRIAGEWAY = "no_red_light_entry", "on_carriageway"
-EASES_MPS2 = 2.0  # how a driver that is too fast slows down to the limit
 AFTER_CONTACT_STEPS = 40
 
 
@@ -245,7 +244,7 @@ def _keeps(name: str, gauge: Gauge, history: History, index: int, met: MetActor 
         s, acts = _keeps_by_braking(name, e, path, met, after_steps=AFTER_CONTACT_STEPS * touched)
     fast = np.flatnonzero(e.speed_mps[e.time_s > -STEP_S / 2, 0] > e.ground.speed_limit_mps + 1e-6)
     if len(fast):
-        first = int(np.searchsorted(e.time_s, -STEP_S / 2)) + int(fast[0])
+        first = e.released + int(fast[0])
         s, acts = _within_limit(s, first, e.ground.speed_limit_mps * e.step_s), min(acts, first)
     acts = acts if stays else min(acts, in_lane)
     if acts >= index:  # it acts when it is too late

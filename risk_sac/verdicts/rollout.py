@@ -213,8 +213,7 @@ def driven(evidence: Evidence, path: Path, striker: int | None, conflict_frame: 
     """
     e, last = evidence, len(path.s) - 1
     task, memory = _task(e, path, striker, conflict_frame), nothing_remembered(len(e.ids))
-    released = int(np.searchsorted(e.time_s, -e.step_s / 2))
-    acts = _acts(task, released, latest, memory)
+    acts = _acts(task, e.released, latest, memory)
     if acts == last:
         return path.s.copy(), acts
     if latest < last:

@@ -11,6 +11,7 @@ from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.collision import Contact
 from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.offences import on_inherited_red
 from risk_sac.world.geometry import overlapping_pairs
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import HEADING, LENGTH, WIDTH, Floats, Kind, X, Y
@@ -79,13 +80,18 @@ def artefact_verdicts(evidence: Evidence, striker: int, conflict: Conflict, fact
     return {
         "no_teleport": not facts.teleported,
         "no_spawn_overlap": not any(each.time_s <= RELEASE_S for each in overlaps),
-        # What was there at the adversaries' release they inherited.
-        "conflict_after_release": conflict.noticed_s >= AFTER_RELEASE_S - 1e-6,
+        # What was there at the adversaries' release they and the ego inherited.
+        "conflict_after_release": begins_after_release(conflict.noticed_s) and not on_inherited_red(evidence),
         "inside_limits": facts.inside_limits,
         "inside_grip": inside_grip(evidence, striker),
         "solid_bodies": not any(each.time_s > RELEASE_S for each in overlaps),
         "ego_model_saw": facts.simulator_agrees is not False,
     }
+
+
+def begins_after_release(time_s: float) -> bool:
+    """Whether a conflict or a violation begins late enough after the release to be no inheritance."""
+    return time_s >= AFTER_RELEASE_S - 1e-6
 
 
 def validity_verdicts(evidence: Evidence, striker: int, contact: Contact, facts: EpisodeFacts) -> Mapping[str, bool]:

@@ -237,7 +237,7 @@ def test_a_violation_without_contact_tells_what_the_nearest_actor_did_until_then
     braking = encounter(x_m=20.0, y_m=0.0, accel_mps2=during(0.5, 3.0, -4.0))
     told = story(braking, violation(time_s=1.5, other_id="lead", ego_speed_mps=14.0, broke=("speeding",)))
     assert told == "leader, 20 m ahead, brakes at 4.0 m/s² for 1.1 s; ego at 14 m/s speeding violates never_fast"
-    assert story(braking, violation(time_s=0.0)) == "no other road user near; ego at 9 m/s violates never_fast"
+    assert story(braking, violation(time_s=0.0)) == "ego at 9 m/s violates never_fast"
 
 
 @pytest.mark.parametrize("conflict_s", [0.75, -1.0])

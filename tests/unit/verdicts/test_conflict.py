@@ -13,6 +13,7 @@ from risk_sac.verdicts.conflict import find_conflict, unresponsive
 from risk_sac.verdicts.course import polyline, pose_at, project, towards
 from tests.unit.verdicts.staged import (
     LANE_M,
+    WALKING,
     crossing_car,
     cut_in,
     hangs_over,
@@ -64,12 +65,30 @@ def test_without_recorded_offsets_the_place_across_the_path_decides(found):
     assert found(unknown) == found(evidence)
 
 
-@pytest.mark.parametrize("speed", [9.0, 11.0, 14.0])
-def test_a_pedestrian_counts_within_four_seconds_and_one_of_the_kerb(found, speed):
+@pytest.mark.parametrize(("speed", "before_s"), [(8.5, 1.15 + 8.5 / 3.4), (14.0, 4.0)])
+def test_a_pedestrian_counts_within_the_time_to_stop(found, speed, before_s):
     evidence = pedestrian_crosses(speed=speed, walk=1.4)
     conflict = found(evidence)
     assert conflict.type is ConflictType.PEDESTRIAN
-    assert evidence.time_s[-1] - conflict.time_s == pytest.approx(4.0, abs=0.2)
+    assert evidence.time_s[-1] - conflict.time_s == pytest.approx(before_s, abs=0.2)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_pedestrian_that_would_just_clear_the_way_counts_before_it_stops_in_it(found, side):
+    # It walks at 2 m/s, would be out of the corridor just before the ego comes, and brakes from 2.2 s on.
+    walker = straight(40.0, side * 4.6, -side * math.pi / 2, 2.0, (2.2, -2.8), start_s=0.0)
+    evidence = stage(straight(0.0, 0.0, 0.0, 12.0, start_s=0.0), walker, kinds=WALKING, from_s=0.0)
+    assert evidence.time_s[-1] - found(evidence).time_s > 2.5
+
+
+@pytest.mark.parametrize(("off_m", "rate", "before_s"), [(0.6, 0.0, 0.8), (0.9, 0.0, 2.9)], ids=["in its lane", "over"])
+def test_a_neighbour_is_in_conflict_once_it_is_over_the_line_and_not_while_it_keeps_its_lane(
+    found, off_m, rate, before_s
+):
+    """Level with the ego and as fast; the marking is 0.725 m from its side."""
+    beside = sideways(straight(0.0, LANE_M, 0.0, 12.0), 0.5, -2.0, off_m)
+    evidence = stage(straight(0.0, 0.0, 0.0, 12.0), sideways(beside, 3.0, -1.0, LANE_M - off_m))
+    assert evidence.time_s[-1] - found(evidence).time_s == pytest.approx(before_s, abs=1.0)
 
 
 @pytest.mark.parametrize("seen_from_s", [5.0, 6.0, 7.5])

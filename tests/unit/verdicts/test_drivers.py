@@ -58,7 +58,7 @@ def test_a_command_builds_up_at_its_jerk():
 def situation(
     gap: float, across: float = 0.0, lateral: float = 0.0, speed: float = 20.0, other: float = 10.0
 ) -> Situation:
-    return Situation(BodyOnPath(gap, -gap - 9.2, math.inf, across, 0.0, other, math.inf), speed, 0.0, 0.9, 0.9, lateral)
+    return Situation(BodyOnPath(gap, -gap - 9.2, math.inf, across, 0.0, other, 0.9, 0.0), speed, 0.0, 0.9, 0.9, lateral)
 
 
 # RSS: after = 20 + 0.75·3 = 22.25; (20 + 22.25)·0.375 + 22.25²/12 − 100/12 = 15.844 + 41.255 − 8.333 = 48.765 m.

@@ -6,13 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from risk_sac.records import ConflictType, Fault, Grade
+from risk_sac.records import ConflictType, Fault, Grade, Severity
 from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.fault import Parts, fault, has_to_yield, parts_of_violation
 from risk_sac.verdicts.offences import endangered_ego
+from risk_sac.verdicts.reference import AVOIDED
 from risk_sac.world.types import Kind
+from tests.builders import collision, judgement, violation
 from tests.unit.verdicts.staged import (
     CAR_M,
     LANE_M,
@@ -37,10 +39,11 @@ JUNCTION = (Area.box(50.0, 70.0, -10.0, 10.0),)
 @pytest.mark.parametrize(
     ("parts", "expected"),
     [
-        (Parts(drove_into=True, other_erred=True), Fault.EGO),
-        (Parts(other_erred=True, ego_erred=True), Fault.SHARED),
-        (Parts(other_erred=True), Fault.OTHER),
-        (Parts(other_erred=True, ego_yields=True, left_rss=True), Fault.OTHER),
+        (Parts(other_broke=True, drove_into=True, ego_erred=True), Fault.SHARED),
+        (Parts(drove_into=True, other_yields=True), Fault.EGO),
+        (Parts(other_yields=True, ego_erred=True), Fault.SHARED),
+        (Parts(other_broke=True), Fault.OTHER),
+        (Parts(other_broke=True, ego_yields=True, left_rss=True), Fault.OTHER),
         (Parts(ego_erred=True), Fault.EGO),
         (Parts(ego_yields=True), Fault.EGO),
         (Parts(left_rss=True), Fault.EGO),
@@ -85,6 +88,23 @@ def test_a_violation_without_contact(own, other_broke, grade, expected):
     assert fault(parts) is expected
 
 
+@pytest.mark.parametrize(
+    ("fault", "by", "severity", "counts"),
+    [
+        (Fault.OTHER, "defensive", Severity.MODERATE, False),
+        (Fault.OTHER, "rss", Severity.MODERATE, True),
+        (Fault.OTHER, "rss", Severity.MINOR, False),
+        (Fault.SHARED, "defensive", Severity.MODERATE, True),
+    ],
+)
+def test_what_others_caused_is_a_headline_only_where_a_driver_that_reacts_prevents_it(fault, by, severity, counts):
+    found = collision(judgement=judgement(fault=fault, drivers={by: AVOIDED}, severity=severity))
+    assert found.headline_candidate is counts
+    if severity is not Severity.MINOR:
+        found = violation(grade=Grade.PREVENTABLE, fault=fault, drivers={by: True})
+        assert found.headline_candidate is counts
+
+
 def past_a_pedestrian(accel: float) -> Evidence:
     """A pedestrian stands 0.3 m beside the ego's way and steps on 0.7 s before it; the ego speeds up from 1 s on."""
     ego = straight(0.0, 0.0, 0.0, 8.0, (1.0, accel), start_s=0.0)
@@ -103,16 +123,28 @@ def test_an_ego_that_speeds_up_past_a_pedestrian_it_sees_at_its_way():
 def starts_into(entered_s: float) -> Evidence:
     """The ego stands at 50, a car comes from the right on red, waits at its way from 1 s on, and both start."""
     ego = straight(45.0, 0.0, 0.0, 0.0, (3.0, 2.3))
-    car = straight(60.0, -5.5, math.pi / 2, 0.0, (4.0, 2.5))
+    car = straight(60.0, -20.5, math.pi / 2, 6.0, (0.0, -3.0), (4.0, 2.5))
     evidence = stage(ego, car, ground=replace(STREET, junctions=JUNCTION))
     link = np.zeros_like(evidence.link)
     link[evidence.time_s < entered_s, 1] = ord("r")
     return replace(evidence, link=link)
 
 
-def test_an_ego_that_stands_and_starts_into_a_crossing_car_it_sees():
-    found = judged(starts_into(entered_s=1.0))
-    assert (found.ego_part.started, found.fault, found.ego_response) == (True, Fault.EGO, "starting")
+@pytest.mark.parametrize(("red", "expected"), [(True, Fault.SHARED), (False, Fault.EGO)])
+def test_an_ego_that_stands_and_starts_into_a_crossing_car_it_sees(red, expected):
+    evidence = starts_into(entered_s=1.0)
+    found = judged(evidence if red else replace(evidence, link=np.zeros_like(evidence.link)))
+    assert (found.ego_part.started, found.fault, found.ego_response) == (True, expected, "starting")
+
+
+@pytest.mark.parametrize(("letter", "expected"), [("", Fault.OTHER), ("g", Fault.EGO)], ids=["none", "had to yield"])
+def test_a_crossing_car_that_runs_into_the_egos_rear_half(letter, expected):
+    """The ego's middle is 1.7 m beyond the other's when the two touch."""
+    evidence = crossing_car(other=9.0, ahead=-6.0)
+    link = np.zeros_like(evidence.link)
+    link[evidence.time_s < 3.0, 0], link[evidence.time_s < 3.0, 1] = ord(letter) if letter else 0, ord("G")
+    evidence = replace(evidence, link=link, ground=replace(STREET, junctions=JUNCTION))
+    assert judged(evidence).fault is expected
 
 
 def test_a_car_that_runs_a_red_light_into_an_ego_that_has_just_started():

@@ -75,6 +75,37 @@ def test_what_crossing_traffic_passed_its_stop_line_on(link, expected):
     assert labels(crossing(GREEN, link)) == expected
 
 
+def dawdles(out_of_it: bool) -> Evidence:
+    """It passes its stop line on red at 1.2 s and creeps for 9 s; `out_of_it`: the junction ends 9 m before the ego."""
+    creeping = straight(60.0, -20.0, math.pi / 2, 10.0, (1.0, -10.0), (1.92, 0.0), start_s=0.0)
+    evidence = stage(straight(0.0, 0.0, 0.0, 5.6, start_s=0.0), creeping, from_s=0.0, until_s=20.0)
+    evidence = with_links(evidence, GREEN, [(0.0, "r"), (1.2, "")])
+    if out_of_it:
+        evidence = replace(evidence, ground=replace(evidence.ground, junctions=(Area.box(45.0, 75.0, -15.0, -9.0),)))
+    return evidence
+
+
+def test_a_striker_on_red_stays_on_red_until_it_has_left_the_junction():
+    assert dawdles(False).time_s[-1] > 8.0
+    assert labels(dawdles(False)) == ("red_light",)
+    assert labels(dawdles(True)) == ()
+
+
+@pytest.mark.parametrize(("release_x_m", "expected"), [(20.0, ()), (0.0, ("red_light",))])
+def test_a_red_light_before_which_the_ego_could_not_stop_at_the_release_is_no_offence(release_x_m, expected):
+    """Its line is at 45 m; at 12 m/s it takes 30 m to stop at leisure."""
+    ego = straight(release_x_m, 0.0, 0.0, 12.0, start_s=0.0)
+    evidence = stage(ego, straight(60.0, 0.0, 0.0, 2.0, start_s=0.0), from_s=0.0)
+    passes_s = (45.0 - 2.3 - release_x_m) / 12.0
+    assert of_ego(with_links(evidence, [(0.0, "r"), (passes_s + 0.1, "")], [])) == expected
+
+
+@pytest.mark.parametrize(("braking", "expected"), [(2.5, ()), (0.0, ("speeding",))])
+def test_a_speed_that_the_ego_inherited_is_no_offence_while_it_slows_down(braking, expected):
+    ego = straight(0.0, 0.0, 0.0, 17.0, (0.5, -braking), start_s=0.0)
+    assert of_ego(stage(ego, straight(44.0, 0.0, 0.0, 0.0, start_s=0.0), from_s=0.0)) == expected
+
+
 @pytest.mark.parametrize("ego", [[(0.0, "g"), (3.5, "")], [(0.0, "r"), (3.5, "")], []])
 def test_priority_takes_an_ego_that_had_it(ego):
     assert labels(crossing(ego, [(0.0, "g"), (3.5, "")])) == ()

@@ -67,8 +67,11 @@ def test_a_leader_that_brakes_hard():
 
 @pytest.mark.parametrize("mirror", [1, -1])
 def test_a_neighbour_that_comes_over(mirror):
-    now = frame((12.0, 2.8, 0.0, 7.0, CAR), mirror=mirror)
-    assert in_conflict(moved(now, lane_offset_m=[0.0, mirror * -0.5]))
+    now = frame((12.0, 2.8, 0.0, 7.0, CAR), mirror=mirror)  # its side is 0.225 m from the marking
+    comes = moved(now, lane_offset_m=[0.0, mirror * -0.5])
+    assert in_conflict(moved(comes, vy_mps=np.array([0.0, mirror * -0.3])))
+    assert not in_conflict(moved(comes, vy_mps=np.array([0.0, mirror * -0.2])))
+    assert in_conflict(moved(now, y_m=now.y_m * 2.5 / 2.8, lane_offset_m=[0.0, mirror * -0.8]))  # over the marking
     assert not in_conflict(moved(now, y_m=now.y_m * 3.0 / 2.8, lane_offset_m=[0.0, mirror * -0.3]))
 
 

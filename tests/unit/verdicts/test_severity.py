@@ -15,6 +15,7 @@ from risk_sac.verdicts.validity import Overlap, overlaps_before_contact
 from risk_sac.world.types import Kind
 from tests.unit.verdicts.recorded import recorded
 from tests.unit.verdicts.staged import (
+    LANE_M,
     STREET,
     WALKING,
     crossing_car,
@@ -22,6 +23,7 @@ from tests.unit.verdicts.staged import (
     leader_brakes,
     mirrored,
     pedestrian_crosses,
+    sideways,
     stage,
     straight,
 )
@@ -37,18 +39,16 @@ def test_a_pedestrian_dies_as_often_as_was_published():
 
 
 @pytest.mark.parametrize(
-    ("closing_mps", "risk", "pedestrian", "expected"),
+    ("impact_mps", "risk", "expected"),
     [
-        (1.99, 0.001, False, Severity.MINOR),
-        (2.0, 0.001, False, Severity.MODERATE),
-        (0.0, 0.001, True, Severity.MODERATE),
-        (12.0, 0.0099, False, Severity.MODERATE),
-        (12.0, 0.01, False, Severity.SEVERE),
-        (12.0, 0.01, True, Severity.SEVERE),
+        (1.99, 0.001, Severity.MINOR),
+        (2.0, 0.001, Severity.MODERATE),
+        (12.0, 0.0099, Severity.MODERATE),
+        (12.0, 0.01, Severity.SEVERE),
     ],
 )
-def test_classes_at_their_edges(closing_mps, risk, pedestrian, expected):
-    assert severity(closing_mps, risk, pedestrian=pedestrian) is expected
+def test_classes_at_their_edges(impact_mps, risk, expected):
+    assert severity(impact_mps, risk) is expected
 
 
 def follows(closing_mps: float) -> Evidence:
@@ -61,17 +61,29 @@ def stands_in_the_way(speed: float) -> Evidence:
     return stage(straight(0.0, 0.0, 0.0, speed), walker, kinds=WALKING)
 
 
+def runs_into_a_rolling_car() -> Evidence:
+    """A pedestrian that runs at 4 m/s at the front of a car that rolls at 0.6 m/s."""
+    return stage(straight(0.0, 0.0, 0.0, 0.6), straight(20.0, 0.2, math.pi, 4.0), kinds=WALKING)
+
+
+def slides_along() -> Evidence:
+    """A car that is 8 m/s slower comes over into the ego's flank at 1 m/s."""
+    return stage(straight(0.0, 0.0, 0.0, 14.0), sideways(straight(36.0, LANE_M, 0.0, 6.0), 1.5, -1.0, LANE_M))
+
+
 @pytest.mark.parametrize(
     ("evidence", "expected"),
     [
         (follows(1.5), Severity.MINOR),
         (follows(3.0), Severity.MODERATE),
         (leader_brakes(), Severity.SEVERE),
-        (crossing_car(), Severity.SEVERE),  # 17 m/s
-        (crossing_car(ego=6.0, other=6.0), Severity.MODERATE),
+        (crossing_car(), Severity.MODERATE),  # closing at 17 m/s, 12 m/s of it along the normal
+        (crossing_car(ego=13.5, other=6.0), Severity.SEVERE),
         (pedestrian_crosses(), Severity.SEVERE),
         (stands_in_the_way(6.0), Severity.MODERATE),
-        (stands_in_the_way(1.0), Severity.MODERATE),
+        (stands_in_the_way(1.0), Severity.MINOR),
+        (runs_into_a_rolling_car(), Severity.MINOR),
+        (slides_along(), Severity.MINOR),
     ],
 )
 def test_a_contact_says_how_bad_it_is(evidence, expected):
@@ -136,17 +148,19 @@ class Expected(NamedTuple):
 
 
 NAMED = {
-    # It passes a pedestrian on red that stands 0.5 m beside its way and speeds up, then brakes for 0.4 s.
-    "dense_267": Expected(Fault.EGO, Grade.PREVENTABLE, "braking", Severity.MODERATE),
-    # It stops in its turn, sees the crossing car for 7.7 s, and starts into it.
-    "dense_263": Expected(Fault.EGO, Grade.PREVENTABLE, "starting", Severity.MODERATE),
-    # It passes a vehicle that stops at an unsignalled crossing, at 14 m/s; a pedestrian comes from behind that vehicle.
-    "mixed_71": Expected(Fault.EGO, Grade.PREVENTABLE, "braking", Severity.MODERATE),
+    # It passes a pedestrian on red that stands 0.5 m beside its way and speeds up, then brakes for 0.4 s. The
+    # pedestrian walks into its flank.
+    "dense_267": Expected(Fault.SHARED, Grade.PREVENTABLE, "accelerating", Severity.MINOR),
+    # It stops in its turn, sees the crossing car, which came on red, for 7.7 s, and starts into it.
+    "dense_263": Expected(Fault.SHARED, Grade.PREVENTABLE, "starting", Severity.MODERATE),
+    # It passes a vehicle that stops at an unsignalled crossing, at 14 m/s; a pedestrian comes from behind that
+    # vehicle, and walks into its flank.
+    "mixed_71": Expected(Fault.EGO, Grade.PREVENTABLE, "braking", Severity.MINOR),
     # Two vehicles side by side creep at 2 m/s, and their flanks touch.
-    "mixed_294": Expected(Fault.OTHER, Grade.FULL_BRAKING, "braking", Severity.MINOR),
-    # A vehicle that overtakes comes over from alongside, twice; the ego rolls on, or brakes late.
-    "low_267": Expected(Fault.SHARED, Grade.PREVENTABLE, "none", Severity.MODERATE),
-    "low_198": Expected(Fault.SHARED, Grade.PREVENTABLE, "late_braking", Severity.MODERATE),
+    "mixed_294": Expected(Fault.OTHER, Grade.UNAVOIDABLE, "braking", Severity.MINOR),
+    # A vehicle that overtakes comes over from alongside, twice; the ego rolls on, or brakes late. Their flanks touch.
+    "low_267": Expected(Fault.SHARED, Grade.PREVENTABLE, "none", Severity.MINOR),
+    "low_198": Expected(Fault.SHARED, Grade.PREVENTABLE, "late_braking", Severity.MINOR),
 }
 
 

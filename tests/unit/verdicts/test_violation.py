@@ -76,7 +76,7 @@ def test_a_careful_driver_keeps_a_distance_that_the_ego_did_not():
     assert found.grade is Grade.PREVENTABLE
     assert set(found.drivers) == {"r157", "fsm", "rss", "defensive", "full_braking"}
     assert (found.other_id, found.other_kind, found.other_role) == ("actor_1", "vehicle", "adversary")
-    assert found.signature == "own violated; ego goes straight, vehicle ahead"
+    assert found.signature == "own violated; ego goes straight"
     assert found.time_s == pytest.approx(3.75, abs=0.15)  # it stands 10 m ahead at 3.15 s
     assert found.robustness < 0.0
     assert (found.broke, found.hidden, found.valid, found.fault) == ((), False, True, Fault.SHARED)  # a brake check
@@ -129,6 +129,34 @@ def test_a_reference_driver_stops_at_red_where_it_can(yellow_m, red_m, grade):
     link[:, 0] = [ord("r") if signal is Signal.RED else 0 for signal, _ in shown]
     found = violated(replace(evidence, link=link), NO_RED, shown)
     assert found.grade is grade
-    assert found.signature == "red light entered; ego goes straight, nobody near"
+    assert found.signature == "red light entered; ego goes straight"
     assert found.broke == ("red_light",)
     assert found.fault is (Fault.EGO if grade is Grade.PREVENTABLE else Fault.OTHER)
+
+
+@pytest.mark.parametrize(("red_m", "valid"), [(38.0, True), (25.0, False)])
+def test_a_red_light_that_the_ego_could_not_stop_at_when_it_was_handed_over_is_inherited(red_m, valid):
+    """It takes 30 m at 12 m/s to stop at leisure."""
+    ego, far = straight(0.0, 0.0, 0.0, 12.0), straight(500.0, 0.0, 0.0, 12.0)
+    evidence = staged(ego, far)
+    shown = to_line(evidence, 1.5 * 12.0 + CAR_M[0] / 2 + red_m, 200.0, 200.0)
+    found = violated(evidence, NO_RED, shown)
+    assert (found.valid, found.verdicts["conflict_after_release"]) == (valid, valid)
+    assert (found.other_id, found.grade) == (None, Grade.PREVENTABLE if valid else None)
+
+
+SLOW = own("ego_speed_mps <= 10")
+
+
+@pytest.mark.parametrize(
+    ("changes", "valid", "time_s"),
+    [
+        (((0.0, -2.0),), False, 0.0),  # it slows down at once
+        (((0.0, -2.0), (3.0, 2.0)), True, 5.0),  # at 3 s it has 6 m/s, and speeds up again
+        ((), True, 5.0),  # it never slows down
+    ],
+)
+def test_a_speed_that_was_inherited_counts_once_it_is_the_egos_own(changes, valid, time_s):
+    found = violated(staged(straight(0.0, 0.0, 0.0, 12.0, *changes), straight(500.0, 0.0, 0.0, 12.0)), SLOW)
+    assert (found.valid, found.other_id) == (valid, None)
+    assert found.time_s == pytest.approx(time_s, abs=0.2)

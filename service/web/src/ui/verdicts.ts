@@ -89,7 +89,7 @@ function braked(after_s: number | null, by: string): string {
 const RULES: Record<string, string> = {
   no_teleport: "the simulator made a road user jump",
   no_spawn_overlap: "two bodies overlapped before the release",
-  conflict_after_release: "the conflict began less than 1 s after the release",
+  conflict_after_release: "the ego inherited the conflict, or a red light, at the release",
   inside_limits: "an adversary left its limits",
   inside_grip: "the striker drove beyond the road's grip",
   solid_bodies: "two bodies overlapped before the contact",

@@ -66,8 +66,8 @@ export function happenedOf(violation: Collision | Violation): string {
 export function violationOf({ requirement, time_s, robustness, ego_speed_mps, other_id, other_role, other_kind, hidden }: Violation): string {
   const when = `${number(time_s, 1)} s after the release, at ${number(ego_speed_mps, 1)} m/s`;
   const least = `The least robustness was ${number(robustness, 2)} scales.`;
-  const near = other_id === null ? "The ego was on course to meet no other road user then." : `The ego would have met the ${other_role} ${other_kind} ${other_id} soonest then${hidden ? ", of which it knew nothing" : ""}.`;
-  return `The ego violated ${words(requirement)} ${when}. ${least} ${near}`;
+  const near = other_id === null ? "" : ` The ego would have met the ${other_role} ${other_kind} ${other_id} soonest then${hidden ? ", of which it knew nothing" : ""}.`;
+  return `The ego violated ${words(requirement)} ${when}. ${least}${near}`;
 }
 
 /** The other requirements that the episode violated, and those that are only reported. */
@@ -97,7 +97,8 @@ function severityInWords({ relative_speed_mps, other_kind, judgement }: Collisio
   const closing = `The closing speed was ${number(relative_speed_mps, 1)} m/s`;
   if (judgement?.severity == null || judgement.injury_risk == null) return `${closing}.`;
   const harm = other_kind === "pedestrian" ? "death" : "serious injury";
-  return `${closing}: ${judgement.severity}, with a risk of ${harm} of ${number(100 * judgement.injury_risk, 1)} %.`;
+  const impact = `${judgement.severity}, for the impact speed was ${number(judgement.impact_mps, 1)} m/s, with a risk of ${harm}`;
+  return `${closing}: ${impact} of ${number(100 * judgement.injury_risk, 1)} %.`;
 }
 
 export function conflictOf({ conflict_type, conflict_s, position, hidden }: Judgement, { time_s, visible_for_s }: Collision): string {
