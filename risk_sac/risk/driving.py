@@ -113,14 +113,16 @@ class RoadUserFeature:
     words: str  # the sentence, with {value}
     source: str
     spread: HasTails | None = None  # None: measured on SUMO's drivers
+    event: str = ""  # features of one event, such as a lane change, are no independent evidence; "": its own
 
     @property
     def published(self) -> bool:
         """Whether its distribution is a published one."""
-        return self.spread is not None
+        return self.spread is not None and self.source != CHOICE
 
 
 SUMO = "SUMO's drivers, measured"
+CHOICE = "choice: no distribution is published, and SUMO's pedestrians stand in undisturbed scenes"
 
 _ROWS = (
     RoadUserFeature(
@@ -129,8 +131,9 @@ _ROWS = (
         per="stop",
         unlikely="above",
         words="brakes by {value:.1f} m/s²",
-        # Lognormal of mean 3.27 m/s² whose 1 of 822 quantiles are near the extremes, 1.51 and 7.47 m/s².
-        source="Evaluation of Driver Deceleration Behavior at Signalized Intersections, TRR 2018, 2007: 821 stops at yellow",
+        # Lognormal of mean 3.27 m/s² whose 1 of 822 quantiles are near the extremes, 1.51 and 7.47 m/s². It is the mean
+        # deceleration of a stop there, the mean of 0.5 s here.
+        source="Evaluation of Driver Deceleration Behavior at Signalized Intersections 2007, TRID 01049374: 821 stops",
         spread=LognormalSpread(3.16, 0.264),
     ),
     RoadUserFeature(
@@ -161,6 +164,7 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="lane_change_duration",
+        event="lane change",
         unit="s",
         per="lane change",
         unlikely="below",
@@ -171,6 +175,7 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="lane_change_gap",
+        event="lane change",
         unit="m",
         per="lane change",
         unlikely="below",
@@ -181,6 +186,7 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="lane_change_headway",
+        event="lane change",
         unit="s",
         per="lane change",
         unlikely="below",
@@ -191,6 +197,7 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="lane_change_ttc",
+        event="lane change",
         unit="s",
         per="lane change",
         unlikely="below",
@@ -199,6 +206,7 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="lateral_speed",
+        event="lane change",
         unit="m/s",
         per="lane change",
         unlikely="above",
@@ -233,6 +241,7 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="junction_gap",
+        event="entry",
         unit="s",
         per="turn that has to yield",
         unlikely="below",
@@ -243,12 +252,13 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="red_entry",
+        event="entry",
         unit="s",
         per="approach to a signal that turns red",
         unlikely="above",
         words="enters {value:.1f} s after the start of red",
-        # 6 to 29 of 100,000 crossing vehicles enter on red, 6 % of them after 2 s and 3 % after 5 s. Choice: 1 of 100 of
-        # those near the line at yellow; half of all vehicles meet red; after 5 s it falls to a tenth within 20 s.
+        # 6 to 29 of 100,000 crossing vehicles enter on red, 6 % of them after 2 s and 3 % after 5 s. Choice: 1 of 100
+        # of those near the line at yellow does; half of all vehicles meet red; after 5 s it falls to a tenth in 20 s.
         source="Yang and Najm 2006, DOT HS 810 580: 47,000 entries on red",
         spread=UpperTail((0.0, 2.0, 5.0, 25.0), (1e-2, 6e-4, 2e-5, 2e-6)),
     ),
@@ -266,7 +276,7 @@ _ROWS = (
         per="crossing",
         unlikely="above",
         words="walks at {value:.1f} m/s",
-        source="Weidmann 1993, Transporttechnik der Fussgänger; 1.36 and 0.24 m/s in TRR 1705, 2000",
+        source="Weidmann 1993, Transporttechnik der Fussgänger; Fugger, Randles et al. 2000 measure N(1.36, 0.24)",
         spread=NormalSpread(1.34, 0.26),
     ),
     RoadUserFeature(
@@ -276,7 +286,7 @@ _ROWS = (
         unlikely="above",
         words="starts walking by {value:.1f} m/s²",
         # 0.14 ± 0.09 g.
-        source="Analysis of Pedestrian Gait and Perception-Reaction at Signal-Controlled Crosswalks, TRR 1705, 2000",
+        source="Fugger, Randles et al. 2000, pedestrian gait at signal-controlled crosswalks: 288 subjects",
         spread=NormalSpread(1.37, 0.88),
     ),
     RoadUserFeature(
@@ -289,6 +299,7 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="crossing_gap",
+        event="step onto the road",
         unit="s",
         per="crossing without priority",
         unlikely="below",
@@ -303,7 +314,8 @@ _ROWS = (
         per="crossing",
         unlikely="above",
         words="walks towards the car for {value:.1f} s",
-        source=SUMO,
+        source=CHOICE,
+        spread=UpperTail((0.0, 1.0, 4.0), (0.1, 0.01, 1e-4)),
     ),
     RoadUserFeature(
         name="stop_in_way",
@@ -311,10 +323,12 @@ _ROWS = (
         per="crossing",
         unlikely="above",
         words="stands in the car's way for {value:.1f} s",
-        source=SUMO,
+        source=CHOICE,
+        spread=UpperTail((0.0, 1.0, 4.0), (0.1, 0.03, 1e-3)),
     ),
     RoadUserFeature(
         name="walks_on_red",
+        event="step onto the road",
         unit="s",
         per="crossing at a signal",
         unlikely="above",
