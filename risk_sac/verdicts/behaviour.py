@@ -19,9 +19,9 @@ MOVES_MPS, STANDS_MPS, DRIVES_MPS = 0.5, 0.3, 5.0
 SAME_SPEED_MPS = 1.0
 SAME_WAY_COS = 0.866  # 30 degrees
 TOWARDS_COS = 0.707  # 45 degrees
-NEAR_M, CLEAR_M, MEETS_M = 30.0, 30.0, 2.5
+NEAR_M, CLEAR_M, MEETS_M = 30.0, 30.0, 2.0
 BESIDE = (0.4, 1.1)  # of a lane's width: where the next vehicle of the lane beside is when a line is crossed
-RED, YIELDS = b"ru", b"g"
+RED, YIELDS, MAJOR = b"ru", b"g", b"G"
 LONGEST_S = 10.0  # a time beyond which none is unlikely
 
 
@@ -94,12 +94,12 @@ def _lines(
     for first, last in runs(over > 0.0):
         crosses = first + np.flatnonzero(jumps[first:last])
         until = int(crosses[0]) if len(crosses) else last
-        time_s = float(e.time_s[frames[first]])
-        yield Observed(actor, "over_line", (until - first) * e.step_s, time_s)
+        yield Observed(actor, "over_line", (until - first) * e.step_s, float(e.time_s[frames[first]]))
         enters = first + np.flatnonzero(over[first:last] > OVER_M)
         if first == 0 or not len(enters) or not (len(crosses) or last == len(frames)):
             continue  # it came so from the release, or went back
         at, around = int(enters[0]), slice(max(first - window, 0), last + window)
+        time_s = float(e.time_s[frames[at]])
         moving = smoothed(lateral[around], window)
         fastest = float(moving.max()) if len(moving) else float(lateral[around].mean())
         yield Observed(actor, "lateral_speed", float(lateral[around].max()), time_s)
@@ -170,21 +170,19 @@ def _junctions(
 
 
 def _arrives_after(e: Evidence, actor: int, frame: int) -> float | None:
-    """Finds after how long the first other vehicle comes to where the actor has been since `frame`, s; None: never."""
+    """Finds after how long a vehicle with priority comes to where the actor has been since `frame`, s; None: never."""
     x, y = e.x_m[frame:, actor], e.y_m[frame:, actor]
     soonest = None
     for other in np.flatnonzero(e.kind == Kind.VEHICLE).tolist():
-        if other == actor:
+        if (
+            other == actor
+            or int(np.nan_to_num(e.link[frame, other])) not in MAJOR
+            or e.speed_mps[frame, other] < MOVES_MPS
+        ):
             continue
         ox, oy = e.x_m[frame:, other], e.y_m[frame:, other]
-        crosses = np.abs(np.sin(e.heading_rad[frame, other] - e.heading_rad[frame, actor])) > 0.5 or bool(
-            np.cos(e.heading_rad[frame, other] - e.heading_rad[frame, actor]) < -SAME_WAY_COS
-        )
-        if not crosses or not e.speed_mps[frame, other] > MOVES_MPS:
-            continue
-        near = np.hypot(ox[:, None] - x, oy[:, None] - y) < MEETS_M
-        arrives = np.flatnonzero(near.any(axis=1))
-        if len(arrives) and near[0].sum() == 0:
+        arrives = np.flatnonzero((np.hypot(ox[:, None] - x, oy[:, None] - y) < MEETS_M).any(axis=1))
+        if len(arrives) and arrives[0] > 0:
             gap_s = float(arrives[0]) * e.step_s
             soonest = gap_s if soonest is None else min(soonest, gap_s)
     return soonest
