@@ -312,7 +312,8 @@ _ROWS = (
         per="crossings",
         unlikely="above",
         words="turns by {value:.1f} rad/s",
-        source=SUMO,
+        source=CHOICE,
+        spread=UpperTail((0.0, 0.5, 2.0), (1.0, 0.1, 1e-3)),
     ),
     RoadUserFeature(
         name="crossing_gap",

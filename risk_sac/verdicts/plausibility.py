@@ -1,8 +1,8 @@
 """Judges how likely road users do what the adversaries of a recording did.
 
-Two probabilities decide, and the less likely counts. The first is the least of all features', corrected for their number
-(Holm 1979): traffic of many honest actors stays ordinary. The second is of all of them together, by the truncated
-product (Zaykin et al. 2002): an adversary that stays just inside every threshold does not.
+Two probabilities decide, and the less likely counts. The first is the least of all features', corrected for their
+number (Holm 1979): traffic of many honest actors stays ordinary. The second is of all of them together, by the
+truncated product (Zaykin et al. 2002): an adversary that stays just inside every threshold does not stay ordinary.
 
 Choice: events are independent, such as three stops of one driver; features of one event count once, by the least
 likely. A feature without a published distribution makes a failure rare at most.
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from risk_sac.records import BehaviourFact, Plausibility, PlausibilityClass
-from risk_sac.risk.driving import FEATURES, HasTails, LowerTail, UpperTail, tail_probability
+from risk_sac.risk.driving import FEATURES, LEAST, HasTails, LowerTail, UpperTail, tail_probability
 from risk_sac.verdicts.behaviour import Observed, observed_of
 from risk_sac.verdicts.evidence import Evidence
 
@@ -72,9 +72,11 @@ def in_words(fact: BehaviourFact) -> str:
     """Returns, e.g., "left changes lane 0.2 s before the next vehicle: 1 of 3,000 lane changes"."""
     feature = FEATURES[fact.feature]
     one_in = 1.0 / fact.probability
-    digits = 1 - math.floor(math.log10(one_in)) if one_in > 10 else 0
+    digits = 1 - math.floor(math.log10(one_in)) if one_in > 10.0 else 0
+    at_most = "at most " if fact.probability <= LEAST else ""
     by = "" if fact.published else " of SUMO's drivers" if feature.spread is None else " (assumed)"
-    return f"{fact.actor} {feature.words.format(value=fact.value)}: 1 of {round(one_in, digits):,.0f} {feature.per}{by}"
+    share = f"{at_most}1 of {round(one_in, digits):,.0f} {feature.per}{by}"
+    return f"{fact.actor} {feature.words.format(value=fact.value)}: {share}"
 
 
 @cache

@@ -39,9 +39,8 @@ def observe(env: RiskSacEnv, seed: int) -> str:
     while not (over or contact):
         _, _, _, over, info = env.step(idle)
         contact = info["collision"].other_id if "collision" in info else ""
-    observed = [
-        (each.actor, each.feature, round(each.value, 4), round(each.time_s, 1)) for each in observed_of(env.evidence())
-    ]
+    features = observed_of(env.evidence())
+    observed = [(each.actor, each.feature, round(each.value, 4), round(each.time_s, 1)) for each in features]
     return json.dumps({"seed": seed, "contact": contact, "observed": observed})
 
 
