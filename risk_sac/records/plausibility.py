@@ -47,6 +47,11 @@ class Plausibility(Record):
     """The least likely feature in words; empty if no adversary acted."""
 
     @property
+    def in_words(self) -> str:
+        """Such as "rare: left brakes by 7.0 m/s²: 1 of 970 stops"."""
+        return f"{self.verdict}: {self.sentence}" if self.sentence else f"{self.verdict}"
+
+    @property
     def plausible(self) -> bool:
         """Whether it is ordinary or rare."""
         return self.verdict is not PlausibilityClass.IMPLAUSIBLE
