@@ -98,7 +98,9 @@ def _probability(observed: Observed, traffic: Undisturbed) -> Judged:
 
 def _least(judged: Sequence[Judged]) -> float:
     """Least probability, corrected for the number of features; the first step of Holm's procedure."""
-    return min(1.0, len(judged) * min((each.probability for each in judged), default=1.0))
+    if not judged:
+        return 1.0
+    return min(1.0, len(judged) * min(each.probability for each in judged))
 
 
 def _joint(judged: Sequence[Judged], scale: float) -> float:
@@ -177,8 +179,8 @@ def _facts(judged: Sequence[Judged], ids: Sequence[str]) -> tuple[BehaviourFact,
             BehaviourFact(
                 actor=ids[actor],
                 feature=name,
-                value=worst.observed.value,
-                time_s=worst.observed.time_s,
+                value=round(worst.observed.value, 3),
+                time_s=round(worst.observed.time_s, 3),
                 times=len(alike),
                 probability=worst.probability,
                 published=worst.published,
