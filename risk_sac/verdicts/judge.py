@@ -17,6 +17,7 @@ from risk_sac.verdicts.evidence import Evidence, recorded_contact
 from risk_sac.verdicts.fault import ego_part, fault, has_to_yield, parts_of_contact, parts_of_violation
 from risk_sac.verdicts.labels import ego_in_words, ground, impact, manoeuvre, response, severity, signature
 from risk_sac.verdicts.offences import ego_offences, endangered_ego, inherits_stop, striker_offences
+from risk_sac.verdicts.plausibility import plausibility_of
 from risk_sac.verdicts.reference import (
     NO_RED_LIGHT_ENTRY,
     ON_CARRIAGEWAY,
@@ -140,6 +141,7 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
                 contact_x_m=contact.x_m,
             )
         ),
+        plausibility=plausibility_of(evidence) if valid else None,
         signature=signature(
             evidence,
             striker,
@@ -290,6 +292,7 @@ def _violation(
         grade=graded,
         drivers=drivers,
         fault=None if graded is None else _fault(evidence, by_others, broke, graded),
+        plausibility=None if graded is None else plausibility_of(evidence),
         signature=f"{violated}; {ego_in_words(driven, others)}",
         definitions=DEFINITIONS,
     )
