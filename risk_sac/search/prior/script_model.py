@@ -56,7 +56,8 @@ Reflect = Callable[[Floats], Floats]
 class ScriptModel:
     """Members, the kinds that they tell apart, and the training egos.
 
-    With `reflect`, a prediction is the mean over a point and its mirror image: the training data favour one side.
+    With `reflect`, a prediction is that of a point or of its mirror image, whichever fails more surely. Choice: not
+    their mean. The training data strike from one side, so the mean would favour points where both neighbours strike.
     """
 
     def __init__(
@@ -99,7 +100,9 @@ class ScriptModel:
         if self._reflect is not None:
             sides = points, self._reflect(points.astype(np.float64))
             own, other = (ScriptModel(self.members, self.kinds, self.egos).predict(side, belief) for side in sides)
-            return Prediction(*(((a + b) / 2).astype(np.float32) for a, b in zip(own, other, strict=True)))
+            taken = own.fails >= other.fails
+            heads = (np.where(taken, *of_sides) for of_sides in zip(own[:2], other[:2], strict=True))
+            return Prediction(*heads, np.where(taken[:, None], own.kinds, other.kinds))
         beliefs = np.broadcast_to(belief, (len(points), len(self.egos)))
         inputs = torch.as_tensor(np.concatenate([points, beliefs], 1), dtype=torch.float32)
         logits = torch.stack([member(inputs) for member in self.members])
