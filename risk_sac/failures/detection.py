@@ -30,8 +30,8 @@ def detected(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Collision
     """Returns the failure of an episode that detects its ego's defects; None without one.
 
     It is one of `candidates`, and a defect changed a command before the contact. The same ego without its defects
-    keeps `MARGIN_M` when the adversaries repeat their recorded motions, see `least_clearance_m`, and no artefact of
-    the simulator speaks against that.
+    keeps `MARGIN_M` when the adversaries repeat their recorded motions, see `least_clearance_m`. Then it has no valid
+    contact, and no artefact of the simulator.
 
     Raises:
       SimulationError: SUMO failed in the repetition.
@@ -43,7 +43,9 @@ def detected(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Collision
         sound = without_defects(spec, episode, series)
     except InfeasibleScene:
         return None
-    if any(violation.artefact for violation in sound.found):
+    if any(
+        violation.artefact or (violation.valid and violation.requirement == NO_CONTACT) for violation in sound.found
+    ):
         return None
     return failures[0] if least_clearance_m(sound.series) >= MARGIN_M else None
 
@@ -74,24 +76,27 @@ def without_defects(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Pl
 def least_clearance_m(series: Series) -> float:
     """Computes how near an ego comes to what is ahead of it or beside it, from the release on, m.
 
-    A body that comes within `MARGIN_M` does not count while it is so near if it then lies behind the ego's rear, or
-    if the ego has stood for `STOOD_S`: the ego has no part in that.
+    A body does not count while it lies behind the ego's rear. One that comes within `MARGIN_M` of the rear in the ego's
+    own track, or of an ego that has stood for `STOOD_S`, does not count either while it stays so near.
 
     Args:
       series: time series of an episode, `T` frames and `n` actors, the ego first; NaN where an actor is absent.
     """
-    gap_m, behind = _surroundings(series)
-    least, excused = np.inf, behind | _stood(series)[:, None]
+    gap_m, behind, follows = _surroundings(series)
+    least, excused = np.inf, follows | _stood(series)[:, None]
     for actor in range(gap_m.shape[1]):
         near = gap_m[:, actor] < MARGIN_M
         begins = np.maximum.accumulate(np.where(near & ~np.roll(near, 1), np.arange(len(near)), 0))
-        counts = np.where(near, ~excused[begins, actor], ~behind[:, actor])
+        counts = ~behind[:, actor] & ~(near & excused[begins, actor])
         least = min(least, gap_m[counts, actor].min(initial=np.inf))
     return float(least)
 
 
-def _surroundings(series: Series) -> tuple[Floats, Bools]:
-    """Returns the gap to each other actor, and whether it lies behind the ego's rear, both `t x (n - 1)`."""
+def _surroundings(series: Series) -> tuple[Floats, Bools, Bools]:
+    """Returns the gap to each other actor, whether it lies behind the ego's rear, and whether in the ego's track there.
+
+    Each is `t x (n - 1)`.
+    """
     time_s = _times(series)
     bodies = np.zeros((len(time_s), ROWS, len(series["ids"])))
     for actor in range(bodies.shape[2]):
@@ -100,13 +105,16 @@ def _surroundings(series: Series) -> tuple[Floats, Bools]:
         bodies[:, X, actor], bodies[:, Y, actor], bodies[:, HEADING, actor] = *at[:2], np.arctan2(at[3], at[2])
     bodies[:, LENGTH], bodies[:, WIDTH] = series["length_m"], series["width_m"]
     gap_m = np.full((len(time_s), bodies.shape[2] - 1), np.inf)
-    behind = np.zeros(gap_m.shape, np.bool_)
+    behind, follows = np.zeros(gap_m.shape, np.bool_), np.zeros(gap_m.shape, np.bool_)
     for moment, state in enumerate(bodies):
         there = np.flatnonzero(np.isfinite(state[X]))
         view = frame_view(np.ascontiguousarray(state[:, there]))
         gap_m[moment, there[1:] - 1] = view.gap
-        behind[moment, there[1:] - 1] = corners(view)[0].max(axis=0) < -view.ego_half_length
-    return gap_m, behind
+        ahead, aside = corners(view)
+        behind[moment, there[1:] - 1] = ahead.max(axis=0) < -view.ego_half_length
+        in_track = (aside.min(axis=0) < view.ego_half_width) & (aside.max(axis=0) > -view.ego_half_width)
+        follows[moment, there[1:] - 1] = in_track
+    return gap_m, behind, follows & behind
 
 
 def _times(series: Series) -> Floats:

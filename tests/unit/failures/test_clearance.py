@@ -44,6 +44,12 @@ def test_what_drives_up_from_behind_does_not_count(y_m: float):
     assert least_clearance_m(behind) == np.inf
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_car_that_overtakes_counts_once_it_is_beside(side: float):
+    overtakes = scene(10.0, lambda t: 14.0 * t - 8.0, lambda t: np.full_like(t, side * (WIDTH_M + 0.3)))
+    assert least_clearance_m(overtakes) == pytest.approx(0.3)
+
+
 def test_a_body_that_reaches_a_standing_ego_counts_only_within_its_first_second():
     def comes(at_s: float) -> Series:
         return scene(
