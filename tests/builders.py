@@ -12,12 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.records import (
+    BehaviourFact,
     Collision,
     ConflictType,
     EpisodeRecord,
     Grade,
     Judgement,
     Outcome,
+    Plausibility,
+    PlausibilityClass,
     ReferenceOutcome,
     RunMetrics,
     Severity,
@@ -144,9 +147,24 @@ def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, 
         },
         "ego_part": None,
         "fault": None,
+        "plausibility": None if grade is None else plausibility(),
         "signature": "cut-in, straight",
     }
     return Judgement(grade=grade, conflict_s=conflict_s, **(values | changes))
+
+
+def plausibility(verdict: PlausibilityClass = PlausibilityClass.ORDINARY, **changes: Any) -> Plausibility:
+    """Of an adversary that brakes by 5.0 m/s² once; its probabilities do not follow from the verdict."""
+    braking = BehaviourFact(
+        actor="lead", feature="braking", value=5.0, time_s=2.0, times=1, probability=0.04, published=True
+    )
+    values: dict[str, Any] = {
+        "least_probability": 0.2,
+        "joint_probability": 0.3,
+        "facts": (braking,),
+        "sentence": "lead brakes by 5.0 m/s²: 1 of 25 stops",
+    }
+    return Plausibility(verdict=verdict, **(values | changes))
 
 
 def collision(**changes: Any) -> Collision:
@@ -193,6 +211,7 @@ def violation(**changes: Any) -> Violation:
         "grade": None,
         "drivers": {},
         "fault": None,
+        "plausibility": None if changes.get("grade") is None else plausibility(),
         "signature": "never_fast violated; straight",
         "definitions": 1,
     }

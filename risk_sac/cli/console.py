@@ -200,14 +200,15 @@ def offences(violation: Collision | Violation) -> Iterator[str]:
     yield from (f"{actor}: {in_words(broke)}" for actor, broke in broken.items() if broke)
 
 
-OUTCOME = "outcome\ngrade\nseverity\nfault\ndriven by"
+OUTCOME = "outcome\ngrade\nplausibility\nseverity\nfault\ndriven by"
 
 
 def outcome(episode: EpisodeRecord, violation: Collision | Violation) -> str:
     """The cell below `OUTCOME`, with as many lines as there are."""
     severity = violation.severity if isinstance(violation, Collision) else None
     fault = f"fault: {violation.blamed}" if violation.blamed else None
-    lines = (episode.outcome, violation.graded, severity, fault, episode.driven_by)
+    plausibility = None if violation.behaviour is None else violation.behaviour.verdict
+    lines = (episode.outcome, violation.graded, plausibility, severity, fault, episode.driven_by)
     return "\n".join(str(line) for line in lines if line)
 
 

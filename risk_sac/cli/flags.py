@@ -17,7 +17,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import notes
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.finder import FINDERS, Map
-from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Fault, Grade, Severity, Violation
+from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Fault, Grade, PlausibilityClass, Severity, Violation
 from risk_sac.run_folder.durable import scratch_folder
 from risk_sac.verdicts.distinct import DistinctFailures
 
@@ -164,6 +164,10 @@ def _severity(worst: Worst) -> Severity | None:
     return worst.severity if isinstance(worst, Collision) else None
 
 
+def _plausibility(worst: Worst) -> PlausibilityClass | None:
+    return None if worst.behaviour is None else worst.behaviour.verdict
+
+
 def _broke(worst: Worst) -> Sequence[str]:
     if isinstance(worst, Violation):
         return worst.broke
@@ -172,6 +176,9 @@ def _broke(worst: Worst) -> Sequence[str]:
 
 FILTERS: Mapping[str, Filter] = {
     "grade": Filter("of this grade", lambda _, worst, wanted: worst.graded == wanted, [*Grade]),
+    "plausibility": Filter(
+        "as plausible as this", lambda _, worst, wanted: _plausibility(worst) == wanted, [*PlausibilityClass]
+    ),
     "severity": Filter("of this severity", lambda _, worst, wanted: _severity(worst) == wanted, [*Severity]),
     "fault": Filter("caused by this party", lambda _, worst, wanted: worst.blamed == wanted, [*Fault]),
     "driven_by": Filter("whose adversaries this drove", lambda each, _, wanted: each.driven_by == wanted, [*DrivenBy]),
@@ -185,17 +192,17 @@ FILTERS: Mapping[str, Filter] = {
 }
 
 
-def _gravest(worst: Worst) -> tuple[int, bool, bool]:
+def _gravest(worst: Worst) -> tuple[bool, int, bool, bool]:
     severity = _severity(worst)
     rank = [*Severity].index(severity) if severity else -1
-    return -rank, not worst.preventable, worst.blamed is not Fault.EGO
+    return not worst.plausible, -rank, not worst.preventable, worst.blamed is not Fault.EGO
 
 
 SORTS: Mapping[str, Callable[[Worst], Any]] = {
     "severity": _gravest,
     "speed": lambda worst: -worst.ego_speed_mps,
 }
-SORTED_BY = "found (the order of the search), severity (the worst first) or speed (the fastest ego first)"
+SORTED_BY = "found (the order of the search), severity (plausible and worst first) or speed (the fastest ego first)"
 
 
 def add_filter_flags(parser: Parser) -> None:

@@ -169,7 +169,8 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
         "failures of any requirement": f"{metrics.failures}",
         "distinct violations": f"{metrics.distinct_failures}",
         "distinct and preventable": f"{metrics.distinct_preventable}",
-        "of these, not minor": f"{metrics.headline_candidates}",
+        "of these, plausible and not minor": f"{metrics.headline_candidates}",
+        "not minor, but implausible": f"{metrics.implausible}",
         **dict(_figure(metric, metrics) for metric in shown),
         "steps per distinct failure": or_dash(metrics.steps_per_distinct_failure, ".0f"),
     }

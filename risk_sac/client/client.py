@@ -22,6 +22,7 @@ from risk_sac.records import (
     Fault,
     Grade,
     Page,
+    PlausibilityClass,
     Power,
     Record,
     Results,
@@ -156,6 +157,7 @@ class Client:
         tier: Literal["valid", "raw"] = "valid",
         requirement: str | None = None,
         grade: Grade | None = None,
+        plausibility: PlausibilityClass | None = None,
         severity: Severity | None = None,
         fault: Fault | None = None,
         driven_by: DrivenBy | None = None,
@@ -165,7 +167,8 @@ class Client:
     ) -> Iterator[Episode]:
         """Failures in the order of their arrival; read page by page as far as they are asked for."""
         query: Query = {"run": run, "tier": tier, "requirement": requirement, "grade": grade, "broke": broke}
-        query |= {"severity": severity, "fault": fault, "driven_by": driven_by, "signature": signature, "limit": page}
+        query |= {"plausibility": plausibility, "severity": severity, "fault": fault, "driven_by": driven_by}
+        query |= {"signature": signature, "limit": page}
         return self._items(EpisodePage, f"{_path(campaign_id)}/failures", query)
 
     def failure(self, campaign_id: str, failure_id: str) -> Failure:

@@ -54,6 +54,8 @@ def _contact(collision: Collision) -> Iterator[str]:
     yield judgement.signature
     yield collision.severity_in_words
     yield f"{began(collision)}{_grade(collision)}"
+    if judgement.plausibility is not None:
+        yield judgement.plausibility.in_words
     if judgement.ego_part is not None:
         yield f"fault: {judgement.fault} · the ego {ego_did(judgement.ego_part)}"
     yield (

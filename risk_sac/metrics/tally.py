@@ -111,6 +111,7 @@ class Tally(Counts):
     contacts_by_second: list[int] = Field(default_factory=list)
     """The same by the second of the contact."""
     _candidates: DistinctFailures = PrivateAttr(default_factory=DistinctFailures)
+    _implausible: DistinctFailures = PrivateAttr(default_factory=DistinctFailures)
     _newest: deque[tuple[bool, bool]] = PrivateAttr(default_factory=lambda: deque(maxlen=WINDOW))
     _spread: Spread = PrivateAttr(default_factory=Spread)
     _requirements: dict[str, RequirementTally] = PrivateAttr(default_factory=dict)
@@ -177,6 +178,7 @@ class Tally(Counts):
             self.distinct_failures += new
             self.distinct_preventable += new_preventable  # whichever of its kind came first
             self.headline_candidates += violation.headline_candidate and self._candidates.add(violation)
+            self.implausible += violation.serious and not violation.plausible and self._implausible.add(violation)
             self.signatures[violation.signature] += 1
 
     def _requirement(self, name: str, counts: str) -> RequirementTally:

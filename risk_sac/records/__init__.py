@@ -44,6 +44,7 @@ from risk_sac.records.judgement import (
     ReferenceOutcome,
     Severity,
 )
+from risk_sac.records.plausibility import BehaviourFact, Plausibility, PlausibilityClass
 from risk_sac.records.run import (
     FINAL,
     Counts,

@@ -87,7 +87,7 @@ class Progress(Record):
     """Of the i.i.d. phase too, if there is one; what follows the totals is of the searches alone."""
     episodes_total: int
     headline: int | None = None
-    """Distinct, preventable, not minor, the same when replayed; each kind once. Null before a replay."""
+    """Distinct, preventable, plausible, not minor, the same when replayed; each kind once. Null before a replay."""
     failures: int
     """Episodes with a valid violation of a requirement that counts."""
     raw_collisions: int
@@ -100,7 +100,9 @@ class Progress(Record):
     distinct_preventable: int
     """The distinct ones among them; sum over the runs."""
     headline_candidates: int = 0
-    """Those without minor contacts."""
+    """Those that are plausible and not minor."""
+    implausible: int = 0
+    """Those that are not minor, but implausible; they are in no headline."""
     headline_waiting: int = 0
     """Candidates in runs that were not replayed yet."""
     window_ecr: OptionalReal

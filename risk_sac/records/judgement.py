@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 
 from risk_sac.records.base import Real, Record
+from risk_sac.records.plausibility import Plausibility
 
 
 class ConflictType(StrEnum):
@@ -142,5 +143,7 @@ class Judgement(Record):
     """What the ego did about the striker. Null where the contact is not valid."""
     fault: Fault | None
     """ego | shared | other. Null where the contact is not valid."""
+    plausibility: Plausibility | None
+    """How likely road users do what the adversaries did. Null where the contact is not valid."""
     signature: str
     """The class of failures it belongs to, in words; what differs in it is distinct."""

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from risk_sac.records.base import Least, Real, Record
 from risk_sac.records.judgement import Fault, Grade, Judgement, Severity
+from risk_sac.records.plausibility import Plausibility
 
 REPEATS = "repeats"  # rule that a violation fails if its replay goes another way; asked of nothing else
 # Rules among a collision's verdicts that are about the simulator or the control, not about fault.
@@ -58,6 +59,11 @@ class Violated(Record, ABC):
 
     @property
     @abstractmethod
+    def behaviour(self) -> Plausibility | None:
+        """How plausible its adversaries' behaviour is; None where it is not valid."""
+
+    @property
+    @abstractmethod
     def prevention(self) -> Mapping[str, bool]:
         """Reference driver → whether it would have prevented it; empty where none was asked."""
 
@@ -67,9 +73,19 @@ class Violated(Record, ABC):
         return self.valid and self.graded is Grade.PREVENTABLE
 
     @property
-    def headline_candidate(self) -> bool:
-        """Whether it is preventable and not minor: a headline failure once its replay is the same."""
+    def serious(self) -> bool:
+        """Whether it is preventable and not minor."""
         return self.preventable
+
+    @property
+    def plausible(self) -> bool:
+        """Whether it is valid and road users do what its adversaries did, though it may be rare."""
+        return self.behaviour is not None and self.behaviour.plausible
+
+    @property
+    def headline_candidate(self) -> bool:
+        """Whether it is serious and plausible: a headline failure once its replay is the same."""
+        return self.serious and self.plausible
 
     @property
     def avoidable(self) -> bool:
@@ -105,6 +121,8 @@ class Violation(Violated):
     """Reference driver → whether it keeps the requirement in the same encounter; empty where it is not valid."""
     fault: Fault | None
     """ego | shared | other. Null where it is not valid."""
+    plausibility: Plausibility | None
+    """How likely road users do what the adversaries did up to then. Null where it is not valid."""
     signature: str
     """Its class of failures, in words."""
     definitions: int
@@ -119,6 +137,11 @@ class Violation(Violated):
     def blamed(self) -> Fault | None:
         """See `Violated.blamed`."""
         return self.fault
+
+    @property
+    def behaviour(self) -> Plausibility | None:
+        """See `Violated.behaviour`."""
+        return self.plausibility
 
     @property
     def prevention(self) -> Mapping[str, bool]:
@@ -196,6 +219,11 @@ class Collision(Violated):
         return self.judgement.fault
 
     @property
+    def behaviour(self) -> Plausibility | None:
+        """See `Violated.behaviour`."""
+        return self.judgement.plausibility
+
+    @property
     def prevention(self) -> Mapping[str, bool]:
         """See `Violated.prevention`."""
         return {name: driver.avoids for name, driver in self.judgement.drivers.items()}
@@ -206,8 +234,8 @@ class Collision(Violated):
         return self.judgement.severity
 
     @property
-    def headline_candidate(self) -> bool:
-        """See `Violated.headline_candidate`."""
+    def serious(self) -> bool:
+        """See `Violated.serious`."""
         return self.preventable and self.severity is not Severity.MINOR
 
     @property
@@ -237,5 +265,12 @@ def valid_violations(collision: Collision | None, violations: Sequence[Violation
 
 
 def worst_of(violations: Sequence[Collision | Violation]) -> Collision | Violation | None:
-    """Returns the valid violation that counts most: for the headline, then a preventable one, then the first."""
-    return max(violations, key=lambda violation: (violation.headline_candidate, violation.preventable), default=None)
+    """Returns the valid violation that counts most.
+
+    One for the headline comes first, then a serious one, then a preventable one, then the first.
+    """
+
+    def rank(violation: Collision | Violation) -> tuple[bool, bool, bool]:
+        return violation.headline_candidate, violation.serious, violation.preventable
+
+    return max(violations, key=rank, default=None)

@@ -17,6 +17,7 @@ from risk_sac.verdicts.evidence import Evidence, lane_heading
 from risk_sac.verdicts.fault import ego_part, fault, has_to_yield, parts_of_contact, parts_of_violation
 from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, ground, manoeuvre, response, severity_of, signature
 from risk_sac.verdicts.offences import ego_offences, endangered_ego, striker_offences
+from risk_sac.verdicts.plausibility import plausibility_of
 from risk_sac.verdicts.reference import (
     NO_RED_LIGHT_ENTRY,
     ON_CARRIAGEWAY,
@@ -130,6 +131,7 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
                 lasted_s=float(evidence.time_s[-1]) - conflict.time_s,
             )
         ),
+        plausibility=plausibility_of(evidence) if valid else None,
         signature=signature(
             evidence,
             striker,
@@ -257,6 +259,7 @@ def _violation(
         grade=graded,
         drivers=drivers,
         fault=None if graded is None else _fault(own_gauge.signals, evidence, met, broke, graded),
+        plausibility=None if graded is None else plausibility_of(evidence),
         signature=f"{violated}; {ego_in_words(driven, others)}, {actor}",
         definitions=DEFINITIONS,
     )

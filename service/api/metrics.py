@@ -38,11 +38,15 @@ COUNTERS = {
     ),
     "headline_candidates": (
         "risk_sac_headline_candidates",
-        "Distinct preventable violations that are no minor contacts.",
+        "Distinct preventable violations that are plausible and no minor contacts.",
+    ),
+    "implausible": (
+        "risk_sac_implausible_failures",
+        "Distinct preventable violations that are no minor contacts, but implausible.",
     ),
     "headline": (
         "risk_sac_headline_failures",
-        "Of these, those whose replay was the same; of each run by itself.",
+        "Candidates whose replay was the same; of each run by itself.",
     ),
 }
 # The funnel of each requirement; by the column that is summed up.

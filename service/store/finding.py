@@ -9,7 +9,7 @@ from operator import attrgetter
 from sqlalchemy import ColumnElement, Select, select
 from sqlalchemy.orm import Session
 
-from risk_sac.records import DrivenBy, Episode, EpisodeId, Fault, Grade, Outcome, Severity
+from risk_sac.records import DrivenBy, Episode, EpisodeId, Fault, Grade, Outcome, PlausibilityClass, Severity
 from service.errors import NotFoundError
 from service.store.stored import StoredPage, read_episode
 from service.store.tables import CampaignRow, EpisodeRow, RunRow, TriageRow
@@ -23,6 +23,7 @@ class Judged:
     valid: bool = False
     """Whether the requirement must be what makes the episode a failure, and not only violated in it."""
     grade: Grade | None = None
+    plausibility: PlausibilityClass | None = None
     severity: Severity | None = None
     fault: Fault | None = None
     driven_by: DrivenBy | None = None
@@ -36,7 +37,7 @@ class Judged:
         if self.requirement is not None:
             column = EpisodeRow.failed if self.valid else EpisodeRow.violated
             yield column.contains(f",{self.requirement},", autoescape=True)
-        for name in ("grade", "severity", "fault", "driven_by", "signature"):
+        for name in ("grade", "plausibility", "severity", "fault", "driven_by", "signature"):
             if (wanted := getattr(self, name)) is not None:
                 yield getattr(EpisodeRow, name) == wanted
         if self.broke is not None:

@@ -77,6 +77,7 @@ class StoredRun(Run, RunResult):
     repetitions: Mapping[int, Repetition]
     """Of its distinct failures, by index of the episode; none if not replayed."""
     headline_candidates: int = 0
+    implausible: int = 0
     pace_s: float | None = None
     """Wall time of an episode of late, s, without the start of the worker and compilation; None before the second."""
 

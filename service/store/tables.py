@@ -19,6 +19,7 @@ TALLIED = (
     "preventable",
     "distinct_preventable",
     "headline_candidates",
+    "implausible",
     "headline",
 )
 
@@ -96,6 +97,7 @@ class RunRow(Base):
     preventable: Mapped[int] = mapped_column(default=0)
     distinct_preventable: Mapped[int] = mapped_column(default=0)
     headline_candidates: Mapped[int] = mapped_column(default=0)
+    implausible: Mapped[int] = mapped_column(default=0)
     headline: Mapped[int | None]  # null before its failures were replayed
     busy_s: Mapped[float] = mapped_column(default=0.0)
     pace_s: Mapped[float | None]  # mean of its newest episodes; null before the second one
@@ -153,6 +155,7 @@ class EpisodeRow(Base):
     violated: Mapped[str | None]  # requirements that were, between commas: ",safe_ttc,no_contact,"
     failed: Mapped[str | None]  # of these, those that make it a failure
     grade: Mapped[str | None]  # of a valid failure
+    plausibility: Mapped[str | None]  # of a valid failure
     severity: Mapped[str | None]  # of its contact
     fault: Mapped[str | None]  # of a valid failure
     signature: Mapped[str | None]  # of the violation that names the episode

@@ -15,6 +15,7 @@ from risk_sac.records import (
     Fault,
     Grade,
     Phase,
+    PlausibilityClass,
     Real,
     Record,
     Severity,
@@ -83,7 +84,7 @@ class FailureTable(Record):
     """Failures by columns: each list has an entry per failure, in order of arrival.
 
     An episode that violates several requirements is one failure. A violation for the headline names it, else a
-    preventable one, else a contact, else the first.
+    preventable one that is not minor, else a preventable one, else a contact, else the first.
     Numbers are rounded to four decimals; the failure itself has all of them. Times count from the adversaries' release.
     """
 
@@ -105,6 +106,10 @@ class FailureTable(Record):
     """All requirements that count and were validly violated."""
     grade: list[Grade | None]
     """Null where it is not valid."""
+    plausibility: list[PlausibilityClass | None]
+    """How likely road users do what the adversaries did; null like `grade`."""
+    unlikely: list[str]
+    """The least likely thing that an adversary did, in words; empty where there is none."""
     severity: list[Severity | None]
     """Null without contact."""
     injury_risk: list[Real]
@@ -210,7 +215,10 @@ def _row(run: StoredRun, record: EpisodeRecord, worst: Collision | Violation) ->
     else:
         row |= {"min_ttc_s": worst.early_min_ttc_s, "min_robustness": worst.early_min_robustness}
     row |= {name: getattr(worst, name, None) for name in (*OF_ANY, *OF_CONTACT)}
+    behaviour = worst.behaviour
     return row | {
+        "plausibility": None if behaviour is None else behaviour.verdict,
+        "unlikely": "" if behaviour is None else behaviour.sentence,
         "ids": record.id_in(run.id),
         "run_ids": run.id,
         "families": run.family,

@@ -163,6 +163,7 @@ def _violation(violation: Violation) -> Iterator[str]:
     )
     yield f"  kind       {violation.signature}"
     yield f"  grade      {_grade(violation)}"
+    yield from _plausible(violation)
     if violation.fault:
         yield f"  fault      {violation.fault}"
     yield f"  the ego    broke {in_words(violation.broke) or 'nothing'}"
@@ -170,6 +171,11 @@ def _violation(violation: Violation) -> Iterator[str]:
 
 def _grade(violation: Collision | Violation) -> str:
     return violation.graded or "none: it is not valid"
+
+
+def _plausible(violation: Collision | Violation) -> Iterator[str]:
+    if violation.behaviour is not None:
+        yield f"  plausible  {violation.behaviour.in_words}"
 
 
 def _contact(collision: Collision) -> Iterator[str]:
@@ -181,6 +187,7 @@ def _contact(collision: Collision) -> Iterator[str]:
     judgement = collision.judgement
     yield f"  kind       {judgement.signature}"
     yield f"  grade      {_grade(collision)}"
+    yield from _plausible(collision)
     yield f"  severity   {collision.severity_in_words}"
     if judgement.fault:
         yield f"  fault      {judgement.fault}"

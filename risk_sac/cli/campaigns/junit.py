@@ -62,7 +62,8 @@ def _case(run: RunResult, named: str) -> TestCase:
             f"headline failures: {headline(metrics.headline, metrics.headline_candidates)}; "
             f"{counted(metrics.raw_collisions, 'contact')}, {metrics.collisions} valid; "
             f"{counted(metrics.failures, 'failure')}; {counted(metrics.distinct_failures, 'distinct violation')}, "
-            f"{metrics.distinct_preventable} preventable, {metrics.headline_candidates} of them not minor"
+            f"{metrics.distinct_preventable} preventable, of them {metrics.headline_candidates} plausible and not "
+            f"minor, {metrics.implausible} implausible"
         )
         case.add_property("funnel", funnel)
     if named:

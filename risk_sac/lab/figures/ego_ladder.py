@@ -4,7 +4,7 @@
 
 plays what OUT lacks, seed by seed, and writes OUT/ladder.csv and OUT/ladder.md from the runs that have ended. A run
 ends with the episode in which it has spent its steps; without its ladder.json it is counted again, by the rules of now.
-A headline failure is distinct, preventable, not minor, and was the same again in a process of its own.
+A headline failure is distinct, preventable, plausible, not minor, and was the same again in a process of its own.
 """
 
 import argparse

@@ -81,7 +81,7 @@ class ScriptEpisode:
     steps: int
     kind: str = ""  # of the valid violation; empty without one
     preventable: bool = False
-    candidate: bool = False  # for the headline: preventable and not minor
+    candidate: bool = False  # for the headline: preventable, plausible and not minor
 
 
 @dataclass(slots=True)

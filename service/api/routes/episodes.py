@@ -17,6 +17,7 @@ from risk_sac.records import (
     Fault,
     Grade,
     Outcome,
+    PlausibilityClass,
     Severity,
     Triage,
     TriageState,
@@ -113,6 +114,9 @@ def list_failures(
     ] = None,
     requirement: AskedRequirement = None,
     grade: Annotated[Grade | None, Query(description="Only failures of this grade.")] = None,
+    plausibility: Annotated[
+        PlausibilityClass | None, Query(description="Only those whose adversaries are as plausible as this.")
+    ] = None,
     severity: Annotated[Severity | None, Query(description="Only contacts as bad as this.")] = None,
     fault: Annotated[Fault | None, Query(description="Only those that this party caused.")] = None,
     driven_by: AskedDrivenBy = None,
@@ -136,6 +140,7 @@ def list_failures(
             requirement=requirement,
             valid=tier == "valid",
             grade=grade,
+            plausibility=plausibility,
             severity=severity,
             fault=fault,
             driven_by=driven_by,

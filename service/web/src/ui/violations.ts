@@ -30,12 +30,18 @@ export function validOf({ outcome, collision, violations }: Recorded): (Collisio
 export function worstOf(episode: Recorded): Collision | Violation | null {
   const valid = validOf(episode);
   const preventable = valid.filter((violation) => gradeOf(violation) === "preventable");
-  const candidate = preventable.find((violation) => severityOf(violation) !== "minor");
-  return candidate ?? preventable[0] ?? valid[0] ?? episode.collision ?? episode.violations[0] ?? null;
+  const serious = preventable.filter((violation) => severityOf(violation) !== "minor");
+  const candidate = serious.find((violation) => plausibilityOf(violation)?.verdict !== "implausible");
+  return candidate ?? serious[0] ?? preventable[0] ?? valid[0] ?? episode.collision ?? episode.violations[0] ?? null;
 }
 
 export function gradeOf(violation: Collision | Violation): Body<"Grade"> | null {
   return isContact(violation) ? violation.judgement.grade : violation.grade;
+}
+
+/** How likely road users do what the adversaries did; null where that was not judged. */
+export function plausibilityOf(violation: Collision | Violation): Body<"Plausibility"> | null {
+  return (isContact(violation) ? violation.judgement?.plausibility : violation.plausibility) ?? null;
 }
 
 /** Null without contact. */

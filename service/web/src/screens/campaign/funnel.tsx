@@ -1,4 +1,4 @@
-/** The funnel failures -> distinct -> preventable -> not minor -> headline over all requirements that count, as bars to one scale. */
+/** The funnel failures -> distinct -> preventable -> plausible -> headline over all requirements that count, as bars to one scale. */
 
 import { count } from "../../ui/text";
 
@@ -7,6 +7,7 @@ export interface Counts {
   distinct_failures: number;
   distinct_preventable: number;
   headline_candidates: number;
+  implausible: number;
   headline: number | null;
 }
 
@@ -14,7 +15,7 @@ const STEPS = [
   ["failures", "failures", "Episodes with a valid violation of a requirement that counts; a contact violates one, too."],
   ["distinct_failures", "distinct", "Violations of each kind once, per run."],
   ["distinct_preventable", "preventable", "Distinct ones that a reference driver would have prevented."],
-  ["headline_candidates", "not minor", "Preventable ones that are no minor contacts."],
+  ["headline_candidates", "plausible", "Preventable ones that are no minor contacts, and whose adversaries do what road users do."],
   ["headline", "headline", "Those that went the same way when replayed; what several runs found alike counts once."],
 ] as const;
 
@@ -36,6 +37,14 @@ export function Funnel({ counts, most = Math.max(counts.failures, counts.distinc
           </li>
         );
       })}
+      {counts.implausible > 0 && (
+        <li key="implausible" title="Preventable ones that are no minor contacts, but whose adversaries do what no road user does. They are in no headline.">
+          <span class="stage-word">implausible</span>
+          <span class="stage-room" />
+          <b data-count="implausible">{count(counts.implausible)}</b>
+          <span class="stage-share" />
+        </li>
+      )}
     </ol>
   );
 }

@@ -50,7 +50,7 @@ export function CampaignScreen({ id }: { id: string }) {
           <Funnel counts={progress} />
           {campaign.runs.length > 1 && (
             <p class="stage-note small faint">
-              Distinct, preventable and not minor are summed over the runs; headline counts what several runs found alike once.
+              Distinct, preventable, plausible and implausible are summed over the runs; headline counts what several runs found alike once.
             </p>
           )}
         </section>

@@ -20,7 +20,7 @@ const HEADS: { column: Column; title: string; number?: boolean; hint?: string }[
     column: "headline",
     title: "Head\u00adline",
     number: true,
-    hint: "distinct, preventable and not minor failures that went the same way when replayed; what several runs found alike counts once",
+    hint: "distinct, preventable, plausible and not minor failures that went the same way when replayed; what several runs found alike counts once",
   },
   { column: "distinct", title: "Distinct", number: true, hint: "distinct valid failures, summed over the runs" },
   {

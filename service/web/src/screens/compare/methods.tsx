@@ -23,7 +23,7 @@ export function Methods({ what, family, rows }: Compared) {
         <thead>
           <tr>
             <th scope="col">{what}</th>
-            <th scope="col" title="distinct, preventable, not minor, and the same when replayed; each kind once over the runs">
+            <th scope="col" title="distinct, preventable, plausible, not minor, and the same when replayed; each kind once over the runs">
               Headline
             </th>
             <th scope="col">Distinct</th>

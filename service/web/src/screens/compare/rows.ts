@@ -22,6 +22,7 @@ export interface Row {
   distinct_failures: number;
   distinct_preventable: number;
   headline_candidates: number;
+  implausible: number;
   /** Each kind once over the row's runs; null before a replay. */
   headline: number | null;
   /** Requirement -> its funnel; none in what was stored before requirements were counted. */
@@ -51,7 +52,7 @@ export interface More {
   environment_steps: number;
 }
 
-const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "headline_candidates", "headline", "requirements", "pcr_by_driver", "by_severity", "by_fault", "episodes_driven_by", "headline_driven_by"] as const;
+const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "headline_candidates", "implausible", "headline", "requirements", "pcr_by_driver", "by_severity", "by_fault", "episodes_driven_by", "headline_driven_by"] as const;
 const FURTHER = ["artefacts", "unresponsive_share", "preventable", "environment_steps", "steps_per_distinct_failure"] as const;
 const NOTHING: Estimate = { mean: null, low: null, high: null };
 

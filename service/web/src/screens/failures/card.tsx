@@ -31,6 +31,11 @@ export function Card({ campaign, table, at, found, triage }: Props) {
     <article class="failure">
       <Thumbnail campaign={campaign} id={id} />
       <div class="judged">
+        {table.plausibility[at] && (
+          <span class="tag" title={table.unlikely[at]}>
+            {table.plausibility[at]}
+          </span>
+        )}
         {table.severity[at] && <span class="tag">{table.severity[at]}</span>}
         {table.fault[at] && <span class="tag">fault: {table.fault[at]}</span>}
         {table.valid[at] ? <GradeTag grade={table.grade[at] ?? "none"} /> : <Refusal rules={table.refused_by[at]!} />}

@@ -7,7 +7,7 @@ import type { FailureTable } from "./wire";
 
 const TYPING_MS = 150;
 const FIRST: Record<Filters["tab"], readonly Facet[]> = {
-  failures: ["severity", "fault", "grade", "driven_by", "method", "family"],
+  failures: ["plausibility", "severity", "fault", "grade", "driven_by", "method", "family"],
   refused: ["rule", "severity", "driven_by", "method", "family"],
 };
 const MORE: Record<Filters["tab"], readonly Facet[]> = {

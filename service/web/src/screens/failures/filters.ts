@@ -5,7 +5,7 @@ import { SORTS, type Sort } from "./sorting";
 import type { FailureTable } from "./wire";
 
 /** Filters that want one value; the empty text wants any. */
-export const FACETS = ["requirement", "family", "method", "run", "grade", "severity", "fault", "driven_by", "prevented_by", "kind", "striker", "triage", "broke", "ego_broke", "rule"] as const;
+export const FACETS = ["requirement", "family", "method", "run", "grade", "plausibility", "severity", "fault", "driven_by", "prevented_by", "kind", "striker", "triage", "broke", "ego_broke", "rule"] as const;
 export type Facet = (typeof FACETS)[number];
 
 export interface Filters extends Record<Facet, string> {
@@ -74,6 +74,8 @@ export function valuesOf(table: FailureTable, facet: Facet, i: number): readonly
       return [table.run_ids[i]!];
     case "grade":
       return [table.grade[i] ?? "none"];
+    case "plausibility":
+      return [table.plausibility[i] ?? "none"];
     case "severity":
       return [table.severity[i] ?? "none"];
     case "fault":

@@ -19,6 +19,7 @@ export const FACET_LABELS: Record<Facet, string> = {
   method: "Method",
   run: "Run",
   grade: "Grade",
+  plausibility: "Plausibility",
   severity: "Severity",
   fault: "Fault",
   driven_by: "Driven by",

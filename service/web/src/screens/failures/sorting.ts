@@ -7,7 +7,7 @@ export type Sort = keyof typeof SORTS;
 
 /** What people choose from; the first is meant where none is chosen. */
 export const SORTS = {
-  severity: "severity, then fault",
+  severity: "plausible, then severity",
   grade: "preventable first",
   closing: "fastest closing",
   reaction: "least time to contact",
@@ -25,6 +25,7 @@ export const SORTS_OF: Record<"failures" | "refused", readonly Sort[]> = {
 const GRADES: readonly (string | null)[] = ["preventable", "full_braking", "unavoidable", null];
 /** What has no severity touched nothing, and is no less than moderate. */
 const SEVERITIES: readonly (string | null)[] = ["severe", "moderate", null, "minor"];
+const PLAUSIBILITIES: readonly (string | null)[] = ["ordinary", "rare", "implausible", null];
 const FAULTS: readonly (string | null)[] = ["ego", "shared", "other", null];
 
 /** The failures in that order: a new list; those without a value come last, the earlier one first among equals. */
@@ -33,12 +34,13 @@ export function sorted(table: FailureTable, failures: readonly number[], sort: S
   const worst = (...first: ((i: number) => number)[]) => by(table, failures, ...first, closing);
   const grade = (i: number) => GRADES.indexOf(table.grade[i]!);
   const severity = (i: number) => SEVERITIES.indexOf(table.severity[i]!);
+  const implausible = (i: number) => +(PLAUSIBILITIES.indexOf(table.plausibility[i]!) > 1);
   const fault = (i: number) => FAULTS.indexOf(table.fault[i]!);
   switch (sort) {
     case "severity":
-      return worst(severity, fault, grade);
+      return worst(implausible, severity, fault, grade);
     case "grade":
-      return worst(grade, severity, fault);
+      return worst(grade, implausible, severity, fault);
     case "closing":
       return worst(closing);
     case "reaction":

@@ -21,7 +21,7 @@ import { Empty, Shown } from "../../ui/states";
 import { capital, words } from "../../ui/text";
 import { useTitle } from "../../ui/title";
 import { GRADE_WORDS } from "../../ui/verdicts";
-import { faultOf, gradeOf, severityOf, signatureOf, worstOf, type Collision, type Violation } from "../../ui/violations";
+import { faultOf, gradeOf, plausibilityOf, severityOf, signatureOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import { Actors } from "./actors";
 import { Take } from "./take";
 import { Verdict } from "./verdict";
@@ -151,9 +151,15 @@ function Replay({ campaign, path, known, series, violation, query }: Played) {
 function Tags({ failure }: { failure: Body<"Failure"> }) {
   const violation = worstOf(failure);
   const [grade, severity, fault] = violation ? [gradeOf(violation), severityOf(violation), faultOf(violation)] : [];
+  const plausibility = violation && plausibilityOf(violation);
   return (
     <>
       <span class={`tag ${grade ?? ""}`}>{grade ? GRADE_WORDS[grade].short : words(failure.outcome)}</span>
+      {plausibility && (
+        <span class="tag" title={plausibility.sentence}>
+          {plausibility.verdict}
+        </span>
+      )}
       {severity && <span class="tag">{severity}</span>}
       {fault && <span class="tag">fault: {fault}</span>}
       <DrivenTag by={failure.driven_by} />

@@ -1,0 +1,189 @@
+"""Judges how likely road users do what the adversaries of a recording did.
+
+Two probabilities decide, and the less likely counts. The first is the least of all features', corrected for their
+number (Holm 1979): traffic of many honest actors stays ordinary. The second is of all of them together, by the
+truncated product (Zaykin et al. 2002): an adversary that stays just inside every threshold does not stay ordinary.
+
+Choice: events are independent, such as three stops of one driver; features of one event count once, by the least
+likely. A feature without a published distribution makes a failure rare at most.
+"""
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from itertools import groupby
+from pathlib import Path
+from typing import NamedTuple
+
+from risk_sac.records import BehaviourFact, Plausibility, PlausibilityClass
+from risk_sac.risk.driving import FEATURES, LEAST, HasTails, LowerTail, UpperTail, tail_probability
+from risk_sac.verdicts.behaviour import Observed, observed_of
+from risk_sac.verdicts.evidence import Evidence
+
+ORDINARY, RARE = 1e-2, 1e-4
+TRUNCATIONS = (0.05, 1.0)  # choice: a few unlikely events among many, and many slightly unlikely ones
+UNDISTURBED = Path(__file__).with_name("undisturbed.json")
+
+
+class Undisturbed(NamedTuple):
+    """What SUMO's drivers do in undisturbed scenes."""
+
+    spreads: Mapping[str, HasTails]  # of the features without a published distribution
+    scale: float  # at least 1: by how much the joint surprise exceeds that of independent features
+
+
+class Judged(NamedTuple):
+    """A feature with its probability."""
+
+    observed: Observed
+    probability: float
+    published: bool
+
+
+def plausibility_of(evidence: Evidence) -> Plausibility:
+    """Judges what the adversaries did from the release to the last frame."""
+    return judge_observed(observed_of(evidence), evidence.ids, undisturbed())
+
+
+def judge_observed(observed: Iterable[Observed], ids: Sequence[str], traffic: Undisturbed) -> Plausibility:
+    """Judges features of adversaries.
+
+    Args:
+      observed: of all adversaries that acted, events in their order.
+      ids: of the actors, by column.
+      traffic: distributions of the features without a published one.
+    """
+    judged = [_probability(each, traffic) for each in observed]
+    published = [each for each in judged if each.published]
+    least, joint = _least(judged), _joint(judged, traffic.scale)
+    surely = min(_least(published), _joint(published, traffic.scale))
+    facts = _facts(judged, ids)
+    return Plausibility(
+        verdict=_class(max(min(least, joint), RARE) if surely >= RARE else surely),
+        least_probability=least,
+        joint_probability=joint,
+        facts=facts,
+        sentence=in_words(facts[0]) if facts else "",
+    )
+
+
+def in_words(fact: BehaviourFact) -> str:
+    """Returns, e.g., "left changes lane 0.2 s before the next vehicle: 1 of 3,000 lane changes"."""
+    feature = FEATURES[fact.feature]
+    one_in = 1.0 / fact.probability
+    digits = 1 - math.floor(math.log10(one_in)) if one_in > 10.0 else 0
+    at_most = "at most " if fact.probability <= LEAST else ""
+    by = "" if fact.published else " of SUMO's drivers" if feature.spread is None else " (assumed)"
+    share = f"{at_most}1 of {round(one_in, digits):,.0f} {feature.per}{by}"
+    return f"{fact.actor} {feature.words.format(value=fact.value)}: {share}"
+
+
+@cache
+def undisturbed() -> Undisturbed:
+    """Reads what SUMO's drivers do, as `risk_sac.lab.figures.undisturbed_behaviour` has measured it."""
+    shipped = json.loads(UNDISTURBED.read_bytes())
+    spreads: dict[str, HasTails] = {}
+    for name, (values, probabilities) in shipped["tails"].items():
+        tail = UpperTail(tuple(values), tuple(probabilities))
+        spreads[name] = tail if FEATURES[name].unlikely == "above" else LowerTail(tail)
+    return Undisturbed(spreads, shipped["scale"])
+
+
+def _probability(observed: Observed, traffic: Undisturbed) -> Judged:
+    feature = FEATURES[observed.feature]
+    spread = feature.spread or traffic.spreads[observed.feature]
+    return Judged(observed, tail_probability(feature, spread, observed.value), feature.published)
+
+
+def _least(judged: Sequence[Judged]) -> float:
+    """Least probability, corrected for the number of features; the first step of Holm's procedure."""
+    if not judged:
+        return 1.0
+    return min(1.0, len(judged) * min(each.probability for each in judged))
+
+
+def _joint(judged: Sequence[Judged], scale: float) -> float:
+    """Probability that the features of independent events are together at least as unlikely."""
+    events = by_event(judged)
+    # The correction for the number of truncations is Bonferroni's.
+    return min(1.0, len(TRUNCATIONS) * min(truncated_product(events, at, scale) for at in TRUNCATIONS))
+
+
+def by_event(judged: Iterable[Judged]) -> list[float]:
+    """Lists the probabilities of events: of each the least of its features', corrected for their number."""
+    grouped = groupby(judged, key=_event)
+    features = [[each.probability for each in group] for _, group in grouped]
+    return [min(1.0, len(probabilities) * min(probabilities)) for probabilities in features]
+
+
+def _event(judged: Judged) -> tuple[int, str, float]:
+    observed = judged.observed
+    name = FEATURES[observed.feature].event
+    return observed.actor, name or observed.feature, observed.time_s
+
+
+def truncated_product(probabilities: Sequence[float], at: float, scale: float = 1.0) -> float:
+    """Probability of a product of the probabilities up to `at` that is at most this one.
+
+    P = Σ_k C(n, k) (1 - τ)^(n - k) τ^k · P(Γ(k) ≥ s - k ln(1 / τ)), s = -Σ ln p over p ≤ τ
+
+    Args:
+      probabilities: of `n` independent events, above 0.
+      at: τ in (0, 1]; 1 is Fisher's method.
+      scale: that s is divided by first.
+
+    Returns:
+      In [0, 1]; 1 if none is up to τ.
+    Source: Zaykin, Zhivotovsky, Westfall and Weir 2002, Genetic Epidemiology 22.
+    """
+    n, surprise = len(probabilities), -sum(math.log(p) for p in probabilities if p <= at) / scale
+    if surprise <= 0.0:
+        return 1.0
+    fewest = n if at >= 1.0 else 1
+    terms = (
+        math.comb(n, k) * (1.0 - at) ** (n - k) * at**k * _erlang_above(k, surprise + k * math.log(at))
+        for k in range(fewest, n + 1)
+    )
+    return min(1.0, sum(terms))
+
+
+def _erlang_above(k: int, value: float) -> float:
+    """Probability that a sum of `k` exponential numbers of mean 1 is above a value."""
+    if value <= 0.0:
+        return 1.0
+    term = total = math.exp(-value)
+    for i in range(1, k):
+        term *= value / i
+        total += term
+    return total
+
+
+def _class(probability: float) -> PlausibilityClass:
+    if probability >= ORDINARY:
+        return PlausibilityClass.ORDINARY
+    return PlausibilityClass.RARE if probability >= RARE else PlausibilityClass.IMPLAUSIBLE
+
+
+def _facts(judged: Sequence[Judged], ids: Sequence[str]) -> tuple[BehaviourFact, ...]:
+    """Lists the least likely value of each feature of each actor, the least likely first."""
+
+    def same(each: Judged) -> tuple[int, str]:
+        return each.observed.actor, each.observed.feature
+
+    facts = []
+    for (actor, name), group in groupby(sorted(judged, key=same), key=same):
+        alike = list(group)
+        worst = min(alike, key=lambda each: each.probability)
+        facts.append(
+            BehaviourFact(
+                actor=ids[actor],
+                feature=name,
+                value=round(worst.observed.value, 3),
+                time_s=round(worst.observed.time_s, 3),
+                times=len(alike),
+                probability=worst.probability,
+                published=worst.published,
+            )
+        )
+    return tuple(sorted(facts, key=lambda fact: fact.probability))
