@@ -44,6 +44,13 @@ def add(commands: Commands) -> None:
         parser.add_argument("path", type=Path, metavar="PATH", help=what)
         parser.add_argument("failure", nargs="?", metavar="FAILURE", help="of a run: id of a failure, or its number")
         parser.group("output").add_argument("--out", type=Path, metavar=metavar, help=out)
+    minimise.add_argument(
+        "--aim",
+        choices=("smallest", "most-plausible"),
+        default="smallest",
+        help="smallest: the fewest and weakest actions; most-plausible: the least unlikely motion that still fails, "
+        "in a bundle that keeps the recording too",
+    )
     clusters = add_command(
         commands,
         "clusters",
@@ -94,6 +101,8 @@ def _minimise(options: argparse.Namespace) -> int:
     asked = _asked(options.path, options.failure)
     if asked.folder is None and options.out is None:
         raise ConfigError("--out", "nothing", "a file for the core of a bundle")
+    if options.aim == "most-plausible":
+        return _more_plausible(asked.bundle, options.out)
     minimal = minimise(asked.bundle)
     core = minimal.manifest.core
     assert core is not None  # that is what `minimise` makes
@@ -113,6 +122,27 @@ def _minimise(options: argparse.Namespace) -> int:
         lines.append(f"Bundle: {options.out}")
     say("\n".join(lines))
     _note(asked, Studied(core=core))
+    return OK
+
+
+def _more_plausible(bundle: "Bundle", out: Path | None) -> int:
+    from risk_sac.failures.bundle import write_bundle
+    from risk_sac.failures.plausible import most_plausible
+    from risk_sac.verdicts.plausibility import unlikely
+
+    likelier = most_plausible(bundle, unlikely)
+    motion = likelier.manifest.plausible
+    assert motion is not None  # that is what `most_plausible` makes
+    if out is not None:
+        write_bundle(out, likelier)
+    lines = [
+        motion.sentence,
+        f"unlikeliness of what the adversaries did: {motion.after:.1f} of {motion.before:.1f}",
+        f"copies, perturbed by 1 %, that fail as well: {motion.held} of {motion.copies}",
+        f"played: {counted(motion.episodes, 'episode')}",
+        *([] if out is None else [f"Bundle, with the recording: {out}"]),
+    ]
+    say("\n".join(lines))
     return OK
 
 

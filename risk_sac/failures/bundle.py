@@ -23,7 +23,7 @@ from risk_sac.config import SHIPPED, FamilyName, RunSpec
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.failures.recording import Series, actions_of, trajectory_digest
-from risk_sac.failures.studied import Core
+from risk_sac.failures.studied import Core, PlausibleMotion
 from risk_sac.records import EpisodeRecord, Record
 from risk_sac.run_folder.arrays import MOST_BYTES, read_limited, unpack_arrays
 from risk_sac.run_folder.durable import replace_file
@@ -76,6 +76,7 @@ PACKAGES = ("libsumo", "numpy")  # packages that decide how an episode goes, giv
 CODE, WORLD = "risk_sac", "sumo_nets"
 MOST_POLICY_BYTES = 2**23
 MANIFEST, HEADS, LAYER = "manifest", "signal_heads", "policy_layer_"  # the layers are numbered
+RECORDED = "recorded"  # array with the bytes of another bundle's file
 NORMALISED = "policy_normalised"  # array that is present if the policy normalises
 
 
@@ -98,6 +99,8 @@ class Manifest(Record):
     """Of the series, see `risk_sac.failures.recording.trajectory_digest`."""
     core: Core | None = None
     """Of what was minimised."""
+    plausible: PlausibleMotion | None = None
+    """Of the least unlikely motion that fails like a recorded one; that one is kept beside it."""
 
     @property
     def name(self) -> str:
@@ -118,6 +121,7 @@ class Bundle:
     series: Series
     signal_heads: NDArray[np.uint8]  # T since the release x heads, SUMO's letters
     policy: FrozenPolicy | None = None  # of the run; None where it learnt no policy or its policy does not fit
+    recorded: "Bundle | None" = None  # what a more plausible motion was searched from
 
 
 def make_bundle(
@@ -186,6 +190,8 @@ def bundle_bytes(bundle: Bundle) -> bytes:
         arrays |= {f"{LAYER}{place}": layer for place, layer in enumerate(bundle.policy.layers)}
         if bundle.policy.normalised:
             arrays[NORMALISED] = np.array(True)
+    if bundle.recorded is not None:
+        arrays[RECORDED] = np.frombuffer(bundle_bytes(bundle.recorded), dtype=np.uint8)
     np.savez_compressed(content, allow_pickle=False, **arrays)
     return content.getvalue()
 
@@ -223,12 +229,14 @@ def read_bundle(file: Path) -> Bundle:
         raise ConfigError("BUNDLE", f"{file} is no bundle that can be played: {error}") from error
 
 
-def _bundle(content: bytes) -> Bundle:
+def _bundle(content: bytes, *, inner: bool = False) -> Bundle:
     arrays = unpack_arrays(content, most_values=MOST_BYTES)  # of which a place's net has one for each letter
     if missing := {MANIFEST, HEADS} - arrays.keys():
         raise ValueError(f"it lacks {', '.join(missing)}")
     manifest = Manifest.model_validate_json(str(arrays.pop(MANIFEST)))
-    heads = arrays.pop(HEADS)
+    heads, recorded = arrays.pop(HEADS), arrays.pop(RECORDED, None)
+    if recorded is not None and inner:
+        raise ValueError("the bundle that it keeps keeps another one")
     normalised = arrays.pop(NORMALISED, None) is not None
     layers = tuple(arrays.pop(f"{LAYER}{place}") for place in range(sum(name.startswith(LAYER) for name in arrays)))
     unpack(manifest.spec.family, arrays)
@@ -240,7 +248,8 @@ def _bundle(content: bytes) -> Bundle:
     if layers:
         policy = FrozenPolicy(layers, problem.action_size, normalised)
         policy.check(problem.observation_size)
-    return Bundle(manifest=manifest, series=arrays, signal_heads=heads, policy=policy)
+    kept = None if recorded is None else _bundle(recorded.tobytes(), inner=True)
+    return Bundle(manifest=manifest, series=arrays, signal_heads=heads, policy=policy, recorded=kept)
 
 
 def _check_playable(problem: Problem, manifest: Manifest, series: Series) -> None:

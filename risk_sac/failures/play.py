@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from risk_sac.config import EgoConfig, RunSpec, method_of
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.env.problem import Problem
-from risk_sac.errors import InfeasibleScene, SimulationError
+from risk_sac.errors import SimulationError
 from risk_sac.failures.question import TwinPlay
 from risk_sac.failures.recording import Recording, Series, actions_of, trajectory_digest
-from risk_sac.records import NO_CONTACT, Collision, Ending, EpisodeRecord, RequirementResult, Violation
+from risk_sac.records import Collision, Ending, EpisodeRecord, RequirementResult, Violation
 from risk_sac.world.types import STEP_S, Floats, Scene, Vector
 
 AFTER_S = 3.0  # how long a twin goes on after the end of the failure that it is compared with
@@ -138,45 +138,3 @@ def twin(spec: RunSpec, episode: EpisodeRecord, actions: Floats, changed: EgoCon
     attacked = changed is not None and method_of(spec.method).agent != "none"
     with closing(RiskSacEnv(problem, spec.learner.reward, controlled=attacked)) as env:
         return play(env, Scene(spec.family, episode.scene), episode.seed, longer)
-
-
-def candidates(episode: EpisodeRecord) -> list[Collision | Violation]:
-    """Returns the preventable contacts of an episode, any of which may show its ego's defects."""
-    return [each for each in episode.valid_violations if each.preventable and each.requirement == NO_CONTACT]
-
-
-def detected(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Collision | Violation | None:
-    """Returns the failure of an episode that detects its ego's defects; None without one.
-
-    A reference driver would have prevented it, and the same ego without its defects does not violate the requirement
-    validly when the adversaries repeat their recorded motions. Blind as these are, they may run into an ego that is
-    elsewhere by then, from behind or while it stands: that is none of its failures. An artefact tells nothing.
-
-    Raises:
-      SimulationError: SUMO failed in the repetition.
-    """
-    failures = candidates(episode)
-    if not failures:
-        return None
-    try:
-        found = without_defects(spec, episode, series).found
-    except InfeasibleScene:
-        return None
-    violated = {each.requirement for each in found if each.valid or each.artefact}
-    return next((each for each in failures if each.requirement not in violated), None)
-
-
-def without_defects(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Played:
-    """Plays the recorded motions of an episode against its ego without the defects, and `AFTER_S` without an attack.
-
-    Raises:
-      InfeasibleScene: without the defects, traffic is in danger when the adversaries are released.
-      SimulationError: SUMO failed.
-    """
-    sound = spec.ego.model_copy(update={"defects": (), "version": None})
-    with closing(RiskSacEnv.of(spec.model_copy(update={"ego": sound}))) as env:
-        actions = np.zeros_like(actions_of(series))
-        steps = min(len(actions) + round(AFTER_S / STEP_S), env.problem.family.horizon_steps)
-        after = np.pad(actions, ((0, steps - len(actions)), (0, 0)))
-        scene = Scene(env.problem.family.name, episode.scene)
-        return play(env, scene, episode.seed, after, motions=series)

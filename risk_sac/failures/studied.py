@@ -11,7 +11,7 @@ from pydantic import ValidationError, computed_field
 
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval
-from risk_sac.records import Collision, EpisodeRecord, Record, Violation
+from risk_sac.records import Collision, EpisodeRecord, Real, Record, Violation
 from risk_sac.run_folder.durable import replace_file
 
 
@@ -41,6 +41,22 @@ class Core(Record):
     """Episodes that were played to find it."""
     held: int
     """Copies, perturbed by up to 1 %, that still fail; no reduction was chosen by these copies."""
+    copies: int
+    sentence: str
+    """What happens, in words."""
+
+
+class PlausibleMotion(Record):
+    """Motion that fails like a recorded one and is less unlikely."""
+
+    before: Real
+    """Unlikeliness of the recorded motion: -log p, summed over features and actors."""
+    after: Real
+    """The same of this motion."""
+    episodes: int
+    """Episodes that were played to find it."""
+    held: int
+    """Copies, perturbed by up to 1 %, that still fail."""
     copies: int
     sentence: str
     """What happens, in words."""

@@ -17,6 +17,7 @@ from risk_sac.failures.recording import actions_of
 from risk_sac.failures.studied import Region, Share, valid_failure
 from risk_sac.records import Collision, Violation
 from risk_sac.scenario.space import SceneSpace
+from risk_sac.verdicts.evidence import Evidence
 from risk_sac.world.types import STEP_S, Floats, Scene
 
 SCENES, COPIES = (0.01, 0.02, 0.05), 40  # of a region: shares of the scene parameters' ranges, and copies at each
@@ -91,6 +92,10 @@ class VariantPlayer:
             return ()
         in_time = [each for each in found if each.time_s <= self.failure.time_s + TAIL_S + STEP_S]
         return sorted(in_time, key=lambda each: not each.valid)
+
+    def evidence(self) -> Evidence:
+        """Returns the evidence of the variant that was played last."""
+        return self.env.evidence()
 
     def fails(self, variant: Variant) -> bool:
         """Whether the ego fails as it did."""

@@ -13,6 +13,7 @@ from risk_sac.env.problem import Problem
 from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Outcome, Violation
 from risk_sac.search.agents.controls import IdleAgent, RandomAgent, ScriptedAgent, ScriptFollower
 from risk_sac.search.agents.learner import Learner
+from risk_sac.search.prior.coordinates import Coordinates
 from risk_sac.search.prior.learner import PretrainedLearner
 from risk_sac.search.prior.policy import PolicyLayout, check_prior, pretrained_for
 from risk_sac.search.prior.sampler import PriorOptimizer, ReplayOptimizer
@@ -81,6 +82,7 @@ class Searchers:
         check_prior(spec.method, spec.family, spec.prior)
         self._space = problem.space
         self._spec = spec
+        self._coordinates = Coordinates.of(problem)
         self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
         pretrained = None if self._start is None or not method.learns else pretrained_for(problem.family)
         self.agent: Actor  # Alg. 1, l. 2
@@ -183,9 +185,13 @@ class Searchers:
         dimension = self._space.dimension + actor.genes
         arguments = dimension, self._spec.learner.scenes, self._spec.stream
         if self._start is None or not actor.genes:
-            return Searcher(sampler(*arguments), actor)
-        whole = method_of(self._spec.method).prior == "all"
-        return Searcher((PriorOptimizer if whole else ReplayOptimizer)(*arguments, self._start), actor)
+            made = sampler(*arguments)
+        else:
+            whole = method_of(self._spec.method).prior == "all"
+            made = (PriorOptimizer if whole else ReplayOptimizer)(*arguments, self._start)
+        if isinstance(made, ArchiveOptimizer) and actor.genes and self._coordinates.symmetric:
+            made.reflect = self._coordinates.reflected
+        return Searcher(made, actor)
 
 
 class Turns:

@@ -19,9 +19,10 @@ from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.search.agents.controls import ScriptFollower
+from risk_sac.search.prior.coordinates import Coordinates
 from risk_sac.search.prior.shipped import GRID
 from risk_sac.search.scene_optimizer import Encounter
-from risk_sac.search.scene_optimizer.archive import mutated
+from risk_sac.search.scene_optimizer.archive import REFLECTED, mutated
 from risk_sac.verdicts.distinct import kind_name
 from risk_sac.world.types import Floats, Scene
 
@@ -119,7 +120,7 @@ class EpisodeStream:
             for name, ego in self._egos.items()
         }
         problem = next(iter(self._envs.values())).problem
-        self._space = problem.space
+        self._space, self._coordinates = problem.space, Coordinates.of(problem)
         self._follower = ScriptFollower(problem.family)
         self._horizon = problem.family.horizon_steps
         self._family, self._key = family, (seed, stream)
@@ -148,8 +149,11 @@ class EpisodeStream:
 
     def _point(self, random: np.random.Generator) -> Floats:
         """Draws a scene and a script, on the grid that files keep."""
-        drawn: Floats = np.round(self._drawn(random) * GRID) / GRID
-        return drawn
+        drawn = self._drawn(random)
+        if self._coordinates.symmetric and random.random() < REFLECTED:
+            drawn = self._coordinates.reflected(drawn[None])[0]
+        rounded: Floats = np.round(drawn * GRID) / GRID
+        return rounded
 
     def _drawn(self, random: np.random.Generator) -> Floats:
         size = self._space.dimension

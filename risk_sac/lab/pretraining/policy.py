@@ -22,12 +22,12 @@ from risk_sac.config.learner import AgentConfig, ReplayConfig, SacConfig
 from risk_sac.egos.registry import pinned
 from risk_sac.env.problem import Problem
 from risk_sac.lab.pretraining.episodes import HELD_OUT, drawn_ego, training_egos
-from risk_sac.lab.pretraining.mirror import Mirror
 from risk_sac.lab.pretraining.rollouts import DECISION_STEPS, DISCOUNT, PolicyEpisode, Turn, play_turn
 from risk_sac.run_folder import checkpoint
 from risk_sac.search.agents.agent import check_device
 from risk_sac.search.agents.replay import Batch, Transition, UniformReplay
 from risk_sac.search.agents.sac import GraphedUpdate, SacAgent
+from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import GOALS, PolicyLayout, PretrainedPolicy, with_goal
 
 TURNS, EPISODES = 4, 5  # of a round, and of a turn

@@ -5,7 +5,9 @@ from typing import Any
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
 from risk_sac.search.agents.learner import Learner
+from risk_sac.search.agents.replay import Transition
 from risk_sac.search.agents.sac import SacAgent
+from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import Folded, PolicyLayout, PretrainedPolicy
 from risk_sac.world.types import Floats, Vector
 
@@ -23,6 +25,9 @@ class PretrainedLearner(Learner):
 
     Choice: what it learns is to reach any failure. If the policy knows kinds, one of them is asked for in each episode
     to explore: a shift of its first bias. Its memory takes these actions like those of any other driver.
+
+    Choice: where the ego has a neighbour on either side, the networks see every other episode in the mirror, by a
+    coin. They act there and learn from it there, because what they were trained on favours one side.
     """
 
     def __init__(
@@ -37,6 +42,7 @@ class PretrainedLearner(Learner):
         config = config.model_copy(update={"agent": agent})
         self._start = start
         self._shift: Vector | None = None
+        self._mirror, self._reflected = Mirror.of(layout), False
         super().__init__(layout.observation_size, layout.action_size, method, config, seed)
 
     def begin(self, genes: Floats) -> None:
@@ -45,6 +51,13 @@ class PretrainedLearner(Learner):
         shifts = self._start.shifts
         goal = int(self._generator.integers(len(shifts) + 1))
         self._shift = shifts[goal - 1] if goal else None
+        self._reflected = self._mirror is not None and bool(self._generator.integers(2))
+
+    def observe(self, transition: Transition, *, own: bool = True) -> None:
+        """See `Learner.observe`."""
+        super().observe(
+            self._mirror.transition(transition) if self._mirror and self._reflected else transition, own=own
+        )
 
     def _make_agent(self, observation_size: int, action_size: int, seed: int) -> SacAgent:
         agent, sac = self._config.agent, self._config.sac
@@ -54,4 +67,7 @@ class PretrainedLearner(Learner):
 
     def _drawn(self, observation: Vector, explore: bool) -> Vector:
         assert isinstance(self._agent, SacAgent)
-        return self._agent.act(observation, explore, self._shift if explore else None)
+        mirror = self._mirror if self._reflected else None
+        seen = observation if mirror is None else mirror.observation(observation)
+        action = self._agent.act(seen, explore, self._shift if explore else None)
+        return action if mirror is None else mirror.action(action)

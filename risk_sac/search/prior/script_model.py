@@ -7,7 +7,7 @@ The belief is a distribution over the training egos: which of them the ego under
 and follows by Bayes' rule from the episodes that were played.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -49,11 +49,22 @@ class Member(nn.Module):
         return logits
 
 
-class ScriptModel:
-    """Members, the kinds that they tell apart, and the training egos."""
+Reflect = Callable[[Floats], Floats]
+"""From points, `n x inputs`, to their mirror images."""
 
-    def __init__(self, members: list[Member], kinds: tuple[str, ...], egos: tuple[str, ...]) -> None:
+
+class ScriptModel:
+    """Members, the kinds that they tell apart, and the training egos.
+
+    With `reflect`, a prediction is that of a point or of its mirror image, whichever fails more surely. Choice: not
+    their mean. The training data strike from one side, so the mean would favour points where both neighbours strike.
+    """
+
+    def __init__(
+        self, members: list[Member], kinds: tuple[str, ...], egos: tuple[str, ...], reflect: Reflect | None = None
+    ) -> None:
         self.members, self.kinds, self.egos = members, kinds, egos
+        self._reflect = reflect
         for member in members:
             member.eval()
 
@@ -61,6 +72,10 @@ class ScriptModel:
     def inputs(self) -> int:
         """Numbers of a point."""
         return self.members[0].first.in_features - len(self.egos)
+
+    def symmetric(self, reflect: Reflect) -> "ScriptModel":
+        """Returns the same model, of which a point and its mirror image get the same prediction."""
+        return ScriptModel(self.members, self.kinds, self.egos, reflect)
 
     def unknown(self) -> Floats:
         """Returns the belief about an ego of which nothing is known, `E`."""
@@ -82,6 +97,12 @@ class ScriptModel:
           points: to predict for.
           belief: about the ego, `E`, or one for each point, `n x E`.
         """
+        if self._reflect is not None:
+            sides = points, self._reflect(points.astype(np.float64))
+            own, other = (ScriptModel(self.members, self.kinds, self.egos).predict(side, belief) for side in sides)
+            taken = own.fails >= other.fails
+            heads = (np.where(taken, *of_sides) for of_sides in zip(own[:2], other[:2], strict=True))
+            return Prediction(*heads, np.where(taken[:, None], own.kinds, other.kinds))
         beliefs = np.broadcast_to(belief, (len(points), len(self.egos)))
         inputs = torch.as_tensor(np.concatenate([points, beliefs], 1), dtype=torch.float32)
         logits = torch.stack([member(inputs) for member in self.members])

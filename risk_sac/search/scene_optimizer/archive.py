@@ -2,6 +2,7 @@
 
 import math
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -80,6 +81,7 @@ class DiscountedBandit:
 INITIAL, RANDOM_SHARE = 12, 0.15  # points drawn at random: the first ones, and of the rest, where elites abound
 DEVIATIONS = (0.05, 0.15, 0.4)  # of a mutation
 SHARES = (0.2, 0.5, 1.0)  # of the coordinates that it changes
+REFLECTED = 0.5  # share of the children
 CROSSED, CROSSING_DEVIATION = 0.5, 0.2  # how often, and how far, it also moves along the line to another elite
 PREVENTABLE_WORTH = 1.0
 ALMOST_WORTH, IMPACT_MPS = 0.4, 5.0  # where R157's driver only just touches; a third of it where at 5.5 m/s
@@ -205,10 +207,16 @@ def _worth_of_any(violation: Collision | Violation) -> float:
 
 
 class ArchiveOptimizer(SceneOptimizer):
-    """Breeds points from elites; scores them so that every method's records carry f_e."""
+    """Breeds points from elites; scores them so that every method's records carry f_e.
+
+    Attributes:
+      reflect: returns mirror images of points, `n x d`; None where they are not points of the same space. Choice: half
+        of the children are reflected, or the side of the first elite would be that of all its descendants.
+    """
 
     kind = "archive"
     initial = INITIAL  # points that are drawn at random at first
+    reflect: Callable[[Floats], Floats] | None = None
 
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:
         super().__init__(dimension, config, seed)
@@ -226,7 +234,10 @@ class ArchiveOptimizer(SceneOptimizer):
             self._parent, self.driven_by = None, DrivenBy.RANDOM
             return self._random.random(self._dimension)
         self._parent, self.driven_by = self._elites.draw(pool, self._random), DrivenBy.SCRIPT
-        return mutated(self._parent.point, pool[self._random.integers(len(pool))].point, self._random)
+        child = mutated(self._parent.point, pool[self._random.integers(len(pool))].point, self._random)
+        if self.reflect is not None and self._random.random() < REFLECTED:
+            child = self.reflect(child[None])[0]
+        return child
 
     def _learn(self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter) -> None:
         parent, self._parent = self._parent, None

@@ -27,7 +27,7 @@ def test_what_an_earlier_run_found_comes_first_and_its_ego_is_believed_in(tmp_pa
     prior = pinned_prior(str(run_folder(tmp_path / "v1")), ["low"])
     problem = Problem.from_spec(RunSpec(family="low", method="risk-sac-diverse", seed=0))
     shipped, start = shipped_prior("low"), start_of(problem, prior)
-    assert (start.earlier, len(start.library)) == (FAILURES, FAILURES + len(shipped.library))
+    assert (start.earlier, len(start.library)) == (FAILURES, FAILURES + 2 * len(shipped.library))
     np.testing.assert_allclose(start.library[:FAILURES], shipped.library[:FAILURES], atol=1e-12)
     assert start.belief.sum() == pytest.approx(1.0)
     assert start.belief.max() > 1.1 / len(start.belief)

@@ -11,8 +11,9 @@ from risk_sac.scenario import car_following
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.place import PLACES, Stretch
+from risk_sac.search.prior.coordinates import Coordinates, Translation
 from risk_sac.search.prior.shipped import inputs_of, shipped_prior
-from risk_sac.search.prior.start import Coordinates, Translation, start_of
+from risk_sac.search.prior.start import start_of
 from risk_sac.search.scripts import SIZE, Genes
 
 
