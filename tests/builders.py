@@ -144,7 +144,8 @@ def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, 
         },
         "ego_part": None,
         "fault": None,
-        "signature": "cut-in, straight",
+        "kind": "cut-in, straight",
+        "variant": "ahead",
     }
     return Judgement(grade=grade, conflict_s=conflict_s, **(values | changes))
 
@@ -193,7 +194,8 @@ def violation(**changes: Any) -> Violation:
         "grade": None,
         "drivers": {},
         "fault": None,
-        "signature": "never_fast violated; straight",
+        "kind": "never_fast violated; straight",
+        "variant": "ego fast",
         "definitions": 1,
     }
     return Violation(**(values | changes))

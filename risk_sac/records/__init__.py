@@ -60,6 +60,7 @@ from risk_sac.records.run import (
 from risk_sac.records.violation import (
     ARTEFACT_RULES,
     NO_CONTACT,
+    PUBLISHED,
     REPEATS,
     Collision,
     RequirementResult,

@@ -23,6 +23,7 @@ ARTEFACT_RULES = frozenset(
 
 
 NO_CONTACT = "no_contact"  # the requirement that a contact violates
+PUBLISHED = ("r157", "fsm", "rss")  # reference drivers by a regulation or a publication; `defensive` is our own
 
 
 class Violated(Record, ABC):
@@ -67,6 +68,11 @@ class Violated(Record, ABC):
         return self.valid and self.graded is Grade.PREVENTABLE
 
     @property
+    def published_preventable(self) -> bool:
+        """Whether it is preventable, and one of `PUBLISHED` would have prevented it."""
+        return self.preventable and any(self.prevention.get(name, False) for name in PUBLISHED)
+
+    @property
     def headline_candidate(self) -> bool:
         """Whether it is preventable and not minor: a headline failure once its replay is the same."""
         return self.preventable
@@ -105,8 +111,10 @@ class Violation(Violated):
     """Reference driver → whether it keeps the requirement in the same encounter; empty where it is not valid."""
     fault: Fault | None
     """ego | shared | other. Null where it is not valid."""
-    signature: str
-    """Its class of failures, in words."""
+    kind: str
+    """What a person tells apart, in words: the requirement and the ego's manoeuvre."""
+    variant: str
+    """All else that tells violations of one kind apart, in words."""
     definitions: int
     """Version of the definitions it was judged by."""
 
@@ -225,9 +233,14 @@ class Collision(Violated):
         return f"touches {self.other_id} at a closing speed of {self.relative_speed_mps:.1f} m/s"
 
     @property
-    def signature(self) -> str:
-        """Its class of failures, in words."""
-        return self.judgement.signature
+    def kind(self) -> str:
+        """Its kind, in words."""
+        return self.judgement.kind
+
+    @property
+    def variant(self) -> str:
+        """Its variant within the kind, in words."""
+        return self.judgement.variant
 
 
 def valid_violations(collision: Collision | None, violations: Sequence[Violation]) -> tuple[Collision | Violation, ...]:

@@ -1,25 +1,26 @@
 """The record of a contact and its judgement, from its evidence alone."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
 from risk_sac.config import Requirement
 from risk_sac.records import NO_CONTACT, Collision, ConflictType, Fault, Grade, Judgement, RequirementResult, Violation
 from risk_sac.risk.measures import Gauge, Measures
-from risk_sac.risk.publish import AHEAD, ASIDE, ENCOUNTER, worst_rss_margin
+from risk_sac.risk.publish import ENCOUNTER, worst_rss_margin
 from risk_sac.risk.rss import ENCOUNTER_CAP_S, TTC_CAP_S
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.sim.collision import Contact
-from risk_sac.verdicts.conflict import SAME_WAY_COS, Conflict, find_conflict, unresponsive
-from risk_sac.verdicts.evidence import Evidence, lane_heading
+from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
+from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.fault import ego_part, fault, has_to_yield, parts_of_contact, parts_of_violation
-from risk_sac.verdicts.labels import ONCOMING_COS, ego_in_words, ground, manoeuvre, response, severity_of, signature
+from risk_sac.verdicts.kinds import name_contact, name_violation
+from risk_sac.verdicts.labels import ground, manoeuvre, response, severity_of
 from risk_sac.verdicts.offences import ego_offences, endangered_ego, striker_offences
 from risk_sac.verdicts.reference import (
     NO_RED_LIGHT_ENTRY,
-    ON_CARRIAGEWAY,
+    PREVENTING,
     History,
     MetActor,
     grade,
@@ -41,8 +42,13 @@ def collision_of(
     evidence: Evidence,
     measures: Sequence[Measures],
     facts: EpisodeFacts,
+    *,
+    drivers: Collection[str] = PREVENTING,
 ) -> Collision:
-    """The record of a contact in `frame`, the last one; `measures` begin with the release at `released_s`."""
+    """The record of a contact in `frame`, the last one; `measures` begin with the release at `released_s`.
+
+    `drivers` are the reference drivers whose word makes it preventable.
+    """
     other, warning = frame.ids[contact.other], measures[:-WARNING_STEPS]
     column = evidence.column(other)
     conflict = find_conflict(evidence, column)
@@ -70,17 +76,24 @@ def collision_of(
         early_min_robustness=min((m.soft_min for m in warning), default=ROBUSTNESS_CLIP),
         simulator_agrees=facts.simulator_agrees,
         verdicts=verdicts,
-        judgement=judge(evidence, other, valid=all(verdicts.values()), conflict=conflict),
+        judgement=judge(evidence, other, valid=all(verdicts.values()), conflict=conflict, preventing=drivers),
     )
 
 
-def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflict | None = None) -> Judgement:
+def judge(
+    evidence: Evidence,
+    striker_id: str,
+    *,
+    valid: bool,
+    conflict: Conflict | None = None,
+    preventing: Collection[str] = PREVENTING,
+) -> Judgement:
     """Judges a contact: how it began, its fault, its severity, its grade.
 
     The contact is in the last frame. Only a valid one is graded, by the drivers that would have prevented it.
 
     A valid contact passed every rule of `artefact_verdicts` and `validity_verdicts`. The conflict is found again if not
-    given.
+    given. `preventing` are the reference drivers whose word counts.
 
     Raises:
       ValueError: the striker is not there in the last frame.
@@ -93,10 +106,20 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
     ego_broke = ego_offences(evidence, striker, crossing=crossing)
     drivers = reference_outcomes(evidence, striker, conflict) if valid else {}
     avoids = {name: each.avoids for name, each in drivers.items()}
-    graded = grade(avoids) if valid else None
+    graded = grade(avoids, preventing) if valid else None
     yields = has_to_yield(conflict.type, where, broke, ego_broke)
     part = ego_part(evidence, striker, conflict, yields)
     severity, injury_risk = severity_of(evidence, striker)
+    kind, variant = name_contact(
+        evidence,
+        striker,
+        conflict,
+        manoeuvre=ego_manoeuvre,
+        response=ego_response,
+        ground=where,
+        broke=broke,
+        ego_broke=ego_broke,
+    )
     return Judgement(
         definitions=DEFINITIONS,
         conflict_type=conflict.type,
@@ -130,22 +153,13 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
                 lasted_s=float(evidence.time_s[-1]) - conflict.time_s,
             )
         ),
-        signature=signature(
-            evidence,
-            striker,
-            conflict,
-            manoeuvre=ego_manoeuvre,
-            response=ego_response,
-            ground=where,
-            broke=broke,
-            ego_broke=ego_broke,
-        ),
+        kind=kind,
+        variant=variant,
     )
 
 
 # Of `ARTEFACT_RULES`, those that the episode tells; `solid_bodies` is read from its record.
 RULES = ("no_teleport", "inside_limits")
-VIOLATED = {NO_RED_LIGHT_ENTRY: "red light entered", ON_CARRIAGEWAY: "carriageway left"}
 # Signals that others bring about too; all others are the ego's own driving.
 OF_OTHERS = frozenset(
     {
@@ -159,7 +173,6 @@ OF_OTHERS = frozenset(
         "ego_jerk_mps3",
     }
 )
-SAME_OFFENCES = {NO_RED_LIGHT_ENTRY: ("red_light",), ON_CARRIAGEWAY: ("off_road", "wrong_direction")}
 
 
 def requirement_results(
@@ -192,6 +205,8 @@ def violations_of(
     gather: Callable[[], History],
     gauge: Gauge,
     artefacts: Mapping[str, float],
+    *,
+    drivers: Collection[str] = PREVENTING,
 ) -> tuple[Violation, ...]:
     """The violations without contact of the requirements that count, in the order of time.
 
@@ -201,6 +216,7 @@ def violations_of(
       gather: returns the whole episode; it takes milliseconds, and is called if there is a violation.
       gauge: that measured it.
       artefacts: rules of `ARTEFACT_RULES` that the episode broke, and when it first did, s of the simulator.
+      drivers: the reference drivers whose word makes a violation preventable.
     """
     counting = [each for each in requirements if each.name != NO_CONTACT and each.counts == "failure"]
     violated = [(each, time_s) for each in counting if (time_s := results[each.name].violated_s) is not None]
@@ -213,7 +229,8 @@ def violations_of(
         index = released + round(time_s / STEP_S)
         verdicts = {rule: artefacts.get(rule, math.inf) > history.frames[index].time_s for rule in RULES}
         verdicts["solid_bodies"] = time_s < overlap_s
-        found.append(_violation(requirement, results[requirement.name], history, gauge, index, verdicts))
+        result = results[requirement.name]
+        found.append(_violation(requirement, result, history, gauge, index, verdicts=verdicts, preventing=drivers))
     return tuple(sorted(found, key=lambda violation: violation.time_s))
 
 
@@ -223,7 +240,9 @@ def _violation(
     history: History,
     gauge: Gauge,
     index: int,
+    *,
     verdicts: Mapping[str, bool],
+    preventing: Collection[str],
 ) -> Violation:
     """The record of a violation that began in frame `index`."""
     frame, measures, evidence = history.frames[index], history.measures[index], history.evidence.until(index)
@@ -238,10 +257,8 @@ def _violation(
     hidden = met is not None and met.conflict.hidden
     own_gauge = gauge.of(requirement)
     drivers = kept_by(requirement, own_gauge, history, index, met) if all(verdicts.values()) else {}
-    graded = grade(drivers) if drivers else None
-    actor = "nobody near" if nearest is None else _actor(frame, measures, nearest, evidence) + ", hidden" * hidden
-    violated = VIOLATED.get(requirement.name, f"{requirement.name} violated")
-    others = tuple(name for name in broke if name not in SAME_OFFENCES.get(requirement.name, ()))
+    graded = grade(drivers, preventing) if drivers else None
+    kind, variant = name_violation(requirement.name, manoeuvre=driven, broke=broke, ego_mps=frame.ego_speed_mps)
     return Violation(
         requirement=requirement.name,
         time_s=result.violated_s,
@@ -257,7 +274,8 @@ def _violation(
         grade=graded,
         drivers=drivers,
         fault=None if graded is None else _fault(own_gauge.signals, evidence, met, broke, graded),
-        signature=f"{violated}; {ego_in_words(driven, others)}, {actor}",
+        kind=kind,
+        variant=variant,
         definitions=DEFINITIONS,
     )
 
@@ -280,19 +298,3 @@ def _soonest_met(measures: Measures) -> int | None:
     encounter_s = measures.assessment.others[ENCOUNTER]
     nearest = int(encounter_s.argmin())
     return nearest + 1 if encounter_s[nearest] < ENCOUNTER_CAP_S else None
-
-
-def _actor(frame: Frame, measures: Measures, actor: int, evidence: Evidence) -> str:
-    """Names an actor by where it is and drives, the same in the mirror but for crossing traffic."""
-    ahead, aside = (float(measures.assessment.others[row, actor - 1]) for row in (AHEAD, ASIDE))
-    if frame.kind[actor] == Kind.PEDESTRIAN:
-        return "pedestrian near"
-    # From the lane's heading: an ego that leaves the road turns away from it.
-    turn = float(frame.heading_rad[actor] - lane_heading(evidence)[-1])
-    if math.cos(turn) < ONCOMING_COS:
-        return "oncoming vehicle"
-    if math.cos(turn) < SAME_WAY_COS:
-        return f"vehicle from the {'right' if math.sin(turn) > 0.0 else 'left'}"
-    if abs(aside) > (frame.width_m[0] + frame.width_m[actor]) / 2:
-        return "vehicle beside it"
-    return "vehicle ahead" if ahead > 0.0 else "vehicle behind"

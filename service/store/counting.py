@@ -52,7 +52,13 @@ def count(run: RunRow, row: EpisodeRow, sign: int) -> None:
 def tally(run: RunRow) -> None:
     """Copies order-dependent counts from the run's metrics."""
     phases = [from_json(text) for text in (run.metrics, run.evaluation) if text is not None]
-    for name in ("distinct_failures", "preventable", "distinct_preventable", "headline_candidates"):
+    for name in (
+        "distinct_failures",
+        "preventable",
+        "distinct_preventable",
+        "distinct_published",
+        "headline_candidates",
+    ):
         setattr(run, name, sum(phase.get(name, 0) for phase in phases))
     replayed = [phase for phase in phases if phase.get("headline") is not None]
     run.headline = len({kind for phase in replayed for kind in phase["headline_kinds"]}) if replayed else None
@@ -87,7 +93,7 @@ def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
     row.grade = None if worst is None or not failed else worst.graded
     row.severity = None if contact is None or not failed else contact.severity
     row.fault = None if worst is None or not failed else worst.blamed
-    row.signature = None if worst is None else worst.signature
+    row.kind = None if worst is None else worst.kind
     row.broke = None if contact is None else listed(contact.judgement.broke)
 
 

@@ -18,6 +18,7 @@ TALLIED = (
     "distinct_failures",
     "preventable",
     "distinct_preventable",
+    "distinct_published",
     "headline_candidates",
     "headline",
 )
@@ -95,6 +96,7 @@ class RunRow(Base):
     distinct_failures: Mapped[int] = mapped_column(default=0)
     preventable: Mapped[int] = mapped_column(default=0)
     distinct_preventable: Mapped[int] = mapped_column(default=0)
+    distinct_published: Mapped[int] = mapped_column(default=0)
     headline_candidates: Mapped[int] = mapped_column(default=0)
     headline: Mapped[int | None]  # null before its failures were replayed
     busy_s: Mapped[float] = mapped_column(default=0.0)
@@ -123,6 +125,7 @@ class RequirementRow(Base):
     valid: Mapped[int] = mapped_column(default=0)
     distinct: Mapped[int] = mapped_column(default=0)
     preventable: Mapped[int] = mapped_column(default=0)
+    published: Mapped[int] = mapped_column(default=0)
 
 
 class EpisodeRow(Base):
@@ -135,7 +138,7 @@ class EpisodeRow(Base):
         Index("episodes_sequence", "campaign_number", "sequence", unique=True),
         Index("episodes_runs", "run_number", "number"),
         Index("episodes_outcomes", "campaign_number", "outcome", "number"),
-        *(_of_judged(f"episodes_{name}s", "campaign_number", name, "number") for name in ("grade", "signature")),
+        *(_of_judged(f"episodes_{name}s", "campaign_number", name, "number") for name in ("grade", "kind")),
         {"sqlite_autoincrement": True},
     )
 
@@ -155,7 +158,7 @@ class EpisodeRow(Base):
     grade: Mapped[str | None]  # of a valid failure
     severity: Mapped[str | None]  # of its contact
     fault: Mapped[str | None]  # of a valid failure
-    signature: Mapped[str | None]  # of the violation that names the episode
+    kind: Mapped[str | None]  # of the violation that names the episode
     broke: Mapped[str | None]  # what its striker broke, between commas: ",red_light,"
     funnel: Mapped[str | None] = mapped_column(Text)  # of the run's phase, this episode included
     sequence: Mapped[int]  # among the campaign's events: 1, 2, …, with those of `changes`
