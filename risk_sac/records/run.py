@@ -155,7 +155,7 @@ class RunMetrics(Counts):
 class Funnel(Record):
     """From contacts to what is worth a person's time.
 
-    The steps after `contacts` count violations of every requirement that counts.
+    The steps after `contacts` count violations of every requirement that counts, and those after `valid` kinds.
     """
 
     contacts: int
@@ -163,7 +163,9 @@ class Funnel(Record):
     """Failures."""
     distinct: int
     preventable: int
-    """Distinct violations that a reference driver prevents."""
+    """Kinds of violations that a reference driver prevents."""
+    published: int = 0
+    """Of these kinds, those that R157, FSM or RSS prevents."""
 
     @classmethod
     def of(cls, metrics: RunMetrics) -> "Funnel":
@@ -173,6 +175,7 @@ class Funnel(Record):
             valid=metrics.failures,
             distinct=metrics.distinct_failures,
             preventable=metrics.distinct_preventable,
+            published=metrics.distinct_published,
         )
 
 
@@ -231,6 +234,7 @@ class Run(RunSummary):
     distinct_failures: int
     preventable: int
     distinct_preventable: int
+    distinct_published: int = 0
 
 
 class RunResult(RunSummary):

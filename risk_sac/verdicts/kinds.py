@@ -19,7 +19,6 @@ FAST_MPS = 30 / 3.6  # Choice: where pedestrians begin to die; see `risk_sac.ver
 LATE_S = 2.0  # Choice: what R157's driver needs to be at full braking
 STRIKERS = {
     ConflictType.LEADER: "leader",
-    ConflictType.CUT_IN: "cut-in",
     ConflictType.MERGE: "neighbour",
     ConflictType.PEDESTRIAN: "pedestrian",
 }
@@ -79,8 +78,9 @@ def name_contact(
     kind = f"{', '.join((_striker(evidence, striker, conflict), *from_hiding))}; {MANOEUVRES[manoeuvre]}"
     ego_mps, other_mps = (float(evidence.speed_mps[-1, column]) for column in (0, striker))
     background = ["background traffic"] if evidence.role[striker] == Role.BACKGROUND else []
+    position = [] if conflict.type is ConflictType.CUT_IN else [conflict.position]
     lasted_s = float(evidence.time_s[-1]) - conflict.time_s
-    of_striker = (*_offences(broke), *background, conflict.position, GROUNDS[ground], _pace(other_mps))
+    of_striker = (*_offences(broke), *background, *position, GROUNDS[ground], _pace(other_mps))
     of_ego = (*_offences(ego_broke), RESPONSES[response], _pace(ego_mps))
     began = "early conflict" if lasted_s >= LATE_S else "late conflict"
     return Named(kind, f"{', '.join(of_striker)}; ego {', '.join(of_ego)}, {began}")
@@ -97,6 +97,8 @@ def name_violation(requirement: str, *, manoeuvre: str, broke: tuple[str, ...], 
 
 
 def _striker(evidence: Evidence, striker: int, conflict: Conflict) -> str:
+    if conflict.type is ConflictType.CUT_IN:
+        return f"cut-in from {conflict.position}"
     if conflict.type is not ConflictType.CROSSING:
         return STRIKERS[conflict.type]
     turn = float(evidence.heading_rad[conflict.frame, striker] - evidence.heading_rad[conflict.frame, 0])

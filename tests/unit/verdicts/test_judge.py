@@ -39,13 +39,13 @@ def judged(evidence: Evidence) -> Judgement:
         ),
         (
             cut_in(),
-            "cut-in; ego goes straight",
-            "ahead, in a lane, fast; ego does not brake, fast, early conflict",
+            "cut-in from ahead; ego goes straight",
+            "in a lane, fast; ego does not brake, fast, early conflict",
         ),
         (
             cut_in(gap=-3.0, ego=12.0, other=12.0),
-            "cut-in; ego goes straight",
-            "without a safe gap, alongside, in a lane, fast; ego does not brake, fast, late conflict",
+            "cut-in from alongside; ego goes straight",
+            "without a safe gap, in a lane, fast; ego does not brake, fast, late conflict",
         ),
         (
             leader_brakes(),
