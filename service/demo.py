@@ -215,7 +215,7 @@ def conclude(campaign: Campaign) -> int:
     if progress.distinct_failures == 0:
         console.print("no valid failure was found; try more --episodes or another --seeds", style="bold red")
         return 1
-    found = headline(progress.headline, progress.headline_candidates)
+    found = headline(progress.headline, progress.headline_candidates, progress.headline_published)
     of = f"of {progress.distinct_failures} distinct ones, {progress.distinct_preventable} preventable"
     console.print(f"headline failures: {found} ({of})", style="bold green")
     return 0

@@ -149,7 +149,8 @@ def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, 
         "ego_part": None,
         "fault": None,
         "plausibility": None if grade is None else plausibility(),
-        "signature": "cut-in, straight",
+        "kind": "cut-in, straight",
+        "variant": "ahead",
     }
     return Judgement(grade=grade, conflict_s=conflict_s, **(values | changes))
 
@@ -213,7 +214,8 @@ def violation(**changes: Any) -> Violation:
         "drivers": {},
         "fault": None,
         "plausibility": None if changes.get("grade") is None else plausibility(),
-        "signature": "never_fast violated; straight",
+        "kind": "never_fast violated; straight",
+        "variant": "ego fast",
         "definitions": 1,
     }
     return Violation(**(values | changes))

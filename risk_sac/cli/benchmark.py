@@ -20,7 +20,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.host.machine import cores
 from risk_sac.host.terminal import console
 from risk_sac.records import Counts
-from risk_sac.report.power import BenchmarkRun, PlayedCounts, measured, method_power, power_of, runs_of
+from risk_sac.report.power import NOT_MEASURED, BenchmarkRun, PlayedCounts, measured, method_power, power_of, runs_of
 
 METHODS: Sequence[MethodName] = ("random", "archive", "risk-sac-diverse")
 SEEDS, STEPS = 10, 20_000
@@ -109,6 +109,9 @@ def _power(options: argparse.Namespace) -> int:
     runs = measured() if options.measured is None else runs_of(read_text(options.measured, "measured"))
     if options.runs:
         return _power_of_folders(options, runs)
+    if not runs:
+        say(NOT_MEASURED)
+        return OK
     method, families = options.method or "archive", options.families or SHIPPED
     power = method_power(method, dict.fromkeys(families, (options.steps or STEPS, 1)), runs)
     if not power.defects:

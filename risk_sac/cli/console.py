@@ -181,9 +181,14 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def headline(found: int | None, candidates: int) -> str:
-    """Number of headline failures; before their replay "at most" the candidates."""
-    return f"at most {candidates}" if found is None and candidates else f"{found or 0}"
+def headline(found: int | None, candidates: int, published: int | None) -> str:
+    """Formats the number of headline failures; before their replay "at most" the candidates.
+
+    `published` are those that R157, FSM or RSS prevents.
+    """
+    if found is None:
+        return f"at most {candidates}" if candidates else "0"
+    return f"{found}, {published or 0} of them preventable by R157, FSM or RSS" if found else "0"
 
 
 def driven_by_in_words(counts: Mapping[str, int]) -> str:

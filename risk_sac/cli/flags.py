@@ -188,7 +188,7 @@ FILTERS: Mapping[str, Filter] = {
     "broke": Filter(
         "whose striker broke this rule, such as red_light", lambda _, worst, wanted: wanted in _broke(worst)
     ),
-    "signature": Filter("with this kind, in the words of the list", lambda _, worst, wanted: worst.signature == wanted),
+    "kind": Filter("of this kind, in the words of the list", lambda _, worst, wanted: worst.kind == wanted),
 }
 
 

@@ -22,7 +22,7 @@ from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.failures.export.formats import FORMATS, FormatName, export, names
 from risk_sac.host.terminal import console, printable
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.run_folder.results import RESULTS, distinct_failures, read_results
+from risk_sac.run_folder.results import RESULTS, first_of_variants, read_results
 
 if TYPE_CHECKING:
     from risk_sac.failures.bundle import Bundle
@@ -123,7 +123,7 @@ def _cases(paths: list[Path], ego: EgoConfig) -> Iterator["Regressed"]:
         else:
             files += sorted(path.glob("*.npz")) if path.is_dir() else [path]
     bundles = [read_bundle(file) for file in files]
-    if not bundles and not any(distinct_failures(read_results(run)) for run in runs):
+    if not bundles and not any(first_of_variants(read_results(run)) for run in runs):
         raise ConfigError("--failures", f"there is no failure in {', '.join(map(str, paths))}")
     yield from (regress(bundle, ego) for bundle in bundles)
     for run in runs:

@@ -14,7 +14,7 @@ from risk_sac.failures.export.formats import FORMATS, Files, FormatName, check_c
 from risk_sac.host.machine import cores
 from risk_sac.host.terminal import complain, console
 from risk_sac.metrics import pooled_headline
-from risk_sac.run_folder.results import RESULTS, TIMES, distinct_failures, read_results
+from risk_sac.run_folder.results import RESULTS, TIMES, first_of_variants, read_results
 
 
 def add(commands: Commands) -> None:
@@ -43,7 +43,7 @@ def add(commands: Commands) -> None:
         commands,
         "verify",
         _verify,
-        "replay the distinct failures of runs in fresh processes",
+        "replay the first failures of each variant in fresh processes",
         more="Only failures that repeat count as headline failures.",
         example="verify runs/low --times 3",
     )
@@ -66,7 +66,7 @@ def _bundle(options: argparse.Namespace) -> int:
         write_bundle(options.out, next(bundles(folder, results, [one])))
         console.print(f"Bundle: {options.out}", soft_wrap=True)
         return OK
-    episodes = distinct_failures(results)
+    episodes = first_of_variants(results)
     for bundle in bundles(folder, results, episodes):
         write_bundle(options.out / f"{bundle.manifest.name}.npz", bundle)
     console.print(f"{counted(len(episodes), 'bundle')}: {options.out}", soft_wrap=True)
@@ -109,7 +109,7 @@ def _verify(options: argparse.Namespace) -> int:
         headline = pooled_headline(each for each in (results.metrics, results.evaluation) if each is not None) or 0
         answer.append({"id": results.spec.id, "headline": headline, "episodes": verified.episodes})
         repeated = len(verified.episodes) - len(verified.flaky)
-        repeat = f"{repeated} of {counted(len(verified.episodes), 'distinct failure')} repeat"
+        repeat = f"{repeated} of {counted(len(verified.episodes), 'failure')} repeat"
         lines.append(f"{results.spec.id}: {counted(headline, 'headline failure')}; {repeat}")
         for index in sorted(verified.flaky):
             repetition = verified.episodes[index]

@@ -41,7 +41,7 @@ from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
 from risk_sac.host.machine import cores
 from risk_sac.host.terminal import complain, console, notes
-from risk_sac.metrics import METRICS, Metric
+from risk_sac.metrics import METRICS, Metric, with_published
 from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import TIMES, RunResults
 
@@ -141,9 +141,10 @@ def _run(options: argparse.Namespace) -> int:
 def _found(metrics: RunMetrics | None) -> str:
     if metrics is None:
         return ""
+    preventable = with_published(metrics.distinct_preventable, metrics.distinct_published)
     return (
         f"contacts {metrics.raw_collisions} → valid {metrics.collisions}  failures {metrics.failures} → "
-        f"distinct {metrics.distinct_failures} → preventable {metrics.distinct_preventable}  "
+        f"distinct {metrics.distinct_failures} → preventable {preventable}  "
         f"sliding ECR {metrics.window_ecr:.2f} PCR {metrics.window_pcr:.2f}  λ {metrics.dual_variable:.3f}"
     )
 
@@ -161,15 +162,18 @@ def _summary(spec: RunSpec, results: RunResults, phases: Mapping[str, RunMetrics
 def _figures(metrics: RunMetrics) -> dict[str, str]:
     shown = (metric for metric in METRICS if not metric.search_only)
     return {
-        "headline failures": headline(metrics.headline, metrics.headline_candidates),
+        "headline failures": headline(
+            metrics.headline, metrics.headline_candidates, len(metrics.headline_kinds_published)
+        ),
         "episodes": f"{metrics.episodes} ({metrics.rejected} rejected)",
         "driven by": driven_by_in_words(metrics.episodes_driven_by),
         "contacts": f"{metrics.raw_collisions} ({counted(metrics.artefacts, 'artefact')})",
         "valid contacts": f"{metrics.collisions} ({metrics.unresponsive} unresponsive)",
         "failures of any requirement": f"{metrics.failures}",
-        "distinct violations": f"{metrics.distinct_failures}",
+        "distinct violations": f"{metrics.distinct_failures} ({counted(metrics.variants, 'variant')})",
         "distinct and preventable": f"{metrics.distinct_preventable}",
-        "of these, plausible and not minor": f"{metrics.headline_candidates}",
+        "of these, by R157, FSM or RSS": f"{metrics.distinct_published}",
+        "preventable, plausible and not minor": f"{metrics.headline_candidates}",
         "not minor, but implausible": f"{metrics.implausible}",
         **dict(_figure(metric, metrics) for metric in shown),
         "steps per distinct failure": or_dash(metrics.steps_per_distinct_failure, ".0f"),

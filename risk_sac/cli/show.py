@@ -131,7 +131,7 @@ def _list(options: argparse.Namespace, results: RunResults) -> None:
     episodes = [failure.episode for failure in results.failures]
     chosen = [by_index[each.index] for each in listed(options, matching(options, episodes))]
     lines = [
-        f"headline failures{where}: {headline(phase.headline, phase.headline_candidates)}{_driven_by(phase)}\n"
+        f"headline failures{where}: {_headline(phase)}{_driven_by(phase)}\n"
         f"episodes driven by: {driven_by_in_words(phase.episodes_driven_by)}"
         for where, phase in (("", results.metrics), (" of the evaluation", results.evaluation))
         if phase is not None
@@ -141,6 +141,10 @@ def _list(options: argparse.Namespace, results: RunResults) -> None:
         lines.append(f"refused by a validity rule: {refused} (--raw lists them)")
     table = _table(results.spec.id, chosen) if chosen else "No failures to list."
     print_answer(options, list(map(_plain, chosen)), "\n".join(lines), table)
+
+
+def _headline(phase: RunMetrics) -> str:
+    return headline(phase.headline, phase.headline_candidates, len(phase.headline_kinds_published))
 
 
 def _driven_by(phase: RunMetrics) -> str:

@@ -177,15 +177,18 @@ def _failures(path: Path) -> Iterator[tuple[str, EpisodeRecord]]:
 
 def _clusters(options: argparse.Namespace) -> int:
     from risk_sac.failures.clusters import overview
+    from risk_sac.metrics import with_published
 
     summary = overview(episode for run in options.runs for episode in _failures(run))
-    table = narrow_table("failures", "distinct", "preventable", "kind; look first at")
+    table = narrow_table("failures", "variants", "preventable", "kind; look first at")
     for cluster in summary.clusters:
         first = f"{cluster.name}\n  {cluster.representative} ({cluster.grade})"
-        table.add_row(str(cluster.failures), str(cluster.distinct), str(cluster.preventable), escape(first))
+        preventable = with_published(cluster.preventable, cluster.published)
+        table.add_row(str(cluster.failures), str(cluster.variants), preventable, escape(first))
     kinds = f"{counted(len(summary.clusters), 'kind')}; effective number of kinds (Vendi score): {summary.vendi:.1f}"
+    note = "in brackets: preventable by R157, FSM or RSS"
     covered = f"cells of the taxonomy with a contact: {summary.covered} of {summary.cells}"
-    print_answer(options, summary, table, f"{kinds}\n{covered}")
+    print_answer(options, summary, table, f"{kinds}\n{covered}\n{note}")
     if options.out is not None:
         replace_file(options.out, summary.model_dump_json(indent=2).encode())
     return OK

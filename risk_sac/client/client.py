@@ -162,13 +162,13 @@ class Client:
         fault: Fault | None = None,
         driven_by: DrivenBy | None = None,
         broke: str | None = None,
-        signature: str | None = None,
+        kind: str | None = None,
         page: int = PAGE,
     ) -> Iterator[Episode]:
         """Failures in the order of their arrival; read page by page as far as they are asked for."""
         query: Query = {"run": run, "tier": tier, "requirement": requirement, "grade": grade, "broke": broke}
         query |= {"plausibility": plausibility, "severity": severity, "fault": fault, "driven_by": driven_by}
-        query |= {"signature": signature, "limit": page}
+        query |= {"kind": kind, "limit": page}
         return self._items(EpisodePage, f"{_path(campaign_id)}/failures", query)
 
     def failure(self, campaign_id: str, failure_id: str) -> Failure:

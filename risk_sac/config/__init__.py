@@ -1,7 +1,17 @@
 """Every setting of the system, as frozen pydantic models with unit and meaning by each field."""
 
 from risk_sac.config.base import Interval, Settings
-from risk_sac.config.campaign import FAMILY_NAME, SHIPPED, Budget, CampaignSpec, FamilyName, Iid, Requirement, RunSpec
+from risk_sac.config.campaign import (
+    FAMILY_NAME,
+    SHIPPED,
+    Budget,
+    CampaignSpec,
+    FamilyName,
+    Iid,
+    JudgeConfig,
+    Requirement,
+    RunSpec,
+)
 from risk_sac.config.ego import CarFollowing, EgoConfig, SensorConfig
 from risk_sac.config.learner import (
     AgentConfig,
@@ -35,6 +45,7 @@ __all__ = [
     "Iid",
     "IidName",
     "Interval",
+    "JudgeConfig",
     "LagrangianConfig",
     "LearnerConfig",
     "Method",

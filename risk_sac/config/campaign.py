@@ -100,6 +100,17 @@ class Iid(Settings):
     """Of scenes, actions and SUMO; no stream of a search is the same, whatever its seed."""
 
 
+PreventingDriver = Literal["r157", "fsm", "rss", "defensive"]
+
+
+class JudgeConfig(Settings):
+    """Whose word counts when failures are judged."""
+
+    drivers: Annotated[tuple[PreventingDriver, ...], Field(min_length=1)] = ("r157", "fsm", "rss", "defensive")
+    """Reference drivers, each of which makes a failure preventable that it would have prevented. The others are asked
+    as well, and reported only."""
+
+
 PriorName = Annotated[str, Field(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f]+$")]
 
 
@@ -114,6 +125,7 @@ class RunSpec(Settings):
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     learner: LearnerConfig = LearnerConfig()
+    judge: JudgeConfig = JudgeConfig()
     prior: PriorName = "shipped"
 
     @property
@@ -155,6 +167,7 @@ class CampaignSpec(Settings):
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     learner: LearnerConfig = LearnerConfig()
+    judge: JudgeConfig = JudgeConfig()
     prior: PriorName = "shipped"
     """What methods with a prior start from: `shipped`, `none`, or the scripts of an earlier campaign, by its id; on the
     command line the folder of a run or campaign. They are copied, and the copy's name takes the place of this one."""
@@ -212,7 +225,7 @@ class CampaignSpec(Settings):
         )
 
     def _shared(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in ("ego", "odd", "requirements", "learner", "prior")}
+        return {name: getattr(self, name) for name in ("ego", "odd", "requirements", "learner", "judge", "prior")}
 
 
 MOST_BYTES = 2 * 2**30  # of a run, beside the 0.6 GB or so that any run takes for code

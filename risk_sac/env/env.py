@@ -277,7 +277,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             visible_for_s=self._perception.in_view_for(other, frame.time_s),
             ever_visible=self._perception.ever_seen(other),
         )
-        return collision_of(contact, frame, self._released_s, self.evidence(), self.trace.since_release, facts)
+        measures, drivers = self.trace.since_release, self.problem.drivers
+        return collision_of(contact, frame, self._released_s, self.evidence(), measures, facts, drivers=drivers)
 
     def requirement_results(self) -> dict[str, RequirementResult]:
         """Returns the robustness of each requirement since the release."""
@@ -286,7 +287,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def violations(self, results: Mapping[str, RequirementResult]) -> tuple[Violation, ...]:
         """Violations without contact of the requirements that count; see `violations_of`."""
-        return violations_of(self.problem.requirements, results, self._history, self._gauge, self._artefacts)
+        requirements, drivers = self.problem.requirements, self.problem.drivers
+        return violations_of(requirements, results, self._history, self._gauge, self._artefacts, drivers=drivers)
 
     def _history(self) -> History:
         return History(self.trace.frames, self.trace.measures, self.evidence())

@@ -112,6 +112,7 @@ class Problem:
     ego: EgoConfig
     requirements: tuple[Requirement, ...]  # the ODD's, then the user's
     rss: RssParameters
+    drivers: tuple[str, ...]  # reference drivers whose word makes a failure preventable
 
     @classmethod
     def from_spec(cls, spec: RunSpec) -> "Problem":
@@ -146,6 +147,7 @@ class Problem:
             ego=ego,
             requirements=tuple((shipped | own).values()),
             rss=_rss_parameters(odd),
+            drivers=spec.judge.drivers,
         )
         problem.check_demand(spec)
         return problem

@@ -30,7 +30,7 @@ from risk_sac.run_folder.results import (
     TIMES,
     RunResults,
     Verified,
-    distinct_failures,
+    first_of_variants,
     read_results,
     read_verified,
     with_headline,
@@ -101,7 +101,9 @@ logger = logging.getLogger(__name__)
 def verify(
     folders: Sequence[Path], times: int = TIMES, jobs: int = 1, stopping: Callable[[], bool] = lambda: False
 ) -> Mapping[Path, Verified]:
-    """Replays the distinct failures of finished runs, each in `times` processes, and notes what came of it.
+    """Replays the first failures of each variant of finished runs, and notes what came of it.
+
+    Each is replayed in `times` processes.
 
     Each run's results.json then has its headline failures.
 
@@ -127,7 +129,7 @@ def verify(
         if known is not None and enough and known.code == code and known.versions == versions():
             up_to_date[folder] = known
         else:
-            episodes = {episode.index: Repetition(times=0, same=0) for episode in distinct_failures(results)}
+            episodes = {episode.index: Repetition(times=0, same=0) for episode in first_of_variants(results)}
             missing[folder] = Verified(digest=results.digest, code=code, versions=versions(), episodes=episodes)
     failed = [folder for folder, verified in missing.items() if verified.episodes]
     told = _replayed(failed, times, max(jobs, 1), stopping) if failed else {}

@@ -28,7 +28,7 @@ class Case(Record):
     digest: str
     """Of its trajectory: failures of different campaigns, and a failure and its core, share an id."""
     name: str
-    """Its signature, in words."""
+    """Its kind, in words."""
     grade: Grade | None
     verdict: Verdict
     reason: str

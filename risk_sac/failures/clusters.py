@@ -1,4 +1,4 @@
-"""Sorts failures into clusters by signature, and names one of each to look at first."""
+"""Sorts failures into clusters by kind, and names one of each to look at first."""
 
 import math
 from collections import defaultdict
@@ -9,7 +9,7 @@ import numpy as np
 
 from risk_sac.metrics.metric import outcome_features
 from risk_sac.records import Collision, EpisodeRecord, Grade, Record, Violation
-from risk_sac.verdicts.distinct import CELLS, distinct_failures, kind_of
+from risk_sac.verdicts.distinct import CELLS, taxonomy_cell, variant_name
 from risk_sac.world.types import Floats
 
 SPEED_MPS, LEAST = 20.0, -3.0  # the same ranges for a violation without contact: of the ego's speed, and of robustness
@@ -25,14 +25,17 @@ class _Member(NamedTuple):
 
 
 class Cluster(Record):
-    """The failures of one signature."""
+    """The failures of one kind."""
 
     name: str
-    """The signature, in words."""
+    """The kind, in words."""
     failures: int
-    distinct: int
+    variants: int
+    """Different ones among them."""
     preventable: int
     """That a reference driver would have prevented."""
+    published: int
+    """Of these, those that R157, FSM or RSS would have prevented."""
     representative: str
     """Id of the one to look at first: the most preventable, and of those the shortest."""
     grade: Grade | None
@@ -44,7 +47,7 @@ class Overview(Record):
 
     clusters: tuple[Cluster, ...]
     vendi: float
-    """Vendi score of the distinct failures: as many that have nothing in common would be as various; 0 without any."""
+    """Vendi score of the variants: as many that have nothing in common would be as various; 0 without any."""
     covered: int
     """Cells of the taxonomy of contacts with a failure in them."""
     cells: int
@@ -53,30 +56,33 @@ class Overview(Record):
 
 def overview(episodes: Iterable[tuple[str, EpisodeRecord]]) -> Overview:
     """Sorts valid violations into clusters."""
-    members_by_signature: defaultdict[str, list[_Member]] = defaultdict(list)
-    kinds = set()
+    members_by_kind: defaultdict[str, list[_Member]] = defaultdict(list)
+    taxonomy = set()
     for name, episode in episodes:
         for violation in episode.valid_violations:
             if isinstance(violation, Collision):
-                kinds.add(kind_of(violation))
-            members_by_signature[violation.signature].append(_Member(name, episode, violation))
-    distinct = {}
-    for name, members in members_by_signature.items():
-        violations = [member.violation for member in members]
-        distinct[name] = [violations[position] for position in distinct_failures(violations)]
-    clusters = [_cluster(name, members, len(distinct[name])) for name, members in members_by_signature.items()]
+                taxonomy.add(taxonomy_cell(violation))
+            members_by_kind[violation.kind].append(_Member(name, episode, violation))
+    first_of_variants: dict[str, list[Collision | Violation]] = {}
+    for name, members in members_by_kind.items():
+        first: dict[str, Collision | Violation] = {}
+        for member in members:
+            first.setdefault(variant_name(member.violation), member.violation)
+        first_of_variants[name] = list(first.values())
+    clusters = [_cluster(name, members, len(first_of_variants[name])) for name, members in members_by_kind.items()]
     clusters.sort(key=lambda cluster: (-cluster.preventable, -cluster.failures, cluster.name))
-    score = vendi(list(distinct.values()))
-    return Overview(clusters=tuple(clusters), vendi=score, covered=len(kinds), cells=CELLS)
+    score = vendi(list(first_of_variants.values()))
+    return Overview(clusters=tuple(clusters), vendi=score, covered=len(taxonomy), cells=CELLS)
 
 
-def _cluster(name: str, members: Sequence[_Member], distinct: int) -> Cluster:
+def _cluster(name: str, members: Sequence[_Member], variants: int) -> Cluster:
     first = min(members, key=_rank)
     return Cluster(
         name=name,
         failures=len(members),
-        distinct=distinct,
+        variants=variants,
         preventable=sum(member.violation.preventable for member in members),
+        published=sum(member.violation.published_preventable for member in members),
         representative=first.name,
         grade=first.violation.graded,
     )

@@ -26,7 +26,7 @@ from risk_sac.failures.play import Played, Policy, play
 from risk_sac.failures.recording import actions_of, trajectory_digest
 from risk_sac.failures.variants import alike
 from risk_sac.records import Collision, Violation
-from risk_sac.run_folder.results import distinct_failures, read_results
+from risk_sac.run_folder.results import first_of_variants, read_results
 from risk_sac.search.agents.controls import Held, ScriptFollower
 from risk_sac.world.types import Floats, Scene
 
@@ -39,7 +39,7 @@ class _Ending(NamedTuple):
 
     verdict: Verdict
     reason: str
-    found: str = ""  # signature of what happened instead
+    found: str = ""  # kind of what happened instead
     played: Played | None = None  # how it went, where a requirement that counts was violated
 
 
@@ -58,7 +58,7 @@ def regress(bundle: Bundle, ego: EgoConfig) -> Regressed:
     case = Case(
         id=manifest.id,
         digest=manifest.digest,
-        name=named.signature if named else "no violation",
+        name=named.kind if named else "no violation",
         grade=named.graded if named else None,
         verdict=ending.verdict,
         reason=ending.reason,
@@ -75,7 +75,7 @@ def _as_played(bundle: Bundle, ego: EgoConfig, played: Played) -> Bundle:
 
 
 def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Regressed]:
-    """Plays the distinct failures of a run against another ego, with the run's policy where it has one.
+    """Plays the first failures of each variant of a run against another ego, with the run's policy where it has one.
 
     Raises:
       ConfigError: the folder holds no run, or none whose policy can act on.
@@ -86,7 +86,7 @@ def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Regressed]:
     if policy is None and method_of(results.spec.method).learns:
         got = f"{folder} has not finished, or has no checkpoint, so that its policy cannot act on"
         raise ConfigError("--failures", got, remedy="make bundles")
-    for episode in distinct_failures(results):
+    for episode in first_of_variants(results):
         yield regress(recorded_bundle(folder, results, episode, policy), ego)
 
 
@@ -130,9 +130,9 @@ def _judge(bundle: Bundle, ego: EgoConfig) -> _Ending:
 def compared(violations: Sequence[Collision | Violation], wanted: Sequence[Collision | Violation]) -> _Ending:
     """Compares the violations of an old failure with another ego's."""
     if still := [each for each in violations if any(alike([each], old) for old in wanted)]:
-        return _Ending(Verdict.STILL_FAILING, _events(still), still[0].signature)
+        return _Ending(Verdict.STILL_FAILING, _events(still), still[0].kind)
     if valid := [each for each in violations if each.valid]:
-        return _Ending(Verdict.NEW_KIND, f"{_events(valid)}: {valid[0].signature}", valid[0].signature)
+        return _Ending(Verdict.NEW_KIND, f"{_events(valid)}: {valid[0].kind}", valid[0].kind)
     if not violations:
         kept = (f"{old.requirement} is kept" if isinstance(old, Violation) else "nothing is touched" for old in wanted)
         return _Ending(Verdict.FIXED, " and ".join(kept))
@@ -141,7 +141,7 @@ def compared(violations: Sequence[Collision | Violation], wanted: Sequence[Colli
     if any(each.artefact for each in violations):  # and it may have ended the episode before the failure
         return _Ending(Verdict.NOT_COMPARABLE, said)
     if BLIND in broken:
-        return _Ending(Verdict.NEW_KIND, f"{events}, which it never saw", violations[0].signature)
+        return _Ending(Verdict.NEW_KIND, f"{events}, which it never saw", violations[0].kind)
     return _Ending(Verdict.FIXED, said)
 
 

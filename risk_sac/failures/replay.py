@@ -1,8 +1,8 @@
 """Episodes played once more, from their records and the actions that were recorded.
 
-`python -m risk_sac.failures.replay FILE TIMES JOBS FOLDER...` replays the distinct failures of runs `TIMES` over, each
-time in a process of its own, `JOBS` of them at once. Each appends a line of JSON for each run to the file. They are
-forked from a process that has read the libraries, which costs more than playing, but has never started SUMO.
+`python -m risk_sac.failures.replay FILE TIMES JOBS FOLDER...` replays the first failures of each variant `TIMES` over,
+each time in a process of its own, `JOBS` of them at once. Each appends a line of JSON for each run to the file. They
+are forked from a process that has read the libraries, which costs more than playing, but has never started SUMO.
 """
 
 import json
@@ -21,7 +21,7 @@ from risk_sac.failures.recording import trajectory_digest
 from risk_sac.records import EpisodeRecord
 from risk_sac.risk.measures import soft_min
 from risk_sac.run_folder.arrays import read_series
-from risk_sac.run_folder.results import FAILURES, RunResults, distinct_failures, read_results, series_name
+from risk_sac.run_folder.results import FAILURES, RunResults, first_of_variants, read_results, series_name
 
 ATTEMPTS = 3
 Prepared = Mapping[Path, tuple[RunResults, RiskSacEnv]]
@@ -49,12 +49,12 @@ def _say(file: Path, *lines: dict[str, object]) -> None:
 
 
 def _tell(file: Path, runs: Prepared) -> None:
-    """Replays the distinct failures of all runs, and says of each run which are the same again."""
+    """Replays the first failures of each variant of all runs, and says of each run which are the same again."""
     lines = list[dict[str, object]]()
     for folder, (results, env) in runs.items():
         try:
             with closing(env):
-                same = [each.index for each in distinct_failures(results) if _repeats(folder, each, env)]
+                same = [each.index for each in first_of_variants(results) if _repeats(folder, each, env)]
             lines.append({"folder": str(folder), "same": same})
         except (RiskSacError, OSError) as error:
             lines.append({"folder": str(folder), "error": f"{type(error).__name__}: {error}"})

@@ -9,7 +9,7 @@ from risk_sac.failures.recording import Series
 from risk_sac.records import Collision, Violation
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
 from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
-from risk_sac.verdicts.labels import ONCOMING_COS, RESPONSES
+from risk_sac.verdicts.kinds import ONCOMING_COS, RESPONSES
 from risk_sac.verdicts.offences import IN_WORDS, STANDING_MPS
 from risk_sac.world.types import STEP_S, Floats, Kind
 
@@ -71,7 +71,7 @@ def _who(series: Series, striker: int, at: int, broke: str) -> str:
     elif math.cos(turn) < ONCOMING_COS:
         name = "oncoming vehicle"
     else:
-        name = f"vehicle from the {'right' if math.sin(turn) > 0.0 else 'left'}"  # as its signature says it
+        name = f"vehicle from the {'right' if math.sin(turn) > 0.0 else 'left'}"  # as its kind says it
     name += broke
     if abs(ahead_m) < 1.0:
         return f"{name}, level with it"

@@ -51,7 +51,8 @@ def _contact(collision: Collision) -> Iterator[str]:
         f"the ego's {collision.ego_zone}, at {collision.ego_speed_mps:.1f} m/s, touched the {collision.other_zone} of "
         f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {known(collision)}"
     )
-    yield judgement.signature
+    yield judgement.kind
+    yield judgement.variant
     yield collision.severity_in_words
     yield f"{began(collision)}{_grade(collision)}"
     if judgement.plausibility is not None:
@@ -70,7 +71,8 @@ def _violation(violation: Violation) -> Iterator[str]:
         unseen = ", of which it did not know" if violation.hidden else ""
         met = f"; it would have met {violation.other_role} {violation.other_id!r} first{unseen}"
     yield f"the ego, at {violation.ego_speed_mps:.1f} m/s, violated {violation.requirement}{met}"
-    yield violation.signature
+    yield violation.kind
+    yield violation.variant
     yield f"least robustness: {violation.robustness:.2f}{_grade(violation)}"
     fault = f" · fault: {violation.fault}" if violation.fault is not None else ""
     yield f"the ego's offences: {_words(', '.join(violation.broke)) or 'none'}{fault}"

@@ -23,7 +23,16 @@ from risk_sac.metrics.metric import (
     pooled_counts,
     pooled_headline,
     pooled_names,
+    pooled_published,
     wilson_interval,
 )
 from risk_sac.metrics.rows import METRICS, RATIOS, MetricName
-from risk_sac.metrics.tally import COLUMNS, WINDOW, Tally, pooled_requirements, preventable, requirement_cells
+from risk_sac.metrics.tally import (
+    COLUMNS,
+    WINDOW,
+    Tally,
+    pooled_requirements,
+    preventable,
+    requirement_cells,
+    with_published,
+)

@@ -17,7 +17,7 @@ HISTOGRAMS = (
     "prevented_by",
     "by_severity",
     "by_fault",
-    "signatures",
+    "kinds",
     "conflicts_by_second",
     "contacts_by_second",
 )

@@ -165,6 +165,12 @@ def pooled_headline(metrics: Iterable[RunMetrics]) -> int | None:
     return len({kind for each in replayed for kind in each.headline_kinds}) if replayed else None
 
 
+def pooled_published(metrics: Iterable[RunMetrics]) -> int | None:
+    """Counts the headline failures of several runs that R157, FSM or RSS prevents; as `pooled_headline`."""
+    replayed = [run for run in metrics if run.headline is not None]
+    return len({kind for run in replayed for kind in run.headline_kinds_published}) if replayed else None
+
+
 def headline_driven_by(metrics: Iterable[RunMetrics]) -> dict[str, int]:
     """Counts headline failures of several runs by the first one's driver.
 

@@ -9,11 +9,20 @@ from pydantic import ConfigDict, Field, PrivateAttr
 
 from risk_sac.errors import NotFinite
 from risk_sac.metrics.metric import Spread, outcome_features, wilson_interval
-from risk_sac.records import Collision, Counts, EpisodeRecord, Outcome, RequirementCounts, RunMetrics, Violation
-from risk_sac.verdicts.distinct import DistinctFailures, FailureKind, distinct_failures, kind_of
+from risk_sac.records import (
+    PUBLISHED,
+    Collision,
+    Counts,
+    EpisodeRecord,
+    Outcome,
+    RequirementCounts,
+    RunMetrics,
+    Violation,
+)
+from risk_sac.verdicts.distinct import DistinctFailures, TaxonomyCell, taxonomy_cell, variant_name
 from risk_sac.world.types import STEP_S
 
-STEPS = ("violated", "valid", "distinct", "preventable")
+STEPS = ("violated", "valid", "distinct", "preventable", "published")
 COLUMNS = ("requirement", "counts", *STEPS, "rate (95 %)")
 
 
@@ -23,17 +32,25 @@ class RequirementTally:
     def __init__(self, counts: str) -> None:
         self._counts = counts
         self.violated = self._valid = 0
-        self._distinct, self._preventable = DistinctFailures(), DistinctFailures()
+        self._distinct, self._preventable, self._published = (DistinctFailures() for _ in range(3))
 
-    def add(self, violation: Collision | Violation) -> tuple[bool, bool]:
-        """Counts a valid violation; returns whether it is distinct, and distinct among the preventable ones."""
-        new = self._distinct.add(violation)  # the only one that may refuse it
+    def add(self, violation: Collision | Violation) -> tuple[bool, bool, bool]:
+        """Counts a valid violation.
+
+        Returns whether it is the first of its kind: of all, of the preventable ones, and of those that R157, FSM or RSS
+        prevents.
+        """
         self._valid += 1
-        return new, violation.preventable and self._preventable.add(violation)
+        return (
+            self._distinct.add(violation),
+            violation.preventable and self._preventable.add(violation),
+            violation.published_preventable and self._published.add(violation),
+        )
 
     def counts(self, rated: int) -> RequirementCounts:
         """The funnel so far, given the episodes that rates are taken over."""
-        steps = (self.violated, self._valid, self._distinct.count, self._preventable.count)
+        kinds = (self._distinct.count, self._preventable.count, self._published.count)
+        steps = (self.violated, self._valid, *kinds)
         return _funnel(self._counts, steps, rated)
 
 
@@ -50,10 +67,15 @@ def pooled_requirements(metrics: Sequence[RunMetrics]) -> dict[str, RequirementC
 
 def requirement_cells(name: str, requirement: RequirementCounts) -> list[str]:
     """The cells of a requirement's row, under `COLUMNS`; a dash where nothing is judged."""
-    judged = (requirement.valid, requirement.distinct, requirement.preventable)
-    steps = map(str, judged) if requirement.counts == "failure" else "–––"
+    judged = (requirement.valid, requirement.distinct, requirement.preventable, requirement.published)
+    steps = map(str, judged) if requirement.counts == "failure" else "––––"
     rate = f"{requirement.rate:.3f} [{requirement.rate_low:.3f}, {requirement.rate_high:.3f}]"
     return [name, requirement.counts, str(requirement.violated), *steps, rate]
+
+
+def with_published(count: int | None, published: int | None) -> str:
+    """Formats a count of preventable failures, and in brackets those that R157, FSM or RSS prevents."""
+    return "–" if count is None else f"{count:,} ({published or 0:,})"
 
 
 def _funnel(counts: str, steps: Sequence[int], rated: int) -> RequirementCounts:
@@ -97,14 +119,14 @@ class Tally(Counts):
     episodes_driven_by: Counter[str] = Field(default_factory=Counter)
     """What drove the adversaries → episodes."""
     prevented_by: Counter[str] = Field(default_factory=Counter)
-    """Reference driver → valid contacts that it would have prevented."""
+    """Reference driver, or `published` → valid contacts that it would have prevented."""
     by_severity: Counter[str] = Field(default_factory=Counter)
     """Severity → valid contacts."""
     by_fault: Counter[str] = Field(default_factory=Counter)
     """Fault → failures, each by its worst violation."""
-    signatures: Counter[str] = Field(default_factory=Counter)
-    """Signature → valid violations."""
-    kinds: set[FailureKind] = Field(default_factory=set)
+    kinds: Counter[str] = Field(default_factory=Counter)
+    """Kind → valid violations."""
+    taxonomy: set[TaxonomyCell] = Field(default_factory=set)
     """Of the valid contacts."""
     conflicts_by_second: list[int] = Field(default_factory=list)
     """Valid contacts by the second in which they began."""
@@ -112,6 +134,7 @@ class Tally(Counts):
     """The same by the second of the contact."""
     _candidates: DistinctFailures = PrivateAttr(default_factory=DistinctFailures)
     _implausible: DistinctFailures = PrivateAttr(default_factory=DistinctFailures)
+    _variants: set[str] = PrivateAttr(default_factory=set)
     _newest: deque[tuple[bool, bool]] = PrivateAttr(default_factory=lambda: deque(maxlen=WINDOW))
     _spread: Spread = PrivateAttr(default_factory=Spread)
     _requirements: dict[str, RequirementTally] = PrivateAttr(default_factory=dict)
@@ -141,7 +164,6 @@ class Tally(Counts):
         if failed:
             if not record.valid_violations:
                 raise ValueError(f"episode {record.index} is a failure without a valid violation")
-            distinct_failures(record.valid_violations)  # raises for a NaN before anything is counted
             if struck is not None:
                 self._add_collision(struck)
             self._add_violations(record)
@@ -174,12 +196,15 @@ class Tally(Counts):
         if record.worst_violation is not None and record.worst_violation.blamed is not None:
             self.by_fault[record.worst_violation.blamed] += 1
         for violation in record.valid_violations:
-            new, new_preventable = self._requirement(violation.requirement, "failure").add(violation)
+            new, preventable_kind, published_kind = self._requirement(violation.requirement, "failure").add(violation)
             self.distinct_failures += new
-            self.distinct_preventable += new_preventable  # whichever of its kind came first
+            self.distinct_preventable += preventable_kind
+            self.distinct_published += published_kind
             self.headline_candidates += violation.headline_candidate and self._candidates.add(violation)
             self.implausible += violation.serious and not violation.plausible and self._implausible.add(violation)
-            self.signatures[violation.signature] += 1
+            self.kinds[violation.kind] += 1
+            self._variants.add(variant_name(violation))
+        self.variants = len(self._variants)
 
     def _requirement(self, name: str, counts: str) -> RequirementTally:
         return self._requirements.setdefault(name, RequirementTally(counts))
@@ -196,9 +221,12 @@ class Tally(Counts):
         self.collisions += 1
         self.preventable_collisions += collision.preventable
         self.avoidable += collision.avoidable
-        self.prevented_by.update({name: int(prevents) for name, prevents in collision.prevention.items()})
+        prevented = {name: int(prevents) for name, prevents in collision.prevention.items()}
+        if prevented:
+            prevented["published"] = max(prevented.get(name, 0) for name in PUBLISHED)
+        self.prevented_by.update(prevented)
         self.by_severity[judged.severity] += 1
-        self.kinds.add(kind_of(collision))
+        self.taxonomy.add(taxonomy_cell(collision))
         self.unresponsive += judged.unresponsive
         self.conflicts_by_second[self._second(judged.conflict_s)] += 1
         self.contacts_by_second[self._second(collision.time_s)] += 1

@@ -61,7 +61,7 @@ from risk_sac.records.run import (
 from risk_sac.records.violation import (
     ARTEFACT_RULES,
     NO_CONTACT,
-    REACTING,
+    PUBLISHED,
     REPEATS,
     Collision,
     RequirementResult,

@@ -87,18 +87,22 @@ class Progress(Record):
     """Of the i.i.d. phase too, if there is one; what follows the totals is of the searches alone."""
     episodes_total: int
     headline: int | None = None
-    """Distinct, preventable, plausible, not minor, the same when replayed; each kind once. Null before a replay."""
+    """Kinds of failures, preventable, plausible, not minor, the same when replayed. Null before a replay."""
+    headline_published: int | None = None
+    """Of these kinds, those that R157, FSM or RSS prevents."""
     failures: int
     """Episodes with a valid violation of a requirement that counts."""
     raw_collisions: int
     """All contacts of the ego."""
     rejected: int
     distinct_failures: int
-    """Sum over the runs; what two runs found alike counts twice."""
+    """Kinds of failures: sum over the runs; what two runs found alike counts twice."""
     preventable: int
     """Failures that a reference driver would have prevented, repetitions included."""
     distinct_preventable: int
-    """The distinct ones among them; sum over the runs."""
+    """Kinds of these; sum over the runs."""
+    distinct_published: int = 0
+    """Of these kinds, those that R157, FSM or RSS prevents; sum over the runs."""
     headline_candidates: int = 0
     """Those that are plausible and not minor."""
     implausible: int = 0
@@ -198,6 +202,8 @@ class Total(Counts):
     runs: int
     headline: int | None = None
     """Each kind once."""
+    headline_published: int | None = None
+    """Of these kinds, those that R157, FSM or RSS prevents."""
     ecr: OptionalReal
     ecr_low: OptionalReal
     """95 % interval: Wilson over all episodes, widened to the bootstrap over the seeds."""
@@ -215,7 +221,7 @@ class Total(Counts):
     unresponsive_share: OptionalReal
     """Of the valid contacts; null without one."""
     pcr_by_driver: Mapping[str, DriverPcr] = {}
-    """Reference driver → its own PCR."""
+    """Reference driver → its own PCR; `published` → that of R157, FSM or RSS."""
     episodes_driven_by: Mapping[str, int] = {}
     """What drove the adversaries → episodes."""
     headline_driven_by: Mapping[str, int] = {}
@@ -226,8 +232,8 @@ class Total(Counts):
     """Fault → failures."""
     requirements: Mapping[str, RequirementCounts] = {}
     """Requirement → its funnel."""
-    signatures: Mapping[str, int]
-    """Signature → valid violations."""
+    kinds: Mapping[str, int]
+    """Kind → valid violations."""
     conflicts_by_second: list[int]
     """Valid contacts by the second in which the conflict began."""
     contacts_by_second: list[int]
@@ -244,5 +250,6 @@ class Results(Record):
     adjustments: tuple[Adjustment, ...] = ()
     """What its episodes use otherwise than it was asked for, such as an ODD beyond what a family supports."""
     headline: int | None = None  # as in the campaign's progress
+    headline_published: int | None = None
     runs: list[RunResult]
     totals: list[Total]

@@ -20,7 +20,7 @@ class ConflictType(StrEnum):
 class Grade(StrEnum):
     """Whether a reference driver would have prevented a valid failure; PCR counts `PREVENTABLE`."""
 
-    PREVENTABLE = "preventable"  # by at least one of `risk_sac.verdicts.reference.PREVENTING`
+    PREVENTABLE = "preventable"  # by at least one of the drivers that `judge.drivers` of the spec names
     FULL_BRAKING = "full_braking"  # only by full braking at once
     UNAVOIDABLE = "unavoidable"
 
@@ -148,5 +148,8 @@ class Judgement(Record):
     """ego | shared | other. Null where the contact is not valid."""
     plausibility: Plausibility | None
     """How likely road users do what the adversaries did. Null where the contact is not valid."""
-    signature: str
-    """The class of failures it belongs to, in words; what differs in it is distinct."""
+    kind: str
+    """What a person tells apart, in words: the striker and its direction, whether it was hidden, the ego's
+    manoeuvre."""
+    variant: str
+    """All else that tells failures of one kind apart, in words."""

@@ -34,7 +34,9 @@ class Counts(Record):
     failures: int = 0
     """Episodes with a valid violation that counts."""
     distinct_failures: int = 0
-    """Valid violations unlike every earlier one of their run."""
+    """Kinds of valid violations in their run."""
+    variants: int = 0
+    """The same by variant: kinds are divided into them."""
     preventable: int = 0
     """Failures that a reference driver prevents."""
     preventable_collisions: int = 0
@@ -42,11 +44,13 @@ class Counts(Record):
     avoidable: int = 0
     """Valid contacts that it, or full braking at once, prevents."""
     distinct_preventable: int = 0
-    """Distinct violations that it prevents."""
+    """Kinds of violations that it prevents."""
+    distinct_published: int = 0
+    """Of these kinds, those that R157, FSM or RSS prevents."""
     headline_candidates: int = 0
-    """Those of them that are plausible and not minor."""
+    """Kinds of preventable violations that are plausible and not minor."""
     implausible: int = 0
-    """Those that are not minor, but do what no road user does."""
+    """Kinds of those that are not minor, but do what no road user does."""
     artefacts: int = 0
     """Contacts made by simulator or control."""
     unresponsive: int = 0
@@ -62,7 +66,7 @@ class Counts(Record):
 
 
 class RequirementCounts(Record):
-    """The funnel of one requirement: violated → valid → distinct → preventable, in episodes."""
+    """The funnel of one requirement: violated → valid, in episodes, → distinct → preventable, in kinds."""
 
     counts: str
     """failure | report"""
@@ -72,7 +76,9 @@ class RequirementCounts(Record):
     """Of these, the valid ones of a requirement that counts."""
     distinct: int = 0
     preventable: int = 0
-    """Distinct violations that a reference driver prevents."""
+    """Kinds of violations that a reference driver prevents."""
+    published: int = 0
+    """Of these kinds, those that R157, FSM or RSS prevents."""
     rate: Real = 0.0
     """`valid` / episodes; `violated` / episodes where it is reported only."""
     rate_low: Real = 0.0
@@ -102,7 +108,8 @@ class RunMetrics(Counts):
 
     headline: int | None = None
     """Null before a replay."""
-    headline_kinds: tuple[str, ...] = ()  # requirement, signature and cell of each
+    headline_kinds: tuple[str, ...] = ()
+    headline_kinds_published: tuple[str, ...] = ()  # of these, those that R157, FSM or RSS prevents
     headline_kinds_driven_by: tuple[DrivenBy | None, ...] = ()  # what drove the first episode of each
     episodes_driven_by: Mapping[str, int] = {}
     """What drove the adversaries → episodes, rejected scenes included."""
@@ -129,13 +136,13 @@ class RunMetrics(Counts):
     temperature: Real
     """α."""
     steps_per_distinct_failure: float | None = None
-    """Environment steps per distinct failure; null without one."""
+    """Environment steps per kind of failure; null without one."""
     covered: int = 0
     """Cells of the fixed taxonomy of contacts that a valid one lies in."""
-    signatures: Mapping[str, int] = {}
-    """Signature → valid violations, in the order in which they were first met."""
+    kinds: Mapping[str, int] = {}
+    """Kind → valid violations, in the order in which they were first met."""
     prevented_by: Mapping[str, int] = {}
-    """Reference driver → valid contacts that it prevents."""
+    """Reference driver → valid contacts that it prevents; `published` → those that R157, FSM or RSS prevents."""
     by_severity: Mapping[str, int] = {}
     """Severity → valid contacts."""
     by_fault: Mapping[str, int] = {}
@@ -151,7 +158,7 @@ class RunMetrics(Counts):
 class Funnel(Record):
     """From contacts to what is worth a person's time.
 
-    The steps after `contacts` count violations of every requirement that counts.
+    The steps after `contacts` count violations of every requirement that counts, and those after `valid` kinds.
     """
 
     contacts: int
@@ -159,7 +166,9 @@ class Funnel(Record):
     """Failures."""
     distinct: int
     preventable: int
-    """Distinct violations that a reference driver prevents."""
+    """Kinds of violations that a reference driver prevents."""
+    published: int = 0
+    """Of these kinds, those that R157, FSM or RSS prevents."""
 
     @classmethod
     def of(cls, metrics: RunMetrics) -> "Funnel":
@@ -169,6 +178,7 @@ class Funnel(Record):
             valid=metrics.failures,
             distinct=metrics.distinct_failures,
             preventable=metrics.distinct_preventable,
+            published=metrics.distinct_published,
         )
 
 
@@ -227,6 +237,7 @@ class Run(RunSummary):
     distinct_failures: int
     preventable: int
     distinct_preventable: int
+    distinct_published: int = 0
 
 
 class RunResult(RunSummary):

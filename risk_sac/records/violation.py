@@ -21,10 +21,10 @@ ARTEFACT_RULES = frozenset(
         "ego_model_saw",
     }
 )
-# Reference drivers that react to the conflict. A defensive one slows before it, which the ego owes only where it could
-# not see.
-REACTING = frozenset({"r157", "fsm", "rss"})
 NO_CONTACT = "no_contact"  # the requirement that a contact violates
+# Reference drivers by a regulation or a publication, which react to the conflict. `defensive` is our own, and slows
+# before it, which the ego owes only where it could not see.
+PUBLISHED = ("r157", "fsm", "rss")
 
 
 class Violated(Record, ABC):
@@ -77,15 +77,19 @@ class Violated(Record, ABC):
     def serious(self) -> bool:
         """Whether it is preventable and not minor.
 
-        One that others caused has to be preventable by a driver that reacts, not by a defensive one alone.
+        One that others caused has to be preventable by one of `PUBLISHED`, not by a defensive driver alone.
         """
-        reacted = any(self.prevention.get(name, False) for name in REACTING)
-        return self.preventable and (reacted or self.blamed is not Fault.OTHER)
+        return self.preventable and (self.published_preventable or self.blamed is not Fault.OTHER)
 
     @property
     def plausible(self) -> bool:
         """Whether it is valid and road users do what its adversaries did, though it may be rare."""
         return self.behaviour is not None and self.behaviour.plausible
+
+    @property
+    def published_preventable(self) -> bool:
+        """Whether it is preventable, and one of `PUBLISHED` would have prevented it."""
+        return self.preventable and any(self.prevention.get(name, False) for name in PUBLISHED)
 
     @property
     def headline_candidate(self) -> bool:
@@ -129,8 +133,10 @@ class Violation(Violated):
     """ego | shared | other. Null where it is not valid."""
     plausibility: Plausibility | None
     """How likely road users do what the adversaries did up to then. Null where it is not valid."""
-    signature: str
-    """Its class of failures, in words."""
+    kind: str
+    """What a person tells apart, in words: the requirement and the ego's manoeuvre."""
+    variant: str
+    """All else that tells violations of one kind apart, in words."""
     definitions: int
     """Version of the definitions it was judged by."""
 
@@ -260,9 +266,14 @@ class Collision(Violated):
         return f"touches {self.other_id} at a closing speed of {self.relative_speed_mps:.1f} m/s"
 
     @property
-    def signature(self) -> str:
-        """Its class of failures, in words."""
-        return self.judgement.signature
+    def kind(self) -> str:
+        """Its kind, in words."""
+        return self.judgement.kind
+
+    @property
+    def variant(self) -> str:
+        """Its variant within the kind, in words."""
+        return self.judgement.variant
 
 
 def valid_violations(collision: Collision | None, violations: Sequence[Violation]) -> tuple[Collision | Violation, ...]:

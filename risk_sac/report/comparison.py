@@ -23,6 +23,7 @@ from risk_sac.metrics import (
     pooled_counts,
     pooled_headline,
     pooled_names,
+    pooled_published,
     pooled_requirements,
 )
 from risk_sac.records import PHASES, Counts, DriverPcr, EpisodeRecord, Phase, Record, RequirementCounts
@@ -51,6 +52,8 @@ class Cell(Counts):
     """Of the runs that are counted."""
     headline: int | None
     """Each kind once."""
+    headline_published: int | None
+    """Of these kinds, those that R157, FSM or RSS prevents."""
     estimates: Mapping[MetricName, Estimate]
     """By the name of the metric."""
     steps_per_distinct_failure: float | None
@@ -67,7 +70,7 @@ class Cell(Counts):
     unresponsive_share: float | None
     """`unresponsive` / valid contacts."""
     pcr_by_driver: Mapping[str, DriverPcr]
-    """Reference driver → its own PCR."""
+    """Reference driver → its own PCR; `published` → that of R157, FSM or RSS."""
     episodes_driven_by: Mapping[str, int]
     """What drove the adversaries → episodes."""
     headline_driven_by: Mapping[str, int]
@@ -78,8 +81,8 @@ class Cell(Counts):
     """Fault → failures."""
     requirements: Mapping[str, RequirementCounts]
     """Requirement → its funnel."""
-    signatures: Mapping[str, int]
-    """Signature → valid violations."""
+    kinds: Mapping[str, int]
+    """Kind → valid violations."""
     conflicts_by_second: tuple[int, ...]
     """Valid contacts by the second in which the conflict began."""
     contacts_by_second: tuple[int, ...]
@@ -99,6 +102,7 @@ def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
         phase=phase,
         seeds=tuple(run.spec.seed for run in runs),
         headline=pooled_headline(metrics),
+        headline_published=pooled_published(metrics),
         **dict(counts),
         **ratios,
         estimates={metric.name: estimate(metric, metrics) for metric in metrics_of(phase)},
@@ -109,7 +113,7 @@ def cell_of(runs: Sequence[FinishedRun], phase: Phase) -> Cell:
         by_severity=pooled_names([each.by_severity for each in metrics]),
         by_fault=pooled_names([each.by_fault for each in metrics]),
         requirements=pooled_requirements(metrics),
-        signatures=pooled_names([each.signatures for each in metrics]),
+        kinds=pooled_names([each.kinds for each in metrics]),
         conflicts_by_second=pooled_bins([each.conflicts_by_second for each in metrics]),
         contacts_by_second=pooled_bins([each.contacts_by_second for each in metrics]),
     )
@@ -149,6 +153,11 @@ class Comparison:
     def headline(self) -> int | None:
         """Headline failures of all searches; what several found alike counts once. None before one was replayed."""
         return pooled_headline(metrics for run in self.runs for metrics in run.metrics.values())
+
+    @property
+    def headline_published(self) -> int | None:
+        """Of the headline failures, those that R157, FSM or RSS prevents."""
+        return pooled_published(metrics for run in self.runs for metrics in run.metrics.values())
 
     @property
     def headline_candidates(self) -> int:

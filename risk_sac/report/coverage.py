@@ -19,13 +19,13 @@ from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import with_environment
 from risk_sac.scenario.odd import TINY, field, intersect, narrow, paths
 from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.verdicts.distinct import CELLS, FailureKind, kind_of
+from risk_sac.verdicts.distinct import CELLS, TaxonomyCell, taxonomy_cell
 from risk_sac.world.types import Bools, Floats
 
 BINS, PAIR_BINS = 10, 4
 NOT_PLAYED = (Outcome.REJECTED, Outcome.INVALID)
 ROLES = ("adversary", "background")
-# What a contact can be in each of the taxonomy's respects, as `FailureKind` has it, and in words.
+# What a contact can be in each of the taxonomy's respects, as `TaxonomyCell` has it, and in words.
 VALUES: Mapping[str, Mapping[object, str]] = {
     "striker": {f"{role} {kind}": f"{kind} ({role})" for role in ROLES for kind in ("vehicle", "pedestrian")},
     "ego_manoeuvre": {
@@ -226,7 +226,7 @@ def _beyond(odd: Odd, space: SceneSpace) -> Iterator[str]:
 
 def kinds(collisions: Iterable[Collision | None]) -> Kinds:
     """Counts valid contacts by cell of the taxonomy."""
-    counts = Counter(kind_of(collision) for collision in collisions if collision is not None and collision.valid)
+    counts = Counter(taxonomy_cell(collision) for collision in collisions if collision is not None and collision.valid)
     values = {
         respect: {
             words: sum(count for kind, count in counts.items() if getattr(kind, respect) == value)
@@ -237,6 +237,6 @@ def kinds(collisions: Iterable[Collision | None]) -> Kinds:
     return Kinds(cells=CELLS, hit={_in_words(kind): count for kind, count in counts.most_common()}, values=values)
 
 
-def _in_words(kind: FailureKind) -> str:
-    parts = (VALUES[respect].get(getattr(kind, respect), "") for respect in FailureKind._fields)
+def _in_words(kind: TaxonomyCell) -> str:
+    parts = (VALUES[respect].get(getattr(kind, respect), "") for respect in TaxonomyCell._fields)
     return ", ".join(part for part in parts if part)

@@ -127,7 +127,7 @@ def _kinds(comparison: Comparison, family: FamilyName, origin: Origin) -> list[K
     kinds = []
     for cluster in comparison.overviews[family].clusters[:MOST_KINDS]:
         run, record = episodes[cluster.representative]
-        violation = next((one for one in record.valid_violations if one.signature == cluster.name), None)
+        violation = next((one for one in record.valid_violations if one.kind == cluster.name), None)
         command = origin.show(run, cluster.representative)
         drawing = _draw(run, origin.folders.get(run.spec.digest), record)
         kinds.append(Kind(cluster, run, record, violation, command, drawing))

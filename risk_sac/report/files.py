@@ -71,6 +71,8 @@ class Table(Record):
     """By family, phase and method, the reference first; none before a run has finished."""
     tests: list[PairedTest]
     headline: int | None  # each kind once over all searches
+    headline_published: int | None
+    """Of these kinds, those that R157, FSM or RSS prevents."""
     paid_tests: list[PairedTest]
     """Headline failures within 30 processor seconds; declared beforehand, so corrected by themselves."""
     failures: Mapping[FamilyName, Overview]
@@ -110,6 +112,7 @@ def table_of(comparison: Comparison) -> Table:
         cells=list(comparison.cells),
         tests=list(comparison.tests),
         headline=comparison.headline,
+        headline_published=comparison.headline_published,
         paid_tests=list(comparison.paid_tests),
         failures=comparison.overviews,
         studies={family: comparison.studies(family) for family in comparison.overviews},
@@ -133,7 +136,7 @@ def table_json(comparison: Comparison) -> str:
 def table_csv(comparison: Comparison) -> str:
     """`table.csv`; empty where there is no value."""
     text = io.StringIO()
-    names = list(dict.fromkeys(("family", "method", "phase", "runs", "headline", *_PLAIN)))
+    names = list(dict.fromkeys(("family", "method", "phase", "runs", "headline", "headline_published", *_PLAIN)))
     names += dict.fromkeys(name for cell in comparison.cells for name in _by_name(cell))
     for metric in METRICS:
         names += [metric.name, f"{metric.name}_low", f"{metric.name}_high", f"{metric.name}_runs"]

@@ -14,7 +14,7 @@ from risk_sac.run_folder.results import RunResults, read_results
 from risk_sac.scenario.families import family_named
 
 SPEC, RUNS = "spec.yaml", "runs"
-SHARED = ("ego", "odd", "requirements", "learner")
+SHARED = ("ego", "odd", "requirements", "learner", "judge")
 AGAIN = "risk-sac evaluate --spec spec.yaml --out campaign"  # with the spec that the report ends with
 
 

@@ -22,6 +22,12 @@ NOTE = (
 )
 
 
+NOT_MEASURED = (
+    "Not measured under these definitions of a failure: what finding nothing is worth is unknown until the benchmark "
+    "is run again."
+)
+
+
 class BenchmarkRun(NamedTuple):
     """A run of the benchmark, as `detections.csv` has it."""
 
@@ -61,7 +67,7 @@ def runs_of(text: str) -> list[BenchmarkRun]:
 
 @cache
 def measured() -> Sequence[BenchmarkRun]:
-    """Returns the runs that are shipped."""
+    """Returns the runs that are shipped; none until the benchmark is measured under the present definitions."""
     return runs_of(MEASURED.read_text(encoding="utf-8"))
 
 
@@ -72,7 +78,7 @@ def played_by(finished: "Sequence[FinishedRun]") -> list[PlayedCounts]:
 
 
 def power_of(spec: CampaignSpec, played: Collection[PlayedCounts], runs: Sequence[BenchmarkRun] | None = None) -> Power:
-    """Returns what the budget of a campaign is worth.
+    """Returns what the budget of a campaign is worth; says so where nothing was measured at all.
 
     Args:
       spec: of the campaign.
@@ -80,6 +86,8 @@ def power_of(spec: CampaignSpec, played: Collection[PlayedCounts], runs: Sequenc
       runs: of the benchmark; those that are shipped if None.
     """
     methods, runs = [], measured() if runs is None else runs
+    if not runs:
+        return Power(note=NOT_MEASURED, comparison="", methods=())
     for method in spec.methods:
         known = {run.family for run in runs if run.method == method}
         budgets = tuple(_budget(spec, family, method, played, runs) for family in spec.families if family in known)

@@ -20,7 +20,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from risk_sac.config import FamilyName, RunSpec
-from risk_sac.metrics import COLUMNS, METRICS, RATIOS, Estimate, Metric, Ratio, requirement_cells
+from risk_sac.metrics import COLUMNS, METRICS, RATIOS, Estimate, Metric, Ratio, requirement_cells, with_published
 from risk_sac.records import DriverPcr
 from risk_sac.report.comparison import DECLARED, REFERENCE, RIVALS, Comparison, declared, metrics_of
 from risk_sac.report.paired import LEVEL, pair_power
@@ -86,6 +86,7 @@ def _environment(layout: Layout) -> Environment:
         "spreads": spreads,
         "symbol": symbol,
         "tight": lambda text: Markup("\n".join(line for line in text.splitlines() if line.strip())),
+        "with_published": with_published,
         "versions": lambda versions: ", ".join(map(" ".join, versions.items())) or DASH,
     }
     environment.tests["declared"] = declared

@@ -70,7 +70,7 @@ class FinishedRun:
         for record in self.phase("search"):
             tally.add(record)
             kinds = tally.headline_candidates, tally.distinct_preventable, tally.distinct_failures
-            findings.append(Found(*kinds, len(tally.kinds)))
+            findings.append(Found(*kinds, len(tally.taxonomy)))
         return tuple(findings)
 
 

@@ -8,7 +8,6 @@ studies/        cores and regions that were asked for, see `risk_sac.failures.st
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import REPEATS, Adjustment, DrivenBy, EpisodeId, EpisodeRecord, Repetition, RunMetrics
 from risk_sac.run_folder.durable import read_sealed, write_sealed
-from risk_sac.verdicts.distinct import DistinctFailures, Niche, kind_name, niche_of
+from risk_sac.verdicts.distinct import variant_name
 
 RESULTS = "results.json"
 EPISODES = "episodes.jsonl"
@@ -106,7 +105,7 @@ TIMES = 3  # default number of replays of a failure
 
 @dataclass(frozen=True, kw_only=True)
 class Verified:
-    """The distinct failures of a run."""
+    """Replays of the first failures of each variant of a run."""
 
     digest: str  # of the results
     code: str  # SHA-256 over the sources that replayed them
@@ -121,16 +120,16 @@ class Verified:
     def judged(self, records: Sequence[EpisodeRecord]) -> tuple[EpisodeRecord, ...]:
         """Marks violations that do not repeat as refused by that rule.
 
-        So are violations like them in their phase, except in an episode that was replayed itself and does repeat.
+        So are violations of the same variant in their phase, except in an episode that was replayed and does repeat.
         """
         if not self.flaky:
             return tuple(records)
-        flaky = {kind for each in records if each.index in self.flaky for kind in _kinds(each)}
+        flaky = {variant for each in records if each.index in self.flaky for variant in _variants(each)}
         repeating = self.episodes.keys() - self.flaky
         return tuple(
             record
             if record.index in repeating
-            else record.refused(REPEATS, {name for kind, name in _kinds(record).items() if kind in flaky})
+            else record.refused(REPEATS, {name for variant, name in _variants(record).items() if variant in flaky})
             for record in records
         )
 
@@ -138,12 +137,21 @@ class Verified:
         """Adds the headline to the metrics of a phase, whose episodes are `judged`."""
         repeating = self.episodes.keys() - self.flaky
         first: dict[str, DrivenBy | None] = {}  # of a kind: what drove the episode
+        published: dict[str, None] = {}  # kinds
         for episode in judged:
-            for each in episode.valid_violations if episode.index in repeating else ():
-                if each.headline_candidate:
-                    first.setdefault(kind_name(each), episode.driven_by)
-        kinds = {"headline_kinds": tuple(first), "headline_kinds_driven_by": tuple(first.values())}
-        return metrics.model_copy(update={"headline": len(first), **kinds})
+            for violation in episode.valid_violations if episode.index in repeating else ():
+                if violation.headline_candidate:
+                    first.setdefault(violation.kind, episode.driven_by)
+                    if violation.published_preventable:
+                        published[violation.kind] = None
+        return metrics.model_copy(
+            update={
+                "headline": len(first),
+                "headline_kinds": tuple(first),
+                "headline_kinds_published": tuple(published),
+                "headline_kinds_driven_by": tuple(first.values()),
+            }
+        )
 
 
 def with_headline(results: RunResults, verified: Verified) -> RunResults:
@@ -161,27 +169,34 @@ def with_headline(results: RunResults, verified: Verified) -> RunResults:
     )
 
 
-def _kinds(episode: EpisodeRecord) -> Mapping[tuple[str, Niche], str]:
-    """Phase and niche of each valid violation of an episode → its requirement."""
-    return {(episode.phase, niche_of(each)): each.requirement for each in episode.valid_violations}
+def _variants(episode: EpisodeRecord) -> Mapping[tuple[str, str], str]:
+    """Phase and variant of each valid violation of an episode → its requirement."""
+    return {(episode.phase, variant_name(each)): each.requirement for each in episode.valid_violations}
 
 
-def distinct_failures(results: RunResults) -> list[EpisodeRecord]:
-    """Selects episodes with the first failure of a kind in their phase.
+def first_of_variants(results: RunResults) -> list[EpisodeRecord]:
+    """Selects episodes with the first failure of a variant in their phase.
 
-    It is the first valid, the first preventable, or the first candidate.
-
-    A candidate is one for the headline. The episodes come in their order.
+    It is the first valid, the first preventable, the first that R157, FSM or RSS prevents, or the first candidate for
+    the headline. The episodes come in their order.
     """
-    distinct: defaultdict[tuple[str, str], DistinctFailures] = defaultdict(DistinctFailures)
+    seen: set[tuple[str, str, str]] = set()
     episodes = []
     for episode in (failure.episode for failure in results.failures):
-        valid = episode.valid_violations
-        new = [distinct[episode.phase, "valid"].add(each) for each in valid]
-        new += [distinct[episode.phase, "preventable"].add(each) for each in valid if each.preventable]
-        new += [distinct[episode.phase, "candidate"].add(each) for each in valid if each.headline_candidate]
-        if any(new):
+        new = {
+            (episode.phase, variant_name(violation), step)
+            for violation in episode.valid_violations
+            for step, passed in (
+                ("valid", True),
+                ("preventable", violation.preventable),
+                ("published", violation.published_preventable),
+                ("candidate", violation.headline_candidate),
+            )
+            if passed
+        }
+        if not new <= seen:
             episodes.append(episode)
+        seen |= new
     return episodes
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.records import GAINS_MPS, REACTING, ConflictType, EgoPart, Fault, Grade
+from risk_sac.records import GAINS_MPS, PUBLISHED, ConflictType, EgoPart, Fault, Grade
 from risk_sac.risk.rss import margins
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.scenario.limits import emergency_decel_mps2
@@ -322,7 +322,7 @@ def parts_of_contact(
         or part.sped_up
         or part.started
         or min(braked_after_s, lasted_s) >= RESPONDS_S + LATE_S
-        or any(avoids.get(name, False) for name in REACTING)
+        or any(avoids.get(name, False) for name in PUBLISHED)
         or (part.too_fast and grade is Grade.PREVENTABLE and YIELDS.isdisjoint(broke)),
         ego_yields=yields == "ego",
         left_rss=part.left_first == "ego"

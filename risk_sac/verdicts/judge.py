@@ -1,7 +1,7 @@
 """The record of a contact and its judgement, from its evidence alone."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 
@@ -15,12 +15,13 @@ from risk_sac.sim.collision import Contact
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.evidence import Evidence, recorded_contact
 from risk_sac.verdicts.fault import ego_part, fault, has_to_yield, parts_of_contact, parts_of_violation
-from risk_sac.verdicts.labels import ego_in_words, ground, impact, manoeuvre, response, severity, signature
+from risk_sac.verdicts.kinds import name_contact, name_violation
+from risk_sac.verdicts.labels import ground, impact, manoeuvre, response, severity
 from risk_sac.verdicts.offences import ego_offences, endangered_ego, inherits_stop, striker_offences
 from risk_sac.verdicts.plausibility import plausibility_of
 from risk_sac.verdicts.reference import (
     NO_RED_LIGHT_ENTRY,
-    ON_CARRIAGEWAY,
+    PREVENTING,
     History,
     MetActor,
     grade,
@@ -49,8 +50,13 @@ def collision_of(
     evidence: Evidence,
     measures: Sequence[Measures],
     facts: EpisodeFacts,
+    *,
+    drivers: Collection[str] = PREVENTING,
 ) -> Collision:
-    """The record of a contact in `frame`, the last one; `measures` begin with the release at `released_s`."""
+    """The record of a contact in `frame`, the last one; `measures` begin with the release at `released_s`.
+
+    `drivers` are the reference drivers whose word makes it preventable.
+    """
     other, warning = frame.ids[contact.other], measures[:-WARNING_STEPS]
     column = evidence.column(other)
     conflict = find_conflict(evidence, column)
@@ -78,17 +84,24 @@ def collision_of(
         early_min_robustness=min((m.soft_min for m in warning), default=ROBUSTNESS_CLIP),
         simulator_agrees=facts.simulator_agrees,
         verdicts=verdicts,
-        judgement=judge(evidence, other, valid=all(verdicts.values()), conflict=conflict),
+        judgement=judge(evidence, other, valid=all(verdicts.values()), conflict=conflict, preventing=drivers),
     )
 
 
-def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflict | None = None) -> Judgement:
+def judge(
+    evidence: Evidence,
+    striker_id: str,
+    *,
+    valid: bool,
+    conflict: Conflict | None = None,
+    preventing: Collection[str] = PREVENTING,
+) -> Judgement:
     """Judges a contact: how it began, its fault, its severity, its grade.
 
     The contact is in the last frame. Only a valid one is graded, by the drivers that would have prevented it.
 
     A valid contact passed every rule of `artefact_verdicts` and `validity_verdicts`. The conflict is found again if not
-    given.
+    given. `preventing` are the reference drivers whose word counts.
 
     Raises:
       ValueError: the striker is not there in the last frame.
@@ -101,11 +114,21 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
     ego_broke = ego_offences(evidence, striker, crossing=crossing)
     drivers = reference_outcomes(evidence, striker, conflict) if valid else {}
     avoids = {name: each.avoids for name, each in drivers.items()}
-    graded = grade(avoids) if valid else None
+    graded = grade(avoids, preventing) if valid else None
     yields = has_to_yield(conflict.type, where, broke, ego_broke)
     part = ego_part(evidence, striker, conflict, yields)
     contact = recorded_contact(evidence, striker)
     impact_mps, injury_risk = impact(evidence, striker, contact)
+    kind, variant = name_contact(
+        evidence,
+        striker,
+        conflict,
+        manoeuvre=ego_manoeuvre,
+        response=ego_response,
+        ground=where,
+        broke=broke,
+        ego_broke=ego_broke,
+    )
     return Judgement(
         definitions=DEFINITIONS,
         conflict_type=conflict.type,
@@ -142,22 +165,13 @@ def judge(evidence: Evidence, striker_id: str, *, valid: bool, conflict: Conflic
             )
         ),
         plausibility=plausibility_of(evidence) if valid else None,
-        signature=signature(
-            evidence,
-            striker,
-            conflict,
-            manoeuvre=ego_manoeuvre,
-            response=ego_response,
-            ground=where,
-            broke=broke,
-            ego_broke=ego_broke,
-        ),
+        kind=kind,
+        variant=variant,
     )
 
 
 # Of `ARTEFACT_RULES`, those that the episode tells; `solid_bodies` is read from its record.
 RULES = ("no_teleport", "inside_limits")
-VIOLATED = {NO_RED_LIGHT_ENTRY: "red light entered", ON_CARRIAGEWAY: "carriageway left"}
 # Signals that others bring about too; all others are the ego's own driving.
 OF_OTHERS = frozenset(
     {
@@ -173,7 +187,6 @@ OF_OTHERS = frozenset(
 )
 INHERITED_S = 5.0  # Choice: a violation that the ego inherits and has not ended by then is its own
 ONSETS = 4  # of one requirement that are judged
-SAME_OFFENCES = {NO_RED_LIGHT_ENTRY: ("red_light",), ON_CARRIAGEWAY: ("off_road", "wrong_direction")}
 
 
 def requirement_results(
@@ -206,6 +219,8 @@ def violations_of(
     gather: Callable[[], History],
     gauge: Gauge,
     artefacts: Mapping[str, float],
+    *,
+    drivers: Collection[str] = PREVENTING,
 ) -> tuple[Violation, ...]:
     """The violations without contact of the requirements that count, in the order of time.
 
@@ -215,6 +230,7 @@ def violations_of(
       gather: returns the whole episode; it takes milliseconds, and is called if there is a violation.
       gauge: that measured it.
       artefacts: rules of `ARTEFACT_RULES` that the episode broke, and when it first did, s of the simulator.
+      drivers: the reference drivers whose word makes a violation preventable.
     """
     counting = [each for each in requirements if each.name != NO_CONTACT and each.counts == "failure"]
     violated = [requirement for requirement in counting if results[requirement.name].violated_s is not None]
@@ -228,7 +244,7 @@ def violations_of(
             time_s = (index - history.evidence.released) * STEP_S
             verdicts = {rule: artefacts.get(rule, math.inf) > history.frames[index].time_s for rule in RULES}
             verdicts["solid_bodies"] = time_s < overlap_s
-            frames.append(_violation(requirement, result, history, gauge, index, verdicts))
+            frames.append(_violation(requirement, result, history, gauge, index, verdicts=verdicts, preventing=drivers))
             if frames[-1].valid:
                 break
         violations.append(next((violation for violation in frames if violation.valid), frames[0]))
@@ -256,7 +272,9 @@ def _violation(
     history: History,
     gauge: Gauge,
     index: int,
+    *,
     verdicts: Mapping[str, bool],
+    preventing: Collection[str],
 ) -> Violation:
     """The record of a violation that began in frame `index`."""
     frame, measures, evidence = history.frames[index], history.measures[index], history.evidence.until(index)
@@ -273,9 +291,8 @@ def _violation(
     if requirement.name == NO_RED_LIGHT_ENTRY:  # it may be violated before the line, when the ego cannot stop any more
         broke = tuple(dict.fromkeys(("red_light", *broke)))
     drivers = kept_by(requirement, own_gauge, history, index, met) if all(verdicts.values()) else {}
-    graded = grade(drivers) if drivers else None
-    violated = VIOLATED.get(requirement.name, f"{requirement.name} violated")
-    others = tuple(name for name in broke if name not in SAME_OFFENCES.get(requirement.name, ()))
+    graded = grade(drivers, preventing) if drivers else None
+    kind, variant = name_violation(requirement.name, manoeuvre=driven, broke=broke, ego_mps=frame.ego_speed_mps)
     named = None if by_others is None else nearest
     return Violation(
         requirement=requirement.name,
@@ -293,7 +310,8 @@ def _violation(
         drivers=drivers,
         fault=None if graded is None else _fault(evidence, by_others, broke, graded),
         plausibility=None if graded is None else plausibility_of(evidence),
-        signature=f"{violated}; {ego_in_words(driven, others)}",
+        kind=kind,
+        variant=variant,
         definitions=DEFINITIONS,
     )
 

@@ -18,13 +18,13 @@ import math
 
 import numpy as np
 
-from risk_sac.records import ConflictType, Severity
+from risk_sac.records import Severity
 from risk_sac.sim.collision import Contact
 from risk_sac.verdicts.conflict import BRAKES_MPS2, Conflict
 from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
 from risk_sac.verdicts.evidence import Evidence, front_moved_across, inside
-from risk_sac.verdicts.offences import IN_WORDS, RECENT_S, STANDING_MPS
-from risk_sac.world.types import Kind, Role
+from risk_sac.verdicts.offences import RECENT_S, STANDING_MPS
+from risk_sac.world.types import Kind
 
 KMH = 3.6  # in 1 m/s
 MILES_PER_H = 3.6 / 1.609344
@@ -91,33 +91,6 @@ BESIDE_M = 3.0  # a pedestrian this near to a crossing means to use it
 RECENT_M = 12.0  # a quarter of a circle of 8 m: an ego that creeps through its turn is turning
 TURN_RAD = math.radians(20.0)  # more than a lane change takes
 LANE_CHANGE_M = 1.0
-ONCOMING_COS = math.cos(math.radians(135.0))
-STRIKERS = {
-    ConflictType.LEADER: "leader",
-    ConflictType.CUT_IN: "cut-in",
-    ConflictType.MERGE: "neighbour",
-    ConflictType.PEDESTRIAN: "pedestrian",
-}
-MANOEUVRES = {
-    "straight": "ego goes straight",
-    "left_turn": "ego turns left",
-    "right_turn": "ego turns right",
-    "lane_change": "ego changes lanes",
-}
-RESPONSES = {
-    "none": "does not brake",
-    "late_braking": "brakes late",
-    "braking": "brakes",
-    "standing": "stands",
-    "starting": "starts",
-    "accelerating": "speeds up",
-}
-GROUNDS = {
-    "lane": "in a lane",
-    "junction": "in a junction",
-    "crossing": "on a crossing",
-    "beside_crossing": "beside a crossing",
-}
 
 
 def ground(evidence: Evidence, striker: int) -> str:
@@ -172,44 +145,3 @@ def response(evidence: Evidence, conflict: Conflict) -> str:
         return "accelerating"
     after_s = np.flatnonzero(accel[conflict.frame :] <= -BRAKES_MPS2)[0] * evidence.step_s
     return "late_braking" if after_s > R157_PERCEIVES_S + R157_DELAY_S else "braking"
-
-
-def signature(
-    evidence: Evidence,
-    striker: int,
-    conflict: Conflict,
-    *,
-    manoeuvre: str,
-    response: str,
-    ground: str,
-    broke: tuple[str, ...],
-    ego_broke: tuple[str, ...],
-) -> str:
-    """Names the class of failures that a failure belongs to; what differs in it is a different failure.
-
-    Such as "pedestrian on red, ahead, from hiding, on a crossing; ego goes straight, brakes late". What the striker
-    broke follows its name, what the ego broke its manoeuvre: "oncoming vehicle, ...; ego turns left against priority".
-
-    It names no zone of a body: a pedestrian of half a metre has four, and one failure would be four. Nor does it name a
-    side where the mirrored scene is the same failure (a cut-in, a pedestrian). Traffic from the left and from the right
-    is distinguished: it has other rules and other distances.
-    """
-    who = " ".join((_striker(evidence, striker, conflict), *(IN_WORDS[name] for name in broke)))
-    if evidence.role[striker] == Role.BACKGROUND:
-        who = f"background {who}"
-    where = [conflict.position, *(["from hiding"] if conflict.hidden else []), GROUNDS[ground]]
-    return f"{', '.join((who, *where))}; {ego_in_words(manoeuvre, ego_broke)}, {RESPONSES[response]}"
-
-
-def ego_in_words(manoeuvre: str, broke: tuple[str, ...]) -> str:
-    """Names what the ego did and broke, such as "ego turns left against priority"."""
-    return " ".join((MANOEUVRES[manoeuvre], *(IN_WORDS[name] for name in broke)))
-
-
-def _striker(evidence: Evidence, striker: int, conflict: Conflict) -> str:
-    if conflict.type is not ConflictType.CROSSING:
-        return STRIKERS[conflict.type]
-    turn = float(evidence.heading_rad[conflict.frame, striker] - evidence.heading_rad[conflict.frame, 0])
-    if math.cos(turn) < ONCOMING_COS:
-        return "oncoming vehicle"
-    return "vehicle from the right" if math.sin(turn) > 0.0 else "vehicle from the left"

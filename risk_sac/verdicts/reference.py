@@ -4,7 +4,7 @@ Source: UN Regulation 157, 5.2.5 and Annex 3; the drivers in `risk_sac.verdicts.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -69,8 +69,9 @@ DRIVERS = {
     "defensive": (DEFENSIVE, 0.0),
     "full_braking": (FULL_BRAKING, 0.0),
 }
-# What one of these avoids is preventable; full braking at once is a bound, and R157's rule for cut-ins knows no driver.
-PREVENTING = frozenset({"r157", "fsm", "rss", "defensive"})
+# What one of these avoids is preventable, unless the spec's `judge.drivers` names fewer. Full braking at once is a
+# bound, and R157's rule for cut-ins knows no driver.
+PREVENTING = ("r157", "fsm", "rss", "defensive")
 # Choice: a driver that was further along than the ego at the contact, and so is missed, avoids it by being faster and
 # not by care. Such is one that brakes later than the ego did for a pedestrian that then runs into the ego's flank.
 LEAD_M = 0.1
@@ -117,9 +118,14 @@ def _met(evidence: Evidence, path: Path, striker: int) -> list[int]:
     return [int(i) for i in np.flatnonzero(near) if i not in (0, striker)]
 
 
-def grade(keeps: Mapping[str, bool]) -> Grade:
-    """Grades a violation, with or without contact, by which reference drivers would have prevented it."""
-    if any(keeps.get(name, False) for name in PREVENTING):
+def grade(keeps: Mapping[str, bool], drivers: Collection[str] = PREVENTING) -> Grade:
+    """Grades a violation by which reference drivers would have prevented it.
+
+    Args:
+      keeps: reference driver → whether it keeps the requirement.
+      drivers: those whose word counts.
+    """
+    if any(keeps.get(name, False) for name in drivers):
         return Grade.PREVENTABLE
     return Grade.FULL_BRAKING if keeps["full_braking"] else Grade.UNAVOIDABLE
 

@@ -30,19 +30,23 @@ COUNTERS = {
     "episodes_done": ("risk_sac_episodes", "Finished episodes, rejected scenes included."),
     "raw_collisions": ("risk_sac_contacts", "Episodes in which the ego touched something."),
     "failures": ("risk_sac_failures", "Episodes with a valid violation of a requirement that counts."),
-    "distinct_failures": ("risk_sac_distinct_failures", "Valid violations that resemble no earlier one of their run."),
+    "distinct_failures": ("risk_sac_distinct_failures", "Kinds of valid violations, of each run by itself."),
     "preventable": ("risk_sac_preventable_failures", "Failures that a reference driver would have prevented."),
     "distinct_preventable": (
         "risk_sac_distinct_preventable_failures",
-        "Distinct violations that a reference driver would have prevented.",
+        "Of these kinds, those that a reference driver would have prevented.",
+    ),
+    "distinct_published": (
+        "risk_sac_distinct_published_failures",
+        "Of these kinds, those that R157, FSM or RSS would have prevented.",
     ),
     "headline_candidates": (
         "risk_sac_headline_candidates",
-        "Distinct preventable violations that are plausible and no minor contacts.",
+        "Kinds of preventable violations that are plausible and no minor contacts.",
     ),
     "implausible": (
         "risk_sac_implausible_failures",
-        "Distinct preventable violations that are no minor contacts, but implausible.",
+        "Kinds of preventable violations that are no minor contacts, but implausible.",
     ),
     "headline": (
         "risk_sac_headline_failures",
@@ -53,10 +57,14 @@ COUNTERS = {
 OF_REQUIREMENTS = {
     "violated": ("risk_sac_requirement_violated", "Episodes that violated the requirement."),
     "valid": ("risk_sac_requirement_valid", "Of these, failures: it counts, and the violation is valid."),
-    "distinct": ("risk_sac_requirement_distinct", "Valid violations that resemble no earlier one of their run."),
+    "distinct": ("risk_sac_requirement_distinct", "Kinds of valid violations, of each run by itself."),
     "preventable": (
         "risk_sac_requirement_preventable",
-        "Distinct violations that a reference driver would have prevented.",
+        "Of these kinds, those that a reference driver would have prevented.",
+    ),
+    "published": (
+        "risk_sac_requirement_published",
+        "Of these kinds, those that R157, FSM or RSS would have prevented.",
     ),
 }
 NODE_GAUGES: tuple[tuple[str, str, Callable[[ClusterNode], float]], ...] = (

@@ -52,7 +52,14 @@ def count(run: RunRow, row: EpisodeRow, sign: int) -> None:
 def tally(run: RunRow) -> None:
     """Copies order-dependent counts from the run's metrics."""
     phases = [from_json(text) for text in (run.metrics, run.evaluation) if text is not None]
-    for name in ("distinct_failures", "preventable", "distinct_preventable", "headline_candidates", "implausible"):
+    for name in (
+        "distinct_failures",
+        "preventable",
+        "distinct_preventable",
+        "distinct_published",
+        "headline_candidates",
+        "implausible",
+    ):
         setattr(run, name, sum(phase.get(name, 0) for phase in phases))
     replayed = [phase for phase in phases if phase.get("headline") is not None]
     run.headline = len({kind for phase in replayed for kind in phase["headline_kinds"]}) if replayed else None
@@ -88,7 +95,7 @@ def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
     row.plausibility = None if worst is None or not failed or worst.behaviour is None else worst.behaviour.verdict
     row.severity = None if contact is None or not failed else contact.severity
     row.fault = None if worst is None or not failed else worst.blamed
-    row.signature = None if worst is None else worst.signature
+    row.kind = None if worst is None else worst.kind
     row.broke = None if contact is None else listed(contact.judgement.broke)
 
 

@@ -28,7 +28,7 @@ class Judged:
     fault: Fault | None = None
     driven_by: DrivenBy | None = None
     broke: str | None = None
-    signature: str | None = None
+    kind: str | None = None
     iid: bool = True
     """Whether those of an i.i.d. phase are asked for, too."""
 
@@ -37,7 +37,7 @@ class Judged:
         if self.requirement is not None:
             column = EpisodeRow.failed if self.valid else EpisodeRow.violated
             yield column.contains(f",{self.requirement},", autoescape=True)
-        for name in ("grade", "plausibility", "severity", "fault", "driven_by", "signature"):
+        for name in ("grade", "plausibility", "severity", "fault", "driven_by", "kind"):
             if (wanted := getattr(self, name)) is not None:
                 yield getattr(EpisodeRow, name) == wanted
         if self.broke is not None:

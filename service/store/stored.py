@@ -7,7 +7,7 @@ queued ──> running ──> succeeded | failed
    └─────────────────> cancelled | failed
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Generic, Self, TypeVar
@@ -16,7 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import from_json
 
 from risk_sac.config import IID_METHODS, CampaignSpec, RunSpec
-from risk_sac.metrics import pooled_headline
+from risk_sac.metrics import pooled_headline, pooled_published
 from risk_sac.records import CampaignHead, Episode, EpisodeRecord, Repetition, Run, RunMetrics, RunResult, State
 from service.errors import OutdatedError, TransitionError
 from service.store.tables import Base, CampaignRow, EpisodeRow, RunRow
@@ -138,8 +138,15 @@ class StoredCampaign(CampaignHead):
     @property
     def headline(self) -> int | None:
         """Headline failures of search and evaluation; a kind found by several runs counts once."""
-        phases = (phase for run in self.searches for phase in (run.metrics, run.evaluation) if phase is not None)
-        return pooled_headline(phases)
+        return pooled_headline(self._phases())
+
+    @property
+    def headline_published(self) -> int | None:
+        """Of the headline failures, those that R157, FSM or RSS prevents."""
+        return pooled_published(self._phases())
+
+    def _phases(self) -> Iterator[RunMetrics]:
+        return (phase for run in self.searches for phase in (run.metrics, run.evaluation) if phase is not None)
 
     @property
     def ego(self) -> dict[str, Any]:

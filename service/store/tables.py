@@ -18,6 +18,7 @@ TALLIED = (
     "distinct_failures",
     "preventable",
     "distinct_preventable",
+    "distinct_published",
     "headline_candidates",
     "implausible",
     "headline",
@@ -96,6 +97,7 @@ class RunRow(Base):
     distinct_failures: Mapped[int] = mapped_column(default=0)
     preventable: Mapped[int] = mapped_column(default=0)
     distinct_preventable: Mapped[int] = mapped_column(default=0)
+    distinct_published: Mapped[int] = mapped_column(default=0)
     headline_candidates: Mapped[int] = mapped_column(default=0)
     implausible: Mapped[int] = mapped_column(default=0)
     headline: Mapped[int | None]  # null before its failures were replayed
@@ -125,6 +127,7 @@ class RequirementRow(Base):
     valid: Mapped[int] = mapped_column(default=0)
     distinct: Mapped[int] = mapped_column(default=0)
     preventable: Mapped[int] = mapped_column(default=0)
+    published: Mapped[int] = mapped_column(default=0)
 
 
 class EpisodeRow(Base):
@@ -137,7 +140,7 @@ class EpisodeRow(Base):
         Index("episodes_sequence", "campaign_number", "sequence", unique=True),
         Index("episodes_runs", "run_number", "number"),
         Index("episodes_outcomes", "campaign_number", "outcome", "number"),
-        *(_of_judged(f"episodes_{name}s", "campaign_number", name, "number") for name in ("grade", "signature")),
+        *(_of_judged(f"episodes_{name}s", "campaign_number", name, "number") for name in ("grade", "kind")),
         {"sqlite_autoincrement": True},
     )
 
@@ -158,7 +161,7 @@ class EpisodeRow(Base):
     plausibility: Mapped[str | None]  # of a valid failure
     severity: Mapped[str | None]  # of its contact
     fault: Mapped[str | None]  # of a valid failure
-    signature: Mapped[str | None]  # of the violation that names the episode
+    kind: Mapped[str | None]  # of the violation that names the episode
     broke: Mapped[str | None]  # what its striker broke, between commas: ",red_light,"
     funnel: Mapped[str | None] = mapped_column(Text)  # of the run's phase, this episode included
     sequence: Mapped[int]  # among the campaign's events: 1, 2, …, with those of `changes`

@@ -24,6 +24,7 @@ from risk_sac.metrics import (
     pooled_counts,
     pooled_headline,
     pooled_names,
+    pooled_published,
     pooled_requirements,
 )
 from risk_sac.records import (
@@ -53,6 +54,7 @@ def results(campaign: StoredCampaign) -> Results:
         state=campaign.state,
         complete=campaign.state.final,
         headline=campaign.headline,
+        headline_published=campaign.headline_published,
         adjustments=_adjustments(campaign),
         runs=campaign.runs,
         totals=totals(campaign.searches),
@@ -94,13 +96,14 @@ def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
             "method": method,
             "runs": len(group),
             "headline": pooled_headline(group),
+            "headline_published": pooled_published(group),
             "requirements": pooled_requirements(group),
             "pcr_by_driver": pcr_by_driver(group),
             "episodes_driven_by": pooled_names([metrics.episodes_driven_by for metrics in group]),
             "headline_driven_by": headline_driven_by(group),
             "by_severity": pooled_names([metrics.by_severity for metrics in group]),
             "by_fault": pooled_names([metrics.by_fault for metrics in group]),
-            "signatures": pooled_names([metrics.signatures for metrics in group]),
+            "kinds": pooled_names([metrics.kinds for metrics in group]),
             "conflicts_by_second": pooled_bins([metrics.conflicts_by_second for metrics in group]),
             "contacts_by_second": pooled_bins([metrics.contacts_by_second for metrics in group]),
         }

@@ -22,7 +22,7 @@ from risk_sac.records import (
     TriageState,
     Violation,
 )
-from risk_sac.verdicts.distinct import DistinctFailures, Niche, niche_of
+from risk_sac.verdicts.distinct import DistinctFailures, variant_name
 from service.store.stored import StoredCampaign, StoredRecord, StoredRun
 
 Repeats = Literal["verified", "flaky"]
@@ -49,24 +49,26 @@ OF_JUDGEMENT = (
     "broke",
     "ego_broke",
 )
-COUNTED = ("failures", "distinct", "preventable")
+COUNTED = ("failures", "distinct", "preventable", "published")
 
 
 class KindRow(Record):
-    """The failures of one signature."""
+    """The failures of one kind."""
 
-    signature: str
-    """What `signature=` of the failures takes."""
+    name: str
+    """In words; what `kind=` of the failures takes."""
     requirement: str
     """That is violated; `no_contact` by a contact."""
-    name: str
-    """In words."""
+    variants: int
+    """Different ones among the valid failures, of all families."""
     failures: int
     """Valid ones, of all families."""
     distinct: int
-    """Those that are distinct in their run and phase; what two runs found alike counts twice."""
+    """The first of their kind in their run and phase; what two runs found alike counts twice."""
     preventable: int
     """Valid ones that a reference driver would have prevented."""
+    published: int
+    """Of these, those that R157, FSM or RSS would have prevented."""
 
 
 class FamilyScenes(Record):
@@ -122,10 +124,10 @@ class FailureTable(Record):
     """Whether it is the first of a kind in the headline."""
     distinct: list[bool]
     """Whether one of its valid violations is the first of its kind in its run and phase."""
-    niche: list[int | None]
-    """Which distinct failure of the campaign it is, counted from 0 over all runs; null where it is not valid."""
     kind: list[int]
     """Position in `kinds`."""
+    variant: list[int | None]
+    """Position in `variants`; null where it is not valid."""
     striker: list[str | None]
     """What touched the ego; without contact what the ego would have met soonest, if any."""
     striker_kind: list[str | None]
@@ -168,6 +170,8 @@ class FailureTable(Record):
     """What people made of it; `new` at first."""
     kinds: list[KindRow]
     """The most preventable failures first, then the most failures."""
+    variants: list[str]
+    """What tells failures of one kind apart, in words; two kinds may have the same words."""
     scenes: Mapping[FamilyName, FamilyScenes]
     """By family, of those with a failure."""
 
@@ -178,7 +182,7 @@ def failure_table(
     """Returns the table of these failures in their order; one without a triage is new."""
     runs = {run.number: run for run in campaign.runs}
     distinct: defaultdict[tuple[int, str], DistinctFailures] = defaultdict(DistinctFailures)
-    headline, niches = DistinctFailures(), dict[Niche, int]()
+    headline, variants = DistinctFailures(), dict[str, int]()
     failures, naming, rows = list(failures), list[Collision | Violation](), list[dict[str, Any]]()
     for failure in failures:
         worst, valid = failure.record.worst_violation, failure.record.valid_violations
@@ -188,14 +192,15 @@ def failure_table(
         candidates = [each for each in valid if each.headline_candidate and row["repeats"] == "verified"]
         row["headline"] = sum(map(headline.add, candidates)) > 0
         row["distinct"] = sum(map(kinds.add, valid)) > 0
-        row["niche"] = niches.setdefault(niche_of(worst), len(niches)) if valid else None
+        row["variant"] = variants.setdefault(variant_name(worst), len(variants)) if valid else None
         naming.append(worst)
         rows.append(row)
     kind_rows = _kinds(naming, rows)
-    places = {(kind.requirement, kind.signature): place for place, kind in enumerate(kind_rows)}
+    places = {kind.name: place for place, kind in enumerate(kind_rows)}
     table: dict[str, Any] = {
-        "kind": [places[worst.requirement, worst.signature] for worst in naming],
+        "kind": [places[worst.kind] for worst in naming],
         "kinds": kind_rows,
+        "variants": [name.partition(" | ")[2] for name in variants],
         "triage": [triages.get(failure.number, TriageState.NEW) for failure in failures],
         "scenes": _scenes([row["families"] for row in rows], [failure.record.scene for failure in failures]),
     }
@@ -239,17 +244,19 @@ def _row(run: StoredRun, record: EpisodeRecord, worst: Collision | Violation) ->
 
 
 def _kinds(naming: Sequence[Collision | Violation], rows: Sequence[Mapping[str, Any]]) -> list[KindRow]:
-    """Of the signatures, the most preventable failures first."""
-    kinds: dict[tuple[str, str], dict[str, Any]] = {}
+    """Counts the failures of each kind, those with the most preventable failures first."""
+    kinds: dict[str, dict[str, Any]] = {}
+    variants: defaultdict[str, set[int]] = defaultdict(set)
     for worst, row in zip(naming, rows, strict=True):
-        requirement, name = worst.requirement, worst.signature
-        said = {"signature": name, "requirement": requirement, "name": name}
-        kind = kinds.setdefault((requirement, name), said | dict.fromkeys(COUNTED, 0))
+        kind = kinds.setdefault(worst.kind, {"requirement": worst.requirement} | dict.fromkeys(COUNTED, 0))
         kind["failures"] += row["valid"]
         kind["distinct"] += row["distinct"]
         kind["preventable"] += worst.preventable
-    ordered = sorted(kinds.values(), key=lambda kind: (-kind["preventable"], -kind["failures"], kind["name"]))
-    return [KindRow(**kind) for kind in ordered]
+        kind["published"] += worst.published_preventable
+        if row["variant"] is not None:
+            variants[worst.kind].add(row["variant"])
+    found = [KindRow(name=name, variants=len(variants[name]), **kind) for name, kind in kinds.items()]
+    return sorted(found, key=lambda kind: (-kind.preventable, -kind.failures, kind.name))
 
 
 def _scenes(families: Sequence[str], scenes: Sequence[Mapping[str, float]]) -> dict[str, FamilyScenes]:

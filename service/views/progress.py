@@ -129,7 +129,8 @@ def progress(campaign: StoredCampaign, workers: int) -> Progress:
     means = {name: _mean([getattr(metrics, name) for metrics in present]) for name in AVERAGED}
     waiting = sum(run.headline_candidates for run in searches if run.metrics is None or run.metrics.headline is None)
     eta = 0.0 if campaign.state.final else eta_s(runs, campaign.spec, workers)
-    rest = {"headline": campaign.headline, "headline_waiting": waiting, "eta_s": eta}
+    headline = {"headline": campaign.headline, "headline_published": campaign.headline_published}
+    rest = headline | {"headline_waiting": waiting, "eta_s": eta}
     return Progress.model_validate(sums | means | rest)
 
 

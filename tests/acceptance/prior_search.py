@@ -25,7 +25,7 @@ from risk_sac.maps.finder import Map
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.results import EPISODES, records_from_lines
 from risk_sac.search.loop import execute_run
-from risk_sac.verdicts.distinct import kind_name
+from risk_sac.verdicts.distinct import variant_name
 from tests.maps import osm_town
 
 # Of each pattern a place of 50 km/h with the most adversaries, chosen before the first run.
@@ -91,9 +91,9 @@ def row(records: list[EpisodeRecord]) -> Row:
         "episodes": len(records),
         "steps": sum(record.steps for record in records),
         "valid": len(found),
-        "distinct": len({kind_name(each) for each in found}),
-        "preventable_distinct": len({kind_name(each) for each in found if each.preventable}),
-        "candidates_distinct": len({kind_name(each) for each in found if each.headline_candidate}),
+        "distinct": len({variant_name(each) for each in found}),
+        "preventable_distinct": len({variant_name(each) for each in found if each.preventable}),
+        "candidates_distinct": len({variant_name(each) for each in found if each.headline_candidate}),
         **{f"{driver}_episodes": drove[driver] for driver in ("policy", "model", "script", "random")},
         **{f"{driver}_failures": failed[driver] for driver in ("policy", "model", "script", "random")},
     }

@@ -14,7 +14,7 @@ from risk_sac.failures.bundle import read_bundle
 from risk_sac.failures.cases import Regression, Verdict
 from risk_sac.failures.minimise import COPIES, minimise
 from risk_sac.failures.variants import VariantPlayer
-from risk_sac.run_folder.results import distinct_failures, read_results, read_verified
+from risk_sac.run_folder.results import first_of_variants, read_results, read_verified
 from tests.acceptance.conftest import Tell
 from tests.ego_processes import served
 
@@ -36,7 +36,7 @@ def register(monkeypatch: pytest.MonkeyPatch, folder: Path, table: str) -> None:
 
 def found(folder: Path, ego: str) -> Found:
     assert main(["run", *RUN, "--ego", ego, "--out", str(folder / "run")]) == 0
-    first = next(iter(distinct_failures(read_results(folder / "run"))))
+    first = next(iter(first_of_variants(read_results(folder / "run"))))
     assert main(["bundle", str(folder / "run"), str(first.index), "--out", str(folder / "one.npz")]) == 0
     return Found(folder / "run", folder / "one.npz")
 

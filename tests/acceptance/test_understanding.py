@@ -24,7 +24,7 @@ from risk_sac.failures.regress import regress, regress_run
 from risk_sac.failures.variants import VariantPlayer
 from risk_sac.report import read_run
 from risk_sac.run_folder.arrays import read_series
-from risk_sac.run_folder.results import FAILURES, VERIFIED, distinct_failures, read_results, read_verified, series_name
+from risk_sac.run_folder.results import FAILURES, VERIFIED, first_of_variants, read_results, read_verified, series_name
 from risk_sac.run_folder.series import write_series
 from risk_sac.search.frozen_policy import FrozenPolicy
 from tests.acceptance.conftest import Tell
@@ -81,7 +81,7 @@ def test_every_distinct_failure_repeats_to_the_bit(run: Path, capsys: pytest.Cap
 
 def tampered_with(run: Path) -> int:
     """Changes actions of the first distinct failure, and returns its index."""
-    index = distinct_failures(read_results(run))[0].index
+    index = first_of_variants(read_results(run))[0].index
     file = run / FAILURES / series_name(index)
     arrays = read_series(file)
     arrays["actions"][-5:] *= -1.0
@@ -110,7 +110,7 @@ def test_what_does_not_repeat_is_flaky_and_counts_as_no_failure(
 
 def test_every_distinct_failure_has_a_bundle(run: Path, failures: Path) -> None:
     spec = read_results(run).spec
-    expected = {episode.id_in(spec.id) for episode in distinct_failures(read_results(run))}
+    expected = {episode.id_in(spec.id) for episode in first_of_variants(read_results(run))}
     assert len(expected) >= 2
     assert {file.stem.rpartition("-")[0] for file in failures.iterdir()} == expected
 
@@ -266,7 +266,7 @@ def test_a_run_that_learned_has_a_policy_and_one_that_did_not_has_none(run: Path
     assert policy_of(run, read_results(run)) is None
     assert policy_of(tmp_path / "run", replace(results, finished=False)) is None
 
-    (bundle,) = bundles(tmp_path / "run", results, distinct_failures(results))
+    (bundle,) = bundles(tmp_path / "run", results, first_of_variants(results))
     write_bundle(tmp_path / "failure.npz", bundle)
     kept = read_bundle(tmp_path / "failure.npz")
     assert kept.policy is not None

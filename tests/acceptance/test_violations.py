@@ -17,7 +17,7 @@ from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.minimise import minimise
 from risk_sac.failures.recording import actions_of
 from risk_sac.records import EpisodeRecord, Violation
-from risk_sac.run_folder.results import distinct_failures, read_results
+from risk_sac.run_folder.results import first_of_variants, read_results
 from tests.acceptance.conftest import Tell
 from tests.exports.test_mcap import read
 
@@ -64,7 +64,7 @@ def test_it_is_listed_sorted_and_verified(folder: Path, tell: Tell) -> None:
     assert "never_fast violated" in out
     status, out, _ = tell("verify", folder / "run", "--times", 1)
     assert status == 0
-    distinct = len(distinct_failures(read_results(folder / "run")))
+    distinct = len(first_of_variants(read_results(folder / "run")))
     assert f"{distinct} of {distinct} distinct" in out
 
 

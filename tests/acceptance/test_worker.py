@@ -16,7 +16,7 @@ from risk_sac.execution.local import LocalExecutor
 from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Started
 from risk_sac.records import Repetition
 from risk_sac.run_folder.arrays import read_series
-from risk_sac.run_folder.results import FAILURES, distinct_failures, read_results, series_name
+from risk_sac.run_folder.results import FAILURES, first_of_variants, read_results, series_name
 from risk_sac.run_folder.series import write_series
 from service.runs.manager import worker_program
 from service.settings import ServiceSettings
@@ -101,7 +101,7 @@ def test_a_worker_that_finds_all_played_replays_what_nobody_has_and_refuses_what
     before = said[-1]
     assert isinstance(before, Finished)
     assert not before.repetitions
-    first, *others = [episode.index for episode in distinct_failures(read_results(tmp_path / "run"))]
+    first, *others = [episode.index for episode in first_of_variants(read_results(tmp_path / "run"))]
     file = tmp_path / "run" / FAILURES / series_name(first)
     series = read_series(file)
     series["actions"][-5:] *= -1.0

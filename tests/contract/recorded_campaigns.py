@@ -54,7 +54,7 @@ LEADER = judgement(
     Grade.FULL_BRAKING,
     -0.5,
     unresponsive=True,
-    signature="leader",
+    kind="leader",
     severity=Severity.SEVERE,
     injury_risk=0.02,
     fault=Fault.SHARED,

@@ -275,7 +275,7 @@ def test_a_list_of_failures_is_filtered_and_says_that_there_are_more(call, clien
     for flags, query in (
         (["--grade", "full_braking"], {"grade": "full_braking"}),
         (["--fault", "shared", "--severity", "severe"], {"fault": "shared"}),
-        (["--signature", "leader"], {"signature": "leader"}),
+        (["--kind", "leader"], {"kind": "leader"}),
         (["--broke", "speeding"], {"broke": "speeding"}),
         (["--run", "low-random-3"], {"run": "low-random-3"}),
         (["--raw"], {"tier": "raw"}),

@@ -53,7 +53,7 @@ def metrics(episodes: int) -> RunMetrics:
         pcr_low=low,
         pcr_high=high,
         episodes_driven_by={"script": preventable, "random": failures - preventable},
-        signatures={"cut-in, straight": failures},
+        kinds={"cut-in, straight": failures},
         requirements={NO_CONTACT: contacts},
     )
 

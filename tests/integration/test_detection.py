@@ -39,7 +39,7 @@ def test_a_search_ends_at_the_first_detection(found: Detection, folder: Path) ->
     assert found.reached <= found.triggered <= found.detected == found.steps < STEPS
     assert found.episode is not None
     assert found.episode.collision is not None
-    assert found.signature == found.episode.collision.signature
+    assert found.kind == found.episode.collision.kind
     assert first_detection(SPEC, folder, STEPS) == found  # nothing is played again
     (folder / "detection.json").unlink()
     assert first_detection(SPEC, folder, STEPS) == found  # from the checkpoint
@@ -72,7 +72,7 @@ def test_recorded_motions_repeat_the_failure_of_the_same_ego(found: Detection, f
 def test_a_search_that_detects_nothing_ends_with_its_budget(tmp_path: Path) -> None:
     spec = SPEC.model_copy(update={"family": "low", "method": "random", "ego": read_ego("default+sumo-distracted")})
     found = first_detection(spec, tmp_path, 300)
-    assert (found.detected, found.reached, found.signature) == (None, None, "")
+    assert (found.detected, found.reached, found.kind) == (None, None, "")
     assert 300 <= found.steps < 500
 
 

@@ -81,8 +81,8 @@ def test_a_guide_that_goes_on_anyway_has_time_until_it_has_found_enough() -> Non
 def shares(*findings: tuple[int, str, Grade]) -> list[float]:
     """Share of the policy's turns among 2,000, after each finding."""
     turns, found = Turns(0, COLD), []
-    for arm, signature, grade in findings:
-        turns.tell(arm, 100, [collision(judgement=judgement(grade, signature=signature))])
+    for arm, kind, grade in findings:
+        turns.tell(arm, 100, [collision(judgement=judgement(grade, kind=kind))])
         found.append(sum(turns.draw() for _ in range(2000)) / 2000)
     return found
 

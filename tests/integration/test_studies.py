@@ -119,7 +119,7 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
     assert clusters["complete"]
     found = clusters["families"]["low"]["clusters"]
     metrics = service.get(campaign_id, "/results")["runs"][0]["metrics"]
-    assert {cluster["name"]: cluster["failures"] for cluster in found} == metrics["signatures"]
+    assert {cluster["name"]: cluster["failures"] for cluster in found} == metrics["kinds"]
     ids = {each["id"] for each in service.get(campaign_id, "/failures", limit=100)["items"]}
     assert {cluster["representative"] for cluster in found} <= ids
 

@@ -36,7 +36,7 @@ def test_an_ego_that_leaves_the_road_would_have_been_kept_on_it_by_its_lane() ->
     assert {violation.requirement for violation in found} == {"on_carriageway"}
     assert {violation.grade for violation in found} == {Grade.PREVENTABLE}
     assert {violation.broke for violation in found} == {("off_road",)}
-    assert all(violation.signature.startswith("carriageway left; ego ") for violation in found)
+    assert all(violation.kind.startswith("carriageway left; ego ") for violation in found)
 
 
 @pytest.mark.parametrize("family", ["low", "mixed", "dense"])

@@ -36,7 +36,7 @@ def metrics():
         distinct_preventable=1,
         artefacts=1,
         unresponsive=0,
-        signatures={"cut-in, straight": 1},
+        kinds={"cut-in, straight": 1},
         conflicts_by_second=(0, 0, 1, 0),
         contacts_by_second=(0, 0, 0, 1),
     )

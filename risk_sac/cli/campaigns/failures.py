@@ -135,7 +135,7 @@ def failures_table(failures: Sequence[Episode]) -> Table:
             continue
         speeds = [worst.ego_speed_mps, *([worst.other_speed_mps] if isinstance(worst, Collision) else [])]
         table.add_row(
-            escape(f"{failure.id}\n{', '.join(failure.failed or [worst.requirement])}\n{worst.signature}"),
+            escape(f"{failure.id}\n{', '.join(failure.failed or [worst.requirement])}\n{worst.kind}"),
             outcome(failure, worst),
             ", ".join(or_dash(speed, ".1f") for speed in speeds),
             escape("\n".join([in_words([failure.reason])] if failure.reason else offences(worst))),
@@ -161,7 +161,8 @@ def _violation(violation: Violation) -> Iterator[str]:
         f"release, at {or_dash(violation.ego_speed_mps, '.1f')} m/s; least robustness "
         f"{or_dash(violation.robustness, '.2f')} scales{actor}"
     )
-    yield f"  kind       {violation.signature}"
+    yield f"  kind       {violation.kind}"
+    yield f"  variant    {violation.variant}"
     yield f"  grade      {_grade(violation)}"
     yield from _plausible(violation)
     if violation.fault:
@@ -185,7 +186,8 @@ def _contact(collision: Collision) -> Iterator[str]:
         f"{collision.other_role} {collision.other_id!r} at {or_dash(collision.other_speed_mps, '.1f')} m/s"
     )
     judgement = collision.judgement
-    yield f"  kind       {judgement.signature}"
+    yield f"  kind       {judgement.kind}"
+    yield f"  variant    {judgement.variant}"
     yield f"  grade      {_grade(collision)}"
     yield from _plausible(collision)
     yield f"  severity   {collision.severity_in_words}"

@@ -41,7 +41,7 @@ class GateBounds:
     pcr: float | None = None
     requirements: Mapping[str, float] = field(default_factory=dict)  # by name; of runs of the i.i.d. phase as well
     preventable: int | None = None  # distinct ones
-    known: Mapping[str, frozenset[str]] | None = None  # family → signatures of failures that are no news
+    known: Mapping[str, frozenset[str]] | None = None  # family → kinds of failures that are no news
     judged_by: JudgedBy = "interval"
 
     @classmethod
@@ -175,8 +175,8 @@ def excesses(total: Total, bounds: GateBounds) -> Iterator[str]:
         found = counted(total.distinct_preventable, "distinct preventable failure")
         yield f"{found}, where {bounds.preventable} may be"
     if bounds.known is not None:
-        for signature in sorted(total.signatures.keys() - bounds.known.get(total.family, frozenset())):
-            yield f"a new kind of failure: {signature}"
+        for kind in sorted(total.kinds.keys() - bounds.known.get(total.family, frozenset())):
+            yield f"a new kind of failure: {kind}"
 
 
 def verdict(results: Results, bounds: GateBounds) -> tuple[int, str]:
@@ -218,5 +218,5 @@ def _read_known(file: Path) -> Mapping[str, frozenset[str]]:
         raise ConfigError("--no-new-failures", str(file), expected) from error
     known: dict[str, frozenset[str]] = {}
     for total in earlier.totals:
-        known[total.family] = known.get(total.family, frozenset()) | total.signatures.keys()
+        known[total.family] = known.get(total.family, frozenset()) | total.kinds.keys()
     return known

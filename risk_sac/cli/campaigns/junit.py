@@ -28,7 +28,8 @@ def junit(
     """
     names = Names(results, service_url, url, failures)
     report = JUnitXml("risk-sac")
-    headline_failures = headline(results.headline, sum(total.headline_candidates for total in results.totals))
+    candidates = sum(total.headline_candidates for total in results.totals)
+    headline_failures = headline(results.headline, candidates, results.headline_published)
     for family in dict.fromkeys(run.family for run in results.runs):
         suite = TestSuite(family)
         runs = [run for run in results.runs if run.family == family]
@@ -58,12 +59,13 @@ def _case(run: RunResult, named: str) -> TestCase:
         if value is not None:
             case.add_property(name, printable(value))
     if (metrics := run.metrics) is not None:
+        published = len(metrics.headline_kinds_published)
         funnel = (
-            f"headline failures: {headline(metrics.headline, metrics.headline_candidates)}; "
+            f"headline failures: {headline(metrics.headline, metrics.headline_candidates, published)}; "
             f"{counted(metrics.raw_collisions, 'contact')}, {metrics.collisions} valid; "
             f"{counted(metrics.failures, 'failure')}; {counted(metrics.distinct_failures, 'distinct violation')}, "
-            f"{metrics.distinct_preventable} preventable, of them {metrics.headline_candidates} plausible and not "
-            f"minor, {metrics.implausible} implausible"
+            f"{metrics.distinct_preventable} preventable, {metrics.distinct_published} of them by R157, FSM or RSS, "
+            f"{metrics.headline_candidates} plausible and not minor, {metrics.implausible} implausible"
         )
         case.add_property("funnel", funnel)
     if named:
@@ -158,7 +160,7 @@ class Names:
 
     def _of_failure(self, failure: Episode) -> list[str]:
         worst = failure.worst_violation
-        kind = "no violation" if worst is None else f"{worst.signature}; grade {worst.graded}"
+        kind = "no violation" if worst is None else f"{worst.kind}; grade {worst.graded}"
         return [f"{failure.id}: {kind}", f"  {look_command(self.service_url, self.results.campaign_id, failure.id)}"]
 
 

@@ -15,7 +15,7 @@ from risk_sac.client import Campaign, CampaignSummary, Client, Results
 from risk_sac.config import IID_METHODS
 from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import notes
-from risk_sac.metrics import pooled_requirements
+from risk_sac.metrics import pooled_requirements, with_published
 from risk_sac.records import DrivenBy, Total
 
 COUNTS = ("head-\nline", "epi-\nsodes", "fail-\nures", "dis-\ntinct", "preven-\ntable")
@@ -67,8 +67,11 @@ def figures(campaign: CampaignSummary) -> str:
     eta = "?" if progress.eta_s is None else f"{progress.eta_s:.0f} s"
     reason = f"; {campaign.state}, {on_one_line(campaign.reason)}" if campaign.reason else ""
     failures = f"{counted(progress.failures, 'failure')}{_by_requirement(campaign)}"
-    first = f"headline failures: {headline(progress.headline, progress.headline_candidates)}"
-    found = f"{first}; {failures}, {progress.distinct_preventable} distinct and preventable"
+    first = (
+        f"headline failures: {headline(progress.headline, progress.headline_candidates, progress.headline_published)}"
+    )
+    preventable = f"{progress.distinct_preventable} distinct and preventable"
+    found = f"{first}; {failures}, {preventable} ({progress.distinct_published} by R157, FSM or RSS)"
     rates = f"ECR {or_dash(progress.window_ecr, '.2f')}, PCR {or_dash(progress.window_pcr, '.2f')}"
     return f"{found}, {rates}, ETA {eta}{reason}"
 
@@ -121,10 +124,12 @@ def results_table(results: Results, bounds: GateBounds) -> Table:
     """Per family and method the funnel, and ECR and PCR over their intervals; 80 columns hold it.
 
     The title has the headline failures of the campaign: what several methods found alike counts once there.
-    Failures, distinct and preventable ones are of every requirement that counts.
+    Failures, distinct and preventable ones are of every requirement that counts. In brackets are those that R157, FSM
+    or RSS prevents.
     """
     partial = "" if results.complete else ", so far"
-    found = headline(results.headline, sum(total.headline_candidates for total in results.totals))
+    candidates = sum(total.headline_candidates for total in results.totals)
+    found = headline(results.headline, candidates, results.headline_published)
     title = f"headline failures: {found}\n{results.campaign_id} {results.state}{partial}"
     table = Table(title=title, box=SIMPLE_HEAD, padding=0)
     table.add_column("family", overflow="fold")  # of a place on a map it is long
@@ -136,9 +141,9 @@ def results_table(results: Results, bounds: GateBounds) -> Table:
         table.add_row(
             total.family,
             f"{total.method}\n{counted(total.runs, 'run')}",
-            or_dash(total.headline, "d"),
-            *map(str, (total.episodes, total.failures)),
-            *map(str, (total.distinct_failures, total.distinct_preventable)),
+            "-" if total.headline is None else with_published(total.headline, total.headline_published),
+            *map(str, (total.episodes, total.failures, total.distinct_failures)),
+            with_published(total.distinct_preventable, total.distinct_published),
             _rate(total.ecr, total.ecr_low, total.ecr_high, broken.get("ECR")),
             _rate(total.pcr, total.pcr_low, total.pcr_high, broken.get("PCR")),
             style="red" if broken else None,

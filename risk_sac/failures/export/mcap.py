@@ -194,5 +194,5 @@ def _moments(failure: Recorded) -> Iterator[tuple[int, str]]:
     if isinstance(failure.violation, Collision):
         began = released + round(failure.violation.judgement.conflict_s * 10)
         if 0 <= began < failure.moment:
-            yield began, f"the conflict begins: {failure.violation.signature}"
+            yield began, f"the conflict begins: {failure.violation.kind}"
     yield failure.moment, f"the ego {failure.violation.event}: {story(failure.series, failure.violation)}"

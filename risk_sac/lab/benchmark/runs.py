@@ -48,7 +48,7 @@ class Detection(Record):
     """Until a failure first showed the defect, see `failures.detection`; null if none did."""
     refuted: int
     """Candidates that the ego without the defects has too."""
-    signature: str
+    kind: str
     """Of the failure that detected it; empty without one."""
     episode: EpisodeRecord | None
     """In which that happened; its time series is in the folder."""
@@ -58,7 +58,7 @@ class Detection(Record):
         times = {name: getattr(self, name) for name in ("reached", "triggered", "detected")}
         changed = {name: None if at is None or at > steps else at for name, at in times.items()}
         if changed["detected"] is None:
-            changed |= {"signature": "", "episode": None}
+            changed |= {"kind": "", "episode": None}
         return self.model_copy(update=changed | {"budget_steps": steps})
 
 
@@ -146,7 +146,7 @@ def _play(spec: RunSpec, folder: Path, budget_steps: int, before: Detection | No
         triggered=_first(each for each in seen.records if each.failed),
         detected=None if episode is None else episode.environment_steps,
         refuted=refuted,
-        signature="" if failure is None else failure.signature,
+        kind="" if failure is None else failure.kind,
         episode=episode,
     )
 

@@ -52,7 +52,7 @@ def diagram(methods: Sequence[RunMethod], means: Floats) -> Figure:
 
 COLUMNS = (
     *("defects", "family", "method", "seed", "budget_steps", "steps", "episodes"),
-    *("reached", "triggered", "detected", "refuted", "signature", "driven_by"),
+    *("reached", "triggered", "detected", "refuted", "kind", "driven_by"),
 )
 METHODS = (
     *("method", "runs", "falsification rate (95 %)", "mean steps", "median steps"),

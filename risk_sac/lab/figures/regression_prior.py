@@ -93,7 +93,7 @@ def rows(cases: Sequence[Case], detections: Sequence[Detection]) -> Iterator[dic
             "triggered": case_detection.triggered,
             "steps": case_detection.steps,
             "driven_by": case_detection.episode.driven_by if case_detection.episode else None,
-            "signature": case_detection.signature,
+            "kind": case_detection.kind,
         }
 
 

@@ -23,7 +23,7 @@ from risk_sac.search.prior.coordinates import Coordinates
 from risk_sac.search.prior.shipped import GRID
 from risk_sac.search.scene_optimizer import Encounter
 from risk_sac.search.scene_optimizer.archive import REFLECTED, mutated
-from risk_sac.verdicts.distinct import kind_name
+from risk_sac.verdicts.distinct import variant_name
 from risk_sac.world.types import Floats, Scene
 
 SOUND: dict[str, EgoConfig] = {
@@ -208,7 +208,7 @@ def outcome_of(encounter: Encounter, point: Floats, ego: str, steps: int) -> Scr
         point=point,
         ego=ego,
         steps=steps,
-        kind="" if worst is None else kind_name(worst),
+        kind="" if worst is None else variant_name(worst),
         preventable=worst is not None and worst.preventable,
         candidate=worst is not None and worst.headline_candidate,
     )

@@ -18,7 +18,7 @@ from risk_sac.search.agents.replay import Transition
 from risk_sac.search.frozen_policy import Layers, respond
 from risk_sac.search.prior.policy import goal_of, with_goal
 from risk_sac.search.scene_optimizer import Encounter
-from risk_sac.verdicts.distinct import kind_name
+from risk_sac.verdicts.distinct import variant_name
 from risk_sac.world.types import Vector
 
 DECISION_STEPS, DISCOUNT = AgentConfig().decision_steps, AgentConfig().discount
@@ -122,7 +122,7 @@ def _episode(env: RiskSacEnv, turn: Turn, asked: int, random: np.random.Generato
         asked=asked,
         decisions=decisions,
         goal="" if worst is None else goal_of(worst),
-        kind="" if worst is None else kind_name(worst),
+        kind="" if worst is None else variant_name(worst),
         candidate=worst is not None and worst.headline_candidate,
         bonus=paid if isinstance(worst, Collision) else 0.0,
         steps=steps,

@@ -23,7 +23,7 @@ from risk_sac.run_folder.durable import LOCK, lock, read_sealed, replace_file, s
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
 from risk_sac.scenario.families import family_named, shipped_alike
 from risk_sac.scenario.library import library
-from risk_sac.verdicts.distinct import kind_name
+from risk_sac.verdicts.distinct import variant_name
 
 FOLDER = "priors"
 KEPT = re.compile(r"[a-z0-9_]{0,41}[0-9a-f]{12}")
@@ -48,7 +48,7 @@ class PlayedScript:
         return cls(
             scene=record.scene,
             genes=record.script or (),
-            kind="" if worst is None else kind_name(worst),
+            kind="" if worst is None else variant_name(worst),
             candidate=worst is not None and worst.headline_candidate,
         )
 

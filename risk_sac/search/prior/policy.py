@@ -7,7 +7,6 @@ requirements may be others.
 prior/weights/<family>-policy.npz   plain arrays; README.md says how they were made
 """
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -27,7 +26,6 @@ from risk_sac.search.prior.files import DATA, arrays_of, write_arrays
 from risk_sac.world.types import Vector
 
 GOALS = 15  # kinds of failures that can be asked for, at most
-MANNERS = re.compile(r" (speeding|on red)")
 ABSENT_SCENE, ABSENT_REQUIREMENT = 0.5, 1.0  # entries of an observation for what a problem lacks; 0 for an adversary's
 HIDDEN_LAYERS = 2
 Arrays = tuple[NDArray[np.float32], ...]
@@ -76,8 +74,8 @@ class PretrainedPolicy:
 
 
 def goal_of(violation: Collision | Violation) -> str:
-    """Returns the goal that a violation reaches: the other's part of its signature, without two of its manners."""
-    return f"{violation.requirement}: {MANNERS.sub('', violation.signature.split(';')[0])}"
+    """Returns the goal that a violation reaches: its requirement and the striker's part of its kind."""
+    return f"{violation.requirement}: {violation.kind.split(';')[0]}"
 
 
 def with_goal(observation: Vector, goal: int) -> NDArray[np.float32]:

@@ -13,7 +13,7 @@ from risk_sac.search.prior.start import Start
 from risk_sac.search.scene_optimizer import ArchiveOptimizer, Encounter
 from risk_sac.search.scene_optimizer.archive import DEVIATIONS, SHARES
 from risk_sac.search.scene_optimizer.base import State
-from risk_sac.verdicts.distinct import NEW, NEW_CANDIDATE, Finds
+from risk_sac.verdicts.distinct import CANDIDATE, NEW_VARIANT, Finds
 from risk_sac.world.types import Floats
 
 CANDIDATES = 1024  # points among which the model chooses
@@ -98,7 +98,7 @@ class PriorOptimizer(ArchiveOptimizer):
         return self._from_model()
 
     def _from_library(self) -> Floats:
-        """Draws a row that was not played yet, the more likely the rarer its kind is so far; then all over again.
+        """Draws a row that was not played yet, the more likely the rarer its variant is so far; then all over again.
 
         Some of the draws are from what an earlier run found, while some of that was not played.
         """
@@ -108,7 +108,7 @@ class PriorOptimizer(ArchiveOptimizer):
         earlier = rows[rows < self._earlier]
         if len(earlier) and self._random.random() < EARLIER_SHARE:
             rows = earlier
-        novelty = np.array([_novelty(self._finds.kinds[self._library_kinds[row]]) for row in rows])
+        novelty = np.array([_novelty(self._finds.variants[self._library_kinds[row]]) for row in rows])
         weights = novelty * self._library_worth[rows]
         row = int(self._random.choice(rows, p=weights / weights.sum()))
         self._played.append(row)
@@ -123,8 +123,8 @@ class PriorOptimizer(ArchiveOptimizer):
         points[:, :size] = np.repeat(self._random.random((scenes, size)), CANDIDATES // scenes, axis=0)
         points[:, size:] = self._scripts(CANDIDATES)
         prediction = self._model.predict(self._translation.known(points), self._belief)
-        worth = NEW * prediction.fails + NEW_CANDIDATE * prediction.candidate
-        novelty = np.array([_novelty(self._finds.kinds[kind]) for kind in self._model.kinds])
+        worth = NEW_VARIANT * (prediction.fails + CANDIDATE * prediction.candidate)
+        novelty = np.array([_novelty(self._finds.variants[kind]) for kind in self._model.kinds])
         best: Floats = points[int((worth * (prediction.kinds @ novelty)).argmax())]
         return best
 
@@ -177,5 +177,5 @@ class ReplayOptimizer(PriorOptimizer):
 
 
 def _novelty(found: int) -> float:
-    """Share of its worth that another failure of a kind has."""
+    """Share of its worth that another failure of a variant has."""
     return 1.0 / (1.0 + found) ** 2

@@ -11,7 +11,7 @@ import numpy as np
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import NO_CONTACT, Collision, DrivenBy, Severity, Violation
 from risk_sac.search.scene_optimizer.base import Encounter, SceneOptimizer, State
-from risk_sac.verdicts.distinct import niche_of
+from risk_sac.verdicts.distinct import Finds, variant_name
 from risk_sac.world.types import Floats
 
 
@@ -89,7 +89,7 @@ LEAST_WORTH = 0.02  # of a failure
 MINOR_SHARE = 0.25  # of its worth that a minor contact has
 NEAR_MISS_WORTH = 0.1
 NEAR_MARGIN = 0.3  # of a requirement, in scales: what undisturbed traffic keeps is about 1
-NEW, NEW_CANDIDATE = 0.5, 2.0  # credit of a parent for a distinct failure, and for a candidate for the headline
+CREDIT = 0.5  # of a parent, for each unit of worth that `Finds` gives to what is new
 
 
 @dataclass(slots=True, kw_only=True)
@@ -106,12 +106,12 @@ class Elite:
 
 
 class Elites:
-    """One elite for each distinct violation, and a near miss for each adversary or requirement without one."""
+    """One elite for each variant of violations, and a near miss for each adversary or requirement without one."""
 
     def __init__(self) -> None:
-        self._failures: dict[str, Elite] = {}  # by niche
+        self._failures: dict[str, Elite] = {}  # by variant: its niche
         self._misses: dict[str, Elite] = {}  # by target
-        self._candidates: set[str] = set()  # niches with a candidate for the headline
+        self._finds = Finds()
 
     @property
     def failures(self) -> int:
@@ -136,17 +136,15 @@ class Elites:
 
     def add_failure(self, point: Floats, violation: Collision | Violation, parent: Elite | None) -> None:
         """Adds a valid violation if it is the first in its niche, or worth more than that."""
-        niche, kind = " ".join(map(str, niche_of(violation))), violation.signature
+        niche = variant_name(violation)
         known = self._failures.get(niche)
         worth = _worth(violation)
+        new = self._finds.add([violation])
         if parent is not None:
-            new_candidate = violation.headline_candidate and niche not in self._candidates
-            parent.credit += NEW * (known is None) + NEW_CANDIDATE * new_candidate
-        if violation.headline_candidate:
-            self._candidates.add(niche)
+            parent.credit += CREDIT * new
         if known is None or known.worth < worth:
             target = violation.other_id if isinstance(violation, Collision) else violation.requirement
-            self._failures[niche] = Elite(point=point, worth=worth, target=target, kind=kind)
+            self._failures[niche] = Elite(point=point, worth=worth, target=target, kind=violation.kind)
 
     def add_misses(self, point: Floats, encounter: Encounter) -> None:
         """Adds near misses by adversary and by requirement, where none was nearer.
@@ -170,14 +168,14 @@ class Elites:
         return {
             "failures": {niche: _plain(elite) for niche, elite in self._failures.items()},
             "misses": {name: _plain(elite) for name, elite in self._misses.items()},
-            "candidates": sorted(self._candidates),
+            "finds": self._finds.state(),
         }
 
     def load(self, state: State) -> None:
         """Continues from `state()`."""
         self._failures = {niche: _elite(elite) for niche, elite in state["failures"].items()}
         self._misses = {name: _elite(elite) for name, elite in state["misses"].items()}
-        self._candidates = set(state["candidates"])
+        self._finds.load(state["finds"])
 
 
 def _plain(elite: Elite) -> State:

@@ -123,8 +123,8 @@ def list_failures(
     broke: Annotated[
         str | None, Query(max_length=40, pattern="^[a-z_]+$", description="Only those whose striker broke this.")
     ] = None,
-    signature: Annotated[
-        str | None, Query(max_length=300, pattern=r"^[^\x00]*$", description="Only those with exactly this signature.")
+    kind: Annotated[
+        str | None, Query(max_length=300, pattern=r"^[^\x00]*$", description="Only those of exactly this kind.")
     ] = None,
     limit: Limit = 50,
     cursor: Cursor = None,
@@ -145,7 +145,7 @@ def list_failures(
             fault=fault,
             driven_by=driven_by,
             broke=broke,
-            signature=signature,
+            kind=kind,
             iid=run is not None,
         ),
         project=caller.sees,

@@ -33,7 +33,7 @@ TOTAL = {
     "pcr_low": 0.03,
     "pcr_high": 0.054,
     "unresponsive": 0,
-    "signatures": {},
+    "kinds": {},
     "conflicts_by_second": [],
     "contacts_by_second": [],
 }
@@ -97,14 +97,14 @@ def test_more_distinct_preventable_failures_than_may_be_are_named(bound, status)
 
 def test_a_kind_of_failure_is_news_unless_any_method_of_the_earlier_campaign_found_it_in_that_family(tmp_path):
     file = tmp_path / "known.json"
-    earlier = results("succeeded", {"signatures": {LEADER: 2}}, {"method": "random", "signatures": {CUT_IN: 1}})
+    earlier = results("succeeded", {"kinds": {LEADER: 2}}, {"method": "random", "kinds": {CUT_IN: 1}})
     file.write_text(earlier.model_dump_json())
     bounds = GateBounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file}))
-    assert verdict(results("succeeded", {"signatures": {LEADER: 9, CUT_IN: 1}}), bounds)[0] == 0
-    status, reason = verdict(results("succeeded", {"family": "dense", "signatures": {LEADER: 1}}), bounds)
+    assert verdict(results("succeeded", {"kinds": {LEADER: 9, CUT_IN: 1}}), bounds)[0] == 0
+    status, reason = verdict(results("succeeded", {"family": "dense", "kinds": {LEADER: 1}}), bounds)
     assert (status, reason) == (1, f"dense sac: a new kind of failure: {LEADER}")
-    assert verdict(results("running", {"signatures": {}}), bounds)[0] == 2
-    violation = results("succeeded", {"signatures": {LEADER: 1, FAST: 3}})  # without a contact
+    assert verdict(results("running", {"kinds": {}}), bounds)[0] == 2
+    violation = results("succeeded", {"kinds": {LEADER: 1, FAST: 3}})  # without a contact
     assert verdict(violation, bounds) == (1, f"low sac: a new kind of failure: {FAST}")
     file.write_text(violation.model_dump_json())
     assert verdict(violation, GateBounds.of(argparse.Namespace(**UNBOUND | {"no_new_failures": file})))[0] == 0

@@ -7,7 +7,7 @@ from risk_sac.config import Budget, LearnerConfig, RunSpec
 from risk_sac.errors import CheckpointError, ConfigError
 from risk_sac.execution.evaluate import run
 from risk_sac.records import Repetition
-from risk_sac.run_folder.results import EPISODES, RESULTS, Verified, distinct_failures, read_results, write_verified
+from risk_sac.run_folder.results import EPISODES, RESULTS, Verified, first_of_variants, read_results, write_verified
 from risk_sac.search.run import CHECKPOINT
 
 SPEC = RunSpec(
@@ -73,7 +73,7 @@ def test_a_folder_with_damaged_results_and_the_checkpoint_of_another_run_is_left
 def test_the_same_command_again_keeps_the_headline_of_the_replay(folder, finished):
     assert execute(folder).metrics.headline is None
     results = finished[1]
-    episodes = {episode.index: Repetition(times=2, same=2) for episode in distinct_failures(results)}
+    episodes = {episode.index: Repetition(times=2, same=2) for episode in first_of_variants(results)}
     write_verified(folder, Verified(digest=results.digest, code="", versions={}, episodes=episodes))
     execute(folder)
     found = read_results(folder).metrics

@@ -64,8 +64,8 @@ def test_where_no_action_is_left_nothing_is_weakened():
     assert search.taken == 1
 
 
-def failure(signature: str, grade: Grade, **changes: float) -> Collision:
-    return collision(verdicts={"ego_moving": True}, judgement=judgement(grade, signature=signature), **changes)
+def failure(kind: str, grade: Grade, **changes: float) -> Collision:
+    return collision(verdicts={"ego_moving": True}, judgement=judgement(grade, kind=kind), **changes)
 
 
 def found(*collisions: Collision) -> list[tuple[str, EpisodeRecord]]:

@@ -45,7 +45,7 @@ def test_a_baseline_makes_the_same_verdict_of_the_same_failure_known_and_no_othe
     assert now.beside(now).passed
 
 
-HIT = collision(other_id="lead", judgement=judgement(signature="cut-in"))
+HIT = collision(other_id="lead", judgement=judgement(kind="cut-in"))
 ARTEFACT = violation(requirement="gentle", verdicts={"no_teleport": False})
 
 

@@ -72,7 +72,7 @@ any_judgement = st.builds(
     grade=st.sampled_from(Grade),
     conflict_s=st.floats(-5, 20),
     unresponsive=st.booleans(),
-    signature=st.sampled_from(("cut-in", "pedestrian", "leader")),
+    kind=st.sampled_from(("cut-in", "pedestrian", "leader")),
 )
 any_collision = st.builds(
     contact,
@@ -110,12 +110,10 @@ JUDGED = [
         hit=contact(
             time_s=15.0,
             other_id="adv_2",
-            judgement=judgement(Grade.PREVENTABLE, -0.4, signature="pedestrian, straight", unresponsive=True),
+            judgement=judgement(Grade.PREVENTABLE, -0.4, kind="pedestrian, straight", unresponsive=True),
         ),
     ),
-    episode(
-        Outcome.FAILURE, 20, hit=contact(time_s=2.0, judgement=judgement(Grade.UNAVOIDABLE, 1.5, signature="leader"))
-    ),
+    episode(Outcome.FAILURE, 20, hit=contact(time_s=2.0, judgement=judgement(Grade.UNAVOIDABLE, 1.5, kind="leader"))),
     # Its striker left the grip of its tyres: an artefact, whose grade would not count.
     episode(
         Outcome.DEGENERATE, 30, hit=contact(verdicts={"inside_grip": False}, judgement=judgement(unresponsive=True))

@@ -13,7 +13,7 @@ from risk_sac.metrics.rows import (
     preventable_collision_rate,
 )
 from risk_sac.records import Funnel, Grade, Outcome
-from risk_sac.verdicts.distinct import distinct_failures, kind_of
+from risk_sac.verdicts.distinct import distinct_failures, taxonomy_cell
 from tests.builders import judgement
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
 
@@ -104,8 +104,8 @@ def test_incremental_equals_batch(records):
     assert metrics.distinct_preventable == len(distinct_failures([hit for hit in hits if hit.preventable]))
     assert metrics.avoidable == sum(hit.judgement.grade in (Grade.PREVENTABLE, Grade.FULL_BRAKING) for hit in hits)
     assert sum(metrics.conflicts_by_second) == sum(metrics.contacts_by_second) == len(hits)
-    assert sum(metrics.signatures.values()) == len(hits)
-    assert metrics.covered == len({kind_of(hit) for hit in hits})
+    assert sum(metrics.kinds.values()) == len(hits)
+    assert metrics.covered == len({taxonomy_cell(hit) for hit in hits})
     assert metrics.efficiency == pytest.approx(efficiency_score(counted(records)), abs=1e-12)
     assert metrics.cost_rate == pytest.approx(cost_rate(counted(records)), abs=1e-12)
     assert metrics.distinct_failures == len(distinct_failures(hits))

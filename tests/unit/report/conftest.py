@@ -18,7 +18,7 @@ LEADER = judgement(
     Grade.FULL_BRAKING,
     -0.5,
     unresponsive=True,
-    signature="leader, straight",
+    kind="leader, straight",
     severity=Severity.SEVERE,
     fault=Fault.SHARED,
 )

@@ -28,7 +28,7 @@ def test_what_does_not_repeat_is_refused_and_what_is_like_it_but_repeats_is_not(
         failure(0),
         failure(1),  # like it, and not replayed
         failure(2, judgement=judgement(Grade.FULL_BRAKING)),  # like it, and the same when it was replayed
-        failure(3, other_speed_mps=20.0),  # of another kind
+        failure(3, judgement=judgement(variant="alongside")),  # of another variant
         failure(4, phase="evaluation"),
         episode_record(5),
     ]
@@ -64,21 +64,22 @@ def results_of(*episodes: EpisodeRecord) -> RunResults:
 
 
 MINOR = judgement(severity=Severity.MINOR)
-HEADLINE = ("no_contact: cut-in, straight [1-0-0]", "never_fast: never_fast violated; straight [1]")
+HEADLINE = ("cut-in, straight", "never_fast violated; straight")
 
 
 def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repeats():
     results = results_of(
-        failure(0, judgement=MINOR, other_speed_mps=20.0),
+        failure(0, judgement=MINOR),
         failure(1),
         failure(2),  # like it
-        failure(3, judgement=judgement(Grade.FULL_BRAKING, signature="leader")),
-        failure(4, judgement=judgement(signature="merge")),  # does not repeat
+        failure(3, judgement=judgement(Grade.FULL_BRAKING, kind="leader")),
+        failure(4, judgement=judgement(kind="merge")),  # does not repeat
         episode_record(6, Outcome.FAILURE, violations=(violation(grade=Grade.PREVENTABLE),)),
         failure(7, phase="evaluation"),
     )
     found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e6=2, e7=2)).metrics
     assert (found.headline, found.headline_kinds) == (2, HEADLINE)
+    assert found.headline_kinds_published == HEADLINE[:1]
     assert results.metrics.headline is None, "before a replay"
 
 

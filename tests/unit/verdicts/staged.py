@@ -143,7 +143,7 @@ def mirrored(evidence: Evidence) -> Evidence:
 def judged(evidence: Evidence) -> Judgement:
     """Judges a valid contact with `actor_1`; in the mirror the verdict has to be the same."""
     first, second = (judge(each, "actor_1", valid=True) for each in (evidence, mirrored(evidence)))
-    sides = {"conflict_y_m": first.conflict_y_m, "signature": first.signature}
+    sides = {"conflict_y_m": first.conflict_y_m, "kind": first.kind}
     assert second.model_copy(update=sides) == first
     return first
 

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.records import Collision
 from risk_sac.verdicts.course import BodyOnPath
-from risk_sac.verdicts.distinct import DistinctFailures, FailureKind, distinct_failures, kind_of
+from risk_sac.verdicts.distinct import TaxonomyCell, taxonomy_cell
 from risk_sac.verdicts.drivers import (
     FULL_MPS2,
     Situation,
@@ -114,56 +113,8 @@ def test_a_longer_gap_is_never_more_dangerous(a, b, ego, leader, accel):
     assert 0.0 <= critical(far, ego, accel, leader) <= critical(near, ego, accel, leader) <= 1.0
 
 
-def failure(
-    signature: str = "leader", ego: float = 6.0, other: float = 2.0, after: float = 1.0, **changes: Any
-) -> Collision:
-    return collision(
-        time_s=2.0 + after,
-        ego_speed_mps=ego,
-        other_speed_mps=other,
-        relative_speed_mps=ego - other,
-        judgement=judgement(None, 2.0, signature=signature),
-        **changes,
-    )
-
-
-any_failure = st.builds(
-    failure, st.sampled_from(["leader", "cut-in"]), st.floats(0, 30), st.floats(0, 30), st.floats(0, 8)
-)
-
-
-@pytest.mark.parametrize(
-    ("second", "distinct"),
-    [
-        (failure(), False),
-        (failure(ego=8.3), False),
-        (failure(ego=8.4), True),  # 30 km/h
-        (failure(ego=20.0, after=-0.1), True),
-        (failure(other=9.0), True),
-        (failure(after=1.9), False),
-        (failure(after=2.1), True),
-        (failure("cut-in"), True),
-        (failure(ego_zone="left", other_id="adv_1", early_min_robustness=0.0), False),
-    ],
-)
-def test_signature_first_and_then_the_cell(second, distinct):
-    assert distinct_failures([failure(), second]) == ((0, 1) if distinct else (0,))
-
-
-@given(st.lists(any_failure, max_size=30), st.randoms(use_true_random=False))
-def test_the_count_is_the_same_in_any_order_and_after_a_resume(hits, order):
-    found, again = DistinctFailures(), DistinctFailures()
-    for hit in hits:
-        found.add(hit)
-    shuffled = list(hits)
-    order.shuffle(shuffled)
-    for hit in shuffled + hits[:3]:
-        again.add(hit)
-    assert found.count == again.count == len(distinct_failures(hits))
-
-
-def kind(judged: dict[str, Any] | None = None, **changes: Any) -> FailureKind:
-    return kind_of(collision(judgement=judgement(**(judged or {})), **changes))
+def cell(judged: dict[str, Any] | None = None, **changes: Any) -> TaxonomyCell:
+    return taxonomy_cell(collision(judgement=judgement(**(judged or {})), **changes))
 
 
 @pytest.mark.parametrize(
@@ -182,8 +133,8 @@ def kind(judged: dict[str, Any] | None = None, **changes: Any) -> FailureKind:
         ({"other_role": "background"}, "striker", "background vehicle"),
     ],
 )
-def test_a_kind_is_told_by_its_edges(changes, field, value):
-    assert getattr(kind(**changes), field) == value
+def test_a_cell_of_the_taxonomy_is_told_by_its_edges(changes, field, value):
+    assert getattr(cell(**changes), field) == value
 
 
 def test_who_comes_closer_is_more_critical_than_who_stands():

@@ -6,6 +6,7 @@ import pytest
 from risk_sac.records import ConflictType, Grade, Judgement
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import DEFINITIONS, judge
+from risk_sac.world.types import Role
 from tests.unit.verdicts.staged import (
     STREET,
     WALKING,
@@ -24,28 +25,57 @@ def judged(evidence: Evidence) -> Judgement:
 
 
 @pytest.mark.parametrize(
-    ("evidence", "signature"),
+    ("evidence", "kind", "variant"),
     [
-        (pedestrian_crosses(), "pedestrian, ahead, on a crossing; ego goes straight against priority, does not brake"),
+        (
+            pedestrian_crosses(),
+            "pedestrian; ego goes straight",
+            "ahead, on a crossing, slow; ego against priority, does not brake, fast, early conflict",
+        ),
         (
             pedestrian_crosses(seen_from_s=7.0),
-            "pedestrian, ahead, from hiding, on a crossing; ego goes straight against priority, does not brake",
+            "pedestrian, from hiding; ego goes straight",
+            "ahead, on a crossing, slow; ego against priority, does not brake, fast, late conflict",
         ),
-        (cut_in(), "cut-in, ahead, in a lane; ego goes straight, does not brake"),
+        (
+            cut_in(),
+            "cut-in from ahead; ego goes straight",
+            "in a lane, fast; ego does not brake, fast, early conflict",
+        ),
         (
             cut_in(gap=-3.0, ego=12.0, other=12.0),
-            "cut-in without a safe gap, alongside, in a lane; ego goes straight, does not brake",
+            "cut-in from alongside; ego goes straight",
+            "without a safe gap, in a lane, fast; ego does not brake, fast, late conflict",
         ),
-        (leader_brakes(), "leader brake-checking, ahead, in a lane; ego goes straight, does not brake"),
-        (crossing_car(side=-1), "vehicle from the right, ahead, in a lane; ego goes straight, does not brake"),
+        (
+            leader_brakes(),
+            "leader; ego goes straight",
+            "brake-checking, ahead, in a lane, slow; ego does not brake, fast, early conflict",
+        ),
+        (
+            crossing_car(side=-1),
+            "vehicle from the right; ego goes straight",
+            "ahead, in a lane, fast; ego does not brake, fast, early conflict",
+        ),
         (
             crossing_car(side=1, other=16.0),
-            "vehicle from the left speeding, ahead, in a lane; ego goes straight, does not brake",
+            "vehicle from the left; ego goes straight",
+            "speeding, ahead, in a lane, fast; ego does not brake, fast, early conflict",
         ),
     ],
 )
-def test_signatures_in_words(evidence, signature):
-    assert judged(evidence).signature == signature
+def test_kind_and_variant_in_words(evidence, kind, variant):
+    found = judged(evidence)
+    assert (found.kind, found.variant) == (kind, variant)
+
+
+def test_who_drives_a_striker_makes_no_other_kind():
+    evidence = crossing_car()
+    background = judged(
+        replace(evidence, role=np.where(evidence.role == Role.ADVERSARY, Role.BACKGROUND, evidence.role))
+    )
+    assert background.kind == judged(evidence).kind
+    assert background.variant != judged(evidence).variant
 
 
 @pytest.mark.parametrize(
@@ -58,8 +88,8 @@ def test_a_mirrored_failure_is_the_same_failure(evidence):
 
 def test_traffic_from_either_side_is_told_apart_in_the_name_only():
     first, second = judged(crossing_car()), judged(mirrored(crossing_car()))
-    assert second.signature == first.signature.replace("right", "left")
-    own = {"conflict_y_m": first.conflict_y_m, "signature": first.signature}
+    assert second.kind == first.kind.replace("right", "left")
+    own = {"conflict_y_m": first.conflict_y_m, "kind": first.kind}
     assert second.model_copy(update=own) == first
 
 

@@ -65,7 +65,7 @@ def test_a_lane_change_that_is_over_changes_nothing(evidence, side):
 def test_an_ego_that_comes_over_to_its_neighbour_merges_into_it():
     # 0.375 m off its lane's centre 0.31 s after it began, at 2 s.
     found = judged(merge())
-    assert found.signature == "neighbour, alongside, in a lane; ego changes lanes, does not brake"
+    assert found.kind == "neighbour; ego changes lanes"
     assert (found.conflict_type, found.grade) == (ConflictType.MERGE, Grade.PREVENTABLE)
     assert found.conflict_s == found.noticed_s == pytest.approx(2.4, abs=0.06)
     assert "r157_ttc" not in found.drivers

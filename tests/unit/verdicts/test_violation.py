@@ -56,8 +56,7 @@ def violated(
     evidence: Evidence, requirement: Requirement, signals: list[tuple[Signal, float]] | None = None
 ) -> Violation:
     [first], [second] = (played(each, requirement, signals) for each in (evidence, mirrored(evidence)))
-    swapped = second.signature.replace("right", "LEFT").replace("left", "right").replace("LEFT", "left")
-    assert second.model_copy(update={"signature": swapped if "vehicle from" in swapped else second.signature}) == first
+    assert second == first
     return first
 
 
@@ -76,7 +75,7 @@ def test_a_careful_driver_keeps_a_distance_that_the_ego_did_not():
     assert found.grade is Grade.PREVENTABLE
     assert set(found.drivers) == {"r157", "fsm", "rss", "defensive", "full_braking"}
     assert (found.other_id, found.other_kind, found.other_role) == ("actor_1", "vehicle", "adversary")
-    assert found.signature == "own violated; ego goes straight"
+    assert (found.kind, found.variant) == ("own violated; ego goes straight", "ego slow")
     assert found.time_s == pytest.approx(3.75, abs=0.15)  # it stands 10 m ahead at 3.15 s
     assert found.robustness < 0.0
     assert (found.broke, found.hidden, found.valid, found.fault) == ((), False, True, Fault.SHARED)  # a brake check
@@ -129,7 +128,7 @@ def test_a_reference_driver_stops_at_red_where_it_can(yellow_m, red_m, grade):
     link[:, 0] = [ord("r") if signal is Signal.RED else 0 for signal, _ in shown]
     found = violated(replace(evidence, link=link), NO_RED, shown)
     assert found.grade is grade
-    assert found.signature == "red light entered; ego goes straight"
+    assert found.kind == "red light entered; ego goes straight"
     assert found.broke == ("red_light",)
     assert found.fault is (Fault.EGO if grade is Grade.PREVENTABLE else Fault.OTHER)
 

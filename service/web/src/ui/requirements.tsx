@@ -1,4 +1,4 @@
-/** The funnel of each requirement, as a table: violated -> valid -> distinct -> preventable, and its rate. */
+/** The funnel of each requirement, as a table: violated -> valid -> distinct -> preventable -> published, and its rate. */
 
 import type { ComponentChildren } from "preact";
 import type { Body } from "../api/types";
@@ -11,8 +11,9 @@ export type Requirements = Record<string, Body<"RequirementCounts">>;
 const COLUMNS = [
   ["violated", "Episodes in which it was violated after the adversaries' release"],
   ["valid", "Of these, failures: it counts, and no rule refused the violation"],
-  ["distinct", "The first of their kind in their run"],
-  ["preventable", "Distinct, and a reference driver would have prevented them"],
+  ["distinct", "Kinds of these, each once in a run"],
+  ["preventable", "Kinds that a reference driver would have prevented"],
+  ["published", "Of these, kinds that R157, FSM or RSS would have prevented"],
 ] as const;
 
 /** Those that count first. */

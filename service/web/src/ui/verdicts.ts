@@ -28,9 +28,13 @@ export const DRIVERS: Record<string, string> = {
   fsm: "the fuzzy safety model",
   rss: "the RSS driver",
   defensive: "the defensive driver",
+  published: "R157, FSM or RSS",
   [FULL_BRAKING]: "full braking at once",
   [TTC_RULE]: "R157's time-to-collision rule",
 };
+
+/** Reference drivers by a regulation or a publication. */
+export const PUBLISHED: readonly string[] = ["r157", "fsm", "rss"];
 
 export function driverWords(name: string): string {
   return Object.hasOwn(DRIVERS, name) ? DRIVERS[name]! : `the ${words(name)} driver`;

@@ -60,7 +60,12 @@ export function driversOf(violation: Collision | Violation): [string, boolean][]
   return Object.entries(violation.judgement?.drivers ?? {}).map(([name, { avoids }]) => [name, avoids]);
 }
 
-/** Null of a contact that was stored before contacts were judged. */
-export function signatureOf(violation: Collision | Violation): string | null {
-  return isContact(violation) ? (violation.judgement?.signature ?? null) : violation.signature;
+/** Its kind, in words. */
+export function kindOf(violation: Collision | Violation): string {
+  return isContact(violation) ? violation.judgement.kind : violation.kind;
+}
+
+/** Its variant within the kind, in words. */
+export function variantOf(violation: Collision | Violation): string {
+  return isContact(violation) ? violation.judgement.variant : violation.variant;
 }

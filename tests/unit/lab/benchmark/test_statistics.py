@@ -25,7 +25,7 @@ def runs(method: RunMethod, defect: str, *detected: int | None) -> list[Detectio
             triggered=steps,
             detected=steps,
             refuted=0,
-            signature="" if steps is None else "leader",
+            kind="" if steps is None else "leader",
             episode=None,
         )
         for seed, steps in enumerate(detected)
@@ -87,7 +87,7 @@ def test_ranks_that_never_differ_are_no_coincidence():
     assert friedman(np.ones((9, 3))) == 1.0
 
 
-TEXT = """defects,family,method,seed,budget_steps,steps,episodes,detected,signature
+TEXT = """defects,family,method,seed,budget_steps,steps,episodes,detected,kind
 latency,low,archive,0,20000,300,3,300,"a, b"
 latency,low,archive,1,20000,20000,200,,
 speeds,mixed,archive,0,20000,9000,60,9000,a

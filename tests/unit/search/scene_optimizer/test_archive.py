@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import Collision, Grade, ReferenceOutcome, Severity
 from risk_sac.search.scene_optimizer import ArchiveOptimizer, DiscountedBandit, Encounter
-from risk_sac.search.scene_optimizer.archive import INITIAL, NEW_CANDIDATE, Elites, mutated
+from risk_sac.search.scene_optimizer.archive import CREDIT, INITIAL, Elites, mutated
+from risk_sac.verdicts.distinct import CANDIDATE, NEW_KIND, NEW_VARIANT
 from tests.builders import collision, judgement, violation
 
 HERE, THERE = np.full(3, 0.25), np.full(3, 0.75)
@@ -20,7 +21,7 @@ def failure(
     grade: Grade, kind: str = "cut-in", impact_mps: float = 5.0, striker: str = "left", **judged: Any
 ) -> Collision:
     careful = ReferenceOutcome(avoids=grade is Grade.PREVENTABLE, impact_speed_mps=impact_mps)
-    return collision(other_id=striker, judgement=judgement(grade, signature=kind, drivers={"r157": careful}, **judged))
+    return collision(other_id=striker, judgement=judgement(grade, kind=kind, drivers={"r157": careful}, **judged))
 
 
 def test_a_niche_keeps_what_the_careful_driver_came_nearest_to_preventing():
@@ -46,10 +47,21 @@ def test_a_minor_contact_ranks_below_what_the_headline_counts():
     elites.add_failure(THERE, failure(Grade.PREVENTABLE), minor)
     (severe,) = elites.pool()
     assert severe.worth > minor.worth
-    assert minor.credit == NEW_CANDIDATE
+    assert minor.credit == CREDIT * CANDIDATE * NEW_KIND
     elites.add_failure(HERE, failure(Grade.PREVENTABLE, severity=Severity.MINOR), severe)
     np.testing.assert_array_equal(elites.pool()[0].point, THERE)
     assert severe.credit == 0.0
+
+
+def test_a_new_kind_earns_its_parent_four_times_what_a_new_variant_earns():
+    elites = Elites()
+    elites.add_failure(HERE, failure(Grade.UNAVOIDABLE), None)
+    (parent,) = elites.pool()
+    elites.add_failure(HERE, failure(Grade.UNAVOIDABLE, variant="alongside"), parent)
+    assert parent.credit == CREDIT * NEW_VARIANT
+    elites.add_failure(HERE, failure(Grade.UNAVOIDABLE, kind="leader"), parent)
+    assert parent.credit == CREDIT * (NEW_VARIANT + NEW_KIND)
+    assert NEW_KIND == 4 * NEW_VARIANT
 
 
 def test_near_misses_stand_in_for_who_has_struck_nobody():
@@ -67,7 +79,7 @@ def test_a_requirement_is_aimed_at_once_it_is_nearly_violated_and_until_it_is():
     elites.add_misses(THERE, Encounter(margins={"no_red_light_entry": 0.1}))
     assert {e.target: e.point[0] for e in elites.pool()} == {"no_red_light_entry": 0.75}
     elites.add_failure(HERE, violation(requirement="no_red_light_entry"), None)
-    elites.add_failure(THERE, violation(requirement="on_carriageway", signature="off", robustness=-1.0), None)
+    elites.add_failure(THERE, violation(requirement="on_carriageway", kind="off", robustness=-1.0), None)
     assert [e.kind for e in elites.pool()] == ["never_fast violated; straight", "off"]
     assert elites.pool()[0].worth < elites.pool()[1].worth
 

@@ -55,13 +55,13 @@ def test_a_pause_that_the_disk_refuses_to_note_is_shown_all_the_same(store, ledg
     assert store.revision(campaign.id) == before
 
 
-def test_contacts_are_found_by_grade_severity_fault_what_was_broken_and_signature(store, ledger, episode):
+def test_contacts_are_found_by_grade_severity_fault_what_was_broken_and_kind(store, ledger, episode):
     campaign = ledger.create(SPEC)
     numbers = [start(store, ledger) for _ in range(2)]
     kinds = [
         judgement(),
         judgement(Grade.FULL_BRAKING, broke=(), severity=Severity.MINOR, fault=Fault.SHARED),
-        judgement(Grade.UNAVOIDABLE, broke=("wrong_direction",), signature="crossing, 50 % hidden"),
+        judgement(Grade.UNAVOIDABLE, broke=("wrong_direction",), kind="crossing, 50 % hidden"),
     ]
     for number in numbers:
         told = [judged(episode(index, Outcome.FAILURE), kind) for index, kind in enumerate(kinds)]
@@ -76,8 +76,8 @@ def test_contacts_are_found_by_grade_severity_fault_what_was_broken_and_signatur
     assert found(fault=Fault.SHARED, severity=Severity.MINOR) == [1, 1]
     assert found(broke="red_light", grade=Grade.PREVENTABLE) == [0, 0]
     assert found(broke="red-light") == found(broke="redXlight") == found(broke="red") == []
-    assert found(signature="crossing, 50 % hidden") == [2, 2]
-    assert found(signature="crossing") == []
+    assert found(kind="crossing, 50 % hidden") == [2, 2]
+    assert found(kind="crossing") == []
 
 
 def test_an_id_with_a_nul_is_unknown_on_every_database(store, ledger):

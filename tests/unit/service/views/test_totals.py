@@ -59,14 +59,14 @@ def drawn(count):
         outcome = dice.choice([Outcome.SAFE, Outcome.REJECTED, Outcome.FAILURE, Outcome.FAILURE, Outcome.DEGENERATE])
         grade = dice.choice(list(Grade)) if outcome is Outcome.FAILURE else None
         hit = collision(
-            ego_speed_mps=dice.choice([5.0, 15.0]), judgement=judgement(grade, signature=dice.choice("abcdefgh"))
+            ego_speed_mps=dice.choice([5.0, 15.0]), judgement=judgement(grade, kind=dice.choice("abcdefgh"))
         )
         touched = outcome in (Outcome.FAILURE, Outcome.DEGENERATE)
         if outcome is Outcome.DEGENERATE:
             hit = hit.model_copy(update={"verdicts": {"ego_moving": False}})
         more = {"mean_cost": dice.random(), "dual_variable": dice.random()}
         if outcome is Outcome.FAILURE and dice.random() < 0.4:
-            more["violations"] = (violation(grade=dice.choice(list(Grade)), signature=dice.choice("abcd")),)
+            more["violations"] = (violation(grade=dice.choice(list(Grade)), kind=dice.choice("abcd")),)
             touched = dice.random() < 0.5
         yield episode_record(index, outcome, collision=hit if touched else None, **more)
 
@@ -119,7 +119,7 @@ def test_the_headline_has_the_first_of_a_kind_over_all_runs_that_is_not_minor_an
     )
     searched = campaign.model_copy(update={"runs": (first, second)})
     minor, grave = (collision(judgement=judgement(severity=each)) for each in (Severity.MINOR, Severity.SEVERE))
-    other = collision(judgement=judgement(signature="leader"))
+    other = collision(judgement=judgement(kind="leader"))
     hits = [(first, 0, minor), (first, 1, grave), (first, 2, other), (second, 0, grave), (second, 3, other)]
     found = told(failure_table(searched, [plain_failure(*each) for each in hits], {}))
     assert list(zip(found["severity"], found["headline"], strict=True)) == [
@@ -134,7 +134,7 @@ def test_the_headline_has_the_first_of_a_kind_over_all_runs_that_is_not_minor_an
 def test_what_two_runs_found_alike_is_one_failure_of_the_campaign(ledger):
     campaign = ledger.create(SPEC)
     first, second = campaign.runs
-    slow, other = collision(ego_speed_mps=2.0), collision(judgement=judgement(signature="leader"))
+    slow, other = collision(ego_speed_mps=2.0), collision(judgement=judgement(kind="leader"))
     hits = [(first, 0, collision()), (first, 1, slow), (second, 0, collision()), (second, 1, other)]
     assert failure_table(campaign, [plain_failure(*each) for each in hits], {}).niche == [0, 1, 0, 2]
 

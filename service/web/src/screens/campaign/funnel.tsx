@@ -6,16 +6,18 @@ export interface Counts {
   failures: number;
   distinct_failures: number;
   distinct_preventable: number;
+  distinct_published: number;
   headline_candidates: number;
   implausible: number;
   headline: number | null;
+  headline_published: number | null;
 }
 
 const STEPS = [
   ["failures", "failures", "Episodes with a valid violation of a requirement that counts; a contact violates one, too."],
-  ["distinct_failures", "distinct", "Violations of each kind once, per run."],
-  ["distinct_preventable", "preventable", "Distinct ones that a reference driver would have prevented."],
-  ["headline_candidates", "plausible", "Preventable ones that are no minor contacts, and whose adversaries do what road users do."],
+  ["distinct_failures", "distinct", "Kinds of violations, each once in a run."],
+  ["distinct_preventable", "preventable", "Kinds that a reference driver would have prevented."],
+  ["headline_candidates", "plausible", "Preventable kinds with more than minor contacts, whose adversaries do what road users do."],
   ["headline", "headline", "Those that went the same way when replayed; what several runs found alike counts once."],
 ] as const;
 
@@ -27,7 +29,7 @@ export function Funnel({ counts, most = Math.max(counts.failures, counts.distinc
         const before = step ? counts[STEPS[step - 1]![0]] : 0;
         const now = counts[name];
         return (
-          <li key={name} title={meaning}>
+          <li key={name} title={meaning + besideOf(name, counts)}>
             <span class="stage-word">{word}</span>
             <span class="stage-room">
               {now !== null && now > 0 && <span class={`stage-bar stage-${step + 1}`} style={{ width: `${(100 * now) / most}%` }} />}
@@ -47,6 +49,13 @@ export function Funnel({ counts, most = Math.max(counts.failures, counts.distinc
       )}
     </ol>
   );
+}
+
+/** How many of the preventable ones R157, FSM or RSS would have prevented. */
+function besideOf(step: (typeof STEPS)[number][0], counts: Counts): string {
+  if (step === "distinct_preventable") return ` R157, FSM or RSS would have prevented ${counts.distinct_published}.`;
+  if (step === "headline" && counts.headline !== null) return ` R157, FSM or RSS would have prevented ${counts.headline_published ?? 0}.`;
+  return "";
 }
 
 function share(part: number, of: number): string {

@@ -4,7 +4,7 @@ import { address } from "../../router";
 import { drivenWords } from "../../ui/driven";
 import { words } from "../../ui/text";
 import { GRADE_WORDS, type GradeName } from "../../ui/verdicts";
-import { isContact, signatureOf, gradeOf, worstOf } from "../../ui/violations";
+import { isContact, kindOf, gradeOf, worstOf } from "../../ui/violations";
 import type { Found } from "./live";
 
 export function Newest({ campaign, found }: { campaign: string; found: Found[] }) {
@@ -30,7 +30,7 @@ export function Newest({ campaign, found }: { campaign: string; found: Found[] }
 function described(found: Found): string {
   const worst = worstOf(found);
   if (worst === null) return "failure";
-  const kind = signatureOf(worst)?.split(";")[0] ?? words(worst.other_kind ?? "failure");
+  const kind = kindOf(worst).split(";")[0]!;
   const [named, mps] = isContact(worst) ? ["closing speed", worst.relative_speed_mps] : ["ego's speed", worst.ego_speed_mps];
   const grade = gradeOf(worst);
   return [kind, mps === null ? "" : `${named} ${mps.toFixed(1)} m/s`, grade && GRADE_WORDS[grade as GradeName].short].filter(Boolean).join(", ");

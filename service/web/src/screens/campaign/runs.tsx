@@ -57,7 +57,7 @@ function Card({ run, campaign, away, hide }: { run: Run; campaign: Body<"Campaig
         <Figure name="headline" value={known(run.metrics?.headline)} />
         <Figure name="failures" value={count(run.failures)} />
         <Figure name="distinct" value={count(run.distinct_failures)} />
-        <Figure name="preventable" value={count(run.distinct_preventable)} />
+        <Figure name="preventable" value={`${count(run.distinct_preventable)} (${count(run.distinct_published)})`} />
         <Figure name="ECR" value={run.metrics ? `${number(100 * (run.metrics.ecr ?? NaN), 1)} %` : "–"} />
         <Figure name="PCR" value={run.metrics ? `${number(100 * (run.metrics.pcr ?? NaN), 1)} %` : "–"} />
       </dl>

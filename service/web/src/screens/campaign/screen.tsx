@@ -56,6 +56,7 @@ export function CampaignScreen({ id }: { id: string }) {
         </section>
         <section class="card tiles" aria-label="Where the search stands">
           <Tile name={waiting ? `headline failures; ${waitingWords(waiting)}` : "headline failures"} value={known(progress.headline)} title={HEADLINE} />
+          <Tile name="of these, by R157, FSM or RSS" value={known(progress.headline_published)} title={PUBLISHED} />
           <Tile name="sliding ECR" value={percent(progress.window_ecr)} title={OVER} />
           <Tile name="sliding PCR" value={percent(progress.window_pcr)} title={OVER} />
           <Tile name="dual variable λ" value={number(progress.dual_variable)} title={OVER} />
@@ -88,6 +89,7 @@ export function CampaignScreen({ id }: { id: string }) {
 
 const OVER = "Mean over the runs at work, or over all once none is; without controls such as random, unless there is nothing else.";
 
+const PUBLISHED = "Kinds in the headline that a published reference driver would have prevented; the others only an anticipating one would.";
 const HEADLINE =
   "Distinct, preventable, no minor contact, and the same when replayed. What several runs found alike counts once. A run is replayed at its end.";
 

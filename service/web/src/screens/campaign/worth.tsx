@@ -15,6 +15,7 @@ export function Worth({ campaign }: { campaign: Body<"Campaign"> }) {
       <h2 id="worth-title" title={value.note}>
         {campaign.progress.failures ? "Known defects that this budget detects" : "What finding nothing is worth"}
       </h2>
+      {value.methods.length === 0 && <p>{value.note}</p>}
       {value.methods.map(({ method, sentences }) => (
         <p key={method} title={sentences.slice(1).join(" ")}>
           <b>{method}</b>: {sentences[0]}

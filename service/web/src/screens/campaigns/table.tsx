@@ -20,14 +20,14 @@ const HEADS: { column: Column; title: string; number?: boolean; hint?: string }[
     column: "headline",
     title: "Head\u00adline",
     number: true,
-    hint: "distinct, preventable, plausible and not minor failures that went the same way when replayed; what several runs found alike counts once",
+    hint: "kinds of failures that are preventable, plausible, not minor and the same when replayed; in brackets those that R157, FSM or RSS would have prevented",
   },
-  { column: "distinct", title: "Distinct", number: true, hint: "distinct valid failures, summed over the runs" },
+  { column: "distinct", title: "Distinct", number: true, hint: "kinds of valid failures, summed over the runs" },
   {
     column: "preventable",
     title: "Prevent\u00adable",
     number: true,
-    hint: "the distinct failures that a reference driver would have prevented",
+    hint: "kinds that a reference driver would have prevented; in brackets those that R157, FSM or RSS would have prevented",
   },
   { column: "eta", title: "ETA", number: true, hint: "time until it ends at its present pace" },
   { column: "created", title: "Created", number: true },
@@ -157,9 +157,9 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
         <Sparkline campaign={campaign} learners={learners} />
         <span class="small faint">{percent(progress.window_ecr)}</span>
       </td>
-      <td data-head="Headline" class="number" title={headlineWords(progress)}>{progress.headline === null ? "–" : count(progress.headline)}</td>
+      <td data-head="Headline" class="number" title={headlineWords(progress)}>{progress.headline === null ? "–" : `${count(progress.headline)} (${count(progress.headline_published ?? 0)})`}</td>
       <td data-head="Distinct" class="number">{count(progress.distinct_failures)}</td>
-      <td data-head="Preventable" class="number">{count(progress.distinct_preventable)}</td>
+      <td data-head="Preventable" class="number">{count(progress.distinct_preventable)} ({count(progress.distinct_published)})</td>
       <td data-head="ETA" class="number">{remaining(campaign)}</td>
       <td data-head="Created" class="number">
         <Created at={campaign.created_at} />

@@ -5,7 +5,7 @@ const nothing = { mean: null, low: null, high: null };
 function line(label: string): Line {
   const row = {
     key: "c1 random", name: "random", mark: { colour: "--series-1" as const, dash: [] }, runs: 1, episodes: 40, rejected: 0,
-    raw_collisions: 4, failures: 3, distinct_failures: 2, distinct_preventable: 1, headline_candidates: 1, implausible: 0, headline: 1, requirements: {}, pcr_by_driver: {}, by_severity: {}, by_fault: {}, episodes_driven_by: {}, headline_driven_by: {},
+    raw_collisions: 4, failures: 3, distinct_failures: 2, distinct_preventable: 1, distinct_published: 1, headline_candidates: 1, implausible: 0, headline: 1, headline_published: 0, requirements: {}, pcr_by_driver: {}, by_severity: {}, by_fault: {}, episodes_driven_by: {}, headline_driven_by: {},
     ecr: { mean: 0.075, low: 0.02, high: 0.2 }, pcr: nothing,
     more: {
       efficiency: nothing, cost_rate: nothing, dispersion: nothing, steps_per_distinct_failure: null, artefacts: 0,

@@ -13,7 +13,7 @@ interface Found {
 }
 
 export function Kinds({ campaign, family, overview, cells }: Found) {
-  const most = Math.max(1, ...cells.flatMap((cell) => Object.values(cell.signatures)));
+  const most = Math.max(1, ...cells.flatMap((cell) => Object.values(cell.kinds)));
   if (!overview.clusters.length) return <p class="faint">No method has found a valid failure.</p>;
   return (
     <section class="block">
@@ -21,7 +21,7 @@ export function Kinds({ campaign, family, overview, cells }: Found) {
         Kinds of failures <span class="faint">({overview.clusters.length})</span>
       </h3>
       <p class="faint small">
-        Effective number of kinds (Vendi score): {overview.vendi.toFixed(1)}. The failures lie in {overview.covered} of the taxonomy's {count(overview.cells)} cells.
+        Effective number of variants (Vendi score): {overview.vendi.toFixed(1)}. The failures lie in {overview.covered} of the taxonomy's {count(overview.cells)} cells.
       </p>
       <div class="scroll" tabIndex={0} role="region" aria-label={`Kinds of failures: ${family}`}>
         <table class="kinds">
@@ -33,7 +33,7 @@ export function Kinds({ campaign, family, overview, cells }: Found) {
                   {cell.method}
                 </th>
               ))}
-              <th scope="col" class="number">Distinct</th>
+              <th scope="col" class="number">Variants</th>
               <th scope="col" class="number">Preventable</th>
             </tr>
           </thead>
@@ -45,10 +45,12 @@ export function Kinds({ campaign, family, overview, cells }: Found) {
                   {kind.grade && <span class={`tag ${kind.grade}`}>{GRADE_WORDS[kind.grade as GradeName]?.short ?? kind.grade}</span>}
                 </th>
                 {cells.map((cell) => (
-                  <Heat key={cell.method} value={cell.signatures[kind.name] ?? 0} most={most} />
+                  <Heat key={cell.method} value={cell.kinds[kind.name] ?? 0} most={most} />
                 ))}
-                <td class="number">{count(kind.distinct)}</td>
-                <td class="number">{count(kind.preventable)}</td>
+                <td class="number">{count(kind.variants)}</td>
+                <td class="number">
+                  {count(kind.preventable)} <span class="faint" title="that R157, FSM or RSS would have prevented">({count(kind.published)})</span>
+                </td>
               </tr>
             ))}
           </tbody>

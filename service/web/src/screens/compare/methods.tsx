@@ -23,11 +23,11 @@ export function Methods({ what, family, rows }: Compared) {
         <thead>
           <tr>
             <th scope="col">{what}</th>
-            <th scope="col" title="distinct, preventable, plausible, not minor, and the same when replayed; each kind once over the runs">
+            <th scope="col" title="kinds of failures that are preventable, plausible, not minor, and the same when replayed; in brackets those that R157, FSM or RSS would have prevented">
               Headline
             </th>
-            <th scope="col">Distinct</th>
-            <th scope="col">Preventable</th>
+            <th scope="col" title="kinds of failures, each once in a run">Distinct</th>
+            <th scope="col" title="kinds that a reference driver would have prevented; in brackets those that R157, FSM or RSS would have prevented">Preventable</th>
             <Axis name="ECR" end={ends.ecr} />
             <Axis name="PCR" end={ends.pcr} />
             <th scope="col" class="number">Runs</th>
@@ -40,9 +40,9 @@ export function Methods({ what, family, rows }: Compared) {
               <th scope="row">
                 <Sample mark={row.mark} /> {row.name}
               </th>
-              <Bar value={row.headline} most={most} />
+              <Bar value={row.headline} most={most} published={row.headline_published ?? 0} />
               <Bar value={row.distinct_failures} most={most} />
-              <Bar value={row.distinct_preventable} most={most} />
+              <Bar value={row.distinct_preventable} most={most} published={row.distinct_published} />
               <Rate name="ECR" row={row} estimate={row.ecr} end={ends.ecr} />
               <Rate name="PCR" row={row} estimate={row.pcr} end={ends.pcr} />
               <td class="number">{row.runs}</td>
@@ -79,10 +79,12 @@ function Rate({ name, row, estimate, end }: { name: string; row: Row; estimate: 
   );
 }
 
-function Bar({ value, most }: { value: number | null; most: number }) {
+/** @param published how many of them R157, FSM or RSS would have prevented. */
+function Bar({ value, most, published }: { value: number | null; most: number; published?: number }) {
   return (
     <td class="bar-cell">
       <b>{value === null ? "–" : count(value)}</b>
+      {value !== null && published !== undefined && <span class="faint"> ({count(published)})</span>}
       <span class="bar-room">
         <span style={{ width: `${(100 * (value ?? 0)) / most}%` }} />
       </span>

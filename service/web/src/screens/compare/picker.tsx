@@ -51,7 +51,7 @@ export function Picker({ chosen: first }: { chosen: string[] }) {
                     <span class="faint small">
                       {moment(campaign.created_at)} · {count(campaign.progress.episodes_done)} episodes · {headlineWords(campaign.progress)},{" "}
                       {count(campaign.progress.distinct_failures)} distinct,{" "}
-                      {count(campaign.progress.distinct_preventable)} preventable
+                      {count(campaign.progress.distinct_preventable)} preventable ({count(campaign.progress.distinct_published)} by R157, FSM or RSS)
                     </span>
                   </label>
                 </li>

@@ -21,10 +21,12 @@ export interface Row {
   failures: number;
   distinct_failures: number;
   distinct_preventable: number;
+  distinct_published: number;
   headline_candidates: number;
   implausible: number;
   /** Each kind once over the row's runs; null before a replay. */
   headline: number | null;
+  headline_published: number | null;
   /** Requirement -> its funnel; none in what was stored before requirements were counted. */
   requirements: Requirements;
   /** Reference driver -> its own PCR. */
@@ -52,7 +54,7 @@ export interface More {
   environment_steps: number;
 }
 
-const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "headline_candidates", "implausible", "headline", "requirements", "pcr_by_driver", "by_severity", "by_fault", "episodes_driven_by", "headline_driven_by"] as const;
+const COUNTS = ["episodes", "rejected", "raw_collisions", "failures", "distinct_failures", "distinct_preventable", "distinct_published", "headline_candidates", "implausible", "headline", "headline_published", "requirements", "pcr_by_driver", "by_severity", "by_fault", "episodes_driven_by", "headline_driven_by"] as const;
 const FURTHER = ["artefacts", "unresponsive_share", "preventable", "environment_steps", "steps_per_distinct_failure"] as const;
 const NOTHING: Estimate = { mean: null, low: null, high: null };
 

@@ -1,4 +1,4 @@
-/** One distinct failure: what is needed to decide whether to open it. */
+/** One kind, variant or episode: what is needed to decide whether to open it. */
 
 import { address } from "../../router";
 import { drivenWords } from "../../ui/driven";
@@ -7,6 +7,7 @@ import { reactionOf } from "./features";
 import { GradeTag, Mark } from "./grade";
 import { refusal } from "../../ui/verdicts";
 import { NO_CONTACT } from "../../ui/violations";
+import { variantOf } from "./filters";
 import type { Found } from "./found";
 import { halves, TRIAGE } from "./naming";
 import { useThumbnail } from "./thumbnails";
@@ -19,9 +20,11 @@ interface Props {
   at: number;
   found: Found;
   triage: (failure: number) => void;
+  /** Address of the variants of a kind, by its name; null where the card does not stand for a kind. */
+  variants: ((kind: string) => string) | null;
 }
 
-export function Card({ campaign, table, at, found, triage }: Props) {
+export function Card({ campaign, table, at, found, triage, variants }: Props) {
   const id = table.ids[at]!;
   const kind = table.kinds[table.kind[at]!]!.name;
   const [striker, ego] = halves(kind);
@@ -46,7 +49,17 @@ export function Card({ campaign, table, at, found, triage }: Props) {
         <a href={address(["campaigns", campaign, "failures", id])} title={kind} data-go>
           {striker}
         </a>
-        <p class="faint small ego">{ego}</p>
+        <p class="faint small ego">
+          {ego}
+          {variants && found.variants > 1 ? (
+            <>
+              {" · "}
+              <a href={variants(kind)}>{found.variants} variants</a>
+            </>
+          ) : (
+            variantOf(table, at) && ` · ${variantOf(table, at)}`
+          )}
+        </p>
       </div>
       <dl class="measures">
         {table.requirement[at] === NO_CONTACT ? (

@@ -22,11 +22,13 @@ interface Props {
   shown: readonly number[];
   hovered: Signal<number | null>;
   triage: (failure: number) => void;
+  /** Address of the variants of a kind, by its name; null where a card does not stand for a kind. */
+  variants: ((kind: string) => string) | null;
   /** The address, with all filters: what is scrolled to is remembered by it. */
   place: string;
 }
 
-export function Cards({ campaign, table, found, shown, hovered, triage, place }: Props) {
+export function Cards({ campaign, table, found, shown, hovered, triage, variants, place }: Props) {
   const list = useRef<HTMLUListElement>(null);
   const { width } = useSize(list);
   const [top, viewHeight] = useView(list);
@@ -92,7 +94,7 @@ export function Cards({ campaign, table, found, shown, hovered, triage, place }:
               onPointerEnter={() => hovered.set(failure)}
               onFocusIn={() => hovered.set(failure)}
             >
-              <Card {...{ campaign, table, triage }} at={failure} found={found[failure]!} />
+              <Card {...{ campaign, table, triage, variants }} at={failure} found={found[failure]!} />
             </li>
           );
         })}

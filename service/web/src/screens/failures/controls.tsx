@@ -1,7 +1,7 @@
 /** The filters above the cards. */
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import { isNarrowed, tally, type Facet, type Filters } from "./filters";
+import { isNarrowed, tally, type By, type Facet, type Filters } from "./filters";
 import { FACET_LABELS, valueWords } from "./naming";
 import type { FailureTable } from "./wire";
 
@@ -19,18 +19,18 @@ interface Props {
   table: FailureTable;
   /** All of the tab: what can be chosen from. */
   episodes: readonly number[];
-  /** Whether distinct failures are counted, and not episodes. */
-  distinct: boolean;
+  /** What is counted. */
+  by: By;
   filters: Filters;
   change: (changed: Partial<Filters>) => void;
   resetAll: () => void;
 }
 
-export function Controls({ table, episodes, distinct, filters, change, resetAll }: Props) {
+export function Controls({ table, episodes, by, filters, change, resetAll }: Props) {
   const more = MORE[filters.tab];
   const [open, setOpen] = useState(() => more.some((facet) => filters[facet]));
   const choice = (facet: Facet) => (
-    <FacetChoice key={facet} {...{ table, episodes, distinct, facet }} chosen={filters[facet]} choose={(value) => change({ [facet]: value })} />
+    <FacetChoice key={facet} {...{ table, episodes, by, facet }} chosen={filters[facet]} choose={(value) => change({ [facet]: value })} />
   );
   return (
     <form class="failure-filters" role="search" aria-label="Filter failures" onSubmit={(event) => event.preventDefault()}>
@@ -50,14 +50,14 @@ export function Controls({ table, episodes, distinct, filters, change, resetAll 
 interface FacetProps {
   table: FailureTable;
   episodes: readonly number[];
-  distinct: boolean;
+  by: By;
   facet: Facet;
   chosen: string;
   choose: (value: string) => void;
 }
 
-function FacetChoice({ table, episodes, distinct, facet, chosen, choose }: FacetProps) {
-  const counts = useMemo(() => tally(table, episodes, facet, distinct), [table, episodes, facet, distinct]);
+function FacetChoice({ table, episodes, by, facet, chosen, choose }: FacetProps) {
+  const counts = useMemo(() => tally(table, episodes, facet, by), [table, episodes, facet, by]);
   const known = counts.some(([value]) => value === chosen);
   return (
     <label data-on={chosen ? true : undefined}>

@@ -10,12 +10,12 @@ import { within, type Brushes } from "./brushes";
 import { Cards } from "./cards";
 import { Controls } from "./controls";
 import { outcomeFeatures, sceneFeatures } from "./features";
-import { inTab, isNarrowed, passing, queryOf, read, reset, type Filters } from "./filters";
+import { groupsOf, inTab, isNarrowed, passing, queryOf, read, reset, type By, type Filters } from "./filters";
 import { foundOf } from "./found";
 import { Parallel } from "./parallel";
 import { RefusedBy } from "./refused";
 import { Scatter } from "./scatter";
-import { oneEach, sorted, SORTS, SORTS_OF, type Sort } from "./sorting";
+import { oneEach, sorted, SORTS, SORTS_OF, underKinds, type Sort } from "./sorting";
 import { TriageDialog, noted, useNoting } from "./triage";
 import type { FailureTable } from "./wire";
 
@@ -29,6 +29,7 @@ const PICTURED = [
   ["yellow", "yellow"],
 ] as const;
 const AXES = 7; // outcome features among the parallel coordinates; the scatter plot offers all of them
+const SHOWN: Record<By, string> = { kind: "kinds of failures", variant: "variants", episode: "failing episodes" };
 const WIDE = "(min-width: 1000px)"; // as in failures.css
 
 export function Explorer({ campaign, query, table: read_ }: { campaign: string; query: URLSearchParams; table: FailureTable }) {
@@ -48,12 +49,13 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
     if (done) change({ brushes });
   };
 
-  const found = useMemo(() => foundOf(read_), [read_]);
+  const by: By = asked.tab === "failures" ? asked.by : "episode";
+  const found = useMemo(() => foundOf(read_, by), [read_, by]);
   const often = useMemo(() => Int32Array.from(found, ({ episodes }) => episodes), [found]);
-  const distinct = asked.tab === "failures" && !asked.every;
-  const one = (some: readonly number[]) => (distinct ? oneEach(table, some, often) : some);
+  const groups = groupsOf(table, by);
+  const one = (some: readonly number[]) => (groups ? oneEach(table, some, often, groups) : some);
   const episodes = useMemo(() => inTab(table, asked), [read_, asked.tab]);
-  const all = useMemo(() => one(episodes), [episodes, distinct]);
+  const all = useMemo(() => one(episodes), [episodes, by]);
   const families = useMemo(() => [...new Set(table.families)], [read_]);
   const family = asked.family || (families.length === 1 ? families[0]! : "");
   const outcomes = useMemo(() => outcomeFeatures(read_), [read_]);
@@ -65,8 +67,11 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
   const plotted = useMemo(() => (asked.family ? all.filter((i) => table.families[i] === asked.family) : all), [all, asked.family]);
   const passed = useMemo(() => passing(table, episodes, asked), [table, episodes, asked]);
   const shown = useMemo(
-    () => sorted(table, one(within(passed, filters.brushes, features)), asked.sort, often),
-    [table, passed, filters.brushes, features, asked.sort, distinct],
+    () => {
+      const all = sorted(table, one(within(passed, filters.brushes, features)), asked.sort, often);
+      return by === "variant" ? underKinds(table, all) : all;
+    },
+    [table, passed, filters.brushes, features, asked.sort, by],
   );
   useEffect(() => keepListed({ campaign, ids: shown.map((at) => table.ids[at]!), query: query.toString() }), [shown, query.toString()]);
   const again = noting.refused;
@@ -77,7 +82,7 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
   };
   return (
     <>
-      <Controls {...{ table, episodes, distinct, filters: asked, change }} resetAll={() => show(reset(asked))} />
+      <Controls {...{ table, episodes, by, filters: asked, change }} resetAll={() => show(reset(asked))} />
       <div class="explorer" data-plots={plots || undefined}>
         {plots && (
           <aside class="plots" aria-label="Plots" tabIndex={0}>
@@ -97,11 +102,16 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
         <section class="found" aria-label="Failures">
           <div class="row found-head">
             <p role="status">
-              <b>{count(shown.length)}</b> of {count(all.length)} {asked.tab === "refused" ? "refused" : distinct ? "distinct failures" : "failing episodes"}
+              <b>{count(shown.length)}</b> of {count(all.length)} {asked.tab === "refused" ? "refused" : SHOWN[by]}
             </p>
             {asked.tab === "failures" && (
-              <label>
-                <input type="checkbox" checked={asked.every} onChange={(event) => change({ every: event.currentTarget.checked })} /> every episode
+              <label class="sort">
+                Show{" "}
+                <select value={by} onChange={(event) => change({ by: event.currentTarget.value as By })}>
+                  <option value="kind">one of each kind</option>
+                  <option value="variant">one of each variant</option>
+                  <option value="episode">every episode</option>
+                </select>
               </label>
             )}
             <label class="sort">
@@ -120,7 +130,12 @@ export function Explorer({ campaign, query, table: read_ }: { campaign: string; 
           </div>
           <PictureLegend />
           {shown.length ? (
-            <Cards {...{ campaign, table, found, shown, hovered }} triage={setOpen} place={place(asked)} />
+            <Cards
+              {...{ campaign, table, found, shown, hovered }}
+              triage={setOpen}
+              place={place(asked)}
+              variants={by === "kind" ? (kind) => place({ ...asked, by: "variant", kind }) : null}
+            />
           ) : (
             <Nothing filters={filters} all={all.length} resetAll={() => show(reset(asked))} />
           )}

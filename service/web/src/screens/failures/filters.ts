@@ -7,12 +7,14 @@ import type { FailureTable } from "./wire";
 /** Filters that want one value; the empty text wants any. */
 export const FACETS = ["requirement", "family", "method", "run", "grade", "plausibility", "severity", "fault", "driven_by", "prevented_by", "kind", "striker", "triage", "broke", "ego_broke", "rule"] as const;
 export type Facet = (typeof FACETS)[number];
+export const BY = ["kind", "variant", "episode"] as const;
+export type By = (typeof BY)[number];
 
 export interface Filters extends Record<Facet, string> {
   /** Failures, or the episodes whose violations a rule refused. */
   tab: "failures" | "refused";
-  /** Each failing episode, and not one of each distinct failure. */
-  every: boolean;
+  /** What a card stands for. */
+  by: By;
   q: string;
   sort: Sort;
   x: string;
@@ -27,7 +29,7 @@ export function read(query: URLSearchParams): Filters {
   return {
     ...facets,
     tab: text("tab") === "refused" ? "refused" : "failures",
-    every: text("every") === "1",
+    by: BY.find((by) => by === text("by")) ?? "kind",
     q: text("q"),
     sort: Object.hasOwn(SORTS, sort) ? (sort as Sort) : "severity",
     x: text("x") || "reaction",
@@ -38,10 +40,10 @@ export function read(query: URLSearchParams): Filters {
 
 /** What `router.address` writes; what is as usual is left out. */
 export function queryOf(filters: Filters): Record<string, string> {
-  const { tab, every, q, sort, x, y, brushes } = filters;
+  const { tab, by, q, sort, x, y, brushes } = filters;
   return {
     tab: tab === "failures" ? "" : tab,
-    every: every ? "1" : "",
+    by: by === "kind" ? "" : by,
     ...Object.fromEntries(FACETS.map((facet) => [facet, filters[facet]])),
     q,
     sort: sort === "severity" ? "" : sort,
@@ -53,8 +55,8 @@ export function queryOf(filters: Filters): Record<string, string> {
 
 /** Takes back everything that hides failures; tab, order and axes stay. */
 export function reset(filters: Filters): Filters {
-  const { tab, every, sort, x, y } = filters;
-  return { ...read(new URLSearchParams()), tab, every, sort, x, y };
+  const { tab, by, sort, x, y } = filters;
+  return { ...read(new URLSearchParams()), tab, by, sort, x, y };
 }
 
 export function isNarrowed(filters: Filters): boolean {
@@ -118,20 +120,31 @@ export function passing(table: FailureTable, failures: readonly number[], filter
   );
 }
 
+/** The variant of a failure in words; empty where it is not valid. */
+export function variantOf(table: FailureTable, i: number): string {
+  return table.variants[table.variant[i] ?? -1] ?? "";
+}
+
 function said(table: FailureTable, i: number, terms: string[]): boolean {
   const lists = [table.failed, table.broke, table.ego_broke, table.refused_by].flatMap((column) => column[i]!);
-  const text = [table.ids[i], table.requirement[i], table.kinds[table.kind[i]!]!.name, table.striker[i] ?? "", ...lists];
+  const text = [table.ids[i], table.requirement[i], table.kinds[table.kind[i]!]!.name, variantOf(table, i), table.striker[i] ?? "", ...lists];
   const all = text.join(" ").toLowerCase();
   return terms.every((term) => all.includes(term));
 }
 
-/** Each value of a facet and how many episodes, or distinct failures, have it; the most frequent first. */
-export function tally(table: FailureTable, failures: readonly number[], facet: Facet, distinct = false): [string, number][] {
+/** The column that numbers what a card stands for; null where that is an episode. */
+export function groupsOf(table: FailureTable, by: By): readonly (number | null)[] | null {
+  return by === "kind" ? table.kind : by === "variant" ? table.variant : null;
+}
+
+/** Each value of a facet and how many kinds, variants or episodes have it; the most frequent first. */
+export function tally(table: FailureTable, failures: readonly number[], facet: Facet, by: By = "episode"): [string, number][] {
+  const groups = groupsOf(table, by);
   const found = new Map<string, Set<number>>();
   for (const i of failures) {
     for (const value of valuesOf(table, facet, i)) {
       const those = found.get(value) ?? new Set();
-      found.set(value, those.add(distinct ? table.niche[i]! : i));
+      found.set(value, those.add(groups ? groups[i]! : i));
     }
   }
   const counts = [...found].map(([value, those]): [string, number] => [value, those.size]);

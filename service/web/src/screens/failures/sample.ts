@@ -24,7 +24,8 @@ export function sample(size: number, changed: Partial<FailureTable> = {}): Failu
     prevented_by: column((i) => (i % 3 === 0 ? ["r157", "full_braking"] : i % 3 === 1 ? ["full_braking"] : [])),
     headline: column(() => false),
     distinct: column((i) => i % 4 === 0),
-    niche: column((i) => (i % 4 === 3 ? null : i % 8)),
+    variant: column((i) => (i % 4 === 3 ? null : i % 8)),
+    variants: Array.from({ length: 8 }, (_, i) => `variant ${i}`),
     driven_by: column((i) => (["policy", "model", "script", "random", null] as const)[i % 5]!),
     kind: column((i) => i % 2),
     striker: column((i) => (i % 2 ? "pedestrian" : "left")),
@@ -50,8 +51,8 @@ export function sample(size: number, changed: Partial<FailureTable> = {}): Failu
     repeats: column(() => null),
     triage: column(() => "new"),
     kinds: [
-      { signature: "cut-in, ahead", requirement: "no_contact", name: "cut-in, ahead", failures: 0, distinct: 0, preventable: 0 },
-      { signature: "pedestrian, from hiding", requirement: "no_contact", name: "pedestrian, from hiding", failures: 0, distinct: 0, preventable: 0 },
+      { requirement: "no_contact", name: "cut-in, ahead", variants: 0, failures: 0, distinct: 0, preventable: 0, published: 0 },
+      { requirement: "no_contact", name: "pedestrian, from hiding", variants: 0, failures: 0, distinct: 0, preventable: 0, published: 0 },
     ],
     scenes: {
       low: { names: ["friction"], rows: column((i) => [i / 10]).filter((_, i) => i % 2 === 0), of: column((i) => i).filter((i) => i % 2 === 0) },

@@ -8,6 +8,7 @@ import type { Body } from "../../api/types";
 import { address } from "../../router";
 import { Empty, Shown } from "../../ui/states";
 import { count } from "../../ui/text";
+import { PUBLISHED } from "../../ui/verdicts";
 import { useTitle } from "../../ui/title";
 import { Explorer } from "./explorer";
 import { queryOf, read, reset } from "./filters";
@@ -76,14 +77,17 @@ function Head({ campaign, about, query, table }: HeadProps) {
 }
 
 /** Each step of the funnel: its name, how many, and what it takes. */
-function funnelOf({ valid, niche, grade, headline, repeats }: FailureTable): [string, number, string][] {
-  const distinct = (test: (i: number) => boolean) => new Set(niche.filter((each, i) => each !== null && test(i))).size;
+function funnelOf({ valid, kind, variant, grade, prevented_by, headline, repeats }: FailureTable): [string, number, string][] {
+  const kinds = (test: (i: number) => boolean) => new Set(kind.filter((_, i) => valid[i] && test(i))).size;
+  const published = (i: number) => grade[i] === "preventable" && prevented_by[i]!.some((driver) => PUBLISHED.includes(driver));
   const replayed = repeats.some((each) => each !== null);
   const found: [string, number, string][] = [["headline", headline.filter(Boolean).length, "Preventable, at least moderate, and the same in each replay"]];
   return [
     ["failing episodes", valid.filter(Boolean).length, "Episodes in which a requirement that counts was violated, and no rule refused the violation"],
-    ["distinct", distinct(() => true), "Distinct failures; what several runs found alike counts once"],
-    ["preventable", distinct((i) => grade[i] === "preventable"), "Distinct failures that a reference driver would have prevented"],
+    ["variants", new Set(variant.filter((each) => each !== null)).size, "Different failures; kinds are divided into them"],
+    ["kinds", kinds(() => true), "Kinds of failures; what several runs found alike counts once"],
+    ["preventable", kinds((i) => grade[i] === "preventable"), "Kinds with a failure that a reference driver would have prevented"],
+    ["published", kinds(published), "Of these, kinds with a failure that R157, FSM or RSS would have prevented"],
     ...(replayed ? found : []),
   ];
 }

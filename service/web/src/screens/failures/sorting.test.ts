@@ -4,7 +4,7 @@ import { sample } from "./sample";
 import { oneEach, sorted, SORTS, type Sort } from "./sorting";
 import type { FailureTable } from "./wire";
 
-const oftenOf = (some: FailureTable) => foundOf(some).map(({ episodes }) => episodes);
+const oftenOf = (some: FailureTable) => foundOf(some, "variant").map(({ episodes }) => episodes);
 
 const table = sample(12);
 const all = table.ids.map((_, i) => i);
@@ -41,11 +41,11 @@ test("by severity the severe come first, then the ego's fault, then the preventa
   expect(sorted(few, [0, 1, 2, 3], "severity", oftenOf(few))).toEqual([2, 3, 1, 0]);
 });
 
-test("a distinct failure is shown by its headline episode, else by its worst", () => {
+test("a variant is shown by its headline episode, else by its worst", () => {
   const severity = (["minor", "severe", "moderate", "severe"] as const).slice();
-  const few = sample(4, { severity, niche: [0, 0, 1, 1], headline: [false, false, true, false] });
-  expect(oneEach(few, [0, 1, 2, 3], oftenOf(few)).sort()).toEqual([1, 2]);
-  expect(oneEach(few, [0, 3], oftenOf(few)).sort()).toEqual([0, 3]);
+  const few = sample(4, { severity, variant: [0, 0, 1, 1], headline: [false, false, true, false] });
+  expect(oneEach(few, [0, 1, 2, 3], oftenOf(few), few.variant).sort()).toEqual([1, 2]);
+  expect(oneEach(few, [0, 3], oftenOf(few), few.variant).sort()).toEqual([0, 3]);
 });
 
 test("who has no time to contact comes last", () => {

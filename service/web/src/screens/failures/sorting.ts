@@ -1,4 +1,4 @@
-/** Orders of failures, and the episode that stands for a distinct one. */
+/** Orders of failures, and the episode that stands for a kind or a variant. */
 
 import { reactionOf } from "./features";
 import type { FailureTable } from "./wire";
@@ -54,15 +54,22 @@ export function sorted(table: FailureTable, failures: readonly number[], sort: S
   }
 }
 
-/** One episode for each distinct failure: that of the headline, else the worst. */
-export function oneEach(table: FailureTable, failures: readonly number[], often: ArrayLike<number>): number[] {
+/** One episode for each group, a kind or a variant: that of the headline, else the worst. */
+export function oneEach(table: FailureTable, failures: readonly number[], often: ArrayLike<number>, groups: readonly (number | null)[]): number[] {
   const found = new Map<number, number>();
   for (const i of sorted(table, failures, "severity", often)) {
-    const niche = table.niche[i]!;
-    const before = found.get(niche);
-    if (before === undefined || (table.headline[i] && !table.headline[before])) found.set(niche, i);
+    const group = groups[i]!;
+    const before = found.get(group);
+    if (before === undefined || (table.headline[i] && !table.headline[before])) found.set(group, i);
   }
   return [...found.values()];
+}
+
+/** The same failures with those of one kind together; kinds in the order of their first failure. */
+export function underKinds(table: FailureTable, failures: readonly number[]): number[] {
+  const first = new Map<number, number>();
+  failures.forEach((i, place) => first.has(table.kind[i]!) || first.set(table.kind[i]!, place));
+  return [...failures].sort((a, b) => first.get(table.kind[a]!)! - first.get(table.kind[b]!)!);
 }
 
 function by(table: FailureTable, failures: readonly number[], ...keys: ((i: number) => number)[]): number[] {

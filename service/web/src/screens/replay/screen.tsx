@@ -21,7 +21,7 @@ import { Empty, Shown } from "../../ui/states";
 import { capital, words } from "../../ui/text";
 import { useTitle } from "../../ui/title";
 import { GRADE_WORDS } from "../../ui/verdicts";
-import { faultOf, gradeOf, plausibilityOf, severityOf, signatureOf, worstOf, type Collision, type Violation } from "../../ui/violations";
+import { faultOf, gradeOf, kindOf, plausibilityOf, severityOf, variantOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import { Actors } from "./actors";
 import { Take } from "./take";
 import { Verdict } from "./verdict";
@@ -66,15 +66,15 @@ function Head({ campaign, failure, query, known }: Props & { known: Body<"Failur
       </a>
     );
   const violation = known && worstOf(known);
-  const signature = violation && signatureOf(violation);
-  useTitle(signature && capital(signature), failure);
+  const kind = violation && kindOf(violation);
+  useTitle(kind && capital(kind), failure);
   return (
     <div class="head">
       <nav class="crumbs" aria-label="Breadcrumb">
         <a href={address(["campaigns", campaign])}>Campaign</a> /{" "}
         <a href={`${address(["campaigns", campaign, "failures"])}${listed.query && `?${listed.query}`}`}>Failures</a> / {failure}
       </nav>
-      <h1>{signature ? capital(signature) : `Failure ${failure}`}</h1>
+      <h1 title={violation ? variantOf(violation) : undefined}>{kind ? capital(kind) : `Failure ${failure}`}</h1>
       {known && <Tags failure={known} />}
       <span class="actions">
         {neighbour(query.get("prev") ?? listed.previous, "Previous")}
