@@ -1,0 +1,337 @@
+"""What drivers and pedestrians do in daily traffic, and how often.
+
+One row per feature: what it measures, of which event, and its distribution among road users. A row without a published
+distribution is measured on SUMO's own drivers in undisturbed scenes, see `risk_sac.verdicts.plausibility`.
+
+Choice: where a source gives two quantiles, or a mean and the extremes of a sample, the distribution of the stated shape
+through them is used. No sample here has more than some thousand events, so nothing is called rarer than `LEAST`.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+LEAST = 1e-6  # choice: the least tail probability that is ever stated
+
+
+class HasTails(Protocol):
+    """A distribution of one number."""
+
+    def below(self, value: float) -> float:
+        """Probability of a value of at most this."""
+        ...
+
+    def above(self, value: float) -> float:
+        """Probability of a value of at least this."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class NormalSpread:
+    """A normal distribution."""
+
+    mean: float
+    deviation: float
+
+    def below(self, value: float) -> float:
+        """Probability of a value of at most this."""
+        return math.erfc((self.mean - value) / (self.deviation * math.sqrt(2.0))) / 2.0
+
+    def above(self, value: float) -> float:
+        """Probability of a value of at least this."""
+        return math.erfc((value - self.mean) / (self.deviation * math.sqrt(2.0))) / 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class LognormalSpread:
+    """A lognormal distribution, by its median and the deviation of the logarithm."""
+
+    median: float
+    deviation: float
+
+    def below(self, value: float) -> float:
+        """Probability of a value of at most this; 0 up to 0."""
+        if value <= 0.0:
+            return 0.0
+        return NormalSpread(math.log(self.median), self.deviation).below(math.log(value))
+
+    def above(self, value: float) -> float:
+        """Probability of a value of at least this."""
+        if value <= 0.0:
+            return 1.0
+        return NormalSpread(math.log(self.median), self.deviation).above(math.log(value))
+
+
+@dataclass(frozen=True, slots=True)
+class LogisticSpread:
+    """A logistic distribution: what a binary logit of one variable says."""
+
+    median: float
+    scale: float
+
+    def below(self, value: float) -> float:
+        """Probability of a value of at most this."""
+        return 1.0 / (1.0 + math.exp((self.median - value) / self.scale))
+
+    def above(self, value: float) -> float:
+        """Probability of a value of at least this."""
+        return 1.0 / (1.0 + math.exp((value - self.median) / self.scale))
+
+
+@dataclass(frozen=True, slots=True)
+class UpperTail:
+    """An upper tail by points, log-linear between them; beyond the last it falls as before it."""
+
+    values: tuple[float, ...]  # ascending
+    probabilities: tuple[float, ...]  # descending, of at least that value
+
+    def below(self, value: float) -> float:
+        """Probability of a value of less than this."""
+        return 1.0 - self.above(value)
+
+    def above(self, value: float) -> float:
+        """Probability of a value of at least this; that of the first point before it."""
+        if value <= self.values[0] or len(self.values) == 1:
+            return self.probabilities[0]
+        k = 1
+        while k < len(self.values) - 1 and self.values[k] < value:
+            k += 1
+        (left, right), (more, less) = self.values[k - 1 : k + 1], self.probabilities[k - 1 : k + 1]
+        share = (value - left) / (right - left)
+        return math.exp((1.0 - share) * math.log(more) + share * math.log(less))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoadUserFeature:
+    """One feature of what a road user did."""
+
+    name: str
+    unit: str
+    per: str  # what its probability is one of
+    unlikely: Literal["above", "below"]  # the side of the unlikely values
+    words: str  # the sentence, with {value}
+    source: str
+    spread: HasTails | None = None  # None: measured on SUMO's drivers
+
+    @property
+    def published(self) -> bool:
+        """Whether its distribution is a published one."""
+        return self.spread is not None
+
+
+SUMO = "SUMO's drivers, measured"
+
+_ROWS = (
+    RoadUserFeature(
+        name="braking",
+        unit="m/s²",
+        per="stop",
+        unlikely="above",
+        words="brakes by {value:.1f} m/s²",
+        # Lognormal of mean 3.27 m/s² whose 1 of 822 quantiles are near the extremes, 1.51 and 7.47 m/s².
+        source="Evaluation of Driver Deceleration Behavior at Signalized Intersections, TRR 2018, 2007: 821 stops at yellow",
+        spread=LognormalSpread(3.16, 0.264),
+    ),
+    RoadUserFeature(
+        name="acceleration",
+        unit="m/s²",
+        per="start",
+        unlikely="above",
+        words="accelerates by {value:.1f} m/s²",
+        # Drivers use N(0.60, 0.08) of what their car can do. Choice: 4.6 m/s², a car of 9 s to 100 km/h.
+        source="Snare 2002, Typical Acceleration Rates of Passenger Vehicles; a car that can do 4.6 m/s²: choice",
+        spread=NormalSpread(2.76, 0.37),
+    ),
+    RoadUserFeature(
+        name="jerk",
+        unit="m/s³",
+        per="change of pedals",
+        unlikely="above",
+        words="jerks by {value:.0f} m/s³",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="pedal_changes",
+        unit="1 in 10 s",
+        per="10 s of driving",
+        unlikely="above",
+        words="changes between gas and brake {value:.0f} times in 10 s",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="lane_change_duration",
+        unit="s",
+        per="lane change",
+        unlikely="below",
+        words="changes lane in {value:.1f} s",
+        # Lognormal; its 1 of 5,609 quantiles are the extremes, 0.7 and 12.4 s.
+        source="Wang, Yang and Hurwitz 2019, doi 10.1016/j.aap.2019.01.006: 5,608 cut-ins",
+        spread=LognormalSpread(2.95, 0.40),
+    ),
+    RoadUserFeature(
+        name="lane_change_gap",
+        unit="m",
+        per="lane change",
+        unlikely="below",
+        words="changes lane {value:.1f} m before the next vehicle",
+        # Median 7.58 m before an automated vehicle, 68.0 % below 10 m. Lognormal: choice.
+        source="Alhuraish, Wang and Zhou 2026, arXiv 2605.01485: 706 cut-ins before automated vehicles",
+        spread=LognormalSpread(7.58, 0.59),
+    ),
+    RoadUserFeature(
+        name="lane_change_headway",
+        unit="s",
+        per="lane change",
+        unlikely="below",
+        words="changes lane {value:.1f} s before the next vehicle",
+        # Lognormal; 12 % below 0.5 s, 20 % above 1.7 s.
+        source="Bham, Estimating Driver Mandatory Lane Change Behavior on a Multi-Lane Freeway: I-80, congested",
+        spread=LognormalSpread(1.02, 0.61),
+    ),
+    RoadUserFeature(
+        name="lane_change_ttc",
+        unit="s",
+        per="lane change",
+        unlikely="below",
+        words="changes lane {value:.1f} s before the next vehicle would touch it",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="lateral_speed",
+        unit="m/s",
+        per="lane change",
+        unlikely="above",
+        words="moves across by {value:.1f} m/s",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="over_line",
+        unit="s",
+        per="drive",
+        unlikely="above",
+        words="drives over a line for {value:.1f} s without changing lane",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="pacing",
+        unit="s",
+        per="drive",
+        unlikely="above",
+        words="stays level with a vehicle at its speed for {value:.1f} s",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="speeding",
+        unit="m/s",
+        per="drive",
+        unlikely="above",
+        words="drives {value:.1f} m/s above the limit",
+        # Mean 31 mph and 6 % above 40 mph, where 30 mph are allowed. Normal: choice.
+        source="Department for Transport, Vehicle Speed Compliance Statistics, Great Britain: 2019",
+        spread=NormalSpread(0.45, 2.6),
+    ),
+    RoadUserFeature(
+        name="junction_gap",
+        unit="s",
+        per="turn that has to yield",
+        unlikely="below",
+        words="drives {value:.1f} s before a vehicle that has priority",
+        # A logit: 50 % accept 6.5 s and 85 % accept 8.25 s.
+        source="Fitzpatrick 1991, Gaps Accepted at Stop-Controlled Intersections, TRR 1303",
+        spread=LogisticSpread(6.5, 1.01),
+    ),
+    RoadUserFeature(
+        name="red_entry",
+        unit="s",
+        per="approach to a signal that turns red",
+        unlikely="above",
+        words="enters {value:.1f} s after the start of red",
+        # 6 to 29 of 100,000 crossing vehicles enter on red, 6 % of them after 2 s and 3 % after 5 s. Choice: 1 of 100 of
+        # those near the line at yellow; half of all vehicles meet red; after 5 s it falls to a tenth within 20 s.
+        source="Yang and Najm 2006, DOT HS 810 580: 47,000 entries on red",
+        spread=UpperTail((0.0, 2.0, 5.0, 25.0), (1e-2, 6e-4, 2e-5, 2e-6)),
+    ),
+    RoadUserFeature(
+        name="junction_stop",
+        unit="s",
+        per="way through a junction",
+        unlikely="above",
+        words="stops in the junction for {value:.1f} s without a reason",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="walking_speed",
+        unit="m/s",
+        per="crossing",
+        unlikely="above",
+        words="walks at {value:.1f} m/s",
+        source="Weidmann 1993, Transporttechnik der Fussgänger; 1.36 and 0.24 m/s in TRR 1705, 2000",
+        spread=NormalSpread(1.34, 0.26),
+    ),
+    RoadUserFeature(
+        name="walking_acceleration",
+        unit="m/s²",
+        per="start",
+        unlikely="above",
+        words="starts walking by {value:.1f} m/s²",
+        # 0.14 ± 0.09 g.
+        source="Analysis of Pedestrian Gait and Perception-Reaction at Signal-Controlled Crosswalks, TRR 1705, 2000",
+        spread=NormalSpread(1.37, 0.88),
+    ),
+    RoadUserFeature(
+        name="turn_rate",
+        unit="rad/s",
+        per="crossing",
+        unlikely="above",
+        words="turns by {value:.1f} rad/s",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="crossing_gap",
+        unit="s",
+        per="crossing without priority",
+        unlikely="below",
+        words="steps out {value:.1f} s before the car",
+        # Mean of the critical gap of young pedestrians, the least of all groups. Its spread, that of drivers: choice.
+        source="Sahani, Saipriya and Bhuyan 2018, Transp. Dev. Econ. 4(2) 15",
+        spread=LogisticSpread(5.31, 1.01),
+    ),
+    RoadUserFeature(
+        name="towards_car",
+        unit="s",
+        per="crossing",
+        unlikely="above",
+        words="walks towards the car for {value:.1f} s",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="stop_in_way",
+        unit="s",
+        per="crossing",
+        unlikely="above",
+        words="stands in the car's way for {value:.1f} s",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="walks_on_red",
+        unit="s",
+        per="crossing at a signal",
+        unlikely="above",
+        words="steps out {value:.1f} s after the start of red",
+        source="Araya-Porras, Mora-Calderón and Aguero-Valverde 2022, doi 10.15517/ri.v32i2.50386: 1,707 crossings",
+        spread=UpperTail((0.0,), (0.106,)),
+    ),
+)
+FEATURES: Mapping[str, RoadUserFeature] = {feature.name: feature for feature in _ROWS}
+
+
+def tail_probability(feature: RoadUserFeature, spread: HasTails, value: float) -> float:
+    """Computes how probable a value at least as unlikely is, in [`LEAST`, 1].
+
+    Args:
+      feature: tells the side of the unlikely values.
+      spread: its own, or that of SUMO's drivers.
+      value: in the feature's unit.
+    """
+    return max(spread.above(value) if feature.unlikely == "above" else spread.below(value), LEAST)
