@@ -102,41 +102,59 @@ class UpperTail:
         return math.exp((1.0 - share) * math.log(more) + share * math.log(less))
 
 
+@dataclass(frozen=True, slots=True)
+class LowerTail:
+    """A lower tail by points: the upper tail of the negative value."""
+
+    mirrored: UpperTail
+
+    def below(self, value: float) -> float:
+        """Probability of a value of at most this."""
+        return self.mirrored.above(-value)
+
+    def above(self, value: float) -> float:
+        """Probability of a value of more than this."""
+        return self.mirrored.below(-value)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RoadUserFeature:
     """One feature of what a road user did."""
 
     name: str
     unit: str
-    per: str  # what its probability is one of
+    per: str  # what its probability is a share of
     unlikely: Literal["above", "below"]  # the side of the unlikely values
     words: str  # the sentence, with {value}
     source: str
     spread: HasTails | None = None  # None: measured on SUMO's drivers
+    event: str = ""  # features of one event, such as a lane change, are no independent evidence; "": its own
 
     @property
     def published(self) -> bool:
         """Whether its distribution is a published one."""
-        return self.spread is not None
+        return self.spread is not None and self.source != CHOICE
 
 
 SUMO = "SUMO's drivers, measured"
+CHOICE = "choice: no distribution is published, and SUMO's pedestrians stand in undisturbed scenes"
 
 _ROWS = (
     RoadUserFeature(
         name="braking",
         unit="m/s²",
-        per="stop",
+        per="stops",
         unlikely="above",
         words="brakes by {value:.1f} m/s²",
-        # Lognormal of mean 3.27 m/s² whose 1 of 822 quantiles are near the extremes, 1.51 and 7.47 m/s².
-        source="Evaluation of Driver Deceleration Behavior at Signalized Intersections, TRR 2018, 2007: 821 stops at yellow",
+        # Lognormal of mean 3.27 m/s² whose 1 of 822 quantiles are near the extremes, 1.51 and 7.47 m/s². It is the mean
+        # deceleration of a stop there, the mean of 0.5 s here.
+        source="Evaluation of Driver Deceleration Behavior at Signalized Intersections 2007, TRID 01049374: 821 stops",
         spread=LognormalSpread(3.16, 0.264),
     ),
     RoadUserFeature(
         name="acceleration",
         unit="m/s²",
-        per="start",
+        per="starts",
         unlikely="above",
         words="accelerates by {value:.1f} m/s²",
         # Drivers use N(0.60, 0.08) of what their car can do. Choice: 4.6 m/s², a car of 9 s to 100 km/h.
@@ -146,7 +164,7 @@ _ROWS = (
     RoadUserFeature(
         name="jerk",
         unit="m/s³",
-        per="change of pedals",
+        per="drives",
         unlikely="above",
         words="jerks by {value:.0f} m/s³",
         source=SUMO,
@@ -154,15 +172,16 @@ _ROWS = (
     RoadUserFeature(
         name="pedal_changes",
         unit="1 in 10 s",
-        per="10 s of driving",
+        per="drives",
         unlikely="above",
         words="changes between gas and brake {value:.0f} times in 10 s",
         source=SUMO,
     ),
     RoadUserFeature(
         name="lane_change_duration",
+        event="lane change",
         unit="s",
-        per="lane change",
+        per="lane changes",
         unlikely="below",
         words="changes lane in {value:.1f} s",
         # Lognormal; its 1 of 5,609 quantiles are the extremes, 0.7 and 12.4 s.
@@ -171,8 +190,9 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="lane_change_gap",
+        event="lane change",
         unit="m",
-        per="lane change",
+        per="lane changes",
         unlikely="below",
         words="changes lane {value:.1f} m before the next vehicle",
         # Median 7.58 m before an automated vehicle, 68.0 % below 10 m. Lognormal: choice.
@@ -181,8 +201,9 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="lane_change_headway",
+        event="lane change",
         unit="s",
-        per="lane change",
+        per="lane changes",
         unlikely="below",
         words="changes lane {value:.1f} s before the next vehicle",
         # Lognormal; 12 % below 0.5 s, 20 % above 1.7 s.
@@ -191,24 +212,28 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="lane_change_ttc",
+        event="lane change",
         unit="s",
-        per="lane change",
+        per="lane changes",
         unlikely="below",
         words="changes lane {value:.1f} s before the next vehicle would touch it",
         source=SUMO,
     ),
     RoadUserFeature(
         name="lateral_speed",
+        event="lane change",
         unit="m/s",
-        per="lane change",
+        per="lane changes",
         unlikely="above",
         words="moves across by {value:.1f} m/s",
-        source=SUMO,
+        # A lane of 3.5 m in the durations above.
+        source="Wang, Yang and Hurwitz 2019, doi 10.1016/j.aap.2019.01.006: from the durations",
+        spread=LognormalSpread(1.19, 0.40),
     ),
     RoadUserFeature(
         name="over_line",
         unit="s",
-        per="drive",
+        per="drives",
         unlikely="above",
         words="drives over a line for {value:.1f} s without changing lane",
         source=SUMO,
@@ -216,7 +241,7 @@ _ROWS = (
     RoadUserFeature(
         name="pacing",
         unit="s",
-        per="drive",
+        per="drives",
         unlikely="above",
         words="stays level with a vehicle at its speed for {value:.1f} s",
         source=SUMO,
@@ -224,7 +249,7 @@ _ROWS = (
     RoadUserFeature(
         name="speeding",
         unit="m/s",
-        per="drive",
+        per="drives",
         unlikely="above",
         words="drives {value:.1f} m/s above the limit",
         # Mean 31 mph and 6 % above 40 mph, where 30 mph are allowed. Normal: choice.
@@ -233,8 +258,9 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="junction_gap",
+        event="entry",
         unit="s",
-        per="turn that has to yield",
+        per="entries that have to yield",
         unlikely="below",
         words="drives {value:.1f} s before a vehicle that has priority",
         # A logit: 50 % accept 6.5 s and 85 % accept 8.25 s.
@@ -243,19 +269,20 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="red_entry",
+        event="entry",
         unit="s",
-        per="approach to a signal that turns red",
+        per="approaches to a red light",
         unlikely="above",
         words="enters {value:.1f} s after the start of red",
-        # 6 to 29 of 100,000 crossing vehicles enter on red, 6 % of them after 2 s and 3 % after 5 s. Choice: 1 of 100 of
-        # those near the line at yellow; half of all vehicles meet red; after 5 s it falls to a tenth within 20 s.
+        # 6 to 29 of 100,000 crossing vehicles enter on red, 6 % of them after 2 s and 3 % after 5 s. Choice: 1 of 100
+        # of those near the line at yellow does; half of all vehicles meet red; after 5 s it falls to a tenth in 20 s.
         source="Yang and Najm 2006, DOT HS 810 580: 47,000 entries on red",
         spread=UpperTail((0.0, 2.0, 5.0, 25.0), (1e-2, 6e-4, 2e-5, 2e-6)),
     ),
     RoadUserFeature(
         name="junction_stop",
         unit="s",
-        per="way through a junction",
+        per="ways through a junction",
         unlikely="above",
         words="stops in the junction for {value:.1f} s without a reason",
         source=SUMO,
@@ -263,34 +290,36 @@ _ROWS = (
     RoadUserFeature(
         name="walking_speed",
         unit="m/s",
-        per="crossing",
+        per="crossings",
         unlikely="above",
         words="walks at {value:.1f} m/s",
-        source="Weidmann 1993, Transporttechnik der Fussgänger; 1.36 and 0.24 m/s in TRR 1705, 2000",
+        source="Weidmann 1993, Transporttechnik der Fussgänger; Fugger, Randles et al. 2000 measure N(1.36, 0.24)",
         spread=NormalSpread(1.34, 0.26),
     ),
     RoadUserFeature(
         name="walking_acceleration",
         unit="m/s²",
-        per="start",
+        per="starts",
         unlikely="above",
         words="starts walking by {value:.1f} m/s²",
         # 0.14 ± 0.09 g.
-        source="Analysis of Pedestrian Gait and Perception-Reaction at Signal-Controlled Crosswalks, TRR 1705, 2000",
+        source="Fugger, Randles et al. 2000, pedestrian gait at signal-controlled crosswalks: 288 subjects",
         spread=NormalSpread(1.37, 0.88),
     ),
     RoadUserFeature(
         name="turn_rate",
         unit="rad/s",
-        per="crossing",
+        per="crossings",
         unlikely="above",
         words="turns by {value:.1f} rad/s",
-        source=SUMO,
+        source=CHOICE,
+        spread=UpperTail((0.0, 0.5, 2.0), (1.0, 0.1, 1e-3)),
     ),
     RoadUserFeature(
         name="crossing_gap",
+        event="step onto the road",
         unit="s",
-        per="crossing without priority",
+        per="crossings without priority",
         unlikely="below",
         words="steps out {value:.1f} s before the car",
         # Mean of the critical gap of young pedestrians, the least of all groups. Its spread, that of drivers: choice.
@@ -300,23 +329,26 @@ _ROWS = (
     RoadUserFeature(
         name="towards_car",
         unit="s",
-        per="crossing",
+        per="crossings",
         unlikely="above",
         words="walks towards the car for {value:.1f} s",
-        source=SUMO,
+        source=CHOICE,
+        spread=UpperTail((0.0, 1.0, 4.0), (0.1, 0.01, 1e-4)),
     ),
     RoadUserFeature(
         name="stop_in_way",
         unit="s",
-        per="crossing",
+        per="crossings",
         unlikely="above",
         words="stands in the car's way for {value:.1f} s",
-        source=SUMO,
+        source=CHOICE,
+        spread=UpperTail((0.0, 1.0, 4.0), (0.1, 0.03, 1e-3)),
     ),
     RoadUserFeature(
         name="walks_on_red",
+        event="step onto the road",
         unit="s",
-        per="crossing at a signal",
+        per="crossings at a signal",
         unlikely="above",
         words="steps out {value:.1f} s after the start of red",
         source="Araya-Porras, Mora-Calderón and Aguero-Valverde 2022, doi 10.15517/ri.v32i2.50386: 1,707 crossings",
