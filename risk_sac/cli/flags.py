@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar, get_args
 
 from risk_sac.cli.console import EGO, number
 from risk_sac.cli.parser import Parser
-from risk_sac.config import METHODS, EgoConfig
+from risk_sac.config import METHODS, Behaviour, EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.egos.registry import refuse_class
 from risk_sac.errors import ConfigError
@@ -57,9 +57,12 @@ def budget_flags(options: argparse.Namespace) -> dict[str, Any]:
     return {name: getattr(options, name) for name in BUDGET}
 
 
-def add_ego_flag(parser: Parser) -> None:
-    """Adds the flag that names the ego."""
-    parser.group("scene").add_argument("--ego", metavar="EGO", help=f"vehicle under test: {EGO} (default: default)")
+def add_scene_flags(parser: Parser) -> None:
+    """Adds the flags that name the ego and how its adversaries behave."""
+    scene = parser.group("scene")
+    scene.add_argument("--ego", metavar="EGO", help=f"vehicle under test: {EGO} (default: default)")
+    behaviours = "|".join(get_args(Behaviour))
+    scene.add_argument("--behaviour", metavar=behaviours, help="limits of the adversaries (default: ordinary)")
 
 
 def named_ego(text: str) -> EgoConfig:
@@ -69,9 +72,10 @@ def named_ego(text: str) -> EgoConfig:
     return read_ego(text)
 
 
-def ego_flag(options: argparse.Namespace) -> dict[str, Any]:
-    """The ego of a run or a campaign; None where the flag was not given."""
-    return {"ego": None if options.ego is None else named_ego(options.ego).model_dump(mode="json")}
+def scene_flags(options: argparse.Namespace) -> dict[str, Any]:
+    """The ego of a run or a campaign, and the behaviour in its ODD; None where a flag was not given."""
+    ego = None if options.ego is None else named_ego(options.ego).model_dump(mode="json")
+    return {"ego": ego, "behaviour": options.behaviour}
 
 
 def add_prior_flag(parser: Parser, earlier: str = "the folder of an earlier run or campaign") -> None:

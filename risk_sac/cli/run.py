@@ -26,13 +26,13 @@ from risk_sac.cli.console import (
 from risk_sac.cli.flags import (
     add_budget_flags,
     add_campaign_flags,
-    add_ego_flag,
     add_map_flags,
     add_prior_flag,
+    add_scene_flags,
     budget_flags,
     campaign_flags,
-    ego_flag,
     families_on_map,
+    scene_flags,
 )
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.config import METHODS, SHIPPED, RunMethod, RunSpec
@@ -62,7 +62,7 @@ def add(commands: Commands) -> None:
         example="run --family low --method archive --episodes 100 --out runs/low",
     )
     run.group("scene").add_argument("--family", metavar="low|mixed|dense", help="scenario family")
-    add_ego_flag(run)
+    add_scene_flags(run)
     add_map_flags(run, several=False)
     search = run.group("search")
     search.add_argument("--method", metavar="NAME", help=f"one of {', '.join(get_args(RunMethod))} (default: risk-sac)")
@@ -84,7 +84,7 @@ def add(commands: Commands) -> None:
         example="evaluate --families low --methods archive random --seeds 3 --episodes 100 --out runs/compared",
     )
     add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
-    add_ego_flag(evaluate)
+    add_scene_flags(evaluate)
     add_prior_flag(evaluate)
     add_map_flags(evaluate, several=True)
     execution = evaluate.group("execution")
@@ -108,7 +108,7 @@ def _run(options: argparse.Namespace) -> int:
         remedy = "or a map with --network, or a file with --spec"
         raise ConfigError("family", "nothing", "low, mixed or dense", remedy)
     named = {name: getattr(options, name) for name in ("family", "method", "seed", "prior")}
-    spec = read_spec(options.spec, named | budget_flags(options) | ego_flag(options))
+    spec = read_spec(options.spec, named | budget_flags(options) | scene_flags(options))
     say_adjustments(adjustments(spec))
     from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
 
@@ -152,7 +152,8 @@ def _found(metrics: RunMetrics | None) -> str:
 def _summary(spec: RunSpec, results: RunResults, phases: Mapping[str, RunMetrics]) -> Table:
     """One column per phase."""
     columns = {name: _figures(metrics) for name, metrics in phases.items()}
-    title = f"{spec.family} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s on {results.device}"
+    setting = f"{spec.family} · {spec.odd.dynamic.behaviour} behaviour"
+    title = f"{setting} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s on {results.device}"
     table = Table("", *columns, title=title)
     for figure in next(iter(columns.values()), {}):
         table.add_row(figure, *(column[figure] for column in columns.values()))
@@ -192,7 +193,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     methods = [name for name, method in METHODS.items() if not method.needs]
     defaults = {"families": list(SHIPPED), "methods": methods, "seeds": list(range(SEEDS))}
     options.families = families_on_map(options) or options.families
-    spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | ego_flag(options), defaults)
+    spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | scene_flags(options), defaults)
     say_adjustments(adjustments(spec))
     # Here, because loading what checks the settings takes seconds.
     from risk_sac.execution.evaluate import evaluate

@@ -25,7 +25,16 @@ from risk_sac.config.learner import (
     WarmStartConfig,
 )
 from risk_sac.config.methods import IID_METHODS, METHODS, IidName, Method, MethodName, RunMethod, method_of
-from risk_sac.config.odd import CrossingType, DynamicElements, Environment, Odd, Precipitation, Scenery, SignalType
+from risk_sac.config.odd import (
+    Behaviour,
+    CrossingType,
+    DynamicElements,
+    Environment,
+    Odd,
+    Precipitation,
+    Scenery,
+    SignalType,
+)
 
 __all__ = [
     "FAMILY_NAME",
@@ -33,6 +42,7 @@ __all__ = [
     "METHODS",
     "SHIPPED",
     "AgentConfig",
+    "Behaviour",
     "Budget",
     "CampaignSpec",
     "CarFollowing",

@@ -15,6 +15,7 @@ CrossingType = Literal["none", "zebra", "signalised"]
 ActorKind = Literal["vehicle", "pedestrian"]
 Precipitation = Literal["none", "rain", "heavy_rain"]
 TimeOfDay = Literal["day", "night"]
+Behaviour = Literal["ordinary", "emergency", "extreme"]
 
 
 def _as_sorted_set(values: tuple[str, ...]) -> tuple[str, ...]:
@@ -53,6 +54,10 @@ class Environment(Settings):
 class DynamicElements(Settings):
     """Other actors and the limits they keep."""
 
+    behaviour: Behaviour = "ordinary"
+    """Preset of the adversaries' limits below; a limit that is stated takes its place. `ordinary` is what people do in
+    daily traffic, `emergency` what they do to avoid an accident, `extreme` what vehicles and persons can do at all."""
+
     actor_kinds: Annotated[tuple[ActorKind, ...], SetOf] | None = None
     """Kinds of actor that may be present."""
     ego_speed_mps: Interval | None = None
@@ -61,17 +66,19 @@ class DynamicElements(Settings):
     """Speed of the adversary vehicles, m/s; the low end holds for their start, after which they may brake."""
     vehicle_accel_mps2: Interval | None = None
     """Longitudinal acceleration of the adversary vehicles, m/s²; low is the hardest braking."""
+    vehicle_jerk_mps3: Interval | None = None
+    """Change of the adversary vehicles' longitudinal acceleration, m/s³, up or down, from 0."""
     vehicle_lateral_speed_mps: Interval | None = None
-    """Speed of the adversary vehicles across their lane, m/s, to either side, from 0. Usual is 1.2, UN R157's extreme
-    1.8."""
+    """Speed of the adversary vehicles across their lane, m/s, to either side, from 0."""
     vehicle_lateral_accel_mps2: Interval | None = None
     """Acceleration of the adversary vehicles across their lane, m/s², to either side, from 0, without the lane's own
     curve."""
     pedestrian_speed_mps: Interval | None = None
-    """Speed of pedestrians, m/s; the low end holds for their start. Usual is up to 2; a high of up to 3 lets them
-    run."""
+    """Speed of pedestrians, m/s; the low end holds for their start. A high above 2 lets them run."""
     pedestrian_accel_mps2: Interval | None = None
-    """Acceleration of pedestrians, m/s²."""
+    """Acceleration of pedestrians, m/s², along their heading; the larger end also bounds it in any direction."""
+    pedestrian_turn_radps: Interval | None = None
+    """Rate at which standing pedestrians turn, rad/s, to either side, from 0; walking, they turn more slowly."""
 
 
 class Odd(Settings):

@@ -26,10 +26,11 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
 
     Args:
       file: YAML of a RunSpec, or of a CampaignSpec with a single run once the flags have picked one.
-      flags: fields of RunSpec, those of its budget under their own names; None where a flag was not given.
+      flags: fields of RunSpec, those of its budget and the behaviour under their own names; None where a flag was not
+        given.
     """
     given = {name: value for name, value in flags.items() if value is not None}
-    data = _with_budget({} if file is None else read_fields(file, "spec"), given)
+    data = _placed({} if file is None else read_fields(file, "spec"), given)
     if data.keys() & {"label", "iid", *CAMPAIGN_ONLY.values()}:
         shared = {name: value for name, value in given.items() if name not in CAMPAIGN_ONLY}
         return _only_run(data | shared, {name: given[name] for name in CAMPAIGN_ONLY if name in given})
@@ -39,14 +40,14 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
 def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping[str, Any]) -> CampaignSpec:
     """Returns the campaign described by a YAML file, overridden by flags as `read_spec` has them, else by defaults."""
     given = {name: value for name, value in flags.items() if value is not None}
-    data = _with_budget({} if file is None else read_fields(file, "spec"), given)
+    data = _placed({} if file is None else read_fields(file, "spec"), given)
     return _validate(CampaignSpec, {**defaults, **data, **given})
 
 
 def read_posted(file: Path | None, flags: Mapping[str, Any]) -> CampaignSpec | dict[str, Any]:
     """Returns a campaign to post; one on an uploaded network as fields, which the service checks."""
     given = {name: value for name, value in flags.items() if value is not None}
-    data = _with_budget({} if file is None else read_fields(file, "spec"), given) | given
+    data = _placed({} if file is None else read_fields(file, "spec"), given) | given
     return data if "network" in data else _validate(CampaignSpec, data)
 
 
@@ -73,11 +74,19 @@ def campaign_yaml(spec: CampaignSpec) -> str:
     return yaml.safe_dump(spec.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
 
 
-def _with_budget(data: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
-    """Moves the budget's fields from the flags to where a spec has them."""
+def _placed(data: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    """Moves the budget's fields and the behaviour from the flags to where a spec has them."""
     budget = {name: given.pop(name) for name in Budget.model_fields if name in given}
-    stored = data.get("budget", {})
-    return data | {"budget": {**stored, **budget}} if budget and isinstance(stored, dict) else data
+    data = _with(data, ("budget",), budget)
+    return _with(data, ("odd", "dynamic"), {"behaviour": given.pop("behaviour")}) if "behaviour" in given else data
+
+
+def _with(data: dict[str, Any], path: tuple[str, ...], fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Adds fields to an object inside a spec; leaves a spec that has no object there as it is, to be refused later."""
+    if not path:
+        return data | fields
+    stored = data.get(path[0], {})
+    return data | {path[0]: _with(stored, path[1:], fields)} if fields and isinstance(stored, dict) else data
 
 
 def _only_run(data: dict[str, Any], picked: Mapping[str, Any]) -> RunSpec:

@@ -27,8 +27,9 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.host.process_state import c_numbers
 from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.records import Collision, RequirementResult, Violation
+from risk_sac.risk.conduct import ADVERSARY_MEMORY, conduct_cost
 from risk_sac.risk.measures import Gauge, Measures
-from risk_sac.risk.realism import refuse_danger, refuse_overlap, soft_cost
+from risk_sac.risk.realism import refuse_danger, refuse_overlap
 from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.families import FAMILIES
@@ -46,7 +47,7 @@ from risk_sac.verdicts.online import conflicts_now, reflex_of
 from risk_sac.verdicts.reference import History
 from risk_sac.verdicts.validity import EpisodeFacts
 from risk_sac.world.geometry import relative_view
-from risk_sac.world.types import STEP_S, Bools, Frame, Kind, Scene
+from risk_sac.world.types import STEP_S, Bools, Floats, Frame, Kind, Scene
 
 FEASIBLE_TRIES = 100
 Observation = NDArray[np.float32]
@@ -99,6 +100,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     _adversaries: Adversaries
     _frame: Frame
     _measures: Measures
+    _conduct: Floats  # what C_soft remembers, ADVERSARY_MEMORY x adversaries
     _steps: int
     _contact_s: float | None  # from the release
     _artefacts: dict[str, float]  # rule that the episode broke -> when it first did
@@ -155,7 +157,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             self._sim.brake(self._reflex.braking(self._frame, self._ego_path(), self._in_sight()))
         before, self._frame = self._frame, self._sim.step()
         contact = find_contact(before, self._frame)
-        previous, self._measures = self._measures, self._measure(before, 0 if contact is None else contact.other)
+        self._measures = self._measure(before, 0 if contact is None else contact.other)
         self._steps += 1
         if self._controlled and not self._adversaries.keep_limits(self._frame):
             self._artefacts.setdefault("inside_limits", self._frame.time_s)
@@ -164,7 +166,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self.trace.append(self._frame, self._measures, np.array(shares, dtype=np.float32))
         collision = None if contact is None else self._judge(contact)
         self._contact_s = None if collision is None else collision.time_s
-        cost = self._cost(before, self._frame, previous, self._measures)
+        cost = self._cost()
         reward = risk_reward(
             self._measures.signals["ttc_s"],
             self._measures.signals["rss_margin"],
@@ -211,6 +213,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._perception.sight = sight(sensor, visible.visibility_m, visible.unlit_m)
         self._steps = 0
         self._artefacts = {}
+        self._conduct = np.zeros((ADVERSARY_MEMORY, len(self.problem.family.adversaries)))
         self._contact_s = None
         self._lead_in(self._sim.reset(layout, sumo_seed), scene)
         self._released_s = self._frame.time_s
@@ -251,19 +254,12 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _in_sight(self) -> Bools:
         return np.concatenate(([True], self._measures.assessment.seen))
 
-    def _cost(self, before: Frame, frame: Frame, previous: Measures, now: Measures) -> float:
-        """C_soft of Eq. 5 over the adversaries."""
-        if before.ids != frame.ids:  # an actor left the net, far from the ego
-            return 0.0
-        return soft_cost(
-            self._adversaries.rows(frame),
-            self._adversaries.accel_limits(frame),
-            frame.kind,
-            frame.state,
-            now.assessment.gap_m,
-            before.state,
-            previous.assessment.gap_m,
-        )
+    def _cost(self) -> float:
+        """C_soft of Eq. 5 over the adversaries; updates what it remembers of them."""
+        frame, adversaries = self._frame, self._adversaries
+        rows = adversaries.rows(frame)
+        width_m = self._ground.lane_width_m
+        return conduct_cost(rows, adversaries.slots, frame.kind, frame.link, frame.state, self._conduct, width_m)
 
     def _judge(self, contact: Contact) -> Collision:
         frame = self._frame
@@ -300,7 +296,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def _observe(self) -> Observation:
         time_left = 1.0 - self._steps / self.problem.family.horizon_steps
         m = self._measures
-        return self._encoder.encode(self._frame, m.assessment, m.robustness, self._unit_scene, time_left)
+        return self._encoder.encode(self._frame, m.assessment, self._conduct, m.robustness, self._unit_scene, time_left)
 
 
 def make_default(family: FamilyName) -> RiskSacEnv:

@@ -1,8 +1,8 @@
 """What the joint policy sees, in the ego's frame and scaled to about [-1, 1].
 
-Per adversary its motion relative to the ego, then the ego itself, its signal, the scene ξ, the
-robustness of every requirement and the time left. Robustness is part of the state because STL keeps
-history: without it the shaped reward would not be Markov.
+Per adversary its motion relative to the ego and what C_soft remembers of it, then the ego itself, its signal, the
+scene ξ, the robustness of every requirement and the time left. Robustness and that memory are part of the state because
+STL and C_soft keep history: without them neither the shaped reward nor the cost would be Markov.
 """
 
 import numpy as np
@@ -13,6 +13,7 @@ from risk_sac.env.observation_layout import (
     GAP_M,
     LATERAL_MPS,
     LIMIT,
+    MOTION_PER_ADVERSARY,
     PER_ADVERSARY,
     PER_EGO,
     SPEED_MPS,
@@ -20,6 +21,7 @@ from risk_sac.env.observation_layout import (
     Y_M,
     observation_size,
 )
+from risk_sac.risk.conduct import MEMORY_SCALE
 from risk_sac.risk.publish import AHEAD, ASIDE, CLOSING_X, CLOSING_Y, COS, GAP, SEEN, SIN, Assessment
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.scenario.family import Family
@@ -36,9 +38,27 @@ class Encoder:
         self._ids: tuple[str, ...] = ()
 
     def encode(
-        self, frame: Frame, assessment: Assessment, robustness: Floats, unit_scene: Floats, time_left: float
+        self,
+        frame: Frame,
+        assessment: Assessment,
+        memory: Floats,
+        robustness: Floats,
+        unit_scene: Floats,
+        time_left: float,
     ) -> NDArray[np.float32]:
-        """The observation, `size`, each entry in [-LIMIT, LIMIT]; an adversary that left the net is all zeros."""
+        """Encodes a frame and what C_soft remembers.
+
+        Args:
+          frame: the latest.
+          assessment: of that frame.
+          memory: `ADVERSARY_MEMORY x adversaries`, see `risk_sac.risk.conduct`.
+          robustness: of each requirement.
+          unit_scene: the scene in the unit cube.
+          time_left: share of the horizon.
+
+        Returns:
+          `size`, each entry in [-LIMIT, LIMIT]; an adversary that left the net is all zeros.
+        """
         if frame.ids is not self._ids:
             self._ids = frame.ids
             self._rows = np.array([frame.ids.index(a) if a in frame.ids else 0 for a in self._adversaries])
@@ -47,6 +67,7 @@ class Encoder:
             self._rows,
             assessment.others,
             frame.state,
+            memory,
             frame.stop_line_m,
             int(frame.signal),
             unit_scene,
@@ -61,6 +82,7 @@ def _encoded(
     rows: NDArray[np.int64],
     others: Floats,
     state: Floats,
+    memory: Floats,
     stop_line_m: float,
     signal: int,
     unit_scene: Floats,
@@ -83,6 +105,8 @@ def _encoded(
         result[at + 7] = state[ACCEL, row] / ACCEL_MPS2
         result[at + 8] = others[GAP, i] / GAP_M
         result[at + 9] = others[SEEN, i]
+        for k in range(len(MEMORY_SCALE)):
+            result[at + MOTION_PER_ADVERSARY + k] = memory[k, slot] / MEMORY_SCALE[k]
     at = len(rows) * PER_ADVERSARY
     result[at] = state[SPEED, 0] / SPEED_MPS
     result[at + 1] = state[ACCEL, 0] / ACCEL_MPS2

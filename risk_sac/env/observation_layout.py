@@ -1,6 +1,7 @@
 """Sizes and scales of an observation; see `risk_sac.env.observation`."""
 
-PER_ADVERSARY = 10
+MOTION_PER_ADVERSARY = 10
+PER_ADVERSARY = MOTION_PER_ADVERSARY + 6  # the memory of C_soft: `risk_sac.risk.conduct.ADVERSARY_MEMORY`
 PER_EGO = 8
 LATERAL_ADVERSARY, LATERAL_EGO = (1, 3, 5), 2  # the entries of these that change their sign in a mirror
 LIMIT = 5.0  # of every entry

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from risk_sac.config import CrossingType, DynamicElements, Environment, FamilyName, Interval, Odd, Scenery, SignalType
+from risk_sac.scenario.behaviour import preset
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.place import FixedSignal, Place
 from risk_sac.scenario.space import Parameter, SceneSpace
@@ -92,10 +93,6 @@ def road_odd(place: Place, signals: tuple[SignalType, ...], crossings: tuple[Cro
             actor_kinds=("pedestrian", "vehicle") if pedestrians else ("vehicle",),
             ego_speed_mps=Interval(low=0, high=limit_mps),
             vehicle_speed_mps=Interval(low=0, high=limit_mps * 1.2),
-            vehicle_accel_mps2=Interval(low=-8, high=3.5),
-            vehicle_lateral_speed_mps=Interval(low=0, high=1.2),
-            vehicle_lateral_accel_mps2=Interval(low=0, high=1.5),
-            pedestrian_speed_mps=Interval(low=0, high=2),  # walking; a user's ODD may let them run
-            pedestrian_accel_mps2=Interval(low=-1.5, high=1.5),
+            **preset("ordinary"),
         ),
     )

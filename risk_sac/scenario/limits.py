@@ -16,10 +16,6 @@ CORNERING = 0.6  # of the circle, for the curve of the lane: drivers leave more,
 CHANGING_LANE = 0.3  # of the circle at most, for moving across the lane; at least 0.43 are left for braking
 SLIP = 0.2  # lateral over longitudinal speed: about 11 degrees against the lane
 
-# Where the ODD says nothing.
-LATERAL_MPS = 1.2  # a lane change of 3 s; UN R157 takes 1.8 m/s as the extreme
-LATERAL_ACCEL_MPS2 = 1.5
-
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
@@ -30,17 +26,21 @@ class Limits:
     accel_mps2: float
     brake_mps2: float
     grip_mps2: float  # of the longitudinal and the lateral acceleration together, cornering included
-    jerk_mps3: float = 20.0  # an emergency braking builds up in about 0.4 s
-    lateral_mps: float = LATERAL_MPS
-    lateral_accel_mps2: float = LATERAL_ACCEL_MPS2
+    jerk_mps3: float
+    lateral_mps: float
+    lateral_accel_mps2: float
     curvature_per_m: float = 0.2  # of a car that turns as tightly as it can
     # pedestrians
     walk_speed_mps: float
     walk_accel_mps2: float
     walk_brake_mps2: float
-    walk_disc_mps2: float = 1.5  # along and across the heading together
     walk_jerk_mps3: float = 5.0  # from rest to full acceleration in 0.3 s
-    heading_rate_radps: float = 2.0  # standing: a right angle in 0.8 s
+    heading_rate_radps: float  # standing
+
+    @cached_property
+    def walk_disc_mps2(self) -> float:
+        """Acceleration of a pedestrian along and across its heading together."""
+        return max(self.walk_accel_mps2, self.walk_brake_mps2)
 
     @cached_property
     def cornering_mps2(self) -> float:
@@ -62,29 +62,30 @@ class Limits:
 def limits_from_odd(odd: Odd, friction: float) -> Limits:
     """The bounds of a complete ODD, with vehicle acceleration further bounded by friction · g."""
     dynamic = odd.dynamic
-    if not (
-        dynamic.vehicle_speed_mps
-        and dynamic.vehicle_accel_mps2
-        and dynamic.pedestrian_speed_mps
-        and dynamic.pedestrian_accel_mps2
-    ):
+    accel, jerk = dynamic.vehicle_accel_mps2, dynamic.vehicle_jerk_mps3
+    lateral, lateral_accel = dynamic.vehicle_lateral_speed_mps, dynamic.vehicle_lateral_accel_mps2
+    walk, walk_accel, turn = (
+        dynamic.pedestrian_speed_mps,
+        dynamic.pedestrian_accel_mps2,
+        dynamic.pedestrian_turn_radps,
+    )
+    speed = dynamic.vehicle_speed_mps
+    if not (speed and accel and jerk and lateral and lateral_accel and walk and walk_accel and turn):
         raise ValueError("the ODD is incomplete; intersect it with a family's default first")
     grip = HEADROOM * friction * GRAVITY_MPS2
     return Limits(
-        speed_mps=dynamic.vehicle_speed_mps.high,
-        accel_mps2=min(dynamic.vehicle_accel_mps2.high, grip),
-        brake_mps2=min(-dynamic.vehicle_accel_mps2.low, grip),
+        speed_mps=speed.high,
+        accel_mps2=min(accel.high, grip),
+        brake_mps2=min(-accel.low, grip),
         grip_mps2=grip,
-        lateral_mps=_high(dynamic.vehicle_lateral_speed_mps, LATERAL_MPS),
-        lateral_accel_mps2=min(_high(dynamic.vehicle_lateral_accel_mps2, LATERAL_ACCEL_MPS2), CHANGING_LANE * grip),
-        walk_speed_mps=dynamic.pedestrian_speed_mps.high,
-        walk_accel_mps2=dynamic.pedestrian_accel_mps2.high,
-        walk_brake_mps2=-dynamic.pedestrian_accel_mps2.low,
+        jerk_mps3=jerk.high,
+        lateral_mps=lateral.high,
+        lateral_accel_mps2=min(lateral_accel.high, CHANGING_LANE * grip),
+        walk_speed_mps=walk.high,
+        walk_accel_mps2=walk_accel.high,
+        walk_brake_mps2=-walk_accel.low,
+        heading_rate_radps=turn.high,
     )
-
-
-def _high(interval: Interval | None, default: float) -> float:
-    return default if interval is None else interval.high
 
 
 def emergency_decel_mps2(friction: float) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 from risk_sac.config import Environment, Interval, Odd, Precipitation, Requirement, Scenery
 from risk_sac.errors import OddError
 from risk_sac.records import NO_CONTACT
+from risk_sac.scenario.behaviour import behaving, preset
 from risk_sac.scenario.limits import GRAVITY_MPS2, WET_FRICTION
 from risk_sac.scenario.space import Parameter, SceneSpace
 
@@ -27,6 +28,13 @@ RED_LIGHT_HOLD_S = 1.0
 CARRIAGEWAY_SCALE_M = 2.0  # a car reaches 1.65 m into a road of one lane, and 2.6 m or more into a wider one
 TINY = 1e-6  # in any unit; SUMO refuses a speed of 1e-320
 LEAST_ACCEL_MPS2 = 0.1  # below it an actor that has stopped never starts again
+# Field whose bounds hold to either side → least high end that leaves an actor able to move.
+EITHER_SIDE = {
+    "dynamic.vehicle_jerk_mps3": 1.0,  # braking of 4 m/s² builds up in 4 s
+    "dynamic.vehicle_lateral_speed_mps": 0.0,  # a vehicle may keep to its lane
+    "dynamic.vehicle_lateral_accel_mps2": LEAST_ACCEL_MPS2,
+    "dynamic.pedestrian_turn_radps": 0.1,
+}
 BRAKING_HOLD_S = 0.5  # braking shorter than that is a correction, not an emergency stop
 
 # What every value of a field must lie in; an ODD outside it describes no road on Earth.
@@ -38,10 +46,12 @@ SENSIBLE: dict[str, Interval] = {
     "dynamic.ego_speed_mps": Interval(low=0, high=60),
     "dynamic.vehicle_speed_mps": Interval(low=0, high=60),
     "dynamic.vehicle_accel_mps2": Interval(low=-12, high=12),
+    "dynamic.vehicle_jerk_mps3": Interval(low=0, high=50),
     "dynamic.vehicle_lateral_speed_mps": Interval(low=0, high=1.8),
     "dynamic.vehicle_lateral_accel_mps2": Interval(low=0, high=3),
     "dynamic.pedestrian_speed_mps": Interval(low=0, high=10),
     "dynamic.pedestrian_accel_mps2": Interval(low=-10, high=10),
+    "dynamic.pedestrian_turn_radps": Interval(low=0, high=10),
 }
 
 # Widest values that every family supports if a campaign asks for them; a family's defaults are usual values.
@@ -50,9 +60,7 @@ EXTREME: dict[str, Interval | tuple[str, ...]] = {
     "environment.visibility_m": Interval(low=40, high=2000),
     "environment.precipitation": ("heavy_rain", "none", "rain"),
     "environment.time_of_day": ("day", "night"),
-    "dynamic.vehicle_lateral_speed_mps": Interval(low=0, high=1.8),  # UN R157
-    "dynamic.vehicle_lateral_accel_mps2": Interval(low=0, high=3),
-    "dynamic.pedestrian_speed_mps": Interval(low=0, high=3),  # running
+    **{f"dynamic.{name}": interval for name, interval in preset("extreme").items()},
 }
 
 SIGNAL_OF = {"zebra": "none", "signalised": "fixed_time"}
@@ -63,6 +71,7 @@ def intersect(default: Odd, user: Odd, space: SceneSpace | None = None) -> Odd:
     """The ODD that a family's default and a user's both allow, field by field.
 
     The user's narrows the default, or widens a field of `EXTREME` up to that; a field left out keeps the default's.
+    The default's limits of adversaries are those of the user's behaviour.
 
     Args:
       default: of the family.
@@ -73,7 +82,8 @@ def intersect(default: Odd, user: Odd, space: SceneSpace | None = None) -> Odd:
       OddError: a field of the user's is physically senseless, or leaves nothing of what the family supports.
     """
     check(user)
-    limits = widest(default)
+    dynamic = behaving(default.dynamic, user.dynamic.behaviour)
+    default, limits = default.model_copy(update={"dynamic": dynamic}), widest(default)
     return Odd(
         scenery=_with_their_signals(_intersect_branch("scenery", default, user, limits)),
         environment=_rained_on(_intersect_branch("environment", default, user, limits), user.environment),
@@ -105,14 +115,11 @@ def check(odd: Odd) -> None:
         if interval is not None and not (interval.low <= -LEAST_ACCEL_MPS2 and interval.high >= LEAST_ACCEL_MPS2):
             wanted = f"low <= -{LEAST_ACCEL_MPS2:g} and high >= {LEAST_ACCEL_MPS2:g}"
             raise _error(path, interval, f"{wanted}, so that actors can both brake and accelerate")
-    lateral = odd.dynamic.vehicle_lateral_accel_mps2
-    if lateral is not None and lateral.high < LEAST_ACCEL_MPS2:
-        wanted = f"a high of at least {LEAST_ACCEL_MPS2:g}; a lateral speed of 0 forbids moving"
-        raise _error("dynamic.vehicle_lateral_accel_mps2", lateral, wanted)
-    for path in ("dynamic.vehicle_lateral_speed_mps", "dynamic.vehicle_lateral_accel_mps2"):
+    for path, least in EITHER_SIDE.items():
         interval = field(odd, path)
-        if interval is not None and interval.low > 0:
-            raise _error(path, interval, "a low of 0, since a vehicle may keep to its lane")
+        if interval is not None and (interval.low > 0 or interval.high < least):
+            wanted = f"a low of 0 and a high of at least {least:g}"
+            raise _error(path, interval, wanted, "the bounds hold to either side; a lateral speed of 0 forbids moving")
     for path in paths(odd):
         if field(odd, path) == ():
             raise _error(path, (), "at least one kind, or the field left out")
@@ -232,7 +239,7 @@ def _intersect_branch(branch: str, default: Odd, user: Odd, limits: Odd, space: 
     usual, asked, ours = (getattr(odd, branch) for odd in (default, user, limits))
     for name in type(usual).model_fields:
         theirs, supported = getattr(asked, name), getattr(ours, name)
-        if theirs is None or supported is None:
+        if theirs is None or supported is None or name == "behaviour":
             values[name] = getattr(usual, name) if theirs is None else theirs
             continue
         values[name] = common = _common(supported, theirs)
@@ -305,5 +312,7 @@ def _error(path: str, got: Any, wanted: str, remedy: str = "") -> OddError:
 
 
 def text_of(value: Any) -> str:
-    """An interval or a set, as messages write it."""
+    """A word, an interval or a set, as messages write it."""
+    if isinstance(value, str):
+        return value
     return f"[{value.low:g}, {value.high:g}]" if isinstance(value, Interval) else f"{{{', '.join(value)}}}"

@@ -17,7 +17,7 @@ from risk_sac.scenario.limits import Limits
 from risk_sac.sim.solid import Others, Walker, clip, taper, walks_into
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.sim.vehicle_control import VehicleControl
-from risk_sac.world.types import LATERAL, SPEED, STEP_S, VX, VY, Floats, Frame
+from risk_sac.world.types import LATERAL, SPEED, STEP_S, VX, VY, Frame
 
 TOLERANCE_MPS = 0.02  # SUMO's rounding, divided by the step
 LEAP_MPS = 4.0  # at a corner of a coarsely drawn lane, a body off its middle moves up to 0.3 m more or less in a step
@@ -112,10 +112,11 @@ def shares_of(action: object, size: int) -> list[float]:
 class Adversaries:
     """Adversaries of an episode."""
 
+    slots: NDArray[np.intp]
+
     def __init__(self, family: Family, limits: Limits, frame: Frame) -> None:
         """Starts from the motion in `frame`."""
         f, rows = frame, {id_: row for row, id_ in enumerate(frame.ids)}
-        self._limits = limits
         self._vehicles = {
             id_: VehicleControl(limits, *(float(a[rows[id_]]) for a in (f.speed_mps, f.accel_mps2, f.lateral_mps)))
             for id_ in family.vehicles
@@ -146,22 +147,14 @@ class Adversaries:
         sim.apply(vehicles, walkers)
 
     def rows(self, frame: Frame) -> NDArray[np.intp]:
-        """Rows of the frame that hold adversaries."""
+        """Rows of the frame that hold adversaries; `slots` are then their places in the family's order."""
         if frame.ids is not self._ids:
             self._ids = frame.ids
             present = [id_ for id_ in self._order if id_ in frame.ids]
             self._rows = np.array([frame.ids.index(id_) for id_ in present], dtype=np.intp)
             self._driven = [(frame.ids.index(id_), self._vehicles[id_]) for id_ in present if id_ in self._vehicles]
-            vehicle_limit = max(self._limits.accel_mps2, self._limits.brake_mps2)
-            walker_limit = max(self._limits.walk_accel_mps2, self._limits.walk_brake_mps2)
-            limits = [vehicle_limit if id_ in self._vehicles else walker_limit for id_ in present]
-            self._accel_limits = np.array(limits)
+            self.slots = np.array([self._order.index(id_) for id_ in present], dtype=np.intp)
         return self._rows
-
-    def accel_limits(self, frame: Frame) -> Floats:
-        """Greatest absolute acceleration of each actor in `rows`, m/s²."""
-        self.rows(frame)
-        return self._accel_limits
 
     def keep_limits(self, frame: Frame) -> bool:
         """Whether every adversary vehicle drove as commanded, and so inside its limits.

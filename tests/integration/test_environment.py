@@ -111,6 +111,9 @@ NARROWER = {
     "dynamic.vehicle_lateral_accel_mps2": {"low": 0, "high": 0.3},
     "dynamic.pedestrian_speed_mps": {"low": 0, "high": 0.5},
     "dynamic.pedestrian_accel_mps2": {"low": -0.3, "high": 0.3},
+    "dynamic.pedestrian_turn_radps": {"low": 0, "high": 0.2},
+    "dynamic.vehicle_jerk_mps3": {"low": 0, "high": 3},
+    "dynamic.behaviour": "emergency",
 }
 SEEDS = range(4)
 REFUSED = ("scenery.lanes", "scenery.speed_limit_mps", "dynamic.actor_kinds")

@@ -15,11 +15,11 @@ from risk_sac.cli.campaigns.output import add_newest_command, chosen_id, figures
 from risk_sac.cli.console import OK, Board, columns, number, print_answer, say_adjustments
 from risk_sac.cli.flags import (
     add_campaign_flags,
-    add_ego_flag,
     add_place_flags,
     add_prior_flag,
+    add_scene_flags,
     campaign_flags,
-    ego_flag,
+    scene_flags,
 )
 from risk_sac.cli.parser import Commands, Parser, add_command
 from risk_sac.client import Campaign, Client, Episode, Results
@@ -47,7 +47,7 @@ def add(commands: Commands) -> None:
         example="campaigns submit --families low --episodes 50 --watch --max-pcr 0.1",
     )
     add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
-    add_ego_flag(parser)
+    add_scene_flags(parser)
     add_prior_flag(parser, "the id of an earlier campaign")
     add_place_flags(parser, MAP_UPLOADED)
     service = parser.group("service")
@@ -214,7 +214,7 @@ def _submit(options: argparse.Namespace) -> int:
         if getattr(options, name) is not None and not options.watch:
             raise ConfigError(f"--{name.replace('_', '-')}", "it without --watch", "both")
     bounds = _prepare(options)
-    flags = campaign_flags(options, SEEDS) | ego_flag(options)
+    flags = campaign_flags(options, SEEDS) | scene_flags(options)
     flags |= {name: getattr(options, name) for name in ("label", "network", "pattern", "place", "places")}
     spec = read_posted(options.spec, flags)
     if isinstance(spec, CampaignSpec):

@@ -37,8 +37,7 @@ def dual_step(dual_variable: float, cost: float, config: LagrangianConfig) -> fl
     mean tells what the policies of the last 100,000 steps cost, and RPER's draws favour costly ones; λ is to follow
     the policy that acts now, and it averages over the last 1/η_λ steps by itself.
 
-    Deviation: λ is capped at λ_max, which the paper does not do, so that a burst of cost cannot drown
-    the risk reward for good.
+    Deviation: λ is capped at λ_max, which the paper does not do, so that it stays finite where no policy keeps d.
 
     Args:
       dual_variable: λ ≥ 0.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, RunMethod, method_of
-from risk_sac.env.observation_layout import PER_ADVERSARY, PER_EGO, observation_size
+from risk_sac.env.observation_layout import MOTION_PER_ADVERSARY, PER_ADVERSARY, PER_EGO, observation_size
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.records import Collision, Violation
@@ -38,6 +38,7 @@ class PolicyLayout:
     adversaries: tuple[str, ...]
     scene: tuple[tuple[str, float, float], ...]  # name, least and greatest value of each parameter
     requirements: tuple[str, ...]
+    per_adversary: int = PER_ADVERSARY  # entries of each adversary; its motion comes first
 
     @classmethod
     def of(cls, problem: Problem) -> "PolicyLayout":
@@ -49,7 +50,8 @@ class PolicyLayout:
     @property
     def observation_size(self) -> int:
         """Entries of an observation."""
-        return observation_size(len(self.adversaries), len(self.scene), len(self.requirements))
+        size = observation_size(len(self.adversaries), len(self.scene), len(self.requirements))
+        return size - (PER_ADVERSARY - self.per_adversary) * len(self.adversaries)
 
     @property
     def action_size(self) -> int:
@@ -93,6 +95,7 @@ def write_policy(path: Path, pretrained: PretrainedPolicy) -> None:
         "adversaries": layout.adversaries,
         "scene": layout.scene,
         "requirements": layout.requirements,
+        "per_adversary": layout.per_adversary,
         "goals": pretrained.goals,
         "temperature": pretrained.temperature,
         **pretrained.card,
@@ -114,7 +117,8 @@ def read_policy(path: Path) -> PretrainedPolicy:
             tuple(arrays[f"{name}-{i}"].astype(np.float32) for i in range(count)) for name in ("policy", "critics")
         )
         scene = tuple((str(name), float(low), float(high)) for name, low, high in meta.pop("scene"))
-        layout = PolicyLayout(tuple(meta.pop("adversaries")), scene, tuple(meta.pop("requirements")))
+        per_adversary = int(meta.pop("per_adversary", MOTION_PER_ADVERSARY))  # the shipped ones know motion alone
+        layout = PolicyLayout(tuple(meta.pop("adversaries")), scene, tuple(meta.pop("requirements")), per_adversary)
         family, goals, temperature = meta.pop("family"), tuple(meta.pop("goals")), float(meta.pop("temperature"))
         seen, acted = layout.observation_size + GOALS + 1, layout.action_size
         _check(policy, (1, seen, 2 * acted))
@@ -209,9 +213,10 @@ def _translation(shipped: PolicyLayout, own: PolicyLayout) -> tuple[NDArray[np.f
     constant = np.zeros(shipped.observation_size, np.float32)
     for slot, name in enumerate(shipped.adversaries):
         if name in own.adversaries:
-            at, source = slot * PER_ADVERSARY, own.adversaries.index(name) * PER_ADVERSARY
-            matrix[at : at + PER_ADVERSARY, source : source + PER_ADVERSARY] = np.eye(PER_ADVERSARY)
-    at, source = len(shipped.adversaries) * PER_ADVERSARY, len(own.adversaries) * PER_ADVERSARY
+            at, source = slot * shipped.per_adversary, own.adversaries.index(name) * own.per_adversary
+            known_entries = min(shipped.per_adversary, own.per_adversary)
+            matrix[at : at + known_entries, source : source + known_entries] = np.eye(known_entries)
+    at, source = len(shipped.adversaries) * shipped.per_adversary, len(own.adversaries) * own.per_adversary
     matrix[at : at + PER_EGO, source : source + PER_EGO] = np.eye(PER_EGO)
     at, source = at + PER_EGO, source + PER_EGO
     known = {name: (source + i, low, high) for i, (name, low, high) in enumerate(own.scene)}

@@ -1,17 +1,28 @@
 """Catalogues: families, methods, formats, egos."""
 
 from collections.abc import Mapping
-from typing import Literal, TypeVar
+from typing import Literal, TypeVar, get_args
 
 from fastapi import APIRouter
 from pydantic import BaseModel
 
-from risk_sac.config import METHODS, EgoConfig, FamilyName, Method, MethodName, Odd, Requirement
+from risk_sac.config import (
+    METHODS,
+    Behaviour,
+    DynamicElements,
+    EgoConfig,
+    FamilyName,
+    Method,
+    MethodName,
+    Odd,
+    Requirement,
+)
 from risk_sac.egos.defects.catalogue import DEFECTS, DefectKind
 from risk_sac.egos.registry import cards
 from risk_sac.failures.export.formats import FORMATS, FormatName
 from risk_sac.records import Record
 from risk_sac.risk.signals import SIGNALS
+from risk_sac.scenario.behaviour import behaving
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import requirements_from_odd, widest
 
@@ -66,6 +77,8 @@ class FamilyEntry(Record):
     adversaries: list[str]
     odd: Odd
     """Default operational design domain; a campaign's own narrows it."""
+    behaviours: dict[Behaviour, DynamicElements]
+    """The default's dynamic elements under each behaviour of a campaign's ODD."""
     odd_limits: Odd
     """How far a campaign's own may go: a few fields may be wider than the default, as far as this."""
     requirements: list[Requirement]
@@ -185,6 +198,7 @@ def list_families() -> Families:
             parameters=[_told(SceneParameter, parameter) for parameter in family.space.parameters],
             adversaries=list(family.adversaries),
             odd=family.odd,
+            behaviours={each: behaving(family.odd.dynamic, each) for each in get_args(Behaviour)},
             odd_limits=widest(family.odd),
             requirements=list(requirements_from_odd(family.odd, EgoConfig().response_s)),
         )

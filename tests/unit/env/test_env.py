@@ -135,8 +135,9 @@ def test_a_scene_is_refused_by_what_it_has_come_to_at_the_release(low, changes, 
 
 @each_family
 def test_hardly_a_random_scene_has_bodies_that_overlap_before_the_release(family):
-    space, generator = FAMILIES[family].space, np.random.default_rng(5)
+    generator = np.random.default_rng(5)
     with closing(make_default(family)) as env:
+        space = env.problem.space
         reasons = [refusal(env, space.from_unit(generator.random(space.dimension))) for _ in range(100)]
     assert reasons.count("initial_overlap") <= 1
     assert sum(reason is not None for reason in reasons) <= 10

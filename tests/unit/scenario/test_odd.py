@@ -1,10 +1,15 @@
+from itertools import pairwise
+from typing import get_args
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.config import DynamicElements, Environment, Interval, Odd, Scenery
+from risk_sac.config import Behaviour, DynamicElements, Environment, Interval, Odd, Scenery
 from risk_sac.errors import OddError
 from risk_sac.risk.stl import Monitor
+from risk_sac.scenario.behaviour import BOUNDS, preset
+from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS, intersect, requirements_from_odd
 
 
@@ -26,9 +31,7 @@ DEFAULT = Odd(
         actor_kinds=("pedestrian", "vehicle"),
         ego_speed_mps=interval(0, 15),
         vehicle_speed_mps=interval(0, 20),
-        vehicle_accel_mps2=interval(-8, 3),
-        pedestrian_speed_mps=interval(0, 4),
-        pedestrian_accel_mps2=interval(-4, 3),
+        **preset("ordinary"),
     ),
 )
 
@@ -57,6 +60,29 @@ def test_intersection_is_the_set_of_common_values(bounds):
         assert intersect(DEFAULT, user).dynamic.vehicle_speed_mps == interval(low, min(high, 20))
 
 
+@pytest.mark.parametrize("behaviour", get_args(Behaviour))
+def test_a_behaviour_sets_the_limits_that_the_user_leaves_out(behaviour):
+    stated = DynamicElements(behaviour=behaviour, vehicle_accel_mps2=interval(-6, 3))
+    both = intersect(DEFAULT, Odd(dynamic=stated)).dynamic
+    assert both.behaviour == behaviour
+    assert both.vehicle_accel_mps2 == interval(-6, 3)  # beyond the ordinary -4 to 2
+    for field in BOUNDS.keys() - {"vehicle_accel_mps2"}:
+        assert getattr(both, field) == preset(behaviour)[field]
+
+
+def test_each_behaviour_contains_the_one_before_it():
+    for bounds in BOUNDS.values():
+        for narrow, wide in pairwise((bounds.ordinary, bounds.emergency, bounds.extreme)):
+            assert wide[0] <= narrow[0] <= narrow[1] <= wide[1]
+
+
+def test_emergency_limits_of_a_dry_road():
+    limits = limits_from_odd(intersect(DEFAULT, Odd(dynamic=DynamicElements(behaviour="emergency"))), 1.0)
+    assert (limits.brake_mps2, limits.accel_mps2, limits.jerk_mps3) == (8.0, 3.5, 20.0)
+    assert (limits.lateral_mps, limits.lateral_accel_mps2) == (1.2, 1.5)
+    assert (limits.walk_speed_mps, limits.walk_disc_mps2, limits.heading_rate_radps) == (2.0, 1.5, 2.0)
+
+
 @pytest.mark.parametrize(
     ("part", "field", "value"),
     [
@@ -65,6 +91,9 @@ def test_intersection_is_the_set_of_common_values(bounds):
         ("dynamic", "vehicle_accel_mps2", interval(1, 3)),  # no braking
         ("dynamic", "vehicle_lateral_speed_mps", interval(0, 1.9)),
         ("dynamic", "vehicle_lateral_accel_mps2", interval(0, 0)),
+        ("dynamic", "vehicle_jerk_mps3", interval(0, 0.5)),
+        ("dynamic", "vehicle_jerk_mps3", interval(2, 10)),
+        ("dynamic", "pedestrian_turn_radps", interval(0, 0)),
         ("scenery", "crossing_types", ("signalised",)),
         ("scenery", "signal_types", ()),
         ("scenery", "lanes", interval(0, 2)),

@@ -4,12 +4,13 @@ import math
 from dataclasses import replace
 from itertools import pairwise
 from random import Random
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from risk_sac.config import DynamicElements, Interval, Odd
+from risk_sac.config import Behaviour, DynamicElements, Odd
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import GRAVITY_MPS2, Limits, limits_from_odd
 from risk_sac.scenario.odd import intersect
@@ -26,9 +27,13 @@ LIMITS = Limits(
     accel_mps2=3.5,
     brake_mps2=8.0,
     grip_mps2=9.3,
+    jerk_mps3=20.0,
+    lateral_mps=1.2,
+    lateral_accel_mps2=1.5,
     walk_speed_mps=2.0,
     walk_accel_mps2=1.5,
     walk_brake_mps2=1.5,
+    heading_rate_radps=2.0,
 )
 EPS = 1e-9
 WIDE = LateralRoom(left_m=50.0, right_m=50.0)
@@ -58,7 +63,7 @@ def sequence(seed: int) -> Actions:
 sequences = st.integers(0, 2**32).map(sequence)
 
 
-def limits_on(friction: float, **dynamic: Interval) -> Limits:
+def limits_on(friction: float, **dynamic: Any) -> Limits:
     odd = intersect(FAMILIES["dense"].odd, Odd(dynamic=DynamicElements(**dynamic)))
     return limits_from_odd(odd, friction)
 
@@ -77,9 +82,7 @@ def drive(
     return control, commands, stations, offsets
 
 
-USUAL: dict[str, Interval] = {}
-WIDEST = {"vehicle_lateral_speed_mps": Interval(low=0, high=1.8), "vehicle_lateral_accel_mps2": Interval(low=0, high=3)}
-odds = st.sampled_from((USUAL, WIDEST))
+odds = st.sampled_from([{"behaviour": behaviour} for behaviour in get_args(Behaviour)])
 frictions, radii, sides = st.floats(0.3, 1.0), st.floats(7, 40), st.booleans()
 
 

@@ -166,8 +166,8 @@ def test_a_corner_turns_the_body_over_its_own_length_by_hand():
 
 def test_a_bend_is_approached_by_hand():
     limits = Limits(
-        speed_mps=20, accel_mps2=3, brake_mps2=8, grip_mps2=5, lateral_accel_mps2=1,
-        walk_speed_mps=2, walk_accel_mps2=1.5, walk_brake_mps2=1.5,
+        speed_mps=20, accel_mps2=3, brake_mps2=8, grip_mps2=5, jerk_mps3=20, lateral_mps=1.2, lateral_accel_mps2=1,
+        walk_speed_mps=2, walk_accel_mps2=1.5, walk_brake_mps2=1.5, heading_rate_radps=2,
     )  # fmt: skip
     assert limits.cornering_mps2 == pytest.approx(3.0)
     assert limits.approach_mps2 == pytest.approx(3.0)  # 3² + (3 + 1)² = 5²

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from risk_sac.config import RunSpec
-from risk_sac.env.observation_layout import PER_ADVERSARY, PER_EGO
+from risk_sac.env.observation_layout import MOTION_PER_ADVERSARY, PER_ADVERSARY, PER_EGO
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.search.frozen_policy import respond
@@ -63,6 +63,16 @@ def test_other_files_are_refused_in_one_line(tmp_path, pretrained, damage):
     with pytest.raises(ConfigError, match=r"^prior: .*low-policy.npz") as raised:
         read_policy(path)
     assert "\n" not in str(raised.value)
+
+
+def test_a_policy_that_knows_motion_alone_does_the_same_whatever_else_is_observed(layout):
+    known = replace(layout, per_adversary=MOTION_PER_ADVERSARY)
+    pretrained = pretrained_policy(known, GOAL_NAMES)
+    seen, rest = observed(layout), PER_ADVERSARY * len(layout.adversaries)
+    rows = seen[:rest].reshape(-1, PER_ADVERSARY)
+    motion = np.concatenate((rows[:, :MOTION_PER_ADVERSARY].ravel(), seen[rest:]))
+    got = respond(plain(Folded.of(pretrained, layout).policy), seen)
+    np.testing.assert_allclose(got, respond(plain(pretrained.policy), with_goal(motion, 0)), atol=1e-4)
 
 
 def test_networks_folded_into_their_own_layout_do_the_same(pretrained, layout):

@@ -31,6 +31,7 @@ export function Header({ campaign, again }: { campaign: Campaign; again: () => v
           {egoWords(campaign.ego)}
           {spec.ego?.defects?.length ? `, with ${spec.ego.defects.join(", ")}` : ""}
         </Fact>
+        <Fact name="Behaviour">{spec.odd?.dynamic?.behaviour ?? "ordinary"}</Fact>
         <Fact name={spec.seeds.length > 1 ? "Seeds" : "Seed"}>{spec.seeds.join(", ")}</Fact>
         <Fact name="Posted">{moment(campaign.created_at)}</Fact>
       </dl>

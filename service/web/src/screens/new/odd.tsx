@@ -1,7 +1,7 @@
 /** The operational design domain: a range for each of its fields, within what the chosen families support. */
 
 import { useField } from "./form";
-import { Wrongs } from "./field";
+import { SchemaField, Wrongs } from "./field";
 import { apart, hull, same, scaleOf, type Range } from "./range";
 import { RangeInput } from "./range_input";
 import type { Field, Shape } from "./schema";
@@ -10,6 +10,8 @@ import { pathText, type Path } from "./values";
 
 type Family = Body<"FamilyEntry">;
 type Which = "odd" | "odd_limits";
+type Behaviour = keyof Family["behaviours"];
+const BEHAVIOUR: Path = ["odd", "dynamic", "behaviour"];
 
 export function OddFields({ shape, families }: { shape: Shape; families: readonly Family[] }) {
   if (shape.kind !== "object") return null;
@@ -22,6 +24,7 @@ export function OddFields({ shape, families }: { shape: Shape; families: readonl
           {branch.shape.kind === "object" &&
             branch.shape.fields.map((field) => {
               const path = ["odd", branch.name, field.name];
+              if (field.shape.kind === "choice") return <SchemaField key={field.name} field={field} path={path} />;
               if (field.shape.kind === "list") return <SetField key={field.name} field={field} path={path} families={families} />;
               return <RangeField key={field.name} field={field} path={path} families={families} />;
             })}
@@ -39,7 +42,7 @@ interface OfFamilies {
 
 function RangeField({ field, path, families }: OfFamilies) {
   const { id, value, change, wrong } = useField<{ low: number; high: number } | null>(path, true);
-  const usual = each<Range>(families, path, "odd");
+  const usual = each<Range>(behaving(families, useField<Behaviour>(BEHAVIOUR).value), path, "odd");
   const preset = hull(usual.map(([, range]) => range));
   const scale = scaleOf(hull(each<Range>(families, path, "odd_limits").map(([, range]) => range)), field.name === "lanes");
   if (usual.length === 0) return null;
@@ -76,6 +79,11 @@ function RangeField({ field, path, families }: OfFamilies) {
       </p>
     </div>
   );
+}
+
+/** The families with the defaults of a behaviour, which their own are where it is not known yet. */
+function behaving(families: readonly Family[], behaviour: Behaviour): Family[] {
+  return families.map((family) => ({ ...family, odd: { ...family.odd, dynamic: family.behaviours[behaviour] ?? family.odd.dynamic } }));
 }
 
 /** What the default is; by family where they differ. */

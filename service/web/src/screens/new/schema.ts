@@ -101,7 +101,7 @@ function resolved(schema: Schema, schemas: Record<string, Schema>): Schema {
   return resolved(found, schemas);
 }
 
-const UNITS: Record<string, string> = { mps: "m/s", mps2: "m/s²", m: "m", s: "s", rad: "rad" };
+const UNITS: Record<string, string> = { mps: "m/s", mps2: "m/s²", mps3: "m/s³", radps: "rad/s", m: "m", s: "s", rad: "rad" };
 const LONG: Record<string, string> = { accel: "acceleration", cpu: "CPU time", odd: "ODD", ttc: "TTC", rss: "RSS", td: "TD", sac: "SAC", ddpg: "DDPG" };
 
 /** `reaction_time_s` -> "Reaction time" and "s"; `ttc_scale_s` -> "TTC scale" and "s". */

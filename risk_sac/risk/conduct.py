@@ -1,0 +1,250 @@
+"""Soft realism cost: how unlikely it is that people behave as the adversaries do, step by step.
+
+Every scale is absolute, so that the same motion costs the same under every preset of limits. A scale with a published
+distribution in `risk_sac.risk.driving` runs from 0 at a value that 1 of 100 road users exceeds to 1 at one that 1 of
+10,000 exceeds; the others are choices.
+
+A policy can foresee its cost only if it knows what the cost remembers: `ADVERSARY_MEMORY` numbers of each adversary,
+which the observation holds.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from risk_sac.risk.driving import FEATURES
+from risk_sac.world.jit import compiled
+from risk_sac.world.types import (
+    ACCEL,
+    HEADING,
+    LATERAL,
+    LENGTH,
+    OFFSET,
+    SPEED,
+    STEP_S,
+    VX,
+    VY,
+    WIDTH,
+    Floats,
+    Kind,
+    X,
+    Y,
+)
+
+ORDINARY, IMPLAUSIBLE = 1e-2, 1e-4  # tail probabilities at which a cost begins, and at which it is 1
+
+PEDESTRIAN = int(Kind.PEDESTRIAN)  # compiled code knows no enums of int8
+
+# Rows of the memory, one column for each adversary.
+PEDAL = 0  # which pedal was pressed last: 1 gas, -1 brake, 0 none yet
+CHANGES = 1  # changes between the pedals; fades with CHANGES_S
+LEVEL = 2  # s, how long it has worked to stay level with a vehicle, or has been close beside one
+OVER = 3  # s, how long it has kept to a line or over it
+IDLE = 4  # s, how long it has stood in the way without a reason
+HELD = 5  # m/s², mean acceleration of about the last HELD_S
+ADVERSARY_MEMORY = 6
+MEMORY_SCALE = np.array([1.0, 3.0, 5.0, 5.0, 5.0, 8.0])  # of each row in an observation
+
+CHANGES_S = 10.0  # choice: as long as the changes of pedal are counted over by an analyst
+HELD_S = 0.5  # choice: SUMO's drivers touch a pedal for a step or two
+PEDAL_MPS2, STEPS_OUT_MPS2 = 1.0, 0.5  # choice: from there a pedal is pressed, and a pedestrian starts or stops
+FORGET = 2.0  # choice: timers run back twice as fast as they ran up, so that a short swerve does not reset them
+
+
+def _quantile(name: str, probability: float) -> float:
+    """Finds by bisection the value of a published feature that has this tail probability."""
+    feature = FEATURES[name]
+    assert feature.spread is not None
+    tail = feature.spread.above if feature.unlikely == "above" else feature.spread.below
+    low, high = (0.0, 100.0) if feature.unlikely == "above" else (100.0, 0.0)  # from likely to unlikely
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if tail(middle) > probability else (low, middle)
+    return (low + high) / 2
+
+
+def _scale(name: str) -> tuple[float, float]:
+    return _quantile(name, ORDINARY), _quantile(name, IMPLAUSIBLE)
+
+
+BRAKING_FREE, BRAKING_FULL = _scale("braking")  # 5.8 to 8.4 m/s²
+ACCELERATION_FREE, ACCELERATION_FULL = _scale("acceleration")  # 3.6 to 4.1 m/s²
+GAP_FREE, GAP_FULL = _scale("lane_change_gap")  # 1.9 to 0.8 m
+HEADWAY_FREE, HEADWAY_FULL = _scale("lane_change_headway")  # 0.25 to 0.11 s
+WALKING_FREE, WALKING_FULL = _scale("walking_speed")  # 1.9 to 2.3 m/s
+# Choices, where nothing is published: what SUMO's drivers stay below costs nothing.
+CHANGES_FREE, CHANGES_FULL = 1.8, 3.5  # in 10 s
+LATERAL_FREE, LATERAL_FULL = 1.0, 1.8  # m/s; UN R157's fastest cut-in
+LEVEL_FREE, LEVEL_FULL = 1.5, 4.0  # s
+OVER_FREE, OVER_FULL = 0.5, 2.0  # s
+IDLE_FREE, IDLE_FULL = 2.0, 5.0  # s
+TOWARDS_FREE, TOWARDS_FULL = 0.5, 0.9  # cosine of the walking direction with the way back to the car
+
+OVERLOOKS = 0.5  # choice: the most that a cut-in costs, since drivers overlook cars in the next lane
+NEAR_LINE_M = 0.15  # from the body's side to the line
+CALM_MPS = 0.5  # slower across, a vehicle is not changing lanes
+LEVEL_MPS, LEVEL_ASIDE_M = 1.0, 2.5  # difference of speeds, and room between the bodies, of vehicles that are level
+CLOSE_ASIDE_M, WORKING_MPS2 = 1.0, 0.5  # cars in lanes side by side leave 1.5 m; cruising takes no acceleration
+MOVING_MPS = 2.0
+SAME_WAY_COS = 0.9
+STANDING_MPS = 0.5
+CLEAR_M = 12.0  # free way ahead that gives no reason to stand
+AHEAD_M = 30.0  # how far ahead of the car a pedestrian is in its way
+BESIDE_M = 1.0  # closer than that, a pedestrian beside the car walks into it
+WALKING_MPS = 0.3
+GO = ord("G")
+
+# Terms of the cost.
+PEDALS, ACCELERATION, LATERAL_SPEED, OVER_LINE, PACING, CUT_IN, STANDING, WALKING, TOWARDS_CAR = range(9)
+TERMS = 9
+
+
+@compiled
+def ramp(value: float, free: float, full: float) -> float:
+    """Computes (value - free) / (full - free), between 0 and 1; `full` may be the smaller one."""
+    return min(max((value - free) / (full - free), 0.0), 1.0)
+
+
+@compiled
+def _run(timer_s: float, on: bool) -> float:
+    return timer_s + STEP_S if on else max(timer_s - FORGET * STEP_S, 0.0)
+
+
+@compiled
+def conduct_cost(
+    rows: NDArray[np.intp],
+    slots: NDArray[np.intp],
+    kind: NDArray[np.int8],
+    link: NDArray[np.uint8],
+    state: Floats,
+    memory: Floats,
+    lane_width_m: float,
+) -> float:
+    """Soft realism cost of a step, C_soft(s, a) of (5).
+
+    C_soft = max over adversaries and terms of ramp(value of the feature)
+
+    Choice: the worst adversary and its worst feature count, not a mean, or one could behave as it liked beside others
+    that do nothing.
+
+    Args:
+      rows: columns of the adversaries in `state`.
+      slots: their columns in `memory`.
+      kind: `n`.
+      link: `n`, SUMO's letter of the signal ahead of each actor.
+      state: `rows x n`, after the step.
+      memory: `ADVERSARY_MEMORY x adversaries`; updated.
+      lane_width_m: of all lanes.
+
+    Returns:
+      In [0, 1]; 0 without adversaries.
+    """
+    terms = conduct_terms(rows, slots, kind, link, state, memory, lane_width_m)
+    return terms.max() if len(rows) else 0.0
+
+
+@compiled
+def conduct_terms(
+    rows: NDArray[np.intp],
+    slots: NDArray[np.intp],
+    kind: NDArray[np.int8],
+    link: NDArray[np.uint8],
+    state: Floats,
+    memory: Floats,
+    lane_width_m: float,
+) -> Floats:
+    """Computes every term of `conduct_cost`, `adversaries x TERMS`, each in [0, 1]; updates the memory."""
+    terms = np.zeros((len(rows), TERMS))
+    for k in range(len(rows)):
+        row, slot = rows[k], slots[k]
+        if kind[row] == PEDESTRIAN:
+            _pedestrian(row, state, memory[:, slot], terms[k])
+        else:
+            _vehicle(row, kind, link, state, memory[:, slot], lane_width_m, terms[k])
+    return terms
+
+
+@compiled
+def _count_changes(accel: float, pressed: float, memory: Floats) -> None:
+    memory[HELD] += (accel - memory[HELD]) * STEP_S / HELD_S
+    pedal = 1.0 if memory[HELD] > pressed else -1.0 if memory[HELD] < -pressed else 0.0
+    memory[CHANGES] *= math.exp(-STEP_S / CHANGES_S)
+    if pedal != 0.0:
+        if pedal == -memory[PEDAL]:
+            memory[CHANGES] += 1.0
+        memory[PEDAL] = pedal
+
+
+@compiled
+def _vehicle(
+    row: int,
+    kind: NDArray[np.int8],
+    link: NDArray[np.uint8],
+    state: Floats,
+    memory: Floats,
+    lane_width_m: float,
+    terms: Floats,
+) -> None:
+    accel, speed, lateral = state[ACCEL, row], state[SPEED, row], state[LATERAL, row]
+    _count_changes(accel, PEDAL_MPS2, memory)
+    to_line = lane_width_m / 2 - abs(state[OFFSET, row]) - state[WIDTH, row] / 2
+    moves, changes_lane = speed > MOVING_MPS, abs(lateral) > CALM_MPS
+    cos, sin = math.cos(state[HEADING, row]), math.sin(state[HEADING, row])
+    level, paces, clear = False, False, True
+    for other in range(state.shape[1]):
+        if other == row:
+            continue
+        dx, dy = state[X, other] - state[X, row], state[Y, other] - state[Y, row]
+        along, across = dx * cos + dy * sin, dy * cos - dx * sin
+        half_m = (state[LENGTH, row] + state[LENGTH, other]) / 2
+        half_width = (state[WIDTH, row] + state[WIDTH, other]) / 2
+        if half_m - 1.0 < along < half_m + CLEAR_M and abs(across) < half_width + CLEAR_M / 2:
+            clear = False
+        same_way = math.cos(state[HEADING, other] - state[HEADING, row]) > SAME_WAY_COS
+        aside = abs(across) - half_width
+        if kind[other] == PEDESTRIAN or not same_way or aside > LEVEL_ASIDE_M or along > half_m:
+            continue
+        behind = -along - half_m  # negative while the two are side by side
+        if behind < 0.0 and moves and abs(state[SPEED, other] - speed) < LEVEL_MPS:
+            level = True
+            paces = paces or abs(accel) > WORKING_MPS2 or aside < CLOSE_ASIDE_M
+        towards = lateral if across > 0.0 else -lateral
+        if to_line < 0.0 and towards > CALM_MPS and state[SPEED, other] > MOVING_MPS and aside > -half_width / 2:
+            near = max(ramp(behind, GAP_FREE, GAP_FULL), ramp(behind / state[SPEED, other], HEADWAY_FREE, HEADWAY_FULL))
+            terms[CUT_IN] = max(terms[CUT_IN], OVERLOOKS * near)
+    memory[OVER] = _run(memory[OVER], moves and to_line < NEAR_LINE_M and not changes_lane)
+    if paces or not level:  # two that cruise side by side do not pace each other
+        memory[LEVEL] = _run(memory[LEVEL], paces)
+    memory[IDLE] = _run(memory[IDLE], speed < STANDING_MPS and clear and (link[row] == 0 or link[row] == GO))
+    terms[PEDALS] = ramp(memory[CHANGES], CHANGES_FREE, CHANGES_FULL)
+    terms[ACCELERATION] = max(
+        ramp(-accel, BRAKING_FREE, BRAKING_FULL), ramp(accel, ACCELERATION_FREE, ACCELERATION_FULL)
+    )
+    terms[LATERAL_SPEED] = ramp(abs(lateral), LATERAL_FREE, LATERAL_FULL)
+    terms[OVER_LINE] = ramp(memory[OVER], OVER_FREE, OVER_FULL)
+    terms[PACING] = ramp(memory[LEVEL], LEVEL_FREE, LEVEL_FULL)
+    terms[STANDING] = ramp(memory[IDLE], IDLE_FREE, IDLE_FULL)
+
+
+@compiled
+def _pedestrian(row: int, state: Floats, memory: Floats, terms: Floats) -> None:
+    speed = state[SPEED, row]
+    _count_changes(state[ACCEL, row], STEPS_OUT_MPS2, memory)
+    cos, sin = math.cos(state[HEADING, 0]), math.sin(state[HEADING, 0])
+    dx, dy = state[X, row] - state[X, 0], state[Y, row] - state[Y, 0]
+    ahead, aside = dx * cos + dy * sin, dy * cos - dx * sin
+    half_m, half_width = state[LENGTH, 0] / 2, state[WIDTH, 0] / 2
+    to_front, to_side = ahead - half_m, abs(aside) - half_width
+    in_way = 0.0 < to_front < AHEAD_M and to_side < half_width / 2 and state[SPEED, 0] > STANDING_MPS
+    memory[IDLE] = _run(memory[IDLE], in_way and speed < WALKING_MPS)
+    terms[PEDALS] = ramp(memory[CHANGES], CHANGES_FREE, CHANGES_FULL)
+    terms[WALKING] = ramp(speed, WALKING_FREE, WALKING_FULL)
+    terms[STANDING] = ramp(memory[IDLE], IDLE_FREE, IDLE_FULL)
+    if speed < WALKING_MPS:
+        return
+    if in_way:
+        terms[TOWARDS_CAR] = ramp(-math.cos(state[HEADING, row] - state[HEADING, 0]), TOWARDS_FREE, TOWARDS_FULL)
+    into_side = (state[VY, row] * cos - state[VX, row] * sin) * (-1.0 if aside > 0.0 else 1.0)
+    if abs(ahead) < half_m and 0.0 <= to_side < BESIDE_M and into_side > STANDING_MPS:
+        terms[TOWARDS_CAR] = 1.0 - to_side / BESIDE_M

@@ -1,0 +1,181 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from risk_sac.env.observation_layout import MOTION_PER_ADVERSARY, PER_ADVERSARY
+from risk_sac.risk import conduct
+from risk_sac.risk.conduct import (
+    ACCELERATION,
+    ADVERSARY_MEMORY,
+    CUT_IN,
+    LATERAL_SPEED,
+    MEMORY_SCALE,
+    OVER_LINE,
+    PACING,
+    PEDALS,
+    STANDING,
+    TOWARDS_CAR,
+    WALKING,
+    conduct_cost,
+    conduct_terms,
+)
+from risk_sac.risk.driving import FEATURES
+from risk_sac.world import types
+from risk_sac.world.types import Kind
+
+LANE_M = 3.3
+EGO = {"speed": 12.0}
+
+
+def state_of(*bodies: dict[str, float]) -> np.ndarray:
+    """Columns of a frame; a body is a car on the x axis that drives along it unless it says otherwise."""
+    state = np.zeros((11, len(bodies)))
+    for i, body in enumerate(bodies):
+        usual = {"length": 4.6, "width": 1.8} | body
+        for name, value in usual.items():
+            state[getattr(types, name.upper()), i] = value
+    return state
+
+
+class Played:
+    """One adversary beside an ego, in column 1, and what the cost remembers of it."""
+
+    def __init__(self, kind: Kind = Kind.VEHICLE) -> None:
+        self.memory = np.zeros((ADVERSARY_MEMORY, 1))
+        self.kind = np.array([Kind.VEHICLE, kind], dtype=np.int8)
+
+    def step(
+        self, other: dict[str, float], ego: dict[str, float] = EGO, times: int = 1, link: str = "\0"
+    ) -> np.ndarray:
+        state = state_of(ego, other)
+        links = np.array([0, ord(link)], dtype=np.uint8)
+        for _ in range(times):
+            terms = conduct_terms(np.array([1]), np.array([0]), self.kind, links, state, self.memory, LANE_M)
+        return terms[0]
+
+
+FAR = {"x": 100.0, "speed": 12.0}
+
+
+@pytest.mark.parametrize(("name", "free"), [("braking", conduct.BRAKING_FREE), ("walking_speed", conduct.WALKING_FREE)])
+def test_a_published_scale_begins_where_1_of_100_goes_and_ends_where_1_of_10_000_goes(name, free):
+    assert FEATURES[name].spread.above(free) == pytest.approx(1e-2, rel=1e-3)
+
+
+def test_braking_costs_by_its_own_scale_whatever_the_limits():
+    half_way = (conduct.BRAKING_FREE + conduct.BRAKING_FULL) / 2
+    assert Played().step(FAR | {"accel": -4.0})[ACCELERATION] == 0.0
+    assert Played().step(FAR | {"accel": -half_way})[ACCELERATION] == pytest.approx(0.5)
+    assert Played().step(FAR | {"accel": -9.0})[ACCELERATION] == 1.0
+
+
+def pedals(swings: int) -> float:
+    """The term after so many changes between 2 m/s² and -4 m/s², a second each."""
+    played = Played()
+    for swing in range(swings + 1):
+        terms = played.step(FAR | {"accel": 2.0 if swing % 2 else -4.0}, times=10)
+    return float(terms[PEDALS])
+
+
+def test_changing_between_gas_and_brake_costs_from_the_second_time_on():
+    assert pedals(0) == pedals(1) == 0.0
+    assert 0.0 < pedals(3) < pedals(5) == 1.0
+
+
+def test_a_pedal_that_is_touched_for_a_step_is_none():
+    played = Played()
+    for _ in range(20):
+        assert played.step(FAR | {"accel": 2.6}, times=5)[PEDALS] == 0.0
+        assert played.step(FAR | {"accel": -4.5})[PEDALS] == 0.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_working_to_stay_level_costs_after_a_while_and_cruising_side_by_side_does_not(side):
+    beside = {"y": side * LANE_M, "speed": 12.0}
+    assert Played().step(beside, times=100)[PACING] == 0.0
+    assert Played().step(beside | {"accel": 1.0}, times=14)[PACING] == 0.0
+    assert Played().step(beside | {"accel": 1.0}, times=40)[PACING] == pytest.approx(1.0)
+    assert Played().step(beside | {"accel": 1.0, "speed": 14.0}, times=40)[PACING] == 0.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_keeping_to_the_line_costs_and_crossing_it_does_not(side):
+    over = FAR | {"offset": side * 0.9}
+    assert Played().step(over, times=20)[OVER_LINE] == pytest.approx(1.0)
+    assert Played().step(over | {"lateral": -side * 0.8}, times=20)[OVER_LINE] == 0.0
+    assert Played().step(FAR | {"offset": side * 0.4}, times=50)[OVER_LINE] == 0.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_cutting_in_costs_by_the_room_that_it_leaves(side):
+    def cut_in(ahead_m: float) -> float:
+        other = {"x": 4.6 + ahead_m, "y": side * 2.4, "offset": -side * 0.9, "lateral": -side * 0.8, "speed": 12.0}
+        return float(Played().step(other)[CUT_IN])
+
+    assert cut_in(-2.0) == conduct.OVERLOOKS  # beside the ego
+    assert cut_in(12.0 * conduct.HEADWAY_FREE + 0.01) == 0.0
+    assert 0.0 < cut_in(2.0) < conduct.OVERLOOKS
+    away = {"x": 2.0, "y": side * 2.4, "offset": -side * 0.9, "lateral": side * 0.8, "speed": 12.0}
+    assert Played().step(away)[CUT_IN] == 0.0
+
+
+def test_moving_across_costs_beyond_a_quick_lane_change():
+    assert Played().step(FAR | {"lateral": 1.0})[LATERAL_SPEED] == 0.0
+    assert Played().step(FAR | {"lateral": -1.4})[LATERAL_SPEED] == pytest.approx(0.5)
+
+
+def test_standing_costs_where_nothing_is_ahead_and_the_light_is_not_red():
+    still = {"x": 60.0, "y": 20.0, "heading": math.pi / 2}
+    assert Played().step(still, times=60)[STANDING] == 1.0
+    assert Played().step(still, times=60, link="r")[STANDING] == 0.0
+    assert Played().step(still, times=60, ego={"x": 60.0, "y": 28.0})[STANDING] == 0.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_walking_at_a_car_costs_and_crossing_before_it_does_not(side):
+    def walk(heading: float, x: float = 15.0, y: float = 0.0) -> float:
+        walker = {"length": 0.3, "width": 0.5, "x": x, "y": side * y, "speed": 1.3, "heading": side * heading}
+        walker |= {"vx": 1.3 * math.cos(heading), "vy": 1.3 * side * math.sin(heading)}
+        return float(Played(Kind.PEDESTRIAN).step(walker)[TOWARDS_CAR])
+
+    assert walk(math.pi) == 1.0
+    assert walk(-math.pi / 2) == 0.0
+    assert walk(-math.pi / 2, x=0.0, y=1.4) == pytest.approx(0.5)  # into the side of the car, from 0.5 m
+    assert walk(math.pi, y=6.0) == 0.0  # on the sidewalk
+
+
+def test_a_pedestrian_costs_that_walks_faster_than_most_or_stands_in_the_cars_way():
+    walker = {"length": 0.3, "width": 0.5, "x": 15.0}
+    fast = Played(Kind.PEDESTRIAN).step(walker | {"speed": 3.0, "heading": math.pi / 2})
+    assert fast[WALKING] == 1.0
+    assert Played(Kind.PEDESTRIAN).step(walker, times=60)[STANDING] == 1.0
+    assert Played(Kind.PEDESTRIAN).step(walker, ego={"speed": 0.0}, times=60)[STANDING] == 0.0
+
+
+def test_the_cost_is_that_of_the_worst_adversary_and_0_without_one():
+    state = state_of(EGO, FAR | {"accel": -9.0}, FAR | {"x": 150.0})
+    memory, link = np.zeros((ADVERSARY_MEMORY, 2)), np.zeros(3, dtype=np.uint8)
+    kind = np.zeros(3, dtype=np.int8)
+    rows, none = np.array([1, 2]), np.array([], dtype=np.intp)
+    assert conduct_cost(rows, np.array([0, 1]), kind, link, state, memory, LANE_M) == 1.0
+    assert conduct_cost(none, none, kind, link, state, memory, LANE_M) == 0.0
+
+
+values = st.floats(-50, 50)
+
+
+@given(st.lists(st.tuples(values, values, values, values, values, st.floats(0, 30)), min_size=1, max_size=30))
+def test_every_term_stays_in_the_unit_interval(steps):
+    names = ("x", "y", "heading", "accel", "lateral", "speed")
+    for kind in Kind:
+        played = Played(kind)
+        for step in steps:
+            terms = played.step(dict(zip(names, step, strict=True)))
+            assert 0.0 <= terms.min() <= terms.max() <= 1.0
+
+
+def test_the_observation_holds_all_that_the_cost_remembers():
+    assert PER_ADVERSARY - MOTION_PER_ADVERSARY == ADVERSARY_MEMORY == len(MEMORY_SCALE)
