@@ -9,7 +9,8 @@ from fastapi import FastAPI
 from prometheus_client import Histogram
 
 from risk_sac import __version__
-from risk_sac.execution.executor import Executor, executor_named
+from risk_sac.execution import executor_named
+from risk_sac.execution.executor import Executor
 from risk_sac.scenario.library import VARIABLE
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi

@@ -1,9 +1,10 @@
 """`risk-sac regress`: plays old failures against another ego and writes a JUnit report."""
 
 import argparse
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from junitparser import Error, Failure, Skipped
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
@@ -11,7 +12,7 @@ from pydantic import ValidationError
 from rich.markup import escape
 from rich.table import Table
 
-from risk_sac.cli.console import COULD_NOT_RUN, EGO, FAILED, OK, counted, narrow_table
+from risk_sac.cli.console import COULD_NOT_RUN, EGO, FAILED, OK, counted, narrow_table, write_out
 from risk_sac.cli.flags import named_ego
 from risk_sac.cli.parser import Commands, add_command
 from risk_sac.config import EgoConfig
@@ -27,12 +28,6 @@ from risk_sac.run_folder.results import RESULTS, distinct_failures, read_results
 if TYPE_CHECKING:
     from risk_sac.failures.bundle import Bundle
     from risk_sac.failures.regress import Regressed
-import shlex
-from typing import TYPE_CHECKING, Literal
-
-from risk_sac.cli.console import write_out
-
-if TYPE_CHECKING:
     from risk_sac.report.inputs import Inputs
 
 

@@ -17,7 +17,7 @@ from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.config.spec_file import campaign_yaml, read_campaign
 from risk_sac.env.problem import Problem, checked_campaign
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import executor_named
+from risk_sac.execution import executor_named
 from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.execution.jobs import Job, JobProgress, execute, worker_program
 from risk_sac.execution.recorder import Recorder

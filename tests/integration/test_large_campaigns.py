@@ -14,7 +14,7 @@ from risk_sac.records import Outcome
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.views.reports import Reports
-from service.views.whole import LARGE, MEMORY_BYTES, Content, Sources, View, content_of
+from service.views.whole import LARGE, MEMORY_BYTES, CampaignView, Content, Sources, content_of
 from tests.load.large import enlarge
 from tests.server import Service
 
@@ -46,7 +46,7 @@ def here(service: Service, campaign: str) -> Iterator[Callable[..., Content]]:
     settings = ServiceSettings(data_dir=service.data_dir)
     with closing(Store(settings.url, opened=True)) as store:
         sources = Sources(settings, store, Reports(settings), store.campaign(campaign))
-        yield lambda **fields: content_of(View(campaign_id=campaign, edition="", **fields), sources)
+        yield lambda **fields: content_of(CampaignView(campaign_id=campaign, edition="", **fields), sources)
 
 
 def asked(service: Service, method: str, path: str, **options: Any) -> tuple[httpx.Response, set[tuple[int, int]]]:

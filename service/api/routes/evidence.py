@@ -7,7 +7,7 @@ from starlette.concurrency import run_in_threadpool
 
 from risk_sac.failures.cases import Regression
 from risk_sac.records import State
-from risk_sac.report.evidence import Evidence
+from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.report.rendering import POLICY
 from service.api.context import AskedCampaign, Context, Service
 from service.api.pages import CROWDED, INVALID, STORAGE, UNKNOWN, Responses, problem
@@ -23,7 +23,7 @@ NOT_PLAYED = problem(409, "The regression has not ended, or has failed")
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
 
 
-@router.get("/report", response_model=Evidence, responses=REPORT | UNCHANGED | NOT_PLAYED | CROWDED)
+@router.get("/report", response_model=CampaignEvidence, responses=REPORT | UNCHANGED | NOT_PLAYED | CROWDED)
 async def get_report(
     request: Request,
     service: Service,

@@ -28,10 +28,10 @@ class Ready(Record):
 EXAMPLE = 'risk_sac_episodes_total{family="low",method="risk-sac"} 4711.0\n…'
 METRICS: Responses = {200: {"content": {"text/plain": {"schema": {"type": "string"}, "example": EXAMPLE}}}}
 
-router = APIRouter(tags=["operations"])
+router = APIRouter()
 
 
-@router.get("/healthz", responses=STOPPED)
+@router.get("/healthz", tags=["operations"], responses=STOPPED)
 async def get_health(service: Service) -> Health:
     """Liveness: restart the service if this fails."""
     if not service.manager.alive:
@@ -40,7 +40,7 @@ async def get_health(service: Service) -> Health:
     return Health()
 
 
-@router.get("/readyz", responses=UNREADY)
+@router.get("/readyz", tags=["operations"], responses=UNREADY)
 def get_readiness(service: Service) -> Ready:
     """Readiness: whether campaigns can be posted and progress; recovers once the cause is gone."""
     problem = service.manager.storage_problem
@@ -51,7 +51,13 @@ def get_readiness(service: Service) -> Ready:
 
 
 # A key that may see all campaigns: the runs at work are among the metrics.
-@router.get("/metrics", response_class=Response, responses=METRICS, dependencies=[Depends(require_admin)])
+@router.get(
+    "/metrics",
+    tags=["operations"],
+    response_class=Response,
+    responses=METRICS,
+    dependencies=[Depends(require_admin)],
+)
 def get_metrics(service: Service) -> Response:
     """Metrics in the text format of Prometheus."""
     return Response(generate_latest(service.metrics), media_type=CONTENT_TYPE_LATEST)

@@ -14,7 +14,7 @@ from service.api.context import AskedCampaign, Context, Service, caller_of
 from service.api.pages import CROWDED, INVALID, STORAGE, TAGGED, UNKNOWN, Responses, cacheable, link
 from service.store.stored import StoredCampaign
 from service.views.reports import MEDIA_TYPES, Clusters, Figures
-from service.views.whole import View, ViewName
+from service.views.whole import CampaignView, ViewName
 
 TableFormat = Literal["json", "md", "csv"]
 SpecFormat = Literal["json", "yaml"]
@@ -109,7 +109,7 @@ async def reported(
     """Answers with a view of the report, or one of its figures; `parts` as in `cacheable`."""
     edition = await run_in_threadpool(service.reports.edition, campaign)
     headers = cacheable(request, edition, *parts)
-    asked = View(name=view, campaign_id=campaign.id, edition=edition, format=format, **fields)
+    asked = CampaignView(name=view, campaign_id=campaign.id, edition=edition, format=format, **fields)
     key_id = (await caller_of(request)).key_id
     if figure is None:
         content = await service.views.content(asked, campaign, key_id)
