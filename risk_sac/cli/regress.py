@@ -28,7 +28,7 @@ from risk_sac.run_folder.results import RESULTS, distinct_failures, read_results
 if TYPE_CHECKING:
     from risk_sac.failures.bundle import Bundle
     from risk_sac.failures.regress import Regressed
-    from risk_sac.report.inputs import Inputs
+    from risk_sac.report.files import Inputs
 
 
 def add(commands: Commands) -> None:
@@ -189,7 +189,7 @@ def _report(options: argparse.Namespace) -> int:
     # Here, because loading numpy takes a while.
     from risk_sac.report.document import Origin, report_page, show_command
     from risk_sac.report.evidence import gathered
-    from risk_sac.report.inputs import read_folders
+    from risk_sac.report.files import read_folders
     from risk_sac.report.power import played_by, power_of
 
     format_ = format_of(options.out)
