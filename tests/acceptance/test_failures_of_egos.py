@@ -12,7 +12,6 @@ import pytest
 from risk_sac.cli import main
 from risk_sac.failures.bundle import read_bundle
 from risk_sac.failures.cases import Regression, Verdict
-from risk_sac.failures.minimise import COPIES, minimise
 from risk_sac.failures.variants import VariantPlayer
 from risk_sac.run_folder.results import distinct_failures, read_results, read_verified
 from tests.acceptance.conftest import Tell
@@ -69,17 +68,6 @@ def test_failures_of_an_ego_in_our_process_repeat(near: Found, tell: Tell) -> No
     status, out, _ = tell("replay", near.bundle)
     assert status == 0
     assert "every array is as recorded" in out
-
-
-def test_they_have_pictures_twins_and_a_core(near: Found, tell: Tell, tmp_path: Path) -> None:
-    index = read_bundle(near.bundle).manifest.episode.index
-    for twin in ("idle", "default", "r157"):
-        file = tmp_path / f"{twin}.png"
-        assert tell("show", near.run, index, "--twin", twin, "--out", file)[0] == 0
-        assert file.read_bytes().startswith(b"\x89PNG")
-    minimal = minimise(read_bundle(near.bundle), most=3 * (COPIES + 1))
-    assert minimal.manifest.core is not None
-    assert minimal.manifest.spec.ego.driver == "broken"
 
 
 def test_a_better_ego_is_another_and_the_same_one_fails_still(near: Found, tell: Tell, tmp_path: Path) -> None:

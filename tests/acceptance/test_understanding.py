@@ -108,13 +108,6 @@ def test_what_does_not_repeat_is_flaky_and_counts_as_no_failure(
     assert read_verified(run, "0" * 64) is None  # of other results
 
 
-def test_every_distinct_failure_has_a_bundle(run: Path, failures: Path) -> None:
-    spec = read_results(run).spec
-    expected = {episode.id_in(spec.id) for episode in distinct_failures(read_results(run))}
-    assert len(expected) >= 2
-    assert {file.stem.rpartition("-")[0] for file in failures.iterdir()} == expected
-
-
 def test_a_core_does_less_and_fails_in_the_same_way_as_surely(
     run: Path, failure: Path, tmp_path: Path, tell: Tell
 ) -> None:
@@ -202,12 +195,6 @@ def test_what_is_missing_is_said_before_anything_is_played(
     assert status == 2
     assert complaint in err
     assert not (tmp_path / "cases.json").exists()
-
-
-def test_an_ego_that_sees_nothing_fixes_nothing(failures: Path, tmp_path: Path, tell: Tell) -> None:
-    (tmp_path / "blind.yaml").write_text("sensor: {range_m: 1, field_of_view_rad: 0.01, memory_s: 0}\n")
-    _, verdicts = regressed(tell, tmp_path, "--failures", failures, "--ego", tmp_path / "blind.yaml")
-    assert set(verdicts) == {Verdict.NEW_KIND}
 
 
 @pytest.mark.parametrize("verb", ["minimise", "region"])

@@ -217,14 +217,6 @@ def test_what_cannot_run_is_exit_status_2_without_a_traceback(
     assert printed.out == ""
 
 
-@pytest.mark.parametrize(
-    "bad", [["--max-ecr", "2"], ["--max-pcr", "x"], ["--max-pcr", "inf"], ["--timeout", "0"], ["--timeout", "nan"]]
-)
-def test_bad_arguments_are_exit_status_2(bad: list[str], call: Callable[..., int]) -> None:
-    with pytest.raises(SystemExit, match="2"):
-        call("watch", "c1", *bad)
-
-
 def test_a_report_that_cannot_be_written_is_known_before_anything_is_queued(
     answer: Callable[..., Any], call: Callable[..., int], tmp_path: Path
 ) -> None:

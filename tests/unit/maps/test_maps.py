@@ -1,5 +1,4 @@
 import math
-import os
 import re
 from contextlib import closing, nullcontext
 from pathlib import Path
@@ -15,7 +14,6 @@ from shapely.affinity import affine_transform
 import sumo_nets
 from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError, DamagedError, MapError
-from risk_sac.maps import convert
 from risk_sac.maps.clearance import too_near, truck_reaches, waits_in_the_way
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.cut import walk_over
@@ -133,24 +131,6 @@ def test_a_kept_place_that_was_changed_is_refused(town, tmp_path, monkeypatch):
     assert library.kept(name)
     with pytest.raises(ConfigError, match="there is no place 'junction_000000000000'"):
         family_named("junction_000000000000")
-
-
-@pytest.mark.parametrize(
-    ("script", "says"),
-    [
-        ("kill -SEGV $$", r"\(SIGSEGV\)"),
-        ("kill -KILL $$", "time or memory"),
-        ("echo 'Error: no nodes' >&2; exit 1", "no nodes"),
-    ],
-)
-def test_why_netconvert_failed_is_told(tmp_path, monkeypatch, script, says):
-    program, file = tmp_path / "netconvert", tmp_path / "map.osm"
-    program.write_text(f"#!/bin/sh\n{script}\n")
-    program.chmod(0o755)
-    file.write_text(osm_town())
-    monkeypatch.setattr(convert, "netconvert", lambda: (str(program), {}))
-    with pytest.raises(MapError, match=says):
-        present_net(file, tmp_path)
 
 
 def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_the_left(town, tmp_path, monkeypatch):
@@ -331,19 +311,6 @@ def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radiu
         car = chord.buffer(1.85 / 2, cap_style="flat")
         assert min(car.distance(Point(point)) for point in waiting) > 0.25 + 0.1  # half a person, and a little
     assert (walk.x_m == pytest.approx(-0.05 * side)) == (radius_m == 12.0)  # none is sent back without need
-
-
-def test_places_that_nobody_names_go_when_they_are_old(tmp_path, monkeypatch):
-    monkeypatch.setenv(library.VARIABLE, str(tmp_path))
-    named, new, old = (library.keep(shipped(name), b"<net/>") for name in ("low", "mixed", "dense"))
-    (tmp_path / "of another program").mkdir()
-    for path in (named, old, "of another program"):
-        os.utime(tmp_path / path, (0, 0))
-    assert library.prune(tmp_path, {named}, 3600.0, 0.0) == [old]
-    assert {path.name for path in tmp_path.iterdir()} == {named, new, "of another program"}
-    os.utime(tmp_path / new, (0, 0))
-    assert library.keep(shipped("mixed"), b"<net/>") == new  # wanted again
-    assert library.prune(tmp_path, (), 3600.0, 0.0) == [named]
 
 
 def test_a_pattern_without_any_candidate_says_why() -> None:
