@@ -313,13 +313,13 @@ def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radiu
     assert (walk.x_m == pytest.approx(-0.05 * side)) == (radius_m == 12.0)  # none is sent back without need
 
 
-def test_a_pattern_without_any_candidate_says_why() -> None:
+def test_a_pattern_without_any_candidate_says_why():
     found = survey(read_net(NETS / "low" / "low.net.xml"))
     assert set(found.nowhere) == {"crossing", "junction"}
     assert "has no road to a junction" in found.nowhere["junction"]
 
 
-def test_a_way_that_is_barely_too_short_contradicts_itself_nowhere(tmp_path: Path) -> None:
+def test_a_way_that_is_barely_too_short_contradicts_itself_nowhere(tmp_path):
     file = tmp_path / "map.net.xml"
     for seconds, says in ((16.96, "after driving 16.9 s; wanted 17 s"), (16.999, "after driving 16.9 s; wanted 17 s")):
         metres = 2 * seconds * 13.89
@@ -329,7 +329,7 @@ def test_a_way_that_is_barely_too_short_contradicts_itself_nowhere(tmp_path: Pat
 
 
 @given(wanted=st.floats(0.1, 1e4), share=st.floats(0.0, 1.0, exclude_max=True))
-def test_what_is_lacking_is_less_than_what_was_wanted_as_it_is_written(wanted: float, share: float) -> None:
+def test_what_is_lacking_is_less_than_what_was_wanted_as_it_is_written(wanted, share):
     if wanted * share < wanted - 1e-6:
         got, above = lacking(wanted * share, "m", wanted).split(" m; wanted ")
         assert float(got) < float(above.removesuffix(" m"))
@@ -350,9 +350,7 @@ def test_what_is_lacking_is_less_than_what_was_wanted_as_it_is_written(wanted: f
         (":centre_{pocket}_0", 1.3, False),
     ],
 )
-def test_a_place_whose_lanes_are_driven_longer_or_shorter_than_drawn_is_refused(
-    tmp_path: Path, place: str, lane: str, share: float, fits: bool
-) -> None:
+def test_a_place_whose_lanes_are_driven_longer_or_shorter_than_drawn_is_refused(tmp_path, place, lane, share, fits):
     south = {"own": "from_south", "on": "to_north", "straight": "9", "pocket": "20"}
     west = {"own": "from_west", "on": "to_east", "straight": "13", "pocket": "22"}
     changed = re.escape(lane.format(**(south if place == "from_south" else west)))
