@@ -20,7 +20,7 @@ from risk_sac.records import Record
 from service.api.context import Service, require_admin
 from service.api.pages import STOPPED, UNREADY, Responses, link
 from service.api.problems import ProblemError, Reason
-from service.store.counting import check_readable
+from service.store.queries import check_readable
 
 
 class Health(Record):
