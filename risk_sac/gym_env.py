@@ -14,7 +14,7 @@ from risk_sac.config.spec_file import read_ego, read_spec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError, SimulationError
-from risk_sac.failures.canvas import EGO, OTHER, STRIKER, Canvas
+from risk_sac.failures.export.gif import EGO, OTHER, STRIKER, Canvas
 from risk_sac.failures.net import shipped_net, shipped_surfaces
 from risk_sac.world.types import STEP_S, Kind, Role
 

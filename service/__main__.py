@@ -7,10 +7,10 @@ import sys
 
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
-from risk_sac.execution.executor import executor_named
+from risk_sac.execution import executor_named
 from service.api.connections import Server
 from service.app import create_app
-from service.host.logs import set_up_logs
+from service.host import set_up_logs
 from service.keys import check_exposure
 from service.runs.manager import worker_program
 from service.settings import MISUSED, read_settings

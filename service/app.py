@@ -9,7 +9,8 @@ from fastapi import FastAPI
 from prometheus_client import Histogram
 
 from risk_sac import __version__
-from risk_sac.execution.executor import Executor, executor_named
+from risk_sac.execution import executor_named
+from risk_sac.execution.executor import Executor
 from risk_sac.scenario.library import VARIABLE
 from service.api.context import Context
 from service.api.description import DESCRIPTION, openapi
@@ -17,21 +18,9 @@ from service.api.metrics import registry, request_latencies
 from service.api.middleware import add_middleware
 from service.api.pages import Cursors
 from service.api.problems import add_problem_handlers
-from service.api.routes import (
-    campaigns,
-    catalogue,
-    docs,
-    episodes,
-    events,
-    evidence,
-    exports,
-    networks,
-    operations,
-    regressions,
-    reports,
-)
+from service.api.routes import campaigns, catalogue, episodes, events, exports, networks, regressions, reports, server
 from service.api.stream import Streams
-from service.host.data_folder import hold_data_folder
+from service.host import hold_data_folder
 from service.keys import check_exposure
 from service.networks.network_store import NetworkStore
 from service.networks.surveys import Surveys
@@ -77,10 +66,10 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
         docs_url=None,
         redoc_url=None,
     )
-    shown = (episodes, exports, events, reports, evidence)
-    for routes in (campaigns, *shown, regressions, networks, catalogue, operations, docs):
+    shown = (episodes, exports, events, reports)
+    for routes in (campaigns, *shown, regressions, networks, catalogue, server):
         app.include_router(routes.router)
-    app.router.routes += docs.page_routes()
+    app.router.routes += server.page_routes()
     add_problem_handlers(app)
     add_middleware(app, settings, latencies)
     app.openapi = lambda: openapi(app)  # type: ignore[method-assign]  # FastAPI's documented way

@@ -12,8 +12,8 @@ from pydantic_core import ErrorDetails, from_json
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import ExecutorName
-from risk_sac.execution.ray.settings import RaySettings
+from risk_sac.execution import ExecutorName
+from risk_sac.execution.ray import RaySettings
 from risk_sac.host.machine import cores
 from risk_sac.run_folder.results import TIMES
 

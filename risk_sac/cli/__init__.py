@@ -8,25 +8,54 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from risk_sac import __version__
-from risk_sac.cli import (
-    benchmark,
-    campaigns,
-    egos,
-    places,
-    pretrain,
-    regress,
-    replay,
-    run,
-    serve,
-    show,
-    understand,
-)
+from risk_sac.cli import campaigns, egos, lab, places, regress, replay, run, show, understand
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
-from risk_sac.cli.parser import Parser, as_typed, example_text, wrong_path
+from risk_sac.cli.parser import Commands, Parser, add_command, as_typed, example_text, wrong_path
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.host.terminal import complain, run_command
 from risk_sac.scenario import library
+
+ARENAS = {"MALLOC_ARENA_MAX": "2"}  # glibc gives each thread an arena otherwise, and the server's memory grows
+
+
+def add_service_commands(commands: Commands) -> None:
+    """Adds the commands."""
+    serve = add_command(
+        commands,
+        "serve",
+        _serve,
+        "run the service and its web page in the foreground",
+        example="serve --runs runs",
+    )
+    network = serve.group("network")
+    network.add_argument("--host", metavar="ADDRESS", help="(default: 127.0.0.1)")
+    network.add_argument("--port", type=int, help="(default: 8000)")
+    network.add_argument("--root-path", metavar="PATH", help="path of the service behind a proxy, such as /sim")
+    data = serve.group("data")
+    data.add_argument("--data-dir", type=Path, metavar="DIR", help="(default: data)")
+    runs = "show the runs in this folder, which `run` or `evaluate` wrote; they are copied"
+    data.add_argument("--runs", type=Path, metavar="DIR", help=runs)
+
+    keys = commands.add_parser(
+        "keys", help="create, list and revoke the service's API keys", add_help=False, prefix_chars="\0"
+    )
+    keys.set_defaults(command=_keys)
+    keys.add_argument("rest", nargs="*")
+
+
+def _serve(options: argparse.Namespace) -> int:
+    """Replaces this process: the method's code never imports the service."""
+    given = {"HOST": options.host, "PORT": options.port, "ROOT_PATH": options.root_path}
+    given |= {"DATA_DIR": options.data_dir, "RUNS": options.runs}
+    settings = {f"RISK_SAC_{name}": str(value) for name, value in given.items() if value is not None}
+    os.execve(sys.executable, [sys.executable, "-m", "service"], ARENAS | os.environ | settings)
+
+
+def _keys(options: argparse.Namespace) -> int:
+    """Replaces this process: the method's code never imports the service."""
+    os.execv(sys.executable, [sys.executable, "-m", "service.keys", *options.rest])
+
 
 EPILOG = """exit status:
   0    done
@@ -93,6 +122,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.set_defaults(on_error=FAILED)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     first = (run.add, places.add, egos.add, show.add, replay.add, understand.add, replay.add_export, regress.add)
-    for add in (*first, regress.add_report, benchmark.add, pretrain.add, serve.add, campaigns.add):
+    for add in (*first, regress.add_report, lab.add_benchmark, lab.add_pretrain, add_service_commands, campaigns.add):
         add(commands)
     return parser

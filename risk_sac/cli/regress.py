@@ -1,9 +1,10 @@
 """`risk-sac regress`: plays old failures against another ego and writes a JUnit report."""
 
 import argparse
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from junitparser import Error, Failure, Skipped
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
@@ -11,7 +12,7 @@ from pydantic import ValidationError
 from rich.markup import escape
 from rich.table import Table
 
-from risk_sac.cli.console import COULD_NOT_RUN, EGO, FAILED, OK, counted, narrow_table
+from risk_sac.cli.console import COULD_NOT_RUN, EGO, FAILED, OK, counted, narrow_table, write_out
 from risk_sac.cli.flags import named_ego
 from risk_sac.cli.parser import Commands, add_command
 from risk_sac.config import EgoConfig
@@ -27,13 +28,7 @@ from risk_sac.run_folder.results import RESULTS, first_of_variants, read_results
 if TYPE_CHECKING:
     from risk_sac.failures.bundle import Bundle
     from risk_sac.failures.regress import Regressed
-import shlex
-from typing import TYPE_CHECKING, Literal
-
-from risk_sac.cli.console import write_out
-
-if TYPE_CHECKING:
-    from risk_sac.report.inputs import Inputs
+    from risk_sac.report.files import Inputs
 
 
 def add(commands: Commands) -> None:
@@ -194,7 +189,7 @@ def _report(options: argparse.Namespace) -> int:
     # Here, because loading numpy takes a while.
     from risk_sac.report.document import Origin, report_page, show_command
     from risk_sac.report.evidence import gathered
-    from risk_sac.report.inputs import read_folders
+    from risk_sac.report.files import read_folders
     from risk_sac.report.power import played_by, power_of
 
     format_ = format_of(options.out)

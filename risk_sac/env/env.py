@@ -36,9 +36,8 @@ from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
 from risk_sac.scenario.limits import conditions, limits_from_odd
 from risk_sac.sim.collision import Contact, find_contact
-from risk_sac.sim.control import Adversaries, shares_of
+from risk_sac.sim.control import Adversaries, RecordedAdversaries, shares_of
 from risk_sac.sim.ego import EVERYTHING, Perception, sight
-from risk_sac.sim.recorded import RecordedAdversaries
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.verdicts.course import Path, polyline
 from risk_sac.verdicts.evidence import Evidence, Ground

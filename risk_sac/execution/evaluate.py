@@ -17,7 +17,7 @@ from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.config.spec_file import campaign_yaml, read_campaign
 from risk_sac.env.problem import Problem, checked_campaign
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import executor_named
+from risk_sac.execution import executor_named
 from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.execution.jobs import Job, JobProgress, execute, worker_program
 from risk_sac.execution.recorder import Recorder
@@ -25,6 +25,7 @@ from risk_sac.failures.bundle import code_digest, versions
 from risk_sac.host.machine import cores
 from risk_sac.records import EpisodeRecord, Repetition, RunMetrics, SeriesFile
 from risk_sac.report import Comparison, FinishedRun, compare, read_run, write_report
+from risk_sac.report.files import RUNS, SPEC
 from risk_sac.run_folder.durable import held, replace_file
 from risk_sac.run_folder.results import (
     TIMES,
@@ -156,7 +157,7 @@ def _replayed(
 ) -> Mapping[Path, Sequence[Collection[int]]]:
     """By run, the failures that were the same, for each process that has replayed it to the end."""
     arguments = [ANSWER, str(times), str(jobs), *map(str, folders)]
-    result = run_helper("risk_sac.failures.replay", arguments, wall_s=math.inf, stopping=stopping)
+    result = run_helper("risk_sac.failures.play", arguments, wall_s=math.inf, stopping=stopping)
     if result.status != 0:
         logger.warning("replaying failures ended with status %d: %s", result.status, result.log)
     lines = [json.loads(line) for line in result.answer.splitlines(keepends=True) if line.endswith(b"\n")]
@@ -167,9 +168,6 @@ def _replayed(
         folder: [line["same"] for line in lines if line["folder"] == str(folder) and "same" in line]
         for folder in folders
     }
-
-
-SPEC, RUNS = "spec.yaml", "runs"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
-from typing import Literal, Protocol, get_args
+from typing import Protocol
 
 from risk_sac.config import RunSpec
-from risk_sac.errors import ConfigError
 from risk_sac.execution.messages import Event, Heard, hear
 
 FOLDER = "{folder}"  # argument that stands for the path of the run's folder
@@ -136,22 +135,4 @@ def taken(messages: Messages, timeout_s: float) -> list[tuple[int, Event | Exite
     return batch
 
 
-ExecutorName = Literal["local", "ray"]
 MakeExecutor = Callable[[WorkerProgram], Executor]
-
-
-def executor_named(name: str) -> MakeExecutor:
-    """Returns the factory of an executor.
-
-    Raises:
-      ConfigError: there is none of this name.
-    """
-    if name == "local":
-        from risk_sac.execution.local import LocalExecutor  # here, since it imports this module
-
-        return LocalExecutor
-    if name == "ray":
-        from risk_sac.execution.ray.executor import RayExecutor
-
-        return RayExecutor
-    raise ConfigError("RISK_SAC_EXECUTOR", f"{name!r}", f"one of {', '.join(get_args(ExecutorName))}")

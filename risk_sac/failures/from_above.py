@@ -1,12 +1,16 @@
-"""Draws failures and maps from above."""
+"""Draws failures and maps from above, with matplotlib and without a window."""
 
-from collections.abc import Iterable, Mapping, Sequence
+import io
+import threading
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
@@ -15,11 +19,48 @@ from matplotlib.patheffects import withStroke
 from risk_sac.config import FamilyName
 from risk_sac.failures.net import LAMPS, Surface, SurfaceUse, roads_of, signal_heads, surfaces
 from risk_sac.failures.recording import BOX, Recording, on_body
-from risk_sac.host.canvas import canvas, picture
 from risk_sac.maps.found import TITLES, Pattern, Survey
 from risk_sac.maps.net import Net
 from risk_sac.records import Collision
 from risk_sac.world.types import Floats, Kind, Role
+
+_UNDATED: dict[str, dict[str, Any]] = {
+    "svg": {"Date": None},
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None, "Producer": None},
+}
+_DRAWING = threading.Lock()  # matplotlib's style is one per process
+
+
+def canvas(size_in: tuple[float, float]) -> Figure:
+    """An empty figure, width x height in inches."""
+    figure = Figure(figsize=size_in, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def picture(draw: Callable[[], Figure], formats: Sequence[str], dpi: float, style: dict[Any, Any]) -> list[bytes]:
+    """A figure as a file of each format; the same figure gives the same bytes.
+
+    Args:
+      draw: makes the figure; in the style, and while nothing else is drawn.
+      formats: png | svg | pdf.
+      dpi: dots per inch.
+      style: matplotlib's settings that differ from its defaults; its types name them one by one.
+    """
+    files = []
+    with _DRAWING, mpl.rc_context():
+        mpl.rcdefaults()  # neither the user's own style nor one that an ego has set
+        mpl.rcParams.update(style | {"svg.hashsalt": "risk-sac"})
+        figure = draw()
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")  # it is laid out now; each file would do it again, a little differently
+        for format_ in formats:
+            file = io.BytesIO()
+            figure.savefig(file, format=format_, dpi=dpi, metadata=_UNDATED[format_])
+            files.append(file.getvalue())
+    return files
+
 
 ASIDE: Floats = np.array([(0, 1), (0, -1), (1, 0), (-1, 0)], dtype=np.float64)  # above, below, right, left
 GAPS_PT = (3.0, 12.0, 24.0)

@@ -59,15 +59,8 @@ def ribbon(centre: Floats, width_m: float) -> Floats:
 
 
 def roads_of(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Surface]:
-    """Returns the surfaces of a scene's net; none where the scene lacks parameters that its family has now."""
-    found = family_named(family)
-    return shipped_surfaces(found.layout(scene).net) if set(found.space.names) <= scene.keys() else ()
-
-
-def net_of(family: FamilyName, scene: Mapping[str, float]) -> Net | None:
-    """Returns a scene's net; None where the scene lacks parameters that its family has now."""
-    found = family_named(family)
-    return shipped_net(found.layout(scene).net) if set(found.space.names) <= scene.keys() else None
+    """Returns the surfaces of a scene's net."""
+    return shipped_surfaces(family_named(family).layout(scene).net)
 
 
 @cache  # there are a few nets, and they stay as they are
@@ -135,19 +128,16 @@ class SignalHead:
 
 
 def signal_heads(family: FamilyName, scene: Mapping[str, float]) -> Sequence[SignalHead]:
-    """Returns the heads of a scene's signals; none where the scene lacks parameters that its family has now."""
-    net = net_of(family, scene)
-    if net is None:
-        return ()
+    """Returns the heads of a scene's signals."""
     layout = family_named(family).layout(scene)
-    found = []
+    net, heads = shipped_net(layout.net), []
     for lane in net.lanes.values():
         if lane.heads:
             head = min(lane.heads, key=lambda head: (head.turn != "s", head.index))
             offset_s = layout.signal_offset_s if head.signal == layout.signal else 0.0
             changes = _changes(net.programs[head.signal], head, offset_s)
-            found += [SignalHead(*place, lane.width_m, changes) for place in _places(lane)]
-    return found
+            heads += [SignalHead(*place, lane.width_m, changes) for place in _places(lane)]
+    return heads
 
 
 def _places(lane: NetLane) -> list[tuple[float, float, float]]:

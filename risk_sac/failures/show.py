@@ -12,9 +12,16 @@ from matplotlib.patches import Rectangle
 
 from risk_sac.config import FamilyName
 from risk_sac.errors import ConfigError
-from risk_sac.failures.from_above import CONFLICT_COLOUR, EGO_COLOUR, OTHER_COLOUR, draw_from_above, legend
+from risk_sac.failures.from_above import (
+    CONFLICT_COLOUR,
+    EGO_COLOUR,
+    OTHER_COLOUR,
+    canvas,
+    draw_from_above,
+    legend,
+    picture,
+)
 from risk_sac.failures.recording import Recording
-from risk_sac.host.canvas import canvas, picture
 from risk_sac.records import Collision, Violation
 from risk_sac.risk.rss import TTC_CAP_S
 from risk_sac.verdicts.words import began, ego_did, known, prevented_by

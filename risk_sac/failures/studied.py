@@ -143,7 +143,7 @@ def read_studies(folder: Path, digest: str) -> Mapping[int, Studied]:
 
     Damaged files are left out.
     """
-    found: dict[int, Studied] = {}
+    studies: dict[int, Studied] = {}
     for file in sorted((folder / STUDIES).glob("*.json")):
         name = _NAME.fullmatch(file.name)
         try:
@@ -152,6 +152,6 @@ def read_studies(folder: Path, digest: str) -> Mapping[int, Studied]:
             continue
         if name is None or noted.digest != digest:
             continue
-        before = found.get(int(name[1]), Studied())
-        found[int(name[1])] = Studied(core=noted.core or before.core, region=noted.region or before.region)
-    return found
+        before = studies.get(int(name[1]), Studied())
+        studies[int(name[1])] = Studied(core=noted.core or before.core, region=noted.region or before.region)
+    return studies

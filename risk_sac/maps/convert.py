@@ -66,23 +66,23 @@ def present_net(file: Path, folder: Path, name: str = "") -> Converted:
     maps = [document for document in documents if document.root in MAP_ROOTS]
     if len(maps) != 1:
         raise MapError("network", f"{name} with {len(maps)} maps", "one")
-    (found,) = maps
-    others = tuple(document for document in documents if document is not found)
+    (map_,) = maps
+    others = tuple(document for document in documents if document is not map_)
     left_out = [remark for document in documents for remark in document.remarks]
-    if found.root == "net" and _version(found.attributes) >= PRESENT:
-        return Converted(found.file, tuple(left_out), others)
+    if map_.root == "net" and _version(map_.attributes) >= PRESENT:
+        return Converted(map_.file, tuple(left_out), others)
     net = folder / "converted.net.xml"
-    if found.root == "OpenDRIVE":
-        return Converted(net, (*left_out, *_from_opendrive(found, net, name)), others)
-    said = _convert(found, net, name)
+    if map_.root == "OpenDRIVE":
+        return Converted(net, (*left_out, *_from_opendrive(map_, net, name)), others)
+    said = _convert(map_, net, name)
     return Converted(net, (*left_out, *remarks(said, "Warning")), others)
 
 
-def _from_opendrive(found: Document, net: Path, name: str) -> list[str]:
+def _from_opendrive(map_: Document, net: Path, name: str) -> list[str]:
     """Converts roads and crosswalks of OpenDRIVE; returns remarks."""
-    folder, walks = net.parent, find_crosswalks(found.file)
-    readied = replace(found, file=folder / "readied.xml")
-    lost = ready(found.file, readied.file, walks)
+    folder, walks = net.parent, find_crosswalks(map_.file)
+    readied = replace(map_, file=folder / "readied.xml")
+    lost = ready(map_.file, readied.file, walks)
     if not walks.count:
         return [*lost, *remarks(_convert(readied, net, name, ["--geometry.remove"]), "Warning")]
     options = sidewalk_options(Path(netconvert()[1]["SUMO_HOME"]) / "data" / "typemap", folder)
@@ -132,14 +132,14 @@ def _version(attributes: Mapping[str, str]) -> tuple[int, ...]:
     return (int(told[1]), int(told[2])) if told else (0,)
 
 
-def _convert(found: Document, net: Path, name: str, options: Sequence[str] = ()) -> str:
+def _convert(map_: Document, net: Path, name: str, options: Sequence[str] = ()) -> str:
     """Runs netconvert, with limits, in the folder of its files; returns its messages.
 
     A comma in a path would make a list.
     """
     program, environment = netconvert()
-    files = [found.file.name, "--output-file", net.name, "--xml-validation", "never"]
-    command = [program, *options, *OPTIONS[found.root], *files]
+    files = [map_.file.name, "--output-file", net.name, "--xml-validation", "never"]
+    command = [program, *options, *OPTIONS[map_.root], *files]
     log = net.with_suffix(".log")
     with log.open("wb") as output:
         process = subprocess.Popen(command, cwd=net.parent, env=environment, stdout=subprocess.DEVNULL, stderr=output)

@@ -151,8 +151,8 @@ def _oncoming(net: Net, own: str, crossed: tuple[str, ...]) -> tuple[Track, ...]
         for link in net.back.get(lane.id, ())
         if abs(link.turn_rad) < 0.8
     ]
-    found = []
+    tracks = []
     for link in links:
         with suppress(NoFit):
-            found.append(turn(net, link, ONWARD_S))
-    return tuple(found[:2])
+            tracks.append(turn(net, link, ONWARD_S))
+    return tuple(tracks[:2])

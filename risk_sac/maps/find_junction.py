@@ -128,11 +128,11 @@ def leg(net: Net, road: Approach, name: str, onward_s: float) -> Leg:
     return Leg(name=name, speed_limit_mps=limit_mps, turns=tuple(tracks))
 
 
-def roomy(found: Track, edge: str, wanted_m: float) -> Track:
+def roomy(track: Track, edge: str, wanted_m: float) -> Track:
     """The track; raises `NoFit` if it begins too near to its reference."""
-    if found.room_m < wanted_m:
-        raise NoFit(f"the length of the way in on {edge!r} is {lacking(found.room_m, 'm', wanted_m)}")
-    return found
+    if track.room_m < wanted_m:
+        raise NoFit(f"the length of the way in on {edge!r} is {lacking(track.room_m, 'm', wanted_m)}")
+    return track
 
 
 def turn(net: Net, link: Link, onward_s: float) -> Track:

@@ -82,10 +82,10 @@ def _beside(net: Net, lane: NetLane, reference_m: float) -> Track | None:
 
 
 def _soon(way: LaneWay, left_m: float) -> list[Link]:
-    found, gone_s = [], left_m / way.lanes[0].limit_mps
+    links, gone_s = list[Link](), left_m / way.lanes[0].limit_mps
     for link, lane in zip(way.links, way.lanes[1:], strict=True):
         if gone_s > SIGNAL_S:
             break
-        found.append(link)
+        links.append(link)
         gone_s += lane.length_m / lane.limit_mps
-    return found
+    return links

@@ -112,11 +112,11 @@ class Map:
         """
         if place is not None:
             return [place_at(self.net, pattern, place)]
-        found = survey(self.net, (pattern,))
-        if not found.fits:
-            why = found.nowhere.get(pattern) or f"at {found.misfits[0].spot.id!r}, {found.misfits[0].why}"
+        places = survey(self.net, (pattern,))
+        if not places.fits:
+            why = places.nowhere.get(pattern) or f"at {places.misfits[0].spot.id!r}, {places.misfits[0].why}"
             raise MapError("places", f"{pattern} fits nowhere on this map: {why}")
-        return found.fits
+        return places.fits
 
     def keep(self, fit: Fit) -> str:
         """Puts a place into the library; returns the name of its family."""

@@ -170,20 +170,20 @@ class Net:
     @cached_property
     def arriving(self) -> Mapping[str, list[Edge]]:
         """Edges with a lane for cars, by the junction at their end."""
-        found = defaultdict(list)
+        arriving = defaultdict(list)
         for edge in self.edges.values():
             if edge.drivable:
-                found[edge.end].append(edge)
-        return found
+                arriving[edge.end].append(edge)
+        return arriving
 
     @cached_property
     def crossings_of(self) -> Mapping[tuple[str, str], list[Crossing]]:
         """By junction and by an edge that they cross."""
-        found = defaultdict(list)
+        crossings = defaultdict(list)
         for crossing in self.crossings:
             for edge in crossing.edges:
-                found[crossing.junction, edge].append(crossing)
-        return found
+                crossings[crossing.junction, edge].append(crossing)
+        return crossings
 
     def are_foes(self, one: Link, other: Link) -> bool:
         """Whether two links of a junction cross or meet, by what the net says."""
@@ -272,19 +272,19 @@ def summary(net: Net) -> NetSummary:
 
 def net_remarks(net: Net) -> list[str]:
     """Reasons why no pattern fits on a net, or only few places can be found."""
-    found = []
+    remarks = []
     driven = {edge.id for edge in net.edges.values() if edge.drivable}
     if not driven:
-        found.append("no edge has a lane for passenger cars: no pattern will fit")
+        remarks.append("no edge has a lane for passenger cars: no pattern will fit")
     if net.keeps_left:
-        found.append("traffic keeps to the left: no pattern will fit")
+        remarks.append("traffic keeps to the left: no pattern will fit")
     if not net.programs:
-        found.append("there are no traffic lights")
+        remarks.append("there are no traffic lights")
     if not net.onward and _roads_meet(net):
-        found.append("there are no connections, although roads meet: no lane leads on to another")
+        remarks.append("there are no connections, although roads meet: no lane leads on to another")
     elif (largest := _largest_part(driven, net)) < len(driven):
-        found.append(f"roads are disconnected: the largest part has {largest} of {len(driven)} edges for cars")
-    return found
+        remarks.append(f"roads are disconnected: the largest part has {largest} of {len(driven)} edges for cars")
+    return remarks
 
 
 def _roads_meet(net: Net) -> bool:

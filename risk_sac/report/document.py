@@ -15,7 +15,7 @@ from risk_sac.failures.recording import Recording
 from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.records import Collision, EpisodeRecord, Power, Violation
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.evidence import Evidence
+from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.report.rendering import Layout, render
 from risk_sac.report.runs import FinishedRun
 from risk_sac.run_folder.arrays import read_series
@@ -53,7 +53,7 @@ DAMAGED = Drawing(None, "its time series or the road net is damaged")
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FailureGroup:
     """A kind of failure, with the episode to look at first."""
 
     cluster: Cluster
@@ -64,7 +64,9 @@ class Kind:
     drawing: Drawing
 
 
-def report_page(comparison: Comparison, evidence: Evidence, origin: Origin, power: Power, layout: Layout) -> str:
+def report_page(
+    comparison: Comparison, evidence: CampaignEvidence, origin: Origin, power: Power, layout: Layout
+) -> str:
     """Renders the whole report of the runs that have finished; `power` is that of their budget."""
     families, lost = _families(comparison.spec)
     return render(
@@ -116,7 +118,7 @@ def _allowed(value: object) -> str:
     return "anything" if value is None else str(value)
 
 
-def _kinds(comparison: Comparison, family: FamilyName, origin: Origin) -> list[Kind]:
+def _kinds(comparison: Comparison, family: FamilyName, origin: Origin) -> list[FailureGroup]:
     episodes = {
         record.id_in(run.spec.id): (run, record)
         for run in comparison.runs
@@ -130,7 +132,7 @@ def _kinds(comparison: Comparison, family: FamilyName, origin: Origin) -> list[K
         violation = next((one for one in record.valid_violations if one.kind == cluster.name), None)
         command = origin.show(run, cluster.representative)
         drawing = _draw(run, origin.folders.get(run.spec.digest), record)
-        kinds.append(Kind(cluster, run, record, violation, command, drawing))
+        kinds.append(FailureGroup(cluster, run, record, violation, command, drawing))
     return kinds
 
 

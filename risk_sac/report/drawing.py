@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from risk_sac.config import RunMethod
-from risk_sac.host.canvas import canvas, picture
+from risk_sac.failures.from_above import canvas, picture
 from risk_sac.metrics import RESAMPLING_SEED
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.figures import (

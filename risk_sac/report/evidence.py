@@ -91,7 +91,7 @@ class FamilyCoverage(Record):
         return {pair: never[pair] for pair in sorted(never, key=lambda pair: -len(never[pair])) if never[pair]}
 
 
-class Evidence(Record):
+class CampaignEvidence(Record):
     """Evidence of a campaign on its ego's failure rate, and its coverage."""
 
     complete: bool
@@ -102,7 +102,7 @@ class Evidence(Record):
     """Of the families with a finished run."""
 
 
-def gathered(comparison: Comparison) -> Evidence:
+def gathered(comparison: Comparison) -> CampaignEvidence:
     """Gather the evidence of the runs that have finished."""
     spec = comparison.spec
     coverage_by_family: dict[FamilyName, FamilyCoverage] = {}
@@ -113,7 +113,7 @@ def gathered(comparison: Comparison) -> Evidence:
                 search=coverage(family_named(family), spec.odd, searched),
                 iid=coverage(family_named(family), spec.odd, fresh) if fresh else None,
             )
-    return Evidence(
+    return CampaignEvidence(
         complete=not comparison.missing and not comparison.undrawn,
         bounds=tuple(map(drawn, comparison.drawn)),
         coverage=coverage_by_family,

@@ -253,14 +253,14 @@ def _share(document: dict[str, Any]) -> None:
 
 def _shared(kind: str, places: Sequence[Any]) -> dict[str, Any]:
     """Replaces repeated entries by references; returns the referenced components."""
-    found = [(each, key) for each in places for key in (each if isinstance(each, dict) else range(len(each)))]
-    counts = Counter(json.dumps(each[key]) for each, key in found)
+    entries = [(place, key) for place in places for key in (place if isinstance(place, dict) else range(len(place)))]
+    counts = Counter(json.dumps(place[key]) for place, key in entries)
     shared: dict[str, Any] = {}
-    for each, key in found:
-        item = each[key]
+    for place, key in entries:
+        item = place[key]
         if counts[json.dumps(item)] > 1:
             base = item.get("name") or str(key)
             names = itertools.chain([base], (f"{base}-{number}" for number in itertools.count(2)))
             name = next(name for name in names if shared.setdefault(name, item) == item)
-            each[key] = {"$ref": f"#/components/{kind}/{name}"}
+            place[key] = {"$ref": f"#/components/{kind}/{name}"}
     return shared

@@ -17,7 +17,7 @@ from risk_sac.records import State
 from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS
 from service.errors import StorageError
 from service.runs.manager import Manager
-from service.store.counting import Statistics, read_statistics
+from service.store.queries import Statistics, read_statistics
 from service.store.reading import Store
 
 BUCKETS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10.0)

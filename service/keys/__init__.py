@@ -23,7 +23,7 @@ from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.host.machine import is_loopback
 from risk_sac.run_folder.durable import lock, read_sealed, write_sealed
 from service.errors import KeysError
-from service.host.data_folder import FILE_MODE, FOLDER_MODE
+from service.host import FILE_MODE, FOLDER_MODE
 from service.settings import ServiceSettings
 
 PROJECT = "[a-z0-9][a-z0-9-]{0,39}"

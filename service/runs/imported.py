@@ -20,7 +20,7 @@ from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.metrics import MetricsAccumulator
 from risk_sac.records import REPEATS, Phase, State
-from risk_sac.report.inputs import SPEC, campaign_in
+from risk_sac.report.files import SPEC, campaign_in
 from risk_sac.report.runs import read_records, read_run
 from risk_sac.run_folder.results import EPISODES, FAILURES, RESULTS, RunResults, read_results, series_name
 from risk_sac.scenario.families import family_named

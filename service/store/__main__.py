@@ -9,7 +9,7 @@ from pathlib import Path
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.host.terminal import complain, console, run_command
 from service.errors import StorageError
-from service.host.data_folder import create_private
+from service.host import create_private
 from service.settings import MISUSED, ServiceSettings, read_settings
 from service.store.database import connected, sqlite_file
 

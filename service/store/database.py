@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session
 
 from risk_sac.execution.messages import without_folders
 from service.errors import StorageError
-from service.host.data_folder import create_private, make_private
+from service.host import create_private, make_private
 from service.store.tables import Base, ServerRow
 
 READERS = 8  # requests answered in threads at once; of more, each would only wait longer for the interpreter

@@ -13,9 +13,17 @@ from sqlalchemy.orm import Session, selectinload
 
 from risk_sac.records import FINAL, Episode, EpisodeRecord, Outcome, State, StateChange, Triage, TriageState
 from service.errors import StorageError
-from service.store.counting import HOUR_S, event_page
 from service.store.database import connect, open_database, storage_errors
-from service.store.finding import Judged, episode_page, find_campaign, find_failure, find_run, find_triage
+from service.store.queries import (
+    HOUR_S,
+    Judged,
+    episode_page,
+    event_page,
+    find_campaign,
+    find_failure,
+    find_run,
+    find_triage,
+)
 from service.store.stored import StoredCampaign, StoredFailure, StoredPage, StoredRecord, Usage, read_episode
 from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
 

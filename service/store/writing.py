@@ -13,19 +13,21 @@ from risk_sac.config import CampaignSpec
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.records import REPEATS, EpisodeRecord, Outcome, State, Triage, TriageState, stored
 from service.errors import ConflictError
-from service.store.counting import (
+from service.store.database import WRITING, storage_errors
+from service.store.queries import (
     NEWEST,
     add_usage,
     count,
     fill,
     fill_record,
+    find_campaign,
+    find_failure,
+    find_triage,
     hold_campaigns,
     next_sequence,
     pace_s,
     tally,
 )
-from service.store.database import WRITING, storage_errors
-from service.store.finding import find_campaign, find_failure, find_triage
 from service.store.reading import Store
 from service.store.stored import RESUMED, StoredCampaign, advance, campaign_state
 from service.store.tables import IMPORTED, CampaignRow, ChangeRow, EpisodeRow, RequirementRow, RunRow, TriageRow

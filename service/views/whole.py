@@ -46,7 +46,7 @@ ViewName = Literal["curves", "scenes", "failure_table", "table", "clusters", "fi
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class View:
+class CampaignView:
     """A view of a campaign, and what it depends on."""
 
     name: ViewName
@@ -81,7 +81,7 @@ class Sources:
     campaign: StoredCampaign | None
 
 
-def content_of(view: View, sources: Sources) -> Content:
+def content_of(view: CampaignView, sources: Sources) -> Content:
     """Makes the content of a view; takes seconds for a large campaign."""
     campaign, store = sources.campaign, sources.store
     if view.name == "prior":
@@ -100,7 +100,7 @@ def content_of(view: View, sources: Sources) -> Content:
 
 
 _PRIOR = TypeAdapter(PriorContent)
-_OF_REPORT: Mapping[str, Callable[[CampaignReport, View], bytes]] = {
+_OF_REPORT: Mapping[str, Callable[[CampaignReport, CampaignView], bytes]] = {
     "table": lambda made, view: reports.table(made, view.format, view.address).encode(),
     "clusters": lambda made, view: reports.clusters(made).encode(),
     "figures": lambda made, view: reports.figures(made, view.address).encode(),
@@ -113,14 +113,14 @@ class _Passing(Exception):
     """Content that does not last, so that no cache keeps it."""
 
 
-class Views(OnDemandCache[View]):
+class Views(OnDemandCache[CampaignView]):
     """Makes views of small campaigns at once, and of large ones in a helper process, one at a time."""
 
     def __init__(self, settings: ServiceSettings, store: Store, reports: Reports, helper: Helper, kept: int) -> None:
         super().__init__(self._helped, "views of large campaigns", kept)
         self._settings, self._store, self._reports, self._helper = settings, store, reports, helper
 
-    async def content(self, view: View, campaign: StoredCampaign, key_id: str | None) -> Content:
+    async def content(self, view: CampaignView, campaign: StoredCampaign, key_id: str | None) -> Content:
         """Returns the content of a view of a campaign, or raises what its making raises."""
         if not _large(campaign):
             sources = Sources(self._settings, self._store, self._reports, campaign)
@@ -130,7 +130,7 @@ class Views(OnDemandCache[View]):
         except _Passing as content:
             return Content(content.args[0], lasting=False)
 
-    async def figure(self, view: View, campaign: StoredCampaign, name: str, key_id: str | None) -> Content:
+    async def figure(self, view: CampaignView, campaign: StoredCampaign, name: str, key_id: str | None) -> Content:
         """Returns one figure of a view of them all; NotFoundError if there is no such figure."""
         if not _large(campaign):
             made = await run_in_threadpool(self._reports.report, campaign)
@@ -141,7 +141,7 @@ class Views(OnDemandCache[View]):
                 raise unknown_figure(campaign.id, name)
             return Content(figures.read(name), content.lasting)
 
-    def _helped(self, view: View) -> bytes:
+    def _helped(self, view: CampaignView) -> bytes:
         settings = self._settings
         question = _Question(view=view, data_dir=settings.data_dir, database_url=settings.database_url)
         result = self._helper.run(
@@ -184,7 +184,7 @@ class Priors:
         if spec.prior in SHIPPED_OR_NONE:
             return None
         campaign_id = await run_in_threadpool(self._campaign_id, spec.prior, project)
-        view = View(name="prior", campaign_id=campaign_id, edition="", prior=spec.prior)
+        view = CampaignView(name="prior", campaign_id=campaign_id, edition="", prior=spec.prior)
         found = _PRIOR.validate_json(await self._views.get(view, key_id))
         return found.checked(spec.prior, spec.families)
 
@@ -209,7 +209,7 @@ def _large(campaign: StoredCampaign) -> bool:
 class _Question:
     """A view, and where its helper finds the campaign."""
 
-    view: View
+    view: CampaignView
     data_dir: Path
     database_url: str | None
 

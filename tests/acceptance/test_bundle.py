@@ -26,7 +26,6 @@ from risk_sac.failures.recording import trajectory_digest
 from risk_sac.run_folder.arrays import MOST_ARRAYS, MOST_BYTES
 from risk_sac.run_folder.results import read_results
 from risk_sac.scenario import library
-from tests.acceptance.conftest import Tell
 
 RUN = ["--family", "dense", "--method", "random", "--seed", "1", "--episodes", "20"]
 NET = Path(sumo_nets.__path__[0]) / "dense" / "dense.net.xml"
@@ -44,7 +43,7 @@ def bundle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "failure.npz"
 
 
-def test_a_fresh_process_elsewhere_plays_it_again_to_the_bit(bundle: Path, tmp_path: Path) -> None:
+def test_a_fresh_process_elsewhere_plays_it_again_to_the_bit(bundle, tmp_path):
     shutil.copy(bundle, tmp_path)
     command = [sys.executable, "-m", "risk_sac", "replay", bundle.name]
     told = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
@@ -55,7 +54,7 @@ def test_a_fresh_process_elsewhere_plays_it_again_to_the_bit(bundle: Path, tmp_p
     assert said in told.stdout.replace("\n", " ")
 
 
-def test_it_holds_every_signal_head_of_every_frame_since_the_release(bundle: Path) -> None:
+def test_it_holds_every_signal_head_of_every_frame_since_the_release(bundle):
     found = read_bundle(bundle)
     frames = int((found.series["time_s"] >= found.series["released_s"]).sum())
     assert len(found.signal_heads) == frames
@@ -63,7 +62,7 @@ def test_it_holds_every_signal_head_of_every_frame_since_the_release(bundle: Pat
     assert set(found.signal_heads.tobytes()) <= set(b"rRyYgGuoOs")
 
 
-def test_show_draws_it_without_its_run_and_takes_no_number(bundle: Path, tmp_path: Path, tell: Tell) -> None:
+def test_show_draws_it_without_its_run_and_takes_no_number(bundle, tmp_path, tell):
     file = Path(shutil.copy(bundle, tmp_path))
     status, out, _ = tell("show", file)
     assert (status, "failure.png" in out) == (0, True)
@@ -100,7 +99,7 @@ def series(arrays: Arrays, **changes: np.ndarray | None) -> None:
     manifest(arrays, digest=trajectory_digest(kept))
 
 
-def test_other_actions_are_noticed(bundle: Path, tmp_path: Path, tell: Tell) -> None:
+def test_other_actions_are_noticed(bundle, tmp_path, tell):
     def steer(arrays: Arrays) -> None:
         turned = arrays["actions"].copy()
         turned[-8:] *= -1.0
@@ -136,13 +135,7 @@ def test_other_actions_are_noticed(bundle: Path, tmp_path: Path, tell: Tell) -> 
         *("no actions", "wide actions", "no numbers", "times in a square", "no policy", "half a policy", "many arrays"),
     ],
 )
-def test_what_cannot_be_replayed_is_refused_in_one_line(
-    change: Callable[[Arrays], None],
-    complaint: str,
-    bundle: Path,
-    tmp_path: Path,
-    tell: Tell,
-) -> None:
+def test_what_cannot_be_replayed_is_refused_in_one_line(change, complaint, bundle, tmp_path, tell):
     status, out, err = tell("replay", changed(bundle, tmp_path / "a.npz", change))
     assert status == 2
     assert complaint in err
@@ -201,9 +194,7 @@ ONE = array((1,), bytes(8))
         *("lzma", "bzip2", "a bomb", "large"),
     ],
 )
-def test_hostile_files_are_refused_in_one_line(
-    content: Callable[[], bytes], complaint: str, tmp_path: Path, tell: Tell
-) -> None:
+def test_hostile_files_are_refused_in_one_line(content, complaint, tmp_path, tell):
     (tmp_path / "a.npz").write_bytes(content())
     status, out, err = tell("replay", tmp_path / "a.npz")
     assert status == 2
@@ -212,7 +203,7 @@ def test_hostile_files_are_refused_in_one_line(
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_flipped_bit_is_noticed_or_makes_no_difference(seed: int, bundle: Path, tmp_path: Path) -> None:
+def test_a_flipped_bit_is_noticed_or_makes_no_difference(seed, bundle, tmp_path):
     content = bytearray(bundle.read_bytes())
     content[int(np.random.default_rng(seed).integers(len(content)))] ^= 1 << seed
     (tmp_path / "a.npz").write_bytes(content)
@@ -223,9 +214,7 @@ def test_a_flipped_bit_is_noticed_or_makes_no_difference(seed: int, bundle: Path
     assert found.manifest == read_bundle(bundle).manifest
 
 
-def test_a_failure_that_does_not_repeat_gets_no_bundle(
-    bundle: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tell: Tell
-) -> None:
+def test_a_failure_that_does_not_repeat_gets_no_bundle(bundle, tmp_path, monkeypatch, tell):
     run = bundle.parent / "elsewhere"
     contact = read_results(run).failures[0]
     monkeypatch.setattr("risk_sac.failures.play.actions_of", lambda series: series["actions"][-3:])
@@ -256,7 +245,7 @@ def replayed_elsewhere(file: Path, folder: Path) -> "subprocess.CompletedProcess
     return subprocess.run(command, cwd=folder, env=elsewhere, capture_output=True, text=True)
 
 
-def test_a_failure_on_a_map_is_played_again_where_nobody_has_the_map(placed: Path, tmp_path: Path) -> None:
+def test_a_failure_on_a_map_is_played_again_where_nobody_has_the_map(placed, tmp_path):
     told = replayed_elsewhere(placed, tmp_path)
     assert told.returncode == 0, told.stderr
     assert "every array is as recorded" in told.stdout.replace("\n", " ")
@@ -281,9 +270,7 @@ def repack(arrays: Arrays, net: bytes) -> None:
         ("</edge>", "cannot be played at: mismatched tag"),
     ],
 )
-def test_a_carried_net_that_says_more_than_roads_reaches_nobody(
-    placed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, inside: str, says: str
-) -> None:
+def test_a_carried_net_that_says_more_than_roads_reaches_nobody(placed, tmp_path, monkeypatch, inside, says):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path / "places"))
     file = changed(placed, tmp_path / "a.npz", lambda arrays: repack(arrays, f"<net>{inside}</net>".encode()))
     with pytest.raises(ConfigError, match=re.escape(says)):
@@ -291,9 +278,7 @@ def test_a_carried_net_that_says_more_than_roads_reaches_nobody(
     assert not (tmp_path / "places").exists()
 
 
-def test_a_bundle_that_lost_its_place_or_carries_another_is_refused(
-    placed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_bundle_that_lost_its_place_or_carries_another_is_refused(placed, tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path / "places"))
     told = replayed_elsewhere(changed(placed, tmp_path / "a.npz", lambda arrays: arrays.pop(bundles.NET)), tmp_path)
     assert (told.returncode, "there is no place 'junction_" in told.stderr.replace("\n", " ")) == (2, True), told.stderr

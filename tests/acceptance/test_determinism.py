@@ -63,7 +63,7 @@ def stopped(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_the_run_has_learnt_something_to_be_deterministic_about(uninterrupted: tuple[RunOutcome, Listener]) -> None:
+def test_the_run_has_learnt_something_to_be_deterministic_about(uninterrupted):
     summary, listener = uninterrupted
     assert summary.finished
     assert [r.phase for r in listener.records] == ["search"] * EPISODES + ["evaluation"] * EVALUATION
@@ -83,9 +83,7 @@ print(execute_run(RunSpec.model_validate_json(sys.argv[1]), Path(sys.argv[2]), L
 """
 
 
-def test_another_process_goes_on_with_a_stopped_run_as_if_it_never_stopped(
-    uninterrupted: tuple[RunOutcome, Listener], stopped: Path, tmp_path: Path
-) -> None:
+def test_another_process_goes_on_with_a_stopped_run_as_if_it_never_stopped(uninterrupted, stopped, tmp_path):
     shutil.copytree(stopped, tmp_path, dirs_exist_ok=True)
     done = subprocess.run(
         [sys.executable, "-c", ELSEWHERE, spec().model_dump_json(), str(tmp_path)],
@@ -98,9 +96,7 @@ def test_another_process_goes_on_with_a_stopped_run_as_if_it_never_stopped(
 
 
 @pytest.mark.parametrize("stop_after", [*(pytest.param(stop, marks=pytest.mark.torture) for stop in (1, EPISODES)), 4])
-def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
-    uninterrupted: tuple[RunOutcome, Listener], tmp_path: Path, stop_after: int
-) -> None:
+def test_a_stopped_and_resumed_run_equals_one_never_interrupted(uninterrupted, tmp_path, stop_after):
     expected, whole = uninterrupted
     stopped, before = run(tmp_path, limit=stop_after)
     assert not stopped.finished
@@ -116,7 +112,7 @@ def test_a_stopped_and_resumed_run_equals_one_never_interrupted(
     assert resumed.evaluation == expected.evaluation
 
 
-def test_a_resumed_i_i_d_phase_draws_on_and_no_search_meets_its_scenes(tmp_path: Path) -> None:
+def test_a_resumed_i_i_d_phase_draws_on_and_no_search_meets_its_scenes(tmp_path):
     drawn = CampaignSpec(families=("mixed",), iid=Iid(episodes=4), learner=LEARNER).drawn()[1]
     whole, first, rest, searched = Listener(), Listener(2), Listener(10**9), Listener(10**9)
     expected = execute_run(drawn, tmp_path / "whole", whole)
@@ -131,7 +127,7 @@ def test_a_resumed_i_i_d_phase_draws_on_and_no_search_meets_its_scenes(tmp_path:
     assert len(set(scenes)) == len(scenes)
 
 
-def test_a_resumed_archive_search_breeds_on_as_if_never_interrupted(tmp_path: Path) -> None:
+def test_a_resumed_archive_search_breeds_on_as_if_never_interrupted(tmp_path):
     bred = spec(method="archive").model_copy(update={"budget": Budget(episodes=INITIAL + 6)})
     whole, first, rest = Listener(), Listener(INITIAL + 3), Listener()
     expected = execute_run(bred, tmp_path / "whole", whole)
@@ -144,7 +140,7 @@ def test_a_resumed_archive_search_breeds_on_as_if_never_interrupted(tmp_path: Pa
 
 @pytest.mark.parametrize("limit", [*(pytest.param(limit, marks=pytest.mark.torture) for limit in (1, 3)), 7])
 @pytest.mark.parametrize("prior", ["none", "shipped"])
-def test_a_resumed_search_by_two_takes_turns_as_if_never_interrupted(tmp_path: Path, prior: str, limit: int) -> None:
+def test_a_resumed_search_by_two_takes_turns_as_if_never_interrupted(tmp_path, prior, limit):
     at_once = LEARNER.model_copy(update={"warm_start": WarmStartConfig(episodes=0)})  # both act from the beginning on
     changes = {"budget": Budget(episodes=9), "learner": at_once, "prior": prior}
     shared = spec(seed=2, method="risk-sac-diverse").model_copy(update=changes)
@@ -161,9 +157,7 @@ def test_a_resumed_search_by_two_takes_turns_as_if_never_interrupted(tmp_path: P
 
 
 @pytest.mark.parametrize("damaged", ["newest", "both"])
-def test_a_run_with_damaged_checkpoints_equals_one_never_interrupted(
-    uninterrupted: tuple[RunOutcome, Listener], stopped: Path, tmp_path: Path, damaged: str
-) -> None:
+def test_a_run_with_damaged_checkpoints_equals_one_never_interrupted(uninterrupted, stopped, tmp_path, damaged):
     expected, whole = uninterrupted
     shutil.copytree(stopped, tmp_path, dirs_exist_ok=True)
     files = [tmp_path / CHECKPOINT, previous(tmp_path / CHECKPOINT)]
@@ -179,7 +173,7 @@ def test_a_run_with_damaged_checkpoints_equals_one_never_interrupted(
     assert after.series == whole.series
 
 
-def test_a_damaged_series_is_reported_as_it_was_written(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_damaged_series_is_reported_as_it_was_written(tmp_path, caplog):
     slow = Requirement(name="slow", formula="ego_speed_mps <= 1")  # which the ego violates in each episode
     failing, told, again = (
         spec(method="random").model_copy(update={"requirements": (slow,)}),
@@ -195,7 +189,7 @@ def test_a_damaged_series_is_reported_as_it_was_written(tmp_path: Path, caplog: 
     assert {lost.name, changed.name} == {Path(record.args[0]).name for record in caplog.records if record.args}
 
 
-def test_a_finished_run_tells_of_its_episodes_and_repeats_none(tmp_path: Path) -> None:
+def test_a_finished_run_tells_of_its_episodes_and_repeats_none(tmp_path):
     first, told = run(tmp_path, method="random")
     written = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.npz")}
     again, listener = run(tmp_path, method="random")

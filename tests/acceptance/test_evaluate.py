@@ -55,7 +55,7 @@ def table(folder: Path) -> dict[str, Any]:
     return stored
 
 
-def test_report_holds_cells_tests_runs_and_figures(whole: Path) -> None:
+def test_report_holds_cells_tests_runs_and_figures(whole):
     stored = table(whole)
     assert stored["complete"] is True
     assert stored["command"] == "risk-sac evaluate " + " ".join(FLAGS)
@@ -70,7 +70,7 @@ def test_report_holds_cells_tests_runs_and_figures(whole: Path) -> None:
     assert len((whole / "out" / "table.csv").read_text().splitlines()) == 3
 
 
-def test_command_on_the_page_gives_the_digest_of_the_row(whole: Path) -> None:
+def test_command_on_the_page_gives_the_digest_of_the_row(whole):
     page = (whole / "out" / "table.md").read_text()
     match = re.search(r"^risk-sac (run --spec .*)$", page, re.MULTILINE)
     assert match
@@ -80,9 +80,7 @@ def test_command_on_the_page_gives_the_digest_of_the_row(whole: Path) -> None:
     assert json.loads((whole / "repeated" / "results.json").read_text())["digest"] == row["digest"]
 
 
-def test_finished_runs_are_not_run_again_and_the_report_is_the_same(
-    whole: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_finished_runs_are_not_run_again_and_the_report_is_the_same(whole, monkeypatch):
     out = whole / "out"
     runs = {path: path.stat().st_mtime_ns for path in (out / "runs").rglob("*")}
     report = {path: path.read_bytes() for path in out.glob("[tf]*/**/*") if path.is_file()}
@@ -94,9 +92,7 @@ def test_finished_runs_are_not_run_again_and_the_report_is_the_same(
     assert {path: path.read_bytes() for path in report} == report
 
 
-def test_folder_of_another_comparison_is_refused_and_kept(
-    whole: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_folder_of_another_comparison_is_refused_and_kept(whole, monkeypatch, capsys):
     monkeypatch.chdir(whole)
     before = (whole / "out" / "spec.yaml").read_bytes()
     assert cli.main(["evaluate", *FLAGS, "--seeds", "3", "--episodes", "7"]) == 2
@@ -106,7 +102,7 @@ def test_folder_of_another_comparison_is_refused_and_kept(
     assert (whole / "out" / "spec.yaml").read_bytes() == before
 
 
-def test_an_interrupted_comparison_goes_on_and_equals_one_that_never_was(whole: Path, tmp_path: Path) -> None:
+def test_an_interrupted_comparison_goes_on_and_equals_one_that_never_was(whole, tmp_path):
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
     runs = tmp_path / "out" / "runs"
     for folder in runs.glob("*-sac-*"):  # the others are found finished
@@ -154,15 +150,13 @@ ONE = ["--families", "low", "--methods", "random", "--seeds", "1", "--first-seed
 ONE += ["--verify", "0", "--out"]
 
 
-def test_a_crashed_run_is_tried_again(crash: Callable[[int], None], tmp_path: Path) -> None:
+def test_a_crashed_run_is_tried_again(crash, tmp_path):
     crash(1)
     assert cli.main(["evaluate", *ONE, str(tmp_path / "out")]) == 0
     assert [(row["method"], row["seed"]) for row in table(tmp_path)["runs"]] == [("random", 4)]
 
 
-def test_a_run_that_crashes_every_time_has_failed(
-    crash: Callable[[int], None], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_that_crashes_every_time_has_failed(crash, tmp_path, capsys):
     crash(ATTEMPTS)
     assert cli.main(["evaluate", *ONE, str(tmp_path / "out")]) == 1
     assert capsys.readouterr().err.startswith(
@@ -172,9 +166,7 @@ def test_a_run_that_crashes_every_time_has_failed(
     assert (tmp_path / "out" / "table.md").exists()
 
 
-def test_what_fails_is_named_and_the_others_go_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_fails_is_named_and_the_others_go_on(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "spec.yaml").write_text(SPEC)
     runs = tmp_path / "out" / "runs"

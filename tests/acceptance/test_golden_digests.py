@@ -1,7 +1,5 @@
 """A change that is not meant to change results changes none: small runs come to the digests that were recorded."""
 
-from pathlib import Path
-
 import pytest
 
 from tests.acceptance.golden_digests import METHODS, SEEDS, digest, fingerprint, recorded
@@ -23,7 +21,5 @@ def digests() -> dict[str, str]:
 
 @pytest.mark.parametrize("family", SEEDS)
 @pytest.mark.parametrize("method", METHODS)
-def test_a_small_run_comes_to_the_recorded_digest(
-    digests: dict[str, str], family: str, method: str, tmp_path: Path
-) -> None:
+def test_a_small_run_comes_to_the_recorded_digest(digests, family, method, tmp_path):
     assert digest(family, method, tmp_path) == digests[f"{family} {method}"]

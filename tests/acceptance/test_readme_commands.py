@@ -11,13 +11,13 @@ from tests.server import ROOT
 README = ROOT / "README.md"
 
 
-def test_readme_has_the_two_commands_and_those_of_a_run() -> None:
+def test_readme_has_the_two_commands_and_those_of_a_run():
     commands = [step.command for step in steps(README.read_text(encoding="utf-8"))]
     assert commands[:3] == ["make demo", "make test", "source .venv/bin/activate"]
 
 
 @pytest.mark.skipif(not (Path(sys.prefix) / "bin" / "activate").exists(), reason="needs the .venv of `make install`")
-def test_commands_of_a_run_print_what_readme_shows(tmp_path: Path) -> None:
+def test_commands_of_a_run_print_what_readme_shows(tmp_path):
     """Those of `make` are left out: `python -m tests.acceptance.readme` runs them too, in half an hour."""
     clone = cloned(tmp_path)
     (clone / ".venv").symlink_to(sys.prefix)

@@ -65,7 +65,7 @@ def struck(bundle: Bundle) -> tuple[object, ...]:
     return collision.valid, collision.other_id, collision.judgement.conflict_type, collision.judgement.grade
 
 
-def test_every_distinct_failure_repeats_to_the_bit(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_distinct_failure_repeats_to_the_bit(run, capsys):
     assert main(["verify", str(run), "--times", "2"]) == 0
     found = read_run(run)
     expected = found.metrics["search"].distinct_failures
@@ -89,9 +89,7 @@ def tampered_with(run: Path) -> int:
     return index
 
 
-def test_what_does_not_repeat_is_flaky_and_counts_as_no_failure(
-    run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_does_not_repeat_is_flaky_and_counts_as_no_failure(run, tmp_path, capsys):
     shutil.copytree(run, tmp_path / "run", ignore=shutil.ignore_patterns(VERIFIED))
     first = tampered_with(tmp_path / "run")
     assert main(["verify", str(tmp_path / "run"), "--times", "2"]) == 1
@@ -106,13 +104,6 @@ def test_what_does_not_repeat_is_flaky_and_counts_as_no_failure(
     assert tampered.metrics["search"].raw_collisions == whole.metrics["search"].raw_collisions
     assert tampered.digest == whole.digest
     assert read_verified(run, "0" * 64) is None  # of other results
-
-
-def test_every_distinct_failure_has_a_bundle(run: Path, failures: Path) -> None:
-    spec = read_results(run).spec
-    expected = {episode.id_in(spec.id) for episode in first_of_variants(read_results(run))}
-    assert len(expected) >= 2
-    assert {file.stem.rpartition("-")[0] for file in failures.iterdir()} == expected
 
 
 def test_a_core_does_less_and_fails_in_the_same_way_as_surely(
@@ -143,9 +134,7 @@ def regressed(tell: Tell, tmp_path: Path, *arguments: object) -> tuple[int, list
     return status, [case.verdict for case in cases]
 
 
-def test_with_its_own_ego_every_failure_still_fails_and_a_baseline_accepts_that(
-    failures: Path, tmp_path: Path, tell: Tell
-) -> None:
+def test_with_its_own_ego_every_failure_still_fails_and_a_baseline_accepts_that(failures, tmp_path, tell):
     status, verdicts = regressed(tell, tmp_path, "--failures", failures, "--ego", "default")
     assert status == 1
     assert set(verdicts) == {Verdict.STILL_FAILING}
@@ -154,7 +143,7 @@ def test_with_its_own_ego_every_failure_still_fails_and_a_baseline_accepts_that(
     assert regressed(tell, tmp_path, *again)[0] == 0
 
 
-def test_what_still_fails_is_exported_as_the_other_ego_has_it(failure: Path, tmp_path: Path, tell: Tell) -> None:
+def test_what_still_fails_is_exported_as_the_other_ego_has_it(failure, tmp_path, tell):
     exports = tmp_path / "exports"
     asked = ("--failures", failure, "--ego", "default", "--exports", exports, "--format", "gif")
     assert regressed(tell, tmp_path, *asked) == (1, [Verdict.STILL_FAILING])
@@ -163,7 +152,7 @@ def test_what_still_fails_is_exported_as_the_other_ego_has_it(failure: Path, tmp
     assert tell("replay", bundle)[0] == 0
 
 
-def test_a_better_ego_fixes_more_than_a_worse_one(failures: Path, tmp_path: Path, tell: Tell) -> None:
+def test_a_better_ego_fixes_more_than_a_worse_one(failures, tmp_path, tell):
     (tmp_path / "slow.yaml").write_text("reaction_time_s: 1.0\n")
     fixed = {}
     for ego in ("perfect", tmp_path / "slow.yaml"):
@@ -173,7 +162,7 @@ def test_a_better_ego_fixes_more_than_a_worse_one(failures: Path, tmp_path: Path
     assert better > worse
 
 
-def test_what_is_flaky_or_of_another_net_never_counts_as_fixed(failure: Path, tmp_path: Path, tell: Tell) -> None:
+def test_what_is_flaky_or_of_another_net_never_counts_as_fixed(failure, tmp_path, tell):
     def tamper(arrays: dict[str, np.ndarray]) -> None:
         series(arrays, actions=np.where(np.isnan(arrays["actions"]), np.nan, -arrays["actions"]))
 
@@ -195,25 +184,15 @@ def test_what_is_flaky_or_of_another_net_never_counts_as_fixed(failure: Path, tm
     ],
     ids=["no ego", "no baseline"],
 )
-def test_what_is_missing_is_said_before_anything_is_played(
-    arguments: list[str], complaint: str, failures: Path, tmp_path: Path, tell: Tell
-) -> None:
+def test_what_is_missing_is_said_before_anything_is_played(arguments, complaint, failures, tmp_path, tell):
     status, _, err = tell("regress", "--failures", failures, *arguments, "--out", tmp_path / "cases.json")
     assert status == 2
     assert complaint in err
     assert not (tmp_path / "cases.json").exists()
 
 
-def test_an_ego_that_sees_nothing_fixes_nothing(failures: Path, tmp_path: Path, tell: Tell) -> None:
-    (tmp_path / "blind.yaml").write_text("sensor: {range_m: 1, field_of_view_rad: 0.01, memory_s: 0}\n")
-    _, verdicts = regressed(tell, tmp_path, "--failures", failures, "--ego", tmp_path / "blind.yaml")
-    assert set(verdicts) == {Verdict.NEW_KIND}
-
-
 @pytest.mark.parametrize("verb", ["minimise", "region"])
-def test_what_does_not_happen_here_has_neither_core_nor_region(
-    verb: str, failure: Path, tmp_path: Path, tell: Tell
-) -> None:
+def test_what_does_not_happen_here_has_neither_core_nor_region(verb, failure, tmp_path, tell):
     def still(arrays: dict[str, np.ndarray]) -> None:
         series(arrays, actions=np.where(np.isnan(arrays["actions"]), np.nan, 0.0))
 
@@ -239,7 +218,7 @@ class Sharp:
         return np.ones(self.size, np.float32)
 
 
-def test_a_policy_acts_on_when_the_recorded_actions_have_ended(failure: Path) -> None:
+def test_a_policy_acts_on_when_the_recorded_actions_have_ended(failure):
     stage = VariantPlayer(read_bundle(failure))
     with closing(stage.env):
         sharp = Sharp(stage.env.action_size)
@@ -251,7 +230,7 @@ def test_a_policy_acts_on_when_the_recorded_actions_have_ended(failure: Path) ->
     assert (acted[5:] == 1.0).all()
 
 
-def test_a_run_that_learned_has_a_policy_and_one_that_did_not_has_none(run: Path, tmp_path: Path) -> None:
+def test_a_run_that_learned_has_a_policy_and_one_that_did_not_has_none(run, tmp_path):
     learner = ["run", "--family", "low", "--method", "risk-sac", "--seed", "3", "--episodes", "9"]
     subprocess.run([sys.executable, "-m", "risk_sac", *learner, "--out", tmp_path / "run"], check=True)
     results = read_results(tmp_path / "run")

@@ -18,7 +18,6 @@ from risk_sac.failures.minimise import minimise
 from risk_sac.failures.recording import actions_of
 from risk_sac.records import EpisodeRecord, Violation
 from risk_sac.run_folder.results import first_of_variants, read_results
-from tests.acceptance.conftest import Tell
 from tests.exports.test_mcap import read
 
 SPEC = """
@@ -57,7 +56,7 @@ def bundle(folder: Path, failure: str) -> Path:
     return folder / "failure.npz"
 
 
-def test_it_is_listed_sorted_and_verified(folder: Path, tell: Tell) -> None:
+def test_it_is_listed_sorted_and_verified(folder, tell):
     _, out, _ = tell("show", folder / "run")
     assert "never_fast" in out
     _, out, _ = tell("clusters", folder / "run")
@@ -68,13 +67,13 @@ def test_it_is_listed_sorted_and_verified(folder: Path, tell: Tell) -> None:
     assert f"{distinct} of {distinct} distinct" in out
 
 
-def test_it_is_drawn_beside_its_twin(folder: Path, failure: str, tell: Tell) -> None:
+def test_it_is_drawn_beside_its_twin(folder, failure, tell):
     assert tell("show", folder / "run", failure, "--out", folder / "a.png")[0] == 0
     assert tell("show", folder / "run", failure, "--twin", "idle", "--out", folder / "b.png")[0] == 0
     assert (folder / "b.png").stat().st_size > (folder / "a.png").stat().st_size > 10_000
 
 
-def test_a_bundle_of_it_is_played_to_the_horizon_to_the_bit(bundle: Path, tell: Tell) -> None:
+def test_a_bundle_of_it_is_played_to_the_horizon_to_the_bit(bundle, tell):
     found = read_bundle(bundle)
     status, out, _ = tell("replay", bundle)
     assert status == 0
@@ -84,14 +83,14 @@ def test_a_bundle_of_it_is_played_to_the_horizon_to_the_bit(bundle: Path, tell: 
 
 
 @pytest.mark.usefixtures("steering_egos")
-def test_an_ego_that_keeps_the_requirement_has_fixed_it_and_its_own_still_fails(bundle: Path, tell: Tell) -> None:
+def test_an_ego_that_keeps_the_requirement_has_fixed_it_and_its_own_still_fails(bundle, tell):
     status, out, _ = tell("regress", "--failures", bundle, "--ego", "default")
     assert (status, "1 still failing" in out, "violates never_fast after" in out) == (1, True, True)
     status, out, _ = tell("regress", "--failures", bundle, "--ego", "crawler")
     assert (status, "1 fixed" in out, "violates never_fast" in out) == (0, True, False)
 
 
-def test_its_core_fails_by_the_same_requirement_with_less(bundle: Path, tell: Tell, tmp_path: Path) -> None:
+def test_its_core_fails_by_the_same_requirement_with_less(bundle, tell, tmp_path):
     minimal = minimise(read_bundle(bundle), most=40)
     core = minimal.manifest.core
     assert core is not None
@@ -103,7 +102,7 @@ def test_its_core_fails_by_the_same_requirement_with_less(bundle: Path, tell: Te
 
 
 @pytest.mark.parametrize("near", [True, False], ids=["an actor near", "nobody near"])
-def test_every_format_has_the_violation_with_and_without_an_actor(bundle: Path, *, near: bool) -> None:
+def test_every_format_has_the_violation_with_and_without_an_actor(bundle, *, near):
     found = read_bundle(bundle) if near else alone(read_bundle(bundle))
     recorded = Recorded.of(found)
     violation = recorded.violation
@@ -135,7 +134,7 @@ def alone(bundle: Bundle) -> Bundle:
     return replace(bundle, manifest=bundle.manifest.model_copy(update={"episode": changed}))
 
 
-def test_the_table_of_episodes_has_requirements_and_violations(folder: Path, tell: Tell, tmp_path: Path) -> None:
+def test_the_table_of_episodes_has_requirements_and_violations(folder, tell, tmp_path):
     assert tell("export", folder / "run", "--format", "parquet", "--out", tmp_path / "a.parquet")[0] == 0
     rows = parquet.read_table(tmp_path / "a.parquet").to_pylist()
     failed = [row for row in rows if row["failed"] == ["never_fast"]]

@@ -93,9 +93,7 @@ def digest(launcher: Launcher) -> str:
     return said[-1].digest
 
 
-def test_a_worker_that_finds_all_played_replays_what_nobody_has_and_refuses_what_goes_another_way(
-    tmp_path: Path,
-) -> None:
+def test_a_worker_that_finds_all_played_replays_what_nobody_has_and_refuses_what_goes_another_way(tmp_path):
     spec = RunSpec(family="low", method="archive", seed=3, budget=Budget(episodes=20))
     said, _, _ = Launcher(tmp_path / "run", spec).work()
     before = said[-1]
@@ -121,7 +119,7 @@ def test_a_worker_that_finds_all_played_replays_what_nobody_has_and_refuses_what
 
 
 @pytest.mark.parametrize("moment_s", [pytest.param(0.2, marks=pytest.mark.torture), 1.5, 4.0])
-def test_a_worker_with_nothing_to_keep_leaves_at_once(launcher: Launcher, moment_s: float) -> None:
+def test_a_worker_with_nothing_to_keep_leaves_at_once(launcher, moment_s):
     launcher.submit()
     time.sleep(moment_s)  # into the start of Python, an import, or the first episode's compilation
     launcher.executor.cancel(1, 30)
@@ -130,9 +128,7 @@ def test_a_worker_with_nothing_to_keep_leaves_at_once(launcher: Launcher, moment
         assert time.monotonic() - told_at < 20
 
 
-def test_a_worker_that_is_told_to_stop_killed_crashes_or_hangs_goes_on_to_the_same_results(
-    launcher: Launcher, undisturbed: str
-) -> None:
+def test_a_worker_that_is_told_to_stop_killed_crashes_or_hangs_goes_on_to_the_same_results(launcher, undisturbed):
     said, exited, left_after_s = launcher.work(5, lambda _: launcher.executor.cancel(1, 30))
     assert exited == Exited(None, Cause.ENDED, 0)
     assert isinstance(said[-1], Finished)

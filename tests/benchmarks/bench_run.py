@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable
 from functools import wraps
-from pathlib import Path
 
 import pytest
 
@@ -71,9 +70,7 @@ class Stopwatch:
 @pytest.mark.bench
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("family", FAMILIES)
-def test_little_of_a_run_lies_outside_simulator_and_learner(
-    family: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_little_of_a_run_lies_outside_simulator_and_learner(family, tmp_path, monkeypatch):
     spec = RunSpec(family=family, method="risk-sac", seed=0, budget=Budget(episodes=WARM_UP + EPISODES))
     watch = Stopwatch(monkeypatch)
     run(spec, tmp_path / "run", watch.begin)

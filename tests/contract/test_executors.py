@@ -4,7 +4,8 @@ from collections.abc import Iterator
 import pytest
 
 from risk_sac.errors import ConfigError
-from risk_sac.execution.executor import MakeExecutor, WorkerProgram, executor_named
+from risk_sac.execution import executor_named
+from risk_sac.execution.executor import MakeExecutor, WorkerProgram
 from risk_sac.execution.jobs import worker_program
 from risk_sac.execution.ray.executor import RayExecutor
 from tests.contract.executor_contract import ExecutorContract

@@ -36,7 +36,7 @@ def contents(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     return set(zipfile.ZipFile(wheel).namelist())
 
 
-def test_wheel_contains_nets_and_page_and_no_tests(contents: set[str]) -> None:
+def test_wheel_contains_nets_and_page_and_no_tests(contents):
     assert {f"sumo_nets/{name}/{name}.{part}.xml" for name in FAMILIES for part in ("net", "nod", "edg")} <= contents
     assert {"sumo_nets/vtypes.add.xml", "sumo_nets/README.md", "risk_sac/py.typed", "service/py.typed"} <= contents
     assert "service/web/dist/index.html" in contents
@@ -45,7 +45,7 @@ def test_wheel_contains_nets_and_page_and_no_tests(contents: set[str]) -> None:
     assert not [name for name in contents if name.startswith("tests")]
 
 
-def test_wheel_contains_every_module(contents: set[str]) -> None:
+def test_wheel_contains_every_module(contents):
     modules = {
         str(path.relative_to(ROOT))
         for package in PACKAGES
@@ -66,20 +66,18 @@ def loaded() -> set[str]:
     return set(json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout))
 
 
-def test_the_server_process_loads_nothing_that_learns_compiles_or_simulates_and_matplotlib_to_draw(
-    loaded: set[str],
-) -> None:
+def test_the_server_process_loads_nothing_that_learns_compiles_or_simulates_and_matplotlib_to_draw(loaded):
     assert "service.runs.manager" in loaded
     assert "risk_sac.report" in loaded
     assert not {"torch", "libsumo", "botorch", "gpytorch", "numba", "matplotlib", "risk_sac.execution.worker"} & loaded
 
 
-def test_the_server_loads_nothing_of_a_cluster_that_it_does_not_use(loaded: set[str]) -> None:
+def test_the_server_loads_nothing_of_a_cluster_that_it_does_not_use(loaded):
     assert "risk_sac.execution.executor" in loaded
     assert not {"ray", "risk_sac.execution.ray.executor", "risk_sac.execution.ray.bridge"} & loaded
 
 
-def test_the_server_reads_no_upload_itself(loaded: set[str]) -> None:
+def test_the_server_reads_no_upload_itself(loaded):
     assert "service.networks.network_store" in loaded
     assert not [name for name in loaded if name.startswith("service.networks.checker")]
 
@@ -87,7 +85,7 @@ def test_the_server_reads_no_upload_itself(loaded: set[str]) -> None:
 NETS = Path(sumo_nets.__path__[0])
 
 
-def test_rebuilding_the_nets_gives_the_same_bytes(tmp_path: Path) -> None:
+def test_rebuilding_the_nets_gives_the_same_bytes(tmp_path):
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     if shutil.which("netconvert", path=path) is None:
         pytest.skip("netconvert is not installed")
@@ -98,7 +96,7 @@ def test_rebuilding_the_nets_gives_the_same_bytes(tmp_path: Path) -> None:
     assert set(committed) == {"low.net.xml", "mixed.net.xml", "dense.net.xml"}
 
 
-def test_bodies_are_as_large_as_scenes_take_them_to_be() -> None:
+def test_bodies_are_as_large_as_scenes_take_them_to_be():
     sizes: dict[bool, set[tuple[float, float]]] = {False: set(), True: set()}  # by whether it is a truck
     for each in ElementTree.parse(NETS / "vtypes.add.xml").getroot():
         sizes["truck" in each.attrib["id"]].add((float(each.attrib["length"]), float(each.attrib["width"])))

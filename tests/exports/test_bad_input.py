@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +26,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str | Path) -> str:
     return capsys.readouterr().err.replace("\n", " ")
 
 
-def test_a_format_that_cannot_hold_it_names_those_that_can(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_format_that_cannot_hold_it_names_those_that_can(tmp_path, capsys):
     assert "since gif holds one" in refused(capsys, tmp_path, "--format", "gif", "--out", tmp_path / "x.gif")
     assert "got 2 bundles" in refused(capsys, BUNDLE, BUNDLE, "--format", "gif", "--out", tmp_path / "x.gif")
     assert not list(tmp_path.iterdir())
@@ -37,9 +36,7 @@ def test_a_format_that_cannot_hold_it_names_those_that_can(tmp_path: Path, capsy
         formats.check_carries(FormatName.PARQUET, "failure")
 
 
-def test_a_missing_package_names_the_extra_before_anything_is_read(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_package_names_the_extra_before_anything_is_read(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(formats, "find_spec", lambda name: None)
     asked = (tmp_path / "none.npz", "--out", tmp_path / "x", "--format")
     assert "needs foxglove, and that is not installed; pip install 'risk-sac[export]'" in refused(
@@ -53,9 +50,7 @@ def test_a_missing_package_names_the_extra_before_anything_is_read(
 
 
 @pytest.mark.parametrize("name", ["gif", "openscenario", "sumo"])
-def test_a_net_that_is_gone_or_another_one_is_named(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_net_that_is_gone_or_another_one_is_named(name, tmp_path, capsys, monkeypatch):
     nets = tmp_path / "nets"
     shutil.copytree(Path(sumo_nets.__path__[0]), nets)
     monkeypatch.setattr("risk_sac.failures.bundle.files", lambda package: nets)
@@ -67,9 +62,7 @@ def test_a_net_that_is_gone_or_another_one_is_named(
     assert not (tmp_path / "x").exists()
 
 
-def test_a_bundle_that_lacks_an_array_or_a_violation_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bundle_that_lacks_an_array_or_a_violation_is_refused(tmp_path, capsys):
     from risk_sac.failures.recording import trajectory_digest
 
     with np.load(BUNDLE) as archive:
@@ -93,7 +86,7 @@ def small_disk() -> None:
 
 
 @pytest.mark.parametrize(("name", "out"), [("openscenario", "folder"), ("sumo", "x.zip"), ("gif", "x.gif")])
-def test_a_disk_that_fills_leaves_nothing(name: str, out: str, tmp_path: Path) -> None:
+def test_a_disk_that_fills_leaves_nothing(name, out, tmp_path):
     command = [sys.executable, "-m", "risk_sac", "export", BUNDLE, "--format", name, "--out", tmp_path / "new" / out]
     done = subprocess.run(command, capture_output=True, text=True, preexec_fn=small_disk)
     assert done.returncode == 1
@@ -102,14 +95,14 @@ def test_a_disk_that_fills_leaves_nothing(name: str, out: str, tmp_path: Path) -
     assert not list(tmp_path.glob("new/*"))
 
 
-def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_with_something_in_it_is_left_alone(tmp_path, capsys):
     (tmp_path / "kept").write_text("mine")
     said = refused(capsys, BUNDLE, "--format", "openscenario", "--out", tmp_path)
     assert "which exists" in said
     assert [file.name for file in tmp_path.iterdir()] == ["kept"]
 
 
-def test_an_export_is_the_same_file_each_time(tmp_path: Path, exported: Callable[..., Path]) -> None:
+def test_an_export_is_the_same_file_each_time(tmp_path, exported):
     for name in ("openscenario", "commonroad", "mcap", "gif"):
         out = example(FormatName(name))
         again = tmp_path / out.name

@@ -1,7 +1,6 @@
 """CommonRoad scenarios, read by commonroad-io and put before CommonRoad's checker."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,6 @@ import pytest
 
 from risk_sac.failures.export.commonroad import ACTORS, LANELETS, STATES
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.net import colour
 from tests.exports.conftest import CM, ask_checkers, checked
 from tests.exports.make_examples import FAMILIES
@@ -25,9 +23,7 @@ def read(file: Path, frames: int) -> Any:
 @checked
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("name", NAMES)
-def test_it_comes_back_within_a_centimetre(
-    family: str, name: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
-) -> None:
+def test_it_comes_back_within_a_centimetre(family, name, exported, failure):
     recorded = failure(family)
     scenario = read(exported(family, FormatName.COMMONROAD) / name, recorded.frames)
     driven = recorded.actors[NAMES[name] :]  # in one of them the ego is free
@@ -48,9 +44,7 @@ def test_it_comes_back_within_a_centimetre(
 
 
 @checked
-def test_lights_show_what_they_showed_in_every_frame(
-    exported: Callable[..., Path], failure: Callable[[str], Recorded]
-) -> None:
+def test_lights_show_what_they_showed_in_every_frame(exported, failure):
     recorded = failure("dense")
     lights = read(exported("dense", FormatName.COMMONROAD) / "failure.xml", recorded.frames)["lights"]
     heads = [head for lane in recorded.net.lanes.values() for head in lane.heads]
@@ -63,9 +57,7 @@ def test_lights_show_what_they_showed_in_every_frame(
 
 @checked
 @pytest.mark.parametrize("family", FAMILIES)
-def test_its_checker_finds_what_ego_and_striker_drove_feasible(
-    family: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
-) -> None:
+def test_its_checker_finds_what_ego_and_striker_drove_feasible(family, exported, failure):
     recorded = failure(family)
     striker = [actor.id for actor in recorded.actors].index(recorded.violation.other_id)
     vehicles = [ACTORS] + [ACTORS + striker] * (not recorded.actors[striker].pedestrian)

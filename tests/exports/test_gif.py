@@ -1,22 +1,16 @@
 """The GIF, read by Pillow."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 from PIL import Image, ImageColor
 
 from risk_sac.failures.export.formats import FormatName
 from risk_sac.failures.export.gif import EGO, HOLD_MS, LAST_S, STRIKER
-from risk_sac.failures.export.recorded import Recorded
 from tests.exports.make_examples import FAMILIES
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_it_shows_ego_and_striker_up_to_the_contact(
-    family: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
-) -> None:
+def test_it_shows_ego_and_striker_up_to_the_contact(family, exported, failure):
     with Image.open(exported(family, FormatName.GIF)) as animation:
         frames = animation.n_frames
         assert frames == min(failure(family).frames, round(LAST_S * 10))

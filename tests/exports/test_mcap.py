@@ -4,7 +4,6 @@ import io
 import json
 from collections import defaultdict
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -13,7 +12,6 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.reader import make_reader
 
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.failures.export.recorded import Recorded
 from tests.exports.conftest import CM
 from tests.exports.make_examples import FAMILIES
 
@@ -44,9 +42,7 @@ def decoder(schema: Any) -> Callable[[bytes], Any]:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_bodies_and_measures_come_back(
-    family: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
-) -> None:
+def test_bodies_and_measures_come_back(family, exported, failure):
     recorded = failure(family)
     topics, attached = read(exported(family, FormatName.MCAP).read_bytes())
     assert len(topics["/actors"]) == len(topics["/measures"]) == len(topics["/tf"]) == recorded.frames

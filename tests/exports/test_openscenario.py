@@ -2,7 +2,6 @@
 
 import json
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from itertools import combinations
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from lxml import etree
 from shapely.affinity import rotate, translate
 
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.failures.export.recorded import ExportedActor, Recorded
+from risk_sac.failures.export.recorded import ExportedActor
 from risk_sac.failures.net import colour
 from tests.exports.conftest import CM, ask_checkers, checked
 from tests.exports.make_examples import FAMILIES
@@ -25,7 +24,7 @@ CHECKS = {".xosc": 17, ".xodr": 23}
 
 
 @checked
-def test_asams_checkers_find_nothing(exported: Callable[..., Path]) -> None:
+def test_asams_checkers_find_nothing(exported):
     files = [exported(family, FormatName.OPENSCENARIO) / name for family in FAMILIES for name in FILES]
     for file, checks in json.loads(ask_checkers("ask_asam.py", *files)).items():
         assert len(checks) == CHECKS[Path(file).suffix]
@@ -49,9 +48,7 @@ def driven(file: Path, actor: ExportedActor) -> np.ndarray:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_trajectories_come_back_within_a_centimetre(
-    family: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
-) -> None:
+def test_trajectories_come_back_within_a_centimetre(family, exported, failure):
     folder, recorded = exported(family, FormatName.OPENSCENARIO), failure(family)
     for actor in recorded.actors:
         found = driven(folder / "failure-as-recorded.xosc", actor)
@@ -68,9 +65,7 @@ def test_trajectories_come_back_within_a_centimetre(
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_no_two_bodies_overlap_before_the_end_as_a_reader_of_the_standard_draws_them(
-    family: str, exported: Callable[..., Path]
-) -> None:
+def test_no_two_bodies_overlap_before_the_end_as_a_reader_of_the_standard_draws_them(family, exported):
     bodies = drawn_bodies(exported(family, FormatName.OPENSCENARIO) / "failure-as-recorded.xosc")
     last_s = max(max(at) for at in bodies.values())
     for a, b in combinations(bodies, 2):
@@ -97,9 +92,7 @@ def drawn_bodies(file: Path) -> dict[str, dict[float, shapely.Polygon]]:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_ego_is_free_and_knows_where_to_go_and_nobody_else_is(
-    family: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
-) -> None:
+def test_the_ego_is_free_and_knows_where_to_go_and_nobody_else_is(family, exported, failure):
     root = etree.parse(exported(family, FormatName.OPENSCENARIO) / "failure.xosc").getroot()
     follow = {each.get("entityRef") for each in root.iter("EntityRef") if each.getparent().tag == "Actors"}
     assert follow == {actor.id for actor in failure(family).actors[1:]}
@@ -109,9 +102,7 @@ def test_the_ego_is_free_and_knows_where_to_go_and_nobody_else_is(
 
 
 @pytest.mark.parametrize("family", ["mixed", "dense"])
-def test_signals_show_what_they_showed_in_every_frame(
-    family: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
-) -> None:
+def test_signals_show_what_they_showed_in_every_frame(family, exported, failure):
     recorded = failure(family)
     root = etree.parse(exported(family, FormatName.OPENSCENARIO) / "failure.xosc").getroot()
     drawn = {
@@ -130,9 +121,7 @@ def test_signals_show_what_they_showed_in_every_frame(
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_lanes_come_back_within_a_centimetre(
-    family: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
-) -> None:
+def test_lanes_come_back_within_a_centimetre(family, exported, failure):
     root = ET.parse(exported(family, FormatName.OPENSCENARIO) / "roads.xodr").getroot()
     lines = [shapely.LineString(line[:, :2]) for line in middles(root)]
     assert dangling(root) == []

@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ import pytest
 import sumolib
 
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.failures.export.recorded import Recorded
 from tests.exports.conftest import CM
 from tests.exports.make_examples import FAMILIES
 
@@ -25,13 +23,13 @@ def replayed(folder: Path) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_the_binary_does_the_same_to_the_last_bit(family: str, exported: Callable[..., Path]) -> None:
+def test_the_binary_does_the_same_to_the_last_bit(family, exported):
     status, said = replayed(exported(family, FormatName.SUMO))
     assert re.search(r"\d{2,} steps, \d{3,} states of vehicles: largest difference 0; 0 missing", said), said
     assert status == 0
 
 
-def test_other_commands_make_a_difference(exported: Callable[..., Path], tmp_path: Path) -> None:
+def test_other_commands_make_a_difference(exported, tmp_path):
     folder = tmp_path / "changed"
     shutil.copytree(exported("low", FormatName.SUMO), folder)
     told = json.loads((folder / "commands.json").read_text())
@@ -44,9 +42,7 @@ def test_other_commands_make_a_difference(exported: Callable[..., Path], tmp_pat
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_floating_car_data_are_the_recording(
-    family: str, exported: Callable[..., Path], failure: Callable[[str], Recorded]
-) -> None:
+def test_floating_car_data_are_the_recording(family, exported, failure):
     recorded = failure(family)
     actors = {actor.id: actor for actor in recorded.actors}
     frames = list(sumolib.xml.parse(str(exported(family, FormatName.SUMO) / "fcd.xml"), "timestep"))

@@ -74,7 +74,7 @@ def play(sim: SumoSimulation, layout: Layout, steps: int) -> list[Frame]:
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_who_drives_past_an_ego_in_the_ditch_does_not_mind_it(sim: SumoSimulation, pilot: Told, side: int) -> None:
+def test_who_drives_past_an_ego_in_the_ditch_does_not_mind_it(sim, pilot, side):
     pilot.motion = lambda time_s: Motion(300.0, side * 8.0, 0.3, 0.0)
     lane = 1 + side
     layout = replace(
@@ -86,9 +86,7 @@ def test_who_drives_past_an_ego_in_the_ditch_does_not_mind_it(sim: SumoSimulatio
 
 
 @pytest.mark.parametrize("y_m", [1.65, 0.0], ids=["on the oncoming lane", "half over the line"])
-def test_who_comes_towards_an_ego_on_its_lane_stops_until_the_ego_is_back(
-    sim: SumoSimulation, pilot: Told, y_m: float
-) -> None:
+def test_who_comes_towards_an_ego_on_its_lane_stops_until_the_ego_is_back(sim, pilot, y_m):
     back_s = 9.0
     pilot.motion = lambda time_s: Motion(150.0, y_m if time_s < back_s else -1.65, 0.0, 0.0)
     layout = replace(
@@ -106,9 +104,7 @@ def test_who_comes_towards_an_ego_on_its_lane_stops_until_the_ego_is_back(
 
 @pytest.mark.parametrize("beside_m", [2.0, 6.0, 20.0])
 @pytest.mark.parametrize("side", [1, -1])
-def test_an_ego_that_drives_round_a_red_light_has_passed_it(
-    sim: SumoSimulation, pilot: Told, side: int, beside_m: float
-) -> None:
+def test_an_ego_that_drives_round_a_red_light_has_passed_it(sim, pilot, side, beside_m):
     """But not one that is off in the fields."""
     aside_m = side * beside_m
     pilot.motion = lambda time_s: Motion(3.15 + aside_m * min(time_s, 1.0), -60.0 + 10.0 * time_s, math.pi / 2, 10.0)
@@ -126,9 +122,7 @@ def test_an_ego_that_drives_round_a_red_light_has_passed_it(
 
 
 @pytest.mark.parametrize(("lane", "to"), [(1, "to_west"), (2, "to_east")], ids=["turns left", "turns right"])
-def test_the_path_of_a_lane_that_leads_elsewhere_leads_back_to_the_route(
-    sim: SumoSimulation, lane: int, to: str
-) -> None:
+def test_the_path_of_a_lane_that_leads_elsewhere_leads_back_to_the_route(sim, lane, to):
     route = ("from_south", to)
     sim.reset(replace(DENSE, ego=car("ego", route, lane, 100.0, 10.0)), 1)
     path, (line,), complete, *_ = way_of(route, f"from_south_{lane}")
@@ -146,7 +140,7 @@ def test_the_path_of_a_lane_that_leads_elsewhere_leads_back_to_the_route(
     assert np.abs(np.diff(path[HEADING])).max() < 0.3
 
 
-def test_an_ego_that_reaches_the_end_of_its_route_has_arrived(sim: SumoSimulation, pilot: Told) -> None:
+def test_an_ego_that_reaches_the_end_of_its_route_has_arrived(sim, pilot):
     pilot.motion = lambda time_s: Motion(1180.0 + 10.0 * time_s, 0.0, 0.0, 10.0)
     frames = play(sim, replace(LOW, ego=car("ego", ("road",), 1, 1150.0, 10.0)), 60)
     assert sim.ego_arrived
@@ -155,7 +149,7 @@ def test_an_ego_that_reaches_the_end_of_its_route_has_arrived(sim: SumoSimulatio
 
 
 @pytest.mark.parametrize("beside_m", [0.0, 4.0])
-def test_an_ego_s_path_stays_that_of_its_first_lane(sim: SumoSimulation, pilot: Told, beside_m: float) -> None:
+def test_an_ego_s_path_stays_that_of_its_first_lane(sim, pilot, beside_m):
     away_m = beside_m + 3.3
     pilot.motion = lambda time_s: Motion(300.0 + 10.0 * time_s, -min(2.0 * time_s, away_m), 0.0, 10.0)
     play(sim, replace(LOW, ego=car("ego", ("road",), 1, 300.0, 10.0)), 50)
@@ -171,8 +165,8 @@ def test_an_ego_s_path_stays_that_of_its_first_lane(sim: SumoSimulation, pilot: 
 @pytest.mark.parametrize(("own_m", "beside_m"), [(-1.65, -4.95), (-4.95, -1.65)])
 @pytest.mark.parametrize("speed_mps", [6.0, 12.0])
 def test_who_comes_beside_an_ego_that_stands_askew_stops_for_it_only_if_drivers_are_wary(
-    sim: SumoSimulation, pilot: Told, own_m: float, beside_m: float, speed_mps: float, wary: bool
-) -> None:
+    sim, pilot, own_m, beside_m, speed_mps, wary
+):
     """Its front is in the middle of its lane and its tail in the one beside it."""
     towards = math.copysign(1.0, beside_m - own_m)
     pilot.motion = lambda time_s: Motion(150.0, own_m + towards * 1.15, -towards * math.radians(30.0), 0.0)
@@ -215,9 +209,7 @@ def cut_in(sim: SumoSimulation, pilot: Told, begins: int, ends: int, beside: int
 
 
 @pytest.mark.parametrize(("begins", "ends", "beside"), [(2, 2, 1), (1, 1, 0), (1, 2, 0)])
-def test_a_neighbour_cuts_in_to_the_lane_where_the_ego_is(
-    sim: SumoSimulation, pilot: Told, begins: int, ends: int, beside: int
-) -> None:
+def test_a_neighbour_cuts_in_to_the_lane_where_the_ego_is(sim, pilot, begins, ends, beside):
     """Whichever lane that is, and the same from the left and from the right."""
     ego_m, other_m = cut_in(sim, pilot, begins, ends, beside)
     assert abs(other_m[-1] - ego_m[-1]) < 1.0

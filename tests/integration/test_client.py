@@ -4,7 +4,7 @@ import json
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 
@@ -31,7 +31,7 @@ def connected(service: Service) -> Client:
     return Client(f"http://127.0.0.1:{service.port}")
 
 
-def test_a_campaign_is_submitted_followed_and_read(shared: Service, client: Client) -> None:
+def test_a_campaign_is_submitted_followed_and_read(shared, client):
     seen: list[Campaign] = []
     campaign = client.wait(client.submit(SPEC).id, seen.append, timeout_s=LONG_S)
     assert campaign.state == "succeeded"
@@ -45,7 +45,7 @@ def test_a_campaign_is_submitted_followed_and_read(shared: Service, client: Clie
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.torture)])
-def test_a_server_that_is_lost_and_restarted_is_a_pause(number: int, serve: Callable[..., Service]) -> None:
+def test_a_server_that_is_lost_and_restarted_is_a_pause(number, serve):
     service = serve()
 
     def restart(campaign_id: str) -> None:

@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from service.api import connections
-from service.api.routes import docs
+from service.api.routes import server
 from service.keys import KeyFile, Scope
 from service.settings import ServiceSettings
 from tests.contract.serving import serving
@@ -184,12 +184,12 @@ def test_a_key_leaves_connections_for_others(serve_inside, tmp_path):
 
 def test_who_reads_nothing_of_an_answer_is_not_waited_for_for_ever(tmp_path, monkeypatch):
     monkeypatch.setattr(connections, "UNREAD_S", 0.2)
-    most = 8 * (docs.ASSETS / docs.SCRIPT).stat().st_size
+    most = 8 * (server.ASSETS / server.SCRIPT).stat().st_size
     with serving(ServiceSettings(data_dir=tmp_path / "data")) as url, socket.socket() as client:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         client.settimeout(LONG_S)
         client.connect(("127.0.0.1", httpx.URL(url).port))
-        client.sendall(b"GET /docs/%s HTTP/1.1\r\nHost: localhost\r\n\r\n" % docs.SCRIPT.encode() * 8)
+        client.sendall(b"GET /docs/%s HTTP/1.1\r\nHost: localhost\r\n\r\n" % server.SCRIPT.encode() * 8)
         assert client.recv(1) == b"H"
         while established(client):
             time.sleep(0.05)
@@ -203,7 +203,7 @@ def test_who_reads_nothing_of_an_answer_makes_room_for_others(serve_inside):
             client = stack.enter_context(socket.socket())
             client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
             client.connect(("127.0.0.1", service.port))
-            client.sendall(b"GET /docs/%s HTTP/1.1\r\nHost: localhost\r\n\r\n" % docs.SCRIPT.encode() * 8)
+            client.sendall(b"GET /docs/%s HTTP/1.1\r\nHost: localhost\r\n\r\n" % server.SCRIPT.encode() * 8)
         with httpx.Client(base_url=service.client.base_url, timeout=LONG_S) as newcomer:
             service.wait_until(lambda: newcomer.get("/healthz").status_code == 200, timeout_s=connections.UNREAD_S / 2)
 

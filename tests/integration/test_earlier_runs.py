@@ -183,7 +183,7 @@ def refusal(client: httpx.Client, **changes: Any) -> str:
     return str(answer.json()["detail"])
 
 
-def test_a_campaign_goes_on_from_an_earlier_one(shared: Service) -> None:
+def test_a_campaign_goes_on_from_an_earlier_one(shared):
     service = shared
     client, budget = service.client, {"budget": {"episodes": 2}}
     first, silent = (

@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from risk_sac import cli
-from risk_sac.report.evidence import Evidence
+from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.run_folder.results import read_results
 
 LABEL = "night <script>alert(1)</script>"
@@ -55,7 +55,7 @@ def test_its_runs_end_the_campaign_and_are_in_no_count_of_the_search(service, ca
 
 def test_the_report_has_bounds_of_the_i_i_d_phase_alone(service, campaign):
     told = service.get(campaign["id"], "/report")
-    evidence = Evidence.model_validate(told)
+    evidence = CampaignEvidence.model_validate(told)
     assert evidence.complete
     assert [(each.method, each.played + each.refused) for each in evidence.bounds] == [
         ("iid-undisturbed", 5),
@@ -110,7 +110,9 @@ def test_the_command_line_says_the_same_of_the_same_folders(service, campaign, f
     for suffix in (".json", ".html", ".md"):
         assert cli.main(["report", *folders, "--out", str(out.with_suffix(suffix))]) == 0
     told = json.loads(out.with_suffix(".json").read_text())
-    assert Evidence.model_validate(told) == Evidence.model_validate(service.get(campaign["id"], "/report"))
+    assert CampaignEvidence.model_validate(told) == CampaignEvidence.model_validate(
+        service.get(campaign["id"], "/report")
+    )
     page = out.with_suffix(".html").read_text()
     assert "data:image/svg+xml;base64," in page
     assert f"risk-sac show {folders[0]} " in page

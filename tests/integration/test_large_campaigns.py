@@ -14,7 +14,7 @@ from risk_sac.records import Outcome
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.views.reports import Reports
-from service.views.whole import LARGE, MEMORY_BYTES, Content, Sources, View, content_of
+from service.views.whole import LARGE, MEMORY_BYTES, CampaignView, Content, Sources, content_of
 from tests.load.large import enlarge
 from tests.server import Service
 
@@ -46,7 +46,7 @@ def here(service: Service, campaign: str) -> Iterator[Callable[..., Content]]:
     settings = ServiceSettings(data_dir=service.data_dir)
     with closing(Store(settings.url, opened=True)) as store:
         sources = Sources(settings, store, Reports(settings), store.campaign(campaign))
-        yield lambda **fields: content_of(View(campaign_id=campaign, edition="", **fields), sources)
+        yield lambda **fields: content_of(CampaignView(campaign_id=campaign, edition="", **fields), sources)
 
 
 def asked(service: Service, method: str, path: str, **options: Any) -> tuple[httpx.Response, set[tuple[int, int]]]:
@@ -72,9 +72,7 @@ def asked(service: Service, method: str, path: str, **options: Any) -> tuple[htt
         ("/report?format=md", {"name": "report", "format": "md", "address": "{base}"}),
     ],
 )
-def test_a_view_of_a_large_campaign_is_made_in_a_bounded_helper_process(
-    service: Service, campaign: str, here: Callable[..., Content], path: str, fields: dict[str, Any]
-) -> None:
+def test_a_view_of_a_large_campaign_is_made_in_a_bounded_helper_process(service, campaign, here, path, fields):
     answer, limits = asked(service, "GET", f"/v1/campaigns/{campaign}{path}")
     assert answer.status_code == 200, answer.text
     assert (MEMORY_BYTES, MEMORY_BYTES) in limits
@@ -82,7 +80,7 @@ def test_a_view_of_a_large_campaign_is_made_in_a_bounded_helper_process(
     assert answer.content == here(**fields).body
 
 
-def test_all_figures_of_a_large_campaign_are_drawn_at_once(service: Service, campaign: str) -> None:
+def test_all_figures_of_a_large_campaign_are_drawn_at_once(service, campaign):
     (first, *others) = (each["name"] for each in service.get(campaign, "/figures")["items"])
     drawn, limits = asked(service, "GET", f"/v1/campaigns/{campaign}/figures/{first}.svg")
     assert drawn.status_code == 200, drawn.text
@@ -92,7 +90,7 @@ def test_all_figures_of_a_large_campaign_are_drawn_at_once(service: Service, cam
         assert (answer.status_code, limits) == (status, set())
 
 
-def test_a_check_reads_an_earlier_campaign_once_and_writes_nothing(service: Service, campaign: str) -> None:
+def test_a_check_reads_an_earlier_campaign_once_and_writes_nothing(service, campaign):
     body = {"families": ["low"], "methods": ["archive"], "prior": campaign}
     places = service.data_dir / "places"
     before = files(places)

@@ -4,7 +4,6 @@ import math
 from contextlib import closing
 from pathlib import Path
 
-import httpx
 import numpy as np
 import pytest
 
@@ -44,8 +43,8 @@ def played(net: Path, pattern: Pattern, place: str, seed: int) -> list[Frame]:
     [("low", "car_following", "road"), ("mixed", "crossing", "e1"), ("dense", "junction", "from_south")],
 )
 def test_an_episode_is_the_same_in_whichever_direction_its_map_lies(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, net: str, pattern: Pattern, place: str, degrees: int
-) -> None:
+    tmp_path, monkeypatch, net, pattern, place, degrees
+):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     file, angle = NETS / net / f"{net}.net.xml", math.radians(degrees)
     other = tmp_path / "turned.net.xml"
@@ -60,7 +59,7 @@ def test_an_episode_is_the_same_in_whichever_direction_its_map_lies(
         assert (a.signal, a.link.tobytes()) == (b.signal, b.link.tobytes())
 
 
-def test_from_an_extract_of_a_town_to_the_results_of_a_campaign_on_it(shared: Service) -> None:
+def test_from_an_extract_of_a_town_to_the_results_of_a_campaign_on_it(shared):
     service = shared
     taken = service.client.post("/v1/networks", content=osm_town(), headers=XML)
     assert taken.status_code == 201, taken.text
@@ -112,7 +111,7 @@ def _refuses(service: Service, ground: dict[str, str]) -> None:
         ("<OpenDRIVE><include file='/etc/passwd'/><road/></OpenDRIVE>", "got road '?'"),
     ],
 )
-def test_a_map_that_cannot_be_converted_says_why(client: httpx.Client, content: str, says: str) -> None:
+def test_a_map_that_cannot_be_converted_says_why(client, content, says):
     answer = client.post("/v1/networks", content=content, headers=XML)
     assert answer.status_code == 422, answer.text
     assert says in answer.json()["detail"]

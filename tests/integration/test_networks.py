@@ -7,7 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import httpx
@@ -15,7 +15,6 @@ import pytest
 
 from service.keys import KeyFile, Scope
 from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
-from tests.server import Service
 
 NETS = sorted((Path(__file__).parents[2] / "sumo_nets").glob("*/*.net.xml"))
 HALF = b"POST /v1/networks HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/xml\r\nContent-Length: 999\r\n\r\n<"
@@ -27,9 +26,7 @@ def post(
     return client.post("/v1/networks", content=content, params=query, headers={"content-type": f"application/{kind}"})
 
 
-def test_good_networks_survive_a_restart_and_are_listed_in_pages_until_deleted(
-    serve: Callable[..., Service],
-) -> None:
+def test_good_networks_survive_a_restart_and_are_listed_in_pages_until_deleted(serve):
     service = serve()
     uploads = {
         "xml": [net.read_bytes() for net in NETS],
@@ -85,14 +82,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("name", ["actuated", "random", "left-hand"])
-def test_networks_that_sumos_tools_make_are_taken(client: httpx.Client, made: Path, name: str) -> None:
+def test_networks_that_sumos_tools_make_are_taken(client, made, name):
     response = post(client, (made / f"{name}.net.xml").read_bytes())
     assert response.status_code == 201, response.text
     assert response.json()["edges"] > 1
     assert any("keeps to the left" in said for said in response.json()["warnings"]) == (name == "left-hand")
 
 
-def test_slow_senders_of_one_key_keep_out_that_key_and_nobody_else(serve_inside: Callable[..., Service]) -> None:
+def test_slow_senders_of_one_key_keep_out_that_key_and_nobody_else(serve_inside):
     service = serve_inside(body_patience_s=600)
     keys = KeyFile(service.data_dir / "keys.json")
     slow, other = (keys.create("maps", name, Scope.RUN)[1] for name in ("slow", "other"))
@@ -115,7 +112,7 @@ def test_slow_senders_of_one_key_keep_out_that_key_and_nobody_else(serve_inside:
 
 
 @pytest.mark.parametrize("path", ["/v1/networks", "/v1/campaigns"])
-def test_who_sends_too_slowly_is_told_so_and_hung_up_on(serve_inside: Callable[..., Service], path: str) -> None:
+def test_who_sends_too_slowly_is_told_so_and_hung_up_on(serve_inside, path):
     service = serve_inside(body_patience_s=0.5)
     kind = b"xml" if path == "/v1/networks" else b"json"
     with socket.create_connection(("127.0.0.1", service.port), timeout=0.1) as sender:
@@ -133,7 +130,7 @@ def test_who_sends_too_slowly_is_told_so_and_hung_up_on(serve_inside: Callable[.
     assert not list(service.data_dir.glob("networks/.incoming/*"))
 
 
-def test_a_server_that_is_killed_while_it_receives_leaves_nothing_behind(shared: Service) -> None:
+def test_a_server_that_is_killed_while_it_receives_leaves_nothing_behind(shared):
     incoming = shared.data_dir / "networks" / ".incoming"
     with socket.create_connection(("127.0.0.1", shared.port)) as sender:
         sender.sendall(HALF)

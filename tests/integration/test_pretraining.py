@@ -26,7 +26,7 @@ from risk_sac.search.prior.policy import PolicyLayout
 from risk_sac.world.types import Scene, Vector
 
 
-def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_stream_goes_on_as_if_it_had_not_been(tmp_path, monkeypatch):
     monkeypatch.setattr(episodes, "CHUNK", 12)
     monkeypatch.setattr(episodes, "TURN", 6)
     whole, parts = tmp_path / "whole", tmp_path / "parts"
@@ -79,7 +79,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("short")
-def test_a_policy_is_the_same_however_it_was_trained(tmp_path: Path) -> None:
+def test_a_policy_is_the_same_however_it_was_trained(tmp_path):
     """One process or two, in one go or interrupted."""
     whole = trained(tmp_path / "whole", 12, 2, stages=SHORT)
     parts = trained(tmp_path / "parts", 12, 1, interrupted=True, stages=SHORT)
@@ -89,13 +89,13 @@ def test_a_policy_is_the_same_however_it_was_trained(tmp_path: Path) -> None:
 
 
 @pytest.mark.torture
-def test_a_thousand_episodes_give_the_same_weights_again(tmp_path: Path) -> None:
+def test_a_thousand_episodes_give_the_same_weights_again(tmp_path):
     once, again = (trained(tmp_path / name, 1000, jobs) for name, jobs in (("once", 2), ("again", 1)))
     assert digest(once) == digest(again)
     assert once.curve == again.curve
 
 
-def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached() -> None:
+def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached():
     training = PolicyTraining("mixed", 5, 100, kinds=True)
     size = training.pretrained().layout
     step = Transition(
@@ -120,7 +120,7 @@ def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached() -> None:
     assert rewards == pytest.approx({goals[0]: 20.0, goals[1]: 20.0 * (1.0 - policy.MISSED)})
 
 
-def test_kinds_are_asked_for_where_wanted_only() -> None:
+def test_kinds_are_asked_for_where_wanted_only():
     for kinds in (False, True):
         training = PolicyTraining("low", 5, 100, kinds=kinds)
         for name in ("one", "other"):
@@ -131,7 +131,7 @@ def test_kinds_are_asked_for_where_wanted_only() -> None:
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="has the GPU that it must lack")
-def test_a_gpu_that_is_not_there_is_refused_in_one_line() -> None:
+def test_a_gpu_that_is_not_there_is_refused_in_one_line():
     with pytest.raises(ConfigError, match=r"^--device: .*no CUDA device here.*'cpu'"):
         PolicyTraining("low", 5, 100, "cuda")
 
@@ -156,7 +156,7 @@ def observations(env: RiskSacEnv, scene: dict[str, float], actions: list[Vector]
     return seen + [env.step(action)[0] for action in actions]
 
 
-def test_the_simulator_shows_a_mirrored_scene_as_the_mirror_does() -> None:
+def test_the_simulator_shows_a_mirrored_scene_as_the_mirror_does():
     spec = RunSpec(family="low", method="sac", seed=3, ego=EgoConfig(driver="idm-aeb"))  # SUMO's driver keeps right
     mirror = Mirror.of(PolicyLayout.of(Problem.from_spec(spec)))
     assert mirror is not None
@@ -170,6 +170,6 @@ def test_the_simulator_shows_a_mirrored_scene_as_the_mirror_does() -> None:
         np.testing.assert_array_equal(mirror.observation(mirror.observation(own)), own)
 
 
-def test_families_with_unlike_sides_have_no_mirror() -> None:
+def test_families_with_unlike_sides_have_no_mirror():
     for family in ("mixed", "dense"):
         assert Mirror.of(PolicyLayout.of(Problem.from_spec(RunSpec(family=family, method="sac", seed=3)))) is None

@@ -108,12 +108,6 @@ def listed_at(file):
     return "/".join(file["href"].split("/")[:4])
 
 
-def test_a_figure_that_there_is_not_is_a_problem(get):
-    response = get("/figures/ecr_dense.png")
-    assert response.status_code == 404
-    assert response.headers["content-type"] == "application/problem+json"
-
-
 def test_table_grows_with_the_runs_and_names_those_that_are_missing(service):
     campaign_id = service.post(methods=["random", "no-adversary"], seeds=[0, 1, 2, 3], budget={"episodes": 2})
     empty = service.client.get(f"/v1/campaigns/{campaign_id}/table")

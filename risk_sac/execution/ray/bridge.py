@@ -23,9 +23,9 @@ from ray.exceptions import RayError, RayTaskError
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Cause, ClusterState, Exited
 from risk_sac.execution.messages import without_folders
+from risk_sac.execution.ray import RaySettings, read_settings
 from risk_sac.execution.ray.cluster import connect, nodes
 from risk_sac.execution.ray.node import Attendant, Files, Order, read, versions, write
-from risk_sac.execution.ray.settings import RaySettings, read_settings
 from risk_sac.host.terminal import log_to_stderr
 
 logger = logging.getLogger("risk_sac.execution.ray.bridge")

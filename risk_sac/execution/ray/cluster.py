@@ -16,8 +16,8 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 from risk_sac import __version__
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import ClusterNode
+from risk_sac.execution.ray import ADDRESS, RaySettings, variable
 from risk_sac.execution.ray.node import check, versions
-from risk_sac.execution.ray.settings import ADDRESS, RaySettings, variable
 
 logger = logging.getLogger(__name__)
 

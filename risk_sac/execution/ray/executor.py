@@ -23,8 +23,8 @@ from risk_sac.egos import registry
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Cause, ClusterState, Exited, Messages, WorkerProgram, taken
 from risk_sac.execution.messages import Event
+from risk_sac.execution.ray import ADDRESS, read_settings
 from risk_sac.execution.ray.node import Order
-from risk_sac.execution.ray.settings import ADDRESS, read_settings
 from risk_sac.run_folder.durable import scratch_name
 from risk_sac.scenario import library
 from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, file_of

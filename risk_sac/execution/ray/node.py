@@ -23,7 +23,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Exited, WorkerProgram
 from risk_sac.execution.local import LocalExecutor
 from risk_sac.execution.messages import Event, without_folders
-from risk_sac.execution.ray.settings import ADDRESS, variable
+from risk_sac.execution.ray import ADDRESS, variable
 from risk_sac.run_folder.durable import claim, replace_file
 
 GATHER_S = 0.25  # messages within this time are sent together

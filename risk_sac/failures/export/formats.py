@@ -1,26 +1,21 @@
 """Writes exports: XML, the JSON beside them, and one file or one folder, whole or not at all."""
 
+import io
+import json
+import shutil
+import xml.etree.ElementTree as ET
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
-
-from risk_sac.errors import ConfigError
-
-if TYPE_CHECKING:
-    from risk_sac.failures.export.recorded import Recorded
-import io
-import json
-import shutil
-import xml.etree.ElementTree as ET
-import zipfile
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from risk_sac.errors import ConfigError
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.run_folder.durable import replace_file
 
@@ -106,7 +101,7 @@ def check_carries(name: FormatName, of: Literal["failure", "episodes"]) -> None:
         raise ConfigError("format", got, remedy=REMEDY)
 
 
-def export(name: FormatName, source: "Recorded | Sequence[Path]") -> Files:
+def export(name: FormatName, source: Recorded | Sequence[Path]) -> Files:
     """Exports a failure, or all episodes of the runs in some folders.
 
     Raises:

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 
 from risk_sac.config import RunMethod
 from risk_sac.egos.defects.catalogue import DEFECTS
-from risk_sac.host.canvas import canvas, picture
+from risk_sac.failures.from_above import canvas, picture
 from risk_sac.lab.benchmark.runs import Detection
 from risk_sac.lab.benchmark.statistics import MethodSummary, balanced, friedman, restricted_means, summaries, survival
 from risk_sac.metrics.metric import wilson_interval

@@ -39,7 +39,7 @@ COLUMNS = (
 HEAD = f"| {' | '.join(COLUMNS)} |\n|{len(COLUMNS) * '---|'}"
 
 
-class Variant(NamedTuple):
+class PolicyVariant(NamedTuple):
     """What differs from the shipped policy."""
 
     kinds: bool = False
@@ -48,12 +48,12 @@ class Variant(NamedTuple):
 
 
 VARIANTS = {
-    "shipped": Variant(),
-    "kinds": Variant(kinds=True),
-    "one kind": Variant(kinds=True),
-    "γ of 0.9": Variant(discount=0.9),
-    "γ of 0.98": Variant(discount=0.98),
-    "3-step returns": Variant(decisions=3),
+    "shipped": PolicyVariant(),
+    "kinds": PolicyVariant(kinds=True),
+    "one kind": PolicyVariant(kinds=True),
+    "γ of 0.9": PolicyVariant(discount=0.9),
+    "γ of 0.98": PolicyVariant(discount=0.98),
+    "3-step returns": PolicyVariant(decisions=3),
 }
 
 
@@ -97,7 +97,7 @@ def summed(decisions: Sequence[Transition], count: int, discount: float) -> list
 class VariantTraining(PolicyTraining):
     """First stage of the training of a variant."""
 
-    def __init__(self, variant: Variant, goals: Goals, options: argparse.Namespace) -> None:
+    def __init__(self, variant: PolicyVariant, goals: Goals, options: argparse.Namespace) -> None:
         agent = AGENT.model_copy(update={"discount": variant.discount**variant.decisions})
         stages = STAGES[:1]
         super().__init__(

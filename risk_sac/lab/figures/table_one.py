@@ -24,7 +24,7 @@ from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.execution.evaluate import run
 from risk_sac.failures.collect import policy_of
-from risk_sac.host.canvas import canvas, picture
+from risk_sac.failures.from_above import canvas, picture
 from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.report.drawing import LOOKS, STYLE
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines

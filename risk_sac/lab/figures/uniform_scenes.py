@@ -34,7 +34,7 @@ SEED = 5
 CHOICE = 1024  # scripts among which the model chooses
 
 
-class Cell(NamedTuple):
+class Matchup(NamedTuple):
     """One driver of adversaries before one ego."""
 
     family: str
@@ -56,7 +56,7 @@ def chosen(random: np.random.Generator, start: Start, scene: Floats, genes: int)
     return best
 
 
-def found(cell: Cell, scenes: int, scripts: int) -> Iterator[ScriptEpisode]:
+def found(cell: Matchup, scenes: int, scripts: int) -> Iterator[ScriptEpisode]:
     """Yields an episode per scene: the first that fails, or else the last; unplayable scenes are drawn again."""
     spec = RunSpec(family=cell.family, method="archive", seed=SEED, ego=ego_of(cell.ego))
     drawn, random = np.random.default_rng(SEED), np.random.default_rng((SEED, 1))
@@ -84,7 +84,7 @@ def found(cell: Cell, scenes: int, scripts: int) -> Iterator[ScriptEpisode]:
                 yield episode
 
 
-def row(scenes: int, scripts: int, cell: Cell) -> Row:
+def row(scenes: int, scripts: int, cell: Matchup) -> Row:
     """Returns the figures of a driver before an ego."""
     episodes = list(found(cell, scenes, scripts))
     failed = [each for each in episodes if each.kind]
@@ -109,7 +109,7 @@ def main() -> None:
     parser.add_argument("--scripts", type=int, default=500)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
-    cells = [Cell(*cell) for cell in product(options.families, options.egos, options.drivers)]
+    cells = [Matchup(*cell) for cell in product(options.families, options.egos, options.drivers)]
     rows_of(partial(row, options.scenes, options.scripts), cells, options.jobs, options.out / "scenes.csv")
     print((options.out / "scenes.csv").read_text())
 

@@ -36,7 +36,7 @@ NAMES: Mapping[str, Sequence[str]] = {
 }
 
 
-class Judged(NamedTuple):
+class JudgedAgain(NamedTuple):
     """A valid contact, with both verdicts."""
 
     episode: EpisodeRecord
@@ -67,7 +67,7 @@ def _problem(spec: str) -> Problem:
     return Problem.from_spec(RunSpec.model_validate_json(spec))
 
 
-def judged_again(folder: Path) -> Iterator[Judged]:
+def judged_again(folder: Path) -> Iterator[JudgedAgain]:
     """Judges the valid contacts of a run again."""
     results = read_results(folder)
     for failure in results.failures:
@@ -76,7 +76,7 @@ def judged_again(folder: Path) -> Iterator[Judged]:
             continue
         series = read_series(folder / failure.series)
         now = judge(evidence_of(results.spec, failure.episode, series), hit.other_id, valid=True)
-        yield Judged(failure.episode, hit, hit.judgement, now, series)
+        yield JudgedAgain(failure.episode, hit, hit.judgement, now, series)
 
 
 def shares(judgements: Sequence[Judgement]) -> Iterator[tuple[str, str, int]]:

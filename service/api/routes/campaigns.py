@@ -44,7 +44,7 @@ from service.views.curves import Curves, played, results
 from service.views.failure_table import FailureTable
 from service.views.progress import campaign_body, log_tail, retry_after_s, summary_body
 from service.views.scenes import SceneEffects
-from service.views.whole import View, ViewName
+from service.views.whole import CampaignView, ViewName
 
 LISTED = "campaigns"
 EITHER_KIND = documented(CampaignSpec.__name__, ON_MAP)
@@ -224,7 +224,7 @@ async def _viewed(
 ) -> Response:
     """An answer that reads all episodes of a campaign, which the cache keeps."""
     campaign, headers, revision = await run_in_threadpool(_current, campaign_id, request, service, caller)
-    view = View(name=name, campaign_id=campaign_id, edition=campaign.revision, **fields)
+    view = CampaignView(name=name, campaign_id=campaign_id, edition=campaign.revision, **fields)
     content = await service.views.content(view, campaign, caller.key_id)
     return kept(request, content.body, headers, revision, campaign_id)
 

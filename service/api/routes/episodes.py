@@ -42,7 +42,7 @@ from service.api.pages import (
     problem,
 )
 from service.api.posted import AskedRequirement, documented, read_posted
-from service.store.finding import Judged
+from service.store.queries import Judged
 from service.store.stored import StoredPage
 from service.views.series import (
     FailureOfARun,

@@ -8,13 +8,19 @@ from starlette.concurrency import run_in_threadpool
 
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import campaign_yaml
+from risk_sac.failures.cases import Regression
+from risk_sac.records import State
+from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
+from risk_sac.report.rendering import POLICY
 from service.api.context import AskedCampaign, Context, Service, caller_of
-from service.api.pages import CROWDED, INVALID, STORAGE, TAGGED, UNKNOWN, Responses, cacheable, link
+from service.api.pages import CROWDED, INVALID, STORAGE, TAGGED, UNKNOWN, Responses, cacheable, link, problem
+from service.errors import ConflictError, NotFoundError
+from service.runs.regressions import StoredRegression, campaign_of
 from service.store.stored import StoredCampaign
 from service.views.reports import MEDIA_TYPES, Clusters, Figures
-from service.views.whole import View, ViewName
+from service.views.whole import CampaignView, ViewName
 
 TableFormat = Literal["json", "md", "csv"]
 SpecFormat = Literal["json", "yaml"]
@@ -109,7 +115,7 @@ async def reported(
     """Answers with a view of the report, or one of its figures; `parts` as in `cacheable`."""
     edition = await run_in_threadpool(service.reports.edition, campaign)
     headers = cacheable(request, edition, *parts)
-    asked = View(name=view, campaign_id=campaign.id, edition=edition, format=format, **fields)
+    asked = CampaignView(name=view, campaign_id=campaign.id, edition=edition, format=format, **fields)
     key_id = (await caller_of(request)).key_id
     if figure is None:
         content = await service.views.content(asked, campaign, key_id)
@@ -118,3 +124,49 @@ async def reported(
     if not content.lasting:
         del headers["ETag"]
     return Response(content.body, headers=headers, media_type=MEDIA_TYPES[format])
+
+
+ReportFormat = Literal["json", "html", "md"]
+REPORT: Responses = {200: text(html="<!doctype html>…", md="# Failures of an ego: low\n\n> **Search…")}
+NOT_PLAYED = problem(409, "The regression has not ended, or has failed")
+
+
+@router.get("/report", response_model=CampaignEvidence, responses=REPORT | UNCHANGED | NOT_PLAYED | CROWDED)
+async def get_report(
+    request: Request,
+    service: Service,
+    campaign: AskedCampaign,
+    format_: Annotated[ReportFormat, Query(alias="format")] = "json",
+    regression: Annotated[
+        str | None, Query(max_length=200, description="Id of a regression of this campaign, to be told of in it.")
+    ] = None,
+) -> Response:
+    """Bounds and coverage as JSON; with funnel, failures, pictures, limits and commands as one page or as Markdown.
+
+    Search results are no crash rate: bounds come from the i.i.d. phase alone, and there are none without one.
+    """
+    played = None if regression is None else await run_in_threadpool(_played, service, campaign, regression)
+    answer = await reported(
+        request,
+        service,
+        campaign,
+        "report",
+        *("report", format_, *([played.id] if played else [])),
+        format=format_,
+        address=str(request.base_url),
+        regression=Regression(ego=played.ego, cases=played.cases) if played else None,
+    )
+    if format_ == "html":
+        answer.headers["Content-Security-Policy"] = f"{POLICY}; frame-ancestors 'none'"
+    return answer
+
+
+def _played(service: Context, campaign: StoredCampaign, regression_id: str) -> StoredRegression:
+    """Returns a regression of the campaign that has succeeded."""
+    if campaign_of(regression_id) != campaign.id:
+        message = f"campaign {campaign.id} has no regression {regression_id!r}"
+        raise NotFoundError(message, field="regression", got=regression_id)
+    found = service.regressions.get(regression_id)
+    if found.state is not State.SUCCEEDED:
+        raise ConflictError(f"regression {found.id} is {found.state}; wanted one that succeeded", reason="not_ended")
+    return found

@@ -167,9 +167,7 @@ def test_bars_and_complaints_show_control_characters_as_escapes(capsys):
     assert not commands(printed)
 
 
-def test_a_stream_that_foreign_code_has_closed_costs_the_output_and_is_told(
-    monkeypatch,
-):
+def test_a_stream_that_foreign_code_has_closed_costs_the_output_and_is_told(monkeypatch):
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO()))
     sys.stdout.close()
     assert cli.main(["egos", "list"]) == 1

@@ -1,8 +1,4 @@
 import math
-import multiprocessing
-import os
-import subprocess
-import sys
 from contextlib import closing
 from dataclasses import replace
 from itertools import combinations
@@ -19,17 +15,17 @@ from shapely.affinity import rotate, translate
 from risk_sac.config import FamilyName, RewardConfig, RunSpec
 from risk_sac.env.env import RiskSacEnv, make_default
 from risk_sac.env.problem import Problem
-from risk_sac.errors import InfeasibleScene, SimulationError
+from risk_sac.errors import InfeasibleScene
 from risk_sac.records import Collision, Grade, Severity
 from risk_sac.risk.rss import time_to_encounter
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.world.geometry import relative_view
 from risk_sac.world.types import Frame, Kind, Scene
+from tests.unit.env.episodes import Outcome, episode, same
 
 NAMES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
 LEAD_IN_STEPS = 15
 each_family = pytest.mark.parametrize("family", NAMES)
-Outcome = tuple[np.ndarray, float, bool, bool, dict[str, object]]
 
 
 @pytest.fixture
@@ -45,33 +41,11 @@ def middle(family: FamilyName, **changes: float) -> Scene:
     return replace(scene, values=dict(scene.values) | changes)
 
 
-def episode(env: RiskSacEnv, seed: int, action_seed: int = 0, **options: Scene) -> list[Outcome]:
-    """Everything a random episode returns, its reset first."""
-    generator = np.random.default_rng(action_seed)
-    observation, info = env.reset(seed=seed, options=options or None)
-    outcomes: list[Outcome] = [(observation, 0.0, False, False, info)]
-    while not (outcomes[-1][2] or outcomes[-1][3]):
-        outcomes.append(env.step(generator.uniform(-1, 1, env.action_size).astype(np.float32)))
-    return outcomes
-
-
-def same(one: list[Outcome], other: list[Outcome]) -> bool:
-    return len(one) == len(other) and all(
-        np.array_equal(a[0], b[0]) and a[1:] == b[1:] for a, b in zip(one, other, strict=True)
-    )
-
-
 @each_family
 def test_gymnasiums_checker_accepts_the_registered_environment(family):
     with closing(gym.make(f"RiskSAC/{family.capitalize()}-v0", render_mode="rgb_array")) as env:
         assert env.spec.max_episode_steps == FAMILIES[family].horizon_steps
         check_env(env.unwrapped, skip_render_check=True)  # which opens a second one; libsumo has one simulation
-
-
-def test_the_package_alone_is_cheap_to_import():
-    program = "import sys, risk_sac\nprint(sorted({'gymnasium', 'numpy', 'torch', 'pydantic'} & set(sys.modules)))"
-    said = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert said.stdout == "[]\n"
 
 
 @each_family
@@ -353,47 +327,6 @@ def test_an_action_that_is_none_is_refused_and_the_episode_goes_on(low, action):
         low.step(action)
     generator = np.random.default_rng(0)
     assert low.step(generator.uniform(-1, 1, 6).astype(np.float32))[1] == expected[1][1]
-
-
-def test_a_second_environment_of_a_process_is_refused_until_the_first_one_is_gone(low):
-    expected = episode(low, 3)
-    with closing(make_default("mixed")) as second:
-        for _ in range(2):
-            with pytest.raises(SimulationError, match=r"AsyncVectorEnv"):
-                second.reset(seed=1)
-        assert same(episode(low, 3), expected)
-        low.close()
-        second.reset(seed=1)
-        with pytest.raises(SimulationError, match="call reset first"):
-            low.step(low.action_space.sample())
-        low.close()  # takes nothing from the other
-        second.step(second.action_space.sample())
-    assert same(episode(low, 3), expected)
-
-
-def test_an_environment_that_is_lost_gives_way():
-    lost = make_default("low")
-    lost.reset(seed=1)
-    lost.itself = lost  # a cycle
-    del lost
-    with closing(make_default("low")) as env:
-        env.reset(seed=1)
-
-
-def test_a_child_process_has_a_simulation_of_its_own(low):
-    expected = episode(low, 3)
-    low.reset(seed=3)
-
-    def child():
-        with closing(make_default("low")) as env:
-            os._exit(0 if same(episode(env, 3), expected) else 1)
-
-    process = multiprocessing.get_context("fork").Process(target=child)
-    process.start()
-    low.step(np.zeros(6, dtype=np.float32))
-    process.join()
-    assert process.exitcode == 0
-    assert same(episode(low, 3), expected)
 
 
 def test_the_nearest_miss_is_the_least_time_to_encounter_while_ahead_and_in_sight_and_the_ego_on_the_move(low):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from risk_sac.failures import replay
+from risk_sac.failures import play
 from risk_sac.failures.clusters import vendi
 from risk_sac.failures.minimise import _reduce_actions, without
 from risk_sac.failures.question import TwinPlay, read_twin, twin_bytes
@@ -162,8 +162,8 @@ def test_a_process_that_is_killed_is_replaced_but_not_for_ever(tmp_path, monkeyp
         with file.open("ab", buffering=0) as output:
             output.write(b"{}\n")
 
-    monkeypatch.setattr(replay, "_prepared", lambda file, folders: {})
-    monkeypatch.setattr(replay, "_tell", tell)
+    monkeypatch.setattr(play, "_prepared", lambda file, folders: {})
+    monkeypatch.setattr(play, "_tell", tell)
     (tmp_path / "file").touch()
-    assert replay._main(tmp_path / "file", 3, 1, []) == status
+    assert play._main(tmp_path / "file", 3, 1, []) == status
     assert len((tmp_path / "file").read_text().splitlines()) == lines

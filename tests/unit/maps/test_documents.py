@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 import sumo_nets
 from risk_sac.errors import MapError
-from risk_sac.maps import documents
+from risk_sac.maps import convert, documents
+from risk_sac.maps.convert import present_net
 from risk_sac.maps.documents import SIDE_UNKNOWN, rewritten
 from tests.hostile_networks import ADDITIONAL, NET, ROUTES, zipped
+from tests.maps import osm_town
 
 PBF = b"\0\0\0\x0d\n\tOSMHeader\x18\x7c" + bytes(90)
 
@@ -173,3 +175,21 @@ def test_any_other_map_is_read_as_right_hand_and_says_if_it_states_no_side(text,
     (tmp_path / "upload").write_text(text)
     (document,) = rewritten(tmp_path / "upload", tmp_path, "the map")
     assert document.remarks == remarks
+
+
+@pytest.mark.parametrize(
+    ("script", "says"),
+    [
+        ("kill -SEGV $$", r"\(SIGSEGV\)"),
+        ("kill -KILL $$", "time or memory"),
+        ("echo 'Error: no nodes' >&2; exit 1", "no nodes"),
+    ],
+)
+def test_why_netconvert_failed_is_told(tmp_path, monkeypatch, script, says):
+    program, file = tmp_path / "netconvert", tmp_path / "map.osm"
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
+    file.write_text(osm_town())
+    monkeypatch.setattr(convert, "netconvert", lambda: (str(program), {}))
+    with pytest.raises(MapError, match=says):
+        present_net(file, tmp_path)

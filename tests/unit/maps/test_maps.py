@@ -1,5 +1,4 @@
 import math
-import os
 import re
 from contextlib import closing, nullcontext
 from pathlib import Path
@@ -15,7 +14,6 @@ from shapely.affinity import affine_transform
 import sumo_nets
 from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError, DamagedError, MapError
-from risk_sac.maps import convert
 from risk_sac.maps.clearance import too_near, truck_reaches, waits_in_the_way
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.cut import walk_over
@@ -133,24 +131,6 @@ def test_a_kept_place_that_was_changed_is_refused(town, tmp_path, monkeypatch):
     assert library.kept(name)
     with pytest.raises(ConfigError, match="there is no place 'junction_000000000000'"):
         family_named("junction_000000000000")
-
-
-@pytest.mark.parametrize(
-    ("script", "says"),
-    [
-        ("kill -SEGV $$", r"\(SIGSEGV\)"),
-        ("kill -KILL $$", "time or memory"),
-        ("echo 'Error: no nodes' >&2; exit 1", "no nodes"),
-    ],
-)
-def test_why_netconvert_failed_is_told(tmp_path, monkeypatch, script, says):
-    program, file = tmp_path / "netconvert", tmp_path / "map.osm"
-    program.write_text(f"#!/bin/sh\n{script}\n")
-    program.chmod(0o755)
-    file.write_text(osm_town())
-    monkeypatch.setattr(convert, "netconvert", lambda: (str(program), {}))
-    with pytest.raises(MapError, match=says):
-        present_net(file, tmp_path)
 
 
 def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_the_left(town, tmp_path, monkeypatch):
@@ -333,26 +313,13 @@ def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radiu
     assert (walk.x_m == pytest.approx(-0.05 * side)) == (radius_m == 12.0)  # none is sent back without need
 
 
-def test_places_that_nobody_names_go_when_they_are_old(tmp_path, monkeypatch):
-    monkeypatch.setenv(library.VARIABLE, str(tmp_path))
-    named, new, old = (library.keep(shipped(name), b"<net/>") for name in ("low", "mixed", "dense"))
-    (tmp_path / "of another program").mkdir()
-    for path in (named, old, "of another program"):
-        os.utime(tmp_path / path, (0, 0))
-    assert library.prune(tmp_path, {named}, 3600.0, 0.0) == [old]
-    assert {path.name for path in tmp_path.iterdir()} == {named, new, "of another program"}
-    os.utime(tmp_path / new, (0, 0))
-    assert library.keep(shipped("mixed"), b"<net/>") == new  # wanted again
-    assert library.prune(tmp_path, (), 3600.0, 0.0) == [named]
-
-
-def test_a_pattern_without_any_candidate_says_why() -> None:
+def test_a_pattern_without_any_candidate_says_why():
     found = survey(read_net(NETS / "low" / "low.net.xml"))
     assert set(found.nowhere) == {"crossing", "junction"}
     assert "has no road to a junction" in found.nowhere["junction"]
 
 
-def test_a_way_that_is_barely_too_short_contradicts_itself_nowhere(tmp_path: Path) -> None:
+def test_a_way_that_is_barely_too_short_contradicts_itself_nowhere(tmp_path):
     file = tmp_path / "map.net.xml"
     for seconds, says in ((16.96, "after driving 16.9 s; wanted 17 s"), (16.999, "after driving 16.9 s; wanted 17 s")):
         metres = 2 * seconds * 13.89
@@ -362,7 +329,7 @@ def test_a_way_that_is_barely_too_short_contradicts_itself_nowhere(tmp_path: Pat
 
 
 @given(wanted=st.floats(0.1, 1e4), share=st.floats(0.0, 1.0, exclude_max=True))
-def test_what_is_lacking_is_less_than_what_was_wanted_as_it_is_written(wanted: float, share: float) -> None:
+def test_what_is_lacking_is_less_than_what_was_wanted_as_it_is_written(wanted, share):
     if wanted * share < wanted - 1e-6:
         got, above = lacking(wanted * share, "m", wanted).split(" m; wanted ")
         assert float(got) < float(above.removesuffix(" m"))
@@ -383,9 +350,7 @@ def test_what_is_lacking_is_less_than_what_was_wanted_as_it_is_written(wanted: f
         (":centre_{pocket}_0", 1.3, False),
     ],
 )
-def test_a_place_whose_lanes_are_driven_longer_or_shorter_than_drawn_is_refused(
-    tmp_path: Path, place: str, lane: str, share: float, fits: bool
-) -> None:
+def test_a_place_whose_lanes_are_driven_longer_or_shorter_than_drawn_is_refused(tmp_path, place, lane, share, fits):
     south = {"own": "from_south", "on": "to_north", "straight": "9", "pocket": "20"}
     west = {"own": "from_west", "on": "to_east", "straight": "13", "pocket": "22"}
     changed = re.escape(lane.format(**(south if place == "from_south" else west)))

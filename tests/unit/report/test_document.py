@@ -11,7 +11,7 @@ from risk_sac.records import Grade
 from risk_sac.report import compare
 from risk_sac.report.document import Origin, report_page
 from risk_sac.report.evidence import gathered
-from risk_sac.report.inputs import read_folders
+from risk_sac.report.files import read_folders
 from risk_sac.report.power import played_by, power_of
 from risk_sac.run_folder.results import RunResults, write_results
 from risk_sac.scenario.families import FAMILIES

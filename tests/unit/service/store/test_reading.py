@@ -5,7 +5,7 @@ import pytest
 from risk_sac.config import CampaignSpec
 from risk_sac.records import Fault, Grade, Outcome, Severity, State
 from service.errors import NotFoundError
-from service.store.finding import Judged
+from service.store.queries import Judged
 from tests.begun import start
 from tests.builders import judgement
 

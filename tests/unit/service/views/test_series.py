@@ -17,18 +17,6 @@ from tests.begun import BEGUN
 from tests.contract.recorded_campaigns import series_arrays
 
 
-def test_a_series_is_plain_and_null_where_an_actor_is_absent(tmp_path):
-    write_series(tmp_path / "a.npz", series_arrays())
-    series = load_series(tmp_path / "a.npz", None)
-    assert series.x_m == [[0.0, 1.0], [2.0, None], [4.0, 5.0]]
-    assert series.visible == [[None, True], [None, None], [None, False]]
-    assert series.kind == ["vehicle", "pedestrian"]
-    assert series.role == ["ego", "adversary"]
-    assert series.signal == ["none", "red", "green"]
-    assert series.robustness == [[1.0], [None], [-1.0]]
-    assert len(series.actions[0]) == 4
-
-
 def test_a_lost_or_damaged_series_is_a_storage_error_not_a_crash(tmp_path):
     path = tmp_path / "a.npz"
     with pytest.raises(StorageError, match=r"'a\.npz' is gone"):
@@ -144,26 +132,6 @@ def test_eta_is_work_left_at_each_runs_own_pace(done, workers, wanted):
 def test_more_workers_never_take_longer(done, workers):
     runs = [after_start(*each) for each in done]
     assert 0 <= eta_s(runs, SPEC, workers + 1) <= eta_s(runs, SPEC, workers)
-
-
-# Recorded runs in `low` or dense: episodes; processor time until the first, a tenth of them and the end, s.
-RECORDED = {
-    "random": (100, 30.9, 31.5, 37.0),  # compiles first
-    "archive": (100, 3.1, 3.49, 6.9),
-    "bo-only": (100, 3.0, 3.61, 10.8),
-    "no-adversary": (100, 2.9, 3.34, 6.9),
-}
-
-
-@pytest.mark.parametrize("name", RECORDED)
-def test_after_a_tenth_of_the_episodes_the_estimate_is_right_within_a_factor_of_two(name):
-    total, first_s, tenth_s, end_s = RECORDED[name]
-    method, _, family = name.partition(" in ")
-    spec = CampaignSpec.model_validate({"families": ["low"], "methods": [method], "budget": {"episodes": total}})
-    run = changed(RUN, method=method, episodes_total=total, episodes_done=total // 10)
-    pace_s = (tenth_s - first_s) / (total // 10 - 1)
-    run = changed(run, pace_s=pace_s, busy_s=tenth_s, family=family or "low")
-    assert 0.5 <= eta_s([run], spec, workers=1) / (end_s - tenth_s) <= 2
 
 
 @pytest.mark.parametrize(

@@ -38,13 +38,6 @@ def test_what_two_methods_found_alike_counts_once_in_the_campaign_and_once_for_e
     assert results(searched).headline == progress(searched, 1).headline == 3
 
 
-def test_one_run_keeps_its_wilson_interval(ledger, metrics):
-    campaign = ledger.create(CampaignSpec(families=("low",), methods=("sac",), seeds=(0,)))
-    (total,) = results(changed(campaign, runs=(changed(campaign.runs[0], metrics=metrics),))).totals
-    assert (total.ecr_low, total.ecr_high) == pytest.approx((0.0456, 0.6994), abs=1e-4)  # of 1 in 4
-    assert (total.pcr_low, total.pcr_high) == (total.ecr_low, total.ecr_high)  # the same one
-
-
 SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3, 4))
 
 

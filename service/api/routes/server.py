@@ -1,25 +1,76 @@
-"""Entry point, API description and web page; none loads anything from other hosts.
-
-They need no key.
-"""
+"""The server itself: entry point, API description, web page, health and metrics; none but metrics needs a key."""
 
 import json
 from functools import lru_cache
+from http import HTTPStatus
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from fastapi import APIRouter, FastAPI, Request, Response
+from fastapi import APIRouter, Depends, FastAPI, Request, Response
 from fastapi.openapi.docs import get_swagger_ui_html
 from fastapi.responses import HTMLResponse, RedirectResponse
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
-import service
 from risk_sac import __version__
 from risk_sac.records import Record
-from service.api.pages import link
+from service.api.context import Service, require_admin
+from service.api.pages import STOPPED, UNREADY, Responses, link
+from service.api.problems import ProblemError, Reason
+from service.store.queries import check_readable
+
+
+class Health(Record):
+    """The server is alive."""
+
+    status: Literal["ok"] = "ok"
+
+
+class Ready(Record):
+    """Campaigns can be posted and make progress."""
+
+    status: Literal["ready"] = "ready"
+
+
+EXAMPLE = 'risk_sac_episodes_total{family="low",method="risk-sac"} 4711.0\n…'
+METRICS: Responses = {200: {"content": {"text/plain": {"schema": {"type": "string"}, "example": EXAMPLE}}}}
+
+router = APIRouter()
+
+
+@router.get("/healthz", tags=["operations"], responses=STOPPED)
+async def get_health(service: Service) -> Health:
+    """Liveness: restart the service if this fails."""
+    if not service.manager.alive:
+        detail = "the manager has stopped; the log has the reason"
+        raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.MANAGER_STOPPED, detail)
+    return Health()
+
+
+@router.get("/readyz", tags=["operations"], responses=UNREADY)
+def get_readiness(service: Service) -> Ready:
+    """Readiness: whether campaigns can be posted and progress; recovers once the cause is gone."""
+    problem = service.manager.storage_problem
+    if problem is not None:
+        raise ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.STORAGE_UNAVAILABLE, problem)
+    check_readable(service.store.engine)
+    return Ready()
+
+
+# A key that may see all campaigns: the runs at work are among the metrics.
+@router.get(
+    "/metrics",
+    tags=["operations"],
+    response_class=Response,
+    responses=METRICS,
+    dependencies=[Depends(require_admin)],
+)
+def get_metrics(service: Service) -> Response:
+    """Metrics in the text format of Prometheus."""
+    return Response(generate_latest(service.metrics), media_type=CONTENT_TYPE_LATEST)
 
 
 class Entrance(Record):
@@ -47,7 +98,7 @@ document.documentElement.classList.toggle("dark-mode", (localStorage.getItem("ri
     (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark");
 </script>
 """
-BUILT = Path(service.__file__).parent / "web" / "dist"
+BUILT = Path(str(files("service"))) / "web" / "dist"
 # Nothing is loaded from elsewhere, and no script or style stands within a document. Pictures that need a key are
 # fetched and shown as blobs.
 POLICY = (
@@ -57,8 +108,6 @@ POLICY = (
 FOREVER = "public, max-age=31536000, immutable"  # the names of assets tell their content
 MISSING = """<!doctype html><title>RISK-SAC</title><p>This installation has no page: it was left out, or not built yet.
 <code>python service/web/backend.py</code> builds it. <a href="../docs">The API</a> is there."""
-
-router = APIRouter()
 
 
 @router.get("/", tags=["operations"], response_model=Entrance)

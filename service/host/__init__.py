@@ -1,1 +1,0 @@
-"""The server process itself: its logs, locks, event loop and settings."""
