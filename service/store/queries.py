@@ -25,6 +25,7 @@ from risk_sac.records import (
     Funnel,
     Grade,
     Outcome,
+    PlausibilityClass,
     Severity,
     State,
     StateChange,
