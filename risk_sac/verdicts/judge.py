@@ -84,7 +84,14 @@ def collision_of(
         early_min_robustness=min((m.soft_min for m in warning), default=ROBUSTNESS_CLIP),
         simulator_agrees=facts.simulator_agrees,
         verdicts=verdicts,
-        judgement=judge(evidence, other, valid=all(verdicts.values()), conflict=conflict, preventing=drivers),
+        judgement=judge(
+            evidence,
+            other,
+            valid=all(verdicts.values()),
+            conflict=conflict,
+            contact=contact,
+            preventing=drivers,
+        ),
     )
 
 
@@ -95,13 +102,14 @@ def judge(
     valid: bool,
     conflict: Conflict | None = None,
     preventing: Collection[str] = PREVENTING,
+    contact: Contact | None = None,
 ) -> Judgement:
     """Judges a contact: how it began, its fault, its severity, its grade.
 
     The contact is in the last frame. Only a valid one is graded, by the drivers that would have prevented it.
 
-    A valid contact passed every rule of `artefact_verdicts` and `validity_verdicts`. The conflict is found again if not
-    given. `preventing` are the reference drivers whose word counts.
+    A valid contact passed every rule of `artefact_verdicts` and `validity_verdicts`. Conflict and contact are found
+    again if not given. `preventing` are the reference drivers whose word counts.
 
     Raises:
       ValueError: the striker is not there in the last frame.
@@ -117,7 +125,7 @@ def judge(
     graded = grade(avoids, preventing) if valid else None
     yields = has_to_yield(conflict.type, where, broke, ego_broke)
     part = ego_part(evidence, striker, conflict, yields)
-    contact = recorded_contact(evidence, striker)
+    contact = contact or recorded_contact(evidence, striker)
     impact_mps, injury_risk = impact(evidence, striker, contact)
     kind, variant = name_contact(
         evidence,

@@ -151,10 +151,10 @@ MEETING = {
         ({"ego_distance_m": 38.0, "pedestrian_setback_m": 1.3}, "initial_conflict"),
         ({"ego_distance_m": 38.0, "pedestrian_setback_m": 1.5}, None),
         ({"pedestrian_speed_mps": 0.0}, None),
-        ({"ego_distance_m": 25.0}, None),
+        ({"ego_distance_m": 25.0, "pedestrian_speed_mps": 0.8}, None),
         ({"occluder_distance_m": 10.0}, None),
     ],
-    ids=["at the kerb", "0.9 s from it", "1.1 s from it", "standing", "behind the ego by then", "hidden"],
+    ids=["at the kerb", "0.9 s from it", "1.1 s from it", "standing", "more than 1 s behind the ego by then", "hidden"],
 )
 def test_a_scene_is_refused_if_the_careful_driver_already_sees_a_pedestrian_coming(changes, rule):
     with closing(make_default("mixed")) as env:
