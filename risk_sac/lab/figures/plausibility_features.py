@@ -55,7 +55,7 @@ def draw(undisturbed: Mapping[str, Sequence[float]], failing: Mapping[str, Seque
             edges = np.linspace(min(every), max(every) + 1e-9, BINS + 1)
             for name, sample in samples.items():
                 shares = np.full(len(sample), 1.0 / max(1, len(sample)))
-                axis.hist(sample, edges, weights=shares, alpha=0.5, label=f"{name} ({len(sample)})")
+                axis.hist(sample, edges.tolist(), weights=shares, alpha=0.5, label=f"{name} ({len(sample)})")
             axis.set_yscale("log")
             axis.legend(fontsize=7)
     figure.savefig(file, dpi=80)
