@@ -81,6 +81,8 @@ def _violation(violation: Violation) -> Iterator[str]:
     yield violation.kind
     yield violation.variant
     yield f"least robustness: {violation.robustness:.2f}{_grade(violation)}"
+    if violation.plausibility is not None:
+        yield violation.plausibility.in_words
     fault = f" · fault: {violation.fault}" if violation.fault is not None else ""
     yield f"the ego's offences: {_words(', '.join(violation.broke)) or 'none'}{fault}"
 
