@@ -128,22 +128,29 @@ def _minimise(options: argparse.Namespace) -> int:
 def _more_plausible(bundle: "Bundle", out: Path | None) -> int:
     from risk_sac.failures.bundle import write_bundle
     from risk_sac.failures.plausible import most_plausible
-    from risk_sac.verdicts.plausibility import unlikely
 
-    likelier = most_plausible(bundle, unlikely)
+    likelier = most_plausible(bundle)
     motion = likelier.manifest.plausible
     assert motion is not None  # that is what `most_plausible` makes
+    before, after = (_behaviour(each.manifest.episode) for each in (bundle, likelier))
     if out is not None:
         write_bundle(out, likelier)
     lines = [
         motion.sentence,
-        f"unlikeliness of what the adversaries did: {motion.after:.1f} of {motion.before:.1f}",
+        f"recorded: {before}",
+        f"most plausible: {after}",
+        f"unlikeliness, -log p: {motion.before:.1f} before, {motion.after:.1f} after",
         f"copies, perturbed by 1 %, that fail as well: {motion.held} of {motion.copies}",
         f"played: {counted(motion.episodes, 'episode')}",
         *([] if out is None else [f"Bundle, with the recording: {out}"]),
     ]
     say("\n".join(lines))
     return OK
+
+
+def _behaviour(episode: EpisodeRecord) -> str:
+    violation = episode.worst_violation
+    return "" if violation is None or violation.behaviour is None else violation.behaviour.in_words
 
 
 def _region(options: argparse.Namespace) -> int:

@@ -23,7 +23,7 @@ ROWS = 11  # of a frame's state
 def candidates(episode: EpisodeRecord) -> list[Collision | Violation]:
     """Returns the contacts of an episode that may show its ego's defects: plausible, preventable and not minor."""
     contacts = [violation for violation in episode.valid_violations if violation.requirement == NO_CONTACT]
-    return [contact for contact in contacts if contact.headline_candidate]
+    return [contact for contact in contacts if contact.serious and contact.plausible]
 
 
 def detected(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Collision | Violation | None:

@@ -4,6 +4,7 @@ A hill climb over the recorded actions: a change is kept if it lowers the unlike
 make one adversary's drive or steering smoother, constant, weaker, absent, earlier or later over a while, or move it.
 """
 
+import math
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
@@ -17,8 +18,10 @@ from risk_sac.failures.sentence import story
 from risk_sac.failures.studied import PlausibleMotion
 from risk_sac.failures.variants import VariantPlayer, alike
 from risk_sac.verdicts.evidence import Evidence
+from risk_sac.verdicts.plausibility import plausibility_of
 from risk_sac.world.types import Floats
 
+LEAST_LOG = 1e-300  # keeps logarithms finite
 Unlikely = Callable[[Evidence], float]
 """From an episode up to its contact to -log p of what its adversaries did."""
 
@@ -29,21 +32,30 @@ DEVIATIONS = (0.05, 0.15, 0.4)  # of an action that is moved
 FACTORS = (0.3, 1.2)  # by which actions are weakened or strengthened
 
 
-def most_plausible(bundle: Bundle, unlikely: Unlikely, most: int = MOST) -> Bundle:
+def unlikely(evidence: Evidence) -> float:
+    """Computes how unlikely what the adversaries did is: -log p of the least likely feature and of all together, nats.
+
+    Choice: their sum, since either decides the class, and the larger one alone hides what a change gains in the other.
+    """
+    judged = plausibility_of(evidence)
+    return -sum(math.log(max(p, LEAST_LOG)) for p in (judged.least_probability, judged.joint_probability))
+
+
+def most_plausible(bundle: Bundle, score: Unlikely = unlikely, most: int = MOST) -> Bundle:
     """Returns the least unlikely motion that was found, as a bundle that keeps the recording too.
 
-    Scene, striker, type of conflict and grade stay, and a candidate for the headline stays one.
+    Scene, striker, type of conflict and grade stay, and what is not minor does not become so.
 
     Args:
       bundle: of the failure.
-      unlikely: what is lowered.
+      score: what is lowered.
       most: episodes that are played, `COPIES` of them to count how surely the result fails.
 
     Raises:
       ConfigError: the bundle holds no valid failure that can be played here.
       SimulationError: it does not happen here.
     """
-    search = _Climb(VariantPlayer(bundle), unlikely)
+    search = _Climb(VariantPlayer(bundle), score)
     with closing(search.stage.env):
         while search.stage.played < most - COPIES - 1:
             search.step()
@@ -53,12 +65,11 @@ def most_plausible(bundle: Bundle, unlikely: Unlikely, most: int = MOST) -> Bund
 class _Climb:
     """State of the climb: the least unlikely motion so far."""
 
-    def __init__(self, stage: VariantPlayer, unlikely: Unlikely) -> None:
+    def __init__(self, stage: VariantPlayer, score: Unlikely) -> None:
         """Scores the recording, which the stage has just played."""
-        self.stage, self._unlikely = stage, unlikely
-        self._candidate = stage.failure.headline_candidate
+        self.stage, self._score = stage, score
         self.best = stage.original
-        self.before = self.after = unlikely(stage.evidence())
+        self.before = self.after = score(stage.evidence())
         self._random = np.random.default_rng(0)
 
     def step(self) -> None:
@@ -67,9 +78,9 @@ class _Climb:
         violation = alike(self.stage.play(variant)[:1], self.stage.failure)
         if violation is None or violation.graded is not self.stage.grade:
             return
-        if self._candidate and not violation.headline_candidate:
+        if self.stage.failure.serious and not violation.serious:
             return
-        score = self._unlikely(self.stage.evidence())
+        score = self._score(self.stage.evidence())
         if score < self.after:
             self.best, self.after = variant, score
 
