@@ -35,6 +35,7 @@ def yaml_file(folder: Path, text: str) -> Path:
         ("family: low\nmethod: sac\nseed: '3'", "seed"),
         ("family: low\nmethod: sac\nseed: 0\nbudget: {episodes: .nan}", "budget.episodes"),
         ("family: low\nrequirements: [{name: a, formula: x, scale: -1}]", "requirements[0].scale"),
+        ("family: low\njudge: {drivers: [r157, fms]}", "judge.drivers[1]"),
         ("families: [low, low]", "families"),
         ("[1, 2]", "spec"),
         ("family: [", "spec"),

@@ -14,7 +14,7 @@ from risk_sac.metrics.rows import (
 )
 from risk_sac.records import Funnel, Grade, Outcome
 from risk_sac.verdicts.distinct import distinct_failures, taxonomy_cell
-from tests.builders import judgement
+from tests.builders import AVOIDS, TOUCHES, judgement
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
 
 
@@ -33,11 +33,20 @@ def test_run_literals():
 
 def test_funnel_literals():
     metrics = feed(JUDGED)
-    assert Funnel.of(metrics) == Funnel(contacts=7, valid=5, distinct=4, preventable=2)
+    assert Funnel.of(metrics) == Funnel(contacts=7, valid=5, distinct=4, preventable=2, published=2)
     assert (metrics.preventable, metrics.artefacts, metrics.unresponsive) == (3, 1, 1)
     assert metrics.pcr == metrics.window_pcr == preventable_collision_rate(counted(JUDGED)) == 3 / 8
     # Wilson for 3 of 8 by hand: centre (0.375 + 0.2401)/1.4802 = 0.4155, half width 0.2787.
     assert (metrics.pcr_low, metrics.pcr_high) == pytest.approx((0.1368, 0.6943), abs=5e-4)
+
+
+def test_what_only_the_defensive_driver_prevents_is_preventable_and_not_published():
+    by_defensive = judgement(drivers={"r157": TOUCHES, "defensive": AVOIDS}, variant="alongside")
+    metrics = feed([episode(Outcome.FAILURE, 10, hit=contact(judgement=by_defensive))] * 2)
+    assert (metrics.distinct_preventable, metrics.distinct_published) == (1, 0)
+    assert metrics.prevented_by == {"r157": 0, "defensive": 2, "published": 0}
+    metrics = feed([episode(Outcome.FAILURE, 10, hit=contact(judgement=each)) for each in (by_defensive, judgement())])
+    assert (metrics.distinct_preventable, metrics.distinct_published, metrics.variants) == (1, 1, 2)
 
 
 def test_histogram_literals():
@@ -63,8 +72,6 @@ def test_bad_records_are_refused_and_leave_the_figures_alone():
         accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(ttc=math.nan)))
     with pytest.raises(NotFinite, match="finite times"):
         accumulator.add(episode(Outcome.FAILURE, 10, hit=contact(judgement=judgement(conflict_s=-math.inf))))
-    with pytest.raises(NotFinite, match="no NaN"):  # of what tells distinct failures apart
-        accumulator.add(episode(Outcome.FAILURE, 10, hit=contact().model_copy(update={"ego_speed_mps": math.nan})))
     with pytest.raises(NotFinite, match="mean_cost"):
         accumulator.add(episode(cost=math.nan))
     with pytest.raises(ValueError, match="without a valid violation"):

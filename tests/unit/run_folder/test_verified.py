@@ -48,7 +48,9 @@ def test_a_violation_is_refused_by_its_kind_and_what_else_the_episode_violates_s
         episode_record(
             1, Outcome.FAILURE, violations=(broken,), collision=contact, failed=("no_contact", "never_fast")
         ),
-        episode_record(2, Outcome.FAILURE, violations=(violation(requirement="gentle"),)),
+        episode_record(
+            2, Outcome.FAILURE, violations=(violation(requirement="gentle", kind="gentle violated; straight"),)
+        ),
     ]
     found = verified(e0=1).judged(records)
     assert [record.refused_by(REPEATS) for record in found] == [("never_fast",), ("never_fast",), ()]

@@ -6,6 +6,7 @@ import pytest
 from risk_sac.records import ConflictType, Grade, Judgement
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.judge import DEFINITIONS, judge
+from risk_sac.verdicts.reference import PREVENTING, grade
 from risk_sac.world.types import Role
 from tests.unit.verdicts.staged import (
     STREET,
@@ -98,6 +99,16 @@ def test_what_is_not_valid_gets_no_grade():
     assert (found.grade, dict(found.drivers)) == (None, {})
     assert found.conflict_type is ConflictType.CUT_IN
     assert found.definitions == DEFINITIONS
+
+
+def test_only_the_word_of_the_chosen_drivers_makes_a_failure_preventable():
+    evidence = pedestrian_crosses(seen_from_s=3.0)
+    prevents = {name for name, outcome in judged(evidence).drivers.items() if outcome.avoids}
+    for name in PREVENTING:
+        found = judge(evidence, "actor_1", valid=True, preventing=(name,))
+        assert (found.grade is Grade.PREVENTABLE) == (name in prevents)
+        assert found.drivers == judged(evidence).drivers
+    assert grade({"r157": False, "defensive": True, "full_braking": False}, ("r157",)) is Grade.UNAVOIDABLE
 
 
 def test_grades_of_a_pedestrian_that_comes_into_sight():

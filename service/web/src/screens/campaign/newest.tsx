@@ -2,7 +2,6 @@
 
 import { address } from "../../router";
 import { drivenWords } from "../../ui/driven";
-import { words } from "../../ui/text";
 import { GRADE_WORDS, type GradeName } from "../../ui/verdicts";
 import { isContact, kindOf, gradeOf, worstOf } from "../../ui/violations";
 import type { Found } from "./live";
