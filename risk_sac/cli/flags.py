@@ -142,10 +142,13 @@ def families_on_map(options: argparse.Namespace) -> list[str] | None:
     for name in ("family", "families"):
         if flags.get(name) is not None:
             raise ConfigError(name, "it beside --network", "one of them", "a place on a map is the family")
+    if not Path(options.network).is_file():
+        raise ConfigError("network", f"{options.network}, which is no file", "a map")
     if flags.get("pattern") is None:
         raise ConfigError("pattern", "nothing", f"one of {', '.join(FINDERS)}")
     if (flags.get("place") is None) == (flags.get("places") is None):
-        raise ConfigError("place", "nothing, or places too", "the id of one", "`risk-sac places MAP` lists them")
+        got = "nothing" if flags.get("place") is None else "it beside --places"
+        raise ConfigError("place", got, "the id of one place", "`risk-sac places MAP` lists them")
     with scratch_folder() as folder:
         chosen = Map(present_net(Path(options.network), folder).file)
         return [chosen.keep(fit) for fit in chosen.fits(options.pattern, options.place)]

@@ -168,6 +168,8 @@ def field_error(item: Mapping[str, Any], model: type[BaseModel] | None = None) -
     if item["type"] == UNKNOWN_FIELD and model is not None:
         known = _fields_at(location[:-1], model)
         return ConfigError(field, got, f"one of {', '.join(known)}", did_you_mean(str(location[-1]), known))
+    if item["type"] == "model_type" and model is not None:
+        return ConfigError(field, got, f"a JSON object of {', '.join(_fields_at(location, model))}")
     template = _EXPECTED.get(item["type"])
     if template:
         expected = template.format(**item.get("ctx", {}))

@@ -177,8 +177,7 @@ def check(ego: EgoConfig) -> None:
 
 
 def refuse_class(source: str) -> NoReturn:
-    """Raises a ConfigError that says why `module:Class` names no registered ego."""
-    python_card(EntryPoint(name="ego", value=source, group=GROUP))
+    """Raises a ConfigError: `module:Class` names no registered ego."""
     got, remedy = f"the class {source}, which is not registered", f"register it as an entry point of {GROUP!r}"
     raise ConfigError("ego.driver", got, "the name of a registered ego", f"{remedy}: see risk_sac/egos/README.md")
 

@@ -333,3 +333,14 @@ def test_hostile_text_is_shown_and_runs_nothing(
     page.get_by_role("link", name="Refused").click()
     expect(page.locator(".cards li").first).to_contain_text("<script>")
     assert page.evaluate("window.hacked") is None
+
+
+def test_a_screen_of_an_answer_that_it_cannot_draw_says_so(
+    new_page: Callable[..., Page], service: Service, campaign: str
+) -> None:
+    page = new_page(allowed=("404",))
+    page.route("**/failure-table*", lambda route: route.fulfill(json={"ids": ["a"]}))  # as of another version
+    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures")
+    expect(page.get_by_role("alert")).to_contain_text("cannot be drawn")
+    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}")
+    expect(page.get_by_role("alert")).to_have_count(0)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from risk_sac.host.canvas import canvas
+from risk_sac.failures.from_above import canvas
 from risk_sac.risk.driving import FEATURES
 from risk_sac.run_folder.results import read_results
 

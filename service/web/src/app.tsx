@@ -1,7 +1,7 @@
 /** The shell: what stands around every screen, and which screen is shown. */
 
 import type { ComponentChildren } from "preact";
-import { useEffect, useState } from "preact/hooks";
+import { useEffect, useErrorBoundary, useState } from "preact/hooks";
 import { useAlive } from "./api/alive";
 import { absolute, connected, hasKey, setKey, wantsKey } from "./api/client";
 import { placeOf, usePlace, type Place } from "./router";
@@ -53,9 +53,21 @@ export function App() {
         </p>
       )}
       <main id="content" tabIndex={-1}>
-        {keyWanted ? <Login /> : screen(place)}
+        {keyWanted ? <Login /> : <Guarded key={place.parts.join("/")}>{screen(place)}</Guarded>}
       </main>
     </>
+  );
+}
+
+/** Shows why a screen cannot be drawn, in its place. */
+function Guarded({ children }: { children: ComponentChildren }) {
+  const [error] = useErrorBoundary() as [Error | undefined, () => void];
+  if (error === undefined) return <>{children}</>;
+  return (
+    <Empty>
+      <p role="alert">This screen cannot be drawn: {error.message}. The page may be older than the service.</p>
+      <button onClick={() => location.reload()}>Load the page again</button>
+    </Empty>
   );
 }
 

@@ -55,7 +55,7 @@ export function One({ id }: { id: string }) {
             {table.missing.length > 0 && <Missing runs={table.missing} />}
             {table.cells.length === 0 ? (
               <Empty>
-                <p>The report begins with the first run that has finished.</p>
+                <p>No run has finished; the report covers those that have.</p>
                 <a href={address(["campaigns", id])}>To the campaign</a>
               </Empty>
             ) : (
