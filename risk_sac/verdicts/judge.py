@@ -337,7 +337,7 @@ def _inherited(requirement: Requirement, history: History, time_s: float, met: M
     released = history.evidence.released
     frames = history.frames[released : released + round(time_s / STEP_S)]
     stopped = all(frame.signal in (Signal.YELLOW, Signal.RED) for frame in frames)
-    return stopped and inherits_stop(frames[0].ego_speed_mps, frames[0].stop_line_m)
+    return stopped and inherits_stop(frames[0].ego_speed_mps, frames[0].stop_line_m, time_s)
 
 
 def _fault(evidence: Evidence, met: MetActor | None, broke: Sequence[str], graded: Grade) -> Fault:

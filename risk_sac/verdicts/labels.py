@@ -72,9 +72,9 @@ def impact(evidence: Evidence, striker: int, contact: Contact) -> tuple[float, f
     the same.
     """
     if evidence.kind[striker] == Kind.PEDESTRIAN:
-        own_mps = max(contact.closing_normal_ego_mps, 0.0)
+        own_mps = max(0.0, contact.closing_normal_ego_mps)
         return own_mps, fatality_risk(own_mps)
-    closing_mps = max(contact.closing_normal_mps, 0.0)
+    closing_mps = max(0.0, contact.closing_normal_mps)
     ego_kg, other_kg = (mass_kg(float(evidence.length_m[actor])) for actor in (0, striker))
     worse_off_mps = delta_v_mps(closing_mps, min(ego_kg, other_kg), max(ego_kg, other_kg))
     return closing_mps, serious_injury_risk(worse_off_mps)

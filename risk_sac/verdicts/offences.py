@@ -199,12 +199,23 @@ def on_inherited_red(evidence: Evidence) -> bool:
         np.hypot(np.diff(e.x_m[e.released : entered + 1, EGO]), np.diff(e.y_m[e.released : entered + 1, EGO])).sum()
     )
     stopped = np.isin(e.link[e.released : entered, EGO], list(STOPS)).all()
-    return bool(stopped) and inherits_stop(float(e.speed_mps[e.released, EGO]), to_line_m)
+    after_s = float(e.time_s[entered] - e.time_s[e.released])
+    return bool(stopped) and inherits_stop(float(e.speed_mps[e.released, EGO]), to_line_m, after_s)
 
 
-def inherits_stop(speed_mps: float, to_line_m: float) -> bool:
-    """Whether the way to a stop line is too short to stop at leisure."""
-    return speed_mps * R157_DELAY_S + speed_mps**2 / (2 * YIELDING_MPS2) > to_line_m
+def inherits_stop(speed_mps: float, to_line_m: float, after_s: float) -> bool:
+    """Whether the ego inherits that it passes a stop line.
+
+    The way to the line is too short to stop at leisure, and it passes the line before it would then stand: one that
+    passes it later has stopped or crept.
+
+    Args:
+      speed_mps: at the release.
+      to_line_m: way to the line then.
+      after_s: from the release until it passes the line.
+    """
+    stops_s, stops_m = R157_DELAY_S + speed_mps / YIELDING_MPS2, speed_mps**2 / (2 * YIELDING_MPS2)
+    return speed_mps * R157_DELAY_S + stops_m > to_line_m and after_s <= stops_s + 1e-6
 
 
 def _entry(evidence: Evidence, actor: int, letters: bytes) -> int | None:

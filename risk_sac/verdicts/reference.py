@@ -225,9 +225,11 @@ def kept_by(
 
 
 def _stops_at_red(driver: int, history: History, index: int) -> bool:
-    """Whether a driver could stop at the line from when its signal turned yellow or red."""
+    """Whether a driver could stop at the line since its signal turned yellow or red, or since the ego last stood."""
     first = index
     while first > 0 and history.frames[first - 1].signal in (Signal.YELLOW, Signal.RED):
+        if history.frames[first].ego_speed_mps < STANDING_MPS:
+            break
         if first < index and history.frames[first - 1].stop_line_m < history.frames[first].stop_line_m - 1.0:
             break  # of the signal before
         first -= 1

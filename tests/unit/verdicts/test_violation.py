@@ -144,6 +144,15 @@ def test_a_red_light_that_the_ego_could_not_stop_at_when_it_was_handed_over_is_i
     assert (found.other_id, found.grade) == (None, Grade.PREVENTABLE if valid else None)
 
 
+def test_an_ego_that_stops_at_an_inherited_red_light_and_then_creeps_over_the_line_enters_by_itself():
+    ego = straight(0.0, 0.0, 0.0, 12.0, (0.0, -4.0), (6.0, 1.0))  # it stands after 18 m, from 3 s to 6 s
+    evidence = staged(ego, straight(500.0, 0.0, 0.0, 12.0))
+    shown = to_line(evidence, 1.5 * 12.0 + CAR_M[0] / 2 + 19.0, 19.0, 19.0)
+    found = violated(evidence, NO_RED, shown)
+    assert found.time_s > 6.0
+    assert (found.valid, found.grade, found.fault) == (True, Grade.PREVENTABLE, Fault.EGO)
+
+
 SLOW = own("ego_speed_mps <= 10")
 
 
