@@ -47,10 +47,8 @@ class Counts(Record):
     """Kinds of violations that it prevents."""
     distinct_published: int = 0
     """Of these kinds, those that R157, FSM or RSS prevents."""
-    headline_candidates: int = 0
-    """Kinds of preventable violations that are plausible and not minor."""
-    implausible: int = 0
-    """Kinds of those that are not minor, but do what no road user does."""
+    headline_candidates: int = 0  # kinds of preventable violations that are plausible and not minor
+    implausible: int = 0  # kinds of preventable violations that are not minor, but implausible
     artefacts: int = 0
     """Contacts made by simulator or control."""
     unresponsive: int = 0

@@ -12,10 +12,12 @@ from risk_sac.metrics.rows import (
     outcome_dispersion,
     preventable_collision_rate,
 )
-from risk_sac.records import Funnel, Grade, Outcome
+from risk_sac.records import Funnel, Grade, Outcome, PlausibilityClass, Severity
 from risk_sac.verdicts.distinct import distinct_failures, taxonomy_cell
-from tests.builders import AVOIDS, TOUCHES, judgement
+from tests.builders import AVOIDS, TOUCHES, judgement, plausibility
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
+
+ORDINARY, IMPLAUSIBLE = PlausibilityClass.ORDINARY, PlausibilityClass.IMPLAUSIBLE
 
 
 def test_run_literals():
@@ -47,6 +49,17 @@ def test_what_only_the_defensive_driver_prevents_is_preventable_and_not_publishe
     assert metrics.prevented_by == {"r157": 0, "defensive": 2, "published": 0}
     metrics = feed([episode(Outcome.FAILURE, 10, hit=contact(judgement=each)) for each in (by_defensive, judgement())])
     assert (metrics.distinct_preventable, metrics.distinct_published, metrics.variants) == (1, 1, 2)
+
+
+def test_implausible_kinds_are_counted_apart_from_candidates():
+    plain, wild = (judgement(kind="cut-in", plausibility=plausibility(each)) for each in (ORDINARY, IMPLAUSIBLE))
+    minor = judgement(kind="cut-in", severity=Severity.MINOR, plausibility=plausibility(IMPLAUSIBLE))
+    hits = [contact(judgement=each) for each in (wild, wild, minor)]
+    counts = feed([episode(Outcome.FAILURE, hit=hit) for hit in hits])
+    assert (counts.distinct_preventable, counts.headline_candidates, counts.implausible) == (1, 0, 1)
+    hits.append(contact(judgement=plain))
+    counts = feed([episode(Outcome.FAILURE, hit=hit) for hit in hits])
+    assert (counts.distinct_preventable, counts.headline_candidates, counts.implausible) == (1, 1, 1)
 
 
 def test_histogram_literals():
