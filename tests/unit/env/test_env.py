@@ -263,7 +263,9 @@ def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low):
         collision = collision_of(outcomes)
         for step, (_, reward, terminated, _, _) in enumerate(outcomes[1:], start=1):
             bonus = 0.0
-            if terminated and collision is not None:
+            if terminated and collision is not None and not collision.valid:
+                bonus = -config.degenerate_collision
+            elif terminated and collision is not None:
                 shares = {
                     Grade.PREVENTABLE: 1.0,
                     Grade.FULL_BRAKING: config.unpreventable,
@@ -271,7 +273,7 @@ def test_the_reward_is_the_one_computed_by_hand_from_the_recorded_series(low):
                 }
                 worth = shares[collision.judgement.grade]
                 worth *= config.minor if collision.severity is Severity.MINOR else 1.0
-                bonus = worth * config.valid_collision if collision.valid else -config.degenerate_collision
+                bonus = worth * config.valid_collision
             at = LEAD_IN_STEPS + step
             assert reward == pytest.approx(reward_by_hand(series, at, config, bonus), abs=1e-9)
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.env.observation_layout import PER_ADVERSARY, X_M, Y_M
+from risk_sac.env.observation_layout import MOTION_PER_ADVERSARY, PER_ADVERSARY, X_M, Y_M
 from risk_sac.risk.reward import shaped_reward
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.search.agents.controls import Decision, Held, RandomAgent, ScriptedAgent, ScriptFollower
@@ -107,7 +107,10 @@ def follower(*active: float, family: str = "low") -> ScriptFollower:
 
 def observed(*places: tuple[float, float] | None) -> np.ndarray:
     """Neighbours at (x, y), m, at the ego's speed; None: one that has left the net."""
-    rows = [[0.0] * PER_ADVERSARY if p is None else [p[0] / X_M, p[1] / Y_M, 0, 0, 1, 0, 0.6, 0, 0, 1] for p in places]
+    rows = np.zeros((len(places), PER_ADVERSARY))
+    for row, place in zip(rows, places, strict=True):
+        if place is not None:
+            row[:MOTION_PER_ADVERSARY] = [place[0] / X_M, place[1] / Y_M, 0, 0, 1, 0, 0.6, 0, 0, 1]
     return np.array([*np.ravel(rows), 0.6], np.float32)
 
 
