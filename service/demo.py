@@ -193,17 +193,19 @@ def _series(campaign_id: str, failure: Episode) -> str:
 
 
 def draw_command(campaign: Campaign, failures: Sequence[Episode], data_dir: Path) -> str:
-    """Returns the command that draws the first preventable failure, or else the first failure."""
+    """Returns the command that draws the first failure for the headline, else a preventable one, else the first."""
     order = [run.id for run in campaign.runs]
-    first = min(failures, key=lambda each: (not _preventable(each), order.index(each.run_id)))
+    first = min(failures, key=lambda each: (*_rank(each), order.index(each.run_id)))
     program, here = Path(sys.executable).with_name("risk-sac"), Path.cwd()
     program = program.relative_to(here) if program.is_relative_to(here) else program
     folder = ServiceSettings(data_dir=data_dir).run_folder(campaign.id, first.run_id)
     return shlex.join(map(str, (program, "show", folder, first.id, "--out", data_dir / "failure.png")))
 
 
-def _preventable(failure: Episode) -> bool:
-    return any(violation.preventable for violation in failure.valid_violations)
+def _rank(failure: Episode) -> tuple[bool, bool]:
+    """Returns what is lower for a headline candidate, then for a preventable failure."""
+    valid = failure.valid_violations
+    return not any(each.headline_candidate for each in valid), not any(each.preventable for each in valid)
 
 
 def conclude(campaign: Campaign) -> int:
@@ -217,6 +219,7 @@ def conclude(campaign: Campaign) -> int:
         return 1
     found = headline(progress.headline, progress.headline_candidates)
     of = f"of {progress.distinct_failures} distinct ones, {progress.distinct_preventable} preventable"
+    of += f"; {progress.implausible} implausible" if progress.implausible else ""
     console.print(f"headline failures: {found} ({of})", style="bold green")
     return 0
 

@@ -72,6 +72,8 @@ def _violation(violation: Violation) -> Iterator[str]:
     yield f"the ego, at {violation.ego_speed_mps:.1f} m/s, violated {violation.requirement}; {met}"
     yield violation.signature
     yield f"least robustness: {violation.robustness:.2f}{_grade(violation)}"
+    if violation.plausibility is not None:
+        yield violation.plausibility.in_words
     fault = f" · fault: {violation.fault}" if violation.fault is not None else ""
     yield f"the ego's offences: {_words(', '.join(violation.broke)) or 'none'}{fault}"
 

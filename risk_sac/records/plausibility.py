@@ -33,7 +33,7 @@ class BehaviourFact(Record):
 
 
 class Plausibility(Record):
-    """How likely road users do what the adversaries did."""
+    """Probability that road users do what the adversaries did."""
 
     verdict: PlausibilityClass
     """ordinary | rare | implausible: the worse of the two that follow."""

@@ -43,10 +43,8 @@ class Counts(Record):
     """Valid contacts that it, or full braking at once, prevents."""
     distinct_preventable: int = 0
     """Distinct violations that it prevents."""
-    headline_candidates: int = 0
-    """Those of them that are plausible and not minor."""
-    implausible: int = 0
-    """Those that are not minor, but do what no road user does."""
+    headline_candidates: int = 0  # distinct, preventable, plausible and not minor
+    implausible: int = 0  # distinct, preventable and not minor, but implausible
     artefacts: int = 0
     """Contacts made by simulator or control."""
     unresponsive: int = 0

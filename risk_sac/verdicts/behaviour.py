@@ -73,7 +73,11 @@ def _vehicle(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Obse
 
 
 def _around(e: Evidence, actor: int, frames: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
-    """Computes where all actors are as seen from one: ahead, to its left, cosine of the headings; each `F x n`."""
+    """Computes where all actors are, as seen from one.
+
+    Returns:
+      Metres ahead, metres to its left, cosine of the angle between the headings; each `F x n`.
+    """
     heading = e.heading_rad[frames, actor][:, None]
     dx, dy = e.x_m[frames] - e.x_m[frames, actor][:, None], e.y_m[frames] - e.y_m[frames, actor][:, None]
     cos, sin = np.cos(heading), np.sin(heading)
@@ -170,7 +174,10 @@ def _junctions(
 
 
 def _arrives_after(e: Evidence, actor: int, frame: int) -> float | None:
-    """Finds after how long a vehicle with priority comes to where the actor has been since `frame`, s; None: never."""
+    """Finds when a vehicle with priority reaches the actor's way, s.
+
+    The way is that since `frame`, from which the time counts. None if no such vehicle does.
+    """
     x, y = e.x_m[frame:, actor], e.y_m[frame:, actor]
     soonest = None
     for other in np.flatnonzero(e.kind == Kind.VEHICLE).tolist():
@@ -222,7 +229,10 @@ def _walker(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Obser
 def _steps_out(
     e: Evidence, actor: int, frames: NDArray[np.intp], on_road: Bools, on_crossing: Bools
 ) -> Iterator[Observed]:
-    """Measures how a pedestrian steps onto the road: on red, and before which gap where it has no priority."""
+    """Measures how a pedestrian steps onto the road.
+
+    It does so on red, or before a gap where it has no priority.
+    """
     for t in (np.flatnonzero(on_road[1:] & ~on_road[:-1]) + 1).tolist():
         frame, link = int(frames[t]), int(e.link[frames[t], actor])
         time_s = float(e.time_s[frame])
@@ -239,7 +249,11 @@ def _steps_out(
 
 
 def pedal_changes(held: Floats, time_s: Floats) -> tuple[float, float]:
-    """Counts changes between gas and brake in the 10 s that have the most; returns also when the last was."""
+    """Counts changes between gas and brake in the 10 s with most.
+
+    Returns:
+      The number, and the time of the last of them.
+    """
     pressed = np.flatnonzero(np.abs(held) > PRESSED_MPS2)
     changed = pressed[1:][np.diff(np.sign(held[pressed])) != 0]
     if not len(changed):
@@ -260,7 +274,10 @@ def smoothed(values: Floats, frames: int = SMOOTH) -> Floats:
 
 
 def runs(does: Bools) -> list[tuple[int, int]]:
-    """Lists the stretches in which a condition holds, each as its first frame and the one after its last."""
+    """Lists the stretches in which a condition holds.
+
+    Each is its first frame and the one after its last.
+    """
     edges = np.flatnonzero(np.diff(np.concatenate(([False], does, [False])).astype(np.int8)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 

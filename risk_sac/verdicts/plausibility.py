@@ -27,7 +27,7 @@ UNDISTURBED = Path(__file__).with_name("undisturbed.json")
 
 
 class Undisturbed(NamedTuple):
-    """What SUMO's drivers do in undisturbed scenes."""
+    """Distributions of SUMO's drivers in undisturbed scenes."""
 
     spreads: Mapping[str, HasTails]  # of the features without a published distribution
     scale: float  # at least 1: by how much the joint surprise exceeds that of independent features

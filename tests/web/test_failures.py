@@ -66,7 +66,8 @@ def distinct_of(table: dict[str, Any]) -> list[int]:
         severity = ["severe", "moderate", None, "minor"].index(table["severity"][i])
         fault = ["ego", "shared", "other", None].index(table["fault"][i])
         grade = ["preventable", "full_braking", "unavoidable", None].index(table["grade"][i])
-        return not table["headline"][i], severity, fault, grade, -(table["relative_speed_mps"][i] or 0), i
+        implausible = table["plausibility"][i] == "implausible"
+        return not table["headline"][i], implausible, severity, fault, grade, -(table["relative_speed_mps"][i] or 0), i
 
     niches = {table["niche"][i] for i in valid_of(table)}
     return [min((i for i in valid_of(table) if table["niche"][i] == niche), key=order) for niche in niches]

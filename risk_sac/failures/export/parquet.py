@@ -26,6 +26,7 @@ OF_THE_RUN = [pa.field(name, pa.string(), nullable=False) for name in ("id", "ru
 SEED = pa.field("run_seed", pa.int64(), nullable=False)
 SPECS = b"risk_sac.specs"  # key of the file's metadata: a JSON object from run to its spec
 OF_THE_VERDICT = [
+    pa.field("plausibility", pa.string()),
     pa.field("severity", pa.string()),
     pa.field("injury_risk", pa.float64()),
     pa.field("fault", pa.string()),
@@ -86,12 +87,13 @@ def _rows(folder: Path, results: RunResults, id_: str) -> list[dict[str, Any]]:
 
 
 def _verdict(record: EpisodeRecord) -> dict[str, Any]:
-    """Returns severity, fault and prevention of a failure; empty for other episodes."""
+    """Returns plausibility, severity, fault and prevention of a failure; empty for other episodes."""
     worst = record.worst_violation if record.outcome is Outcome.FAILURE else None
     if worst is None:
         return {}
     judged = worst.judgement if isinstance(worst, Collision) else None
     return {
+        "plausibility": worst.behaviour and worst.behaviour.verdict,
         "severity": judged and judged.severity,
         "injury_risk": judged and judged.injury_risk,
         "fault": worst.blamed,

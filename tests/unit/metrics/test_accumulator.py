@@ -12,10 +12,12 @@ from risk_sac.metrics.rows import (
     outcome_dispersion,
     preventable_collision_rate,
 )
-from risk_sac.records import Funnel, Grade, Outcome
+from risk_sac.records import Funnel, Grade, Outcome, PlausibilityClass, Severity
 from risk_sac.verdicts.distinct import distinct_failures, kind_of
-from tests.builders import judgement
+from tests.builders import judgement, plausibility
 from tests.unit.metrics.episodes import HORIZON, JUDGED, RUN, any_run, contact, counted, episode, feed
+
+ORDINARY, IMPLAUSIBLE = PlausibilityClass.ORDINARY, PlausibilityClass.IMPLAUSIBLE
 
 
 def test_run_literals():
@@ -38,6 +40,17 @@ def test_funnel_literals():
     assert metrics.pcr == metrics.window_pcr == preventable_collision_rate(counted(JUDGED)) == 3 / 8
     # Wilson for 3 of 8 by hand: centre (0.375 + 0.2401)/1.4802 = 0.4155, half width 0.2787.
     assert (metrics.pcr_low, metrics.pcr_high) == pytest.approx((0.1368, 0.6943), abs=5e-4)
+
+
+def test_implausible_kinds_are_counted_apart_from_candidates():
+    plain, wild = (judgement(signature="cut-in", plausibility=plausibility(each)) for each in (ORDINARY, IMPLAUSIBLE))
+    minor = judgement(signature="cut-in", severity=Severity.MINOR, plausibility=plausibility(IMPLAUSIBLE))
+    hits = [contact(judgement=each) for each in (wild, wild, minor)]
+    counts = feed([episode(Outcome.FAILURE, hit=hit) for hit in hits])
+    assert (counts.distinct_preventable, counts.headline_candidates, counts.implausible) == (1, 0, 1)
+    hits.append(contact(judgement=plain))
+    counts = feed([episode(Outcome.FAILURE, hit=hit) for hit in hits])
+    assert (counts.distinct_preventable, counts.headline_candidates, counts.implausible) == (1, 1, 1)
 
 
 def test_histogram_literals():

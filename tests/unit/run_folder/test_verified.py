@@ -3,9 +3,9 @@
 import pytest
 
 from risk_sac.config import RunSpec
-from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, Repetition, Severity
+from risk_sac.records import REPEATS, DrivenBy, EpisodeRecord, Grade, Outcome, PlausibilityClass, Repetition, Severity
 from risk_sac.run_folder.results import RecordedFailure, RunResults, Verified, with_headline
-from tests.builders import collision, episode_record, judgement, run_metrics, violation
+from tests.builders import collision, episode_record, judgement, plausibility, run_metrics, violation
 
 
 def failure(index: int, phase: str = "search", driven_by: DrivenBy | None = None, **changes: object) -> EpisodeRecord:
@@ -64,10 +64,11 @@ def results_of(*episodes: EpisodeRecord) -> RunResults:
 
 
 MINOR = judgement(severity=Severity.MINOR)
+IMPLAUSIBLE = judgement(signature="crossing", plausibility=plausibility(PlausibilityClass.IMPLAUSIBLE))
 HEADLINE = ("no_contact: cut-in, straight [1-0-0]", "never_fast: never_fast violated; straight [1]")
 
 
-def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repeats():
+def test_the_headline_has_each_kind_once_if_it_is_preventable_plausible_not_minor_and_repeats():
     results = results_of(
         failure(0, judgement=MINOR, other_speed_mps=20.0),
         failure(1),
@@ -76,13 +77,15 @@ def test_the_headline_has_each_kind_once_if_it_is_preventable_not_minor_and_repe
         failure(4, judgement=judgement(signature="merge")),  # does not repeat
         episode_record(6, Outcome.FAILURE, violations=(violation(grade=Grade.PREVENTABLE),)),
         failure(7, phase="evaluation"),
+        failure(8, judgement=IMPLAUSIBLE),
     )
-    found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e6=2, e7=2)).metrics
+    found = with_headline(results, verified(e0=2, e1=2, e3=2, e4=1, e6=2, e7=2, e8=2)).metrics
     assert (found.headline, found.headline_kinds) == (2, HEADLINE)
     assert results.metrics.headline is None, "before a replay"
 
 
 MINOR_CONTACT = collision(judgement=MINOR)
+IMPLAUSIBLE_CONTACT = collision(judgement=IMPLAUSIBLE)
 UNAVOIDABLE = collision(judgement=judgement(Grade.UNAVOIDABLE))
 REFUSED = collision(verdicts={"inside_limits": False})
 KEPT, PREVENTED = violation(grade=Grade.UNAVOIDABLE), violation(grade=Grade.PREVENTABLE)
@@ -93,6 +96,8 @@ KEPT, PREVENTED = violation(grade=Grade.UNAVOIDABLE), violation(grade=Grade.PREV
     [
         (MINOR_CONTACT, (PREVENTED,), PREVENTED),  # the headline counts it
         (MINOR_CONTACT, (KEPT,), MINOR_CONTACT),
+        (IMPLAUSIBLE_CONTACT, (PREVENTED,), PREVENTED),  # the headline counts it
+        (IMPLAUSIBLE_CONTACT, (KEPT,), IMPLAUSIBLE_CONTACT),
         (UNAVOIDABLE, (KEPT,), UNAVOIDABLE),
         (None, (KEPT, PREVENTED), PREVENTED),
         (REFUSED, (KEPT,), KEPT),

@@ -3,11 +3,11 @@ import math
 import pytest
 
 from risk_sac.config import CampaignSpec
-from risk_sac.records import Fault, Grade, Outcome, Severity, State
+from risk_sac.records import Fault, Grade, Outcome, PlausibilityClass, Severity, State
 from service.errors import NotFoundError
 from service.store.finding import Judged
 from tests.begun import start
-from tests.builders import judgement
+from tests.builders import judgement, plausibility
 
 SPEC = CampaignSpec(families=("low",), methods=("risk-sac", "random"), seeds=(3, 4))
 
@@ -60,7 +60,13 @@ def test_contacts_are_found_by_grade_severity_fault_what_was_broken_and_signatur
     numbers = [start(store, ledger) for _ in range(2)]
     kinds = [
         judgement(),
-        judgement(Grade.FULL_BRAKING, broke=(), severity=Severity.MINOR, fault=Fault.SHARED),
+        judgement(
+            Grade.FULL_BRAKING,
+            plausibility=plausibility(PlausibilityClass.RARE),
+            broke=(),
+            severity=Severity.MINOR,
+            fault=Fault.SHARED,
+        ),
         judgement(Grade.UNAVOIDABLE, broke=("wrong_direction",), signature="crossing, 50 % hidden"),
     ]
     for number in numbers:
@@ -74,6 +80,8 @@ def test_contacts_are_found_by_grade_severity_fault_what_was_broken_and_signatur
     assert found() == [0, 1, 2] * 2
     assert found(grade=Grade.PREVENTABLE, run_id="low-random-3") == [0]
     assert found(fault=Fault.SHARED, severity=Severity.MINOR) == [1, 1]
+    assert found(plausibility=PlausibilityClass.RARE) == [1, 1]
+    assert found(plausibility=PlausibilityClass.ORDINARY) == [0, 2] * 2
     assert found(broke="red_light", grade=Grade.PREVENTABLE) == [0, 0]
     assert found(broke="red-light") == found(broke="redXlight") == found(broke="red") == []
     assert found(signature="crossing, 50 % hidden") == [2, 2]

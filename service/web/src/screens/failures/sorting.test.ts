@@ -41,6 +41,13 @@ test("by severity the severe come first, then the ego's fault, then the preventa
   expect(sorted(few, [0, 1, 2, 3], "severity", oftenOf(few))).toEqual([2, 3, 1, 0]);
 });
 
+test("implausible failures come last, however severe", () => {
+  const plausibility = (["implausible", "rare", "ordinary"] as const).slice();
+  const severity = (["severe", "severe", "moderate"] as const).slice();
+  const few = sample(3, { plausibility, severity, fault: Array(3).fill("ego") });
+  expect(sorted(few, [0, 1, 2], "severity", oftenOf(few))).toEqual([1, 2, 0]);
+});
+
 test("a distinct failure is shown by its headline episode, else by its worst", () => {
   const severity = (["minor", "severe", "moderate", "severe"] as const).slice();
   const few = sample(4, { severity, niche: [0, 0, 1, 1], headline: [false, false, true, false] });

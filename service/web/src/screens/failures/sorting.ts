@@ -25,7 +25,6 @@ export const SORTS_OF: Record<"failures" | "refused", readonly Sort[]> = {
 const GRADES: readonly (string | null)[] = ["preventable", "full_braking", "unavoidable", null];
 /** What has no severity touched nothing, and is no less than moderate. */
 const SEVERITIES: readonly (string | null)[] = ["severe", "moderate", null, "minor"];
-const PLAUSIBILITIES: readonly (string | null)[] = ["ordinary", "rare", "implausible", null];
 const FAULTS: readonly (string | null)[] = ["ego", "shared", "other", null];
 
 /** The failures in that order: a new list; those without a value come last, the earlier one first among equals. */
@@ -34,7 +33,7 @@ export function sorted(table: FailureTable, failures: readonly number[], sort: S
   const worst = (...first: ((i: number) => number)[]) => by(table, failures, ...first, closing);
   const grade = (i: number) => GRADES.indexOf(table.grade[i]!);
   const severity = (i: number) => SEVERITIES.indexOf(table.severity[i]!);
-  const implausible = (i: number) => +(PLAUSIBILITIES.indexOf(table.plausibility[i]!) > 1);
+  const implausible = (i: number) => Number(table.plausibility[i] === "implausible");
   const fault = (i: number) => FAULTS.indexOf(table.fault[i]!);
   switch (sort) {
     case "severity":

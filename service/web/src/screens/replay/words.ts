@@ -3,7 +3,7 @@
 import type { Body } from "../../api/types";
 import { capital, number, words } from "../../ui/text";
 import { preventedBy, refusal, TTC_RULE } from "../../ui/verdicts";
-import { isContact, worstOf, type Collision, type Violation } from "../../ui/violations";
+import { isContact, plausibilityOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 
 type Failure = Body<"Failure">;
 type Judgement = Body<"Judgement">;
@@ -60,7 +60,9 @@ export function refusals(violation: Collision | Violation): string[] {
 
 /** What happened, in a sentence or two. */
 export function happenedOf(violation: Collision | Violation): string {
-  return isContact(violation) ? contactOf(violation) : violationOf(violation);
+  const happened = isContact(violation) ? contactOf(violation) : violationOf(violation);
+  const plausibility = plausibilityOf(violation);
+  return plausibility?.sentence ? `${happened} The adversaries are ${plausibility.verdict}: ${plausibility.sentence}.` : happened;
 }
 
 export function violationOf({ requirement, time_s, robustness, ego_speed_mps, other_id, other_role, other_kind, hidden }: Violation): string {
