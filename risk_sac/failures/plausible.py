@@ -134,5 +134,7 @@ def _moved(part: Floats, random: np.random.Generator) -> Floats:
     if way == 3:
         return np.zeros_like(part)
     if way == 4:
-        return part[np.clip(np.arange(len(part)) + random.integers(-LATER, LATER + 1), 0, len(part) - 1)]
-    return part + random.choice(DEVIATIONS) * random.standard_normal()
+        shifted: Floats = part[np.clip(np.arange(len(part)) + random.integers(-LATER, LATER + 1), 0, len(part) - 1)]
+        return shifted
+    moved: Floats = part + float(random.choice(DEVIATIONS)) * random.standard_normal()
+    return moved

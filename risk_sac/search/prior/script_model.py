@@ -101,8 +101,11 @@ class ScriptModel:
             sides = points, self._reflect(points.astype(np.float64))
             own, other = (ScriptModel(self.members, self.kinds, self.egos).predict(side, belief) for side in sides)
             taken = own.fails >= other.fails
-            heads = (np.where(taken, *of_sides) for of_sides in zip(own[:2], other[:2], strict=True))
-            return Prediction(*heads, np.where(taken[:, None], own.kinds, other.kinds))
+            return Prediction(
+                fails=np.where(taken, own.fails, other.fails),
+                candidate=np.where(taken, own.candidate, other.candidate),
+                kinds=np.where(taken[:, None], own.kinds, other.kinds),
+            )
         beliefs = np.broadcast_to(belief, (len(points), len(self.egos)))
         inputs = torch.as_tensor(np.concatenate([points, beliefs], 1), dtype=torch.float32)
         logits = torch.stack([member(inputs) for member in self.members])
