@@ -339,7 +339,7 @@ def test_hostile_text_is_shown_and_runs_nothing(
     hostile["kinds"] = [{**kind, "name": f"{HOSTILE} {n}"} for n, kind in enumerate(table["kinds"])]
     page.route("**/failure-table*", lambda route: route.fulfill(json=hostile))
     page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures?q=onerror")
-    wait_for(page, len(distinct_of(hostile)))
+    wait_for(page, len(kinds_of(hostile)))
     expect(page.locator(".cards li").first).to_contain_text("<img src=x")
     expect(page.locator(".crumbs")).to_contain_text("<b>7</b>")
     page.locator(".cards li").first.hover()
