@@ -50,7 +50,7 @@ class Member(nn.Module):
 
 
 class ScriptModel:
-    """Members, the kinds that they tell apart, and the training egos."""
+    """Members, the variants that they tell apart as `kinds`, and the training egos."""
 
     def __init__(self, members: list[Member], kinds: tuple[str, ...], egos: tuple[str, ...]) -> None:
         self.members, self.kinds, self.egos = members, kinds, egos
