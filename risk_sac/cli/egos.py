@@ -18,7 +18,7 @@ from risk_sac.egos.registry import SHIPPED, cards
 from risk_sac.host.machine import cores
 from risk_sac.host.terminal import complain
 from risk_sac.metrics import COLUMNS as REQUIREMENT_COLUMNS
-from risk_sac.metrics import pooled_counts, pooled_requirements, requirement_cells, wilson_interval
+from risk_sac.metrics import pooled_counts, pooled_requirements, requirement_cells, wilson_interval, with_published
 
 if TYPE_CHECKING:
     from risk_sac.report import FinishedRun
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 SEEDS = 2
 COLUMNS = (
     *("family", "ego", "runs", "episodes", "invalid", "contacts"),
-    *("valid", "ECR (95 %)", "preventable", "PCR (95 %)", "failures"),
+    *("valid", "ECR (95 %)", "preventable (published)", "PCR (95 %)", "failures"),
 )
 
 
@@ -129,7 +129,8 @@ def _rows(family: str, found: "dict[str, Sequence[FinishedRun]]") -> list[list[s
         pooled = pooled_counts(of_family)
         valid, preventable, rated = pooled.collisions, pooled.preventable_collisions, pooled.rated
         counts = map(str, (len(of_family), pooled.episodes, pooled.invalid, pooled.raw_collisions, valid))
-        rates = _rate(valid, rated), str(preventable), _rate(preventable, rated), str(pooled.failures)
+        by_published = with_published(preventable, sum(run.prevented_by.get("published", 0) for run in of_family))
+        rates = _rate(valid, rated), by_published, _rate(preventable, rated), str(pooled.failures)
         rows.append(((preventable / max(rated, 1), valid / max(rated, 1)), [family, name, *counts, *rates]))
     return [row for _, row in sorted(rows, key=lambda each: each[0], reverse=True)]
 

@@ -33,6 +33,7 @@ from risk_sac.metrics.tally import (
     Tally,
     pooled_requirements,
     preventable,
+    published,
     requirement_cells,
     with_published,
 )

@@ -94,6 +94,11 @@ def preventable(record: EpisodeRecord) -> bool:
     return any(violation.preventable for violation in record.valid_violations)
 
 
+def published(record: EpisodeRecord) -> bool:
+    """Whether the episode has a valid violation that R157, FSM or RSS would have prevented."""
+    return any(violation.published_preventable for violation in record.valid_violations)
+
+
 class Tally(Counts):
     """Counts and sums of a run.
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from risk_sac.config import FamilyName, IidName
 from risk_sac.errors import ConfigError
-from risk_sac.metrics import clopper_pearson, pooled_requirements, preventable
+from risk_sac.metrics import clopper_pearson, pooled_requirements, preventable, published
 from risk_sac.records import EpisodeRecord, Outcome, Record
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.coverage import NOT_PLAYED, Coverage, coverage
@@ -57,6 +57,8 @@ class Drawn(Record):
     """Of any requirement that counts."""
     preventable: Bound
     """By a reference driver."""
+    published: Bound
+    """Of these, by R157, FSM or RSS."""
     requirements: Mapping[str, RequirementBound]
     """Requirement → its funnel."""
 
@@ -159,6 +161,7 @@ def drawn(run: FinishedRun) -> Drawn:
             "contacts": bound(sum(record.collision is not None for record in played)),
             "failures": bound(sum(record.outcome is Outcome.FAILURE for record in played)),
             "preventable": bound(sum(map(preventable, played))),
+            "published": bound(sum(map(published, played))),
             "requirements": requirements,
         }
     )

@@ -59,8 +59,8 @@ def test_a_stream_tells_all_in_order_and_ends_with_the_campaign(shared):
     own = [
         event["data"]["funnel"] for event in seen if event["data"]["run_id"] == "low-random-0" and "id" in event["data"]
     ]
-    assert own[1] == own[2] == {"contacts": 1, "valid": 1, "distinct": 1, "preventable": 1}
-    assert own[-1] == {"contacts": 6, "valid": 6, "distinct": 4, "preventable": 2}
+    assert own[1] == own[2] == {"contacts": 1, "valid": 1, "distinct": 1, "preventable": 1, "published": 1}
+    assert own[-1] == {"contacts": 6, "valid": 6, "distinct": 4, "preventable": 2, "published": 2}
     assert seen[-1]["event"] == "state"
     assert (seen[-1]["data"]["run_id"], seen[-1]["data"]["state"]) == (None, "succeeded")
     for run in ("low-random-0", "low-random-1"):

@@ -56,8 +56,12 @@ def test_a_row_says_what_the_api_says(
     expect(cells.nth(5)).to_have_text("default, Krauss")
     expect(cells.nth(6)).to_have_text(str(said["progress"]["episodes_total"]))
     expect(cells.nth(7)).to_contain_text(f"{100 * said['progress']['window_ecr']:.1f} %")
-    for place, name in enumerate(("headline", "distinct_failures", "distinct_preventable"), start=8):
-        expect(cells.nth(place)).to_have_text(count(said["progress"][name]))
+    found = said["progress"]
+    expect(cells.nth(8)).to_have_text(
+        count(None) if found["headline"] is None else f"{found['headline']} ({found['headline_published']})"
+    )
+    expect(cells.nth(9)).to_have_text(count(found["distinct_failures"]))
+    expect(cells.nth(10)).to_have_text(f"{found['distinct_preventable']} ({found['distinct_published']})")
     expect(cells.nth(11)).to_contain_text("took")
 
 

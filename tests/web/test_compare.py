@@ -53,8 +53,7 @@ def test_the_numbers_of_a_report_are_the_services(
         expect(row).to_be_visible()
         shown = row.locator("td").all_inner_texts()
         counts = [text.strip() for text in (*shown[:3], *shown[5:])]
-        named = [cell[name] for name in ("headline", "distinct_failures", "distinct_preventable")]
-        assert counts == list(map(count, (*named, len(cell["seeds"]), cell["episodes"])))
+        assert counts == [*_kinds_in(cell), count(len(cell["seeds"])), count(cell["episodes"])]
         for name, text in zip(("ecr", "pcr"), shown[3:5], strict=True):
             estimate = cell["estimates"][name]
             assert numbers(text) == per_cent(estimate["mean"], estimate["low"], estimate["high"])
@@ -167,8 +166,18 @@ def _check_total(row: Locator, letter: str, total: dict[str, Any]) -> None:
     for name, text in zip(("ecr", "pcr"), row.locator("td.rate").all_inner_texts(), strict=True):
         assert numbers(text) == per_cent(total[name], total[f"{name}_low"], total[f"{name}_high"])
     shown = [text.strip() for text in row.locator("td").all_inner_texts()]
-    named = ("headline", "distinct_failures", "distinct_preventable", "runs", "episodes")
-    assert [*shown[:3], *shown[5:]] == [count(total[name]) for name in named]
+    assert [*shown[:3], *shown[5:]] == [*_kinds_in(total), count(total["runs"]), count(total["episodes"])]
+
+
+def _kinds_in(row: dict[str, Any]) -> list[str]:
+    """Texts of the headline, the distinct and the preventable kinds of a row."""
+    headline, preventable = count(row["headline"]), count(row["distinct_preventable"])
+    published = "" if row["headline"] is None else f" ({count(row['headline_published'])})"
+    return [
+        f"{headline}{published}",
+        count(row["distinct_failures"]),
+        f"{preventable} ({count(row['distinct_published'])})",
+    ]
 
 
 def _saved(page: Page, button: Locator, folder: Path) -> Path:

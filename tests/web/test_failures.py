@@ -59,8 +59,8 @@ def wait_for(page: Page, number: int) -> None:
     expect(page.locator(".found-head p b")).to_have_text(f"{number:,}")
 
 
-def distinct_of(table: dict[str, Any]) -> list[int]:
-    """The episode that each distinct failure of the campaign is shown by: one of the headline, else the worst."""
+def kinds_of(table: dict[str, Any]) -> list[int]:
+    """The episode that each kind of the campaign is shown by: one of the headline, else the worst."""
 
     def order(i: int) -> tuple[Any, ...]:
         severity = ["severe", "moderate", None, "minor"].index(table["severity"][i])
@@ -69,8 +69,8 @@ def distinct_of(table: dict[str, Any]) -> list[int]:
         implausible = table["plausibility"][i] == "implausible"
         return not table["headline"][i], implausible, severity, fault, grade, -(table["relative_speed_mps"][i] or 0), i
 
-    niches = {table["niche"][i] for i in valid_of(table)}
-    return [min((i for i in valid_of(table) if table["niche"][i] == niche), key=order) for niche in niches]
+    kinds = {table["kind"][i] for i in valid_of(table)}
+    return [min((i for i in valid_of(table) if table["kind"][i] == kind), key=order) for kind in kinds]
 
 
 def valid_of(table: dict[str, Any]) -> list[int]:
@@ -79,18 +79,18 @@ def valid_of(table: dict[str, Any]) -> list[int]:
 
 def test_cards_match_the_api(screen: Callable[..., Page], table: dict[str, Any], campaign: str) -> None:
     page = screen("?sort=newest")
-    distinct = distinct_of(table)
-    assert shown(page) == (len(distinct), len(distinct))
-    newest = max(distinct)
+    kinds = kinds_of(table)
+    assert shown(page) == (len(kinds), len(kinds))
+    newest = max(kinds)
     card = page.locator(".cards li").first
     expect(card).to_have_attribute("aria-posinset", "1")
-    expect(card).to_have_attribute("aria-setsize", str(len(distinct)))
-    link = card.get_by_role("link")
+    expect(card).to_have_attribute("aria-setsize", str(len(kinds)))
+    link = card.locator("a[data-go]")
     assert link.get_attribute("href") == f"#/campaigns/{campaign}/failures/{table['ids'][newest]}"
     assert link.get_attribute("title") == table["kinds"][table["kind"][newest]]["name"]
     expect(card).to_contain_text(f"{table['relative_speed_mps'][newest]:.1f} m/s")
     expect(card).to_contain_text(table["striker"][newest].replace("_", " "))
-    alike = [i for i in valid_of(table) if table["niche"][i] == table["niche"][newest]]
+    alike = [i for i in valid_of(table) if table["kind"][i] == table["kind"][newest]]
     expect(card.locator("dd").nth(2)).to_have_text(f"{len(alike)} {'episode' if len(alike) == 1 else 'episodes'}")
     for method in {table["methods"][i] for i in alike}:
         expect(card.locator(".found-by")).to_contain_text(method)
@@ -98,12 +98,26 @@ def test_cards_match_the_api(screen: Callable[..., Page], table: dict[str, Any],
     expect(card).to_contain_text(words[table["grade"][newest]])
     expect(card).to_contain_text(f"fault: {table['fault'][newest]}")
 
-    page.get_by_label("every episode").check()
+    page.get_by_role("combobox", name="Show").select_option("episode")
     wait_for(page, len(valid_of(table)))
 
 
+def test_a_kind_opens_its_variants(screen: Callable[..., Page], table: dict[str, Any]) -> None:
+    page = screen()
+    variants: dict[int, set[int]] = {}
+    for i in valid_of(table):
+        variants.setdefault(table["kind"][i], set()).add(table["variant"][i])
+    kind, most = max(variants.items(), key=lambda item: len(item[1]))
+    card = page.locator(".cards li", has=page.locator(f'a[data-go][title="{table["kinds"][kind]["name"]}"]'))
+    card.get_by_role("link", name=f"{len(most)} variants").click()
+    wait_for(page, len(most))
+    assert set(page.locator(".cards a[data-go]").evaluate_all("links => links.map(link => link.title)")) == {
+        table["kinds"][kind]["name"]
+    }
+
+
 def test_a_card_opens_the_replay_and_back_finds_the_same_place(screen: Callable[..., Page], campaign: str) -> None:
-    page = screen("?every=1&sort=closing", viewport={"width": 1000, "height": 500})
+    page = screen("?by=episode&sort=closing", viewport={"width": 1000, "height": 500})
     page.mouse.wheel(0, 600)
     card = page.locator(".cards li a[data-go]").nth(3)
     to = card.get_attribute("href")
@@ -117,7 +131,7 @@ def test_a_card_opens_the_replay_and_back_finds_the_same_place(screen: Callable[
 
 def test_filters_survive_a_reload(screen: Callable[..., Page], table: dict[str, Any]) -> None:
     page = screen()
-    page.get_by_label("every episode").check()
+    page.get_by_role("combobox", name="Show").select_option("episode")
     page.get_by_role("combobox", name="Family").select_option("mixed")
     page.get_by_role("combobox", name="Order").select_option("closing")
     page.get_by_role("combobox", name="Horizontal axis").select_option("scene.friction")
@@ -146,7 +160,7 @@ def test_filters_survive_a_reload(screen: Callable[..., Page], table: dict[str, 
 def test_failures_are_filtered_by_severity_fault_and_what_drove_them(
     screen: Callable[..., Page], table: dict[str, Any]
 ) -> None:
-    page = screen("?every=1")
+    page = screen("?by=episode")
     valid = valid_of(table)
     for facet, column in (("Severity", "severity"), ("Fault", "fault")):
         value = next(table[column][i] for i in valid if table[column][i])
@@ -163,7 +177,7 @@ def test_failures_are_filtered_by_severity_fault_and_what_drove_them(
 
 
 def test_ranges_by_numbers_filter(screen: Callable[..., Page], table: dict[str, Any]) -> None:
-    page = screen("?every=1&family=low")
+    page = screen("?by=episode&family=low")
     page.get_by_text("Ranges by numbers").click()
     low = [i for i in valid_of(table) if table["families"][i] == "low"]
     speeds = sorted(table["relative_speed_mps"][i] for i in low)
@@ -189,7 +203,7 @@ def test_ranges_by_numbers_filter(screen: Callable[..., Page], table: dict[str, 
 
 
 def test_dragging_along_an_axis_filters_and_a_click_lets_go(screen: Callable[..., Page], table: dict[str, Any]) -> None:
-    page = screen("?every=1")
+    page = screen("?by=episode")
     page.locator(".lines").scroll_into_view_if_needed()
     box = page.locator(".lines").bounding_box()
     assert box
@@ -285,7 +299,7 @@ def test_triage_that_is_refused_is_taken_back_and_can_be_sent_again(screen: Call
 
 
 def test_keys_go_from_card_to_card(screen: Callable[..., Page], table: dict[str, Any]) -> None:
-    page = screen("?every=1")
+    page = screen("?by=episode")
     last = len(valid_of(table))
     page.locator(".cards a[data-go]").first.focus()
     page.keyboard.press("ArrowRight")
@@ -306,7 +320,7 @@ def test_no_card_cuts_what_it_says(
     told = table | {"requirement": ["mine_" + 35 * "x"] * size, "striker": ["a striker with a long name " * 4] * size}
     told["kinds"] = [{**kind, "name": f"{kind['name']}, and all that it did before"} for kind in table["kinds"]]
     page.route("**/failure-table*", lambda route: route.fulfill(json=told))
-    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures?every=1")
+    page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures?by=episode")
     wait_for(page, len(valid_of(table)))
     seen: set[str] = set()
     while f"{len(valid_of(table)) - 1}" not in seen:  # only cards near the view are in the document
@@ -326,7 +340,7 @@ def test_hostile_text_is_shown_and_runs_nothing(
     hostile["kinds"] = [{**kind, "name": f"{HOSTILE} {n}"} for n, kind in enumerate(table["kinds"])]
     page.route("**/failure-table*", lambda route: route.fulfill(json=hostile))
     page.goto(f"{service.client.base_url}/page/#/campaigns/{campaign}/failures?q=onerror")
-    wait_for(page, len(distinct_of(hostile)))
+    wait_for(page, len(kinds_of(hostile)))
     expect(page.locator(".cards li").first).to_contain_text("<img src=x")
     expect(page.locator(".crumbs")).to_contain_text("<b>7</b>")
     page.locator(".cards li").first.hover()

@@ -39,9 +39,9 @@ def test_a_campaign_tells_the_funnel_of_each_requirement(
     assert (told["never_fast"]["valid"], told["safe_ttc"]["counts"]) == (12, "report")
     for name, funnel in told.items():
         row = page.locator(f"table.requirements tr[data-requirement='{name}']")
-        counts = dict.fromkeys(("violated", "valid", "distinct", "preventable"), "–") | {
+        counts = dict.fromkeys(("violated", "valid", "distinct", "preventable", "published"), "–") | {
             step: str(funnel[step])
-            for step in ("violated", "valid", "distinct", "preventable")
+            for step in ("violated", "valid", "distinct", "preventable", "published")
             if funnel["counts"] == "failure" or step == "violated"
         }
         for step, text in counts.items():
@@ -54,7 +54,7 @@ def test_a_campaign_tells_the_funnel_of_each_requirement(
 
 
 def test_failures_are_filtered_by_requirement(page_at: Callable[..., Page], fast: str) -> None:
-    page = page_at(f"campaigns/{fast}/failures?every=1")
+    page = page_at(f"campaigns/{fast}/failures?by=episode")
     expect(page.locator(".found-head p b")).to_have_text("12")
     card = page.locator(".cards li").first
     expect(card).to_contain_text("violated")

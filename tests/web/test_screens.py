@@ -94,7 +94,7 @@ SCREENS: dict[str, tuple[str, Callable[[Page], None]]] = {
     "nowhere": ("nowhere", heading),
     "new": ("new", form),
     "campaign": ("campaigns/{campaign}", curves),
-    "failures": ("campaigns/{campaign}/failures?every=1&family=mixed&brush=closing:1:", triage),
+    "failures": ("campaigns/{campaign}/failures?by=episode&family=mixed&brush=closing:1:", triage),
     "refused": ("campaigns/{campaign}/failures?tab=refused", heading),
     "replay": ("campaigns/{campaign}/failures/{failure}", plots),
     "twin": ("campaigns/{campaign}/failures/{failure}/twin/idle", plots),

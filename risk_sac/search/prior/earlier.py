@@ -38,7 +38,7 @@ class PlayedScript:
 
     scene: Mapping[str, float]
     genes: tuple[float, ...]
-    kind: str = ""  # of its valid violation; empty: there was none
+    kind: str = ""  # name of the variant of its valid violation; empty: there was none
     candidate: bool = False  # for the headline
 
     @classmethod
@@ -59,7 +59,7 @@ class FamilyScripts:
 
     adversaries: tuple[str, ...]
     mirrored: bool
-    failures: tuple[PlayedScript, ...]  # one of each kind first, and candidates for the headline before others
+    failures: tuple[PlayedScript, ...]  # one of each variant first, and candidates for the headline before others
     latest: tuple[PlayedScript, ...]  # whatever they ended in
 
     @classmethod

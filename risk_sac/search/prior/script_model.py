@@ -54,7 +54,7 @@ Reflect = Callable[[Floats], Floats]
 
 
 class ScriptModel:
-    """Members, the kinds that they tell apart, and the training egos.
+    """Members, the variants that they tell apart as `kinds`, and the training egos.
 
     With `reflect`, a prediction is that of a point or of its mirror image, whichever fails more surely. Choice: not
     their mean. The training data strike from one side, so the mean would favour points where both neighbours strike.

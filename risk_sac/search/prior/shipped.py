@@ -26,7 +26,7 @@ class Prior:
     family: str
     model: ScriptModel
     library: Floats  # n x inputs; points that led to failures
-    library_kinds: tuple[str, ...]  # n
+    library_kinds: tuple[str, ...]  # n, names of variants
     card: Mapping[str, object]
 
 

@@ -27,7 +27,7 @@ class Start:
     model: ScriptModel
     translation: Translation
     library: Floats  # n x d
-    library_kinds: tuple[str, ...]  # n
+    library_kinds: tuple[str, ...]  # n, names of variants
     library_worth: Floats  # n; less than 1 where a row fails less often here than where it was found
     belief: Floats  # E
     earlier: int = 0

@@ -35,7 +35,7 @@ def test_run_literals():
 
 def test_funnel_literals():
     metrics = feed(JUDGED)
-    assert Funnel.of(metrics) == Funnel(contacts=7, valid=5, distinct=4, preventable=2, published=2)
+    assert Funnel.of(metrics) == Funnel(contacts=7, valid=5, distinct=3, preventable=2, published=2)
     assert (metrics.preventable, metrics.artefacts, metrics.unresponsive) == (3, 1, 1)
     assert metrics.pcr == metrics.window_pcr == preventable_collision_rate(counted(JUDGED)) == 3 / 8
     # Wilson for 3 of 8 by hand: centre (0.375 + 0.2401)/1.4802 = 0.4155, half width 0.2787.

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from risk_sac.config import RunMethod, RunSpec
+from risk_sac.config import CampaignSpec, RunMethod, RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.lab.benchmark.runs import ANSWER, Detection, answer_of, first_detection
 from risk_sac.lab.benchmark.statistics import friedman, log_rank, summaries, survival
 from risk_sac.records import DefectPower
-from risk_sac.report.power import method_power, runs_of
+from risk_sac.report.power import NOT_MEASURED, PlayedCounts, method_power, power_of, runs_of
 
 BUDGET = 1000
 
@@ -110,3 +110,16 @@ def test_the_power_of_a_budget_is_what_was_detected_within_it():
     )
     found = method_power("archive", {"low": (9000, 1), "mixed": (8999, 1)}, RUNS)
     assert (found.expected, found.in_most_seeds, found.never) == (0.5, (), ("speeds",))
+
+
+def test_the_power_of_a_campaign_goes_by_its_own_episodes():
+    spec = CampaignSpec(families=("low",), methods=("archive",), seeds=(0, 1))
+    played = [PlayedCounts("low", "archive", 5, 500, ended=True), PlayedCounts("low", "archive", 5, 700, ended=True)]
+    (archive,) = power_of(spec, played, RUNS).methods
+    (budget,) = archive.budgets
+    assert (budget.family, budget.runs, budget.episodes, budget.steps) == ("low", 2, 5, 600)
+
+
+def test_power_without_a_benchmark_says_that_nothing_was_measured():
+    found = power_of(CampaignSpec(families=("low",)), [], [])
+    assert (found.note, found.methods, found.lines) == (NOT_MEASURED, (), [])

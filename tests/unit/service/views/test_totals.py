@@ -50,16 +50,15 @@ def drawn(count):
     dice = random.Random(5)
     for index in range(count):
         outcome = dice.choice([Outcome.SAFE, Outcome.REJECTED, Outcome.FAILURE, Outcome.FAILURE, Outcome.DEGENERATE])
-        grade = dice.choice(list(Grade)) if outcome is Outcome.FAILURE else None
-        hit = collision(
-            ego_speed_mps=dice.choice([5.0, 15.0]), judgement=judgement(grade, kind=dice.choice("abcdefgh"))
-        )
+        kind = dice.choice("abcdefgh")
+        grades = [Grade.UNAVOIDABLE] if kind == "h" else list(Grade)
+        hit = collision(judgement=judgement(dice.choice(grades) if outcome is Outcome.FAILURE else None, kind=kind))
         touched = outcome in (Outcome.FAILURE, Outcome.DEGENERATE)
         if outcome is Outcome.DEGENERATE:
             hit = hit.model_copy(update={"verdicts": {"ego_moving": False}})
         more = {"mean_cost": dice.random(), "dual_variable": dice.random()}
         if outcome is Outcome.FAILURE and dice.random() < 0.4:
-            more["violations"] = (violation(grade=dice.choice(list(Grade)), kind=dice.choice("abcd")),)
+            more["violations"] = (violation(grade=dice.choice(list(Grade)), kind=dice.choice("wxyz")),)
             touched = dice.random() < 0.5
         yield episode_record(index, outcome, collision=hit if touched else None, **more)
 
@@ -127,9 +126,11 @@ def test_the_headline_has_the_first_of_a_kind_over_all_runs_that_is_not_minor_an
 def test_what_two_runs_found_alike_is_one_failure_of_the_campaign(ledger):
     campaign = ledger.create(SPEC)
     first, second = campaign.runs
-    slow, other = collision(ego_speed_mps=2.0), collision(judgement=judgement(kind="leader"))
+    slow, other = (collision(judgement=judgement(**each)) for each in ({"variant": "slow"}, {"kind": "leader"}))
     hits = [(first, 0, collision()), (first, 1, slow), (second, 0, collision()), (second, 1, other)]
-    assert failure_table(campaign, [plain_failure(*each) for each in hits], {}).niche == [0, 1, 0, 2]
+    found = failure_table(campaign, [plain_failure(*each) for each in hits], {})
+    assert (found.variant, found.variants) == ([0, 1, 0, 2], ["ahead", "slow", "ahead"])
+    assert [(kind.name, kind.variants) for kind in found.kinds] == [("cut-in, straight", 2), ("leader", 1)]
 
 
 SCENES_SPEC = CampaignSpec(families=("low",), methods=("random",), seeds=(3,))
