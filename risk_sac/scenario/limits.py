@@ -11,6 +11,7 @@ from risk_sac.scenario.space import Parameter, SceneSpace
 
 GRAVITY_MPS2 = 9.81
 EMERGENCY_DECEL_MPS2 = 9.0  # SUMO's default for passenger cars
+FIRM_BRAKING_MPS2 = 8.0  # that an adversary expects of others, as under emergency behaviour
 HEADROOM = 0.95  # share of the friction circle that is used; the rest is for what a step of 0.1 s cannot resolve
 CORNERING = 0.6  # of the circle, for the curve of the lane: drivers leave more, but brake in curves
 CHANGING_LANE = 0.3  # of the circle at most, for moving across the lane; at least 0.43 are left for braking
@@ -52,6 +53,11 @@ class Limits:
         """Computes the braking left for a lane change in a curve driven as planned."""
         lateral = self.cornering_mps2 + self.lateral_accel_mps2
         return min(self.brake_mps2, math.sqrt(self.grip_mps2**2 - lateral**2))
+
+    @cached_property
+    def others_brake_mps2(self) -> float:
+        """Hardest braking that is expected of others on the same road, whose limits may be wider."""
+        return max(self.brake_mps2, min(FIRM_BRAKING_MPS2, self.grip_mps2))
 
     @cached_property
     def slip(self) -> float:

@@ -114,7 +114,7 @@ class VehicleControl:
             if others is None:
                 break
             met = drives_into(
-                *others, along.path, along.station_m, along.offset_m, motion, stopping, self.limits.brake_mps2
+                *others, along.path, along.station_m, along.offset_m, motion, stopping, self.limits.others_brake_mps2
             )
             if met == CLEAR or (met != AHEAD and wanted[1] == 0.0):
                 break

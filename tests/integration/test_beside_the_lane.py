@@ -9,10 +9,11 @@ import libsumo
 import numpy as np
 import pytest
 
-from risk_sac.config import EgoConfig
+from risk_sac.config import EgoConfig, Odd
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.scenario.limits import limits_from_odd
+from risk_sac.scenario.odd import intersect
 from risk_sac.search.scripts import Genes, Seen, act, cue
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Belief
@@ -193,7 +194,8 @@ def cut_in(sim: SumoSimulation, pilot: Told, begins: int, ends: int, beside: int
     sim.hand_over_ego()
     sim.release()
     frame = sim.step()
-    adversaries = Adversaries(low, limits_from_odd(low.odd, 1.0), frame)
+    emergency = intersect(low.odd, Odd.model_validate({"dynamic": {"behaviour": "emergency"}}))
+    adversaries = Adversaries(low, limits_from_odd(emergency, 1.0), frame)  # the script is written for these limits
     row, slot, found, cued = frame.ids.index(id_), 2 * low.adversaries.index(id_), [], None
     for step in range(80):
         x, y = float(frame.x_m[row] - frame.x_m[0]), float(frame.y_m[row] - frame.y_m[0])
