@@ -84,11 +84,7 @@ def _placed(data: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
 def _with(data: dict[str, Any], path: tuple[str, ...], fields: Mapping[str, Any]) -> dict[str, Any]:
     """Adds fields to an object inside a spec; leaves a spec that has no object there as it is, to be refused later."""
     if not path:
-<<<<<<< HEAD
-        return data | dict(fields)
-=======
         return {**data, **fields}
->>>>>>> ordinary
     stored = data.get(path[0], {})
     return data | {path[0]: _with(stored, path[1:], fields)} if fields and isinstance(stored, dict) else data
 
