@@ -128,6 +128,22 @@ def test_a_core_does_less_and_fails_in_the_same_way_as_surely(
     assert tell("replay", tmp_path / "core.npz")[0] == 0
 
 
+def test_a_more_plausible_motion_fails_alike_and_its_bundle_keeps_the_recording(
+    failure: Path, tmp_path: Path, tell: Tell
+) -> None:
+    file = tmp_path / "likely.npz"
+    assert tell("minimise", failure, "--aim", "most-plausible", "--out", file)[0] == 0
+    origin, likelier = read_bundle(failure), read_bundle(file)
+    motion = likelier.manifest.plausible
+    assert motion is not None
+    assert motion.after < motion.before
+    assert struck(likelier) == struck(origin)
+    assert likelier.recorded is not None
+    assert likelier.recorded.manifest.digest == origin.manifest.digest
+    assert likelier.manifest.digest != origin.manifest.digest
+    assert tell("replay", file)[0] == 0
+
+
 def regressed(tell: Tell, tmp_path: Path, *arguments: object) -> tuple[int, list[Verdict]]:
     status, *_ = tell("regress", *arguments, "--out", tmp_path / "cases.json")
     cases = Regression.model_validate_json((tmp_path / "cases.json").read_bytes()).cases

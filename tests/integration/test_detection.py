@@ -19,7 +19,7 @@ from risk_sac.run_folder.results import FAILURES, series_name
 from risk_sac.world.types import Scene
 
 SPEC = RunSpec(family="mixed", method="archive", seed=501, ego=read_ego("idm-aeb+kerb-waits"))
-STEPS = 4000
+STEPS = 8000
 
 
 @pytest.fixture(scope="module")
