@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from risk_sac.config import EgoConfig, FamilyName, RunSpec
+from risk_sac.config import DynamicElements, EgoConfig, FamilyName, Odd, RunSpec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.env.problem import Problem
 from risk_sac.errors import InfeasibleScene
@@ -20,6 +20,7 @@ RUNGS = {
     "reaction 0.1 s, sees all": EgoConfig(profile="perfect"),
 }
 BESIDE = {"reaction 0.5 s, sees all": EgoConfig(sensor=None), "careful": EgoConfig(profile="careful")}
+EMERGENCY = Odd(dynamic=DynamicElements(behaviour="emergency"))  # these attacks spare egos under ordinary limits
 PHASES = 10  # of the ego's reaction in which attacks begin: an ego about to decide is lucky
 
 
@@ -53,7 +54,7 @@ def attack(family: FamilyName, env: RiskSacEnv, step: int) -> np.ndarray:
 
 def touched(family: FamilyName, ego: EgoConfig) -> tuple[int, int]:
     """Episodes in which the ego ran into an actor, and how many there were."""
-    spec = RunSpec(family=family, method="random", seed=0, ego=ego)
+    spec = RunSpec(family=family, method="random", seed=0, ego=ego, odd=EMERGENCY)
     problem = Problem.from_spec(spec)
     hits = count = 0
     with closing(RiskSacEnv(problem, spec.learner.reward)) as env:

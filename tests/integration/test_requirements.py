@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from risk_sac.config import FamilyName, RunSpec
+from risk_sac.config import DynamicElements, FamilyName, Odd, RunSpec
 from risk_sac.env.env import Observation, RiskSacEnv
 from risk_sac.env.problem import Problem
 from risk_sac.records import ARTEFACT_RULES, Collision
@@ -98,8 +98,11 @@ class Statistics:
         )
 
 
+EMERGENCY = Odd(dynamic=DynamicElements(behaviour="emergency"))  # random actions meet the ego too seldom otherwise
+
+
 def environment(family: FamilyName, *, controlled: bool) -> RiskSacEnv:
-    spec = RunSpec(family=family, method="risk-sac" if controlled else "no-adversary", seed=0)
+    spec = RunSpec(family=family, method="risk-sac" if controlled else "no-adversary", seed=0, odd=EMERGENCY)
     return RiskSacEnv(Problem.from_spec(spec), spec.learner.reward, controlled=controlled)
 
 

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from risk_sac.cli.campaigns.gate import GateBounds
 from risk_sac.cli.regress import read_baseline
 from risk_sac.client.transport import api_key
-from risk_sac.config import CampaignSpec, EgoConfig
+from risk_sac.config import CampaignSpec, EgoConfig, Interval
 from risk_sac.config.spec_file import campaign_yaml, read_campaign, read_ego, read_spec
 from risk_sac.egos.registry import card_of
 from risk_sac.errors import ConfigError
@@ -134,3 +134,17 @@ def test_another_encoding_is_one_line_that_says_what_to_do(name, tmp_path):
         ConfigError, match=r"latin\.yaml, which is no UTF-8 from byte 11 on; wanted a text file; save it as UTF-8"
     ):
         READERS[name][1](file)
+
+
+def test_the_behaviour_of_a_flag_goes_into_the_odd_beside_what_a_file_states(tmp_path):
+    text = "family: low\nodd: {dynamic: {vehicle_jerk_mps3: {low: 0, high: 5}, behaviour: extreme}}\n"
+    dynamic = read_spec(yaml_file(tmp_path, text), {"behaviour": "emergency"}).odd.dynamic
+    assert (dynamic.behaviour, dynamic.vehicle_jerk_mps3) == ("emergency", Interval(low=0, high=5))
+    assert read_spec(None, {"family": "low"}).odd.dynamic.behaviour == "ordinary"
+
+
+def test_an_unknown_behaviour_is_refused_by_its_field():
+    with pytest.raises(ConfigError) as refused:
+        read_spec(None, {"family": "low", "behaviour": "wild"})
+    assert refused.value.field == "odd.dynamic.behaviour"
+    assert "'ordinary', 'emergency' or 'extreme'" in str(refused.value)
