@@ -64,7 +64,7 @@ def test_it_is_listed_sorted_and_verified(folder, tell):
     status, out, _ = tell("verify", folder / "run", "--times", 1)
     assert status == 0
     distinct = len(first_of_variants(read_results(folder / "run")))
-    assert f"{distinct} of {distinct} distinct" in out
+    assert f"{distinct} of {distinct} failure" in out
 
 
 def test_it_is_drawn_beside_its_twin(folder, failure, tell):
