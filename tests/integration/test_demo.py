@@ -26,15 +26,15 @@ def test_a_demo_that_cannot_be_posted_says_so_and_leaves_no_service(tmp_path, ca
 
 def test_it_ends_with_the_defect_that_was_found_and_a_command_that_draws_the_failure(tmp_path, capsys, monkeypatch):
     data_dir = tmp_path / "my data"
-    arguments = ["--methods", "archive", "--episodes", "5", "--seeds", "523"]
+    arguments = ["--methods", "risk-sac-diverse", "--episodes", "20"]
     assert main([*arguments, "--out", str(tmp_path / "demo.json"), "--data-dir", str(data_dir)]) == 0
     found = json.loads((tmp_path / "demo.json").read_text())
     assert all((data_dir / failure["series"]).is_file() for failure in found["failures"])
     printed = capsys.readouterr().out
-    *_, drove = (line for line in printed.splitlines() if line.split()[:2] == ["low", "archive"])
-    assert sum(map(int, drove.split()[2::2])) == 5  # the headline failures of each in brackets
-    assert "planted defect: tailgates: Follows with a headway of 0.3 s, and brakes for an emergency only." in printed
-    last = re.fullmatch(r"the defect `tailgates` was found after ([1-5]) episodes by archive", printed.splitlines()[-1])
+    *_, drove = (line for line in printed.splitlines() if line.split()[:2] == ["mixed", "risk-sac-diverse"])
+    assert sum(map(int, drove.split()[2::2])) == 20  # the headline failures of each in brackets
+    assert "planted defect: latency: Sees others where they were 0.5 s ago." in printed
+    last = re.fullmatch(r"the defect `latency` was found after (\d+) episodes by risk-sac-diverse", printed.splitlines()[-1])
     (line,) = (line for line in printed.splitlines() if line.startswith("draw one: "))
     program, *command = shlex.split(line.removeprefix("draw one: "))
     assert Path(program).is_file()

@@ -11,7 +11,7 @@ from risk_sac.run_folder.results import EPISODES, RESULTS, Verified, first_of_va
 from risk_sac.search.run import CHECKPOINT
 
 SPEC = RunSpec(
-    family="low", method="random", seed=30, budget=Budget(episodes=8), learner=LearnerConfig(checkpoint_every=2)
+    family="mixed", method="random", seed=34, budget=Budget(episodes=8), learner=LearnerConfig(checkpoint_every=2)
 )
 
 
