@@ -16,12 +16,12 @@ function line(label: string): Line {
 }
 
 test("a line of CSV has all columns; an unknown value is empty", () => {
-  expect(csv([line("a")]).split("\r\n")[1]).toBe("low,c1,a,random,1,1,40,4,3,2,1,0.075,0.02,0.2,,,");
+  expect(csv([line("a")]).split("\r\n")[1]).toBe("low,c1,a,random,1,1,0,40,4,3,2,1,1,0.075,0.02,0.2,,,");
 });
 
 test("labels cannot break out of their cell, nor become a formula", () => {
   expect(csv([line('=1,"2"')])).toContain(`,"'=1,""2""",`);
-  expect(markdown([line("a|b\nc")]).split("\n")[2]).toBe("| low | c1 | a b c | random | 1 | 1 | 40 | 4 | 3 | 2 | 1 | 0.075 | 0.02 | 0.2 | – | – | – |");
+  expect(markdown([line("a|b\nc")]).split("\n")[2]).toBe("| low | c1 | a b c | random | 1 | 1 | 0 | 40 | 4 | 3 | 2 | 1 | 1 | 0.075 | 0.02 | 0.2 | – | – | – |");
 });
 
 test("JSON has the values as they are", () => {
