@@ -99,7 +99,8 @@ def test_a_regression_of_the_campaign_is_told_in_it_and_no_other(service, campai
     posted = {"campaign_id": campaign["id"], "ego": {"profile": "perfect"}}
     regression = service.client.post("/v1/regressions", json=posted).json()
     where = f"/v1/regressions/{regression['id']}"
-    service.wait_until(lambda: service.client.get(where).json()["state"] == "succeeded")
+    service.wait_until(lambda: service.client.get(where).json()["state"] not in ("queued", "running"))
+    assert service.client.get(where).json()["state"] == "succeeded"
     told = service.client.get(path, params={"regression": regression["id"], "format": "md"}).text
     assert "profile perfect" in told
     for case in service.client.get(where).json()["cases"]:
