@@ -67,9 +67,9 @@ def test_submit_watch_shows_the_way_on_one_channel_and_the_results_on_the_other(
     assert "ECR above 0.1: low random 0.500" in printed.err
     assert "\x1b" not in printed.err + printed.out
     row, *_ = (line for line in printed.out.splitlines() if "random" in line)
-    assert row.split() == ["low", "random", "-", "12", "6", "4", "2", "0.50", "0.17"]
+    assert row.split() == ["low", "random", "-", "12", "6", "4", "2", "(2)", "0.50", "0.17"]
     (row,) = (line for line in printed.out.splitlines() if "no_contact" in line)
-    assert row.split() == ["no_contact", "failure", "6", "6", "4", "2", "0.500", "[0.254,", "0.746]"]
+    assert row.split() == ["no_contact", "failure", "6", "6", "4", "2", "2", "0.500", "[0.254,", "0.746]"]
 
 
 def test_rates_that_may_be_above_the_bound_are_exit_status_1_unless_the_rate_is_judged(

@@ -109,7 +109,7 @@ def test_with_all_connections_at_work_one_more_is_refused(serve_inside):
             client = streams.enter_context(httpx.Client(base_url=service.client.base_url, timeout=LONG_S))
             streams.enter_context(client.stream("GET", f"/v1/campaigns/{campaign}/events"))
         with socket.create_connection(("127.0.0.1", service.port), timeout=LONG_S) as connection:
-            head, _, body = connection.recv(10_000).partition(b"\r\n\r\n")
+            head, _, body = answered(connection).partition(b"\r\n\r\n")
         assert head.startswith(b"HTTP/1.1 503 Service Unavailable\r\n")
         assert b"retry-after: 1" in head
         assert json.loads(body)["reason"] == "connections_busy"

@@ -13,12 +13,13 @@ from risk_sac.run_folder.results import read_results
 LABEL = "night <script>alert(1)</script>"
 SPEC = {
     "label": LABEL,
+    "families": ["mixed"],  # its headline candidates come early
     "methods": ["archive"],
     "seeds": [601],
     "budget": {"episodes": 40},
     "iid": {"episodes": 5, "seed": 3},
 }
-RUNS = ["low-archive-601", "low-iid-undisturbed-3", "low-iid-random-3"]
+RUNS = ["mixed-archive-601", "mixed-iid-undisturbed-3", "mixed-iid-random-3"]
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +62,7 @@ def test_the_report_has_bounds_of_the_i_i_d_phase_alone(service, campaign):
         ("iid-undisturbed", 5),
         ("iid-random", 5),
     ]
-    assert evidence.coverage["low"].search.episodes + campaign["progress"]["rejected"] == 40
+    assert evidence.coverage["mixed"].search.episodes + campaign["progress"]["rejected"] == 40
     first = evidence.bounds[0].failures
     assert (first.count, first.low) == (0, 0.0)
     assert first.high == pytest.approx(1 - 0.05 ** (1 / evidence.bounds[0].played))
@@ -98,7 +99,8 @@ def test_a_regression_of_the_campaign_is_told_in_it_and_no_other(service, campai
     posted = {"campaign_id": campaign["id"], "ego": {"profile": "perfect"}}
     regression = service.client.post("/v1/regressions", json=posted).json()
     where = f"/v1/regressions/{regression['id']}"
-    service.wait_until(lambda: service.client.get(where).json()["state"] == "succeeded")
+    service.wait_until(lambda: service.client.get(where).json()["state"] not in ("queued", "running"))
+    assert service.client.get(where).json()["state"] == "succeeded"
     told = service.client.get(path, params={"regression": regression["id"], "format": "md"}).text
     assert "profile perfect" in told
     for case in service.client.get(where).json()["cases"]:

@@ -49,7 +49,7 @@ def test_an_episode_is_the_same_in_whichever_direction_its_map_lies(
     file, angle = NETS / net / f"{net}.net.xml", math.radians(degrees)
     other = tmp_path / "turned.net.xml"
     other.write_text(turned(file.read_text(), angle))
-    straight, slanting = played(file, pattern, place, 3), played(other, pattern, place, 3)
+    straight, slanting = played(file, pattern, place, 4), played(other, pattern, place, 4)
     assert len(straight) == len(slanting)
     cos, sin = math.cos(angle), math.sin(angle)
     for a, b in zip(straight, slanting, strict=True):
