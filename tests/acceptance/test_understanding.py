@@ -30,7 +30,7 @@ from risk_sac.search.frozen_policy import FrozenPolicy
 from tests.acceptance.conftest import Tell
 from tests.acceptance.test_bundle import changed, manifest, series
 
-RUN = ["--family", "low", "--method", "archive", "--seed", "3", "--episodes", "60"]
+RUN = ["--family", "low", "--method", "archive", "--seed", "3", "--episodes", "60", "--behaviour", "emergency"]
 
 
 @pytest.fixture(scope="module")
