@@ -37,8 +37,9 @@ CAMPAIGN = {
     "label": "night <b>7</b>",
     "families": ["low", "mixed"],
     "methods": ["archive"],
-    "seeds": [601],
+    "seeds": [3],
     "budget": {"episodes": 60},
+    "odd": {"dynamic": {"behaviour": "emergency"}},
 }
 
 
