@@ -1,5 +1,6 @@
 """Runs that start from a pretrained policy."""
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from risk_sac.search import searchers
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.loop import execute_run
 from risk_sac.search.prior.learner import PretrainedLearner
+from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import Folded, PolicyLayout
 from risk_sac.search.searchers import Searchers
 from tests.builders import pretrained_policy
@@ -67,14 +69,17 @@ def test_exploring_asks_for_kinds_and_evaluating_for_any(layout: PolicyLayout) -
     learner = searchers_of(spec("risk-sac-pretrained")).agent
     assert isinstance(learner, PretrainedLearner)
     seen = np.full(layout.observation_size, 0.3, np.float32)
-    frozen = learner.frozen()
+    frozen, mirror = learner.frozen(), Mirror.of(layout)
+    assert mirror is not None
+    evaluated = (frozen(seen), mirror.action(frozen(mirror.observation(seen))))
     drawn = set()
     for _ in range(40):
         learner.begin(np.empty(0))
-        drawn.add(None if learner._shift is None else learner._shift.tobytes())
-        np.testing.assert_allclose(learner.act(seen, explore=False), frozen(seen), atol=1e-6)
+        asked = None if learner._shift is None else learner._shift.tobytes()
+        drawn.add((asked, learner._reflected))
+        np.testing.assert_allclose(learner.act(seen, explore=False), evaluated[learner._reflected], atol=1e-6)
     shifts = Folded.of(pretrained_policy(layout, GOALS), layout).shifts
-    assert drawn == {None, *(shift.tobytes() for shift in shifts)}
+    assert drawn == set(product((None, *(shift.tobytes() for shift in shifts)), (False, True)))
 
 
 def test_the_diverse_search_shares_its_episodes_between_scripts_and_policy() -> None:

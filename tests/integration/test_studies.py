@@ -16,7 +16,7 @@ from risk_sac.failures.export.formats import FORMATS
 from risk_sac.failures.question import Question
 from risk_sac.run_folder.results import read_results
 
-SPEC = {"families": ["low"], "methods": ["archive"], "seeds": [3], "budget": {"episodes": 16}}
+SPEC = {"families": ["mixed"], "methods": ["archive"], "seeds": [5], "budget": {"episodes": 16}}
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +117,7 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
 
     clusters = service.get(campaign_id, "/clusters")
     assert clusters["complete"]
-    found = clusters["families"]["low"]["clusters"]
+    found = clusters["families"]["mixed"]["clusters"]
     metrics = service.get(campaign_id, "/results")["runs"][0]["metrics"]
     assert {cluster["name"]: cluster["failures"] for cluster in found} == metrics["kinds"]
     ids = {each["id"] for each in service.get(campaign_id, "/failures", limit=100)["items"]}
