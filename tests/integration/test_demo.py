@@ -34,7 +34,9 @@ def test_it_ends_with_the_defect_that_was_found_and_a_command_that_draws_the_fai
     *_, drove = (line for line in printed.splitlines() if line.split()[:2] == ["mixed", "risk-sac-diverse"])
     assert sum(map(int, drove.split()[2::2])) == 20  # the headline failures of each in brackets
     assert "planted defect: latency: Sees others where they were 0.5 s ago." in printed
-    last = re.fullmatch(r"the defect `latency` was found after (\d+) episodes by risk-sac-diverse", printed.splitlines()[-1])
+    last = re.fullmatch(
+        r"the defect `latency` was found after (\d+) episodes by risk-sac-diverse", printed.splitlines()[-1]
+    )
     (line,) = (line for line in printed.splitlines() if line.startswith("draw one: "))
     program, *command = shlex.split(line.removeprefix("draw one: "))
     assert Path(program).is_file()
