@@ -145,7 +145,7 @@ def test_two_campaigns_stand_beside_each_other(
     for at, one in enumerate((campaign, methods)):
         for total in service.get(one, "/results")["totals"]:
             _check_total(row_of(page, f"{one} {total['method']}", total["family"]), "AB"[at], total)
-    posted = dict.fromkeys(("families", "methods", "seeds", "budget.episodes"))
+    posted = dict.fromkeys(("families", "methods", "seeds", "budget.episodes", "odd.dynamic.behaviour"))
     differing = page.get_by_role("region", name="Differing fields")
     assert [row.inner_text() for row in differing.locator("tbody th").all()] == list(posted)
     expect(differing.get_by_role("row", name="budget.episodes")).to_contain_text("60")
