@@ -73,7 +73,7 @@ def named_ego(text: str) -> EgoConfig:
 
 
 def scene_flags(options: argparse.Namespace) -> dict[str, Any]:
-    """The ego of a run or a campaign, and the behaviour in its ODD; None where a flag was not given."""
+    """Returns the ego and the behaviour that flags name; None where one is missing."""
     ego = None if options.ego is None else named_ego(options.ego).model_dump(mode="json")
     return {"ego": ego, "behaviour": options.behaviour}
 

@@ -107,7 +107,10 @@ def _draw(options: argparse.Namespace, spec: RunSpec, recording: Recording, file
 
 
 def _names_failure(path: Path) -> bool:
-    """Whether a word alone is a failure of the newest run: a number or an id, and no file or folder here."""
+    """Tells whether a word names a failure of the newest run.
+
+    It does if it is a number or an id, and no file or folder here.
+    """
     id_ = path.name
     return path.parent == Path.cwd() and not path.exists() and (id_.isdecimal() or EpisodeId.parse(id_) is not None)
 

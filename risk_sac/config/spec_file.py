@@ -82,7 +82,10 @@ def _placed(data: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _with(data: dict[str, Any], path: tuple[str, ...], fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Adds fields to an object inside a spec; leaves a spec that has no object there as it is, to be refused later."""
+    """Adds fields to an object inside a spec.
+
+    A spec that has no object there stays as it is, and is refused later.
+    """
     if not path:
         return {**data, **fields}
     stored = data.get(path[0], {})

@@ -69,7 +69,11 @@ class RemoteCard(EgoCard):
 
 
 def python_card(point: EntryPoint) -> EgoCard:
-    """Returns the card of the class that an entry point names; a ConfigError if it does not declare all of it."""
+    """Returns the card of the class that an entry point names.
+
+    Raises:
+      ConfigError: the class does not declare all of it.
+    """
     file = _source(point)
     try:
         declared = _declared(file.read_bytes(), point.attr)
@@ -82,7 +86,11 @@ def python_card(point: EntryPoint) -> EgoCard:
 
 
 def cards() -> tuple[EgoCard, ...]:
-    """Returns all registered egos by name; a ConfigError if one cannot be used, or two have the same name."""
+    """Returns all registered egos by name.
+
+    Raises:
+      ConfigError: one cannot be used, or two have the same name.
+    """
     points, remotes = _points(), _remotes()
     if twice := points.keys() & remotes.keys():
         raise ConfigError(FILE, f"the names {sorted(twice)}, which entry points have too", "others")
@@ -118,7 +126,7 @@ def card_of(name: str) -> EgoCard:
 
 
 def pinned(ego: EgoConfig) -> EgoConfig:
-    """Returns the ego with version and response time of the registered driver that it names, and of its defects.
+    """Returns the ego with the version and response time of its driver and defects.
 
     Raises:
       ConfigError: there is no such driver or defect, a defect does not fit it, or it has another version than the ego

@@ -27,7 +27,7 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.host.process_state import c_numbers
 from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.records import Collision, RequirementResult, Violation
-from risk_sac.risk.conduct import ADVERSARY_MEMORY, conduct_cost
+from risk_sac.risk.conduct import ADVERSARY_MEMORY, conduct_terms
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.realism import refuse_danger, refuse_overlap
 from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
@@ -258,7 +258,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         frame, adversaries = self._frame, self._adversaries
         rows = adversaries.rows(frame)
         width_m = self._ground.lane_width_m
-        return conduct_cost(rows, adversaries.slots, frame.kind, frame.link, frame.state, self._conduct, width_m)
+        terms = conduct_terms(rows, adversaries.slots, frame.kind, frame.link, frame.state, self._conduct, width_m)
+        return float(terms.max(initial=0.0))
 
     def _judge(self, contact: Contact) -> Collision:
         frame = self._frame

@@ -172,7 +172,10 @@ class Problem:
 
     @property
     def contact_alone_counts(self) -> bool:
-        """Whether the ego can fail by contacts alone: SUMO's driver leaves no road and enters no junction on red."""
+        """Whether the ego can fail by contacts alone.
+
+        SUMO's driver leaves no road and enters no junction on red.
+        """
         counting = {each.name for each in self.requirements if each.counts == "failure"}
         return self.ego.driver is None and not self.ego.defects and counting <= SUMO_KEEPS | {NO_CONTACT}
 
@@ -204,7 +207,9 @@ def _own(field: str, requirement: Requirement, shipped: Mapping[str, Requirement
 
 
 def _rss_parameters(odd: Odd) -> RssParameters:
-    """RSS under the ODD: a driver's delay, and the braking it can be relied on to do, and has to expect of others.
+    """Returns the parameters of RSS under an ODD.
+
+    They are a driver's delay, the braking that others can rely on, and the braking to be expected of others.
 
     Choice: both are RSS_BRAKING_MPS2 or the worst grip of the road that all share. SUMO's drivers keep a headway of 1 s
     and trust the one ahead to brake no harder than they do themselves; that they stop by 4.5 m/s² behind a

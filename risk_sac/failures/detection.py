@@ -74,10 +74,10 @@ def without_defects(spec: RunSpec, episode: EpisodeRecord, series: Series) -> Pl
 
 
 def least_clearance_m(series: Series) -> float:
-    """Computes how near an ego comes to what is ahead of it or beside it, from the release on, m.
+    """Computes the least gap of an ego to bodies ahead of it or beside it, m.
 
-    A body does not count while it lies behind the ego's rear. One that comes within `MARGIN_M` of the rear in the ego's
-    own track, or of an ego that has stood for `STOOD_S`, does not count either while it stays so near.
+    It counts from the release on. A body behind the ego's rear does not count. Nor does one that stays within
+    `MARGIN_M`, if it came so near to the rear in the ego's own track, or to an ego that had stood for `STOOD_S`.
 
     Args:
       series: time series of an episode, `T` frames and `n` actors, the ego first; NaN where an actor is absent.
@@ -93,9 +93,9 @@ def least_clearance_m(series: Series) -> float:
 
 
 def _surroundings(series: Series) -> tuple[Floats, Bools, Bools]:
-    """Returns the gap to each other actor, whether it lies behind the ego's rear, and whether in the ego's track there.
+    """Returns the gap to each other actor, and where that actor is.
 
-    Each is `t x (n - 1)`.
+    That is whether it lies behind the ego's rear, and whether it lies there in the ego's track. Each is `t x (n - 1)`.
     """
     time_s = _times(series)
     bodies = np.zeros((len(time_s), ROWS, len(series["ids"])))

@@ -112,39 +112,6 @@ def _run(timer_s: float, on: bool) -> float:
 
 
 @compiled
-def conduct_cost(
-    rows: NDArray[np.intp],
-    slots: NDArray[np.intp],
-    kind: NDArray[np.int8],
-    link: NDArray[np.uint8],
-    state: Floats,
-    memory: Floats,
-    lane_width_m: float,
-) -> float:
-    """Soft realism cost of a step, C_soft(s, a) of (5).
-
-    C_soft = max over adversaries and terms of ramp(value of the feature)
-
-    Choice: the worst adversary and its worst feature count, not a mean, or one could behave as it liked beside others
-    that do nothing.
-
-    Args:
-      rows: columns of the adversaries in `state`.
-      slots: their columns in `memory`.
-      kind: `n`.
-      link: `n`, SUMO's letter of the signal ahead of each actor.
-      state: `rows x n`, after the step.
-      memory: `ADVERSARY_MEMORY x adversaries`; updated.
-      lane_width_m: of all lanes.
-
-    Returns:
-      In [0, 1]; 0 without adversaries.
-    """
-    terms = conduct_terms(rows, slots, kind, link, state, memory, lane_width_m)
-    return terms.max() if len(rows) else 0.0
-
-
-@compiled
 def conduct_terms(
     rows: NDArray[np.intp],
     slots: NDArray[np.intp],
@@ -154,7 +121,20 @@ def conduct_terms(
     memory: Floats,
     lane_width_m: float,
 ) -> Floats:
-    """Computes every term of `conduct_cost`, `adversaries x TERMS`, each in [0, 1]; updates the memory."""
+    """Computes the terms of a step's soft realism cost, `adversaries x TERMS`, each in [0, 1].
+
+    C_soft(s, a) of (5) is their maximum. Choice: the worst adversary and its worst feature count, not a mean, or one
+    could behave as it liked beside others that do nothing.
+
+    Args:
+      rows: columns of the adversaries in `state`.
+      slots: their columns in `memory`.
+      kind: `n`.
+      link: `n`, SUMO's letter of the signal ahead of each actor.
+      state: `rows x n`, after the step.
+      memory: `ADVERSARY_MEMORY x adversaries`; updated.
+      lane_width_m: of all lanes.
+    """
     terms = np.zeros((len(rows), TERMS))
     for k in range(len(rows)):
         row, slot = rows[k], slots[k]

@@ -99,13 +99,17 @@ class ScriptModel:
         """
         if self._reflect is not None:
             sides = points, self._reflect(points.astype(np.float64))
-            own, other = (ScriptModel(self.members, self.kinds, self.egos).predict(side, belief) for side in sides)
+            own, other = (self._predict(side, belief) for side in sides)
             taken = own.fails >= other.fails
             return Prediction(
                 fails=np.where(taken, own.fails, other.fails),
                 candidate=np.where(taken, own.candidate, other.candidate),
                 kinds=np.where(taken[:, None], own.kinds, other.kinds),
             )
+        return self._predict(points, belief)
+
+    def _predict(self, points: Floats | Vector, belief: Floats) -> Prediction:
+        """Predicts for the points themselves, without their mirror images."""
         beliefs = np.broadcast_to(belief, (len(points), len(self.egos)))
         inputs = torch.as_tensor(np.concatenate([points, beliefs], 1), dtype=torch.float32)
         logits = torch.stack([member(inputs) for member in self.members])

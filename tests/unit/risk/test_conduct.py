@@ -19,7 +19,6 @@ from risk_sac.risk.conduct import (
     STANDING,
     TOWARDS_CAR,
     WALKING,
-    conduct_cost,
     conduct_terms,
 )
 from risk_sac.risk.driving import FEATURES
@@ -160,8 +159,8 @@ def test_the_cost_is_that_of_the_worst_adversary_and_0_without_one():
     memory, link = np.zeros((ADVERSARY_MEMORY, 2)), np.zeros(3, dtype=np.uint8)
     kind = np.zeros(3, dtype=np.int8)
     rows, none = np.array([1, 2]), np.array([], dtype=np.intp)
-    assert conduct_cost(rows, np.array([0, 1]), kind, link, state, memory, LANE_M) == 1.0
-    assert conduct_cost(none, none, kind, link, state, memory, LANE_M) == 0.0
+    assert conduct_terms(rows, np.array([0, 1]), kind, link, state, memory, LANE_M).max() == 1.0
+    assert conduct_terms(none, none, kind, link, state, memory, LANE_M).max(initial=0.0) == 0.0
 
 
 values = st.floats(-50, 50)
