@@ -17,8 +17,8 @@ from risk_sac.host.terminal import console
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.finder import FINDERS, Map, survey
 from risk_sac.maps.found import TITLES, Pattern, Survey
-from risk_sac.maps.net import net_remarks
 from risk_sac.run_folder.durable import scratch_folder
+from risk_sac.world.net import net_remarks
 
 if TYPE_CHECKING:
     from risk_sac.failures.tryout import Tried

@@ -20,8 +20,8 @@ from risk_sac.config import FamilyName
 from risk_sac.failures.net import LAMPS, Surface, SurfaceUse, roads_of, signal_heads, surfaces
 from risk_sac.failures.recording import BOX, Recording, on_body
 from risk_sac.maps.found import TITLES, Pattern, Survey
-from risk_sac.maps.net import Net
 from risk_sac.records import Collision
+from risk_sac.world.net import Net
 from risk_sac.world.types import Floats, Kind, Role
 
 _UNDATED: dict[str, dict[str, Any]] = {

@@ -11,9 +11,9 @@ import numpy as np
 
 import sumo_nets
 from risk_sac.config import FamilyName
-from risk_sac.maps.net import Head, Net, NetLane, Program
-from risk_sac.maps.read_net import read_net
 from risk_sac.scenario.families import family_named
+from risk_sac.world.net import Head, Net, NetLane, Program
+from risk_sac.world.read_net import read_net
 from risk_sac.world.types import Floats
 
 SurfaceUse = Literal["lane", "sidewalk", "crossing", "junction"]

@@ -15,10 +15,9 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from risk_sac.maps.net import Link, Net, NetLane
-from risk_sac.maps.read_net import parse_net, read_tree
-from risk_sac.scenario.layout import Point
-from risk_sac.world.types import Floats
+from risk_sac.world.net import Link, Net, NetLane
+from risk_sac.world.read_net import parse_net, read_tree
+from risk_sac.world.types import Floats, Point
 
 SECTORS = 12  # of headings; each lane is near the middle of some of them, for any grid of streets
 SECTOR_RAD = math.tau / SECTORS

@@ -17,9 +17,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from risk_sac.maps.net import Link, Net, NetLane, once
-from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M, TRUCK_LENGTH_M, TRUCK_WIDTH_M, Point
-from risk_sac.world.types import Floats
+from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M, TRUCK_LENGTH_M, TRUCK_WIDTH_M
+from risk_sac.world.net import Link, Net, NetLane, once
+from risk_sac.world.types import Floats, Point
 
 SAMPLED_M = 0.5
 ALONG = 9  # points on each side of it

@@ -18,7 +18,7 @@ from pathlib import Path
 from risk_sac.errors import MapError
 from risk_sac.maps.documents import MAP_ROOTS, MAX_BYTES, SMALLER, Document, rewritten
 from risk_sac.maps.opendrive import crossing_options, find_crosswalks, ready, sidewalk_options
-from risk_sac.maps.read_net import parse_net, read_tree
+from risk_sac.world.read_net import parse_net, read_tree
 
 PRESENT = (1, 16)  # nets since then say all that is read
 WALL_S = 120

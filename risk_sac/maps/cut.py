@@ -8,11 +8,12 @@ import numpy as np
 
 from risk_sac.maps.clearance import is_near, outlines
 from risk_sac.maps.found import Fit
-from risk_sac.maps.net import Crossing, Net
 from risk_sac.maps.ways import edges_on
 from risk_sac.scenario.family import WALK_OFFSET_M
-from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M, Point, ribbon, triangles
+from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M, ribbon, triangles
 from risk_sac.scenario.place import CrossingPlace, FixedSignal, JunctionPlace, Place, PlaceGround, Stretch, Track, Walk
+from risk_sac.world.net import Crossing, Net
+from risk_sac.world.types import Point
 
 CROSSINGS_M = 60.0  # crossings up to this far from a place are recorded
 WALKED_M = 40.0  # a pedestrian's longest way in an episode

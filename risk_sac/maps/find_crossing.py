@@ -14,12 +14,12 @@ from risk_sac.maps.cut import signal_of, walk_over
 from risk_sac.maps.find_junction import roomy, turn
 from risk_sac.maps.find_stretch import check_limit
 from risk_sac.maps.found import NoFit, Spot, lacking
-from risk_sac.maps.net import Crossing, Edge, Link, Net, NetLane
 from risk_sac.maps.ways import AFTER_S, track, way_on
 from risk_sac.scenario.family import top_speed
 from risk_sac.scenario.hidden_pedestrian import OCCLUDER_M, room_beyond_m, room_wanted_m
 from risk_sac.scenario.layout import LEAD_IN_S, TRUCK_LENGTH_M
 from risk_sac.scenario.place import CrossingPlace, Site, Track
+from risk_sac.world.net import Crossing, Edge, Link, Net, NetLane
 
 OCCLUDED_S = 4.0  # of driving that the way of the occluder goes on
 ONWARD_S = 8.0

@@ -12,10 +12,10 @@ from risk_sac.maps.clearance import ROOM_M, too_near, waits_in_the_way
 from risk_sac.maps.cut import signal_of, walk_over
 from risk_sac.maps.find_stretch import check_limit
 from risk_sac.maps.found import NoFit, Spot, lacking
-from risk_sac.maps.net import Edge, Link, Net, once
 from risk_sac.maps.ways import AFTER_S, track, way_on
 from risk_sac.scenario import junction
 from risk_sac.scenario.place import JunctionPlace, Leg, Stream, Track
+from risk_sac.world.net import Edge, Link, Net, once
 
 ATTACKERS = ("oncoming", "from_left", "from_right")
 ONCOMING_RAD, BESIDE_RAD = math.radians(135.0), math.radians(45.0)

@@ -8,10 +8,10 @@ from contextlib import suppress
 
 from risk_sac.maps.cut import signal_of
 from risk_sac.maps.found import NoFit, Spot, lacking
-from risk_sac.maps.net import Edge, Link, Net, NetLane
 from risk_sac.maps.ways import DRIVEN_S, PIECES_M, LaneWay, track, way_on
 from risk_sac.scenario.car_following import LEAST_BEHIND_M
 from risk_sac.scenario.place import Stretch, Track
+from risk_sac.world.net import Edge, Link, Net, NetLane
 
 SLOWEST_MPS, FASTEST_MPS = 5.0, 60.0
 SHORTEST_M = 20.0  # of an edge that counts as a road of its own

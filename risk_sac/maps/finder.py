@@ -8,11 +8,11 @@ from risk_sac.errors import MapError
 from risk_sac.maps import find_crossing, find_junction, find_stretch
 from risk_sac.maps.cut import cut, ground_around, tracks
 from risk_sac.maps.found import Fit, Misfit, NoFit, Pattern, Spot, Survey
-from risk_sac.maps.net import Net
-from risk_sac.maps.read_net import read_net, read_tree
 from risk_sac.maps.ways import check_lengths
 from risk_sac.scenario import library
 from risk_sac.scenario.place import CrossingPlace, JunctionPlace
+from risk_sac.world.net import Net
+from risk_sac.world.read_net import read_net, read_tree
 
 FINDERS: dict[Pattern, ModuleType] = {
     "car_following": find_stretch,

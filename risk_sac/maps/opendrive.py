@@ -18,7 +18,7 @@ from operator import itemgetter
 from pathlib import Path
 
 from risk_sac.errors import MapError
-from risk_sac.maps.net import Edge, Net
+from risk_sac.world.net import Edge, Net
 
 NEAR_M = 15.0  # so near the end of a road, a crosswalk is that of the junction there
 SIDEWALK_M = 2.0

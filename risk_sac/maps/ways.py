@@ -7,8 +7,8 @@ from itertools import pairwise
 
 from risk_sac.maps.clearance import too_near
 from risk_sac.maps.found import NoFit, lacking
-from risk_sac.maps.net import Link, Net, NetLane, once
 from risk_sac.scenario.place import Piece, Track
+from risk_sac.world.net import Link, Net, NetLane, once
 
 DRIVEN_S = 17.0  # longer than an episode: the ego must not reach the end of the map
 AFTER_S = 15.5  # the same behind a stop line: what is driven until the adversaries' release comes off

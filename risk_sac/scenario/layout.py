@@ -10,9 +10,8 @@ import numpy as np
 import shapely
 
 from risk_sac.scenario.place import Place, PlaceGround, Track, Walk
-from risk_sac.world.types import Role
+from risk_sac.world.types import Point, Role
 
-Point = tuple[float, float]
 SAME_POINT_M = 1e-6
 ON_THE_EDGE_M2 = 1e-9  # twice the area of a triangle that counts as none
 

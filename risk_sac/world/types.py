@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 Floats = NDArray[np.float64]
+Point = tuple[float, float]  # x, y, m
 Vector = NDArray[np.float32]  # what a network takes and gives
 Bools = NDArray[np.bool_]
 

@@ -15,8 +15,8 @@ from pathlib import Path
 from risk_sac.errors import MapError
 from risk_sac.maps.convert import FILE_BYTES, MEMORY_BYTES, Converted, limit, present_net, remarks
 from risk_sac.maps.documents import MAX_ROADS
-from risk_sac.maps.net import net_remarks, summary
-from risk_sac.maps.read_net import parse_net, read_tree
+from risk_sac.world.net import net_remarks, summary
+from risk_sac.world.read_net import parse_net, read_tree
 from service.errors import UploadError
 from service.networks.schemas import (
     CPU_S,

@@ -7,8 +7,8 @@ from enum import StrEnum
 from pydantic import BaseModel, Field
 
 from risk_sac.maps.found import Pattern
-from risk_sac.maps.net import NetSummary
 from risk_sac.records import Page, Record
+from risk_sac.world.net import NetSummary
 
 CPU_S = 150  # a net of 50,000 edges takes 45
 WALL_S = 300

@@ -16,8 +16,8 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures.from_above import map_png
 from risk_sac.maps.finder import FINDERS, Map, survey
 from risk_sac.maps.found import Pattern
-from risk_sac.maps.read_net import read_net
 from risk_sac.run_folder.durable import replace_file, write_sealed
+from risk_sac.world.read_net import read_net
 from service.networks.schemas import (
     MAX_PLACES,
     PICTURE,

@@ -14,8 +14,8 @@ import shapely
 from risk_sac.failures.export.formats import FormatName, export
 from risk_sac.failures.export.opendrive import opendrive
 from risk_sac.failures.export.recorded import Recorded
-from risk_sac.maps.net import Net
-from risk_sac.maps.read_net import read_net
+from risk_sac.world.net import Net
+from risk_sac.world.read_net import read_net
 from tests.exports.read_opendrive import dangling, middles
 from tests.exports.test_mcap import read
 

@@ -15,7 +15,7 @@ import numpy as np
 from risk_sac.failures.export.formats import BESIDE, Files, add, beside, document
 from risk_sac.failures.export.recorded import ExportedActor, Recorded, cycle, goal
 from risk_sac.failures.net import boundaries, colour
-from risk_sac.maps.net import Head, NetLane
+from risk_sac.world.net import Head, NetLane
 from risk_sac.world.types import STEP_S, Floats
 
 FREE, AS_RECORDED = "failure.xml", "failure-as-recorded.xml"

@@ -15,8 +15,8 @@ from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.net import Surface, colour, surfaces
 from risk_sac.failures.recording import BOX, on_body
 from risk_sac.failures.sentence import story
-from risk_sac.maps.net import Net
 from risk_sac.records import Collision
+from risk_sac.world.net import Net
 from risk_sac.world.types import STEP_S, Floats
 
 WIDTH, HEIGHT, FINE = 560, 340, 2  # px; drawn larger by `FINE`, and then made smooth

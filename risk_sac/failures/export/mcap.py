@@ -17,8 +17,8 @@ from risk_sac.failures.export.formats import BESIDE, Files, beside
 from risk_sac.failures.export.recorded import ExportedActor, Recorded
 from risk_sac.failures.net import boundaries, colour
 from risk_sac.failures.sentence import story
-from risk_sac.maps.net import NetLane
 from risk_sac.records import Collision
+from risk_sac.world.net import NetLane
 from risk_sac.world.types import Floats
 
 MAP, EGO = "map", "ego"  # frames of reference

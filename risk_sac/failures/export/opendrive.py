@@ -11,7 +11,7 @@ import numpy as np
 
 from risk_sac.failures.export.formats import BESIDE, add, document
 from risk_sac.failures.net import moved, ribbon
-from risk_sac.maps.net import Net, NetLane
+from risk_sac.world.net import Net, NetLane
 from risk_sac.world.types import Floats
 
 LEAST_ROUND_M = 0.5  # least length of the bend before and behind a corner, where its sides are long enough

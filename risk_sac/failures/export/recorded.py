@@ -16,10 +16,10 @@ from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.failures.bundle import WORLD, Bundle, Manifest, check_world
 from risk_sac.failures.recording import Series
-from risk_sac.maps.net import Net, NetLane
-from risk_sac.maps.read_net import read_net
 from risk_sac.records import Collision, Violation
 from risk_sac.scenario.layout import Layout
+from risk_sac.world.net import Net, NetLane
+from risk_sac.world.read_net import read_net
 from risk_sac.world.types import STEP_S, Floats, Kind, Role
 
 PER_FRAME = ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")

@@ -16,9 +16,9 @@ from risk_sac.failures.recording import Recording, trajectory_digest
 from risk_sac.failures.sentence import sentence, story
 from risk_sac.failures.show import draw_recording
 from risk_sac.failures.thumbnail import EGO, HEIGHT, STRIKER, WIDTH, thumbnail
-from risk_sac.maps.read_net import read_net
 from risk_sac.run_folder.results import RecordedFailure
 from risk_sac.scenario.families import FAMILIES
+from risk_sac.world.read_net import read_net
 from tests.builders import collision, judgement, violation
 from tests.unit.failures.staged import JUDGED, synthetic_contact, synthetic_series, with_release
 

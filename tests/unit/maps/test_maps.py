@@ -20,13 +20,13 @@ from risk_sac.maps.cut import walk_over
 from risk_sac.maps.find_junction import turn
 from risk_sac.maps.finder import Map, place_at, survey
 from risk_sac.maps.found import NoFit, lacking
-from risk_sac.maps.net import Crossing, Edge, Link, Net, NetLane
-from risk_sac.maps.read_net import read_net
 from risk_sac.maps.ways import way_back, way_on
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, family_at, family_named
 from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace
 from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.world.net import Crossing, Edge, Link, Net, NetLane
+from risk_sac.world.read_net import read_net
 from tests.maps import osm_town
 
 LANE = '<lane id="{id}_0" index="0" speed="13.89" length="{m}" shape="{line}"/>'

@@ -7,7 +7,7 @@ import pytest
 
 from risk_sac.maps.convert import Converted, present_net
 from risk_sac.maps.finder import Map, survey
-from risk_sac.maps.net import Net
+from risk_sac.world.net import Net
 
 LINE = '<geometry s="0" x="0" y="0" hdg="0" length="900"><line/></geometry>'
 

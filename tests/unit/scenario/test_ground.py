@@ -10,10 +10,10 @@ from hypothesis.extra.numpy import arrays
 from risk_sac.config import Interval
 from risk_sac.errors import SceneError
 from risk_sac.maps.carriageway import ANY_WAY, SECTORS, Carriageway, carriageway_of, sector_of
-from risk_sac.maps.net import Edge, Net, NetLane
 from risk_sac.risk.publish import depth
 from risk_sac.scenario.layout import areas, is_convex, ribbon, triangles
 from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.world.net import Edge, Net, NetLane
 from risk_sac.world.types import Scene
 
 ELL = [(0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)]

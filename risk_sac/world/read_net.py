@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from risk_sac.errors import MapError
-from risk_sac.maps.net import Crossing, Edge, Head, Junction, LaneUse, Link, Net, NetLane, Program
+from risk_sac.world.net import Crossing, Edge, Head, Junction, LaneUse, Link, Net, NetLane, Program
 
 DRIVER = "passenger"  # the class of every vehicle of ours
 TURNAROUND = "t"

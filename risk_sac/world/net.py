@@ -9,8 +9,7 @@ from typing import Concatenate, Literal, ParamSpec, TypeVar, cast
 
 import numpy as np
 
-from risk_sac.scenario.layout import Point
-from risk_sac.world.types import Floats
+from risk_sac.world.types import Floats, Point
 
 P = ParamSpec("P")
 T = TypeVar("T")
