@@ -124,6 +124,7 @@ class VehicleStart:
     position_m: float  # of the front bumper along the first edge
     speed_mps: float
     body: VehicleBody = "car"
+    uses_oncoming: bool = False  # whether an adversary may leave its edge for oncoming lanes beside it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
