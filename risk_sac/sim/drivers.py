@@ -110,7 +110,7 @@ class SumoDriver:
 class Drivers:
     """Informs SUMO's drivers of the actors that they know.
 
-    The ego gets all actors that it knows of, the others the pedestrians near them.
+    The ego gets all actors that it knows of, the others the pedestrians and static bodies near them.
     """
 
     def __init__(self, layout: Layout, reaction_time_s: float, roads: Roads) -> None:
@@ -123,7 +123,7 @@ class Drivers:
         }
         self._released: dict[str, SumoDriver] = {}
         self._ego: SumoDriver | None = SumoDriver(layout.ego.id, reaction_time_s, emergency)
-        self._walkers = bool(layout.pedestrians)
+        self._outsiders = bool(layout.pedestrians or layout.statics)
         self._ego_id, self._wary = layout.ego.id, layout.wary
         self._roads, self._outside = roads, False
 
@@ -150,9 +150,9 @@ class Drivers:
             self._tell_ego(self._ego, reading, belief, braking_mps2)
         before, self._outside = self._outside, moved is not None and not moved.inside
         hidden = self._outside or (self._wary and self._is_askew(reading, moved))
-        if not (self._walkers or self._wary or hidden or before):
+        if not (self._outsiders or self._wary or hidden or before):
             return
-        candidates = _with_ego(reading.walks) if hidden else reading.walks
+        candidates = _with_ego(reading.outside) if hidden else reading.outside
         for row, id_ in enumerate(reading.vehicles):
             driver = self._others.get(id_)
             if driver is not None and (hidden or reading.near[row] or driver.telling):
@@ -180,7 +180,7 @@ class Drivers:
         They keep the speed they started with, or drive slower for SUMO's models or a pedestrian. SUMO's wish is that of
         the step before, the newest it tells.
         """
-        accel_by_id, candidates = {}, _with_ego(reading.walks) if self._outside else reading.walks
+        accel_by_id, candidates = {}, _with_ego(reading.outside) if self._outside else reading.outside
         for id_, driver in self._released.items():
             row = reading.row.get(id_)
             if row is None:  # left the net
@@ -199,8 +199,8 @@ class Drivers:
         return driver.decide(row, reading.speed_and_accel[row][0], along, state, reading.drives, candidates)
 
 
-def _with_ego(walks: Bools) -> Bools:
+def _with_ego(outside: Bools) -> Bools:
     """Adds the ego to the actors that drivers look out for."""
-    candidates = walks.copy()
+    candidates = outside.copy()
     candidates[0] = True
     return candidates
