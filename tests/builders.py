@@ -26,6 +26,7 @@ from risk_sac.records import (
     Severity,
     Violation,
 )
+from risk_sac.scenario.bodies import CODES
 from risk_sac.search.prior.policy import GOALS, PolicyLayout, PretrainedPolicy
 from risk_sac.world.types import Floats, Frame, Kind, Role, Row, Signal
 
@@ -78,6 +79,7 @@ def frame_of(
         time_s=time_s,
         ids=ids or tuple(f"actor_{i}" for i in range(n)),
         kind=kinds,
+        body=np.where(kinds == Kind.VEHICLE, CODES["car"], CODES["pedestrian"]).astype(np.int8),
         role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
         state=np.array([values[name] for name in ROWS]),
         signal=signal,

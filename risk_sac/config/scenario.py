@@ -176,6 +176,8 @@ class Actor(Moving):
     role: ActorRole = "adversary"
     moves: Literal["lanes", "freely"] | None = None
     """In lanes as a vehicle or anywhere as a pedestrian; without it as its body usually does."""
+    uses_oncoming: bool = False
+    """Whether an adversary may leave its lanes for oncoming ones beside them."""
     when: Comparison | None = None
     """Scenes in which it is there."""
 

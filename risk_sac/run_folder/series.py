@@ -92,6 +92,7 @@ class Trace:
             "released_s": np.array(self.frames[self.released].time_s),
             "ids": np.array(first.ids),
             "kind": first.kind,
+            "body": first.body,
             "role": first.role,
             "length_m": first.length_m,
             "width_m": first.width_m,

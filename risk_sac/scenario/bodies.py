@@ -1,7 +1,8 @@
 """Table of road users' bodies: size, motion, injury, picture and exports, one row each.
 
-Adding a body is one row here. Its types for SUMO are in `sumo_nets/vtypes.add.xml`: `background_` and `adversary_`
-before the body's name, both with the row's size, for bodies that move in lanes.
+Adding a body is one row here. SUMO's types of car and truck are in `sumo_nets/vtypes.add.xml`; those of other bodies
+that move in lanes are copies of the car's with the row's size and driver. All are of the class passenger, so that a
+net's permissions refuse no body: which lanes a body uses is the scenario's.
 
 Sources of sizes: car, truck and pedestrian are choices of the shipped scenarios. Van, bus, motorcycle and bicycle have
 the default sizes of SUMO's classes delivery, bus, motorcycle and bicycle (SUMO documentation, vehicle type parameter
@@ -28,6 +29,17 @@ class BodyLimit(NamedTuple):
     emergency: float
     extreme: float
     source: str
+
+
+class LaneDriver(NamedTuple):
+    """Driver of a body that SUMO drives, in SUMO's terms."""
+
+    accel_mps2: float
+    decel_mps2: float
+    emergency_mps2: float
+
+
+CAR_DRIVER = LaneDriver(2.6, 4.5, 9.0)  # SUMO's class passenger
 
 
 class ExportNames(NamedTuple):
@@ -57,6 +69,8 @@ class Body:
     shape: Shape
     """How it is drawn."""
     export: ExportNames
+    driver: LaneDriver = CAR_DRIVER
+    """As SUMO's class has it, where SUMO drives it."""
     limits: Mapping[str, BodyLimit] = field(default_factory=dict)
     """Field of `Limits` → its bound; those of the ODD hold for the rest."""
 
@@ -109,17 +123,18 @@ _ROWS = (
     ),
     Body(
         name="bus", length_m=12.0, width_m=2.5, height_m=3.4, mass_kg=12000.0, moves=("lanes", "not"), conceals=True,
-        lit=True, injury="occupant", shape="vehicle", export=ExportNames("bus", "bus", 12), limits=_BUS,
+        lit=True, injury="occupant", shape="vehicle", export=ExportNames("bus", "bus", 12),
+        driver=LaneDriver(1.2, 4.0, 7.0), limits=_BUS,
     ),
     Body(
         name="motorcycle", length_m=2.2, width_m=0.9, height_m=1.5, mass_kg=280.0, moves=("lanes", "not"),
         conceals=False, lit=True, injury="motorcyclist", shape="two_wheels",
-        export=ExportNames("motorbike", "motorcycle", 10), limits=_MOTORCYCLE,
+        export=ExportNames("motorbike", "motorcycle", 10), driver=LaneDriver(6.0, 10.0, 10.0), limits=_MOTORCYCLE,
     ),
     Body(
         name="bicycle", length_m=1.6, width_m=0.65, height_m=1.7, mass_kg=90.0, moves=("lanes", "freely", "not"),
         conceals=False, lit=True, injury="cyclist", shape="two_wheels",
-        export=ExportNames("bicycle", "bicycle", 11), limits=_BICYCLE,
+        export=ExportNames("bicycle", "bicycle", 11), driver=LaneDriver(1.2, 3.0, 7.0), limits=_BICYCLE,
     ),
     Body(
         name="pedestrian", length_m=0.5, width_m=0.5, height_m=1.75, mass_kg=75.0, moves=("freely", "not"),

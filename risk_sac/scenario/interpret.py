@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ from risk_sac.config.values import Comparison, Expression, comparison, term
 from risk_sac.errors import ConfigError, InfeasibleScene, did_you_mean
 from risk_sac.scenario.bodies import BODIES, BodyName, Motion
 from risk_sac.scenario.ground import ground_of, kerb_of, net_of
-from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, VehicleStart
+from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, StaticStart, VehicleStart
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.scenario.tracks import Track, lane_named, routed, straight_on
 from risk_sac.world.net import Crossing, Link, Net, NetLane, direction
@@ -257,12 +257,16 @@ class _Scene:
             for name, moving in ((EGO, document.ego), *actors.items())
         }
         ego = self._vehicle(EGO, Role.EGO, document.ego)
-        vehicles, pedestrians = [], []
+        vehicles, pedestrians, statics = list[VehicleStart](), list[PedestrianStart](), list[StaticStart]()
         for name, actor in actors.items():
-            if self._of.moves(name, self._bodies[name]) == "freely":
+            motion = self._of.moves(name, self._bodies[name])
+            if motion == "freely":
                 pedestrians.append(self._pedestrian(name, ROLES[actor.role], actor))
+            elif motion == "not":
+                statics.append(self._static(name, actor))
             else:
-                vehicles.append(self._vehicle(name, ROLES[actor.role], actor))
+                start = self._vehicle(name, ROLES[actor.role], actor)
+                vehicles.append(replace(start, uses_oncoming=actor.uses_oncoming))
         vehicles += [start for name, stream in document.streams.items() for start in self._stream(name, stream)]
         places = [(p.x_m, p.y_m) for p in pedestrians] or [self._placed[EGO].lane.line[-1]]
         ground = ground_of(self._file, tuple(map(_on_grid, places)), walked=bool(pedestrians))
@@ -272,6 +276,7 @@ class _Scene:
             ego=ego,
             vehicles=tuple(vehicles),
             pedestrians=tuple(pedestrians),
+            statics=tuple(statics),
             **ground._asdict(),
             lane_width_m=self._placed[EGO].lane.width_m,
             signal=signal,
@@ -358,7 +363,23 @@ class _Scene:
             y_m=y_m - along_y * setback_m - along_y * lead_m - along_x * offset_m,
             heading_rad=math.atan2(along_y, along_x),
             speed_mps=speed_mps,
+            body=self._bodies[name],
         )
+
+    def _static(self, name: str, actor: Moving) -> StaticStart:
+        path, body = f"actors.{name}", self._bodies[name]
+        if actor.start.reference is None:
+            x_m, y_m, along_x, along_y = self._facing(actor.start, path)
+            heading_rad = math.atan2(along_y, along_x)
+        else:
+            self._speeds[name], self._placed[name] = 0.0, self._place(name, actor, path)
+            _, piece, front_m = self._placed[name].track.start(self._placed[name].before_m)
+            lane = self._net.lanes[f"{piece.edge}_{piece.lane}"]
+            x_m, y_m, heading_rad = _point_of(lane, max(front_m - BODIES[body].length_m / 2, 0.0))
+            left_m = self._value.of(actor.start.left_m, f"{path}.start.left_m")
+            x_m, y_m = x_m - math.sin(heading_rad) * left_m, y_m + math.cos(heading_rad) * left_m
+            heading_rad += math.radians(self._value.of(actor.start.heading_deg, f"{path}.start.heading_deg"))
+        return StaticStart(id=name, x_m=x_m, y_m=y_m, heading_rad=heading_rad, body=body)
 
     def _facing(self, start: Start, path: str) -> tuple[float, float, float, float]:
         """A point, and the unit vector of the direction that an actor faces there."""
@@ -444,7 +465,7 @@ def _started(name: str, role: Role, place: OnTrack, speed_mps: float, body: Body
         lane=piece.lane,
         position_m=position_m,
         speed_mps=min(speed_mps, piece.limit_mps),  # SUMO refuses a faster start
-        body=body,  # type: ignore[arg-type]
+        body=body,
     )
 
 

@@ -4,11 +4,11 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal
 
 import numpy as np
 import shapely
 
+from risk_sac.scenario.bodies import BODIES, BodyName
 from risk_sac.scenario.place import Place, PlaceGround, Track, Walk
 from risk_sac.world.types import Point, Role
 
@@ -108,9 +108,8 @@ def _without_repeats(line: Sequence[Point]) -> list[Point]:
 
 
 LEAD_IN_S = 1.5  # in which SUMO drives all vehicles, before the adversaries are released to the policy
-VehicleBody = Literal["car", "truck"]
-CAR_LENGTH_M, CAR_WIDTH_M = 4.6, 1.85  # as `sumo_nets/vtypes.add.xml` has it
-TRUCK_LENGTH_M, TRUCK_WIDTH_M = 8.0, 2.4
+CAR_LENGTH_M, CAR_WIDTH_M = BODIES["car"].length_m, BODIES["car"].width_m
+TRUCK_LENGTH_M, TRUCK_WIDTH_M = BODIES["truck"].length_m, BODIES["truck"].width_m
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,13 +122,13 @@ class VehicleStart:
     lane: int  # index on the first edge, 0 is the rightmost
     position_m: float  # of the front bumper along the first edge
     speed_mps: float
-    body: VehicleBody = "car"
+    body: BodyName = "car"  # one that moves in lanes
     uses_oncoming: bool = False  # whether an adversary may leave its edge for oncoming lanes beside it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PedestrianStart:
-    """A pedestrian anywhere in the plane."""
+    """An actor that moves anywhere in the plane: a pedestrian, or a bicycle that crosses a road."""
 
     id: str
     role: Role
@@ -137,6 +136,18 @@ class PedestrianStart:
     y_m: float
     heading_rad: float
     speed_mps: float
+    body: BodyName = "pedestrian"  # one that moves freely
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StaticStart:
+    """A body that never moves, anywhere in the plane: parked, or in the way."""
+
+    id: str
+    x_m: float  # of its centre
+    y_m: float
+    heading_rad: float
+    body: BodyName
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,6 +158,7 @@ class Layout:
     ego: VehicleStart
     vehicles: tuple[VehicleStart, ...]
     pedestrians: tuple[PedestrianStart, ...] = ()
+    statics: tuple[StaticStart, ...] = ()
     crossings: tuple[Area, ...] = ()  # pedestrian crossings, where drivers yield
     roadway: tuple[Area, ...] = ()  # where vehicles drive, as far as pedestrians may get there
     junctions: tuple[Area, ...] = ()  # where the ways of vehicles cross
@@ -190,7 +202,7 @@ def vehicle(
     before_m: float,
     speed_mps: float,
     lead_m: float | None = None,
-    body: VehicleBody = "car",
+    body: BodyName = "car",
 ) -> VehicleStart:
     """A vehicle whose front is `before_m` before its track's reference once the adversaries are released.
 

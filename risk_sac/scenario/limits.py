@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
-from risk_sac.config import Interval, Odd, Precipitation
+from risk_sac.config import Behaviour, Interval, Odd, Precipitation
+from risk_sac.scenario.behaviour import BOUNDS
+from risk_sac.scenario.bodies import Body
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 GRAVITY_MPS2 = 9.81
@@ -16,6 +18,17 @@ HEADROOM = 0.95  # share of the friction circle that is used; the rest is for wh
 CORNERING = 0.6  # of the circle, for the curve of the lane: drivers leave more, but brake in curves
 CHANGING_LANE = 0.3  # of the circle at most, for moving across the lane; at least 0.43 are left for braking
 SLIP = 0.2  # lateral over longitudinal speed: about 11 degrees against the lane
+
+
+# Field of `Limits` → field of `odd.dynamic`, and which end of its range.
+PRESETS: Mapping[str, tuple[str, int]] = {
+    "accel_mps2": ("vehicle_accel_mps2", 1),
+    "brake_mps2": ("vehicle_accel_mps2", 0),
+    "walk_speed_mps": ("pedestrian_speed_mps", 1),
+    "walk_accel_mps2": ("pedestrian_accel_mps2", 1),
+    "walk_brake_mps2": ("pedestrian_accel_mps2", 0),
+    "heading_rate_radps": ("pedestrian_turn_radps", 1),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +50,25 @@ class Limits:
     walk_brake_mps2: float
     walk_jerk_mps3: float = 5.0  # from rest to full acceleration in 0.3 s
     heading_rate_radps: float  # standing
+    walk_curvature_per_m: float = math.inf  # of a body on wheels, which turns on the move alone
+    behaviour: Behaviour = "ordinary"
+
+    def of(self, body: Body) -> "Limits":
+        """Returns the limits of a body: its row's, narrowed as the ODD narrows its behaviour's preset."""
+        own = {name: getattr(bound, self.behaviour) * self._narrowed(name) for name, bound in body.limits.items()}
+        if "speed_mps" in own:
+            own["speed_mps"] = min(own["speed_mps"], self.speed_mps)
+        for name in own.keys() & {"accel_mps2", "brake_mps2"}:
+            own[name] = min(own[name], self.grip_mps2)
+        return replace(self, **own) if own else self
+
+    def _narrowed(self, name: str) -> float:
+        """Returns a bound as a share of the behaviour's preset, at most 1; 1 of one without a preset."""
+        if name not in PRESETS:
+            return 1.0
+        field, end = PRESETS[name]
+        preset = float(abs(getattr(BOUNDS[field], self.behaviour)[end]))
+        return min(float(getattr(self, name)) / preset, 1.0)
 
     @cached_property
     def walk_disc_mps2(self) -> float:
@@ -91,6 +123,7 @@ def limits_from_odd(odd: Odd, friction: float) -> Limits:
         walk_accel_mps2=walk_accel.high,
         walk_brake_mps2=-walk_accel.low,
         heading_rate_radps=turn.high,
+        behaviour=dynamic.behaviour,
     )
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.scenario.bodies import body_of
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.solid import Others, VehicleCommand, Walker, clip, taper, walks_into
@@ -62,6 +63,9 @@ class PedestrianControl:
         speed = clip(state.speed_mps + accel * STEP_S, 0.0, limits.walk_speed_mps)
         disc = limits.walk_disc_mps2
         rate = across_mps2 / max(state.speed_mps, speed, disc / limits.heading_rate_radps)
+        if math.isfinite(limits.walk_curvature_per_m):
+            sharpest = limits.walk_curvature_per_m * max(state.speed_mps, speed)
+            rate = clip(rate, -sharpest, sharpest)
         turned = rate * STEP_S
         distance, middle = (state.speed_mps + speed) / 2 * STEP_S, state.heading_rad + turned / 2
         walker = Walker(
@@ -118,15 +122,16 @@ class Adversaries:
     def __init__(self, family: Family, limits: Limits, frame: Frame) -> None:
         """Starts from the motion in `frame`."""
         f, rows = frame, {id_: row for row, id_ in enumerate(frame.ids)}
+        own = {id_: limits.of(body_of(int(frame.body[rows[id_]]))) for id_ in family.adversaries}
         self._vehicles = {
-            id_: VehicleControl(limits, *(float(a[rows[id_]]) for a in (f.speed_mps, f.accel_mps2, f.lateral_mps)))
+            id_: VehicleControl(own[id_], *(float(a[rows[id_]]) for a in (f.speed_mps, f.accel_mps2, f.lateral_mps)))
             for id_ in family.vehicles
             if id_ in rows
         }
         self._pedestrians = {}
         for id_ in (id_ for id_ in family.pedestrians if id_ in rows):
             walker = Walker(*(float(a[rows[id_]]) for a in (f.x_m, f.y_m, f.heading_rad, f.speed_mps)))
-            self._pedestrians[id_] = PedestrianControl(limits, walker)
+            self._pedestrians[id_] = PedestrianControl(own[id_], walker)
         self._order = family.adversaries
         self._slot = {id_: k for k, id_ in enumerate(self._order)}
         self._ids: tuple[str, ...] = ()

@@ -111,7 +111,7 @@ class SumoDriver:
 class Drivers:
     """Informs SUMO's drivers of the actors that they know.
 
-    The ego gets all actors that it knows of, the others the pedestrians near them.
+    The ego gets all actors that it knows of, the others the pedestrians and static bodies near them.
     """
 
     def __init__(self, layout: Layout, reaction_time_s: float, roads: Roads) -> None:
@@ -124,7 +124,7 @@ class Drivers:
         }
         self._released: dict[str, SumoDriver] = {}
         self._ego: SumoDriver | None = SumoDriver(layout.ego.id, reaction_time_s, emergency)
-        self._walkers = bool(layout.pedestrians)
+        self._outsiders = bool(layout.pedestrians or layout.statics)
         self._ego_id, self._wary = layout.ego.id, layout.wary
         self._roads = roads
         self._outside: list[str] = []  # vehicles that SUMO's models do not see where they are
@@ -164,7 +164,7 @@ class Drivers:
         hidden = self._outside
         if self._wary and self._ego_id not in hidden and self._is_askew(reading, moved):
             hidden = [*hidden, self._ego_id]
-        if not (self._walkers or self._wary or hidden or before):
+        if not (self._outsiders or self._wary or hidden or before):
             return
         candidates = _with(hidden, reading)
         for row, id_ in enumerate(reading.vehicles):
@@ -214,10 +214,10 @@ class Drivers:
 
 
 def _with(vehicles: Sequence[str], reading: Reading) -> Bools:
-    """Adds vehicles to the pedestrians that drivers look out for."""
+    """Adds vehicles to the actors that drivers look out for."""
     rows = [reading.row[id_] for id_ in vehicles if id_ in reading.row]
     if not rows:
-        return reading.walks
-    candidates = reading.walks.copy()
+        return reading.outside
+    candidates = reading.outside.copy()
     candidates[rows] = True
     return candidates

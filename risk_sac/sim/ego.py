@@ -4,15 +4,14 @@ import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from risk_sac.config import SensorConfig
+from risk_sac.scenario.bodies import body_of
 from risk_sac.world.geometry import Sight, frame_view, in_sight
 from risk_sac.world.jit import compiled
-from risk_sac.world.types import HEADING, VX, VY, Bools, Floats, Frame, Kind, X, Y
+from risk_sac.world.types import HEADING, VX, VY, Bools, Floats, Frame, X, Y
 
 EVERYTHING = Sight(reach_m=math.inf, half_view_rad=math.pi, occlusion=False)
-VEHICLE = int(Kind.VEHICLE)  # compiled code knows no enums of int8
 
 
 def sight(sensor: SensorConfig | None, visibility_m: float, unlit_m: float = math.inf) -> Sight:
@@ -21,7 +20,7 @@ def sight(sensor: SensorConfig | None, visibility_m: float, unlit_m: float = mat
     Args:
       sensor: of the ego.
       visibility_m: in the episode's weather.
-      unlit_m: the same of pedestrians, which carry no light.
+      unlit_m: the same of bodies that carry no light.
     """
     if sensor is None:
         return EVERYTHING._replace(reach_m=visibility_m, unlit_m=unlit_m)
@@ -79,10 +78,13 @@ class Perception:
     def look(self, frame: Frame) -> Belief:
         """See `Senses.look`."""
         if frame.ids is not self._ids:
+            bodies = [body_of(code) for code in frame.body[1:].tolist()]
+            self._conceals = np.array([body.conceals for body in bodies], dtype=np.bool_)
+            self._lit = np.array([body.lit for body in bodies], dtype=np.bool_)
             self._memory = np.array([self._of(id_) for id_ in frame.ids]).T.copy()
             self._ids = frame.ids
         self.seen, known, state = _look(
-            self._memory, frame.state, frame.kind, frame.time_s, self._memory_s, *self.sight
+            self._memory, frame.state, self._conceals, self._lit, frame.time_s, self._memory_s, *self.sight
         )
         return Belief(known, state)
 
@@ -112,7 +114,8 @@ class Perception:
 def _look(
     memory: Floats,
     state: Floats,
-    kind: NDArray[np.int8],
+    conceals: Bools,
+    lit: Bools,
     now_s: float,
     memory_s: float,
     reach_m: float,
@@ -121,7 +124,7 @@ def _look(
     unlit_m: float,
 ) -> tuple[Bools, Bools, Floats]:
     """Updates the memory; returns which of the others are in sight, and both parts of the belief."""
-    seen = in_sight(frame_view(state), kind[1:] == VEHICLE, Sight(reach_m, half_view_rad, occlusion, unlit_m))
+    seen = in_sight(frame_view(state), conceals, lit, Sight(reach_m, half_view_rad, occlusion, unlit_m))
     n = state.shape[1]
     known, believed = np.ones(n, dtype=np.bool_), state.copy()
     for i in range(1, n):

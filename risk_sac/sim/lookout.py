@@ -26,19 +26,19 @@ YIELDING_MPS2 = 2.5  # braking with which crossing traffic yields; SUMO's driver
 SAME_WAY_COS = 0.5
 MOVING_MPS = 0.5
 BEHIND_M, BEYOND_M = 60.0, 10.0  # path before and beyond the driven stretch on which others are looked for
-NEAR_M = 40.0  # distance beyond which no vehicle has to brake for a pedestrian yet
+NEAR_M = 40.0  # distance beyond which no vehicle has to brake for a pedestrian or a static body yet
 
 
 @compiled
-def near_pedestrians(state: Floats, vehicle: Bools) -> Bools:
-    """Tells which of the `n` actors have a pedestrian within `NEAR_M`.
+def near_outsiders(state: Floats, outside: Bools) -> Bools:
+    """Tells which of the `n` actors have one that SUMO does not know within `NEAR_M`.
 
-    Pedestrians have themselves.
+    Those have themselves.
     """
-    x, y, n = state[X], state[Y], len(vehicle)
+    x, y, n = state[X], state[Y], len(outside)
     near = np.zeros(n, dtype=np.bool_)
     for k in range(n):
-        if not vehicle[k]:
+        if outside[k]:
             for i in range(n):
                 near[i] |= math.hypot(x[i] - x[k], y[i] - y[k]) < NEAR_M
     return near

@@ -9,8 +9,9 @@ import libsumo
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.scenario.layout import Area, Layout
-from risk_sac.sim.lookout import near_pedestrians
+from risk_sac.scenario.bodies import BODIES, CODES
+from risk_sac.scenario.layout import Area, Layout, PedestrianStart, StaticStart, VehicleStart
+from risk_sac.sim.lookout import near_outsiders
 from risk_sac.sim.solid import Walker
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import (
@@ -34,7 +35,6 @@ from risk_sac.world.types import (
     Y,
 )
 
-PEDESTRIAN_SIZE_M = 0.5
 SIDEWALK_M = 1.0  # a pedestrian so near a crossing looks at its signal
 CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
 COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
@@ -65,8 +65,8 @@ class Reading(NamedTuple):
     speed_and_accel: Sequence[tuple[float, float]]  # of each vehicle, m/s and m/s²: also in the frame, but quicker here
     offset_m: Sequence[float]  # of each vehicle from its lane's centre; the same
     drives: Bools  # of all actors of the frame, which are vehicles
-    walks: Bools  # the rest
-    near: Sequence[bool]  # of all actors, which have a pedestrian nearby
+    outside: Bools  # which SUMO's models do not know: pedestrians and static bodies
+    near: Sequence[bool]  # of all actors, which have one of those nearby
 
 
 class Reader:
@@ -78,6 +78,14 @@ class Reader:
         self._roles = {start.id: start.role for start in starts}
         self._roles |= {start.id: start.role for start in layout.pedestrians}
         self._walkers = tuple(walkers)
+        self._statics = layout.statics
+        self._roles |= {start.id: Role.BACKGROUND for start in layout.statics}
+        all_starts: tuple[VehicleStart | PedestrianStart | StaticStart, ...] = (
+            *starts,
+            *layout.pedestrians,
+            *layout.statics,
+        )
+        self._body = {start.id: BODIES[start.body] for start in all_starts}
         self._signal = layout.signal
         self._walk_signals = [] if layout.signal is None else _walk_signals(layout.signal, layout.crossings)
         self._vehicles = tuple(start.id for start in starts)
@@ -87,16 +95,17 @@ class Reader:
     def _describe(self) -> None:
         """Computes what stays the same until a vehicle leaves the net."""
         driving, walking = len(self._vehicles), len(self._walkers)
-        self._ids = (*self._vehicles, *self._walkers)
-        self._kind = np.array([Kind.VEHICLE] * driving + [Kind.PEDESTRIAN] * walking, dtype=np.int8)
+        self._ids = (*self._vehicles, *self._walkers, *(start.id for start in self._statics))
+        bodies = [self._body[id_] for id_ in self._ids]
+        stand = [Kind.PEDESTRIAN if body.shape == "person" else Kind.VEHICLE for body in bodies[driving + walking :]]
+        self._kind = np.array([Kind.VEHICLE] * driving + [Kind.PEDESTRIAN] * walking + stand, dtype=np.int8)
+        self._codes = np.array([CODES[body.name] for body in bodies], dtype=np.int8)
         self._drives = self._kind == int(Kind.VEHICLE)
-        self._walks = ~self._drives
+        self._outside = np.arange(len(self._ids)) >= driving
         self._role = np.array([self._roles[id_] for id_ in self._ids], dtype=np.int8)
         self._row = {id_: row for row, id_ in enumerate(self._vehicles)}
         self._attackers = [(row, v) for row, v in enumerate(self._vehicles) if self._roles[v] is Role.ADVERSARY]
-        get = libsumo.vehicle
-        bodies = [(get.getLength(v), get.getWidth(v)) for v in self._vehicles]
-        self._bodies = np.array(bodies + [(PEDESTRIAN_SIZE_M, PEDESTRIAN_SIZE_M)] * walking).T
+        self._sizes = np.array([(body.length_m, body.width_m) for body in bodies]).T
 
     def forget(self, gone: Collection[str]) -> None:
         """Leaves out vehicles that have left the net."""
@@ -124,21 +133,26 @@ class Reader:
             offsets.append(offset)
         for w in walkers.values():
             told += (w.x_m, w.y_m, w.heading_rad, w.speed_mps, 0.0, w.accel_mps2, 0.0)
+        for start in self._statics:
+            told += (start.x_m, start.y_m, start.heading_rad, 0.0, 0.0, 0.0, 0.0)
         before, self._told = self._told, np.array(told).reshape(-1, 7)
         letter, stop_line_m = self._ahead(moved)
         frame = Frame(
             time_s=libsumo.simulation.getTime(),
             ids=self._ids,
             kind=self._kind,
+            body=self._codes,
             role=self._role,
-            state=_state(self._told, before, self._bodies, len(self._vehicles)),
+            state=_state(self._told, before, self._sizes, len(self._vehicles)),
             signal=COLOURS.get(letter.lower(), Signal.NONE),
             stop_line_m=stop_line_m,
             link=self._links(letter, walkers, moved),
             teleported=libsumo.simulation.getStartingTeleportIDList(),
         )
-        near = near_pedestrians(frame.state, self._drives).tolist() if walkers else [False] * len(self._ids)
-        return Reading(frame, self._vehicles, self._row, speed_and_accel, offsets, self._drives, self._walks, near)
+        near = [False] * len(self._ids)
+        if len(self._ids) > len(self._vehicles):
+            near = near_outsiders(frame.state, self._outside).tolist()
+        return Reading(frame, self._vehicles, self._row, speed_and_accel, offsets, self._drives, self._outside, near)
 
     def _ahead(self, moved: Mapping[str, Told]) -> tuple[str, float]:
         """Returns the letter of the ego's signal and the distance to it.

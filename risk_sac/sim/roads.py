@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from risk_sac.config import EgoConfig
+from risk_sac.scenario.bodies import BODIES, BodyName
 from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.scenario.limits import GRAVITY_MPS2, emergency_decel_mps2
 from risk_sac.sim.paths import (
@@ -310,18 +311,33 @@ def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None
         if name.startswith(LANE_CHANGE):
             libsumo.vehicle.setParameter(layout.ego.id, name, f"{value:g}")
     for start in layout.vehicles:
-        _insert(start, f"background_{start.body}")
+        _insert(start, _type("background", start.body))
     if layout.signal is not None:
         _set_signal(layout.signal, layout.signal_offset_s)
 
 
 def hand_over(start: VehicleStart) -> None:
     """Makes a vehicle drive as commanded, whatever is in its way."""
-    libsumo.vehicle.setType(start.id, f"adversary_{start.body}")
+    libsumo.vehicle.setType(start.id, _type("adversary", start.body))
     for name, value in STEERED.items():  # a change of type leaves the lane-change model as it is
         libsumo.vehicle.setParameter(start.id, f"laneChangeModel.{name}", value)
     libsumo.vehicle.setSpeedMode(start.id, 0)
     libsumo.vehicle.setLaneChangeMode(start.id, 0)
+
+
+def _type(driven: str, name: BodyName) -> str:
+    """Returns the id of a body's type; one that is not shipped is made from the car's."""
+    id_, types = f"{driven}_{name}", libsumo.vehicletype
+    if id_ not in types.getIDList():
+        body = BODIES[name]
+        types.copy(f"{driven}_car", id_)
+        types.setLength(id_, body.length_m)
+        types.setWidth(id_, body.width_m)
+        types.setHeight(id_, body.height_m)
+        types.setAccel(id_, body.driver.accel_mps2)
+        types.setDecel(id_, body.driver.decel_mps2)
+        types.setEmergencyDecel(id_, body.driver.emergency_mps2)
+    return id_
 
 
 def _insert(start: VehicleStart, type_id: str) -> None:

@@ -25,6 +25,7 @@ from risk_sac.sim.pilot import MovedVehicle, Pilot
 from risk_sac.sim.reading import Reader, Reading
 from risk_sac.sim.roads import LateralRoom, Roads, hand_over, place
 from risk_sac.sim.solid import VehicleCommand, Walker
+from risk_sac.sim.standing import stand_in_lanes
 from risk_sac.world.types import STEP_S, Floats, Frame, Role
 
 
@@ -120,6 +121,7 @@ class SumoSimulation:
     _reflex_mps2: float
     _moved: MovedVehicle | None
     _oncoming: dict[str, OncomingVehicle]  # adversaries outside their own lanes
+    _in_lanes: frozenset[str]  # static bodies that SUMO knows too
 
     def __init__(
         self,
@@ -153,6 +155,7 @@ class SumoSimulation:
         try:
             LIBSUMO.load(self, options)
             place(layout, self._ego, self._settings)
+            self._in_lanes = stand_in_lanes(layout.statics)
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise SimulationError(f"SUMO refused the layout of {layout.net}: {error}") from error
@@ -277,8 +280,9 @@ class SumoSimulation:
 
     def _hide(self) -> None:
         """Hides the vehicles that the ego does not know from its models; the lane-change model cannot ignore any."""
-        ego, vehicles = self._layout.ego.id, self._reading.vehicles
-        ignored = " ".join(id_ for id_, known in zip(vehicles, self._belief.known, strict=False) if not known)
+        ego, in_sumo = self._layout.ego.id, self._in_lanes.union(self._reading.vehicles)
+        known = zip(self._reading.frame.ids, self._belief.known, strict=True)
+        ignored = " ".join(id_ for id_, it_knows in known if id_ in in_sumo and not it_knows)
         libsumo.vehicle.setParameter(ego, "carFollowModel.ignoreIDs", ignored)
         libsumo.vehicle.setParameter(ego, "junctionModel.ignoreIDs", ignored)
 
@@ -322,9 +326,10 @@ class SumoSimulation:
         """Whether SUMO lists a collision of the ego with a vehicle, now or within `LISTED_WITHIN_S`.
 
         Ends the episode: the simulation is past the contact afterwards. SUMO tests rectangles along their lanes, so it
-        is a little late or early where a body is turned. None if we tell SUMO the place of either.
+        is a little late or early where a body is turned. None of static bodies, and if we tell SUMO the
+        place of either.
         """
-        if self._moved is not None or other in self._oncoming:
+        if self._moved is not None or other in self._oncoming or other not in self._reading.row:
             return None
         for _ in range(round(LISTED_WITHIN_S / STEP_S)):
             if self._listed(other):

@@ -58,6 +58,7 @@ class Evidence:
     time_s: Floats  # T, from the adversaries' release; negative before it
     ids: tuple[str, ...]
     kind: NDArray[np.int8]  # n
+    body: NDArray[np.int8]  # n, codes of `risk_sac.scenario.bodies`
     role: NDArray[np.int8]  # n
     length_m: Floats  # n
     width_m: Floats  # n
@@ -80,7 +81,7 @@ class Evidence:
         """From the time series of an episode, see `Trace.series`; the adversaries were released at `released_s`."""
         known = np.asarray(series["visible"] == 1.0)
         known[:, 0] = True
-        names = (*PER_ACTOR, "link", "kind", "role", "length_m", "width_m")
+        names = (*PER_ACTOR, "link", "kind", "body", "role", "length_m", "width_m")
         values: dict[str, Any] = {name: series[name] for name in names}
         return cls(
             time_s=series["time_s"] - released_s,

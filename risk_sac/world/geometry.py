@@ -195,15 +195,15 @@ class Sight(NamedTuple):
 
 
 @compiled
-def in_sight(view: RelativeView, vehicle: Bools, sight: Sight) -> Bools:
+def in_sight(view: RelativeView, conceals: Bools, lit: Bools, sight: Sight) -> Bools:
     """Which of the `n` others are within reach, inside the field of view and not hidden; see `line_of_sight`.
 
-    Vehicles hide what is behind them, and carry lights.
+    Bodies that conceal hide what is behind them; those without lights are seen less far at night.
     """
-    seen = line_of_sight(view, vehicle) if sight.occlusion else np.ones(len(view.x), dtype=np.bool_)
+    seen = line_of_sight(view, conceals) if sight.occlusion else np.ones(len(view.x), dtype=np.bool_)
     for i in range(len(seen)):
         x, y = view.x[i], view.y[i]
-        reach_m = sight.reach_m if vehicle[i] else min(sight.reach_m, sight.unlit_m)
+        reach_m = sight.reach_m if lit[i] else min(sight.reach_m, sight.unlit_m)
         if x * x + y * y > reach_m * reach_m or abs(math.atan2(y, x)) > sight.half_view_rad:
             seen[i] = False
     return seen

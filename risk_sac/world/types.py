@@ -23,7 +23,7 @@ STEP_S = 0.1  # one control step is one simulation step
 
 
 class Kind(IntEnum):
-    """What body an actor has."""
+    """How an actor moves: in lanes, or anywhere as pedestrians do."""
 
     VEHICLE = 0
     PEDESTRIAN = 1
@@ -107,6 +107,7 @@ class FrameFields(NamedTuple):
     time_s: float
     ids: tuple[str, ...]
     kind: NDArray[np.int8]
+    body: NDArray[np.int8]  # code of `risk_sac.scenario.bodies`
     role: NDArray[np.int8]
     state: Floats  # rows x n: those below
     signal: Signal
@@ -160,7 +161,9 @@ class Series(BaseModel):
     ids: list[str]
     """n."""
     kind: list[str]
-    """n; vehicle | pedestrian."""
+    """n; vehicle | pedestrian: whether it moves in lanes or anywhere."""
+    body: list[str]
+    """n; car | van | truck | bus | motorcycle | bicycle | pedestrian | child | obstacle."""
     role: list[str]
     """n; ego | adversary | background."""
     length_m: Reals

@@ -18,6 +18,7 @@ from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.records import Collision, Episode, Failure, Record, Triage
 from risk_sac.run_folder.arrays import read_limited, unpack_arrays
 from risk_sac.run_folder.results import FAILURES, RecordedFailure
+from risk_sac.scenario.bodies import body_of
 from risk_sac.world.types import Kind, Role, Series, Signal
 from service.errors import SeriesLost
 from service.settings import ServiceSettings
@@ -100,6 +101,8 @@ def _plain(name: str, array: NDArray[Any]) -> Any:
         return [[_letter(each) for each in row] for row in array.tolist()]
     if name in _NAMED:
         return [_NAMED[name](int(value)).name.lower() for value in array]
+    if name == "body":
+        return [body_of(code).name for code in array.tolist()]
     if array.dtype.kind == "f":
         missing = ~np.isfinite(array)
         array = array.astype(object)

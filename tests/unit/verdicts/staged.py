@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from risk_sac.records import Judgement
+from risk_sac.scenario.bodies import CODES
 from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import judge
@@ -97,6 +98,7 @@ def stage(
         time_s=times,
         ids=tuple(f"actor_{i}" for i in range(n)),
         kind=np.array(kinds, dtype=np.int8),
+        body=np.array([CODES["car" if kind is Kind.VEHICLE else "pedestrian"] for kind in kinds], dtype=np.int8),
         role=np.array([Role.EGO] + [Role.ADVERSARY] * (n - 1), dtype=np.int8),
         length_m=sizes[:, 0].copy(),
         width_m=sizes[:, 1].copy(),
