@@ -87,6 +87,7 @@ CALM_MPS = 0.5  # slower across, a vehicle is not changing lanes
 LEVEL_MPS, LEVEL_ASIDE_M = 1.0, 2.5  # difference of speeds, and room between the bodies, of vehicles that are level
 CLOSE_ASIDE_M, WORKING_MPS2 = 1.0, 0.5  # cars in lanes side by side leave 1.5 m; cruising takes no acceleration
 MOVING_MPS = 2.0
+CRAWLS_MPS = 3.0  # choice: slower in a junction, a vehicle crawls; SUMO's drivers do so for a second when they start
 SAME_WAY_COS = 0.9
 STANDING_MPS = 0.5
 CLEAR_M = 12.0  # free way ahead that gives no reason to stand

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.risk.conduct import CALM_MPS, CRAWLS_MPS, MOVING_MPS, NEAR_LINE_M
 from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.evidence import Evidence, ego_path, inside, seen_along
 from risk_sac.world.types import Bools, Floats, Kind, Role
@@ -87,18 +88,18 @@ def _around(e: Evidence, actor: int, frames: NDArray[np.intp]) -> tuple[Floats, 
 def _lines(
     e: Evidence, actor: int, frames: NDArray[np.intp], ahead_m: Floats, left_m: Floats, cos: Floats
 ) -> Iterator[Observed]:
-    """Measures lane changes and driving over a line, outside junctions."""
+    """Measures lane changes, and how long it keeps to a line or over it; outside junctions."""
     offset, lane_m = e.lane_offset_m[frames, actor], e.ground.lane_width_m
     over = np.abs(offset) + e.width_m[actor] / 2 - lane_m / 2
     over[_in_areas(e, e.ground.junctions, actor, frames)] = -np.inf
     over[np.isnan(over)] = -np.inf
     jumps = np.abs(np.diff(offset, prepend=offset[:1])) > lane_m / 2  # its centre comes into the next lane
     lateral = np.abs(e.lateral_mps[frames, actor])
+    keeps = (over > -NEAR_LINE_M) & (lateral < CALM_MPS) & (e.speed_mps[frames, actor] > MOVING_MPS)
+    yield Observed(actor, "over_line", float(keeps.sum()) * e.step_s, float(e.time_s[frames[keeps.argmax()]]))
     window = round(CHANGE_S / e.step_s)
     for first, last in runs(over > 0.0):
         crosses = first + np.flatnonzero(jumps[first:last])
-        until = int(crosses[0]) if len(crosses) else last
-        yield Observed(actor, "over_line", (until - first) * e.step_s, float(e.time_s[frames[first]]))
         enters = first + np.flatnonzero(over[first:last] > OVER_M)
         if first == 0 or not len(enters) or not (len(crosses) or last == len(frames)):
             continue  # it came so from the release, or went back
@@ -151,7 +152,7 @@ def _pacing(
 def _junctions(
     e: Evidence, actor: int, frames: NDArray[np.intp], ahead_m: Floats, left_m: Floats
 ) -> Iterator[Observed]:
-    """Measures entries on red or without priority, and stops in a junction."""
+    """Measures entries on red or without priority, and how long it stops or crawls in a junction."""
     within = _in_areas(e, e.ground.junctions, actor, frames)
     link, speed = e.link[frames, actor], e.speed_mps[frames, actor]
     enters = (link[:-1] != 0) & ((link[1:] == 0) | (within[1:] & ~within[:-1])) & (speed[1:] > MOVES_MPS)
@@ -165,12 +166,16 @@ def _junctions(
             gap_s = _arrives_after(e, actor, frame)
             if gap_s is not None:
                 yield Observed(actor, "junction_gap", gap_s, float(e.time_s[frame]))
+    if not within.any():
+        return
     in_way = (ahead_m > 0.0) & (ahead_m < CLEAR_M) & (np.abs(left_m) < e.ground.lane_width_m)
     in_way[:, actor] = False
-    stands = within & (speed < STANDS_MPS) & ~in_way.any(axis=1)
-    first, last = max(runs(stands), key=lambda run: run[1] - run[0], default=(0, 0))
-    if last > first:
-        yield Observed(actor, "junction_stop", (last - first) * e.step_s, float(e.time_s[frames[first]]))
+    free, stands = within & ~in_way.any(axis=1), speed < STANDS_MPS
+    stops_s = max((last - first for first, last in runs(free & stands)), default=0) * e.step_s
+    crawls_s = float((free & ~stands & (speed < CRAWLS_MPS)).sum()) * e.step_s
+    entered_s = float(e.time_s[frames[within.argmax()]])
+    yield Observed(actor, "junction_stop", stops_s, entered_s)
+    yield Observed(actor, "junction_crawl", crawls_s, entered_s)
 
 
 def _arrives_after(e: Evidence, actor: int, frame: int) -> float | None:
