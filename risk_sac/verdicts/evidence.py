@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ class Ground:
         return cls(speed_limit_mps=speed_limit_mps, **{name: getattr(layout, name) for name in names})
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence:
     """Arrays of `T` frames up to the contact and `n` actors.
 
@@ -108,6 +109,11 @@ class Evidence:
         if np.isnan(self.x_m[-1, column]):
             raise ValueError(f"striker {id_!r} has left before the contact; wanted one that is there in the last frame")
         return column
+
+    @cached_property
+    def ego_path(self) -> Path:
+        """The ego's recorded path; a verdict reads it many times."""
+        return recorded_path(self.x_m[:, 0], self.y_m[:, 0], self.heading_rad[:, 0])
 
     @property
     def released(self) -> int:
@@ -177,7 +183,7 @@ def recorded_contact(evidence: Evidence, striker: int) -> Contact:
 
 def ego_path(evidence: Evidence) -> Path:
     """The ego's recorded path."""
-    return recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
+    return evidence.ego_path
 
 
 def front_moved_across(evidence: Evidence) -> Floats:

@@ -238,6 +238,8 @@ def _entry(evidence: Evidence, actor: int, letters: bytes) -> int | None:
     e = evidence
     link = e.link[:, actor]
     shown = _is_any(link[:-1], letters)
+    if not shown.any():
+        return None
     passed = shown & (link[1:] == 0)
     in_junction = inside(e.ground.junctions, *_front(e, 0, actor))
     passed |= shown & ~_is_any(link[1:], letters) & in_junction[1:] & ~in_junction[:-1]
@@ -256,7 +258,7 @@ def _stepped_onto_crossing(evidence: Evidence, striker: int) -> int | None:
 
 
 def _is_any(link: Letters, letters: bytes) -> Bools:
-    return np.isin(link, list(letters))
+    return np.logical_or.reduce([link == letter for letter in letters])
 
 
 def _front(evidence: Evidence, first: int, actor: int) -> tuple[Floats, Floats]:
