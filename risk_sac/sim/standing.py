@@ -13,6 +13,7 @@ import libsumo
 from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.layout import StaticStart
 
+KEEP_ROUTE = 1  # of SUMO's `moveToXY`: the nearest place on the route
 ALONG_RAD = 0.35  # greatest angle to the lane of a body that a stand-in along the lane can stand for; choice
 
 
@@ -46,11 +47,13 @@ def _stand_in(start: StaticStart) -> bool:
         typeID="background_car",
         departLane=str(index),
         departPos=repr(front_m),
-        departPosLat=repr(offset_m),
         departSpeed="0",
     )
     vehicle.setLength(start.id, body.length_m)
     vehicle.setWidth(start.id, body.width_m)
     vehicle.setSpeed(start.id, 0.0)
     vehicle.setLaneChangeMode(start.id, 0)
+    x, y = x + (body.length_m / 2) * math.cos(way_rad), y + (body.length_m / 2) * math.sin(way_rad)
+    x, y = x - offset_m * math.sin(way_rad), y + offset_m * math.cos(way_rad)
+    vehicle.moveToXY(start.id, edge, index, x, y, keepRoute=KEEP_ROUTE)
     return True
