@@ -123,6 +123,7 @@ class VehicleStart:
     position_m: float  # of the front bumper along the first edge
     speed_mps: float
     body: BodyName = "car"  # one that moves in lanes
+    uses_oncoming: bool = False  # whether an adversary may leave its edge for oncoming lanes beside it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,6 +166,7 @@ class Layout:
     signal: str | None = None  # id of the traffic light
     signal_offset_s: float = 0.0  # where in its cycle the episode starts
     friction: float = 1.0
+    horizon_steps: int = 150  # of 0.1 s
     wary: bool = False  # whether drivers stop for an ego that stands askew; SUMO tells them of a box along its lane
 
 

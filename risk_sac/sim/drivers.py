@@ -5,6 +5,7 @@ The distance is ours; the speed for it comes from the driver's own car-following
 """
 
 import math
+from collections.abc import Sequence
 
 import libsumo
 
@@ -13,7 +14,7 @@ from risk_sac.scenario.limits import emergency_decel_mps2
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.lookout import project, targets
 from risk_sac.sim.paths import Along
-from risk_sac.sim.pilot import MovedEgo
+from risk_sac.sim.pilot import MovedVehicle
 from risk_sac.sim.reading import Reading
 from risk_sac.sim.roads import Roads
 from risk_sac.world.types import STEP_S, Bools, Floats, Role
@@ -125,7 +126,8 @@ class Drivers:
         self._ego: SumoDriver | None = SumoDriver(layout.ego.id, reaction_time_s, emergency)
         self._outsiders = bool(layout.pedestrians or layout.statics)
         self._ego_id, self._wary = layout.ego.id, layout.wary
-        self._roads, self._outside = roads, False
+        self._roads = roads
+        self._outside: list[str] = []  # vehicles that SUMO's models do not see where they are
 
     def release_ego(self) -> None:
         """Drops the ego's driver: a pilot drives it."""
@@ -135,31 +137,43 @@ class Drivers:
         """Stops telling a vehicle; its driver is only asked what it intends."""
         self._released[vehicle] = self._others.pop(vehicle)
 
-    def tell(self, reading: Reading, belief: Belief, braking_mps2: float, moved: MovedEgo | None = None) -> None:
+    def tell(
+        self,
+        reading: Reading,
+        belief: Belief,
+        braking_mps2: float,
+        moved: MovedVehicle | None = None,
+        beside: Sequence[str] = (),
+    ) -> None:
         """Tells all drivers what to do in the next step.
 
-        SUMO's models see what is on their lanes. Where the ego's body is elsewhere, drivers look out for it themselves.
+        SUMO's models see what is on their lanes. For a body that is elsewhere, drivers look out themselves.
 
         Args:
           reading: the latest.
           belief: the ego's.
           braking_mps2: least braking of an ego that SUMO drives.
           moved: the ego, if a pilot drives it.
+          beside: adversaries that are beside their own lanes.
         """
         if self._ego is not None:
             self._tell_ego(self._ego, reading, belief, braking_mps2)
-        before, self._outside = self._outside, moved is not None and not moved.inside
-        hidden = self._outside or (self._wary and self._is_askew(reading, moved))
+        before, self._outside = self._outside, [*beside]
+        if moved is not None and not moved.inside:
+            self._outside.append(self._ego_id)
+        hidden = self._outside
+        if self._wary and self._ego_id not in hidden and self._is_askew(reading, moved):
+            hidden = [*hidden, self._ego_id]
         if not (self._outsiders or self._wary or hidden or before):
             return
-        candidates = _with_ego(reading.outside) if hidden else reading.outside
+        candidates = _with(hidden, reading)
         for row, id_ in enumerate(reading.vehicles):
             driver = self._others.get(id_)
             if driver is not None and (hidden or reading.near[row] or driver.telling):
                 driver.wanted_mps2 = self._decide(driver, row, reading, reading.frame.state, candidates)
                 driver.tell(*reading.speed_and_accel[row])
 
-    def _is_askew(self, reading: Reading, moved: MovedEgo | None) -> bool:
+    def _is_askew(self, reading: Reading, moved: MovedVehicle | None) -> bool:
         """Whether the ego's body reaches elsewhere than the box along its lane that SUMO's models go by."""
         frame = reading.frame
         along = self._roads.along(self._ego_id) if moved is None else moved.along
@@ -180,7 +194,7 @@ class Drivers:
         They keep the speed they started with, or drive slower for SUMO's models or a pedestrian. SUMO's wish is that of
         the step before, the newest it tells.
         """
-        accel_by_id, candidates = {}, _with_ego(reading.outside) if self._outside else reading.outside
+        accel_by_id, candidates = {}, _with(self._outside, reading)
         for id_, driver in self._released.items():
             row = reading.row.get(id_)
             if row is None:  # left the net
@@ -199,8 +213,11 @@ class Drivers:
         return driver.decide(row, reading.speed_and_accel[row][0], along, state, reading.drives, candidates)
 
 
-def _with_ego(outside: Bools) -> Bools:
-    """Adds the ego to the actors that drivers look out for."""
-    candidates = outside.copy()
-    candidates[0] = True
+def _with(vehicles: Sequence[str], reading: Reading) -> Bools:
+    """Adds vehicles to the actors that drivers look out for."""
+    rows = [reading.row[id_] for id_ in vehicles if id_ in reading.row]
+    if not rows:
+        return reading.outside
+    candidates = reading.outside.copy()
+    candidates[rows] = True
     return candidates

@@ -1,6 +1,6 @@
 """Drives the ego by a pilot in place of SUMO's models, and has SUMO put it there.
 
-SUMO maps such an ego onto the nearest lane along its route, so that its drivers follow it and yield to it. Where the
+SUMO maps such a vehicle onto the nearest lane along its route, so that its drivers follow it and yield to it. Where the
 whole body is beside these lanes, on an oncoming lane or off the road, SUMO keeps it where it is, on no lane.
 """
 
@@ -13,7 +13,7 @@ from risk_sac.scenario.layout import Layout
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.lookout import project, stretch
 from risk_sac.sim.paths import STATION, Along, PathStopLine
-from risk_sac.sim.reading import EgoTold
+from risk_sac.sim.reading import Told
 from risk_sac.sim.roads import Roads
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import Floats, Frame
@@ -47,21 +47,23 @@ class Pilot(Protocol):
         """The ego's motion after the next step, given where it is on its path; raises `EgoFailed`."""
 
 
-class MovedEgo:
-    """The ego that a pilot drives, in SUMO.
+class MovedVehicle:
+    """A vehicle that SUMO puts where it is told, such as the ego of a pilot.
 
     Attributes:
       motion: after its latest step.
+      lane: of its route, from whose start its path leads.
       along: where it is on its path, that of its first lane along its route, whichever lane it is on.
       inside: whether its body is on lanes that lead along its route. SUMO's drivers see what is on these lanes.
       arrived: whether it reached its route's end. SUMO, which removes its own vehicles there, keeps one that is moved.
       told: what SUMO would tell of it.
     """
 
+    lane: str
     along: Along
     inside: bool
     arrived: bool
-    told: EgoTold
+    told: Told
     _stop_line: PathStopLine | None
 
     def __init__(self, vehicle: str, motion: Motion, size_m: tuple[float, float], roads: Roads) -> None:
@@ -69,8 +71,8 @@ class MovedEgo:
         self._vehicle, self._size_m, self._roads = vehicle, size_m, roads
         self.motion, self._stop_line = motion, None
         libsumo.vehicle.setLaneChangeMode(vehicle, NO_LANE_CHANGE)
-        self._lane = libsumo.vehicle.getLaneID(vehicle)
-        self._find(roads.station_m(vehicle, self._lane))
+        self.lane = libsumo.vehicle.getLaneID(vehicle)
+        self._find(roads.station_m(vehicle, self.lane))
 
     def move(self, motion: Motion) -> None:
         """Has SUMO put it there in its next step."""
@@ -80,7 +82,7 @@ class MovedEgo:
         libsumo.vehicle.moveToXY(self._vehicle, "", -1, x, y, 90.0 - math.degrees(heading), ROUTE_OR_NOWHERE)
 
     def settle(self) -> None:
-        """Finds the ego after a step of SUMO, and corrects its speed there.
+        """Finds the vehicle after a step of SUMO, and corrects its speed there.
 
         SUMO derives a speed from the way along the lane, 0 where a lane begins; followers go by it.
         """
@@ -88,26 +90,26 @@ class MovedEgo:
         self._find(self.along.station_m)
 
     def _find(self, near_m: float) -> None:
-        """Finds the ego on its path near a station."""
-        way = self._roads.way(self._vehicle, self._lane)
+        """Finds the vehicle on its path near a station."""
+        way = self._roads.way(self._vehicle, self.lane)
         while way.following is not None and near_m >= way.lane_m:  # stations count from the start of the lane
-            near_m, self._lane = near_m - way.lane_m, way.following
+            near_m, self.lane = near_m - way.lane_m, way.following
             if self._stop_line is not None:
                 self._stop_line = self._stop_line._replace(station_m=self._stop_line.station_m - way.lane_m)
-            way = self._roads.way(self._vehicle, self._lane)
+            way = self._roads.way(self._vehicle, self.lane)
         path, (x, y, heading, speed, accel, _, slip) = way.path, self.motion
         station_m, offset_m, front_x, front_y, lateral, left_m, right_m = _placed(
             path, near_m, x, y, heading, speed, slip, *self._size_m
         )
         self.along = Along(path, station_m, offset_m)
-        room = self._roads.room(self._vehicle, self._lane)
+        room = self._roads.room(self._vehicle, self.lane)
         self.inside = left_m < room.left_m + HANGS_OVER_M and right_m < room.right_m + HANGS_OVER_M
         passes = abs(offset_m) < PASSES_M
         self.arrived = passes and way.complete and station_m >= path[STATION, -1]
         if passes:
             self._stop_line = next((line for line in way.stop_lines if line.station_m >= station_m), None)
         angle = 90.0 - math.degrees(heading)
-        self.told = EgoTold(front_x, front_y, angle, speed, lateral, accel, offset_m, self._ahead(station_m))
+        self.told = Told(front_x, front_y, angle, speed, lateral, accel, offset_m, self._ahead(station_m))
 
     def _ahead(self, station_m: float) -> tuple[str, float] | None:
         if self._stop_line is None:

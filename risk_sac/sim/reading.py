@@ -40,8 +40,8 @@ CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
 COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
 
 
-class EgoTold(NamedTuple):
-    """State of an ego that a pilot drives, in SUMO's terms."""
+class Told(NamedTuple):
+    """State of a vehicle that SUMO does not drive, in SUMO's terms."""
 
     front_x_m: float
     front_y_m: float
@@ -109,8 +109,8 @@ class Reader:
         self._vehicles = tuple(id_ for id_ in self._vehicles if id_ not in gone)
         self._describe()
 
-    def read(self, walkers: Mapping[str, Walker], ego: EgoTold | None = None) -> Reading:
-        """Reads all actors; `ego` is what SUMO would tell of an ego that a pilot drives."""
+    def read(self, walkers: Mapping[str, Walker], moved: Mapping[str, Told]) -> Reading:
+        """Reads all actors; `moved` is what SUMO would tell of the vehicles that it does not drive."""
         get_position, get_angle = libsumo.vehicle.getPosition, libsumo.vehicle.getAngle
         get_speed, get_lateral = libsumo.vehicle.getSpeed, libsumo.vehicle.getLateralSpeed
         get_accel = libsumo.vehicle.getAcceleration
@@ -118,8 +118,8 @@ class Reader:
         told: list[float] = []  # flat: numpy converts nested sequences at half the speed
         speed_and_accel, offsets = [], []
         for id_ in self._vehicles:
-            if ego is not None and not told:
-                x, y, angle, speed, lateral, accel, offset, _ = ego
+            if moved and id_ in moved:
+                x, y, angle, speed, lateral, accel, offset, _ = moved[id_]
             else:
                 (x, y), angle = get_position(id_), get_angle(id_)
                 speed, lateral, accel = get_speed(id_), get_lateral(id_), get_accel(id_)
@@ -132,7 +132,7 @@ class Reader:
         for start in self._statics:
             told += (start.x_m, start.y_m, start.heading_rad, 0.0, 0.0, 0.0, 0.0)
         before, self._told = self._told, np.array(told).reshape(-1, 7)
-        letter, stop_line_m = self._ahead(ego)
+        letter, stop_line_m = self._ahead(moved)
         frame = Frame(
             time_s=libsumo.simulation.getTime(),
             ids=self._ids,
@@ -142,7 +142,7 @@ class Reader:
             state=_state(self._told, before, self._sizes, len(self._vehicles)),
             signal=COLOURS.get(letter.lower(), Signal.NONE),
             stop_line_m=stop_line_m,
-            link=self._links(letter, walkers),
+            link=self._links(letter, walkers, moved),
             teleported=libsumo.simulation.getStartingTeleportIDList(),
         )
         near = [False] * len(self._ids)
@@ -150,19 +150,19 @@ class Reader:
             near = near_outsiders(frame.state, self._outside).tolist()
         return Reading(frame, self._vehicles, self._row, speed_and_accel, offsets, self._drives, self._outside, near)
 
-    def _ahead(self, ego: EgoTold | None) -> tuple[str, float]:
+    def _ahead(self, moved: Mapping[str, Told]) -> tuple[str, float]:
         """Returns the letter of the ego's signal and the distance to it.
 
         The distance is to its stop line; "" and inf without a signal.
         """
         if self._signal is None:
             return "", math.inf
-        if ego is not None:
+        if (ego := moved.get(self._vehicles[0])) is not None:
             return ego.ahead or ("", math.inf)
         ahead = libsumo.vehicle.getNextTLS(self._vehicles[0])
         return (ahead[0][3], ahead[0][2]) if ahead else ("", math.inf)
 
-    def _links(self, ego: str, walkers: Mapping[str, Walker]) -> NDArray[np.uint8]:
+    def _links(self, ego: str, walkers: Mapping[str, Walker], moved: Mapping[str, Told]) -> NDArray[np.uint8]:
         """Reads the signal letters ahead of the ego and of each adversary.
 
         A pedestrian's letter is that of its crossing.
@@ -172,8 +172,9 @@ class Reader:
             return links
         letters = [(0, ego)] if ego else []
         for row, id_ in self._attackers:
-            ahead = libsumo.vehicle.getNextTLS(id_)
-            if ahead:
+            if (told := moved.get(id_)) is not None:
+                letters += [(row, told.ahead[0])] if told.ahead else []
+            elif ahead := libsumo.vehicle.getNextTLS(id_):
                 letters.append((row, ahead[0][3]))
         for row, walker in enumerate(walkers.values(), start=len(self._vehicles)):
             for area, index in self._walk_signals:

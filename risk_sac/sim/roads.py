@@ -3,10 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from itertools import takewhile
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import libsumo
 import numpy as np
+import shapely
 
 from risk_sac.config import EgoConfig
 from risk_sac.scenario.bodies import BODIES, BodyName
@@ -135,22 +136,41 @@ class LateralRoom(NamedTuple):
     right_m: float
 
 
+class Placed(Protocol):
+    """Place of a vehicle that SUMO does not drive: its lane along its route, and where it is on the path from there."""
+
+    lane: str
+    along: Along
+
+
 class Roads:
-    """Roads of an episode's vehicles; answers about a net are kept for the next episode on it."""
+    """Roads of an episode's vehicles; answers about a net are kept for the next episode on it.
+
+    Attributes:
+      moved: the adversaries that SUMO does not drive.
+    """
+
+    moved: Mapping[str, Placed]
 
     def __init__(self) -> None:
         self._net = ""
+        self.moved = {}
         self._routes: dict[str, tuple[str, ...]] = {}
 
     def enter(self, layout: Layout) -> None:
         """Begins an episode."""
         self._routes = {start.id: start.route for start in (layout.ego, *layout.vehicles)}
+        self._uses_oncoming = {start.id for start in layout.vehicles if start.uses_oncoming}
+        self.moved = {}
         if layout.net != self._net:  # another one may use the same names
             self._net = layout.net
             self._way, self._room, self._stretch = cache(way_of), cache(_room), cache(_stretch)
+            self._oncoming_m = cache(_oncoming_m)
 
     def along(self, vehicle: str) -> Along:
         """Locates a vehicle on its path."""
+        if (moved := self.moved.get(vehicle)) is not None:
+            return moved.along
         lane = libsumo.vehicle.getLaneID(vehicle)
         return self._along(vehicle, lane, libsumo.vehicle.getLateralLanePosition(vehicle))
 
@@ -170,13 +190,23 @@ class Roads:
     def place(self, vehicle: str, offset_m: float, width_m: float) -> tuple[LateralRoom, Along]:
         """Returns how far a vehicle may move sideways, and where it is on its path.
 
-        Only lanes that its route continues from count: SUMO halts a vehicle at the end of any other. `offset_m` is that
-        of its centre from its lane's, positive to the left.
+        Of its edge, only lanes that its route continues from count: SUMO halts a vehicle at the end of any other. To
+        their left come oncoming lanes, for a vehicle that uses them. `offset_m` is that of its centre from its lane's,
+        positive to the left.
         """
-        lane = libsumo.vehicle.getLaneID(vehicle)
+        moved = self.moved.get(vehicle)
+        lane = libsumo.vehicle.getLaneID(vehicle) if moved is None else moved.lane
+        along = self._along(vehicle, lane, offset_m) if moved is None else moved.along
+        (left_m, right_m), beyond_m = self.room_beside(vehicle, lane, offset_m, width_m), 0.0
+        if vehicle in self._uses_oncoming:
+            beyond_m = self._oncoming_m(self._routes[vehicle], lane)
+        return LateralRoom(left_m + beyond_m, right_m), along
+
+    def room_beside(self, vehicle: str, lane: str, offset_m: float, width_m: float) -> LateralRoom:
+        """Returns the room beside a vehicle's body up to the edges of its own lanes, negative beyond them."""
         left_m, right_m = self.room(vehicle, lane)
         spare = -width_m / 2 - EDGE_M
-        return LateralRoom(left_m + spare - offset_m, right_m + spare + offset_m), self._along(vehicle, lane, offset_m)
+        return LateralRoom(left_m + spare - offset_m, right_m + spare + offset_m)
 
     def room(self, vehicle: str, lane: str) -> LateralRoom:
         """Returns the room from a lane's middle along a vehicle's route.
@@ -214,6 +244,34 @@ def _room(route: tuple[str, ...], lane: str) -> LateralRoom:
     own, half_m = int(index), libsumo.lane.getWidth(lane) / 2
     right, left = takewhile(bool, reversed(widths[:own])), takewhile(bool, widths[own + 1 :])
     return LateralRoom(sum(left) + half_m, sum(right) + half_m)
+
+
+JOINED_M = 0.5  # gap between the lanes of two directions up to which they are one carriageway
+
+
+def _oncoming_m(route: tuple[str, ...], lane: str) -> float:
+    """Returns the width of the oncoming lanes to the left of a lane's edge, m.
+
+    It is 0 inside junctions, where something lies between, and where a lane of the edge that `route` cannot use does.
+    """
+    edge = edge_of(lane)
+    if edge.startswith(":"):
+        return 0.0
+    leftmost = _lanes_of(edge)[-1]
+    if not leads_on(route, leftmost):
+        return 0.0
+    start, end = libsumo.edge.getFromJunction(edge), libsumo.edge.getToJunction(edge)
+    own, half_m = np.array(libsumo.lane.getShape(leftmost)), libsumo.lane.getWidth(leftmost) / 2
+    for other in libsumo.junction.getOutgoingEdges(end):
+        lanes = [] if other.startswith(":") or libsumo.edge.getToJunction(other) != start else _lanes_of(other)[::-1]
+        widths = [float(libsumo.lane.getWidth(id_)) for id_ in takewhile(car_may_use, lanes)]
+        if not widths:
+            continue
+        line = shapely.LineString(libsumo.lane.getShape(lanes[0]))
+        apart_m = float(np.median(shapely.distance(line, shapely.points((own[:-1] + own[1:]) / 2))))
+        if apart_m - half_m - widths[0] / 2 <= JOINED_M:
+            return sum(widths)
+    return 0.0
 
 
 def _width_on_route(lane: str, route: tuple[str, ...]) -> float:

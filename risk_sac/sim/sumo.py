@@ -19,8 +19,9 @@ from risk_sac.errors import SimulationError
 from risk_sac.scenario.layout import Layout
 from risk_sac.sim.drivers import Drivers
 from risk_sac.sim.ego import EVERYTHING, Belief, Perception, Senses
+from risk_sac.sim.oncoming import OncomingVehicle, leaves
 from risk_sac.sim.paths import Along
-from risk_sac.sim.pilot import MovedEgo, Pilot
+from risk_sac.sim.pilot import MovedVehicle, Pilot
 from risk_sac.sim.reading import Reader, Reading
 from risk_sac.sim.roads import LateralRoom, Roads, hand_over, place
 from risk_sac.sim.solid import VehicleCommand, Walker
@@ -118,7 +119,8 @@ class SumoSimulation:
     _reading: Reading
     _belief: Belief
     _reflex_mps2: float
-    _moved: MovedEgo | None
+    _moved: MovedVehicle | None
+    _oncoming: dict[str, OncomingVehicle]  # adversaries outside their own lanes
     _in_lanes: frozenset[str]  # static bodies that SUMO knows too
 
     def __init__(
@@ -166,7 +168,9 @@ class SumoSimulation:
         self._reader = Reader(layout, self._walkers)
         self._drivers = Drivers(layout, self._ego.reaction_time_s, self._roads)
         self._reflex_mps2 = 0.0
-        self._moved = None
+        self._moved, self._oncoming = None, {}
+        self._roads.moved = self._oncoming
+        self._uses_oncoming = {start.id for start in layout.vehicles if start.uses_oncoming}
         self._seed = seed
         self._senses.reset()
         self._belief = self._look()
@@ -181,7 +185,7 @@ class SumoSimulation:
         motion = self._pilot.begin(self._layout, self._seed, frame)
         self._drivers.release_ego()
         size_m = float(frame.length_m[0]), float(frame.width_m[0])
-        self._moved = MovedEgo(self._layout.ego.id, motion, size_m, self._roads)
+        self._moved = MovedVehicle(self._layout.ego.id, motion, size_m, self._roads)
 
     def release(self) -> None:
         """Hands the adversary vehicles over to commands; only they lose SUMO's safety checks."""
@@ -193,10 +197,27 @@ class SumoSimulation:
     def apply(self, vehicles: Mapping[str, VehicleCommand], walkers: Mapping[str, Walker]) -> None:
         """Commands the adversaries' next step; vehicles that left the net are skipped."""
         for id_, (speed_mps, lateral_mps) in vehicles.items():
-            if id_ in self._reading.row:
-                libsumo.vehicle.setSpeed(id_, speed_mps)
-                libsumo.vehicle.changeSublane(id_, lateral_mps * STEP_S)
+            if id_ not in self._reading.row:
+                continue
+            command = VehicleCommand(speed_mps, lateral_mps)
+            if id_ in self._uses_oncoming and self._is_beside_own_lanes(id_, command):
+                self._oncoming[id_].drive(command)
+                continue
+            libsumo.vehicle.setSpeed(id_, speed_mps)
+            libsumo.vehicle.changeSublane(id_, lateral_mps * STEP_S)
         self._walkers.update(walkers)
+
+    def _is_beside_own_lanes(self, vehicle: str, command: VehicleCommand) -> bool:
+        """Whether an adversary is or will be outside its own lanes; takes it from SUMO, or hands it back."""
+        row, moved = self._reading.row[vehicle], self._oncoming.get(vehicle)
+        frame, offset_m = self._reading.frame, self._reading.offset_m[row]
+        lane = libsumo.vehicle.getLaneID(vehicle) if moved is None else moved.lane
+        own = self._roads.room_beside(vehicle, lane, offset_m, float(frame.width_m[row]))
+        if moved is None and leaves(own, command):
+            self._oncoming[vehicle] = OncomingVehicle(vehicle, frame.state[:, row], self._roads)
+        elif moved is not None and moved.is_back(own) and not leaves(own, command):
+            del self._oncoming[vehicle]
+        return vehicle in self._oncoming
 
     def brake(self, braking_mps2: float) -> None:
         """Makes the ego brake by at least `braking_mps2` in the next step."""
@@ -223,7 +244,8 @@ class SumoSimulation:
             if self._moved is not None and self._pilot is not None:
                 motion = self._pilot.drive(self._reading.frame, self._belief, self._moved.along)
                 self._moved.move(motion)
-            self._drivers.tell(self._reading, self._belief, self._reflex_mps2, self._moved)
+            beside = [id_ for id_, vehicle in self._oncoming.items() if not vehicle.inside]
+            self._drivers.tell(self._reading, self._belief, self._reflex_mps2, self._moved, beside)
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise SimulationError(f"SUMO failed during a step: {error}") from error
@@ -232,6 +254,8 @@ class SumoSimulation:
             if self._layout.ego.id in gone:
                 raise SimulationError("the ego left the net before the horizon; lengthen its route")
             self._reader.forget(gone)
+        for vehicle in self._oncoming.values():
+            vehicle.settle()
         if self._moved is not None:
             self._moved.settle()
             self._belief = self._look()
@@ -248,7 +272,10 @@ class SumoSimulation:
 
     def _look(self) -> Belief:
         """Reads a frame, and lets the ego perceive it."""
-        self._reading = self._reader.read(self._walkers, None if self._moved is None else self._moved.told)
+        moved = {id_: vehicle.told for id_, vehicle in self._oncoming.items()}
+        if self._moved is not None:
+            moved[self._layout.ego.id] = self._moved.told
+        self._reading = self._reader.read(self._walkers, moved)
         return self._senses.look(self._reading.frame)
 
     def _hide(self) -> None:
@@ -299,10 +326,9 @@ class SumoSimulation:
         """Whether SUMO lists a collision of the ego with a vehicle, now or within `LISTED_WITHIN_S`.
 
         Ends the episode: the simulation is past the contact afterwards. SUMO tests rectangles along their lanes, so it
-        is a little late or early where a body is turned. None of static bodies, and if a pilot drives the ego, whose
-        place we tell SUMO.
+        is a little late or early where a body is turned. None of static bodies, and if we tell SUMO the place of either.
         """
-        if self._moved is not None or other not in self._reading.row:
+        if self._moved is not None or other in self._oncoming or other not in self._reading.row:
             return None
         for _ in range(round(LISTED_WITHIN_S / STEP_S)):
             if self._listed(other):

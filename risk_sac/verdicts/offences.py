@@ -19,12 +19,23 @@ from risk_sac.verdicts.course import (
     WANDER_M,
     YIELDING_MPS2,
     BodyOnPath,
+    along_series,
     at,
+    recorded_path,
     time_to_touch,
     with_margin,
 )
 from risk_sac.verdicts.drivers import R157_DELAY_S
-from risk_sac.verdicts.evidence import Evidence, Letters, ego_path, inside, recorded_motion, recorded_size, seen_along
+from risk_sac.verdicts.evidence import (
+    Evidence,
+    Letters,
+    column,
+    ego_path,
+    inside,
+    recorded_motion,
+    recorded_size,
+    seen_along,
+)
 from risk_sac.world.types import HEADING, LENGTH, SPEED, WIDTH, Bools, Floats, Kind, Role, X, Y
 
 EGO = 0
@@ -300,7 +311,31 @@ def enters_safely(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], le
     When it intrudes by 0.3 m into the ego's lane, it is that far ahead and TTC > v_rel / (2 · 6 m/s²) + 0.35 s.
     """
     t = _intrusion(evidence, striker, seen)
-    closing = evidence.speed_mps[t, 0] - seen.speed_mps[t]
+    return _leaves_room(float(evidence.speed_mps[t, EGO]), seen, t, least_gap_m)
+
+
+def cuts_off(evidence: Evidence, striker: int) -> bool:
+    """Whether the ego came into the striker's lane in the last 3 s and left it no room to brake.
+
+    The rule for room is that of `changes_lane_unsafely`, with the striker behind. The ego came over if it moved further
+    towards the striker's way than the striker towards it.
+    """
+    e = evidence
+    path = recorded_path(e.x_m[:, striker], e.y_m[:, striker], e.heading_rad[:, striker])
+    speed_mps, size = column(e.speed_mps, striker), recorded_size(e, striker)
+    seen = along_series(path, speed_mps, size, recorded_motion(e, EGO))
+    t, first = _intrusion(e, EGO, seen), e.since(RECENT_S)
+    if t == 0 or t < first:
+        return False
+    side = math.copysign(1.0, seen.across_m[t - 1])
+    both_m = side * float(seen.across_m[first] - seen.across_m[-1])
+    striker_m = side * float(e.lateral_mps[first + 1 :, striker].sum()) * e.step_s
+    return both_m > 2 * max(striker_m, 0.0) and not _leaves_room(float(speed_mps[t]), seen, t, R157_GAP_M)
+
+
+def _leaves_room(follower_mps: float, seen: BodyOnPath[Floats], t: int, least_gap_m: float) -> bool:
+    """Whether a body ahead on the follower's path leaves it the room of UN R157, 5.2.5.2, in frame `t`."""
+    closing = follower_mps - seen.speed_mps[t]
     needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_CUT_IN_S
     return bool(seen.gap_m[t] > least_gap_m and seen.ttc_s[t] > needed_s)
 
@@ -339,15 +374,13 @@ def turns_into_path(evidence: Evidence, striker: int) -> bool:
     return time_to_touch(path, float(path.s[t]), float(e.speed_mps[t, 0]), size, at(motion, t), HORIZON_S) > HORIZON_S
 
 
-def _intrusion(evidence: Evidence, striker: int, seen: BodyOnPath[Floats]) -> int:
-    """Finds when the striker last came 0.3 m into the ego's lane.
+def _intrusion(evidence: Evidence, actor: int, seen: BodyOnPath[Floats]) -> int:
+    """Finds when an actor last came 0.3 m into the lane along whose path it is seen.
 
     Returns the frame of the contact if it did not.
     """
     e = evidence
-    reach = (
-        np.abs(np.sin(seen.turn_rad)) * e.length_m[striker] + np.abs(np.cos(seen.turn_rad)) * e.width_m[striker]
-    ) / 2
+    reach = (np.abs(np.sin(seen.turn_rad)) * e.length_m[actor] + np.abs(np.cos(seen.turn_rad)) * e.width_m[actor]) / 2
     intrudes = np.abs(seen.across_m) - reach <= e.ground.lane_width_m / 2 - INTRUSION_M
     outside = np.flatnonzero(~intrudes)
     return min(int(outside[-1]) + 1, len(intrudes) - 1) if len(outside) else 0

@@ -11,7 +11,7 @@ from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.collision import Contact
 from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.offences import on_inherited_red
+from risk_sac.verdicts.offences import cuts_off, on_inherited_red
 from risk_sac.world.geometry import overlapping_pairs
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import HEADING, LENGTH, WIDTH, Floats, Kind, X, Y
@@ -107,7 +107,7 @@ def validity_verdicts(evidence: Evidence, striker: int, contact: Contact, facts:
         and facts.visible_for_s >= CROSSING_VISIBLE_S
     )
     return {
-        "not_from_behind": contact.ego_zone != "rear",
+        "not_from_behind": contact.ego_zone != "rear" or cuts_off(evidence, striker),
         "ego_moving": bool(evidence.speed_mps[-1, 0] >= STANDING_MPS),
         "no_sideswipe": bool(not adversary_hit_flank or crossing_conflict),
         "seen_before": facts.ever_visible,

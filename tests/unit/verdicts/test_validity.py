@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ARTEFACT_RULES
-from risk_sac.verdicts.evidence import PER_ACTOR, Evidence, Ground
+from risk_sac.verdicts.evidence import PER_ACTOR, Evidence, Ground, recorded_contact
 from risk_sac.verdicts.validity import validity_verdicts
 from risk_sac.world.types import Frame
 from tests.unit.sim.contacts import (
@@ -28,7 +28,7 @@ from tests.unit.sim.contacts import (
     ego,
     frames,
 )
-from tests.unit.verdicts.staged import CLEAN
+from tests.unit.verdicts.staged import CLEAN, LANE_M, mirrored, sideways, stage, straight
 
 
 def broken(pair: tuple[Frame, Frame], visible_for_s: float = 3.0, ever_visible: bool = True) -> set[str]:
@@ -62,6 +62,45 @@ def broken(pair: tuple[Frame, Frame], visible_for_s: float = 3.0, ever_visible: 
 )
 def test_geometry_alone_decides_the_degenerate_contacts(actors, rules):
     assert broken(frames(*actors)) == rules
+
+
+BEHIND_MPS, EGO_MPS = 20.0, 12.0
+
+
+def from_behind(side: int, gap_m: float, over_m: float = LANE_M, comes_m: float = 0.0, at_s: float = 2.0) -> Evidence:
+    """The ego moves to `side` by `over_m`, the one behind towards it by `comes_m`; `gap_m` apart when they begin to."""
+    since_s = at_s + 1.5
+    ego_motion = sideways(straight(0.0, 0.0, 0.0, EGO_MPS), at_s, side * 2.0, over_m)
+    rear_m = EGO_MPS * since_s - LENGTH_M - gap_m
+    behind = straight(rear_m - BEHIND_MPS * since_s, side * (over_m + comes_m), 0.0, BEHIND_MPS)
+    return stage(ego_motion, sideways(behind, at_s, -side * 2.0, comes_m))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(
+    ("evidence", "valid"),
+    [
+        pytest.param(lambda side: from_behind(side, 10.0), True, id="the ego cuts in"),
+        pytest.param(lambda side: from_behind(side, 23.0), False, id="the ego leaves room"),
+        pytest.param(lambda side: from_behind(side, 12.0, over_m=0.0, comes_m=LANE_M), False, id="the other comes"),
+        pytest.param(lambda side: from_behind(side, 12.0, over_m=0.0), False, id="neither moves"),
+    ],
+)
+def test_a_contact_from_behind_counts_if_the_ego_has_just_left_the_other_no_room(side, evidence, valid):
+    e = evidence(side)
+    contact = recorded_contact(e, 1)
+    assert contact.ego_zone == "rear"
+    assert validity_verdicts(e, 1, contact, CLEAN)["not_from_behind"] is valid
+    assert validity_verdicts(mirrored(e), 1, recorded_contact(mirrored(e), 1), CLEAN)["not_from_behind"] is valid
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_cut_in_of_more_than_three_seconds_ago_excuses_a_striker_from_behind_no_more(side):
+    # At 12.2 m/s it needs 6 s for a gap of 1.2 m, which is less than R157's.
+    ego_motion = sideways(straight(0.0, 0.0, 0.0, EGO_MPS), 0.0, side * 2.0, LANE_M)
+    behind = straight(-LENGTH_M - 1.5, side * LANE_M, 0.0, EGO_MPS + 0.2)
+    e = stage(ego_motion, behind)
+    assert not validity_verdicts(e, 1, recorded_contact(e, 1), CLEAN)["not_from_behind"]
 
 
 @pytest.mark.parametrize("mirror", [1, -1])
