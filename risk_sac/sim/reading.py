@@ -79,7 +79,7 @@ class Reader:
         self._roles |= {start.id: start.role for start in layout.pedestrians}
         self._walkers = tuple(walkers)
         self._statics = layout.statics
-        self._roles |= {start.id: Role.BACKGROUND for start in layout.statics}
+        self._roles |= {start.id: Role.STATIC for start in layout.statics}
         all_starts: tuple[VehicleStart | PedestrianStart | StaticStart, ...] = (
             *starts,
             *layout.pedestrians,
