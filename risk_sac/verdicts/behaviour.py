@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.scenario.layout import Area
-from risk_sac.verdicts.evidence import Evidence, ego_path, inside, seen_along
+from risk_sac.verdicts.evidence import Evidence, ego_path, inside, lanes_of, seen_along
 from risk_sac.world.types import Bools, Floats, Kind, Role
 
 SMOOTH = 5  # frames, 0.5 s: a pedal that is held
@@ -62,8 +62,9 @@ def _vehicle(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Obse
         yield Observed(actor, "jerk", float(jerk.max()), float(time_s[jerk.argmax() + JERK_STEPS]))
     changes, changed_s = pedal_changes(held, time_s)
     yield Observed(actor, "pedal_changes", changes, changed_s)
-    fastest = int(speed.argmax())
-    yield Observed(actor, "speeding", float(speed[fastest] - e.ground.speed_limit_mps), float(time_s[fastest]))
+    over_mps = speed - lanes_of(e, actor).limit_mps[frames]
+    fastest = int(over_mps.argmax())
+    yield Observed(actor, "speeding", float(over_mps[fastest]), float(time_s[fastest]))
     ahead_m, left_m, cos = _around(e, actor, frames)
     yield from _lines(e, actor, frames, ahead_m, left_m, cos)
     level_s, from_s = _pacing(e, actor, frames, ahead_m, left_m, cos)
