@@ -1,6 +1,6 @@
 """Every setting of the system, as frozen pydantic models with unit and meaning by each field."""
 
-from risk_sac.config.base import Interval, Settings
+from risk_sac.config.base import Interval, Settings, field_errors
 from risk_sac.config.campaign import (
     FAMILY_NAME,
     SHIPPED,
@@ -35,6 +35,7 @@ from risk_sac.config.odd import (
     Scenery,
     SignalType,
 )
+from risk_sac.config.scenario import Like, Scenario
 
 __all__ = [
     "FAMILY_NAME",
@@ -58,6 +59,7 @@ __all__ = [
     "JudgeConfig",
     "LagrangianConfig",
     "LearnerConfig",
+    "Like",
     "Method",
     "MethodName",
     "Odd",
@@ -68,11 +70,13 @@ __all__ = [
     "RunMethod",
     "RunSpec",
     "SacConfig",
+    "Scenario",
     "SceneOptimizerConfig",
     "Scenery",
     "SensorConfig",
     "Settings",
     "SignalType",
     "WarmStartConfig",
+    "field_errors",
     "method_of",
 ]

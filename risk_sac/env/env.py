@@ -174,7 +174,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             self._violated.gained(self._measures.robustness),
             self._reward,
         )
-        truncated = self._sim.ego_arrived or self._steps >= self.problem.family.horizon_steps
+        truncated = self._sim.ego_arrived or self._steps >= self.layout.horizon_steps
         info: dict[str, Any] = {"cost": cost, "robustness": self._measures.soft_min}
         if collision is not None:
             info["collision"] = collision
@@ -294,7 +294,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         return Evidence.from_series(self.trace.series(), self._ground, self._released_s)
 
     def _observe(self) -> Observation:
-        time_left = 1.0 - self._steps / self.problem.family.horizon_steps
+        time_left = 1.0 - self._steps / self.layout.horizon_steps
         m = self._measures
         return self._encoder.encode(self._frame, m.assessment, self._conduct, m.robustness, self._unit_scene, time_left)
 

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence, Set
 
 import numpy as np
 
-from risk_sac.maps.clearance import is_near, outlines
 from risk_sac.maps.found import Fit
 from risk_sac.maps.ways import edges_on
+from risk_sac.scenario.clearance import is_near, outlines
 from risk_sac.scenario.family import WALK_OFFSET_M
 from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M, ribbon, triangles
 from risk_sac.scenario.place import CrossingPlace, FixedSignal, JunctionPlace, Place, PlaceGround, Stretch, Track, Walk

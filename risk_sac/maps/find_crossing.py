@@ -9,12 +9,12 @@ from collections.abc import Iterator
 from contextlib import suppress
 from itertools import pairwise
 
-from risk_sac.maps.clearance import truck_reaches
 from risk_sac.maps.cut import signal_of, walk_over
 from risk_sac.maps.find_junction import roomy, turn
 from risk_sac.maps.find_stretch import check_limit
 from risk_sac.maps.found import NoFit, Spot, lacking
 from risk_sac.maps.ways import AFTER_S, track, way_on
+from risk_sac.scenario.clearance import truck_reaches
 from risk_sac.scenario.family import top_speed
 from risk_sac.scenario.hidden_pedestrian import OCCLUDER_M, room_beyond_m, room_wanted_m
 from risk_sac.scenario.layout import LEAD_IN_S, TRUCK_LENGTH_M

@@ -8,12 +8,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
-from risk_sac.maps.clearance import ROOM_M, too_near, waits_in_the_way
 from risk_sac.maps.cut import signal_of, walk_over
 from risk_sac.maps.find_stretch import check_limit
 from risk_sac.maps.found import NoFit, Spot, lacking
 from risk_sac.maps.ways import AFTER_S, track, way_on
 from risk_sac.scenario import junction
+from risk_sac.scenario.clearance import ROOM_M, too_near, waits_in_the_way
 from risk_sac.scenario.place import JunctionPlace, Leg, Stream, Track
 from risk_sac.world.net import Edge, Link, Net, once
 

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from risk_sac.maps.clearance import too_near
 from risk_sac.maps.found import NoFit, lacking
+from risk_sac.scenario.clearance import too_near
 from risk_sac.scenario.place import Piece, Track
 from risk_sac.world.net import Link, Net, NetLane, once
 

@@ -1,33 +1,114 @@
 """Scenario families by name: those shipped, and those at places that the library keeps."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
-from importlib.resources import files
-from pathlib import Path
 
-from risk_sac.config import SHIPPED
+import numpy as np
+
+from risk_sac.config import CrossingType, Interval, Odd, Scenario, SignalType
+from risk_sac.errors import ConfigError, InfeasibleScene
 from risk_sac.scenario import car_following, hidden_pedestrian, junction
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.behaviour import behaving
+from risk_sac.scenario.family import Family, usual_odd
+from risk_sac.scenario.ground import net_of
+from risk_sac.scenario.interpret import Interpreter
+from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.library import kept
-from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace, Place, Stretch
+from risk_sac.scenario.place import CrossingPlace, JunctionPlace, Place, Stretch
+from risk_sac.scenario.shipped import nets_of, shipped_document, shipped_names
+from risk_sac.scenario.space import SceneSpace
+
+SAMPLED = 64  # scenes whose layouts say which roads a scenario has
 
 
-def family_at(name: str, place: Place) -> Family:
-    """Returns the family of a place's pattern under this name."""
-    match place:
-        case Stretch():
-            return car_following.family(name, place)
-        case CrossingPlace():
-            return hidden_pedestrian.family(name, place)
-        case JunctionPlace():
-            return junction.family(name, place)
+def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Family:
+    """Returns the family of a document.
+
+    Args:
+      document: of the scenario.
+      nets: the file of each network that it names, below `sumo_nets/` or anywhere.
+      name: of the family; the document's own if it is left out.
+
+    Raises:
+      ConfigError: the document does not fit its nets.
+    """
+    of = Interpreter(document, nets)
+    vehicles, pedestrians = of.adversaries
+    space = SceneSpace(name or document.name, of.space.parameters)
+    return Family(
+        name=name or document.name,
+        summary=document.summary,
+        space=space,
+        odd=_odd(of),
+        vehicles=vehicles,
+        pedestrians=pedestrians,
+        layout=of.layout,
+        horizon_steps=of.steps(of.horizon_s),
+        like=document.like,
+        requirements=document.requirements,
+        judge=document.judge,
+    )
 
 
+def sampled(of: Interpreter, count: int = SAMPLED) -> Iterator[Layout | InfeasibleScene]:
+    """Layouts of scenes all over a scenario's space, and errors of those that are refused."""
+    for point in np.random.default_rng(0).random((count, of.space.dimension)):
+        try:
+            yield of.layout(of.space.from_unit(point).values)
+        except InfeasibleScene as refused:
+            yield refused
+
+
+def _odd(of: Interpreter) -> Odd:
+    """The default ODD: the roads that the ego drives on, what goes on anywhere, and what the document says of it."""
+    layouts = [layout for layout in sampled(of) if isinstance(layout, Layout)]
+    if not layouts:
+        refused = next(str(refused) for refused in sampled(of) if isinstance(refused, InfeasibleScene))
+        raise ConfigError("constraints", f"none of {SAMPLED} scenes is possible; in the first, {refused}")
+    lanes = [(net_of(layout.net), f"{layout.ego.route[0]}_{layout.ego.lane}") for layout in layouts]
+    limits_mps = [net.lanes[lane].limit_mps for net, lane in lanes]
+    counts = [len(net.edges[net.lanes[lane].edge].drivable) for net, lane in lanes]
+    kinds: dict[bool, SignalType] = {False: "none", True: "fixed_time"}
+    crossings: set[CrossingType] = {kind for layout in layouts for kind in of.crossings(layout.net)} or {"none"}
+    usual = usual_odd(
+        lanes=Interval(low=min(counts), high=max(counts)),
+        limit_mps=Interval(low=min(limits_mps), high=max(limits_mps)),
+        signals=tuple(sorted({kinds[layout.signal is not None] for layout in layouts})),
+        crossings=tuple(sorted(crossings)),
+        walked=any(layout.pedestrians for layout in layouts),
+    )
+    said = of.document.odd
+    usual = usual.model_copy(update={"dynamic": behaving(usual.dynamic, said.dynamic.behaviour)})
+    branches = {}
+    for branch in type(said).model_fields:
+        own = getattr(said, branch)
+        fields = {name: getattr(own, name) for name in type(own).model_fields if getattr(own, name) is not None}
+        branches[branch] = getattr(usual, branch).model_copy(update=fields)
+    return Odd(**branches)
+
+
+class _Families(Mapping[str, Family]):
+    """Shipped families by name, each read when it is first asked for."""
+
+    def __getitem__(self, name: str) -> Family:
+        if name not in shipped_names():
+            raise KeyError(name)
+        return _shipped(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(shipped_names())
+
+    def __len__(self) -> int:
+        return len(shipped_names())
+
+
+FAMILIES: Mapping[str, Family] = _Families()
+
+
+@cache
 def _shipped(name: str) -> Family:
-    return family_at(name, PLACES.validate_json((Path(str(files("sumo_nets"))) / name / "place.json").read_bytes()))
-
-
-FAMILIES: dict[str, Family] = {name: _shipped(name) for name in SHIPPED}
+    document = shipped_document(name)
+    return family_of(document, nets_of(document))
 
 
 ALIKE: Mapping[str, str] = {"car_following": "low", "crossing": "mixed", "junction": "dense"}
@@ -46,3 +127,14 @@ def family_named(name: str) -> Family:
 @cache  # a name holds a digest of what it stands for
 def _kept(name: str) -> Family:
     return family_at(name, kept(name))
+
+
+def family_at(name: str, place: Place) -> Family:
+    """Returns the family of a place's pattern under this name."""
+    match place:
+        case Stretch():
+            return car_following.family(name, place)
+        case CrossingPlace():
+            return hidden_pedestrian.family(name, place)
+        case JunctionPlace():
+            return junction.family(name, place)

@@ -4,7 +4,19 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from risk_sac.config import CrossingType, DynamicElements, Environment, FamilyName, Interval, Odd, Scenery, SignalType
+from risk_sac.config import (
+    CrossingType,
+    DynamicElements,
+    Environment,
+    FamilyName,
+    Interval,
+    JudgeConfig,
+    Odd,
+    Requirement,
+    Scenery,
+    SignalType,
+)
+from risk_sac.config.scenario import Like
 from risk_sac.scenario.behaviour import preset
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.place import FixedSignal, Place
@@ -26,6 +38,9 @@ class Family:
     pedestrians: tuple[str, ...]  # adversary pedestrians, after the vehicles
     layout: Callable[[Mapping[str, float]], Layout]
     horizon_steps: int = 150  # of 0.1 s
+    like: Like | None = None  # shipped family whose prior fits
+    requirements: tuple[Requirement, ...] = ()  # of the scenario, beside the ODD's
+    judge: JudgeConfig | None = None  # None: the campaign's
     mirrored: bool = False  # whether what is on the left at the pattern's shipped family is on the right, or vice versa
 
     @property
@@ -74,15 +89,22 @@ def at_most(usual: float, room: float) -> float:
 
 
 def road_odd(place: Place, signals: tuple[SignalType, ...], crossings: tuple[CrossingType, ...]) -> Odd:
+    """A family's default ODD at a place."""
+    lanes, limit_mps = (Interval(low=value, high=value) for value in (place.lanes, place.speed_limit_mps))
+    return usual_odd(lanes, limit_mps, signals, crossings, walked=crossings != ("none",))
+
+
+def usual_odd(
+    lanes: Interval,
+    limit_mps: Interval,
+    signals: tuple[SignalType, ...],
+    crossings: tuple[CrossingType, ...],
+    *,
+    walked: bool,
+) -> Odd:
     """A family's default ODD: its own roads, and what drivers, pedestrians and the weather do anywhere."""
-    pedestrians, limit_mps = crossings != ("none",), place.speed_limit_mps
     return Odd(
-        scenery=Scenery(
-            lanes=Interval(low=place.lanes, high=place.lanes),
-            speed_limit_mps=Interval(low=limit_mps, high=limit_mps),
-            signal_types=signals,
-            crossing_types=crossings,
-        ),
+        scenery=Scenery(lanes=lanes, speed_limit_mps=limit_mps, signal_types=signals, crossing_types=crossings),
         environment=Environment(
             friction=Interval(low=0.6, high=1.0),
             visibility_m=Interval(low=100, high=2000),
@@ -90,9 +112,9 @@ def road_odd(place: Place, signals: tuple[SignalType, ...], crossings: tuple[Cro
             time_of_day=("day",),
         ),
         dynamic=DynamicElements(
-            actor_kinds=("pedestrian", "vehicle") if pedestrians else ("vehicle",),
-            ego_speed_mps=Interval(low=0, high=limit_mps),
-            vehicle_speed_mps=Interval(low=0, high=limit_mps * 1.2),
+            actor_kinds=("pedestrian", "vehicle") if walked else ("vehicle",),
+            ego_speed_mps=Interval(low=0, high=limit_mps.high),
+            vehicle_speed_mps=Interval(low=0, high=limit_mps.high * 1.2),
             **preset("ordinary"),
         ),
     )

@@ -154,6 +154,7 @@ class Layout:
     signal: str | None = None  # id of the traffic light
     signal_offset_s: float = 0.0  # where in its cycle the episode starts
     friction: float = 1.0
+    horizon_steps: int = 150  # of 0.1 s
     wary: bool = False  # whether drivers stop for an ego that stands askew; SUMO tells them of a box along its lane
 
 

@@ -121,12 +121,14 @@ class Adversaries:
         self._vehicles = {
             id_: VehicleControl(limits, *(float(a[rows[id_]]) for a in (f.speed_mps, f.accel_mps2, f.lateral_mps)))
             for id_ in family.vehicles
+            if id_ in rows
         }
         self._pedestrians = {}
-        for id_ in family.pedestrians:
+        for id_ in (id_ for id_ in family.pedestrians if id_ in rows):
             walker = Walker(*(float(a[rows[id_]]) for a in (f.x_m, f.y_m, f.heading_rad, f.speed_mps)))
             self._pedestrians[id_] = PedestrianControl(limits, walker)
         self._order = family.adversaries
+        self._slot = {id_: k for k, id_ in enumerate(self._order)}
         self._ids: tuple[str, ...] = ()
 
     def command(self, action: Sequence[float], frame: Frame, sim: SumoSimulation) -> None:
@@ -135,15 +137,15 @@ class Adversaries:
         rows = dict(zip(frame.ids, range(len(frame.ids)), strict=True))
         intended = sim.intended_accel()
         vehicles = {}
-        for k, (id_, control) in enumerate(self._vehicles.items()):
-            place = sim.place(id_)
+        slot = self._slot
+        for id_, control in self._vehicles.items():
+            place, k = sim.place(id_), slot[id_]
             if place is not None:
                 others = frame.state, rows[id_]
                 vehicles[id_] = control.step(first[k], second[k], *place, intended[id_], others)
-        k = len(self._vehicles)
         walkers = {
-            id_: control.step(first[k + j], second[k + j], (frame.state, rows[id_]))
-            for j, (id_, control) in enumerate(self._pedestrians.items())
+            id_: control.step(first[slot[id_]], second[slot[id_]], (frame.state, rows[id_]))
+            for id_, control in self._pedestrians.items()
         }
         sim.apply(vehicles, walkers)
 

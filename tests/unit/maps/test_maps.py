@@ -14,7 +14,6 @@ from shapely.affinity import affine_transform
 import sumo_nets
 from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError, DamagedError, MapError
-from risk_sac.maps.clearance import too_near, truck_reaches, waits_in_the_way
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.cut import walk_over
 from risk_sac.maps.find_junction import turn
@@ -22,6 +21,7 @@ from risk_sac.maps.finder import Map, place_at, survey
 from risk_sac.maps.found import NoFit, lacking
 from risk_sac.maps.ways import way_back, way_on
 from risk_sac.scenario import library
+from risk_sac.scenario.clearance import too_near, truck_reaches, waits_in_the_way
 from risk_sac.scenario.families import FAMILIES, family_at, family_named
 from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace
 from risk_sac.sim.sumo import SumoSimulation

@@ -1,0 +1,338 @@
+"""Scenario document: roads, parameters, actors and constraints of a scenario, as a user writes them.
+
+A document says nothing of lengths, limits, signals or ground: these are the net's. `risk_sac.scenario.interpret` makes
+layouts of it.
+"""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Generic, Literal, Self, TypeVar, get_args
+
+from pydantic import Field, StringConstraints, model_validator
+
+from risk_sac.config.base import Settings
+from risk_sac.config.campaign import JudgeConfig, Requirement
+from risk_sac.config.odd import Odd
+from risk_sac.config.values import ARITHMETIC, Comparison, Expression
+from risk_sac.errors import ConfigError, did_you_mean
+
+T = TypeVar("T")
+Word = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
+NetName = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\s]+$")]
+EGO = "ego"
+LONGEST_HORIZON_S = 400.0
+Reference = Literal["stop_line", "crossing", "junction", "lane_end"]
+ActorRole = Literal["adversary", "story", "background", "static"]
+
+
+class Chosen(Settings, Generic[T]):
+    """A value for each word of a parameter."""
+
+    by: Word
+    """Parameter with words."""
+    of: Annotated[Mapping[Word, T], Field(min_length=1)]
+    """Word → value."""
+
+
+Net = NetName | Chosen[NetName]
+Lane = NetName | Chosen[NetName]
+Route = Annotated[tuple[NetName, ...], Field(min_length=1, max_length=200)]
+
+
+class ScenarioParameter(Settings):
+    """An axis of the scene space, or a constant: one of `range`, `words`, `rows` and `value`."""
+
+    unit: Annotated[str, Field(max_length=20)] = "1"
+    meaning: Annotated[str, Field(max_length=200)] = ""
+    range: tuple[float, float] | None = None
+    """Least and greatest value."""
+    words: Annotated[tuple[Word, ...], Field(min_length=1, max_length=50)] | None = None
+    """Alternatives, each an equal part of the axis from 0 to 1."""
+    rows: Annotated[tuple[Mapping[Word, float], ...], Field(min_length=1, max_length=10_000)] | None = None
+    """Values of several names that vary together, each row an equal part of the axis from 0 to 1."""
+    value: float | None = None
+    """Of a constant."""
+    odd: Annotated[str, Field(max_length=60)] | None = None
+    """ODD field that bounds it too, such as `dynamic.vehicle_speed_mps`."""
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        given = [name for name in ("range", "words", "rows", "value") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ConfigError("", " and ".join(given) or "none of them", "one of range, words, rows and value")
+        if self.range is not None and self.range[0] > self.range[1]:
+            remedy = "write the lower bound first"
+            raise ConfigError("range", f"[{self.range[0]:g}, {self.range[1]:g}]", "low <= high", remedy)
+        if self.words is not None and len(set(self.words)) < len(self.words):
+            raise ConfigError("words", ", ".join(self.words), "each word once")
+        for i, row in enumerate(self.rows or ()):
+            if self.rows and row.keys() != self.rows[0].keys():
+                raise ConfigError(
+                    f"rows[{i}]", ", ".join(row), f"the names of the first row: {', '.join(self.rows[0])}"
+                )
+        return self
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names that its rows give values to."""
+        return tuple(self.rows[0]) if self.rows else ()
+
+
+class Start(Settings):
+    """Where an actor starts: on or beside a lane, relative to another actor, at a crossing's kerb, or at a point."""
+
+    lane: Lane | None = None
+    """Lane, such as `road_1`, or an edge, of which the leftmost lane is taken that leads where the actor goes."""
+    at_m: Expression | None = None
+    """Front bumper from the lane's beginning, m; of an actor beside the road its middle."""
+    before: Reference | None = None
+    """What the front bumper is `distance_m` before; a crossing is met at its near edge."""
+    distance_m: Expression | None = None
+    ahead_of: Word | None = None
+    """Actor whose front this one's rear is `gap_m` ahead of."""
+    behind: Word | None = None
+    """Actor whose rear this one's front is `gap_m` behind."""
+    gap_m: Expression | None = None
+    beside: Word | None = None
+    """Actor whose front this one's front is `ahead_m` ahead of."""
+    ahead_m: Expression | None = None
+    lanes_left: Expression = 0.0
+    """Lanes to the left of the other actor's; negative: to the right."""
+    crossing: NetName | Chosen[NetName] | None = None
+    """Edge whose crossing, at its end, the actor is about to walk over."""
+    side: Literal["right", "left"] = "right"
+    """From which side of the road, as vehicles on that edge see it."""
+    setback_m: Expression = 0.0
+    """From the kerb."""
+    offset_m: Expression = 0.0
+    """From the crossing's middle, to the right of the way across."""
+    x_m: Expression | None = None
+    y_m: Expression | None = None
+    left_m: Expression = 0.0
+    """Of the lane's middle."""
+    heading_deg: Expression = 0.0
+    """Counter-clockwise from the lane's direction; of a point from the x axis."""
+    lead_in: bool | None = None
+    """Whether this is where the actor is when the adversaries are released, after 1.5 s; if not, it is where it begins.
+    An actor that starts relative to another one does as that one does; else the actor's place holds at the release."""
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        given = [name for name in _FORMS if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ConfigError("", " and ".join(given) or "none of them", f"one of {', '.join(_FORMS)}")
+        form = given[0]
+        belongs = ["at_m", "before", "distance_m", "gap_m", "ahead_m", "y_m"]
+        wanted = _FORMS[form]
+        for name in belongs:
+            if getattr(self, name) is None and name in wanted and form != "lane":
+                raise ConfigError(name, "nothing", f"a value, beside {form}")
+            if getattr(self, name) is not None and name not in wanted:
+                raise ConfigError(name, "a value", f"nothing beside {form}")
+        if form == "lane" and (self.at_m is None) == (self.before is None):
+            raise ConfigError("", "at_m and before" if self.before else "neither at_m nor before", "one of them")
+        if self.before is not None and self.distance_m is None:
+            raise ConfigError("distance_m", "nothing", f"the distance before the {self.before}, m")
+        return self
+
+    @property
+    def reference(self) -> str | None:
+        """The actor it is relative to."""
+        return self.ahead_of or self.behind or self.beside
+
+
+_FORMS: Mapping[str, tuple[str, ...]] = {
+    "lane": ("at_m", "before", "distance_m"),
+    "ahead_of": ("gap_m",),
+    "behind": ("gap_m",),
+    "beside": ("ahead_m",),
+    "crossing": (),
+    "x_m": ("y_m",),
+}
+
+
+class Moving(Settings):
+    """What the ego and other actors have in common."""
+
+    body: Word | Chosen[Word] = "car"
+    """Row of the table of bodies, or a parameter whose words are such rows."""
+    start: Start
+    speed: Expression = 0.0
+    """Initial speed, m/s; along the actor's heading."""
+    route: Route | Chosen[Route] | None = None
+    """Edges, or lanes, in the order of driving; without it the straightest way on."""
+    turn: Word | Chosen[Word] | None = None
+    """left, straight or right at the first junction, or a parameter with such words; instead of a route."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if self.route is not None and self.turn is not None:
+            raise ConfigError("turn", "a turn beside a route", "one of route and turn")
+        return self
+
+
+class Actor(Moving):
+    """Any road user but the ego."""
+
+    role: ActorRole = "adversary"
+    moves: Literal["lanes", "freely"] | None = None
+    """In lanes as a vehicle or anywhere as a pedestrian; without it as its body usually does."""
+    when: Comparison | None = None
+    """Scenes in which it is there."""
+
+
+class Stream(Settings):
+    """Background traffic on a lane, a gap between any two vehicles; kept clear of other actors."""
+
+    lane: Lane | Chosen[tuple[NetName, ...]] | Annotated[tuple[NetName, ...], Field(min_length=1)]
+    """Lane, or several, which the vehicles take in turns."""
+    before: Reference = "lane_end"
+    from_m: Expression = 0.0
+    """Where the traffic begins: this far before the reference; the first vehicle is a gap behind that."""
+    gap_m: Expression
+    """Between fronts."""
+    count: Annotated[int, Field(ge=1, le=100)] = 2
+    speed: Expression
+    body: Word | Chosen[Word] = "car"
+    route: Route | Chosen[Route] | None = None
+    turn: Word | Chosen[Word] | None = None
+    lead_in: bool = True
+    clear_m: Annotated[float, Field(ge=0, le=1000)] = 10.0
+    """Least gap to other actors on its lane; a vehicle without room starts behind them, or is left out."""
+
+
+class Like(Settings):
+    """The shipped family whose prior fits."""
+
+    family: Word
+    actors: Mapping[Word, Word] = {}
+    """Adversary → the family's actor that it stands for; those of the same name stand for each other."""
+    mirrored: bool = False
+    """Whether what is on the left there is on the right here."""
+
+
+class AllOf(Settings):
+    """Constraints that all hold."""
+
+    all: Annotated[tuple["Constraint", ...], Field(min_length=1, max_length=100)]
+
+
+class AnyOf(Settings):
+    """Constraints of which one holds at least."""
+
+    any: Annotated[tuple["Constraint", ...], Field(min_length=1, max_length=100)]
+
+
+Constraint = Comparison | AllOf | AnyOf
+
+
+class SignalTiming(Settings):
+    """When in its cycle a traffic light is at the start."""
+
+    id: NetName | None = None
+    """Without it the first on the ego's way, or the only one of the net."""
+    offset_s: Expression = 0.0
+
+
+class Scenario(Settings):
+    """A scenario, from which scenes are drawn."""
+
+    name: Word
+    summary: Annotated[str, Field(max_length=300)] = ""
+    tags: Annotated[tuple[Annotated[str, Field(max_length=60)], ...], Field(max_length=30)] = ()
+    """Such as `iso34502:cut-in`, `ncap:CCRb`, or free words."""
+    network: Net
+    """A shipped net's name, or a SUMO net beside the document."""
+    horizon_s: Expression = 15.0
+    """Length of an episode, at most 400."""
+    like: Like | None = None
+    """Without it no prior is used."""
+    parameters: Annotated[Mapping[Word, ScenarioParameter], Field(max_length=100)] = {}
+    ego: Moving
+    actors: Annotated[Mapping[Word, Actor], Field(max_length=100)] = {}
+    streams: Annotated[Mapping[Word, Stream], Field(max_length=50)] = {}
+    constraints: Annotated[tuple[Constraint, ...], Field(max_length=100)] = ()
+    signal: SignalTiming = SignalTiming()
+    friction: Expression = 1.0
+    """Of tyres on the road."""
+    wary: bool = True
+    """Whether drivers stop for an ego that stands askew."""
+    odd: Odd = Odd()
+    requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
+    judge: JudgeConfig | None = None
+
+    @property
+    def values(self) -> Iterator[tuple[str, Expression]]:
+        """All expressions, each with its path in the document."""
+        yield from _expressions("", self)
+
+    @property
+    def choices(self) -> Iterator[tuple[str, "Chosen[Any]"]]:
+        """All values that a parameter's word chooses, each with its path in the document."""
+        yield from _choices("", self)
+
+    @model_validator(mode="after")
+    def _names(self) -> Self:
+        if EGO in self.actors:
+            raise ConfigError("actors.ego", "an actor of this name", "another name", "the ego has a part of its own")
+        if both := sorted(self.actors.keys() & self.streams.keys()):
+            raise ConfigError(f"streams.{both[0]}", "the name of an actor", "another name")
+        for path, choice in self.choices:
+            parameter = self.parameters.get(choice.by)
+            if parameter is None or parameter.words is None:
+                words = [name for name, other in self.parameters.items() if other.words]
+                wanted = f"a parameter with words: {', '.join(words) or 'there is none'}"
+                raise ConfigError(f"{path}.by", repr(choice.by), wanted, did_you_mean(choice.by, words))
+            if missing := sorted(set(parameter.words) - choice.of.keys()):
+                raise ConfigError(f"{path}.of", ", ".join(choice.of), f"a value for {', '.join(missing)} too")
+            if unknown := sorted(choice.of.keys() - set(parameter.words)):
+                remedy = did_you_mean(unknown[0], list(parameter.words))
+                raise ConfigError(f"{path}.of.{unknown[0]}", "a word", f"one of {', '.join(parameter.words)}", remedy)
+        for name, actor in self.actors.items():
+            other = actor.start.reference
+            if other is not None and other != EGO and other not in self.actors:
+                known = [EGO, *(known for known in self.actors if known != name)]
+                field = next(form for form in ("ahead_of", "behind", "beside") if getattr(actor.start, form))
+                where = f"actors.{name}.start.{field}"
+                raise ConfigError(where, repr(other), f"one of {', '.join(known)}", did_you_mean(other, known))
+        if self.ego.start.reference is not None:
+            raise ConfigError("ego.start", "a start relative to another actor", "a lane", "let the others start by it")
+        return self
+
+    @model_validator(mode="after")
+    def _no_cycle(self) -> Self:
+        for name in self.actors:
+            chain, other = [name], self.actors[name].start.reference
+            while other is not None and other != EGO:
+                if other in chain:
+                    cycle = " → ".join([*chain[chain.index(other) :], other])
+                    raise ConfigError(
+                        f"actors.{name}.start", f"a cycle: {cycle}", "a chain that ends at the ego or a lane"
+                    )
+                chain.append(other)
+                other = self.actors[other].start.reference
+        return self
+
+
+def _expressions(path: str, value: object) -> Iterator[tuple[str, Expression]]:
+    for name, field in type(value).model_fields.items() if isinstance(value, Settings) else ():
+        here, there = f"{path}.{name}".removeprefix("."), getattr(value, name)
+        marks = [field.metadata, *(getattr(kind, "__metadata__", ()) for kind in get_args(field.annotation))]
+        if any(ARITHMETIC in mark for mark in marks):
+            yield from [] if there is None else [(here, there)]
+        elif isinstance(there, Mapping):
+            for key, inner in there.items():
+                yield from _expressions(f"{here}.{key}", inner)
+        elif isinstance(there, Settings):
+            yield from _expressions(here, there)
+
+
+def _choices(path: str, value: object) -> "Iterator[tuple[str, Chosen[Any]]]":
+    for name in type(value).model_fields if isinstance(value, Settings) else ():
+        here, there = f"{path}.{name}".removeprefix("."), getattr(value, name)
+        if isinstance(there, Chosen):
+            yield here, there
+        elif isinstance(there, Mapping):
+            for key, inner in there.items():
+                yield from _choices(f"{here}.{key}", inner)
+        else:
+            yield from _choices(here, there)
