@@ -11,7 +11,7 @@ from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.sim.paths import HEADING, LIMIT, STATION, Y
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.world.geometry import overlapping_pairs
-from risk_sac.world.types import Frame, Role
+from risk_sac.world.types import Frame, Role, Signal
 
 GAP_S = 2.0
 RAMP, MAIN = ("ramp", "weave", "out"), ("main", "weave", "out")
@@ -94,3 +94,10 @@ def test_the_path_leaves_an_acceleration_lane_in_three_seconds_at_the_limit(sim)
     assert (ends - begins) / 36.0 == pytest.approx(3.0, abs=0.1)
     assert path[LIMIT, turned[0]] == 36.0
     assert path[Y, -1] == -5.25
+
+
+def test_every_signal_of_a_net_is_read(sim):
+    ego = car("ego", ("from_south", "to_north"), 1, 100, 10)
+    frame = sim.reset(Layout(net="dense/dense.net.xml", ego=ego, vehicles=()), 1)
+    assert frame.signal is not Signal.NONE
+    assert 0.0 < frame.stop_line_m < 135.0
