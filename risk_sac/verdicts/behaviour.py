@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from risk_sac.risk.conduct import CALM_MPS, CRAWLS_MPS, MOVING_MPS, NEAR_LINE_M
 from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.course import BodyOnPath
-from risk_sac.verdicts.evidence import Evidence, ego_path, inside, seen_along
+from risk_sac.verdicts.evidence import Evidence, ego_path, inside, lanes_of, seen_along
 from risk_sac.world.types import Bools, Floats, Kind, Role
 
 SMOOTH = 5  # frames, 0.5 s: a pedal that is held
@@ -68,8 +68,9 @@ def _vehicle(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Obse
         yield Observed(actor, "jerk", float(jerk.max()), float(time_s[jerk.argmax() + JERK_STEPS]))
     changes, changed_s = pedal_changes(held, time_s)
     yield Observed(actor, "pedal_changes", changes, changed_s)
-    fastest = int(speed.argmax())
-    yield Observed(actor, "speeding", float(speed[fastest] - e.ground.speed_limit_mps), float(time_s[fastest]))
+    over_mps = speed - lanes_of(e, actor).limit_mps[frames]
+    fastest = int(over_mps.argmax())
+    yield Observed(actor, "speeding", float(over_mps[fastest]), float(time_s[fastest]))
     ahead_m, left_m, cos = _around(e, actor, frames)
     within = _in_areas(e, e.ground.junctions, actor, frames)
     yield from _lines(e, actor, frames, within, (ahead_m, left_m, cos))
@@ -109,11 +110,11 @@ def _lines(
         enters = first + np.flatnonzero(over[first:last] > OVER_M)
         if first == 0 or not len(enters) or not (len(crosses) or last == len(frames)):
             continue  # it came so from the release, or went back
-        at, around = int(enters[0]), slice(max(first - window, 0), last + window)
+        at, during = int(enters[0]), slice(max(first - window, 0), last + window)
         time_s = float(e.time_s[frames[at]])
-        moving = smoothed(lateral[around], window)
-        fastest = float(moving.max()) if len(moving) else float(lateral[around].mean())
-        yield Observed(actor, "lateral_speed", float(lateral[around].max()), time_s)
+        moving = smoothed(lateral[during], window)
+        fastest = float(moving.max()) if len(moving) else float(lateral[during].mean())
+        yield Observed(actor, "lateral_speed", float(lateral[during].max()), time_s)
         yield Observed(actor, "lane_change_duration", lane_m / max(fastest, 0.1), time_s)
         side = float(np.sign(offset[at]))
         yield from _new_follower(e, actor, frames, at, side * left_m[at], ahead_m[at], cos[at])
