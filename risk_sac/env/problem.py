@@ -12,19 +12,18 @@ from risk_sac.egos.registry import pinned
 from risk_sac.env.observation_layout import observation_size
 from risk_sac.errors import ConfigError, OddError
 from risk_sac.records import NO_CONTACT, Adjustment
+from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import parsed
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import GRAVITY_MPS2, VISIBILITY, limits_from_odd, with_environment
 from risk_sac.scenario.odd import (
-    SHIPPED_REQUIREMENTS,
     TINY,
     field,
     intersect,
     narrow,
     paths,
-    requirements_from_odd,
     text_of,
     widest,
 )
