@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
-from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Interval, Odd, Requirement, RunSpec
+from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Interval, JudgeConfig, Odd, Requirement, RunSpec
 from risk_sac.config.campaign import check_demand
 from risk_sac.config.methods import MethodName
 from risk_sac.egos.registry import pinned
@@ -134,11 +134,12 @@ class Problem:
             )
         shipped = {each.name: each for each in requirements_from_odd(odd, ego.response_s)}
         own = {}
-        for i, requirement in enumerate(spec.requirements):
-            wanted = _own(f"requirements[{i}]", requirement, shipped)
-            if wanted is not None:
-                parsed(i, wanted, STEP_S, family.horizon_steps)
-                own[wanted.name] = wanted
+        for source, requirements in (("scenario.", family.requirements), ("", spec.requirements)):
+            for i, requirement in enumerate(requirements):
+                wanted = _own(f"{source}requirements[{i}]", requirement, shipped)
+                if wanted is not None:
+                    parsed(i, wanted, STEP_S, family.horizon_steps)
+                    own[wanted.name] = wanted
         problem = cls(
             family=family,
             odd=odd,
@@ -146,7 +147,7 @@ class Problem:
             ego=ego,
             requirements=tuple((shipped | own).values()),
             rss=_rss_parameters(odd),
-            drivers=spec.judge.drivers,
+            drivers=(family.judge or spec.judge if spec.judge == JudgeConfig() else spec.judge).drivers,
         )
         problem.check_demand(spec)
         return problem

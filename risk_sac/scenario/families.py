@@ -1,6 +1,7 @@
 """Scenario families by name: those shipped, and those at places that the library keeps."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -16,7 +17,6 @@ from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.library import kept
 from risk_sac.scenario.place import CrossingPlace, JunctionPlace, Place, Stretch
 from risk_sac.scenario.shipped import nets_of, shipped_document, shipped_names
-from risk_sac.scenario.space import SceneSpace
 
 SAMPLED = 64  # scenes whose layouts say which roads a scenario has
 
@@ -34,7 +34,7 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
     """
     of = Interpreter(document, nets)
     vehicles, pedestrians = of.adversaries
-    space = SceneSpace(name or document.name, of.space.parameters)
+    space = replace(of.space, family=name or document.name)
     return Family(
         name=name or document.name,
         summary=document.summary,

@@ -104,7 +104,15 @@ class Interpreter:
             categories = parameter.words if binary and parameter.words else ()
             meaning = parameter.meaning or name.replace("_", " ")
             parameters.append(Parameter(name, parameter.unit, low, high, meaning, parameter.odd, categories))
-        return SceneSpace(self.document.name, tuple(parameters))
+        return SceneSpace(self.document.name, tuple(parameters), self.holds if self.document.constraints else None)
+
+    def holds(self, xi: Mapping[str, float]) -> bool:
+        """Whether a scene keeps all constraints."""
+        value = self.value(xi)
+        try:
+            return all(map(value.holds, self.document.constraints))
+        except ConfigError:  # a value that does not exist there
+            return False
 
     def value(self, xi: Mapping[str, float]) -> Value:
         """What the parameters say in a scene."""
