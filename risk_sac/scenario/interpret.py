@@ -444,7 +444,7 @@ def _started(name: str, role: Role, place: OnTrack, speed_mps: float, body: Body
         lane=piece.lane,
         position_m=position_m,
         speed_mps=min(speed_mps, piece.limit_mps),  # SUMO refuses a faster start
-        body=body,  # type: ignore[arg-type]
+        body=body,
     )
 
 

@@ -80,8 +80,9 @@ class Reader:
         self._walkers = tuple(walkers)
         self._statics = layout.statics
         self._roles |= {start.id: Role.STATIC for start in layout.statics}
-        all_starts = (*starts, *layout.pedestrians, *layout.statics)
-        self._body = {start.id: BODIES[start.body] for start in all_starts}
+        self._body = {start.id: BODIES[start.body] for start in starts}
+        self._body |= {start.id: BODIES[start.body] for start in layout.pedestrians}
+        self._body |= {start.id: BODIES[start.body] for start in layout.statics}
         self._signal = layout.signal
         self._walk_signals = [] if layout.signal is None else _walk_signals(layout.signal, layout.crossings)
         self._vehicles = tuple(start.id for start in starts)
