@@ -17,6 +17,7 @@ from risk_sac.failures.sentence import sentence, story
 from risk_sac.failures.show import draw_recording
 from risk_sac.failures.thumbnail import EGO, HEIGHT, STRIKER, WIDTH, thumbnail
 from risk_sac.run_folder.results import RecordedFailure
+from risk_sac.scenario.bodies import CODES
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.world.read_net import read_net
 from tests.builders import collision, judgement, violation
@@ -191,6 +192,8 @@ def encounter(*, kind: int = 0, x_m: float = 4.0, y_m: float = 3.2, heading: flo
         "released_s": np.array(RELEASE / 10),
         "ids": np.array(["ego", "lead"]),
         "kind": np.array([0, kind], np.int8),
+        "body": np.array([CODES["car"], CODES["pedestrian" if kind else "car"]], np.int8),
+        "role": np.array([0, 1], np.int8),
     }
 
 
