@@ -247,7 +247,8 @@ def _stepped_onto_crossing(evidence: Evidence, striker: int) -> int | None:
 
 
 def _is_any(link: Letters, letters: bytes) -> Bools:
-    return np.logical_or.reduce([link == letter for letter in letters])
+    shown: Bools = np.logical_or.reduce([link == letter for letter in letters])
+    return shown
 
 
 def _front(evidence: Evidence, first: int, actor: int) -> tuple[Floats, Floats]:
