@@ -127,8 +127,11 @@ def _response(series: Series, began: int, response: str) -> str:
         return f"brakes {late_s:.1f} s late" if late_s >= STEP_S / 2 else RESPONSES[response]
     if response == "braking":
         return "brakes, and touches it still"
-    if response in ("standing", "starting") and series["speed_mps"][began, 0] >= STANDING_MPS:
-        return "has stopped" if response == "standing" else "stops, then starts"
+    speed = series["speed_mps"][began:, 0]
+    if response == "standing" and speed[0] >= STANDING_MPS:
+        return "has stopped"
+    if response == "starting" and speed[0] >= STANDING_MPS > speed.min():
+        return "stops, then starts"
     if response == "none" and len(braked):
         return "brakes no longer"
     return RESPONSES[response]
