@@ -14,6 +14,7 @@ from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.library import kept
+from risk_sac.scenario.odd import SIGNAL_OF
 from risk_sac.scenario.place import CrossingPlace, JunctionPlace, Place, Stretch
 from risk_sac.scenario.shipped import nets_of, shipped_document, shipped_names
 from risk_sac.scenario.space import SceneSpace
@@ -70,10 +71,11 @@ def _odd(of: Interpreter) -> Odd:
     counts = [len(net.edges[net.lanes[lane].edge].drivable) for net, lane in lanes]
     kinds: dict[bool, SignalType] = {False: "none", True: "fixed_time"}
     crossings: set[CrossingType] = {kind for layout in layouts for kind in of.crossings(layout.net)} or {"none"}
+    met = {SIGNAL_OF[kind] for kind in crossings if kind in SIGNAL_OF}
     usual = usual_odd(
         lanes=Interval(low=min(counts), high=max(counts)),
         limit_mps=Interval(low=min(limits_mps), high=max(limits_mps)),
-        signals=tuple(sorted({kinds[layout.signal is not None] for layout in layouts})),
+        signals=tuple(sorted({kinds[layout.signal is not None] for layout in layouts} | met)),
         crossings=tuple(sorted(crossings)),
         walked=any(layout.pedestrians for layout in layouts),
     )
