@@ -15,6 +15,7 @@ from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.library import kept
+from risk_sac.scenario.odd import SIGNAL_OF
 from risk_sac.scenario.place import CrossingPlace, JunctionPlace, Place, Stretch
 from risk_sac.scenario.shipped import nets_of, shipped_document, shipped_names
 
@@ -70,10 +71,11 @@ def _odd(of: Interpreter) -> Odd:
     counts = [len(net.edges[net.lanes[lane].edge].drivable) for net, lane in lanes]
     kinds: dict[bool, SignalType] = {False: "none", True: "fixed_time"}
     crossings: set[CrossingType] = {kind for layout in layouts for kind in of.crossings(layout.net)} or {"none"}
+    met = {SIGNAL_OF[kind] for kind in crossings if kind in SIGNAL_OF}
     usual = usual_odd(
         lanes=Interval(low=min(counts), high=max(counts)),
         limit_mps=Interval(low=min(limits_mps), high=max(limits_mps)),
-        signals=tuple(sorted({kinds[layout.signal is not None] for layout in layouts})),
+        signals=tuple(sorted({kinds[layout.signal is not None] for layout in layouts} | met)),
         crossings=tuple(sorted(crossings)),
         walked=any(layout.pedestrians for layout in layouts),
     )
@@ -126,7 +128,8 @@ def family_named(name: str) -> Family:
 
 @cache  # a name holds a digest of what it stands for
 def _kept(name: str) -> Family:
-    return family_at(name, kept(name))
+    document, folder = kept(name)
+    return family_of(document, nets_of(document, folder), name)
 
 
 def family_at(name: str, place: Place) -> Family:

@@ -23,6 +23,7 @@ from risk_sac.scenario.place import FixedSignal, Place
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 EGO = "ego"
+MOST_OVER_LIMIT = 1.2  # fastest vehicles, as a share of the limit; choice
 WALK_OFFSET_M = 1.9  # of a pedestrian from the middle of its way, along the road, at most
 
 
@@ -114,7 +115,7 @@ def usual_odd(
         dynamic=DynamicElements(
             actor_kinds=("pedestrian", "vehicle") if walked else ("vehicle",),
             ego_speed_mps=Interval(low=0, high=limit_mps.high),
-            vehicle_speed_mps=Interval(low=0, high=limit_mps.high * 1.2),
+            vehicle_speed_mps=Interval(low=0, high=limit_mps.high * MOST_OVER_LIMIT),
             **preset("ordinary"),
         ),
     )
