@@ -258,6 +258,14 @@ def test_the_sentence_tells_the_ego_s_manoeuvre_and_that_the_striker_was_hidden(
     )
 
 
+def test_an_ego_that_stops_in_the_conflict_is_told_apart_from_one_that_stood_before():
+    stops = encounter()
+    stops["speed_mps"][-RELEASE:, 0] = 0.2
+    starts = collision(time_s=3.5, judgement=judgement(conflict_s=1.0, ego_response="starting"))
+    assert sentence(stops, starts).endswith("stops, then starts")
+    assert sentence(encounter(), starts).endswith("ego at 14 m/s starts")
+
+
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_flicker_of_motion_is_not_told(side):
     flicker = during(1.0, 1.2, 0.3 * side)
