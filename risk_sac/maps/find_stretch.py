@@ -8,6 +8,7 @@ from contextlib import suppress
 
 from risk_sac.maps.found import Fit, NoFit, Spot, lacking
 from risk_sac.maps.scenarios import (
+    Fields,
     at_most,
     friction,
     initial_speed,
@@ -56,28 +57,32 @@ def fit(net: Net, spot: Spot) -> Fit:
     sides = {side: beside for side in ("left", "right") if (beside := _beside(net, lanes.get(side), reference_m))}
     followed = ego.room_m >= LEAST_FOLLOWING_M + 2 * CAR_LENGTH_M + CLEAR_M
     offset, signal = signal_parts(net, [link.signal for link in _soon(way, own.length_m - reference_m)])
-    actors = {"lead": {"start": {"ahead_of": "ego", "gap_m": "lead_gap_m"}, "speed": "lead_speed_mps"}}
+    actors: Fields = {"lead": {"start": {"ahead_of": "ego", "gap_m": "lead_gap_m"}, "speed": "lead_speed_mps"}}
     parameters = {
         **initial_speed("ego_speed_mps", 8, own.limit_mps, "initial speed of the ego"),
         "lead_gap_m": number((8.0, 50.0), "m", "gap from the ego's front to the leader's rear"),
         **initial_speed("lead_speed_mps", 6, own.limit_mps, "initial speed of the leader"),
     }
     for side, beside in sides.items():
-        start = {"beside": "ego", "ahead_m": f"{side}_offset_m", "lanes_left": 1 if side == "left" else -1}
-        actors[side] = {"start": start, "speed": f"{side}_speed_mps", "route": route_of(net, beside)}
+        lanes_left = 1 if side == "left" else -1
+        actors[side] = {
+            "start": {"beside": "ego", "ahead_m": f"{side}_offset_m", "lanes_left": lanes_left},
+            "speed": f"{side}_speed_mps",
+            "route": route_of(net, beside),
+        }
         low_m = -at_most(BEHIND_M, beside.room_m - CAR_LENGTH_M - CLEAR_M)
         parameters[f"{side}_offset_m"] = number(
             (low_m, AHEAD_M), "m", f"{side} neighbour's front relative to the ego's"
         )
         parameters |= initial_speed(f"{side}_speed_mps", 6, own.limit_mps, f"initial speed of the {side} neighbour")
     if followed:
-        start = {"behind": "ego", "gap_m": "follower_gap_m"}
-        actors["follower"] = {"role": "background", "start": start, "speed": "ego_speed_mps"}
+        behind = {"behind": "ego", "gap_m": "follower_gap_m"}
+        actors["follower"] = {"role": "background", "start": behind, "speed": "ego_speed_mps"}
         high_m = at_most(MOST_FOLLOWING_M, ego.room_m - 2 * CAR_LENGTH_M - CLEAR_M)
         meaning = "gap from the follower's front to the ego's rear"
         parameters["follower_gap_m"] = number((LEAST_FOLLOWING_M, high_m), "m", meaning)
-    start = {"beside": "ego", "ahead_m": f"lead_gap_m + {DISTANT_M:g}"}
-    actors["distant"] = {"role": "background", "start": start, "speed": "lead_speed_mps"}
+    ahead = {"beside": "ego", "ahead_m": f"lead_gap_m + {DISTANT_M:g}"}
+    actors["distant"] = {"role": "background", "start": ahead, "speed": "lead_speed_mps"}
     start = {"lane": lane_of(net, ego), "at_m": reference_m, "lead_in": False}
     fields = {
         "parameters": parameters | offset | friction(),
