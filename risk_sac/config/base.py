@@ -195,8 +195,12 @@ def _fields_at(location: Location, model: type[BaseModel]) -> list[str]:
     node = schema
     for part in location:
         node = _resolve(schema, node)
-        node = node["properties"][part] if isinstance(part, str) else node["items"]
-    return sorted(_resolve(schema, node)["properties"])
+        if isinstance(part, str):  # a field, or a name of the user's own
+            own = [*node.get("patternProperties", {}).values(), node.get("additionalProperties")]
+            node = node.get("properties", {}).get(part) or own[0] or {}
+        else:
+            node = node["items"]
+    return sorted(_resolve(schema, node).get("properties", ()))
 
 
 @cache
