@@ -36,10 +36,14 @@ def changed(path: str, value: Any) -> str:
     return yaml.safe_dump(document, sort_keys=False)
 
 
+def checked(text: str, folder: Path | None = None) -> None:
+    document = document_from(text)
+    check_document(document, nets_of(document, folder))
+
+
 def fault(text: str, folder: Path | None = None) -> ConfigError:
     with pytest.raises(ConfigError) as caught:
-        document = document_from(text)
-        check_document(document, nets_of(document, folder))
+        checked(text, folder)
     return caught.value
 
 
@@ -139,9 +143,8 @@ def test_ego_without_a_way_on() -> None:
         ("name: !!python/object/apply:os.system [ls]", ""),
         ("summary: " + "x" * 10_000_000, ""),
     ],
-    ids=["name twice", "actor twice", "twice in JSON", "empty", "list", "broken", "endless", "deep", "deep JSON", "code",
-         "10 MB"],
-)  # fmt: skip
+    ids="name-twice actor-twice JSON-twice empty list broken endless deep deep-JSON code 10MB".split(),
+)
 def test_text_that_is_no_document(text: str, field: str) -> None:
     error = fault(text)
     assert error.field == field
