@@ -35,7 +35,7 @@ from risk_sac.cli.flags import (
     scene_flags,
 )
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
-from risk_sac.config import METHODS, SHIPPED, RunMethod, RunSpec
+from risk_sac.config import METHODS, RunMethod, RunSpec
 from risk_sac.config.spec_file import read_campaign, read_spec
 from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
@@ -44,6 +44,7 @@ from risk_sac.host.terminal import complain, console, notes
 from risk_sac.metrics import METRICS, Metric, with_published
 from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import TIMES, RunResults
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 
 if TYPE_CHECKING:
     from risk_sac.execution.jobs import Job
@@ -191,7 +192,7 @@ def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
 
 def _evaluate(options: argparse.Namespace) -> int:
     methods = [name for name, method in METHODS.items() if not method.needs]
-    defaults = {"families": list(SHIPPED), "methods": methods, "seeds": list(range(SEEDS))}
+    defaults = {"families": list(PAPER_FAMILIES), "methods": methods, "seeds": list(range(SEEDS))}
     options.families = families_on_map(options) or options.families
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | scene_flags(options), defaults)
     say_adjustments(adjustments(spec))

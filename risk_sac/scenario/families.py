@@ -126,7 +126,8 @@ def family_named(name: str) -> Family:
 
 @cache  # a name holds a digest of what it stands for
 def _kept(name: str) -> Family:
-    return family_at(name, kept(name))
+    document, folder = kept(name)
+    return family_of(document, nets_of(document, folder), name)
 
 
 def family_at(name: str, place: Place) -> Family:

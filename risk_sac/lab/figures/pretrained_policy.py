@@ -11,9 +11,10 @@ import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from risk_sac.config import SHIPPED, EgoConfig, RewardConfig
+from risk_sac.config import EgoConfig, RewardConfig
 from risk_sac.egos.registry import pinned
 from risk_sac.lab.pretraining.rollouts import PolicyEpisode, Turn, play_turn
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.frozen_policy import Layers
 from risk_sac.search.prior.policy import read_policy, shipped_policy
 
@@ -41,7 +42,7 @@ def main() -> None:
     """Prints a row for each ego and driver."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("egos", nargs="+", metavar="EGO")
-    parser.add_argument("--family", choices=SHIPPED, default="low")
+    parser.add_argument("--family", choices=PAPER_FAMILIES, default="low")
     parser.add_argument("--policy", type=Path, metavar="FILE")
     parser.add_argument("--seed", type=int, default=301)
     parser.add_argument("--episodes", type=int, default=60)

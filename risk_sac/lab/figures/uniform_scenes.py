@@ -18,12 +18,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.config import SHIPPED, RunSpec
+from risk_sac.config import RunSpec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.lab.figures.pretrained_policy import ego_of
 from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.lab.pretraining.episodes import ScriptEpisode, outcome_of, play
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.prior.start import Start, start_of
 from risk_sac.search.scene_optimizer.archive import mutated
@@ -103,7 +104,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--egos", nargs="+", required=True, metavar="EGO", help="as pretrained_policy takes them")
-    parser.add_argument("--families", nargs="+", choices=SHIPPED, default=list(SHIPPED))
+    parser.add_argument("--families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
     parser.add_argument("--drivers", nargs="+", choices=DRIVERS, default=list(DRIVERS))
     parser.add_argument("--scenes", type=int, default=60)
     parser.add_argument("--scripts", type=int, default=500)
