@@ -143,7 +143,19 @@ def test_ego_without_a_way_on() -> None:
         ("name: !!python/object/apply:os.system [ls]", ""),
         ("summary: " + "x" * 10_000_000, ""),
     ],
-    ids="name-twice actor-twice JSON-twice empty list broken endless deep deep-JSON code 10MB".split(),
+    ids=[
+        "name-twice",
+        "actor-twice",
+        "JSON-twice",
+        "empty",
+        "list",
+        "broken",
+        "endless",
+        "deep",
+        "deep-JSON",
+        "code",
+        "10MB",
+    ],
 )
 def test_text_that_is_no_document(text: str, field: str) -> None:
     error = fault(text)
