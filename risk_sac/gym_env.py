@@ -75,7 +75,7 @@ class NamedEnv(RiskSacEnv):
                 (frame.x_m[actor], frame.y_m[actor], frame.heading_rad[actor]),
                 (frame.length_m[actor], frame.width_m[actor]),
                 EGO if actor == 0 else STRIKER if driven else OTHER,
-                walks=frame.kind[actor] == Kind.PEDESTRIAN,
+                person=frame.kind[actor] == Kind.PEDESTRIAN,
                 known=True,
             )
         return np.asarray(canvas.picture())

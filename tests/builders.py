@@ -141,6 +141,7 @@ def judgement(grade: Grade | None = Grade.PREVENTABLE, conflict_s: float = 2.5, 
         "severity": Severity.MODERATE,
         "impact_mps": 7.0,
         "injury_risk": 0.005,
+        "harm": "serious injury",
         "unresponsive": False,
         "drivers": {}
         if grade is None
@@ -177,6 +178,7 @@ def collision(**changes: Any) -> Collision:
         "time_s": 3.2,
         "other_id": "lead",
         "other_kind": "vehicle",
+        "other_body": "car",
         "other_role": "adversary",
         "contact_x_m": 2.3,
         "contact_y_m": 0.1,
@@ -206,6 +208,7 @@ def violation(**changes: Any) -> Violation:
         "robustness": -0.4,
         "other_id": None,
         "other_kind": None,
+        "other_body": None,
         "other_role": None,
         "ego_speed_mps": 9.0,
         "ego_manoeuvre": "straight",

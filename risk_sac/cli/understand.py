@@ -3,14 +3,14 @@
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, get_args
 
 from rich.markup import escape
 
 from risk_sac.cli.console import OK, counted, narrow_table, print_answer, say
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.errors import ConfigError
-from risk_sac.failures.studied import Studied, note, valid_failure
+from risk_sac.failures.studied import Aim, Studied, note, valid_failure
 from risk_sac.host.terminal import console
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.durable import replace_file
@@ -46,7 +46,7 @@ def add(commands: Commands) -> None:
         parser.group("output").add_argument("--out", type=Path, metavar=metavar, help=out)
     minimise.add_argument(
         "--aim",
-        choices=("smallest", "most-plausible"),
+        choices=get_args(Aim),
         default="smallest",
         help="smallest: the fewest and weakest actions; most-plausible: the least unlikely motion that still fails, "
         "in a bundle that keeps the recording too",

@@ -11,6 +11,7 @@ from risk_sac.client.following import AWAY_S, Event, events, follow
 from risk_sac.client.transport import DEFAULT_URL, Transport, UnexpectedAnswer, api_key, checked_key, checked_url, read
 from risk_sac.config import CampaignSpec, EgoConfig
 from risk_sac.failures.cases import CampaignRegression
+from risk_sac.failures.studied import Aim
 from risk_sac.records import (
     Campaign,
     CampaignPage,
@@ -190,9 +191,10 @@ class Client:
         path = f"{_path(campaign_id)}/failures/{_part(failure_id)}/export"
         return self._transport.ask("GET", path, query={"format": format_}, patience_s=MAKING_S).content
 
-    def bundle(self, campaign_id: str, failure_id: str, *, core: bool = False) -> bytes:
-        """One failure in a file that stands alone, or its core, which takes some ten seconds."""
-        return self._made(campaign_id, failure_id, "core.npz" if core else "bundle.npz", BUNDLE)
+    def bundle(self, campaign_id: str, failure_id: str, *, aim: Aim | None = None) -> bytes:
+        """One failure in a file that stands alone, or minimised, which takes some 10 or 20 seconds."""
+        names = {None: "bundle.npz", "smallest": "core.npz", "most-plausible": "most-plausible.npz"}
+        return self._made(campaign_id, failure_id, names[aim], BUNDLE)
 
     def regress(self, campaign_id: str, ego: EgoConfig) -> CampaignRegression:
         """Plays the distinct failures of a campaign against another ego, or returns an earlier equal regression."""

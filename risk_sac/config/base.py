@@ -167,7 +167,8 @@ def field_error(item: Mapping[str, Any], model: type[BaseModel] | None = None) -
     got = "nothing" if item["type"] == "missing" else shown(item.get("input"))
     if item["type"] == UNKNOWN_FIELD and model is not None:
         known = _fields_at(location[:-1], model)
-        return ConfigError(field, got, f"one of {', '.join(known)}", did_you_mean(str(location[-1]), known))
+        wanted = f"one of {', '.join(known)}" if known else "no field of this name"
+        return ConfigError(field, got, wanted, did_you_mean(str(location[-1]), known))
     if item["type"] == "model_type" and model is not None:
         return ConfigError(field, got, f"a JSON object of {', '.join(_fields_at(location, model))}")
     template = _EXPECTED.get(item["type"])
@@ -195,12 +196,12 @@ def _fields_at(location: Location, model: type[BaseModel]) -> list[str]:
     node = schema
     for part in location:
         node = _resolve(schema, node)
-        if isinstance(part, str):  # a field, or a name of the user's own
-            own = [*node.get("patternProperties", {}).values(), node.get("additionalProperties")]
-            node = node.get("properties", {}).get(part) or own[0] or {}
-        else:
-            node = node["items"]
-    return sorted(_resolve(schema, node).get("properties", ()))
+        if isinstance(part, int):
+            node = node.get("items", {})
+        else:  # a name that the model does not declare is a mapping's key, or says which of several types is meant
+            keys = [*node.get("patternProperties", {}).values(), node.get("additionalProperties")]
+            node = node.get("properties", {}).get(part) or keys[0] or {}
+    return sorted(_resolve(schema, node).get("properties", {}))
 
 
 @cache

@@ -27,7 +27,7 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.host.process_state import c_numbers
 from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.records import Collision, RequirementResult, Violation
-from risk_sac.risk.conduct import ADVERSARY_MEMORY, conduct_terms
+from risk_sac.risk.conduct import CONDUCT_ROWS, RoadFacts, conduct_terms, see_signals
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.realism import refuse_danger, refuse_overlap
 from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
@@ -99,7 +99,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     _adversaries: Adversaries
     _frame: Frame
     _measures: Measures
-    _conduct: Floats  # what C_soft remembers, ADVERSARY_MEMORY x adversaries
+    _road: RoadFacts
+    _conduct: Floats  # what C_soft remembers, CONDUCT_ROWS x adversaries
     _steps: int
     _contact_s: float | None  # from the release
     _artefacts: dict[str, float]  # rule that the episode broke -> when it first did
@@ -203,6 +204,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         layout = self.layout = self.problem.family.layout(scene.values)
         limits = limits_from_odd(self.problem.odd, layout.friction)
         self._ground = Ground.of(layout, self.problem.speed_limit_mps)
+        self._road = RoadFacts.of(layout, self.problem.speed_limit_mps)
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._reflex = reflex_of(self.problem.ego.profile, self._ground)
         self._gauge.reset(carriageway_of(layout.net))
@@ -212,12 +214,15 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._perception.sight = sight(sensor, visible.visibility_m, visible.unlit_m)
         self._steps = 0
         self._artefacts = {}
-        self._conduct = np.zeros((ADVERSARY_MEMORY, len(self.problem.family.adversaries)))
+        self._conduct = np.zeros((CONDUCT_ROWS, len(self.problem.family.adversaries)))
         self._contact_s = None
         self._lead_in(self._sim.reset(layout, sumo_seed), scene)
         self._released_s = self._frame.time_s
         started = self.problem.family, limits, self._frame
         self._adversaries = Adversaries(*started) if motions is None else RecordedAdversaries(*started, motions)
+        for frame in self.trace.frames:
+            rows = self._adversaries.rows(frame)
+            see_signals(rows, self._adversaries.slots, frame.link, self._conduct)
         refuse_danger(self._measures.assessment, scene, in_conflict=self._r157_driver_in_conflict())
         self._violated.begin(self._measures.robustness)
         self._sim.hand_over_ego()
@@ -257,8 +262,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """C_soft of Eq. 5 over the adversaries; updates what it remembers of them."""
         frame, adversaries = self._frame, self._adversaries
         rows = adversaries.rows(frame)
-        width_m = self._ground.lane_width_m
-        terms = conduct_terms(rows, adversaries.slots, frame.kind, frame.link, frame.state, self._conduct, width_m)
+        seen = frame.kind, frame.link, frame.state
+        terms = conduct_terms(rows, adversaries.slots, *seen, self._conduct, self._road)
         return float(terms.max(initial=0.0))
 
     def _judge(self, contact: Contact) -> Collision:

@@ -61,7 +61,8 @@ class Encoder:
         """
         if frame.ids is not self._ids:
             self._ids = frame.ids
-            self._rows = np.array([frame.ids.index(a) if a in frame.ids else 0 for a in self._adversaries])
+            rows = [frame.ids.index(a) if a in frame.ids else 0 for a in self._adversaries]
+            self._rows = np.array(rows, dtype=np.intp)  # a scenario may have no adversary
         return _encoded(
             self.size,
             self._rows,

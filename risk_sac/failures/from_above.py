@@ -21,8 +21,9 @@ from risk_sac.failures.net import LAMPS, Surface, SurfaceUse, roads_of, signal_h
 from risk_sac.failures.recording import BOX, Recording, on_body
 from risk_sac.maps.found import TITLES, Pattern, Survey
 from risk_sac.records import Collision
+from risk_sac.scenario.bodies import body_of
 from risk_sac.world.net import Net
-from risk_sac.world.types import Floats, Kind, Role
+from risk_sac.world.types import Floats, Role
 
 _UNDATED: dict[str, dict[str, Any]] = {
     "svg": {"Date": None},
@@ -211,7 +212,7 @@ def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, *, in
 def _draw_body(axis: Axes, recording: Recording, actor: int, time_s: float, **style: object) -> None:
     pose, size = recording.pose(actor, time_s), (recording["length_m"][actor], recording["width_m"][actor])
     axis.add_patch(Polygon(_body(recording, actor, time_s), **style))  # type: ignore[arg-type]
-    if recording.series["kind"][actor] == Kind.VEHICLE:
+    if body_of(int(recording.series["body"][actor])).shape in ("vehicle", "two_wheels"):
         arrow = on_body(pose, size, [(0.45, 1), (1, 0), (0.45, -1)])
         axis.plot(arrow[:, 0], arrow[:, 1], color=str(style["edgecolor"]), linewidth=0.6)
 

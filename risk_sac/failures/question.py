@@ -16,7 +16,7 @@ from risk_sac.run_folder.arrays import unpack_arrays
 IDLE = "idle"
 Twin = Literal["idle", "default", "perfect", "careful", "defensive"]
 """What may be changed in a scene's twin: no attack, or the profile of another ego."""
-Subject = Literal["bundle", "core", "region", "twin", "export"]
+Subject = Literal["bundle", "core", "most-plausible", "region", "twin", "export"]
 REFUSED = 3  # exit status; the answer is why, in words
 TOLD = "twin"  # name in a twin's file, beside the arrays of the time series
 

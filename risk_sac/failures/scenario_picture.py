@@ -26,6 +26,7 @@ HEIGHT_IN = (2.2, 8.0)  # least and greatest; in between it follows from the vie
 AROUND_M = 25.0  # of road around all starts
 COLOURS = ("tab:red", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:pink", "tab:olive", "tab:cyan")
 TRAFFIC = "0.55"
+RANGE_ALPHA = 0.12
 LABEL: dict[str, Any] = {
     "xytext": (0, 7),
     "textcoords": "offset points",
@@ -80,8 +81,7 @@ def _figure(document: Scenario, net: Net, starts: Mapping[str, Sequence[Floats]]
     for name, boxes in starts.items():
         traffic = name in document.streams or (name in document.actors and document.actors[name].role == "background")
         colour = EGO_COLOUR if name == EGO else TRAFFIC if traffic else next(colours)
-        alpha = max(0.04, 1.5 / len(boxes))
-        axis.add_collection(PolyCollection(boxes, facecolors=colour, edgecolors="none", alpha=alpha, zorder=2))
+        axis.add_collection(PolyCollection(boxes, facecolors=colour, edgecolors="none", alpha=RANGE_ALPHA, zorder=2))
         axis.add_collection(PolyCollection(boxes[:1], facecolors="none", edgecolors=colour, linewidths=1.2, zorder=3))
         axis.plot([], [], color=colour, linewidth=4, label=name)
         x, y = boxes[0].mean(axis=0)

@@ -7,11 +7,12 @@ import numpy as np
 
 from risk_sac.failures.recording import Series
 from risk_sac.records import Collision, Violation
+from risk_sac.scenario.bodies import body_of
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
 from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
 from risk_sac.verdicts.kinds import ONCOMING_COS, RESPONSES
 from risk_sac.verdicts.offences import IN_WORDS, STANDING_MPS
-from risk_sac.world.types import STEP_S, Floats, Kind
+from risk_sac.world.types import STEP_S, Floats, Kind, Role
 
 IN_LANE_M = 1.5  # a vehicle nearer to the ego's axis leads it, or follows
 ACROSS_MPS = 0.2  # slower lateral motion does not change the place in a lane
@@ -64,8 +65,10 @@ def _who(series: Series, striker: int, at: int, broke: str) -> str:
     turn = series["heading_rad"][at, striker] - heading
     ahead_m, left_m = x * math.cos(heading) + y * math.sin(heading), y * math.cos(heading) - x * math.sin(heading)
     side = "left" if left_m > 0.0 else "right"
-    if series["kind"][striker] == Kind.PEDESTRIAN:
-        name = f"pedestrian on the {side}"
+    body = body_of(int(series["body"][striker]))
+    if body.shape != "vehicle" or series["role"][striker] == Role.STATIC:
+        standing = "standing " if series["role"][striker] == Role.STATIC else ""
+        name = f"{standing}{body.name} on the {side}"
     elif math.cos(turn) > SAME_WAY_COS:
         name = f"{side} neighbour" if abs(left_m) > IN_LANE_M else "leader" if ahead_m > 0.0 else "follower"
     elif math.cos(turn) < ONCOMING_COS:

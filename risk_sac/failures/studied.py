@@ -6,6 +6,7 @@ Each is a file beside the results.
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Literal
 
 from pydantic import ValidationError, computed_field
 
@@ -13,6 +14,9 @@ from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval
 from risk_sac.records import Collision, EpisodeRecord, Real, Record, Violation
 from risk_sac.run_folder.durable import replace_file
+
+Aim = Literal["smallest", "most-plausible"]
+"""What a failure is minimised for."""
 
 
 class Extent(Record):

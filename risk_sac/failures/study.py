@@ -11,6 +11,7 @@ from risk_sac.failures.bundle import bundle_bytes, make_bundle
 from risk_sac.failures.export.formats import FORMATS, export, packed
 from risk_sac.failures.export.recorded import Recorded
 from risk_sac.failures.minimise import minimise
+from risk_sac.failures.plausible import most_plausible
 from risk_sac.failures.play import repeated, twin
 from risk_sac.failures.question import REFUSED, Question, TwinPlay, twin_bytes
 from risk_sac.failures.recording import actions_of
@@ -42,6 +43,8 @@ def answer(question: Question) -> bytes:
     if question.subject == "export":
         assert question.format is not None  # since it asks for an export
         return packed(FORMATS[question.format], export(question.format, Recorded.of(bundle)))
+    if question.subject == "most-plausible":
+        return bundle_bytes(most_plausible(bundle))
     return bundle_bytes(minimise(bundle) if question.subject == "core" else bundle)
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from risk_sac.failures.net import LAMPS, SignalHead, Surface
 from risk_sac.failures.recording import BOX, Recording, on_body
-from risk_sac.world.types import STEP_S, Floats, Kind
+from risk_sac.scenario.bodies import Shape, body_of
+from risk_sac.world.types import STEP_S, Floats
 
 WIDTH, HEIGHT = 240, 150  # px
 VIEW_S = 3.0  # before the violation
@@ -33,7 +34,7 @@ GROUND = {
 def thumbnail(recording: Recording, roads: Sequence[Surface], signals: Sequence[SignalHead] = ()) -> str:
     """Returns an SVG with a transparent ground."""
     view, ends = _View(recording), [*zip(recording.involved, (EGO, STRIKER), strict=False)]
-    if recording.series["kind"][ends[-1][0]] != Kind.PEDESTRIAN:
+    if _shape(recording, ends[-1][0]) == "vehicle":
         ends.reverse()  # a small body lies over a large one
     violated_s = float(recording["released_s"]) + recording.violation.time_s
     others = (actor for actor in range(len(recording.series["ids"])) if actor not in recording.involved)
@@ -113,14 +114,21 @@ def _body(view: _View, recording: Recording, actor: int, style: str) -> Iterator
     pose, size = recording.pose(actor, 0.0), (recording["length_m"][actor], recording["width_m"][actor])
     if not np.isfinite(pose).all():
         return
-    if recording.series["kind"][actor] == Kind.PEDESTRIAN:
+    shape = _shape(recording, actor)
+    if shape == "person":
         ((left, top),) = view(np.array([pose[:2]]))
         radius = max(max(size) / 2 * view.scale, LEAST_RADIUS)
         yield f'<circle {style} cx="{left:.1f}" cy="{top:.1f}" r="{radius:.1f}"/>'
         return
     yield f'<polygon {style} points="{_text(view(on_body(pose, size, BOX)))}"/>'
+    if shape == "block":
+        return
     head = _text(view(on_body(pose, size, [(0.2, 0.7), (0.75, 0), (0.2, -0.7)])))
     yield f'<polygon fill="#fff" fill-opacity=".75" points="{head}"/>'
+
+
+def _shape(recording: Recording, actor: int) -> Shape:
+    return body_of(int(recording.series["body"][actor])).shape
 
 
 def _line(points: Floats, colour: str, width: float, style: str) -> str:

@@ -34,7 +34,7 @@ class Surroundings(NamedTuple):
     """The carriageway around a square of the net, for one sector of headings."""
 
     edges: Floats  # `k x 5`: x, y of both ends of a piece of the outline; 1 / length², 0 for a mere cut
-    lanes: Floats  # `l x 6`: x, y, cos, sin and length of a segment of a lane's middle, any direction; speed limit
+    lanes: Floats  # `l x 7`: x, y, cos, sin, length of a segment of a lane's middle, any direction; speed limit; width
 
 
 class Carriageway:
@@ -50,11 +50,12 @@ class Carriageway:
                     line = shapely.LineString(lane.line[max(i - 1, 0) : i + 3])
                     pieces.append(line.buffer(lane.width_m / 2, cap_style="flat", join_style="mitre"))
                     ways.append(math.atan2(b[1] - a[1], b[0] - a[0]))
-                    segments.append((*a, (b[0] - a[0]) / length_m, (b[1] - a[1]) / length_m, length_m, limit_mps))
+                    way = (b[0] - a[0]) / length_m, (b[1] - a[1]) / length_m
+                    segments.append((*a, *way, length_m, limit_mps, lane.width_m))
         crossed = [] if net is None else list(_crossed_junctions(net))
         self._pieces = np.array([*pieces, *crossed], dtype=object)
         self._ways = np.array(ways + [math.nan] * len(crossed))  # of junctions: any
-        self._segments = np.array(segments, dtype=np.float64).reshape(-1, 6)
+        self._segments = np.array(segments, dtype=np.float64).reshape(-1, 7)
         self._tree = shapely.STRtree(self._pieces)
         self._known: dict[tuple[int, int, int], Surroundings] = {}
 

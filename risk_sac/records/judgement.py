@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from enum import StrEnum
+from typing import Literal
 
 from risk_sac.records.base import Real, Record
 from risk_sac.records.plausibility import Plausibility
@@ -96,6 +97,9 @@ class EgoPart(Record):
         return self.sight_mps is not None and (self.sighted_mps or 0.0) > TOO_FAST * self.sight_mps
 
 
+Harm = Literal["death", "serious injury"]
+
+
 class Judgement(Record):
     """Origin of a contact, and the reference drivers that would have prevented it.
 
@@ -132,10 +136,12 @@ class Judgement(Record):
     severity: Severity
     """minor | moderate | severe."""
     impact_mps: Real
-    """Speed that the severity follows: across the surface where the bodies touch, that at which two vehicles close, or
+    """Speed that the severity follows: across the surface where the bodies touch, that at which two bodies close, or
     the ego's own towards a pedestrian."""
     injury_risk: float
-    """Risk that the pedestrian dies, or an occupant is seriously injured (MAIS 3 or more)."""
+    """Risk of that harm to the road user who is worse off."""
+    harm: Harm
+    """death, of a pedestrian or cyclist | serious injury, MAIS 3 or more, of a motorcyclist or an occupant."""
     unresponsive: bool
     """A visible collision course of 1.5 s or more during which the ego never braked."""
     grade: Grade | None

@@ -114,9 +114,11 @@ class Violation(Violated):
     """The actor that the ego would have met soonest at that time. Null without one, and where the requirement concerns
     the ego's own driving only."""
     other_kind: str | None
-    """vehicle | pedestrian"""
+    """vehicle | pedestrian: whether it moves in lanes or anywhere"""
+    other_body: str | None
+    """car | van | truck | bus | motorcycle | bicycle | pedestrian | child | obstacle"""
     other_role: str | None
-    """adversary | background"""
+    """adversary | background | static"""
     ego_speed_mps: Real
     """At that time."""
     ego_manoeuvre: str
@@ -184,9 +186,11 @@ class Collision(Violated):
     """Since the adversaries' release."""
     other_id: str
     other_kind: str
-    """vehicle | pedestrian"""
+    """vehicle | pedestrian: whether it moves in lanes or anywhere"""
+    other_body: str
+    """car | van | truck | bus | motorcycle | bicycle | pedestrian | child | obstacle"""
     other_role: str
-    """adversary | background"""
+    """adversary | background | static"""
     contact_x_m: Real
     """Contact point ahead of the ego's centre."""
     contact_y_m: Real
@@ -253,11 +257,10 @@ class Collision(Violated):
     @property
     def severity_in_words(self) -> str:
         """Such as "severe: closing speed 11.0 m/s, impact speed 10.8 m/s, risk of death 3.5 %"."""
-        risk = "death" if self.other_kind == "pedestrian" else "serious injury"
         return (
             f"{self.judgement.severity}: closing speed {self.relative_speed_mps:.1f} m/s, "
             f"impact speed {self.judgement.impact_mps:.1f} m/s, "
-            f"risk of {risk} {100 * self.judgement.injury_risk:.1f} %"
+            f"risk of {self.judgement.harm} {100 * self.judgement.injury_risk:.1f} %"
         )
 
     @property

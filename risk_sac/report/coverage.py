@@ -24,7 +24,7 @@ from risk_sac.world.types import Bools, Floats
 
 BINS, PAIR_BINS = 10, 4
 NOT_PLAYED = (Outcome.REJECTED, Outcome.INVALID)
-ROLES = ("adversary", "background")
+ROLES = ("adversary", "background", "static")
 # What a contact can be in each of the taxonomy's respects, as `TaxonomyCell` has it, and in words.
 VALUES: Mapping[str, Mapping[object, str]] = {
     "striker": {f"{role} {kind}": f"{kind} ({role})" for role in ROLES for kind in ("vehicle", "pedestrian")},

@@ -5,15 +5,21 @@ distribution in `risk_sac.risk.driving` runs from 0 at a value that 1 of 100 roa
 10,000 exceeds; the others are choices.
 
 A policy can foresee its cost only if it knows what the cost remembers: `ADVERSARY_MEMORY` numbers of each adversary,
-which the observation holds.
+which the observation holds. What the signals did follows from the scene and the time, which it holds too.
+
+Features of `risk_sac.risk.driving` without a step-by-step form: the duration of a lane change, which is known at its
+end (the lateral speed stands for it); the room to the new follower as a time to collision; the pedestrian's accepted
+gap and entry on red, whose way and crossing a frame does not tell; and turning, which every walker may do at rest.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.risk.driving import FEATURES
+from risk_sac.scenario.layout import Layout
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import (
     ACCEL,
@@ -41,9 +47,13 @@ PEDAL = 0  # which pedal was pressed last: 1 gas, -1 brake, 0 none yet
 CHANGES = 1  # changes between the pedals; fades with CHANGES_S
 LEVEL = 2  # s, how long it has worked to stay level with a vehicle, or has been close beside one
 OVER = 3  # s, how long it has kept to a line or over it
-IDLE = 4  # s, how long it has stood in the way without a reason
+IDLE = 4  # s, how long it has stood or crawled without a reason; below 0, how badly it entered its junction
 HELD = 5  # m/s², mean acceleration of about the last HELD_S
 ADVERSARY_MEMORY = 6
+# Rows that follow from the scene and the time.
+LINK = 6  # SUMO's letter of the signal ahead in the step before
+RED = 7  # s, how long that signal has been red
+CONDUCT_ROWS = 8
 MEMORY_SCALE = np.array([1.0, 3.0, 5.0, 5.0, 5.0, 8.0])  # of each row in an observation
 
 CHANGES_S = 10.0  # choice: as long as the changes of pedal are counted over by an analyst
@@ -57,7 +67,7 @@ def _quantile(name: str, probability: float) -> float:
     feature = FEATURES[name]
     assert feature.spread is not None
     tail = feature.spread.above if feature.unlikely == "above" else feature.spread.below
-    low, high = (0.0, 100.0) if feature.unlikely == "above" else (100.0, 0.0)  # from likely to unlikely
+    low, high = (0.0, 100.0) if feature.unlikely == "above" else (100.0, -100.0)  # from likely to unlikely
     for _ in range(60):
         middle = (low + high) / 2
         low, high = (middle, high) if tail(middle) > probability else (low, middle)
@@ -73,31 +83,67 @@ ACCELERATION_FREE, ACCELERATION_FULL = _scale("acceleration")  # 3.6 to 4.1 m/s�
 GAP_FREE, GAP_FULL = _scale("lane_change_gap")  # 1.9 to 0.8 m
 HEADWAY_FREE, HEADWAY_FULL = _scale("lane_change_headway")  # 0.25 to 0.11 s
 WALKING_FREE, WALKING_FULL = _scale("walking_speed")  # 1.9 to 2.3 m/s
+SPEEDING_FREE, SPEEDING_FULL = _scale("speeding")  # 6.5 to 10.1 m/s above the limit
+RED_FREE, RED_FULL = _scale("red_entry")  # 0 to 3.6 s after the start of red
+ENTRY_GAP_FREE, ENTRY_GAP_FULL = _scale("junction_gap")  # 1.9 to -2.8 s: 1.6 of 1,000 drivers accept 0 s
 # Choices, where nothing is published: what SUMO's drivers stay below costs nothing.
 CHANGES_FREE, CHANGES_FULL = 1.8, 3.5  # in 10 s
 LATERAL_FREE, LATERAL_FULL = 1.0, 1.8  # m/s; UN R157's fastest cut-in
 LEVEL_FREE, LEVEL_FULL = 1.5, 4.0  # s
 OVER_FREE, OVER_FULL = 0.5, 2.0  # s
 IDLE_FREE, IDLE_FULL = 2.0, 5.0  # s
+JERK_FREE, JERK_FULL = 10.0, 20.0  # m/s³ of the held acceleration
 TOWARDS_FREE, TOWARDS_FULL = 0.5, 0.9  # cosine of the walking direction with the way back to the car
 
-OVERLOOKS = 0.5  # choice: the most that a cut-in costs, since drivers overlook cars in the next lane
+OVERLOOKS = 0.5  # choice: the most that a cut-in or an entry costs, since drivers overlook cars and signals
 NEAR_LINE_M = 0.15  # from the body's side to the line
 CALM_MPS = 0.5  # slower across, a vehicle is not changing lanes
 LEVEL_MPS, LEVEL_ASIDE_M = 1.0, 2.5  # difference of speeds, and room between the bodies, of vehicles that are level
 CLOSE_ASIDE_M, WORKING_MPS2 = 1.0, 0.5  # cars in lanes side by side leave 1.5 m; cruising takes no acceleration
 MOVING_MPS = 2.0
+CRAWLS_MPS = 3.0  # choice: slower in a junction, a vehicle crawls; SUMO's drivers do so for a second when they start
 SAME_WAY_COS = 0.9
 STANDING_MPS = 0.5
 CLEAR_M = 12.0  # free way ahead that gives no reason to stand
 AHEAD_M = 30.0  # how far ahead of the car a pedestrian is in its way
 BESIDE_M = 1.0  # closer than that, a pedestrian beside the car walks into it
 WALKING_MPS = 0.3
-GO = ord("G")
+STOP, WAIT, YIELD, GO = ord("r"), ord("u"), ord("g"), ord("G")  # letters of signals
+MIDDLE_M, ACROSS_M = 10.0, 8.0  # choice: from where a vehicle enters to where ways meet, and how far these lie apart
 
 # Terms of the cost.
 PEDALS, ACCELERATION, LATERAL_SPEED, OVER_LINE, PACING, CUT_IN, STANDING, WALKING, TOWARDS_CAR = range(9)
-TERMS = 9
+JERK, SPEEDING, ENTRY = range(9, 12)
+TERMS = 12
+
+
+class RoadFacts(NamedTuple):
+    """What the cost depends on of a place."""
+
+    lane_width_m: float  # of all lanes
+    limit_mps: float
+    junctions: Floats  # a row nx, ny, c and number of its junction for each side of one; nx·x + ny·y <= c within
+
+    @classmethod
+    def of(cls, layout: Layout, limit_mps: float) -> "RoadFacts":
+        """Reads them from a layout."""
+        sides = [(*side, float(k)) for k, area in enumerate(layout.junctions) for side in area.sides]
+        return cls(layout.lane_width_m, limit_mps, np.array(sides).reshape(-1, 4))
+
+
+@compiled
+def _in_junction(row: int, state: Floats, junctions: Floats) -> bool:
+    """Whether a vehicle has its front in a junction."""
+    x = state[X, row] + state[LENGTH, row] / 2 * math.cos(state[HEADING, row])
+    y = state[Y, row] + state[LENGTH, row] / 2 * math.sin(state[HEADING, row])
+    inside = True
+    for i in range(len(junctions)):
+        if i > 0 and junctions[i, 3] != junctions[i - 1, 3]:
+            if inside:
+                return True
+            inside = True
+        inside = inside and junctions[i, 0] * x + junctions[i, 1] * y <= junctions[i, 2]
+    return inside and len(junctions) > 0
 
 
 @compiled
@@ -119,7 +165,7 @@ def conduct_terms(
     link: NDArray[np.uint8],
     state: Floats,
     memory: Floats,
-    lane_width_m: float,
+    road: RoadFacts,
 ) -> Floats:
     """Computes the terms of a step's soft realism cost, `adversaries x TERMS`, each in [0, 1].
 
@@ -132,8 +178,8 @@ def conduct_terms(
       kind: `n`.
       link: `n`, SUMO's letter of the signal ahead of each actor.
       state: `rows x n`, after the step.
-      memory: `ADVERSARY_MEMORY x adversaries`; updated.
-      lane_width_m: of all lanes.
+      memory: `CONDUCT_ROWS x adversaries`; updated.
+      road: where they are.
     """
     terms = np.zeros((len(rows), TERMS))
     for k in range(len(rows)):
@@ -141,8 +187,58 @@ def conduct_terms(
         if kind[row] == PEDESTRIAN:
             _pedestrian(row, state, memory[:, slot], terms[k])
         else:
-            _vehicle(row, kind, link, state, memory[:, slot], lane_width_m, terms[k])
+            _vehicle(row, kind, link, state, memory[:, slot], road, terms[k])
+            _enter(row, kind, link, state, memory[:, slot], terms[k])
     return terms
+
+
+@compiled
+def see_signals(rows: NDArray[np.intp], slots: NDArray[np.intp], link: NDArray[np.uint8], memory: Floats) -> None:
+    """Notes the signals ahead of the adversaries, before a step is judged; arguments as of `conduct_terms`."""
+    for k in range(len(rows)):
+        _see(link[rows[k]], memory[:, slots[k]])
+
+
+@compiled
+def _see(letter: int, memory: Floats) -> None:
+    memory[RED] = memory[RED] + STEP_S if letter in (STOP, WAIT) else 0.0
+    memory[LINK] = letter
+
+
+@compiled
+def _enter(
+    row: int, kind: NDArray[np.int8], link: NDArray[np.uint8], state: Floats, memory: Floats, terms: Floats
+) -> None:
+    """Judges an entry into a junction, at a signal: on red, or before a vehicle that has priority."""
+    if memory[LINK] != 0.0 and link[row] == 0 and state[SPEED, row] > STANDING_MPS:
+        badly = 0.0
+        if memory[LINK] in (STOP, WAIT):
+            badly = ramp(memory[RED], RED_FREE, RED_FULL)
+        elif memory[LINK] == YIELD:
+            badly = ramp(_priority_s(row, kind, link, state), ENTRY_GAP_FREE, ENTRY_GAP_FULL)
+        memory[IDLE] = min(memory[IDLE], -badly * IDLE_FULL) if badly > 0.0 else memory[IDLE]
+    terms[ENTRY] = OVERLOOKS * min(max(-memory[IDLE] / IDLE_FULL, 0.0), 1.0)
+    _see(link[row], memory)
+
+
+@compiled
+def _priority_s(row: int, kind: NDArray[np.int8], link: NDArray[np.uint8], state: Floats) -> float:
+    """Computes when the first vehicle with priority reaches the middle of a junction that another enters, s.
+
+    It keeps its speed and direction; infinite if none comes.
+    """
+    x = state[X, row] + MIDDLE_M * math.cos(state[HEADING, row])
+    y = state[Y, row] + MIDDLE_M * math.sin(state[HEADING, row])
+    soonest_s = math.inf
+    for other in range(state.shape[1]):
+        if other == row or kind[other] == PEDESTRIAN or link[other] != GO or state[SPEED, other] < STANDING_MPS:
+            continue
+        cos, sin = math.cos(state[HEADING, other]), math.sin(state[HEADING, other])
+        dx, dy = x - state[X, other], y - state[Y, other]
+        along, across = dx * cos + dy * sin, dy * cos - dx * sin
+        if along > 0.0 and abs(across) < ACROSS_M:
+            soonest_s = min(soonest_s, along / state[SPEED, other])
+    return soonest_s
 
 
 @compiled
@@ -163,12 +259,14 @@ def _vehicle(
     link: NDArray[np.uint8],
     state: Floats,
     memory: Floats,
-    lane_width_m: float,
+    road: RoadFacts,
     terms: Floats,
 ) -> None:
     accel, speed, lateral = state[ACCEL, row], state[SPEED, row], state[LATERAL, row]
+    terms[JERK] = ramp(abs(accel - memory[HELD]) / HELD_S, JERK_FREE, JERK_FULL)
+    terms[SPEEDING] = ramp(speed - road.limit_mps, SPEEDING_FREE, SPEEDING_FULL)
     _count_changes(accel, PEDAL_MPS2, memory)
-    to_line = lane_width_m / 2 - abs(state[OFFSET, row]) - state[WIDTH, row] / 2
+    to_line = road.lane_width_m / 2 - abs(state[OFFSET, row]) - state[WIDTH, row] / 2
     moves, changes_lane = speed > MOVING_MPS, abs(lateral) > CALM_MPS
     cos, sin = math.cos(state[HEADING, row]), math.sin(state[HEADING, row])
     level, paces, clear = False, False, True
@@ -196,7 +294,12 @@ def _vehicle(
     memory[OVER] = _run(memory[OVER], moves and to_line < NEAR_LINE_M and not changes_lane)
     if paces or not level:  # two that cruise side by side do not pace each other
         memory[LEVEL] = _run(memory[LEVEL], paces)
-    memory[IDLE] = _run(memory[IDLE], speed < STANDING_MPS and clear and (link[row] == 0 or link[row] == GO))
+    within = _in_junction(row, state, road.junctions)
+    idles = (speed < STANDING_MPS and (link[row] == 0 or link[row] == GO)) or (within and speed < CRAWLS_MPS)
+    if memory[IDLE] >= 0.0:
+        memory[IDLE] = _run(memory[IDLE], idles and clear)
+    elif not within:  # it leaves the junction that it entered badly
+        memory[IDLE] = min(memory[IDLE] + FORGET * STEP_S, 0.0)
     terms[PEDALS] = ramp(memory[CHANGES], CHANGES_FREE, CHANGES_FULL)
     terms[ACCELERATION] = max(
         ramp(-accel, BRAKING_FREE, BRAKING_FULL), ramp(accel, ACCELERATION_FREE, ACCELERATION_FULL)

@@ -235,7 +235,7 @@ _ROWS = (
         unit="s",
         per="drives",
         unlikely="above",
-        words="drives over a line for {value:.1f} s without changing lane",
+        words="keeps to a line or over it for {value:.1f} s without changing lane",
         source=SUMO,
     ),
     RoadUserFeature(
@@ -281,10 +281,20 @@ _ROWS = (
     ),
     RoadUserFeature(
         name="junction_stop",
+        event="way through a junction",
         unit="s",
         per="ways through a junction",
         unlikely="above",
         words="stops in the junction for {value:.1f} s without a reason",
+        source=SUMO,
+    ),
+    RoadUserFeature(
+        name="junction_crawl",
+        event="way through a junction",
+        unit="s",
+        per="ways through a junction",
+        unlikely="above",
+        words="crawls in the junction for {value:.1f} s without a reason",
         source=SUMO,
     ),
     RoadUserFeature(

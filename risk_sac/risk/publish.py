@@ -88,7 +88,7 @@ def _measured(
         turn = state[HEADING, 0] - past_heading
         yaw_rate = math.atan2(math.sin(turn), math.cos(turn)) / span_s
         jerk = min(abs(state[ACCEL, 0] - past_accel) / span_s, JERK_CAP_MPS3)
-    offset, limit = nearest_lane(lanes, state[X, 0], state[Y, 0], state[HEADING, 0])
+    offset, limit, _ = nearest_lane(lanes, state[X, 0], state[Y, 0], state[HEADING, 0])
     edge, carriageway = depths(edges, state)
     curvature = 0.0 if speed < LEAST_SPEED_MPS else min(max(yaw_rate / speed, -MOST_CURVATURE), MOST_CURVATURE)
     measured = (
@@ -104,24 +104,27 @@ def _measured(
 
 
 @compiled
-def nearest_lane(lanes: Floats, x: float, y: float, heading: float) -> tuple[float, float]:
-    """Finds the distance to the nearest lane of the ego's direction, and its limit.
+def nearest_lane(lanes: Floats, x: float, y: float, heading: float) -> tuple[float, float, float]:
+    """Finds the distance to the nearest lane of a heading's direction, its limit and its width.
 
-    The distance is to the lane's middle, inf without one; the limit is then that of the nearest lane of any direction,
-    inf without one.
+    The distance is to the lane's middle, inf without one; limit and width are then those of the nearest lane of any
+    direction, inf without one.
     """
     cos, sin = math.cos(heading), math.sin(heading)
-    least2, least2_any, limit, limit_any = math.inf, math.inf, math.inf, math.inf
+    least2, least2_any, own, other = math.inf, math.inf, -1, -1
     for i in range(len(lanes)):
         dx, dy = x - lanes[i, 0], y - lanes[i, 1]
         along = min(max(dx * lanes[i, 2] + dy * lanes[i, 3], 0.0), lanes[i, 4])
         dx, dy = dx - along * lanes[i, 2], dy - along * lanes[i, 3]
         distance2 = dx * dx + dy * dy
         if distance2 < least2_any:
-            least2_any, limit_any = distance2, lanes[i, 5]
+            least2_any, other = distance2, i
         if distance2 < least2 and cos * lanes[i, 2] + sin * lanes[i, 3] > SAME_WAY_COS:
-            least2, limit = distance2, lanes[i, 5]
-    return math.sqrt(least2), limit_any if math.isinf(limit) else limit
+            least2, own = distance2, i
+    nearest = own if own >= 0 else other
+    if nearest < 0:
+        return math.inf, math.inf, math.inf
+    return math.sqrt(least2), lanes[nearest, 5], lanes[nearest, 6]
 
 
 @compiled

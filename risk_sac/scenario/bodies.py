@@ -161,3 +161,8 @@ CODES: Mapping[BodyName, int] = MappingProxyType({name: code for code, name in e
 def body_of(code: int) -> Body:
     """Returns the body that a frame's or recording's code stands for."""
     return BODIES[BODY_NAMES[code]]
+
+
+def body_like(length_m: float, width_m: float) -> Body:
+    """Returns the body whose size comes nearest to a perceived one."""
+    return min(BODIES.values(), key=lambda body: abs(body.length_m - length_m) + abs(body.width_m - width_m))

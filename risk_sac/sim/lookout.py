@@ -26,12 +26,13 @@ YIELDING_MPS2 = 2.5  # braking with which crossing traffic yields; SUMO's driver
 SAME_WAY_COS = 0.5
 MOVING_MPS = 0.5
 BEHIND_M, BEYOND_M = 60.0, 10.0  # path before and beyond the driven stretch on which others are looked for
-NEAR_M = 40.0  # distance beyond which no vehicle has to brake for a pedestrian or a static body yet
+NEAR_M = 40.0  # distance beyond which no vehicle in a town has to brake yet for a pedestrian or a static body
+NEAR_S, NEAR_MPS2 = 0.5, 4.5  # the same at speed: what it drives before and while it brakes
 
 
 @compiled
 def near_outsiders(state: Floats, outside: Bools) -> Bools:
-    """Tells which of the `n` actors have one that SUMO does not know within `NEAR_M`.
+    """Tells which of the `n` actors have one that SUMO does not know within `NEAR_M`, or their braking distance.
 
     Those have themselves.
     """
@@ -40,7 +41,9 @@ def near_outsiders(state: Floats, outside: Bools) -> Bools:
     for k in range(n):
         if outside[k]:
             for i in range(n):
-                near[i] |= math.hypot(x[i] - x[k], y[i] - y[k]) < NEAR_M
+                speed = state[SPEED, i]
+                reach_m = max(NEAR_M, NEAR_S * speed + speed * speed / (2 * NEAR_MPS2))
+                near[i] |= math.hypot(x[i] - x[k], y[i] - y[k]) < reach_m
     return near
 
 

@@ -20,6 +20,8 @@ SHIFT_M = 1.0  # largest step from the end of one lane to the beginning of the n
 TAPER_M = 5.0  # length of the path on which it makes up for that step
 CHANGE_M = 50.0  # length before the end of a lane that leads elsewhere on which the path changes lanes
 CHANGED = 0.6  # share of that length after which the path has changed
+# Choices: the same two lengths as times at the limit, where roads are fast. A lane change then takes 3 s.
+AHEAD_S, CHANGE_S, FAST_MPS = 7.0, 5.0, 20.0
 CAR = "passenger"  # vehicle class of all our vehicles
 
 
@@ -128,7 +130,9 @@ def _line(route: Sequence[str], lane: str) -> Floats:
         return line
     lanes = abs(int(lane.rpartition("_")[2]) - int(leading.rpartition("_")[2]))
     length_m, beside = _length(line), np.array(libsumo.lane.getShape(leading))
-    leaves_m = max(length_m - CHANGE_M * lanes, 0.0)
+    limit_mps = libsumo.lane.getMaxSpeed(lane)
+    change_m = max(CHANGE_M, CHANGE_S * limit_mps) if limit_mps > FAST_MPS else CHANGE_M
+    leaves_m = max(length_m - change_m * lanes, 0.0)
     arrives_m = leaves_m + CHANGED * (length_m - leaves_m)
     first, _ = _cut(line, leaves_m)
     _, last = _cut(beside, arrives_m * _length(beside) / length_m)
@@ -147,15 +151,21 @@ def _length(line: Floats) -> float:
 
 
 def _lanes_ahead(route: Sequence[str], lane: str) -> list[str]:
-    """The lane and those that follow it, junctions included, for `AHEAD_M`."""
-    lanes, length_m = [lane], 0.0
-    while length_m < AHEAD_M:
+    """The lane and those that follow it, junctions included, for `AHEAD_M`, or farther where they are fast."""
+    lanes, length_m, fastest_mps = [lane], 0.0, libsumo.lane.getMaxSpeed(lane)
+    while length_m < max(AHEAD_M, AHEAD_S * fastest_mps):
         following = _next_lane(route, lanes[-1])
         if following is None:
             break
         lanes.append(following)
         length_m += libsumo.lane.getLength(following)
+        fastest_mps = max(fastest_mps, libsumo.lane.getMaxSpeed(following))
     return lanes
+
+
+def needs_lane_change(route: Sequence[str], lane: str) -> bool:
+    """Whether a vehicle on a lane of the route's first edge has to change lanes to follow the route."""
+    return _reach(route[1:], lane) < len(route) - 1
 
 
 def _next_lane(route: Sequence[str], lane: str) -> str | None:

@@ -79,15 +79,15 @@ class Reader:
         self._roles |= {start.id: start.role for start in layout.pedestrians}
         self._walkers = tuple(walkers)
         self._statics = layout.statics
-        self._roles |= {start.id: Role.BACKGROUND for start in layout.statics}
+        self._roles |= {start.id: Role.STATIC for start in layout.statics}
         all_starts: tuple[VehicleStart | PedestrianStart | StaticStart, ...] = (
             *starts,
             *layout.pedestrians,
             *layout.statics,
         )
         self._body = {start.id: BODIES[start.body] for start in all_starts}
-        self._signal = layout.signal
-        self._walk_signals = [] if layout.signal is None else _walk_signals(layout.signal, layout.crossings)
+        self._signals = libsumo.trafficlight.getIDList()
+        self._walk_signals = [place for signal in self._signals for place in _walk_signals(signal, layout.crossings)]
         self._vehicles = tuple(start.id for start in starts)
         self._describe()
         self._told = np.full((len(self._ids), 7), np.nan)
@@ -159,7 +159,7 @@ class Reader:
 
         The distance is to its stop line; "" and inf without a signal.
         """
-        if self._signal is None:
+        if not self._signals:
             return "", math.inf
         if (ego := moved.get(self._vehicles[0])) is not None:
             return ego.ahead or ("", math.inf)
@@ -172,7 +172,7 @@ class Reader:
         A pedestrian's letter is that of its crossing.
         """
         links = np.zeros(len(self._ids), dtype=np.uint8)
-        if self._signal is None:
+        if not self._signals:
             return links
         letters = [(0, ego)] if ego else []
         for row, id_ in self._attackers:
@@ -181,9 +181,9 @@ class Reader:
             elif ahead := libsumo.vehicle.getNextTLS(id_):
                 letters.append((row, ahead[0][3]))
         for row, walker in enumerate(walkers.values(), start=len(self._vehicles)):
-            for area, index in self._walk_signals:
+            for area, signal, index in self._walk_signals:
                 if area.contains(walker.x_m, walker.y_m):
-                    letters.append((row, libsumo.trafficlight.getRedYellowGreenState(self._signal)[index]))
+                    letters.append((row, libsumo.trafficlight.getRedYellowGreenState(signal)[index]))
         for row, letter in letters:
             links[row] = ord(letter)
         return links
@@ -218,11 +218,11 @@ def _state(told: Floats, before: Floats, bodies: Floats, vehicles: int) -> Float
     return state
 
 
-def _walk_signals(signal: str, crossings: Sequence[Area]) -> list[tuple[Area, int]]:
-    """The crossings that a signal controls, each grown onto the sidewalks, and the index of its letter."""
+def _walk_signals(signal: str, crossings: Sequence[Area]) -> list[tuple[Area, str, int]]:
+    """The crossings that a signal controls, each grown onto the sidewalks, the signal, and the index of its letter."""
     found = []
     for index, links in enumerate(libsumo.trafficlight.getControlledLinks(signal)):
         for lane in {lane for link in links for lane in link if CROSSING_LANE.fullmatch(lane)}:
             x, y = np.mean(libsumo.lane.getShape(lane), axis=0)
-            found += [(area.grown(SIDEWALK_M), index) for area in crossings if area.contains(x, y)]
+            found += [(area.grown(SIDEWALK_M), signal, index) for area in crossings if area.contains(x, y)]
     return found

@@ -25,6 +25,7 @@ from risk_sac.sim.paths import (
     controlled_links,
     edge_of,
     leads_on,
+    needs_lane_change,
     way_of,
 )
 from risk_sac.sim.reading import COLOURS
@@ -285,6 +286,8 @@ def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
 EGO_DECEL_MPS2 = 4.5  # SUMO's default for passenger cars
 LANE_CHANGE = "laneChangeModel."
 # So that the commanded lateral speed is the one driven; its limits are those of `risk_sac.sim.control`.
+# Choice: with SUMO's own 1 a third of its drivers stand at the end of an acceleration lane beside dense traffic.
+ASSERTIVE, MERGING = f"{LANE_CHANGE}lcAssertive", "2"
 STEERED = {"lcAccelLat": "100", "lcMaxSpeedLatStanding": "5", "lcMaxSpeedLatFactor": "1"}
 
 
@@ -352,6 +355,8 @@ def _insert(start: VehicleStart, type_id: str) -> None:
         departPos=repr(start.position_m),
         departSpeed=repr(start.speed_mps),
     )
+    if needs_lane_change(start.route, f"{start.route[0]}_{start.lane}"):
+        libsumo.vehicle.setParameter(start.id, ASSERTIVE, MERGING)
 
 
 def _set_signal(signal: str, offset_s: float) -> None:

@@ -60,7 +60,7 @@ SAME_LANE_M = 0.5  # greatest offset of a follower
 ACROSS_MPS = 0.05  # lateral speed from which a vehicle moves into what is beside it
 REACTION_S = 0.5  # reaction time of vehicles behind
 BUILD_UP_S = 0.5  # time in which a braking builds up, and a step
-LONGEST_STEPS = 70  # most steps of a braking: from 17 m/s with ordinary 4 m/s² and what the jerk takes
+LONGEST_STEPS = 130  # most steps of a braking: from 43 m/s with ordinary 4 m/s² and what the jerk takes
 
 Others = tuple[Floats, int]  # a frame's state, and the own column in it
 CLEAR, AHEAD, LEFT, RIGHT = 0, 1, 2, 3

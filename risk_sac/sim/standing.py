@@ -12,7 +12,10 @@ import libsumo
 
 from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.layout import StaticStart
+from risk_sac.sim.paths import CAR, car_may_use
 
+KEEP_ROUTE = 1  # of SUMO's `moveToXY`: the nearest place on the route
+LEAST_M = 0.05  # of a body's width in the lane; less hinders no vehicle
 ALONG_RAD = 0.35  # greatest angle to the lane of a body that a stand-in along the lane can stand for; choice
 
 
@@ -22,35 +25,38 @@ def stand_in_lanes(statics: Iterable[StaticStart]) -> frozenset[str]:
 
 
 def _stand_in(start: StaticStart) -> bool:
-    """Inserts a stand-in if the body's centre is in a lane, and the body along it."""
+    """Inserts a stand-in if the body reaches into a lane, and lies along it."""
     body = BODIES[start.body]
-    edge, centre_m, index = libsumo.simulation.convertRoad(start.x_m, start.y_m, False, "passenger")
+    edge, centre_m, index = libsumo.simulation.convertRoad(start.x_m, start.y_m, False, CAR)
     lane = f"{edge}_{index}"
     if not edge or edge.startswith(":"):
         return False
     x, y = libsumo.simulation.convert2D(edge, centre_m, index)
     way_rad = math.radians(90.0 - libsumo.lane.getAngle(lane, centre_m))
     dx, dy = start.x_m - x, start.y_m - y
-    offset_m = dy * math.cos(way_rad) - dx * math.sin(way_rad)
+    right_m, left_m = _inside(edge, index, dy * math.cos(way_rad) - dx * math.sin(way_rad), body.width_m / 2)
     front_m = centre_m + body.length_m / 2
-    inside = abs(offset_m) <= libsumo.lane.getWidth(lane) / 2 and body.length_m < front_m < libsumo.lane.getLength(lane)
+    inside = left_m - right_m > LEAST_M and body.length_m < front_m < libsumo.lane.getLength(lane)
     if not inside or abs(math.sin(start.heading_rad - way_rad)) > math.sin(ALONG_RAD):
         return False
     route = f"stands_{edge}"
     if route not in libsumo.route.getIDList():
         libsumo.route.add(route, [edge])
-    vehicle = libsumo.vehicle
-    vehicle.add(
-        start.id,
-        route,
-        typeID="background_car",
-        departLane=str(index),
-        departPos=repr(front_m),
-        departPosLat=repr(offset_m),
-        departSpeed="0",
-    )
+    vehicle, offset_m = libsumo.vehicle, (right_m + left_m) / 2
+    vehicle.add(start.id, route, "background_car", departLane=str(index), departPos=repr(front_m), departSpeed="0")
     vehicle.setLength(start.id, body.length_m)
-    vehicle.setWidth(start.id, body.width_m)
+    vehicle.setWidth(start.id, left_m - right_m)
     vehicle.setSpeed(start.id, 0.0)
     vehicle.setLaneChangeMode(start.id, 0)
+    x, y = x + (body.length_m / 2) * math.cos(way_rad), y + (body.length_m / 2) * math.sin(way_rad)
+    x, y = x - offset_m * math.sin(way_rad), y + offset_m * math.cos(way_rad)
+    vehicle.moveToXY(start.id, edge, index, x, y, keepRoute=KEEP_ROUTE)
     return True
+
+
+def _inside(edge: str, index: int, offset_m: float, half_m: float) -> tuple[float, float]:
+    """Returns the right and left end of a body across its lane, without what is beside the carriageway."""
+    lane_m, lanes = libsumo.lane.getWidth(f"{edge}_{index}") / 2, libsumo.edge.getLaneNumber(edge)
+    drivable = [0 <= beside < lanes and car_may_use(f"{edge}_{beside}") for beside in (index - 1, index + 1)]
+    right_m, left_m = offset_m - half_m, offset_m + half_m
+    return right_m if drivable[0] else max(right_m, -lane_m), left_m if drivable[1] else min(left_m, lane_m)

@@ -326,8 +326,8 @@ class SumoSimulation:
         """Whether SUMO lists a collision of the ego with a vehicle, now or within `LISTED_WITHIN_S`.
 
         Ends the episode: the simulation is past the contact afterwards. SUMO tests rectangles along their lanes, so it
-        is a little late or early where a body is turned. None of static bodies, and if we tell SUMO the
-        place of either.
+        is a little late or early where a body is turned. None of static bodies, and if we tell SUMO the place of
+        either.
         """
         if self._moved is not None or other in self._oncoming or other not in self._reading.row:
             return None

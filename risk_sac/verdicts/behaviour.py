@@ -6,8 +6,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.risk.conduct import CALM_MPS, CRAWLS_MPS, MOVING_MPS, NEAR_LINE_M
 from risk_sac.scenario.layout import Area
-from risk_sac.verdicts.evidence import Evidence, ego_path, inside, seen_along
+from risk_sac.verdicts.course import BodyOnPath
+from risk_sac.verdicts.evidence import Evidence, ego_path, inside, lanes_of, seen_along
 from risk_sac.world.types import Bools, Floats, Kind, Role
 
 SMOOTH = 5  # frames, 0.5 s: a pedal that is held
@@ -40,13 +42,17 @@ def observed_of(evidence: Evidence) -> list[Observed]:
     An adversary acts if it moves.
     """
     observed: list[Observed] = []
+    path = None
     released = int(np.searchsorted(evidence.time_s, -1e-6))
     for actor in np.flatnonzero(evidence.role == Role.ADVERSARY).tolist():
         frames = released + np.flatnonzero(~np.isnan(evidence.x_m[released:, actor]))
         if len(frames) <= SMOOTH or not (evidence.speed_mps[frames, actor] > MOVES_MPS).any():
             continue
-        of_kind = _walker if evidence.kind[actor] == Kind.PEDESTRIAN else _vehicle
-        observed += of_kind(evidence, actor, frames)
+        if evidence.kind[actor] == Kind.PEDESTRIAN:
+            path = ego_path(evidence) if path is None else path
+            observed += _walker(evidence, actor, frames, seen_along(path, evidence, actor))
+        else:
+            observed += _vehicle(evidence, actor, frames)
     return observed
 
 
@@ -62,14 +68,16 @@ def _vehicle(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Obse
         yield Observed(actor, "jerk", float(jerk.max()), float(time_s[jerk.argmax() + JERK_STEPS]))
     changes, changed_s = pedal_changes(held, time_s)
     yield Observed(actor, "pedal_changes", changes, changed_s)
-    fastest = int(speed.argmax())
-    yield Observed(actor, "speeding", float(speed[fastest] - e.ground.speed_limit_mps), float(time_s[fastest]))
+    over_mps = speed - lanes_of(e, actor).limit_mps[frames]
+    fastest = int(over_mps.argmax())
+    yield Observed(actor, "speeding", float(over_mps[fastest]), float(time_s[fastest]))
     ahead_m, left_m, cos = _around(e, actor, frames)
-    yield from _lines(e, actor, frames, ahead_m, left_m, cos)
+    within = _in_areas(e, e.ground.junctions, actor, frames)
+    yield from _lines(e, actor, frames, within, (ahead_m, left_m, cos))
     level_s, from_s = _pacing(e, actor, frames, ahead_m, left_m, cos)
     if level_s > 0.0:
         yield Observed(actor, "pacing", level_s, from_s)
-    yield from _junctions(e, actor, frames, ahead_m, left_m)
+    yield from _junctions(e, actor, frames, within, (ahead_m, left_m))
 
 
 def _around(e: Evidence, actor: int, frames: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
@@ -85,28 +93,28 @@ def _around(e: Evidence, actor: int, frames: NDArray[np.intp]) -> tuple[Floats, 
 
 
 def _lines(
-    e: Evidence, actor: int, frames: NDArray[np.intp], ahead_m: Floats, left_m: Floats, cos: Floats
+    e: Evidence, actor: int, frames: NDArray[np.intp], within: Bools, around: tuple[Floats, Floats, Floats]
 ) -> Iterator[Observed]:
-    """Measures lane changes and driving over a line, outside junctions."""
+    """Measures lane changes, and how long it keeps to a line or over it; outside junctions."""
+    ahead_m, left_m, cos = around
     offset, lane_m = e.lane_offset_m[frames, actor], e.ground.lane_width_m
     over = np.abs(offset) + e.width_m[actor] / 2 - lane_m / 2
-    over[_in_areas(e, e.ground.junctions, actor, frames)] = -np.inf
-    over[np.isnan(over)] = -np.inf
-    jumps = np.abs(np.diff(offset, prepend=offset[:1])) > lane_m / 2  # its centre comes into the next lane
+    over[within | np.isnan(over)] = -np.inf
+    jumps = np.concatenate(([False], np.abs(offset[1:] - offset[:-1]) > lane_m / 2))  # into the next lane
     lateral = np.abs(e.lateral_mps[frames, actor])
+    keeps = (over > -NEAR_LINE_M) & (lateral < CALM_MPS) & (e.speed_mps[frames, actor] > MOVING_MPS)
+    yield Observed(actor, "over_line", float(keeps.sum()) * e.step_s, float(e.time_s[frames[keeps.argmax()]]))
     window = round(CHANGE_S / e.step_s)
     for first, last in runs(over > 0.0):
         crosses = first + np.flatnonzero(jumps[first:last])
-        until = int(crosses[0]) if len(crosses) else last
-        yield Observed(actor, "over_line", (until - first) * e.step_s, float(e.time_s[frames[first]]))
         enters = first + np.flatnonzero(over[first:last] > OVER_M)
         if first == 0 or not len(enters) or not (len(crosses) or last == len(frames)):
             continue  # it came so from the release, or went back
-        at, around = int(enters[0]), slice(max(first - window, 0), last + window)
+        at, during = int(enters[0]), slice(max(first - window, 0), last + window)
         time_s = float(e.time_s[frames[at]])
-        moving = smoothed(lateral[around], window)
-        fastest = float(moving.max()) if len(moving) else float(lateral[around].mean())
-        yield Observed(actor, "lateral_speed", float(lateral[around].max()), time_s)
+        moving = smoothed(lateral[during], window)
+        fastest = float(moving.max()) if len(moving) else float(lateral[during].mean())
+        yield Observed(actor, "lateral_speed", float(lateral[during].max()), time_s)
         yield Observed(actor, "lane_change_duration", lane_m / max(fastest, 0.1), time_s)
         side = float(np.sign(offset[at]))
         yield from _new_follower(e, actor, frames, at, side * left_m[at], ahead_m[at], cos[at])
@@ -144,15 +152,16 @@ def _pacing(
     level &= (np.abs(left_m) < 1.5 * e.ground.lane_width_m) & (cos > SAME_WAY_COS)
     level &= (np.abs(speed - speed[:, actor, None]) < SAME_SPEED_MPS) & (speed > 2.0)
     level[:, actor], level[:, e.kind == Kind.PEDESTRIAN] = False, False
-    longest = max(((last - first, first) for column in level.T for first, last in runs(column)), default=(0, 0))
+    paced = np.flatnonzero(level.any(axis=0)).tolist()
+    longest = max(((last - first, first) for k in paced for first, last in runs(level[:, k])), default=(0, 0))
     return longest[0] * e.step_s, float(e.time_s[frames[longest[1]]])
 
 
 def _junctions(
-    e: Evidence, actor: int, frames: NDArray[np.intp], ahead_m: Floats, left_m: Floats
+    e: Evidence, actor: int, frames: NDArray[np.intp], within: Bools, around: tuple[Floats, Floats]
 ) -> Iterator[Observed]:
-    """Measures entries on red or without priority, and stops in a junction."""
-    within = _in_areas(e, e.ground.junctions, actor, frames)
+    """Measures entries on red or without priority, and how long it stops or crawls in a junction."""
+    ahead_m, left_m = around
     link, speed = e.link[frames, actor], e.speed_mps[frames, actor]
     enters = (link[:-1] != 0) & ((link[1:] == 0) | (within[1:] & ~within[:-1])) & (speed[1:] > MOVES_MPS)
     for t in np.flatnonzero(enters).tolist():
@@ -165,12 +174,16 @@ def _junctions(
             gap_s = _arrives_after(e, actor, frame)
             if gap_s is not None:
                 yield Observed(actor, "junction_gap", gap_s, float(e.time_s[frame]))
+    if not within.any():
+        return
     in_way = (ahead_m > 0.0) & (ahead_m < CLEAR_M) & (np.abs(left_m) < e.ground.lane_width_m)
     in_way[:, actor] = False
-    stands = within & (speed < STANDS_MPS) & ~in_way.any(axis=1)
-    first, last = max(runs(stands), key=lambda run: run[1] - run[0], default=(0, 0))
-    if last > first:
-        yield Observed(actor, "junction_stop", (last - first) * e.step_s, float(e.time_s[frames[first]]))
+    free, stands = within & ~in_way.any(axis=1), speed < STANDS_MPS
+    stops_s = max((last - first for first, last in runs(free & stands)), default=0) * e.step_s
+    crawls_s = float((free & ~stands & (speed < CRAWLS_MPS)).sum()) * e.step_s
+    entered_s = float(e.time_s[frames[within.argmax()]])
+    yield Observed(actor, "junction_stop", stops_s, entered_s)
+    yield Observed(actor, "junction_crawl", crawls_s, entered_s)
 
 
 def _arrives_after(e: Evidence, actor: int, frame: int) -> float | None:
@@ -195,7 +208,7 @@ def _arrives_after(e: Evidence, actor: int, frame: int) -> float | None:
     return soonest
 
 
-def _walker(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Observed]:
+def _walker(e: Evidence, actor: int, frames: NDArray[np.intp], seen: BodyOnPath[Floats]) -> Iterator[Observed]:
     speed, time_s = e.speed_mps[frames, actor], e.time_s[frames]
     held = smoothed(speed)
     fastest = int(held.argmax())
@@ -211,13 +224,12 @@ def _walker(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Obser
     x, y = e.x_m[frames, actor], e.y_m[frames, actor]
     on_crossing = inside(e.ground.crossings, x, y, MOVES_MPS)
     on_road = inside(e.ground.roadway, x, y) | on_crossing if e.ground.roadway else np.ones(len(x), dtype=np.bool_)
-    yield from _steps_out(e, actor, frames, on_road, on_crossing)
+    yield from _steps_out(e, actor, frames, on_road, on_crossing, seen)
     to_x, to_y = e.x_m[frames, 0] - x, e.y_m[frames, 0] - y
     away = np.maximum(np.hypot(to_x, to_y), 1e-6)
     heads = (e.vx_mps[frames, actor] * to_x + e.vy_mps[frames, actor] * to_y) / away
     towards = on_road & (speed > MOVES_MPS) & (heads > TOWARDS_COS * speed) & (away < NEAR_M)
     towards &= e.speed_mps[frames, 0] > MOVES_MPS
-    seen = seen_along(ego_path(e), e, actor)
     in_way = on_road & (speed < STANDS_MPS) & (np.abs(seen.across_m[frames]) < e.width_m[0] / 2 + MOVES_MPS)
     in_way &= (seen.gap_m[frames] > 0.0) & (away < NEAR_M)
     for name, does in (("towards_car", towards), ("stop_in_way", in_way)):
@@ -227,7 +239,7 @@ def _walker(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Obser
 
 
 def _steps_out(
-    e: Evidence, actor: int, frames: NDArray[np.intp], on_road: Bools, on_crossing: Bools
+    e: Evidence, actor: int, frames: NDArray[np.intp], on_road: Bools, on_crossing: Bools, seen: BodyOnPath[Floats]
 ) -> Iterator[Observed]:
     """Measures how a pedestrian steps onto the road.
 
@@ -242,7 +254,6 @@ def _steps_out(
             began = int(before[-1]) + 1 if len(before) else 0
             yield Observed(actor, "walks_on_red", time_s - float(e.time_s[began]), time_s)
         if on_red or not on_crossing[t]:
-            seen = seen_along(ego_path(e), e, actor)
             gap_m, speed = float(seen.gap_m[frame]), float(e.speed_mps[frame, 0])
             if gap_m > 0.0 and speed > MOVES_MPS:
                 yield Observed(actor, "crossing_gap", min(gap_m / speed, LONGEST_S), time_s)
@@ -278,8 +289,12 @@ def runs(does: Bools) -> list[tuple[int, int]]:
 
     Each is its first frame and the one after its last.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], does, [False])).astype(np.int8)))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+    flags, found, last = does.tobytes(), [], 0  # ten times as fast as np.diff on arrays of an episode's length
+    while (first := flags.find(1, last)) >= 0:
+        last = flags.find(0, first)
+        last = len(flags) if last < 0 else last
+        found.append((first, last))
+    return found
 
 
 def _in_areas(e: Evidence, areas: Sequence[Area], actor: int, frames: NDArray[np.intp]) -> Bools:

@@ -31,6 +31,7 @@ from risk_sac.verdicts.evidence import (
     front_moved_across,
     inside,
     lane_path,
+    lanes_of,
     recorded_motion,
     recorded_size,
     seen_along,
@@ -124,7 +125,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
 def _lane_conflicts(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], *, wary: bool) -> tuple[Bools, Bools]:
     e = evidence
     offset, accel = column(e.lane_offset_m, striker), column(e.accel_mps2, striker)
-    return lane_conflicts(seen, column(e.speed_mps, 0), offset, accel, e.ground.lane_width_m, wary)
+    return lane_conflicts(seen, column(e.speed_mps, 0), offset, accel, lanes_of(e, 0).width_m, wary)
 
 
 def left_its_place(evidence: Evidence) -> int | None:
@@ -279,7 +280,8 @@ def _type(
     if not same_way:
         return ConflictType.CROSSING
     first = int(np.searchsorted(evidence.time_s, evidence.time_s[frame] - SETTLED_S - 1e-6))
-    settled = (np.abs(across_m[first : frame + 1]) <= evidence.ground.lane_width_m / 2).all()
+    width_m = lanes_of(evidence, 0, first).width_m[: frame + 1 - first]
+    settled = (np.abs(across_m[first : frame + 1]) <= width_m / 2).all()
     if settled:
         return ConflictType.LEADER
     return ConflictType.MERGE if came_over else ConflictType.CUT_IN

@@ -339,7 +339,7 @@ def lane_conflict(
 
 @compiled
 def lane_conflicts(
-    others: BodyOnPath[Floats], speed_mps: Floats, offset_m: Floats, accel_mps2: Floats, lane_width_m: float, wary: bool
+    others: BodyOnPath[Floats], speed_mps: Floats, offset_m: Floats, accel_mps2: Floats, width_m: Floats, wary: bool
 ) -> tuple[Bools, Bools]:
     """`lane_conflict` in each of `T` frames."""
     begins, lasts = np.empty(len(speed_mps), dtype=np.bool_), np.empty(len(speed_mps), dtype=np.bool_)
@@ -355,5 +355,5 @@ def lane_conflicts(
             o.reach_m[t],
             o.nearing_mps[t],
         )
-        begins[t], lasts[t] = lane_conflict(other, speed_mps[t], offset_m[t], accel_mps2[t], lane_width_m, wary)
+        begins[t], lasts[t] = lane_conflict(other, speed_mps[t], offset_m[t], accel_mps2[t], width_m[t], wary)
     return begins, lasts

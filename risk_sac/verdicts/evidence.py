@@ -1,12 +1,16 @@
 """Record of an episode up to its contact, as arrays; the judge's only input."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.maps.carriageway import ANY_WAY, carriageway_of
+from risk_sac.risk.publish import nearest_lane
 from risk_sac.scenario.layout import Area, Layout
 from risk_sac.sim.collision import Contact, contact_with
 from risk_sac.verdicts.course import WANDER_M, BodyOnPath, MovingBox, Path, along_series, recorded_path
@@ -48,7 +52,7 @@ class Ground:
         return cls(speed_limit_mps=speed_limit_mps, **{name: getattr(layout, name) for name in names})
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence:
     """Arrays of `T` frames up to the contact and `n` actors.
 
@@ -109,6 +113,11 @@ class Evidence:
             raise ValueError(f"striker {id_!r} has left before the contact; wanted one that is there in the last frame")
         return column
 
+    @cached_property
+    def ego_path(self) -> Path:
+        """The ego's recorded path; a verdict reads it many times."""
+        return recorded_path(self.x_m[:, 0], self.y_m[:, 0], self.heading_rad[:, 0])
+
     @property
     def released(self) -> int:
         """The frame of the adversaries' release; the last one if that comes later."""
@@ -145,6 +154,35 @@ def soon_inside(
     return soon
 
 
+class LaneSeries(NamedTuple):
+    """Lane of an actor, frame by frame."""
+
+    limit_mps: Floats
+    width_m: Floats
+
+
+def lanes_of(evidence: Evidence, actor: int, first: int = 0) -> LaneSeries:
+    """Reads the lane that an actor is nearest to, in its direction, from frame `first` on.
+
+    Without a net, without a lane nearby and where the actor has left, it is the ground's limit and width.
+    """
+    e, ground = evidence, evidence.ground
+    limit_mps = np.full(len(e.time_s) - first, ground.speed_limit_mps)
+    width_m = np.full(len(e.time_s) - first, ground.lane_width_m)
+    if not ground.net:
+        return LaneSeries(limit_mps, width_m)
+    carriageway = carriageway_of(ground.net)
+    places = zip(e.x_m[first:, actor].tolist(), e.y_m[first:, actor].tolist(), strict=True)
+    for t, (x, y) in enumerate(places):
+        if math.isnan(x):
+            continue
+        lanes = carriageway.around(x, y, ANY_WAY).lanes
+        _, limit, width = nearest_lane(lanes, x, y, float(e.heading_rad[first + t, actor]))
+        if math.isfinite(limit):
+            limit_mps[t], width_m[t] = limit, width
+    return LaneSeries(limit_mps, width_m)
+
+
 NO_JUMP_M = 0.5  # what the offset may differ in a step from what the ego moved across
 STANDING_M = 0.01  # driven in a step; below it the direction of motion is noise
 
@@ -177,7 +215,7 @@ def recorded_contact(evidence: Evidence, striker: int) -> Contact:
 
 def ego_path(evidence: Evidence) -> Path:
     """The ego's recorded path."""
-    return recorded_path(evidence.x_m[:, 0], evidence.y_m[:, 0], evidence.heading_rad[:, 0])
+    return evidence.ego_path
 
 
 def front_moved_across(evidence: Evidence) -> Floats:
@@ -191,7 +229,7 @@ def front_moved_across(evidence: Evidence) -> Floats:
     """
     e = evidence
     lateral = e.lateral_mps[:, 0] * e.step_s
-    offset, width = e.lane_offset_m[:, 0], e.ground.lane_width_m
+    offset, width = e.lane_offset_m[:, 0], lanes_of(e, 0).width_m
     steps = np.diff(offset, prepend=offset[:1])
     steps -= width * np.round((steps - lateral) / width)
     jumps = ~(np.abs(steps - lateral) <= NO_JUMP_M)  # to a lane of another width; NaN without offsets

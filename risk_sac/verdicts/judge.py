@@ -11,6 +11,7 @@ from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.publish import ENCOUNTER, worst_rss_margin
 from risk_sac.risk.rss import ENCOUNTER_CAP_S, TTC_CAP_S
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
+from risk_sac.scenario.bodies import body_of
 from risk_sac.sim.collision import Contact
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.evidence import Evidence, recorded_contact
@@ -68,6 +69,7 @@ def collision_of(
         time_s=contact.time_s - released_s,
         other_id=other,
         other_kind=Kind(int(frame.kind[contact.other])).name.lower(),
+        other_body=body_of(int(frame.body[contact.other])).name,
         other_role=Role(int(frame.role[contact.other])).name.lower(),
         contact_x_m=contact.x_m,
         contact_y_m=contact.y_m,
@@ -126,7 +128,7 @@ def judge(
     yields = has_to_yield(conflict.type, where, broke, ego_broke)
     part = ego_part(evidence, striker, conflict, yields)
     contact = contact or recorded_contact(evidence, striker)
-    impact_mps, injury_risk = impact(evidence, striker, contact)
+    struck = impact(evidence, striker, contact)
     kind, variant = name_contact(
         evidence,
         striker,
@@ -151,9 +153,10 @@ def judge(
         ground=where,
         broke=broke,
         ego_broke=ego_broke,
-        severity=severity(impact_mps, injury_risk),
-        impact_mps=impact_mps,
-        injury_risk=injury_risk,
+        severity=severity(struck.speed_mps, struck.risk),
+        impact_mps=struck.speed_mps,
+        injury_risk=struck.risk,
+        harm=struck.harm,
         unresponsive=unresponsive(evidence, conflict),
         grade=graded,
         drivers=drivers,
@@ -308,6 +311,7 @@ def _violation(
         robustness=result.robustness,
         other_id=None if named is None else frame.ids[named],
         other_kind=None if named is None else Kind(int(frame.kind[named])).name.lower(),
+        other_body=None if named is None else body_of(int(frame.body[named])).name,
         other_role=None if named is None else Role(int(frame.role[named])).name.lower(),
         ego_speed_mps=frame.ego_speed_mps,
         ego_manoeuvre=driven,

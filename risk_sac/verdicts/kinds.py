@@ -8,6 +8,7 @@ import math
 from typing import NamedTuple
 
 from risk_sac.records import ConflictType
+from risk_sac.scenario.bodies import body_of
 from risk_sac.verdicts.conflict import Conflict
 from risk_sac.verdicts.evidence import Evidence
 from risk_sac.verdicts.offences import IN_WORDS
@@ -20,7 +21,6 @@ LATE_S = 2.0  # Choice: what R157's driver needs to be at full braking
 STRIKERS = {
     ConflictType.LEADER: "leader",
     ConflictType.MERGE: "neighbour",
-    ConflictType.PEDESTRIAN: "pedestrian",
 }
 MANOEUVRES = {
     "straight": "ego goes straight",
@@ -97,14 +97,22 @@ def name_violation(requirement: str, *, manoeuvre: str, broke: tuple[str, ...], 
 
 
 def _striker(evidence: Evidence, striker: int, conflict: Conflict) -> str:
+    """Names the striker; a body that the conflict's type does not say is named by its row."""
+    body = body_of(int(evidence.body[striker]))
+    vehicle = "vehicle" if body.shape == "vehicle" else body.name
+    if evidence.role[striker] == Role.STATIC:
+        return f"standing {vehicle}"
+    of_body = "" if body.shape == "vehicle" else f" of a {vehicle}"
     if conflict.type is ConflictType.CUT_IN:
-        return f"cut-in from {conflict.position}"
+        return f"cut-in{of_body} from {conflict.position}"
+    if conflict.type is ConflictType.PEDESTRIAN:
+        return vehicle
     if conflict.type is not ConflictType.CROSSING:
-        return STRIKERS[conflict.type]
+        return STRIKERS[conflict.type] if body.shape == "vehicle" else f"{vehicle} as {STRIKERS[conflict.type]}"
     turn = float(evidence.heading_rad[conflict.frame, striker] - evidence.heading_rad[conflict.frame, 0])
     if math.cos(turn) < ONCOMING_COS:
-        return "oncoming vehicle"
-    return "vehicle from the right" if math.sin(turn) > 0.0 else "vehicle from the left"
+        return f"oncoming {vehicle}"
+    return f"{vehicle} from the right" if math.sin(turn) > 0.0 else f"{vehicle} from the left"
 
 
 def _offences(broke: tuple[str, ...]) -> tuple[str, ...]:

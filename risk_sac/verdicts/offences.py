@@ -19,9 +19,7 @@ from risk_sac.verdicts.course import (
     WANDER_M,
     YIELDING_MPS2,
     BodyOnPath,
-    along_series,
     at,
-    recorded_path,
     time_to_touch,
     with_margin,
 )
@@ -29,9 +27,9 @@ from risk_sac.verdicts.drivers import R157_DELAY_S
 from risk_sac.verdicts.evidence import (
     Evidence,
     Letters,
-    column,
     ego_path,
     inside,
+    lanes_of,
     recorded_motion,
     recorded_size,
     seen_along,
@@ -72,7 +70,7 @@ def striker_offences(evidence: Evidence, striker: int, *, crossing: bool) -> tup
     rules = {
         "red_light": entered_on(evidence, striker, RED),
         "priority": crossing and took_priority(evidence, striker, EGO),
-        "wrong_direction": reverses(evidence, striker),
+        "wrong_direction": reverses(evidence, striker) or "wrong_direction" in left_carriageway(evidence, striker),
         "speeding": speeds(evidence, striker),
     }
     return tuple(name for name, broke in rules.items() if broke)
@@ -100,8 +98,8 @@ def ego_offences(evidence: Evidence, striker: int | None = None, *, crossing: bo
     return tuple(name for name, broke in rules.items() if broke)
 
 
-def left_carriageway(evidence: Evidence) -> frozenset[str]:
-    """Names how the ego's whole body left its carriageway in the last 3 s.
+def left_carriageway(evidence: Evidence, actor: int = EGO) -> frozenset[str]:
+    """Names how a vehicle's whole body left its carriageway in the last 3 s.
 
     `wrong_direction`: on an oncoming lane, without overtaking; `off_road`: beside any lane.
     """
@@ -109,12 +107,14 @@ def left_carriageway(evidence: Evidence) -> frozenset[str]:
     if not e.ground.net:
         return frozenset()
     carriageway = carriageway_of(e.ground.net)
+    order = [actor, *(column for column in range(len(e.ids)) if column != actor)]
     state = np.zeros((WIDTH + 1, len(e.ids)))
-    state[LENGTH], state[WIDTH] = e.length_m, e.width_m
+    state[LENGTH], state[WIDTH] = e.length_m[order], e.width_m[order]
     for t in range(len(e.time_s) - 1, e.since(RECENT_S) - 1, -LOOK_STEPS):
-        state[X], state[Y], state[HEADING], state[SPEED] = e.x_m[t], e.y_m[t], e.heading_rad[t], e.speed_mps[t]
-        place = float(state[X, EGO]), float(state[Y, EGO])
-        own = carriageway.around(*place, sector_of(float(state[HEADING, EGO]))).edges
+        for row, values in ((X, e.x_m), (Y, e.y_m), (HEADING, e.heading_rad), (SPEED, e.speed_mps)):
+            state[row] = values[t, order]
+        place = float(state[X, 0]), float(state[Y, 0])
+        own = carriageway.around(*place, sector_of(float(state[HEADING, 0]))).edges
         if depths(own, state)[1] >= 0.0:
             continue
         if depths(carriageway.around(*place, ANY_WAY).edges, state)[1] < 0.0:
@@ -152,7 +152,7 @@ def speeds(evidence: Evidence, actor: int) -> bool:
     The ego may be as fast as at the release, less 2 m/s² from 1.15 s after it on.
     """
     e, first = evidence, evidence.since(RECENT_S)
-    allowed = np.full(len(e.time_s) - first, SPEEDING_FACTOR * e.ground.speed_limit_mps)
+    allowed = SPEEDING_FACTOR * lanes_of(e, actor, first).limit_mps
     if actor == EGO:
         inherited = e.speed_mps[e.released, EGO] - EASES_MPS2 * np.maximum(e.time_s[first:] - RESPONDS_S, 0.0)
         allowed = np.maximum(allowed, inherited)
@@ -238,6 +238,8 @@ def _entry(evidence: Evidence, actor: int, letters: bytes) -> int | None:
     e = evidence
     link = e.link[:, actor]
     shown = _is_any(link[:-1], letters)
+    if not shown.any():
+        return None
     passed = shown & (link[1:] == 0)
     in_junction = inside(e.ground.junctions, *_front(e, 0, actor))
     passed |= shown & ~_is_any(link[1:], letters) & in_junction[1:] & ~in_junction[:-1]
@@ -256,7 +258,8 @@ def _stepped_onto_crossing(evidence: Evidence, striker: int) -> int | None:
 
 
 def _is_any(link: Letters, letters: bytes) -> Bools:
-    return np.isin(link, list(letters))
+    any_of: Bools = np.logical_or.reduce([link == letter for letter in letters])
+    return any_of
 
 
 def _front(evidence: Evidence, first: int, actor: int) -> tuple[Floats, Floats]:
@@ -310,30 +313,11 @@ def enters_safely(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], le
 
     When it intrudes by 0.3 m into the ego's lane, it is that far ahead and TTC > v_rel / (2 · 6 m/s²) + 0.35 s.
     """
-    t = _intrusion(evidence, striker, seen)
-    return _leaves_room(float(evidence.speed_mps[t, EGO]), seen, t, least_gap_m)
+    t = intrusion(evidence, striker, EGO, seen)
+    return leaves_room(float(evidence.speed_mps[t, EGO]), seen, t, least_gap_m)
 
 
-def cuts_off(evidence: Evidence, striker: int) -> bool:
-    """Whether the ego came into the striker's lane in the last 3 s and left it no room to brake.
-
-    The rule for room is that of `changes_lane_unsafely`, with the striker behind. The ego came over if it moved further
-    towards the striker's way than the striker towards it.
-    """
-    e = evidence
-    path = recorded_path(e.x_m[:, striker], e.y_m[:, striker], e.heading_rad[:, striker])
-    speed_mps, size = column(e.speed_mps, striker), recorded_size(e, striker)
-    seen = along_series(path, speed_mps, size, recorded_motion(e, EGO))
-    t, first = _intrusion(e, EGO, seen), e.since(RECENT_S)
-    if t == 0 or t < first:
-        return False
-    side = math.copysign(1.0, seen.across_m[t - 1])
-    both_m = side * float(seen.across_m[first] - seen.across_m[-1])
-    striker_m = side * float(e.lateral_mps[first + 1 :, striker].sum()) * e.step_s
-    return both_m > 2 * max(striker_m, 0.0) and not _leaves_room(float(speed_mps[t]), seen, t, R157_GAP_M)
-
-
-def _leaves_room(follower_mps: float, seen: BodyOnPath[Floats], t: int, least_gap_m: float) -> bool:
+def leaves_room(follower_mps: float, seen: BodyOnPath[Floats], t: int, least_gap_m: float) -> bool:
     """Whether a body ahead on the follower's path leaves it the room of UN R157, 5.2.5.2, in frame `t`."""
     closing = follower_mps - seen.speed_mps[t]
     needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_CUT_IN_S
@@ -349,7 +333,7 @@ def checks_brakes(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], be
     e = evidence
     first = min(began, e.since(RECENT_S))
     behind = (seen.gap_m > 0.0) & (seen.gap_m <= HORIZON_S * e.speed_mps[:, 0])
-    behind &= np.abs(seen.across_m) <= e.ground.lane_width_m / 2
+    behind &= np.abs(seen.across_m) <= lanes_of(e, EGO).width_m / 2
     braked = behind & (e.accel_mps2[:, striker] < -CHECKS_MPS2) & ~np.isin(e.link[:, striker], STOPPING_LETTERS)
     frames = first + np.flatnonzero(braked[first:])
     return bool(np.count_nonzero(~_any_ahead(e, striker, frames)) >= CHECKS_STEPS)
@@ -374,14 +358,14 @@ def turns_into_path(evidence: Evidence, striker: int) -> bool:
     return time_to_touch(path, float(path.s[t]), float(e.speed_mps[t, 0]), size, at(motion, t), HORIZON_S) > HORIZON_S
 
 
-def _intrusion(evidence: Evidence, actor: int, seen: BodyOnPath[Floats]) -> int:
-    """Finds when an actor last came 0.3 m into the lane along whose path it is seen.
+def intrusion(evidence: Evidence, actor: int, owner: int, seen: BodyOnPath[Floats]) -> int:
+    """Finds when an actor last came 0.3 m into the lane of the owner of the path that it is seen along.
 
     Returns the frame of the contact if it did not.
     """
     e = evidence
     reach = (np.abs(np.sin(seen.turn_rad)) * e.length_m[actor] + np.abs(np.cos(seen.turn_rad)) * e.width_m[actor]) / 2
-    intrudes = np.abs(seen.across_m) - reach <= e.ground.lane_width_m / 2 - INTRUSION_M
+    intrudes = np.abs(seen.across_m) - reach <= lanes_of(e, owner).width_m / 2 - INTRUSION_M
     outside = np.flatnonzero(~intrudes)
     return min(int(outside[-1]) + 1, len(intrudes) - 1) if len(outside) else 0
 

@@ -26,6 +26,7 @@ TRUNCATIONS = (0.05, 1.0)  # choice: a few unlikely events among many, and many 
 # Choice: drivers overlook the vehicle beside them in 1 of 10,000 lane changes. The published gaps are of drivers that
 # looked, and samples of some hundred lane changes say nothing of the others.
 OVERLOOKED = 1e-4
+NEGLIGIBLE = 1e-12
 ROOM = frozenset({"lane_change_gap", "lane_change_headway"})
 UNDISTURBED = Path(__file__).with_name("undisturbed.json")
 
@@ -146,11 +147,13 @@ def truncated_product(probabilities: Sequence[float], at: float, scale: float = 
     if surprise <= 0.0:
         return 1.0
     fewest = n if at >= 1.0 else 1
-    terms = (
-        math.comb(n, k) * (1.0 - at) ** (n - k) * at**k * _erlang_above(k, surprise + k * math.log(at))
-        for k in range(fewest, n + 1)
-    )
-    return min(1.0, sum(terms))
+    total, log_at = 0.0, math.log(at)
+    for k in range(fewest, n + 1):
+        share = math.comb(n, k) * (1.0 - at) ** (n - k) * at**k
+        total += share * _erlang_above(k, surprise + k * log_at)
+        if share < NEGLIGIBLE and k > at * n:  # as are the shares of more
+            break
+    return min(1.0, total)
 
 
 def _erlang_above(k: int, value: float) -> float:

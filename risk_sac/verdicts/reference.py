@@ -22,6 +22,7 @@ from risk_sac.verdicts.evidence import (
     ego_path,
     keeps_lane,
     lane_path,
+    lanes_of,
     recorded_motion,
     recorded_size,
     seen_along,
@@ -250,10 +251,11 @@ def _keeps(name: str, gauge: Gauge, history: History, index: int, met: MetActor 
     else:
         touched = history.measures[-1].assessment.touched
         s, acts = _keeps_by_braking(name, e, path, met, after_steps=AFTER_CONTACT_STEPS * touched)
-    fast = np.flatnonzero(e.speed_mps[e.time_s > -STEP_S / 2, 0] > e.ground.speed_limit_mps + 1e-6)
+    limit_mps = lanes_of(e, 0).limit_mps
+    fast = np.flatnonzero((e.speed_mps[:, 0] > limit_mps + 1e-6) & (e.time_s > -STEP_S / 2))
     if len(fast):
-        first = e.released + int(fast[0])
-        s, acts = _within_limit(s, first, e.ground.speed_limit_mps * e.step_s), min(acts, first)
+        first = int(fast[0])
+        s, acts = _within_limit(s, first, limit_mps * e.step_s), min(acts, first)
     acts = acts if stays else min(acts, in_lane)
     if acts >= index:  # it acts when it is too late
         return False
@@ -291,11 +293,11 @@ def _keeps_by_braking(name: str, e: Evidence, path: Path, met: MetActor | None, 
     return np.concatenate((path.s[: first + 1], driven)), first
 
 
-def _within_limit(s: Floats, first: int, most_m: float) -> Floats:
-    """Limits the speed from frame `first` on; `most_m` is the limit's way in a step."""
+def _within_limit(s: Floats, first: int, most_m: Floats) -> Floats:
+    """Limits the speed from frame `first` on; `most_m` is the limit's way in each step."""
     steps = np.diff(s, prepend=s[:1])
     for t in range(first, len(steps)):
-        steps[t] = min(steps[t], max(most_m, steps[t - 1] - EASES_MPS2 * STEP_S**2))
+        steps[t] = min(steps[t], max(most_m[min(t, len(most_m) - 1)], steps[t - 1] - EASES_MPS2 * STEP_S**2))
     driven: Floats = s[0] + np.cumsum(steps)
     return driven
 

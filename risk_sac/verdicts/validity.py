@@ -1,5 +1,6 @@
 """Finds bodies that overlap in a record before the contact; none should."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -10,8 +11,9 @@ import numpy as np
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.collision import Contact
 from risk_sac.verdicts.conflict import Conflict
-from risk_sac.verdicts.evidence import Evidence
-from risk_sac.verdicts.offences import cuts_off, on_inherited_red
+from risk_sac.verdicts.course import along_series, recorded_path
+from risk_sac.verdicts.evidence import Evidence, column, recorded_motion, recorded_size
+from risk_sac.verdicts.offences import EGO, R157_GAP_M, RECENT_S, intrusion, leaves_room, on_inherited_red
 from risk_sac.world.geometry import overlapping_pairs
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import HEADING, LENGTH, WIDTH, Floats, Kind, X, Y
@@ -112,6 +114,25 @@ def validity_verdicts(evidence: Evidence, striker: int, contact: Contact, facts:
         "no_sideswipe": bool(not adversary_hit_flank or crossing_conflict),
         "seen_before": facts.ever_visible,
     }
+
+
+def cuts_off(evidence: Evidence, striker: int) -> bool:
+    """Whether the ego came into the striker's lane in the last 3 s and left it no room to brake.
+
+    The rule for room is that of `changes_lane_unsafely`, with the striker behind. The ego came over if it moved further
+    towards the striker's way than the striker towards it.
+    """
+    e = evidence
+    path = recorded_path(e.x_m[:, striker], e.y_m[:, striker], e.heading_rad[:, striker])
+    speed_mps, size = column(e.speed_mps, striker), recorded_size(e, striker)
+    seen = along_series(path, speed_mps, size, recorded_motion(e, EGO))
+    t, first = intrusion(e, EGO, striker, seen), e.since(RECENT_S)
+    if t == 0 or t < first:
+        return False
+    side = math.copysign(1.0, seen.across_m[t - 1])
+    both_m = side * float(seen.across_m[first] - seen.across_m[-1])
+    striker_m = side * float(e.lateral_mps[first + 1 :, striker].sum()) * e.step_s
+    return both_m > 2 * max(striker_m, 0.0) and not leaves_room(float(speed_mps[t]), seen, t, R157_GAP_M)
 
 
 def inside_grip(evidence: Evidence, striker: int) -> bool:

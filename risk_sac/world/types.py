@@ -35,6 +35,7 @@ class Role(IntEnum):
     EGO = 0
     ADVERSARY = 1
     BACKGROUND = 2
+    STATIC = 3
 
 
 class Signal(IntEnum):
@@ -165,7 +166,7 @@ class Series(BaseModel):
     body: list[str]
     """n; car | van | truck | bus | motorcycle | bicycle | pedestrian | child | obstacle."""
     role: list[str]
-    """n; ego | adversary | background."""
+    """n; ego | adversary | background | static."""
     length_m: Reals
     """n."""
     width_m: Reals

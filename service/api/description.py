@@ -31,6 +31,7 @@ TITLES = {
     "get_scenes": "Get scene effects",
     "get_bundle": "Get replay bundle",
     "get_core": "Get minimal failure",
+    "get_most_plausible": "Get most plausible failure",
     "get_region": "Get failing region",
     "get_twin": "Get twin picture",
     "get_twin_play": "Get twin recording",

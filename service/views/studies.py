@@ -49,8 +49,8 @@ class Studies(OnDemandCache[Study]):
         self._settings, self._helper = settings, helper
 
     async def get(self, subject: Study, key_id: str | None) -> bytes:
-        """Returns the study; a failure without core or region is refused at once."""
-        if subject.subject in ("core", "region"):
+        """Returns the study; what cannot be minimised or has no region is refused at once."""
+        if subject.subject in ("core", "most-plausible", "region"):
             episode = subject.failure.episode
             try:
                 valid_failure(episode.id, episode)

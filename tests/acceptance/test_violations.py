@@ -129,7 +129,7 @@ def test_every_format_has_the_violation_with_and_without_an_actor(bundle, *, nea
 def alone(bundle: Bundle) -> Bundle:
     """The same, as if nothing had been in the ego's way."""
     episode = bundle.manifest.episode
-    nobody = {"other_id": None, "other_kind": None, "other_role": None}
+    nobody = {"other_id": None, "other_kind": None, "other_body": None, "other_role": None}
     violations = (named(episode).model_copy(update=nobody), *episode.violations[1:])
     changed = episode.model_copy(update={"violations": violations})
     return replace(bundle, manifest=bundle.manifest.model_copy(update={"episode": changed}))

@@ -14,7 +14,7 @@ from risk_sac.verdicts.judge import judge
 from risk_sac.verdicts.validity import artefact_verdicts
 from tests.unit.verdicts.staged import CLEAN, crossing_car, cut_in, leader_brakes, pedestrian_crosses
 
-BUDGET_MS = 3.0
+BUDGET_MS = 4.0
 STAGED = {
     "cut-in": lambda: cut_in(gap=8.0, ego=12.0, other=10.0, at_s=7.0),  # 12 s
     "leader": leader_brakes,

@@ -28,6 +28,7 @@ from risk_sac.records import (
 from risk_sac.report import FinishedRun
 from risk_sac.run_folder.results import EPISODES, FAILURES, RecordedFailure, RunResults, series_name, write_results
 from risk_sac.run_folder.series import PER_ACTOR, PER_OTHER, write_series
+from risk_sac.scenario.bodies import CODES
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign, StoredRun
@@ -57,6 +58,7 @@ LEADER = judgement(
     kind="leader",
     severity=Severity.SEVERE,
     injury_risk=0.02,
+    harm="serious injury",
     fault=Fault.SHARED,
 )
 OUTCOMES = {
@@ -129,6 +131,7 @@ def series_arrays() -> dict[str, np.ndarray]:
         "released_s": np.array(0.0),
         "ids": np.array(["ego", "lead"]),
         "kind": np.array([0, 1], dtype=np.int8),
+        "body": np.array([CODES["car"], CODES["pedestrian"]], dtype=np.int8),
         "role": np.array([0, 1], dtype=np.int8),
         "length_m": np.array([4.6, 0.5]),
         "width_m": np.array([1.8, 0.5]),

@@ -201,8 +201,8 @@ def test_what_does_not_repeat_can_be_drawn_but_not_played(client, tmp_path):
         assert client.get(f"{FOLDER}/{RUN}-search-1/twins/{twin}").status_code == 422
 
 
-@pytest.mark.parametrize("what", ["core.npz", "region"])
-def test_what_is_no_valid_failure_has_neither_core_nor_region_and_is_not_played(client, monkeypatch, what):
+@pytest.mark.parametrize("what", ["core.npz", "most-plausible.npz", "region"])
+def test_what_is_no_valid_failure_is_not_minimised_and_has_no_region_and_is_not_played(client, monkeypatch, what):
     monkeypatch.setattr(on_demand.Helper, "run", lambda *_: pytest.fail("it was played"))
     contacts = client.get(FOLDER, params={"tier": "raw"}).json()["items"]
     invalid = next(each["id"] for each in contacts if each["outcome"] == "degenerate")

@@ -23,7 +23,7 @@ from risk_sac.sim.paths import Along, path_along
 from risk_sac.sim.pilot import Motion
 from risk_sac.sim.solid import VehicleCommand
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.world.types import HEADING, STEP_S, VX, VY, Floats, Frame, Role, X, Y
+from risk_sac.world.types import HEADING, LATERAL, SPEED, STEP_S, VX, VY, Floats, Frame, Role, X, Y
 
 SPEED_MPS = 20.0
 LIMITS = limits_from_odd(FAMILIES["low"].odd, 1.0)
@@ -134,6 +134,20 @@ def test_an_adversary_that_may_not_use_oncoming_lanes_stays_in_its_own(sim):
 def test_an_episode_beside_the_own_lanes_is_repeated_exactly(sim):
     first, second = (play(sim, meeting(230.0), ACROSS)[0] for _ in range(2))
     assert [frame.state.tobytes() for frame in first] == [frame.state.tobytes() for frame in second]
+
+
+def test_the_recorded_speeds_repeat_an_episode(sim):
+    layout = meeting(230.0)
+    first, _, _ = play(sim, layout, ACROSS)
+    frame = sim.reset(layout, 1)
+    for _ in range(LEAD_STEPS):
+        frame = sim.step()
+    sim.hand_over_ego()
+    sim.release()
+    for recorded in first[1:]:
+        sim.apply({"actor": VehicleCommand(*(float(recorded.state[row, 1]) for row in (SPEED, LATERAL)))}, {})
+        frame = sim.step()
+        np.testing.assert_allclose(frame.state, recorded.state, atol=1e-9)
 
 
 def test_both_directions_of_a_road_are_alike(sim):

@@ -57,10 +57,14 @@ def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tm
     asked = ["campaigns", "failures", "bundle", campaign_id, str(failure["index"]), "--out"]
     assert cli.main([*asked, str(tmp_path / "failure.npz")]) == 0
     assert cli.main(["replay", str(tmp_path / "failure.npz")]) == 0
-    assert cli.main([*asked, str(tmp_path / "core.npz"), "--core"]) == 0
+    assert cli.main([*asked, str(tmp_path / "core.npz"), "--minimise", "smallest"]) == 0
     core = read_bundle(tmp_path / "core.npz").manifest.core
     assert core is not None
     assert core.after.segments <= core.before.segments
+    assert cli.main([*asked, str(tmp_path / "likelier.npz"), "--minimise", "most-plausible"]) == 0
+    likelier = read_bundle(tmp_path / "likelier.npz")
+    assert likelier.manifest.plausible.after <= likelier.manifest.plausible.before
+    assert likelier.recorded.manifest.episode.index == failure["index"]
 
     region = service.get(campaign_id, f"/failures/{id_}/region")
     assert [share["played"] for share in region["shares"]] == [40, 40, 40, 10, 40]

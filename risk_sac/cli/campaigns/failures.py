@@ -16,6 +16,7 @@ from risk_sac.cli.parser import FAILURE_HELP, Commands, Parser
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import Twin
+from risk_sac.failures.studied import Aim
 from risk_sac.host.terminal import notes
 from risk_sac.records import Collision, EpisodeId, Violation
 
@@ -56,7 +57,11 @@ def add(commands: Commands) -> None:
     _add_failure(parser)
     output = parser.group("output")
     output.add_argument(
-        "--core", action="store_true", help="only what makes the ego fail, which takes the service 10 s"
+        "--minimise",
+        choices=get_args(Aim),
+        metavar="AIM",
+        help="smallest: only what makes the ego fail, which takes the service 10 s; most-plausible: the least unlikely "
+        "motion that still fails, which takes 20 s",
     )
     output.add_argument("--out", type=Path, metavar="FILE.npz", help="(default: FAILURE.npz)")
 
@@ -104,7 +109,7 @@ def _list(options: argparse.Namespace) -> int:
 def _bundle(options: argparse.Namespace) -> int:
     with Client.from_environment(options.url) as client:
         failure_id = _id_of(client, options.id, options.failure)
-        content = client.bundle(options.id, failure_id, core=options.core)
+        content = client.bundle(options.id, failure_id, aim=options.minimise)
     file = options.out or Path(f"{failure_id}.npz")
     write_out(file, content, "Bundle", notes)
     return OK

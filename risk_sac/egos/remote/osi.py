@@ -18,7 +18,8 @@ from risk_sac.egos.driving import PATH_X, PATH_Y, STATION, lane_edges, point_at
 from risk_sac.egos.guard import Malformed
 from risk_sac.egos.remote import osi_pb2
 from risk_sac.egos.seam import EpisodeStart, Perceived, Trajectory
-from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Floats, Kind, Lane, Road, Signal, X, Y
+from risk_sac.scenario.bodies import Shape, body_like
+from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Floats, Lane, Road, Signal, X, Y
 
 # OSI's numbers.
 DRIVING, INTERSECTION, NORMAL = 2, 4, 2
@@ -128,11 +129,9 @@ def _road_point(xy: Floats) -> Mapping[str, float]:
 
 VERSION = {"version_major": 3, "version_minor": 8, "version_patch": 0}
 # OSI's numbers.
-TYPE_VEHICLE, TYPE_PEDESTRIAN, TYPE_CAR, TYPE_HEAVY_TRUCK = 2, 3, 4, 7
+TYPE_OTHER, TYPE_VEHICLE, TYPE_PEDESTRIAN = 1, 2, 3
+TYPES: Mapping[Shape, int] = {"person": TYPE_PEDESTRIAN, "block": TYPE_OTHER}  # the rest are vehicles
 TRAJECTORY = 1
-# Choice: what nothing of ours has. Heights are usual ones, and a long body is a truck.
-CAR_HEIGHT_M, TRUCK_HEIGHT_M, WALKER_HEIGHT_M = 1.5, 3.0, 1.75
-TRUCK_FROM_M = 6.5
 SIGNAL_ID = 1 << 32  # id of the one signal ahead; beyond the ids of actors
 
 
@@ -229,17 +228,17 @@ def trajectory_of(request: bytes, perceived: Perceived, rear_axle_m: float) -> T
 
 def _moving(perceived: Perceived, column: int, number: int) -> Mapping[str, Any]:
     state = perceived.state[:, column]
-    walks, truck = perceived.kind[column] == Kind.PEDESTRIAN, state[LENGTH] > TRUCK_FROM_M
-    height_m = WALKER_HEIGHT_M if walks else TRUCK_HEIGHT_M if truck else CAR_HEIGHT_M
+    body = body_like(float(state[LENGTH]), float(state[WIDTH]))
+    height_m = body.height_m
     base = {
         "dimension": {"length": state[LENGTH], "width": state[WIDTH], "height": height_m},
         "position": _vector(state[X], state[Y], height_m / 2),
         "orientation": {"roll": 0.0, "pitch": 0.0, "yaw": math.remainder(state[HEADING], math.tau)},
         "velocity": _vector(state[VX], state[VY]),
     }
-    told: dict[str, Any] = {"id": {"value": number}, "base": base, "type": TYPE_PEDESTRIAN if walks else TYPE_VEHICLE}
-    if not walks:
-        told["vehicle_classification"] = {"type": TYPE_HEAVY_TRUCK if truck else TYPE_CAR}
+    told: dict[str, Any] = {"id": {"value": number}, "base": base, "type": TYPES.get(body.shape, TYPE_VEHICLE)}
+    if told["type"] == TYPE_VEHICLE:
+        told["vehicle_classification"] = {"type": body.export.osi}
     return told
 
 

@@ -146,7 +146,7 @@ def _add_light(root: ET.Element, failure: Recorded, lane: NetLane, head: Head, n
 
 def _add_obstacle(root: ET.Element, actor: ExportedActor, number: int) -> None:
     obstacle = add(root, "dynamicObstacle", id=number)
-    add(obstacle, "type", actor.type)
+    add(obstacle, "type", actor.body.export.commonroad)
     box = add(add(obstacle, "shape"), "rectangle")
     add(box, "length", actor.length_m)
     add(box, "width", actor.width_m)

@@ -52,11 +52,11 @@ class Canvas:
                 self._pen.ellipse((x - r, y - r, x + r, y + r), fill=fill)
 
     def body(
-        self, pose: tuple[float, float, float], size_m: tuple[float, float], tone: str, *, walks: bool, known: bool
+        self, pose: tuple[float, float, float], size_m: tuple[float, float], tone: str, *, person: bool, known: bool
     ) -> None:
-        """Draws a body: a pedestrian as a circle, a vehicle with a light patch to the front."""
+        """Draws a body: a person as a circle, a vehicle with a light patch to the front."""
         fill = tone if known else None
-        if walks:
+        if person:
             ring = np.linspace(0.0, 2.0 * np.pi, 17)[:-1]
             circle = pose[:2] + 0.45 * np.column_stack((np.cos(ring), np.sin(ring)))
             self._pen.polygon(self._placed(circle), fill=fill, outline=tone, width=3)
@@ -141,7 +141,7 @@ def _picture(failure: Recorded, ground: Sequence[Surface], frame: int, middle: F
                 (actor.x_m[frame], actor.y_m[frame], actor.heading_rad[frame]),
                 (actor.length_m, actor.width_m),
                 EGO if column == 0 else STRIKER if column == failure.striker else OTHER,
-                walks=actor.pedestrian,
+                person=actor.body.shape == "person",
                 known=column == 0 or failure.series["visible"][frame, column] == 1,
             )
     picture = canvas.picture()

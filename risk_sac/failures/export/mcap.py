@@ -27,7 +27,6 @@ UNSEEN_ALPHA = 0.35  # of a body that the ego does not know of
 ASPHALT = (0.25, 0.25, 0.27)
 GROUND = {"lane": ASPHALT, "inside": ASPHALT, "sidewalk": (0.55, 0.55, 0.55), "crossing": (0.8, 0.8, 0.8)}
 LIGHTS = {"red": (1, 0, 0), "red_yellow": (1, 0.5, 0), "yellow": (1, 0.9, 0), "green": (0, 0.8, 0), "off": (0.2,) * 3}
-HEIGHTS_M = {True: 1.75, False: 1.5}  # of pedestrians, and of vehicles
 MEASURES = "risk_sac.Measures"
 
 
@@ -109,13 +108,18 @@ def _body(failure: Recorded, actor: ExportedActor, frame: int) -> fox.SceneEntit
     seen = column == 0 or bool(failure.series["visible"][frame, column])
     tone = BLUE if column == 0 else ORANGE if column == failure.striker else GREY
     paint = _paint(tone, 1.0 if seen else UNSEEN_ALPHA)
-    height = HEIGHTS_M[actor.pedestrian]
+    person, height = actor.body.shape == "person", actor.body.height_m
     x, y, z, heading = (float(values[frame]) for values in (actor.x_m, actor.y_m, actor.z_m, actor.heading_rad))
     pose = fox.Pose(position=fox.Vector3(x=x, y=y, z=z + height / 2), orientation=_turned(heading))
     size = fox.Vector3(x=actor.length_m, y=actor.width_m, z=height)
     above = fox.Pose(position=fox.Vector3(x=x, y=y, z=z + height + 0.8), orientation=_turned(0.0))
     speed = f"{actor.speed_mps[frame]:.3f}"
-    told = {"role": actor.role.name.lower(), "speed_mps": speed, "seen_by_ego": str(seen).lower()}
+    told = {
+        "body": actor.body.name,
+        "role": actor.role.name.lower(),
+        "speed_mps": speed,
+        "seen_by_ego": str(seen).lower(),
+    }
     cube = fox.CubePrimitive(pose=pose, size=size, color=paint)
     cylinder = fox.CylinderPrimitive(pose=pose, size=size, bottom_scale=1, top_scale=1, color=paint)
     return fox.SceneEntity(
@@ -123,8 +127,8 @@ def _body(failure: Recorded, actor: ExportedActor, frame: int) -> fox.SceneEntit
         frame_id=MAP,
         id=actor.id,
         metadata=[fox.KeyValuePair(key=key, value=value) for key, value in told.items()],
-        cubes=[] if actor.pedestrian else [cube],
-        cylinders=[cylinder] if actor.pedestrian else [],
+        cubes=[] if person else [cube],
+        cylinders=[cylinder] if person else [],
         texts=[fox.TextPrimitive(pose=above, billboard=True, font_size=0.8, text=actor.id, color=paint)],
     )
 

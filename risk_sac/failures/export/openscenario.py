@@ -6,6 +6,7 @@ clock; the ego is free, and is asked to drive where it was going. In the other f
 
 import xml.etree.ElementTree as ET
 from datetime import datetime
+from typing import Any
 
 import numpy as np
 from scenariogeneration import xosc
@@ -14,6 +15,7 @@ from risk_sac.failures.export.formats import BESIDE, Files, beside, document
 from risk_sac.failures.export.opendrive import opendrive
 from risk_sac.failures.export.recorded import ExportedActor, Recorded, cycle, goal
 from risk_sac.failures.net import colour
+from risk_sac.scenario.bodies import Body
 from risk_sac.world.types import STEP_S
 
 VERSION = 2  # of OpenSCENARIO 1
@@ -27,7 +29,8 @@ LACKS = (
 )
 MADE = datetime(2000, 1, 1)  # a date is required; with a true one the same failure would be another file
 REAR_AXLE, FRONT_AXLE = 0.3, 0.3  # of a body's length, from its middle
-HEIGHTS_M = {"car": 1.5, "truck": 3.2, "pedestrian": 1.75}
+# Diameter of the wheels and width between them, m.
+WHEELS_M = {"car": (0.7, 1.6), "two_wheels": (0.6, 0.1), "other": (1.0, 2.0)}
 FASTEST_MPS, ACCEL_MPS2, DECEL_MPS2 = 60.0, 10.0, 12.0  # a body's; players check what they drive against it
 LAST_S = 20.0  # that a free ego may take
 
@@ -89,17 +92,19 @@ def _roads(failure: Recorded, roads: bytes) -> xosc.RoadNetwork:
     return network
 
 
-def _body(actor: ExportedActor) -> xosc.Vehicle | xosc.Pedestrian:
-    height = HEIGHTS_M[actor.type]
-    if actor.pedestrian:
+def _body(actor: ExportedActor) -> xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject:
+    body, height = actor.body, actor.body.height_m
+    if body.shape in ("person", "block"):
         box = xosc.BoundingBox(actor.width_m, actor.length_m, height, 0, 0, height / 2)
-        return xosc.Pedestrian("pedestrian", 75, xosc.PedestrianCategory.pedestrian, box)
+        if body.shape == "block":
+            return xosc.MiscObject(body.name, body.mass_kg, _category(xosc.MiscObjectCategory, body), box)
+        return xosc.Pedestrian(body.name, body.mass_kg, _category(xosc.PedestrianCategory, body), box)
     box = xosc.BoundingBox(actor.width_m, actor.length_m, height, REAR_AXLE * actor.length_m, 0, height / 2)
-    wheel_m, track_m = (1.0, 2.0) if actor.type == "truck" else (0.7, 1.6)
+    wheel_m, track_m = WHEELS_M["two_wheels" if body.rides else "car" if body.name == "car" else "other"]
     base_m = (REAR_AXLE + FRONT_AXLE) * actor.length_m
     return xosc.Vehicle(
-        actor.type,
-        getattr(xosc.VehicleCategory, actor.type),
+        body.name,
+        _category(xosc.VehicleCategory, body),
         box,
         xosc.Axle(0.5, wheel_m, track_m, base_m, wheel_m / 2),
         xosc.Axle(0.0, wheel_m, track_m, 0.0, wheel_m / 2),
@@ -109,10 +114,15 @@ def _body(actor: ExportedActor) -> xosc.Vehicle | xosc.Pedestrian:
     )
 
 
+def _category(categories: Any, body: Body) -> Any:
+    """Returns the format's word for a body, as the body's row has it."""
+    return getattr(categories, body.export.openscenario)
+
+
 def _place(actor: ExportedActor, frame: int) -> xosc.WorldPosition:
     """Returns the place of the rear axle's middle; of a pedestrian, its own."""
     heading = float(actor.heading_rad[frame])
-    back_m = 0.0 if actor.pedestrian else REAR_AXLE * actor.length_m
+    back_m = 0.0 if actor.body.shape in ("person", "block") else REAR_AXLE * actor.length_m
     x, y = actor.x_m[frame] - back_m * np.cos(heading), actor.y_m[frame] - back_m * np.sin(heading)
     return xosc.WorldPosition(float(x), float(y), float(actor.z_m[frame]), heading, 0, 0)
 

@@ -7,7 +7,6 @@ from functools import cached_property
 from importlib.resources import files
 from itertools import groupby
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,14 +16,14 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures.bundle import WORLD, Bundle, Manifest, check_world
 from risk_sac.failures.recording import Series
 from risk_sac.records import Collision, Violation
+from risk_sac.scenario.bodies import Body, body_of
 from risk_sac.scenario.layout import Layout
 from risk_sac.world.net import Net, NetLane
 from risk_sac.world.read_net import read_net
 from risk_sac.world.types import STEP_S, Floats, Kind, Role
 
 PER_FRAME = ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")
-PER_ACTOR = ("kind", "role", "length_m", "width_m")
-TRUCK_FROM_M = 6.0  # length
+PER_ACTOR = ("kind", "body", "role", "length_m", "width_m")
 BEYOND_M = 60.0  # into the last road, where a free ego has been through what the failure is about
 
 
@@ -33,7 +32,8 @@ class ExportedActor:
     """A road user; its arrays have a row for each frame until it left the net."""
 
     id: str
-    pedestrian: bool
+    body: Body
+    pedestrian: bool  # whether it moves anywhere, as pedestrians do
     role: Role
     length_m: float
     width_m: float
@@ -44,11 +44,6 @@ class ExportedActor:
     heading_rad: Floats  # without jumps of 2π
     speed_mps: Floats
     accel_mps2: Floats
-
-    @property
-    def type(self) -> Literal["pedestrian", "truck", "car"]:
-        """Names its type for other tools."""
-        return "pedestrian" if self.pedestrian else "truck" if self.length_m > TRUCK_FROM_M else "car"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,6 +164,7 @@ def _actor(series: Series, column: int, net: Net) -> ExportedActor:
     per_frame["heading_rad"] = np.unwrap(per_frame["heading_rad"])
     return ExportedActor(
         id=str(series["ids"][column]),
+        body=body_of(int(series["body"][column])),
         pedestrian=bool(series["kind"][column] == Kind.PEDESTRIAN),
         role=Role(int(series["role"][column])),
         length_m=float(series["length_m"][column]),

@@ -237,6 +237,13 @@ async def get_core(failure: Asked, headers: Headers, service: Service, caller: C
     return Response(await service.studies.get(Study(failure, "core"), caller.key_id), headers=headers, media_type=ZIP)
 
 
+@router.get("/failures/{failure_id}/most-plausible.npz", response_class=Response, responses=made(ZIP) | PLAYED)
+async def get_most_plausible(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
+    """The least unlikely motion that still fails, and the recording; takes up to 300 episodes, some 20 s."""
+    study = Study(failure, "most-plausible")
+    return Response(await service.studies.get(study, caller.key_id), headers=headers, media_type=ZIP)
+
+
 @router.get("/failures/{failure_id}/region", response_model=Region, responses=made(JSON) | PLAYED)
 async def get_region(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
     """Share of its neighbours that fail alike: nearby scenes, other traffic, other actions; takes 170 episodes."""

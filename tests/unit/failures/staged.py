@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from risk_sac.records import ConflictType, Judgement, Outcome
 from risk_sac.run_folder.results import RecordedFailure
+from risk_sac.scenario.bodies import CODES
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.space import SceneSpace
 from tests.builders import AVOIDS, TOUCHES, collision, episode_record, judgement
@@ -26,6 +27,7 @@ def synthetic_contact(judged: Judgement = JUDGED) -> RecordedFailure:
         time_s=1.95,
         other_id="pedestrian",
         other_kind="pedestrian",
+        other_body="pedestrian",
         contact_y_m=-0.5,
         other_zone="left",
         ego_speed_mps=10.0,
@@ -60,6 +62,7 @@ def synthetic_series() -> dict[str, NDArray[np.generic]]:
         "released_s": np.array(0.1),
         "ids": np.array(["ego", "pedestrian", "bystander"]),
         "kind": np.array([0, 1, 0], dtype=np.int8),
+        "body": np.array([CODES["car"], CODES["pedestrian"], CODES["car"]], dtype=np.int8),
         "role": np.array([0, 1, 2], dtype=np.int8),
         "length_m": np.array([4.6, 0.5, 4.6]),
         "width_m": np.array([1.85, 0.5, 1.85]),

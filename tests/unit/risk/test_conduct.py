@@ -10,15 +10,20 @@ from risk_sac.risk import conduct
 from risk_sac.risk.conduct import (
     ACCELERATION,
     ADVERSARY_MEMORY,
+    CONDUCT_ROWS,
     CUT_IN,
+    ENTRY,
+    JERK,
     LATERAL_SPEED,
     MEMORY_SCALE,
     OVER_LINE,
     PACING,
     PEDALS,
+    SPEEDING,
     STANDING,
     TOWARDS_CAR,
     WALKING,
+    RoadFacts,
     conduct_terms,
 )
 from risk_sac.risk.driving import FEATURES
@@ -26,6 +31,9 @@ from risk_sac.world import types
 from risk_sac.world.types import Kind
 
 LANE_M = 3.3
+SQUARE = [(nx, ny, 10.0, 0.0) for nx, ny in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))]
+STREET = RoadFacts(LANE_M, 13.9, np.array(SQUARE[:0]).reshape(-1, 4))
+JUNCTION = RoadFacts(LANE_M, 13.9, np.array(SQUARE))  # within 10 m of the middle
 EGO = {"speed": 12.0}
 
 
@@ -42,8 +50,8 @@ def state_of(*bodies: dict[str, float]) -> np.ndarray:
 class Played:
     """One adversary beside an ego, in column 1, and what the cost remembers of it."""
 
-    def __init__(self, kind: Kind = Kind.VEHICLE) -> None:
-        self.memory = np.zeros((ADVERSARY_MEMORY, 1))
+    def __init__(self, kind: Kind = Kind.VEHICLE, road: RoadFacts = STREET) -> None:
+        self.memory, self.road = np.zeros((CONDUCT_ROWS, 1)), road
         self.kind = np.array([Kind.VEHICLE, kind], dtype=np.int8)
 
     def step(
@@ -52,7 +60,7 @@ class Played:
         state = state_of(ego, other)
         links = np.array([0, ord(link)], dtype=np.uint8)
         for _ in range(times):
-            terms = conduct_terms(np.array([1]), np.array([0]), self.kind, links, state, self.memory, LANE_M)
+            terms = conduct_terms(np.array([1]), np.array([0]), self.kind, links, state, self.memory, self.road)
         return terms[0]
 
 
@@ -133,6 +141,78 @@ def test_standing_costs_where_nothing_is_ahead_and_the_light_is_not_red():
     assert Played().step(still, times=60, ego={"x": 60.0, "y": 28.0})[STANDING] == 0.0
 
 
+def test_jerking_costs_and_pressing_a_pedal_as_ordinary_drivers_do_does_not():
+    def jerks(*accels: float) -> list[float]:
+        played = Played()
+        return [float(played.step(FAR | {"accel": accel})[JERK]) for accel in accels]
+
+    assert max(jerks(-1.0, -2.0, -3.0, -4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0)) == 0.0  # 10 m/s³
+    assert jerks(-7.5) == [pytest.approx(0.5)]  # 15 m/s³
+    assert jerks(*[-8.0] * 9, 3.0)[-1] > 0.9
+
+
+def test_speeding_costs_where_1_of_100_drive_so_fast():
+    limit = STREET.limit_mps
+    assert Played().step(FAR | {"speed": limit + 6.0})[SPEEDING] == 0.0
+    assert Played().step(FAR | {"speed": limit + 12.0})[SPEEDING] == 1.0
+
+
+def turned(body: dict[str, float], angle: float) -> dict[str, float]:
+    """A body on the x axis, turned round the middle of the junction."""
+    return body | {"x": body["x"] * math.cos(angle), "y": body["x"] * math.sin(angle), "heading": angle}
+
+
+def entries(letter: str, wait_s: float, ego: dict[str, float], angle: float = 0.0, ego_link: str = "G") -> list[float]:
+    """The term of an entry and of each step afterwards, through the junction and out of it."""
+    played = Played(road=JUNCTION)
+    waits = turned({"x": -13.0, "speed": 0.0}, angle)
+    links = {"waits": [ord(ego_link), ord(letter)], "goes": [ord(ego_link), 0]}
+    terms = []
+    ways = ["waits"] * round(wait_s * 10) + ["goes"] * 50
+    for step, way in enumerate(ways):
+        gone_m = 0.8 * max(0, step - round(wait_s * 10))
+        other = waits if way == "waits" else turned({"x": -12.0 + gone_m, "speed": 8.0}, angle)
+        link = np.array(links[way], dtype=np.uint8)
+        row, slot = np.array([1]), np.array([0])
+        step_terms = conduct_terms(
+            row, slot, played.kind, link, state_of(turned(ego, 0.0), other), played.memory, JUNCTION
+        )
+        if way == "goes":
+            terms.append(float(step_terms[0, ENTRY]))
+    return terms
+
+
+ELSEWHERE = {"x": 300.0, "speed": 10.0}
+
+
+@pytest.mark.parametrize("angle", [math.pi / 2, -math.pi / 2])
+def test_entering_on_red_costs_until_the_junction_is_left_and_more_the_longer_it_was_red(angle):
+    late = entries("r", 5.0, ELSEWHERE, angle)
+    assert late[0] == late[20] == conduct.OVERLOOKS
+    assert late[-1] == 0.0
+    assert 0.15 < entries("r", 2.0, ELSEWHERE, angle)[0] < 0.35
+    assert entries("G", 5.0, ELSEWHERE, angle)[0] == entries("y", 5.0, ELSEWHERE, angle)[0] == 0.0
+
+
+@pytest.mark.parametrize("angle", [math.pi / 2, -math.pi / 2])
+def test_entering_before_one_that_has_priority_costs_a_part(angle):
+    near, far = {"x": -15.0, "speed": 12.0}, {"x": -80.0, "speed": 12.0}
+    close = entries("g", 1.0, near, angle)
+    assert 0.02 < close[0] < 0.2
+    assert close[-1] == 0.0
+    assert entries("g", 1.0, far, angle)[0] == 0.0
+    assert entries("g", 1.0, near, angle, ego_link="r")[0] == 0.0
+    assert entries("g", 1.0, turned(near, 0.0) | {"x": 30.0}, angle)[0] == 0.0  # it is past
+
+
+def test_crawling_in_a_junction_costs_and_crawling_on_the_road_does_not():
+    slow = {"x": 0.0, "speed": 2.0}
+    ahead = {"x": 100.0, "speed": 12.0}
+    assert Played(road=JUNCTION).step(slow, ahead, times=60)[STANDING] == 1.0
+    assert Played(road=JUNCTION).step(slow | {"x": 30.0}, ahead, times=60)[STANDING] == 0.0
+    assert Played(road=JUNCTION).step(slow | {"speed": 5.0}, ahead, times=60)[STANDING] == 0.0
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_walking_at_a_car_costs_and_crossing_before_it_does_not(side):
     def walk(heading: float, x: float = 15.0, y: float = 0.0) -> float:
@@ -156,11 +236,11 @@ def test_a_pedestrian_costs_that_walks_faster_than_most_or_stands_in_the_cars_wa
 
 def test_the_cost_is_that_of_the_worst_adversary_and_0_without_one():
     state = state_of(EGO, FAR | {"accel": -9.0}, FAR | {"x": 150.0})
-    memory, link = np.zeros((ADVERSARY_MEMORY, 2)), np.zeros(3, dtype=np.uint8)
+    memory, link = np.zeros((CONDUCT_ROWS, 2)), np.zeros(3, dtype=np.uint8)
     kind = np.zeros(3, dtype=np.int8)
     rows, none = np.array([1, 2]), np.array([], dtype=np.intp)
-    assert conduct_terms(rows, np.array([0, 1]), kind, link, state, memory, LANE_M).max() == 1.0
-    assert conduct_terms(none, none, kind, link, state, memory, LANE_M).max(initial=0.0) == 0.0
+    assert conduct_terms(rows, np.array([0, 1]), kind, link, state, memory, STREET).max() == 1.0
+    assert conduct_terms(none, none, kind, link, state, memory, STREET).max(initial=0.0) == 0.0
 
 
 values = st.floats(-50, 50)

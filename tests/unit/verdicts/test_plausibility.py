@@ -7,6 +7,7 @@ from scipy.stats import combine_pvalues
 
 from risk_sac.records import PlausibilityClass
 from risk_sac.risk.driving import FEATURES
+from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.behaviour import Observed, observed_of, pedal_changes, runs, smoothed
 from risk_sac.verdicts.plausibility import (
     judge_observed,
@@ -15,6 +16,7 @@ from risk_sac.verdicts.plausibility import (
     undisturbed,
 )
 from tests.unit.verdicts.staged import (
+    STREET,
     cut_in,
     leader_brakes,
     mirrored,
@@ -54,11 +56,30 @@ class TestObserved:
         assert values(evidence, "lane_change_gap") == [0.0]
         assert plausibility_of(evidence).verdict is PlausibilityClass.RARE  # as of a driver that overlooks the ego
 
-    def test_driving_over_the_line_is_timed(self):
-        hovers = sideways(straight(20.0, 3.3, 0.0, 12.0), 1.0, -1.0, 1.0)
+    @pytest.mark.parametrize(("moved_m", "keeps_s"), [(1.0, 6.0), (0.65, 6.3), (0.4, 0.0)])
+    def test_keeping_over_the_line_or_beside_it_is_timed_without_the_way_there(self, moved_m, keeps_s):
+        hovers = sideways(straight(20.0, 3.3, 0.0, 12.0), 1.0, -1.0, moved_m)
         evidence = stage(straight(0.0, 0.0, 0.0, 12.0), hovers, contact=False, until_s=8.0)
-        (over_s,) = values(evidence, "over_line")
-        assert over_s == pytest.approx(8.0 - 1.0 - (3.3 / 2 - 1.85 / 2), abs=0.2)
+        assert values(evidence, "over_line") == pytest.approx([keeps_s], abs=0.21)
+
+    def test_changing_lanes_is_no_keeping_to_the_line(self):
+        assert values(cut_in(gap=12.0, ego=14.0, other=9.0), "over_line") == pytest.approx([0.0])
+
+    def test_crawling_through_a_junction_is_timed_and_stopping_there_apart(self):
+        crawls = straight(60.0, -12.0, math.pi / 2, 2.0, (6.5, -2.0))
+        junction = replace(STREET, junctions=(Area.box(50.0, 70.0, -10.0, 10.0),))
+        evidence = stage(straight(0.0, 0.0, 0.0, 1.0), crawls, ground=junction, contact=False, until_s=9.5)
+        entered_s = (12.0 - 10.0 - 4.6 / 2) / 2.0 - 1.5
+        assert values(evidence, "junction_crawl") == pytest.approx([7.5 - max(entered_s, 0.0)], abs=0.3)
+        assert values(evidence, "junction_stop") == pytest.approx([2.0], abs=0.3)
+        assert plausibility_of(evidence).facts[0].feature == "junction_crawl"
+        assert plausibility_of(evidence).verdict is PlausibilityClass.RARE
+
+    def test_driving_through_a_junction_is_no_crawling(self):
+        junction = replace(STREET, junctions=(Area.box(50.0, 70.0, -10.0, 10.0),))
+        drives = straight(60.0, -30.0, math.pi / 2, 6.0)
+        evidence = stage(straight(0.0, 0.0, 0.0, 1.0), drives, ground=junction, contact=False, until_s=8.0)
+        assert values(evidence, "junction_crawl") == values(evidence, "junction_stop") == [0.0]
 
     def test_a_pedestrian_s_speed_is_measured(self):
         assert values(pedestrian_crosses(walk=1.9), "walking_speed") == pytest.approx([1.9])

@@ -103,7 +103,7 @@ def test_a_striker_that_has_left_cannot_have_struck():
 
 @pytest.mark.parametrize("evidence", [cut_in(), leader_brakes()], ids=["cut-in", "leader"])
 def test_what_is_stored_is_judged_alike(evidence):
-    names = (*PER_ACTOR, "link", "kind", "role", "length_m", "width_m")
+    names = (*PER_ACTOR, "link", "kind", "body", "role", "length_m", "width_m")
     stored = {name: getattr(evidence, name) for name in names} | {"ids": np.array(evidence.ids)}
     stored |= {"time_s": evidence.time_s + 1.5, "visible": np.where(evidence.known, 1.0, np.nan)}
     first = judge(evidence, "actor_1", valid=True)

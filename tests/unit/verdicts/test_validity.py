@@ -36,7 +36,7 @@ def broken(pair: tuple[Frame, Frame], visible_for_s: float = 3.0, ever_visible: 
     contact = contact_of(*pair)
     names = (*PER_ACTOR, "link")
     series = {name: np.array([getattr(frame, name) for frame in pair]) for name in names}
-    series |= {name: getattr(pair[0], name) for name in ("ids", "kind", "role", "length_m", "width_m")}
+    series |= {name: getattr(pair[0], name) for name in ("ids", "kind", "body", "role", "length_m", "width_m")}
     series |= {"time_s": np.array([frame.time_s for frame in pair]), "visible": np.ones((2, len(pair[0].ids)))}
     evidence = Evidence.from_series(series, Ground(), 0.0)
     facts = replace(CLEAN, visible_for_s=visible_for_s, ever_visible=ever_visible)

@@ -24,7 +24,7 @@ function drawActor(scene: Scene, i: number): void {
   ctx.fillStyle = ctx.strokeStyle = ink[PART_COLOURS[part]];
   ctx.setLineDash(visible ? NO_DASH : DASH);
   ctx.lineWidth = part === "background" ? 1 : 1.6;
-  if (recording.pedestrian[i]) drawPerson(scene, recording.width_m[i]! * camera.scale, visible);
+  if (recording.shape[i] === "person") drawPerson(scene, recording.width_m[i]! * camera.scale, visible);
   else drawVehicle(scene, i, recording.length_m[i]! * camera.scale, recording.width_m[i]! * camera.scale, visible);
   ctx.restore();
 }
@@ -43,7 +43,7 @@ function drawVehicle(scene: Scene, i: number, length: number, width: number, vis
   ctx.setLineDash(NO_DASH);
   if (visible && part === "striker") hatch(scene, length, width);
   ctx.strokeStyle = ctx.fillStyle = visible ? ink["--surface"] : ctx.strokeStyle;
-  drawHeading(ctx, length, width);
+  if (recording.shape[i] !== "block") drawHeading(ctx, length, width);
   if (part === "ego") disc(ctx, -length * 0.12, 0, width * 0.2, true);
   if (part === "adversary") disc(ctx, -length * 0.12, 0, width * 0.17, false);
 }

@@ -12,6 +12,7 @@ export function recording() {
     released_s: 1,
     ids: ["ego", "ped"],
     kind: ["vehicle", "pedestrian"],
+    body: ["car", "pedestrian"],
     role: ["ego", "adversary"],
     length_m: [4, 0.5],
     width_m: [2, 0.5],

@@ -4,6 +4,15 @@ import type { Body } from "../api/types";
 import { isContact, type Collision, type Violation } from "../ui/violations";
 
 export type Series = Body<"Series">;
+/** Bodies that are no closed vehicles, and so hide nothing. */
+const SHAPES: Record<string, Shape> = {
+  motorcycle: "two_wheels",
+  bicycle: "two_wheels",
+  pedestrian: "person",
+  child: "person",
+  obstacle: "block",
+};
+export type Shape = "vehicle" | "two_wheels" | "person" | "block";
 export type Part = "ego" | "striker" | "adversary" | "background";
 
 export interface Recording {
@@ -18,7 +27,10 @@ export interface Recording {
   time_s: Float64Array;
   ids: string[];
   parts: Part[];
-  pedestrian: boolean[];
+  /** How each body is drawn. */
+  shape: Shape[];
+  /** Whether what is behind it is hidden from the ego's sensor. */
+  conceals: boolean[];
   length_m: number[];
   width_m: number[];
   /** Of `steps x actors`, as those that follow; NaN where the actor is absent. */
@@ -53,8 +65,9 @@ export function recordingOf(series: Series, violation: Collision | Violation): R
     actors,
     time_s,
     ids: series.ids,
-    parts: series.role.map((role, i) => (i === striker ? "striker" : (role as Part))),
-    pedestrian: series.kind.map((kind) => kind === "pedestrian"),
+    parts: series.role.map((role, i) => (i === striker ? "striker" : role === "static" ? "background" : (role as Part))),
+    shape: series.body.map((body) => SHAPES[body] ?? "vehicle"),
+    conceals: series.body.map((body) => !(body in SHAPES)),
     length_m: series.length_m.map((length) => length ?? 0),
     width_m: series.width_m.map((width) => width ?? 0),
     x_m: flat(series.x_m, actors),

@@ -26,7 +26,7 @@ export function drawShade(scene: Scene): void {
   ctx.beginPath();
   const beyond = 3 * sensor.range_m; // so that the straight far side lies outside of the range
   for (let i = 1; sensor.occlusion && i < recording.actors; i++) {
-    if (recording.pedestrian[i] || !present(scene, i)) continue;
+    if (!recording.conceals[i] || !present(scene, i)) continue;
     place(scene, i);
     if (!shadow(eyeX, eyeY, body, beyond, behind)) continue;
     ctx.moveTo(pixelX(scene, behind[0]!), pixelY(scene, behind[1]!));
@@ -81,7 +81,7 @@ export function drawSightLines(scene: Scene): void {
 function freeShare({ poses, recording }: Scene, actor: number): number {
   let share = 1;
   for (let i = 1; i < recording.actors; i++) {
-    if (i === actor || recording.pedestrian[i] || Number.isNaN(poses[3 * i]!)) continue;
+    if (i === actor || !recording.conceals[i] || Number.isNaN(poses[3 * i]!)) continue;
     const [x, y, heading] = [poses[3 * i]!, poses[3 * i + 1]!, poses[3 * i + 2]!];
     const meets = entry(poses[0]!, poses[1]!, poses[3 * actor]!, poses[3 * actor + 1]!, x, y, heading, recording.length_m[i]!, recording.width_m[i]!);
     share = Math.min(share, meets);

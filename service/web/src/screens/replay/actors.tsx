@@ -14,7 +14,7 @@ const LETTERS: Record<string, string> = { G: "green", g: "green, yields", y: "ye
 export function Actors({ recording, clock }: { recording: Recording; clock: Clock }) {
   const time = useLazyTime(clock);
   const instant = instantAt(recording.time_s, time);
-  const { series, ids, parts, pedestrian } = recording;
+  const { series, ids, parts, shape } = recording;
   const at = (rows: (number | null)[][], i: number) => rows[instant.index]?.[i] ?? null;
   const margin = (value: number | null, bad: boolean) => (value === null ? "–" : <span class={bad ? "bad" : ""}>{signed(value)} m</span>);
   const present = ids.map((_, i) => i).filter((i) => at(series.x_m, i) !== null);
@@ -52,7 +52,7 @@ export function Actors({ recording, clock }: { recording: Recording; clock: Cloc
                   <th scope="row">{ids[i]}</th>
                   <td>
                     {parts[i] === "striker" && recording.moment === "violation" ? "nearest" : ROLES[parts[i]!]}
-                    {pedestrian[i] && ", on foot"}
+                    {shape[i] === "person" && ", on foot"}
                   </td>
                   <td class="number">{number(at(series.speed_mps, i), 1)} m/s</td>
                   <td class="number">{signed(at(series.accel_mps2, i) ?? Number.NaN)} m/s²</td>

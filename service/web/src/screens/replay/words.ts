@@ -95,11 +95,10 @@ function contactOf(collision: Collision): string {
 }
 
 /** How fast the bodies closed, and how bad that is. */
-function severityInWords({ relative_speed_mps, other_kind, judgement }: Collision): string {
+function severityInWords({ relative_speed_mps, judgement }: Collision): string {
   const closing = `The closing speed was ${number(relative_speed_mps, 1)} m/s`;
   if (judgement?.severity == null || judgement.injury_risk == null) return `${closing}.`;
-  const harm = other_kind === "pedestrian" ? "death" : "serious injury";
-  const impact = `${judgement.severity}, for the impact speed was ${number(judgement.impact_mps, 1)} m/s, with a risk of ${harm}`;
+  const impact = `${judgement.severity}, for the impact speed was ${number(judgement.impact_mps, 1)} m/s, with a risk of ${judgement.harm}`;
   return `${closing}: ${impact} of ${number(100 * judgement.injury_risk, 1)} %.`;
 }
 

@@ -1,0 +1,73 @@
+"""Compares the realism cost of `risk-sac`, which λ bounds, with that of `sac`, which nothing bounds.
+
+    python -m risk_sac.lab.figures.realism_constraint OUT [--family mixed] [--episodes 1000] [--seed 7] [--jobs 2]
+
+plays what OUT lacks and writes OUT/table.md: per family the mean cost d over the last 200 episodes of both methods. An
+interrupted run goes on where it was; `--table` only reads what there is.
+"""
+
+import argparse
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from statistics import fmean
+
+from risk_sac.config import FamilyName
+from risk_sac.records import EpisodeRecord
+from risk_sac.run_folder.results import EPISODES, records_from_lines
+
+FAMILIES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
+METHODS = ("risk-sac", "sac")
+LAST = 200  # episodes that are compared
+HEAD = "| family | episodes | d of risk-sac | d of sac | ratio | λ |\n|---|---|---|---|---|---|"
+
+
+def play(options: argparse.Namespace, family: FamilyName, method: str) -> None:
+    """Plays a run in a process of its own, which learns with one thread."""
+    arguments = ["run", "--family", family, "--method", method, "--ego", options.ego, "--seed", str(options.seed)]
+    arguments += ["--episodes", str(options.episodes), "--prior", "none", "--out", str(options.out / family / method)]
+    subprocess.run([sys.executable, "-m", "risk_sac", *arguments], check=True, stdout=subprocess.DEVNULL)
+
+
+def row(family: FamilyName, constrained: Sequence[EpisodeRecord], free: Sequence[EpisodeRecord]) -> str:
+    """Compares two runs over the last episodes that both have played."""
+    count = min(len(constrained), len(free))
+    last = slice(max(count - LAST, 0), count)
+    kept, spent = (fmean(episode.mean_cost for episode in run[last]) for run in (constrained, free))
+    ratio = f"{spent / kept:.2f}" if kept else "–"
+    return f"| {family} | {count} | {kept:.3f} | {spent:.3f} | {ratio} | {constrained[count - 1].dual_variable:.2f} |"
+
+
+def rows(out: Path) -> Iterator[str]:
+    """Lists the families that both methods have begun."""
+    for family in FAMILIES:
+        files = [out / family / method / EPISODES for method in METHODS]
+        if all(file.exists() and file.stat().st_size for file in files):
+            constrained, free = (records_from_lines(file.read_bytes()) for file in files)
+            yield row(family, constrained, free)
+
+
+def main() -> None:
+    """Plays what is missing and writes the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--family", choices=FAMILIES, action="append")
+    parser.add_argument("--ego", default="idm-aeb")
+    parser.add_argument("--episodes", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=7)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--table", action="store_true", help="play nothing")
+    options = parser.parse_args()
+    if not options.table:
+        runs = [(family, method) for family in options.family or FAMILIES for method in METHODS]
+        with ThreadPoolExecutor(options.jobs) as pool:
+            list(pool.map(lambda run: play(options, *run), runs))
+    table = "\n".join([HEAD, *rows(options.out)])
+    (options.out / "table.md").write_text(table + "\n")
+    print(table)
+
+
+if __name__ == "__main__":
+    main()
