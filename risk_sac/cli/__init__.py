@@ -116,7 +116,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="risk-sac",
         description="Finds scenes and adversaries that make an automated vehicle, the ego, fail.",
-        epilog=example_text("run --family low --method archive --episodes 100 --out runs/low", EPILOG),
+        epilog=example_text("run --scenario low --method archive --episodes 100 --out runs/low", EPILOG),
     )
     parser.add_argument("--version", action="version", version=f"risk-sac {__version__}")
     parser.set_defaults(on_error=FAILED)

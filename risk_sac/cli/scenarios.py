@@ -1,6 +1,7 @@
 """`risk-sac scenarios`: lists, shows, checks, draws and copies scenario documents."""
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
@@ -13,6 +14,7 @@ from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import console
 from risk_sac.scenario import library
+from risk_sac.scenario.check import check_document
 from risk_sac.scenario.reading import read_document
 from risk_sac.scenario.shipped import FOLDER, nets_of, networks, scenario_file, shipped_document, shipped_names
 
@@ -64,16 +66,22 @@ def kept_name(name_or_file: str) -> str:
     Raises:
       ConfigError: the document has a fault, or there is none.
     """
-    document, folder = document_at(name_or_file)
-    if not _is_file(name_or_file):
+    if not is_file(name_or_file):
         return name_or_file
-    from risk_sac.scenario.check import check_document  # here, because nets take a while to read
+    try:
+        document, folder = document_at(name_or_file)
+        nets = nets_of(document, folder)
+        check_document(document, nets)
+    except ConfigError as error:
+        for fault in (error, *error.others):
+            fault.field = f"{name_or_file}: {fault.field}".removesuffix(": ")
+        raise
+    return library.keep(document, own_nets(nets))
 
-    nets = nets_of(document, folder)
-    check_document(document, nets)
-    return library.keep(
-        document, {name: Path(file).read_bytes() for name, file in nets.items() if Path(file).is_absolute()}
-    )
+
+def own_nets(nets: Mapping[str, str]) -> dict[str, bytes]:
+    """Reads the nets that do not ship, by the document's names for them."""
+    return {name: Path(file).read_bytes() for name, file in nets.items() if Path(file).is_absolute()}
 
 
 def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
@@ -82,14 +90,14 @@ def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
     Raises:
       ConfigError: there is no such scenario or file, or the document has a fault.
     """
-    if _is_file(name_or_file):
+    if is_file(name_or_file):
         return read_document(Path(name_or_file)), Path(name_or_file).absolute().parent
     if name_or_file in shipped_names():
         return shipped_document(name_or_file), None
     return library.kept(name_or_file)
 
 
-def _is_file(name_or_file: str) -> bool:
+def is_file(name_or_file: str) -> bool:
     """Whether it names a file; one with a folder or an ending does, although it may not be there."""
     if Path(name_or_file).suffix or "/" in name_or_file:
         if not Path(name_or_file).is_file():
