@@ -4,10 +4,10 @@ Source: RISK-SAC, Sec. II-A; ISO 34503 for the ODD's branches.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from risk_sac.config import Environment, Interval, Odd, Precipitation, Requirement, Scenery
+from risk_sac.config import Environment, Interval, Odd, Precipitation, Requirement, Scenery, SignalType
 from risk_sac.errors import OddError
 from risk_sac.records import NO_CONTACT
 from risk_sac.scenario.behaviour import behaving, preset
@@ -63,7 +63,7 @@ EXTREME: dict[str, Interval | tuple[str, ...]] = {
     **{f"dynamic.{name}": interval for name, interval in preset("extreme").items()},
 }
 
-SIGNAL_OF = {"zebra": "none", "signalised": "fixed_time"}
+SIGNAL_OF: Mapping[str, SignalType] = {"zebra": "none", "signalised": "fixed_time"}
 """Kind of crossing → the kind of signal that an ego meets there."""
 
 

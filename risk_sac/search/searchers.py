@@ -187,7 +187,7 @@ class Searchers:
         if self._start is None or not actor.genes:
             made = sampler(*arguments)
         else:
-            whole = method_of(self._spec.method).prior == "all"
+            whole = method_of(self._spec.method).prior == "all" and self._start.model is not None
             made = (PriorOptimizer if whole else ReplayOptimizer)(*arguments, self._start)
         if isinstance(made, ArchiveOptimizer) and actor.genes and self._coordinates.symmetric:
             made.reflect = self._coordinates.reflected

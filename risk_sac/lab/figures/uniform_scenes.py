@@ -52,6 +52,8 @@ def script(random: np.random.Generator, start: Start, genes: int) -> Floats:
 def chosen(random: np.random.Generator, start: Start, scene: Floats, genes: int) -> Floats:
     """Returns the script that the model holds to be worth most in a scene."""
     points = np.array([np.concatenate([scene, script(random, start, genes)]) for _ in range(CHOICE)])
+    assert start.model is not None
+    assert start.translation is not None
     prediction = start.model.predict(start.translation.known(points), start.belief)
     best: Floats = points[int((prediction.fails + 4.0 * prediction.candidate).argmax())][-genes:]
     return best
@@ -64,6 +66,7 @@ def found(cell: Matchup, scenes: int, scripts: int) -> Iterator[ScriptEpisode]:
     with closing(RiskSacEnv.of(spec)) as env:
         space, horizon = env.problem.space, env.problem.family.horizon_steps
         follower, start = ScriptFollower(env.problem.family), start_of(env.problem, "shipped")
+        assert start is not None  # shipped families have priors
         while scenes:
             scene, seed, episode = drawn.random(space.dimension), int(drawn.integers(1 << 30)), None
             for _ in range(scripts if cell.driver == "any" else 1):
