@@ -114,8 +114,12 @@ class Problem:
     drivers: tuple[str, ...]  # reference drivers whose word makes a failure preventable
 
     @classmethod
-    def from_spec(cls, spec: RunSpec) -> "Problem":
+    def from_spec(cls, spec: RunSpec, family: Family | None = None) -> "Problem":
         """Translates a run's settings.
+
+        Args:
+          spec: of the run.
+          family: that it plays, where the spec's has no name in a library.
 
         Raises:
           OddError: the ODD contradicts itself or leaves no scene.
@@ -124,7 +128,7 @@ class Problem:
             registered or in another version; or the run takes too much memory.
         """
         ego = pinned(spec.ego)
-        family = family_named(spec.family)
+        family = family or family_named(spec.family)
         odd = intersect(family.odd, spec.odd, family.space)
         if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
             raise OddError(

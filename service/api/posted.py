@@ -134,6 +134,11 @@ class CampaignPlaces(Settings):
 
 async def _campaign(request: Request, service: Service, caller: CurrentCaller) -> CampaignSpec:
     content, value = await _read_json(request)
+    if isinstance(value, dict) and "scenarios" in value:
+        if "families" in value:
+            raise invalid_field("scenarios", value["scenarios"], "either scenarios or families, which mean the same")
+        value = {"families": value.pop("scenarios")} | value
+        content = json.dumps(value).encode()
     if isinstance(value, dict) and "network" in value:
         if "families" in value:
             wanted = "either families or a network with its places, not both"

@@ -1,6 +1,6 @@
 """What searches find with and without the prior, at equal steps: at families, or at places of an invented town.
 
-    python -m tests.acceptance.prior_search OUT --egos fiss-plus [--families low mixed dense] [--seeds 3] [--steps 5000]
+    python -m tests.acceptance.prior_search OUT --egos fiss-plus [--scenario low mixed dense] [--seeds 3] [--steps 5000]
     python -m tests.acceptance.prior_search OUT --egos idm-aeb --town
 
 plays what OUT lacks, and rewrites OUT/searches.csv after each run.
@@ -105,7 +105,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--egos", nargs="+", required=True, metavar="EGO")
-    parser.add_argument("--families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
+    parser.add_argument("--scenario", dest="families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
     parser.add_argument("--town", action="store_true", help="at places of the town instead of at families")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--steps", type=int, default=5000)

@@ -1,6 +1,6 @@
 """Measures Table I of the paper, while methods search and frozen.
 
-    python -m risk_sac.lab.figures.table_one OUT [--families NAME …] [--seeds N] [--episodes N] [--uniform N] [--jobs N]
+    python -m risk_sac.lab.figures.table_one OUT [--scenario NAME …] [--seeds N] [--episodes N] [--uniform N] [--jobs N]
 
 plays what OUT lacks, seeds outermost, and rewrites OUT/runs.csv after each run; at the end it writes OUT/table.md and
 OUT/curves.svg. A frozen policy is played in scenes of its method's own sampler and in uniformly drawn ones, which are
@@ -154,7 +154,7 @@ def main() -> None:
     """Plays what is missing."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
+    parser.add_argument("--scenario", dest="families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)

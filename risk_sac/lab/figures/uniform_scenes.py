@@ -1,6 +1,6 @@
 """Compares scripts in uniformly drawn scenes: chosen, random and best.
 
-    python -m risk_sac.lab.figures.uniform_scenes OUT --egos NAME ... [--families NAME ...] [--drivers NAME ...]
+    python -m risk_sac.lab.figures.uniform_scenes OUT --egos NAME ... [--scenario NAME ...] [--drivers NAME ...]
         [--scenes N] [--scripts N]
 
 plays each driver before each ego, and rewrites OUT/scenes.csv after each. All meet the same scenes, and nothing is
@@ -107,7 +107,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--egos", nargs="+", required=True, metavar="EGO", help="as pretrained_policy takes them")
-    parser.add_argument("--families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
+    parser.add_argument("--scenario", dest="families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
     parser.add_argument("--drivers", nargs="+", choices=DRIVERS, default=list(DRIVERS))
     parser.add_argument("--scenes", type=int, default=60)
     parser.add_argument("--scripts", type=int, default=500)
