@@ -2,6 +2,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from risk_sac.scenario.place import PLACES, JunctionPlace
 
 from risk_sac.config import EgoConfig
 from risk_sac.errors import InfeasibleScene
@@ -10,7 +11,6 @@ from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
-from risk_sac.scenario.place import PLACES, JunctionPlace
 from risk_sac.sim.sumo import NETS, SumoSimulation
 from risk_sac.world.types import Kind, Scene
 
