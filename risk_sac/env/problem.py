@@ -238,7 +238,12 @@ def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
     for method in spec.methods:
         check_installed(method)
     alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()  # the i.i.d. phase's among them
-    for family in spec.families:
+    for number, family in enumerate(spec.families):
+        try:
+            family_named(family)
+        except ConfigError as error:
+            field = f"families[{number}]" if error.field == "family" else error.field
+            raise ConfigError(field, error.got, error.expected, error.remedy) from error
         first, *others = (run for run in alike if run.family == family)
         problem = Problem.from_spec(first)
         for run in others:
