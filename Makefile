@@ -24,7 +24,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@echo "compiling, once: else it would be a part of the first searches' processor time"; set -e; \
 	folder=$$(mktemp -d); trap 'rm -r "$$folder"' EXIT; \
 	for run in "low --method archive --episodes 60" "mixed --method risk-sac --episodes 15"; do \
-		$(PYTHON) -m risk_sac run --family $$run --seed 1 --out "$$folder/$${run%% *}" > /dev/null; done
+		$(PYTHON) -m risk_sac run --scenario $$run --seed 1 --out "$$folder/$${run%% *}" > /dev/null; done
 	@touch $@
 
 page: $(STAMP) ## build the web page anew, after a change of its sources

@@ -78,7 +78,9 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m service.demo", description=__doc__)
     parser.add_argument("--defect", default=DEFECT, choices=DEFECTS, metavar="NAME", help="that the ego has")
     parser.add_argument(
-        "--family", help=f"scenario family (default: {FAMILY}, or the first in which another defect matters)"
+        "--scenario",
+        dest="family",
+        help=f"scenario family (default: {FAMILY}, or the first in which another defect matters)",
     )
     parser.add_argument(
         "--methods", nargs="+", default=["risk-sac-diverse", "random"], help="search methods, side by side"

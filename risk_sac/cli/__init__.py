@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from risk_sac import __version__
-from risk_sac.cli import campaigns, egos, lab, places, regress, replay, run, show, understand
+from risk_sac.cli import campaigns, egos, lab, places, regress, replay, run, scenarios, show, understand
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
 from risk_sac.cli.parser import Commands, Parser, add_command, as_typed, example_text, wrong_path
 from risk_sac.egos import registry
@@ -116,12 +116,22 @@ def _parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="risk-sac",
         description="Finds scenes and adversaries that make an automated vehicle, the ego, fail.",
-        epilog=example_text("run --family low --method archive --episodes 100 --out runs/low", EPILOG),
+        epilog=example_text("run --scenario low --method archive --episodes 100 --out runs/low", EPILOG),
     )
     parser.add_argument("--version", action="version", version=f"risk-sac {__version__}")
     parser.set_defaults(on_error=FAILED)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    first = (run.add, places.add, egos.add, show.add, replay.add, understand.add, replay.add_export, regress.add)
+    first = (
+        run.add,
+        scenarios.add,
+        places.add,
+        egos.add,
+        show.add,
+        replay.add,
+        understand.add,
+        replay.add_export,
+        regress.add,
+    )
     for add in (*first, regress.add_report, lab.add_benchmark, lab.add_pretrain, add_service_commands, campaigns.add):
         add(commands)
     return parser

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar, get_args
 
 from risk_sac.cli.console import EGO, number
 from risk_sac.cli.parser import Parser
+from risk_sac.cli.scenarios import kept_name
 from risk_sac.config import METHODS, Behaviour, EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.egos.registry import refuse_class
@@ -34,7 +35,8 @@ BUDGET: Mapping[str, tuple[type, str, str]] = {
 def add_campaign_flags(parser: Parser, *, families: str, methods: str, seeds: int) -> None:
     """Adds the flags of a campaign; the help names the defaults that are given here."""
     scene, search = parser.group("scene"), parser.group("search")
-    scene.add_argument("--families", nargs="+", metavar="FAMILY", help=f"of low, mixed, dense (default: {families})")
+    named = f"shipped, kept or in a file; `risk-sac scenarios list` (default: {families})"
+    scene.add_argument("--scenario", dest="families", nargs="+", metavar="NAME_OR_FILE", help=named)
     search.add_argument("--methods", nargs="+", metavar="NAME", help=f"of {', '.join(METHODS)} (default: {methods})")
     search.add_argument("--seeds", type=int, metavar="N", help=f"number of seeds (default: {seeds})")
     search.add_argument("--first-seed", type=int, metavar="S", help="first of the N seeds (default: 0)")
@@ -86,7 +88,8 @@ def add_prior_flag(parser: Parser, earlier: str = "the folder of an earlier run 
 
 def campaign_flags(options: argparse.Namespace, seeds: int) -> dict[str, Any]:
     """Fields of a campaign; None where a flag was not given."""
-    flags = {"families": options.families, "methods": options.methods} | budget_flags(options)
+    families = options.families and [kept_name(name) for name in options.families]
+    flags = {"families": families, "methods": options.methods} | budget_flags(options)
     return flags | {"seeds": _seeds(options, seeds), "iid": _iid(options), "prior": vars(options).get("prior")}
 
 

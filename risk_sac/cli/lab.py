@@ -16,7 +16,8 @@ from rich.table import Table
 
 from risk_sac.cli.console import OK, folded_table, number, say
 from risk_sac.cli.parser import Commands, add_command
-from risk_sac.config import SHIPPED, FamilyName, MethodName
+from risk_sac.cli.scenarios import kept_name
+from risk_sac.config import FamilyName, MethodName
 from risk_sac.config.base import read_text
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.errors import ConfigError
@@ -24,6 +25,7 @@ from risk_sac.host.machine import cores
 from risk_sac.host.terminal import console
 from risk_sac.records import Counts
 from risk_sac.report.power import NOT_MEASURED, BenchmarkRun, PlayedCounts, measured, method_power, power_of, runs_of
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 
 METHODS: Sequence[MethodName] = ("random", "archive", "risk-sac-diverse")
 SEEDS, STEPS = 10, 20_000
@@ -65,12 +67,14 @@ def add_benchmark(commands: Commands) -> None:
         _power,
         "estimate how many known faults a method finds with a budget",
         more="The estimate comes from a benchmark that was measured.",
-        example="power --families low --method archive --steps 20000",
+        example="power --scenario low --method archive --steps 20000",
     )
     budget = worth.group("budget")
     folders = "folder of `risk-sac evaluate`, or folders of runs, whose budget it is; instead of the flags"
     worth.add_argument("runs", type=Path, nargs="*", metavar="RUNS", help=folders)
-    budget.add_argument("--families", nargs="+", choices=SHIPPED, metavar="FAMILY", help="(default: all)")
+    budget.add_argument(
+        "--scenario", dest="families", nargs="+", choices=PAPER_FAMILIES, metavar="FAMILY", help="(default: all)"
+    )
     budget.add_argument("--method", choices=known, metavar="NAME", help="(default: archive)")
     budget.add_argument("--steps", type=number(int, 1), metavar="N", help=f"(default: {STEPS})")
     measured = "detections.csv of a benchmark (default: the one that is shipped)"
@@ -115,7 +119,7 @@ def _power(options: argparse.Namespace) -> int:
     if not runs:
         say(NOT_MEASURED)
         return OK
-    method, families = options.method or "archive", options.families or SHIPPED
+    method, families = options.method or "archive", options.families or PAPER_FAMILIES
     power = method_power(method, dict.fromkeys(families, (options.steps or STEPS, 1)), runs)
     if not power.defects:
         known = ", ".join(sorted({run.method for run in runs if run.family in families}))
@@ -154,12 +158,17 @@ def add_pretrain(commands: Commands) -> None:
         "make a prior: play scripts and train a policy before many egos",
         more="The same command again goes on with an interrupted one. For each family it writes DIR/<family>.npz with"
         " script model and library, and DIR/<family>-policy.npz with the curve of its training beside it.",
-        example="pretrain --families low --streams 2 --chunks 4 --policy-episodes 0 --out results/prior",
+        example="pretrain --scenario low --streams 2 --chunks 4 --policy-episodes 0 --out results/prior",
     )
     titles = ("scene", "script model", "policy", "execution", "output")
     scene, scripts, policy, execution, output = map(parser.group, titles)
     scene.add_argument(
-        "--families", nargs="+", choices=SHIPPED, default=list(SHIPPED), metavar="NAME", help="(default: all)"
+        "--scenario",
+        dest="families",
+        nargs="+",
+        default=list(PAPER_FAMILIES),
+        metavar="NAME_OR_FILE",
+        help=f"(default: {' '.join(PAPER_FAMILIES)})",
     )
     streams = "independent sequences of script episodes for each family; 0: no script model (default: %(default)s)"
     scripts.add_argument("--streams", type=number(int, 0, 100), default=4, metavar="N", help=streams)
@@ -178,6 +187,7 @@ def add_pretrain(commands: Commands) -> None:
 
 
 def _pretrain(options: argparse.Namespace) -> int:
+    options.families = [kept_name(name) for name in options.families]
     options.out.mkdir(parents=True, exist_ok=True)
     with ProcessPoolExecutor(options.jobs or cores(), multiprocessing.get_context("spawn")) as pool:
         if options.streams:

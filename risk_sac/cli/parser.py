@@ -16,6 +16,7 @@ from risk_sac.host.terminal import complain
 WIDTH = 78
 FLAG = re.compile(r"--[a-z][\w-]*")
 RESULTS_HELP = "folder of a run, or its results.json"
+SCENARIO_FLAG = "--scenario"  # for the fields `family` and `families`
 FAILURE_HELP = "id of a failure, or the number at its end"
 
 Commands: TypeAlias = "argparse._SubParsersAction[Parser]"
@@ -142,13 +143,14 @@ def as_typed(error: ConfigError, options: argparse.Namespace) -> str:
 
     A flag that was not given, beside a file of settings, keeps the name of the field.
     """
-    for part in reversed(re.split(r"[.\[]", error.field)):
+    for part in reversed(re.split(r"[.\[]", error.field)) if ": " not in error.field else ():  # a path in a document
         given = vars(options).get(part.replace("-", "_"), "")
-        if f"--{part}".replace("_", "-") not in options.parser.flags():
+        flag = SCENARIO_FLAG if part in ("family", "families") else f"--{part}".replace("_", "-")
+        if flag not in options.parser.flags():
             continue
         if given is None and vars(options).get("spec") is not None:
             break
-        error.field = f"--{part}".replace("_", "-")
+        error.field = flag
         break
     if error.got != "nothing":
         return str(error)

@@ -35,7 +35,8 @@ from risk_sac.cli.flags import (
     scene_flags,
 )
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
-from risk_sac.config import METHODS, SHIPPED, RunMethod, RunSpec
+from risk_sac.cli.scenarios import kept_name
+from risk_sac.config import METHODS, RunMethod, RunSpec
 from risk_sac.config.spec_file import read_campaign, read_spec
 from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
@@ -44,6 +45,7 @@ from risk_sac.host.terminal import complain, console, notes
 from risk_sac.metrics import METRICS, Metric, with_published
 from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import TIMES, RunResults
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 
 if TYPE_CHECKING:
     from risk_sac.execution.jobs import Job
@@ -59,9 +61,10 @@ def add(commands: Commands) -> None:
         _run,
         "search for failures with one method and one seed",
         more="No server is needed. The same command again continues an interrupted run.",
-        example="run --family low --method archive --episodes 100 --out runs/low",
+        example="run --scenario low --method archive --episodes 100 --out runs/low",
     )
-    run.group("scene").add_argument("--family", metavar="low|mixed|dense", help="scenario family")
+    named = "scenario that ships, is kept or in a file; `risk-sac scenarios list`"
+    run.group("scene").add_argument("--scenario", dest="family", metavar="NAME_OR_FILE", help=named)
     add_scene_flags(run)
     add_map_flags(run, several=False)
     search = run.group("search")
@@ -81,7 +84,7 @@ def add(commands: Commands) -> None:
         _evaluate,
         "compare methods over seeds",
         more="Writes tables and figures. The same command again continues an interrupted comparison.",
-        example="evaluate --families low --methods archive random --seeds 3 --episodes 100 --out runs/compared",
+        example="evaluate --scenario low --methods archive random --seeds 3 --episodes 100 --out runs/compared",
     )
     add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
     add_scene_flags(evaluate)
@@ -106,7 +109,8 @@ def _run(options: argparse.Namespace) -> int:
         options.family = families[0]
     if options.spec is None and options.family is None:
         remedy = "or a map with --network, or a file with --spec"
-        raise ConfigError("family", "nothing", "low, mixed or dense", remedy)
+        raise ConfigError("family", "nothing", "low, mixed, dense, another scenario or a file", remedy)
+    options.family = options.family and kept_name(options.family)
     named = {name: getattr(options, name) for name in ("family", "method", "seed", "prior")}
     spec = read_spec(options.spec, named | budget_flags(options) | scene_flags(options))
     say_adjustments(adjustments(spec))
@@ -191,7 +195,7 @@ def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
 
 def _evaluate(options: argparse.Namespace) -> int:
     methods = [name for name, method in METHODS.items() if not method.needs]
-    defaults = {"families": list(SHIPPED), "methods": methods, "seeds": list(range(SEEDS))}
+    defaults = {"families": list(PAPER_FAMILIES), "methods": methods, "seeds": list(range(SEEDS))}
     options.families = families_on_map(options) or options.families
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | scene_flags(options), defaults)
     say_adjustments(adjustments(spec))

@@ -2,8 +2,6 @@
 
 from risk_sac.config.base import Interval, Settings, field_errors
 from risk_sac.config.campaign import (
-    FAMILY_NAME,
-    SHIPPED,
     Budget,
     CampaignSpec,
     FamilyName,
@@ -38,10 +36,8 @@ from risk_sac.config.odd import (
 from risk_sac.config.scenario import Like, Scenario
 
 __all__ = [
-    "FAMILY_NAME",
     "IID_METHODS",
     "METHODS",
-    "SHIPPED",
     "AgentConfig",
     "Behaviour",
     "Budget",

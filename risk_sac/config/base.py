@@ -199,7 +199,8 @@ def _fields_at(location: Location, model: type[BaseModel]) -> list[str]:
         if isinstance(part, int):
             node = node.get("items", {})
         else:  # a name that the model does not declare is a mapping's key, or says which of several types is meant
-            node = node.get("properties", {}).get(part) or node.get("additionalProperties") or {}
+            keys = [*node.get("patternProperties", {}).values(), node.get("additionalProperties")]
+            node = node.get("properties", {}).get(part) or keys[0] or {}
     return sorted(_resolve(schema, node).get("properties", {}))
 
 

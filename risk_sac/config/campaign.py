@@ -5,13 +5,11 @@ The same `CampaignSpec` is the REST body, the CLI's YAML and the stored record.
 
 import hashlib
 import math
-import re
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Field, StringConstraints, WithJsonSchema, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, StringConstraints, model_validator
 
 from risk_sac.config.base import Settings
 from risk_sac.config.ego import EgoConfig
@@ -20,27 +18,8 @@ from risk_sac.config.methods import IID_METHODS, MethodName, RunMethod, method_o
 from risk_sac.config.odd import Odd
 from risk_sac.errors import ConfigError
 
-SHIPPED = ("low", "mixed", "dense")
-PLACED = r"(car_following|crossing|junction)(_[a-z0-9_]{1,40})?_[0-9a-f]{12}"
-FAMILY_NAME = re.compile(rf"^({'|'.join(SHIPPED)}|{PLACED})$")
-
-
-def _family_name(name: str) -> str:
-    if not FAMILY_NAME.fullmatch(name):  # as pydantic says it of literals, so that clients get the same text
-        *others, last = map(repr, SHIPPED)
-        expected = f"{', '.join(others)} or {last}, or the name of a place on a map"
-        raise PydanticCustomError("literal_error", "Input should be {expected}", {"expected": expected})
-    return name
-
-
-FamilyName = Annotated[
-    str,
-    AfterValidator(_family_name),
-    WithJsonSchema(
-        {"anyOf": [{"type": "string", "enum": list(SHIPPED)}, {"type": "string", "pattern": f"^{PLACED}$"}]}
-    ),
-]
-"""A shipped family, or a pattern at a place of a map; the digits are of the place."""
+FamilyName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,59}$")]
+"""A scenario that ships, or one that a library of scenarios keeps; its last digits are of its document and nets."""
 Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
 MOST_EPISODES = 2_000_000  # of a campaign; the database takes about 1.2 KB for each
 MOST_FAMILIES = 100  # of a campaign

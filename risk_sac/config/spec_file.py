@@ -18,6 +18,7 @@ PROFILES: tuple[str, ...] = get_args(EgoConfig.model_fields["profile"].annotatio
 EGO_NAMES, EGO_FILE = f"{', '.join(PROFILES)}, a registered ego", "a YAML file with the fields of a campaign's ego"
 DRIVER = re.compile(r"[a-z][a-z0-9_-]{0,39}")
 RUN_DEFAULTS = {"method": "risk-sac", "seed": 0}
+SCENARIOS = {"scenario": "family", "scenarios": "families"}  # as a user writes it -> the field of a spec
 CAMPAIGN_ONLY = {"family": "families", "method": "methods", "seed": "seeds"}  # a run's field -> a campaign's
 
 
@@ -30,7 +31,7 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
         given.
     """
     given = {name: value for name, value in flags.items() if value is not None}
-    data = _placed({} if file is None else read_fields(file, "spec"), given)
+    data = _placed({} if file is None else with_scenarios(read_fields(file, "spec")), given)
     if data.keys() & {"label", "iid", *CAMPAIGN_ONLY.values()}:
         shared = {name: value for name, value in given.items() if name not in CAMPAIGN_ONLY}
         return _only_run(data | shared, {name: given[name] for name in CAMPAIGN_ONLY if name in given})
@@ -40,14 +41,14 @@ def read_spec(file: Path | None, flags: Mapping[str, Any]) -> RunSpec:
 def read_campaign(file: Path | None, flags: Mapping[str, Any], defaults: Mapping[str, Any]) -> CampaignSpec:
     """Returns the campaign described by a YAML file, overridden by flags as `read_spec` has them, else by defaults."""
     given = {name: value for name, value in flags.items() if value is not None}
-    data = _placed({} if file is None else read_fields(file, "spec"), given)
+    data = _placed({} if file is None else with_scenarios(read_fields(file, "spec")), given)
     return _validate(CampaignSpec, {**defaults, **data, **given})
 
 
 def read_posted(file: Path | None, flags: Mapping[str, Any]) -> CampaignSpec | dict[str, Any]:
     """Returns a campaign to post; one on an uploaded network as fields, which the service checks."""
     given = {name: value for name, value in flags.items() if value is not None}
-    data = _placed({} if file is None else read_fields(file, "spec"), given) | given
+    data = _placed({} if file is None else with_scenarios(read_fields(file, "spec")), given) | given
     return data if "network" in data else _validate(CampaignSpec, data)
 
 
@@ -81,6 +82,16 @@ def _placed(data: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     return _with(data, ("odd", "dynamic"), {"behaviour": given.pop("behaviour")}) if "behaviour" in given else data
 
 
+def with_scenarios(data: dict[str, Any]) -> dict[str, Any]:
+    """Returns the fields of a spec with `scenario` and `scenarios` under the names that records have for them."""
+    for name, field in SCENARIOS.items():
+        if name in data:
+            if field in data:
+                raise ConfigError(name, f"it beside {field}, which means the same", "one of them")
+            data = {field if known == name else known: value for known, value in data.items()}
+    return data
+
+
 def _with(data: dict[str, Any], path: tuple[str, ...], fields: Mapping[str, Any]) -> dict[str, Any]:
     """Adds fields to an object inside a spec.
 
@@ -104,7 +115,10 @@ def _only_run(data: dict[str, Any], picked: Mapping[str, Any]) -> RunSpec:
         runs = list(_validate(CampaignSpec, data | {CAMPAIGN_ONLY[k]: [v] for k, v in picked.items()}).searches())
     if len(runs) != 1:
         raise ConfigError(
-            "spec", f"a campaign of {len(runs) or 'no such'} runs", "one", "pick it with --family, --method and --seed"
+            "spec",
+            f"a campaign of {len(runs) or 'no such'} runs",
+            "one",
+            "pick it with --scenario, --method and --seed",
         )
     return runs[0]
 

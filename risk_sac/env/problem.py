@@ -5,26 +5,25 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
-from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Interval, Odd, Requirement, RunSpec
+from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Interval, JudgeConfig, Odd, Requirement, RunSpec
 from risk_sac.config.campaign import check_demand
 from risk_sac.config.methods import MethodName
 from risk_sac.egos.registry import pinned
 from risk_sac.env.observation_layout import observation_size
 from risk_sac.errors import ConfigError, OddError
 from risk_sac.records import NO_CONTACT, Adjustment
+from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import parsed
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import GRAVITY_MPS2, VISIBILITY, limits_from_odd, with_environment
 from risk_sac.scenario.odd import (
-    SHIPPED_REQUIREMENTS,
     TINY,
     field,
     intersect,
     narrow,
     paths,
-    requirements_from_odd,
     text_of,
     widest,
 )
@@ -115,8 +114,12 @@ class Problem:
     drivers: tuple[str, ...]  # reference drivers whose word makes a failure preventable
 
     @classmethod
-    def from_spec(cls, spec: RunSpec) -> "Problem":
+    def from_spec(cls, spec: RunSpec, family: Family | None = None) -> "Problem":
         """Translates a run's settings.
+
+        Args:
+          spec: of the run.
+          family: that it plays, where the spec's has no name in a library.
 
         Raises:
           OddError: the ODD contradicts itself or leaves no scene.
@@ -125,7 +128,7 @@ class Problem:
             registered or in another version; or the run takes too much memory.
         """
         ego = pinned(spec.ego)
-        family = family_named(spec.family)
+        family = family or family_named(spec.family)
         odd = intersect(family.odd, spec.odd, family.space)
         if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
             raise OddError(
@@ -135,11 +138,12 @@ class Problem:
             )
         shipped = {each.name: each for each in requirements_from_odd(odd, ego.response_s)}
         own = {}
-        for i, requirement in enumerate(spec.requirements):
-            wanted = _own(f"requirements[{i}]", requirement, shipped)
-            if wanted is not None:
-                parsed(i, wanted, STEP_S, family.horizon_steps)
-                own[wanted.name] = wanted
+        for source, requirements in (("scenario.", family.requirements), ("", spec.requirements)):
+            for i, requirement in enumerate(requirements):
+                wanted = _own(f"{source}requirements[{i}]", requirement, shipped)
+                if wanted is not None:
+                    parsed(i, wanted, STEP_S, family.horizon_steps)
+                    own[wanted.name] = wanted
         problem = cls(
             family=family,
             odd=odd,
@@ -147,7 +151,7 @@ class Problem:
             ego=ego,
             requirements=tuple((shipped | own).values()),
             rss=_rss_parameters(odd),
-            drivers=spec.judge.drivers,
+            drivers=(family.judge or spec.judge if spec.judge == JudgeConfig() else spec.judge).drivers,
         )
         problem.check_demand(spec)
         return problem

@@ -1,4 +1,4 @@
-"""Bundles of failures: packed, checked and unpacked with their places.
+"""Bundles of failures: packed, checked and unpacked with their scenarios.
 
 A bundled net reaches the simulator only if it has the elements that `risk_sac.maps.cut` writes and no others: SUMO
 writes files that a parameter of a signal names, and reads those that XML includes.
@@ -18,8 +18,9 @@ import numpy as np
 from defusedxml.ElementTree import fromstring
 from numpy.typing import NDArray
 from pydantic import ValidationError
+from yaml import YAMLError
 
-from risk_sac.config import SHIPPED, FamilyName, RunSpec
+from risk_sac.config import FamilyName, RunSpec
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.failures.recording import Series, actions_of, trajectory_digest
@@ -28,39 +29,41 @@ from risk_sac.records import EpisodeRecord, Record
 from risk_sac.run_folder.arrays import MOST_BYTES, read_limited, unpack_arrays
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.scenario import library
-from risk_sac.scenario.place import PLACES
+from risk_sac.scenario.shipped import shipped_names
 from risk_sac.search.frozen_policy import FrozenPolicy
 from risk_sac.search.scripts import SIZE
 from risk_sac.world.types import Scene
 
-PLACE, NET = "place", "place_net"  # names of the arrays
+SCENARIO = "scenario/"  # names of the arrays with a scenario's files begin so
 ELEMENTS = {"net", "location", "type", "edge", "lane", "tlLogic", "phase"}
 ELEMENTS |= {"junction", "request", "connection", "roundabout"}
 
 
 def carried(family: FamilyName) -> dict[str, NDArray[np.uint8]]:
-    """Returns the arrays of a family's place; none for a shipped one."""
-    if family in SHIPPED:
+    """Returns the arrays of a kept scenario, its document and nets; none for a shipped one."""
+    if family in shipped_names():
         return {}
-    place, net = library.files_of(family)
-    return {PLACE: np.frombuffer(place, dtype=np.uint8), NET: np.frombuffer(net, dtype=np.uint8)}
+    files = library.files_of(family)
+    return {f"{SCENARIO}{name}": np.frombuffer(content, dtype=np.uint8) for name, content in files.items()}
 
 
 def unpack(family: FamilyName, arrays: MutableMapping[str, NDArray[Any]]) -> None:
-    """Moves a bundle's place into this machine's library of places.
+    """Moves a bundle's scenario into this machine's library of scenarios.
 
     Raises:
-      ValueError: the arrays are no such place.
+      ValueError: the arrays are no such scenario.
     """
-    text, net = arrays.pop(PLACE, None), arrays.pop(NET, None)
-    if text is None or net is None or family in SHIPPED:
+    names = [name for name in arrays if name.startswith(SCENARIO)]
+    files = {name.removeprefix(SCENARIO): arrays.pop(name).tobytes() for name in names}
+    if not files or family in shipped_names():
         return
     try:
-        PLACES.validate_json(text.tobytes())
-        check_net(net.tobytes())
-        library.put(family, text.tobytes(), net.tobytes())
-    except (ValueError, ConfigError, ParseError) as error:
-        raise ValueError(f"the place that it carries cannot be played at: {error}") from error
+        for name, content in files.items():
+            if name != library.DOCUMENT:
+                check_net(content)
+        library.put(family, files)
+    except (ValueError, YAMLError, ParseError) as error:
+        raise ValueError(f"the scenario that it carries cannot be played: {error}") from error
 
 
 def check_net(net: bytes) -> None:
@@ -84,7 +87,7 @@ class Manifest(Record):
     """Description of a bundle's failure."""
 
     format: Literal[1, 2, 3] = 1  # another one with whatever an older reader would misread
-    """2 of those that hold a policy, 3 of those that hold a place."""
+    """2 of those that hold a policy, 3 of those that hold a scenario."""
     id: str
     """The episode's, as the run that found it names it."""
     spec: RunSpec
@@ -136,7 +139,7 @@ def make_bundle(
     if policy is not None and sum(layer.nbytes for layer in policy.layers) > MOST_POLICY_BYTES:
         policy = None
     manifest = Manifest(
-        format=3 if spec.family not in SHIPPED else 1 if policy is None else 2,
+        format=3 if spec.family not in shipped_names() else 1 if policy is None else 2,
         id=episode.id_in(spec.id),
         spec=spec,
         episode=episode,
@@ -182,7 +185,7 @@ def _portable(name: str, spec: RunSpec) -> str:
 
 
 def bundle_bytes(bundle: Bundle) -> bytes:
-    """Returns the content of a bundle's file; a ConfigError if its place is gone."""
+    """Returns the content of a bundle's file; a ConfigError if its scenario is gone."""
     content = io.BytesIO()
     arrays = {**bundle.series, MANIFEST: np.array(bundle.manifest.model_dump_json()), HEADS: bundle.signal_heads}
     arrays |= carried(bundle.manifest.spec.family)

@@ -19,7 +19,7 @@ from matplotlib.patheffects import withStroke
 from risk_sac.config import FamilyName
 from risk_sac.failures.net import LAMPS, Surface, SurfaceUse, roads_of, signal_heads, surfaces
 from risk_sac.failures.recording import BOX, Recording, on_body
-from risk_sac.maps.found import TITLES, Pattern, Survey
+from risk_sac.maps.found import TITLES, Survey
 from risk_sac.records import Collision
 from risk_sac.scenario.bodies import body_of
 from risk_sac.world.net import Net
@@ -273,11 +273,7 @@ def _draw_conflict(axis: Axes, recording: Recording) -> None:
     axis.plot(*place, label="striker then", **style)
 
 
-MARKS: dict[Pattern, tuple[str, str]] = {
-    "car_following": ("o", "tab:blue"),
-    "crossing": ("s", "tab:orange"),
-    "junction": ("^", "tab:green"),
-}
+MARKS = dict(zip(TITLES, (("o", "tab:blue"), ("s", "tab:orange"), ("^", "tab:green")), strict=True))
 WIDTH_IN, DPI = 9.0, 130
 HEIGHT_IN = (4.5, 12.0)  # least and greatest height; in between it follows from the map's
 NAMED = 60  # most places that are labelled with their names

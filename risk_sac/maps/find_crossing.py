@@ -5,22 +5,40 @@ passed the crossing on it hides a pedestrian from the left. So it is where roads
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from itertools import pairwise
 
-from risk_sac.maps.cut import signal_of, walk_over
 from risk_sac.maps.find_junction import roomy, turn
 from risk_sac.maps.find_stretch import check_limit
-from risk_sac.maps.found import NoFit, Spot, lacking
+from risk_sac.maps.found import Fit, NoFit, Spot, lacking
+from risk_sac.maps.scenarios import (
+    Fields,
+    at_most,
+    friction,
+    initial_speed,
+    lane_of,
+    number,
+    pedestrian,
+    route_of,
+    scenario_of,
+    signal_parts,
+    top_speed,
+    walking,
+)
 from risk_sac.maps.ways import AFTER_S, track, way_on
 from risk_sac.scenario.clearance import truck_reaches
-from risk_sac.scenario.family import top_speed
-from risk_sac.scenario.hidden_pedestrian import OCCLUDER_M, room_beyond_m, room_wanted_m
 from risk_sac.scenario.layout import LEAD_IN_S, TRUCK_LENGTH_M
-from risk_sac.scenario.place import CrossingPlace, Site, Track
+from risk_sac.scenario.tracks import Track
 from risk_sac.world.net import Crossing, Edge, Link, Net, NetLane
 
+NEAREST_M, FARTHEST_M = 25.0, 90.0  # range of the ego's distance from the crossing
+FOLLOWING_M = 25.0  # distance from the ego's front to its follower's
+OCCLUDER_MPS = 12.0
+NEXT_M, OCCLUDER_M = 0.5, 25.0  # range of the occluder's distance from the crossing
+ONCOMING, ONCOMING_MPS = 4, 10.0
+ONCOMING_M, SPACING_M = 60.0, 30.0  # distance of the first oncoming vehicle from the crossing, and between them
+ROOM_BEYOND_M = LEAD_IN_S * OCCLUDER_MPS + TRUCK_LENGTH_M  # least room before a crossing for an oncoming occluder
 OCCLUDED_S = 4.0  # of driving that the way of the occluder goes on
 ONWARD_S = 8.0
 BESIDE_RAD = math.radians(30.0)  # by which lanes beside each other may not be parallel
@@ -37,8 +55,8 @@ def spots(net: Net) -> Iterator[Spot]:
                 yield Spot(pattern="crossing", id=id_, x_m=x, y_m=y)
 
 
-def place(net: Net, spot: Spot) -> CrossingPlace:
-    """Makes a place of the crossing at the end of a road.
+def fit(net: Net, spot: Spot) -> Fit:
+    """Writes the scenario of the crossing at the end of a road.
 
     Raises:
       NoFit: nothing can hide a pedestrian, or there is no room.
@@ -48,27 +66,92 @@ def place(net: Net, spot: Spot) -> CrossingPlace:
     check_limit(edge.drivable[0])
     beyond = len(edge.drivable) < 2
     find = _with_oncoming if beyond else _with_neighbour
-    ego_lane, ego, occluder, link = find(net, edge, crossing)
+    own, ego, occluder, link = find(net, edge, crossing)
+    offset, signal = signal_parts(net, (crossing.signal, link.signal))
+    oncoming = () if beyond else _oncoming(net, edge.id, crossing.edges)
+    if beyond:
+        start: Fields = {"lane": lane_of(net, occluder), "at_m": f"occluder_distance_m + {TRUCK_LENGTH_M:g}"}
+    else:
+        start = _before(net, occluder, "occluder_distance_m")
+    fields = {
+        "parameters": _parameters(own, ego, occluder, beyond=beyond) | offset | friction(),
+        "ego": {
+            "start": _before(net, ego, "ego_distance_m"),
+            "speed": "ego_speed_mps",
+            "route": route_of(net, ego),
+        },
+        "actors": {
+            "occluder": {
+                "body": "truck",
+                "start": start,
+                "speed": "occluder_speed_mps",
+                "route": route_of(net, occluder),
+            },
+            "pedestrian": pedestrian(edge.id, "left" if beyond else "right"),
+            "follower": {
+                "role": "background",
+                "start": {"beside": "ego", "ahead_m": -FOLLOWING_M},
+                "speed": "ego_speed_mps",
+            },
+        },
+        "streams": _streams(net, oncoming),
+        **signal,
+    }
     kind = "signalised" if crossing.signal is not None else "unsignalised"
     hidden = "from behind a vehicle that came the other way" if beyond else "from behind a vehicle in the next lane"
-    return CrossingPlace(
-        net="",
-        summary=f"Crossing {crossing.id!r} of {edge.id!r}, {kind}: a pedestrian steps out {hidden}.",
-        lanes=len(edge.drivable),
-        speed_limit_mps=ego_lane.limit_mps,
-        lane_width_m=ego_lane.width_m,
-        signal=signal_of(net, (crossing.signal, link.signal)),
-        sites=(
-            Site(
-                signalised=signal_of(net, (crossing.signal, link.signal)) is not None,
-                ego=ego,
-                occluder=occluder,
-                beyond=beyond,
-                oncoming=() if beyond else _oncoming(net, edge.id, crossing.edges),
-                walk=walk_over(net, crossing, ego_lane.way_out_rad + (math.pi if beyond else 0.0)),
-            ),
-        ),
-    )
+    summary = f"Crossing {crossing.id!r} of {edge.id!r}, {kind}: a pedestrian steps out {hidden}."
+    actors = {name: name for name in ("occluder", "pedestrian")}
+    like = {"family": "mixed", "actors": actors, "mirrored": beyond}  # whose pedestrian comes from the right
+    scenario = scenario_of(spot, summary, ["iso34502:pedestrian"], like, fields)
+    return Fit(spot, scenario, (ego, occluder, *oncoming))
+
+
+def _parameters(own: NetLane, ego: Track, occluder: Track, *, beyond: bool) -> Fields:
+    """States all but the signal's and the road's parameters."""
+    lead_m = LEAD_IN_S * top_speed(own.limit_mps)
+    ego_m = at_most(FARTHEST_M, ego.room_m - FOLLOWING_M - TRUCK_LENGTH_M - lead_m)
+    if beyond:
+        last, meaning = occluder.pieces[-1], "crossing's far edge to the occluder's rear"
+        occluder_m = at_most(OCCLUDER_M, last.length_m - last.reach_m - TRUCK_LENGTH_M)
+    else:
+        meaning = "occluder's front to the crossing's near edge"
+        occluder_m = at_most(OCCLUDER_M, occluder.room_m - TRUCK_LENGTH_M - lead_m)
+    return {
+        **initial_speed("ego_speed_mps", 6, own.limit_mps, "initial speed of the ego"),
+        "ego_distance_m": number((NEAREST_M, ego_m), "m", "ego's front to the crossing's near edge"),
+        "occluder_distance_m": number((NEXT_M, occluder_m), "m", meaning),
+        **initial_speed("occluder_speed_mps", 0, min(OCCLUDER_MPS, own.limit_mps), "initial speed of the occluder"),
+        **walking("pedestrian along the road from the crossing's axis"),
+    }
+
+
+def _before(net: Net, way: Track, distance_m: str) -> Fields:
+    """Starts before the crossing at the end of a track's lane."""
+    return {"lane": lane_of(net, way), "before": "crossing", "distance_m": distance_m}
+
+
+def _streams(net: Net, oncoming: Sequence[Track]) -> Fields:
+    """Oncoming vehicles, on the tracks in turns."""
+    streams, gap_m = {}, SPACING_M * len(oncoming)
+    for i, (name, way) in enumerate(zip(("oncoming", "oncoming_beside"), oncoming, strict=False)):
+        first_m = ONCOMING_M + SPACING_M * i
+        starts_m = [first_m + gap_m * k for k in range(ONCOMING // len(oncoming))]
+        if count := sum(start_m + TRUCK_LENGTH_M <= way.room_m for start_m in starts_m):
+            streams[name] = {
+                "lane": lane_of(net, way),
+                "from_m": first_m - gap_m,
+                "gap_m": gap_m,
+                "count": count,
+                "speed": ONCOMING_MPS,
+                "lead_in": False,
+                "route": route_of(net, way),
+            }
+    return streams
+
+
+def _room_wanted_m(limit_mps: float) -> float:
+    """Least room before a crossing on the ego's track."""
+    return NEAREST_M + FOLLOWING_M + TRUCK_LENGTH_M + LEAD_IN_S * top_speed(limit_mps)
 
 
 def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[NetLane, Track, Track, Link]:
@@ -107,10 +190,8 @@ def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[NetLane, T
     ego, link = _ego(net, own)
     parked_m = TRUCK_LENGTH_M + OCCLUDER_M
     occluder = track(net, way_on(net, beside[0], OCCLUDED_S, from_m=parked_m), 0.0, parked_m)
-    if occluder.room_m < room_beyond_m():
-        raise NoFit(
-            f"the length of the way in of oncoming vehicles is {lacking(occluder.room_m, 'm', room_beyond_m())}"
-        )
+    if occluder.room_m < ROOM_BEYOND_M:
+        raise NoFit(f"the length of the way in of oncoming vehicles is {lacking(occluder.room_m, 'm', ROOM_BEYOND_M)}")
     return own, ego, occluder, link
 
 
@@ -127,7 +208,7 @@ def _is_beside(own: NetLane, other: NetLane) -> bool:
 def _ego(net: Net, own: NetLane) -> tuple[Track, Link]:
     """The ego's track, if there is room, and the link it begins with."""
     found, link = _straight(net, own, AFTER_S)
-    return roomy(found, own.edge, room_wanted_m(own.limit_mps)), link
+    return roomy(found, own.edge, _room_wanted_m(own.limit_mps)), link
 
 
 def _straight(net: Net, lane: NetLane, onward_s: float) -> tuple[Track, Link]:

@@ -7,16 +7,42 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
-from risk_sac.maps.cut import signal_of, walk_over
 from risk_sac.maps.find_stretch import check_limit
-from risk_sac.maps.found import NoFit, Spot, lacking
+from risk_sac.maps.found import Fit, NoFit, Spot, lacking
+from risk_sac.maps.scenarios import (
+    Fields,
+    at_most,
+    friction,
+    initial_speed,
+    lane_of,
+    number,
+    pedestrian,
+    route_of,
+    scenario_of,
+    signal_parts,
+    top_speed,
+    walking,
+)
 from risk_sac.maps.ways import AFTER_S, track, way_on
-from risk_sac.scenario import junction
 from risk_sac.scenario.clearance import ROOM_M, too_near, waits_in_the_way
-from risk_sac.scenario.place import JunctionPlace, Leg, Stream, Track
+from risk_sac.scenario.family import MOST_OVER_LIMIT
+from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S
+from risk_sac.scenario.tracks import STRAIGHT_RAD, Track
 from risk_sac.world.net import Edge, Link, Net, once
 
+NEAREST_M, FARTHEST_M = 10.0, 90.0  # range of the distance of attacker and ego from the stop line
+LEAST_RANGE_M = 10.0  # least range of those distances at a place
+STREAM_MPS, STREAM_M = 9.0, 30.0
+WIDEST_GAP_M = 40.0  # widest gap between background vehicles
+STREAM_ROOM_M = STREAM_M + 2 * WIDEST_GAP_M + CAR_LENGTH_M + LEAD_IN_S * STREAM_MPS  # least before the stop line
+WHO = {
+    "ego": "the ego",
+    "oncoming": "the oncoming vehicle",
+    "from_left": "the vehicle from the left",
+    "from_right": "the vehicle from the right",
+}
 ATTACKERS = ("oncoming", "from_left", "from_right")
 ONCOMING_RAD, BESIDE_RAD = math.radians(135.0), math.radians(45.0)
 ONWARD_S = 8.0  # of driving that an attacker's way goes on behind the junction
@@ -49,8 +75,8 @@ def spots(net: Net) -> Iterator[Spot]:
                 yield Spot(pattern="junction", id=edge.id, x_m=x, y_m=y)
 
 
-def place(net: Net, spot: Spot) -> JunctionPlace:
-    """Makes a place of the junction at the end of a road.
+def fit(net: Net, spot: Spot) -> Fit:
+    """Writes the scenario of the junction at the end of a road.
 
     Raises:
       NoFit: nothing crosses, or there is too little road.
@@ -73,22 +99,87 @@ def place(net: Net, spot: Spot) -> JunctionPlace:
     if not legs:
         raise NoFit("; ".join(whys) or f"no way across {at.id!r} crosses or joins one of those from {edge.id!r}")
     approaches = {name: other for name, other in others.items() if name in legs} | {"ego": own}
-    crossing = next(iter(net.crossings_of.get((at.id, edge.id), ())), None)
-    streams = [(name, stream(net, found)) for name, found in approaches.items()]
-    return JunctionPlace(
-        net="",
-        summary=f"Junction {at.id!r} from {edge.id!r}: {_listed([junction.WHO[name] for name in legs])} "
-        f"{'crosses or turns' if len(legs) == 1 else 'cross or turn'}"
-        f"{', and a pedestrian walks' if crossing is not None else ''}.",
-        lanes=len(edge.drivable),
-        speed_limit_mps=max(each.speed_limit_mps for each in (ego, *legs.values())),
-        lane_width_m=own.links[0].source.width_m,
-        signal=signal_of(net, [link.signal for link in own.links]),
-        ego=ego,
-        others=tuple(legs.values()),
-        streams=tuple(Stream(name=f"{name}_road", track=found) for name, found in streams if found is not None),
-        walk=None if crossing is None else walk_over(net, crossing, own.driven_rad),
+    ways = {f"{name}_road": stream(net, other) for name, other in approaches.items()}
+    streams = {name: way for name, way in ways.items() if way is not None}
+    walked = (at.id, edge.id) in net.crossings_of
+    fields = _fields(net, own, (ego, *legs.values()), streams, walked=walked)
+    summary = (
+        f"Junction {at.id!r} from {edge.id!r}: {_listed([WHO[name] for name in legs])} "
+        f"{'crosses or turns' if len(legs) == 1 else 'cross or turn'}{', and a pedestrian walks' if walked else ''}."
     )
+    like = {"family": "dense", "actors": {name: name for name in (*legs, *["pedestrian"] * walked)}}
+    scenario = scenario_of(spot, summary, ["iso34502:intersection"], like, fields)
+    return Fit(spot, scenario, (*(way for one in (ego, *legs.values()) for way in one.turns), *streams.values()))
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A road that leads to a junction, with the tracks of a vehicle across it."""
+
+    name: str  # of the vehicle
+    limit_mps: float
+    words: tuple[str, ...]  # of the turns
+    turns: tuple[Track, ...]  # by where they lead, from left to right; the reference is the stop line
+    signalised: bool  # whether each has a signal
+
+
+def _fields(net: Net, own: Approach, legs: Sequence[Leg], streams: Mapping[str, Track], *, walked: bool) -> Fields:
+    """States what the document of a junction has; the first leg is the ego's."""
+    offset, signal = signal_parts(net, [link.signal for link in own.links])
+    parameters: Fields = {}
+    for one in legs:
+        parameters |= _parameters(one)
+    if walked:
+        parameters |= walking("pedestrian across the near crossing's axis")
+    if streams:
+        parameters["background_gap_m"] = number((15.0, WIDEST_GAP_M), "m", "spacing of the background vehicles")
+    actors = {one.name: _moving(net, one) for one in legs[1:]}
+    if walked:
+        actors["pedestrian"] = pedestrian(own.edge.id)
+    traffic = {
+        name: {
+            "lane": lane_of(net, way),
+            "from_m": STREAM_M,
+            "gap_m": "background_gap_m",
+            "speed": STREAM_MPS,
+            "route": route_of(net, way),
+        }
+        for name, way in streams.items()
+    }
+    fastest_mps = max(one.limit_mps for one in legs)
+    odd = {"dynamic": {"vehicle_speed_mps": {"low": 0.0, "high": fastest_mps * MOST_OVER_LIMIT}}}
+    return {
+        "parameters": parameters | offset | friction(),
+        "ego": _moving(net, legs[0]),
+        "actors": actors,
+        "streams": traffic,
+        **({"odd": odd} if fastest_mps > legs[0].limit_mps else {}),
+        **signal,
+    }
+
+
+def _parameters(leg: Leg) -> Fields:
+    name, who = leg.name, WHO[leg.name]
+    turn = {f"{name}_turn": {"words": leg.words, "meaning": f"which way {who} goes"}} if len(leg.words) > 1 else {}
+    room_m = min(way.room_m for way in leg.turns)
+    high_m = at_most(FARTHEST_M, room_m - CAR_LENGTH_M - LEAD_IN_S * top_speed(leg.limit_mps))
+    distance = number((NEAREST_M, high_m), "m", f"{who}'s front to its stop line")
+    speed = initial_speed(f"{name}_speed_mps", 5, leg.limit_mps, f"initial speed of {who}")
+    return {**turn, f"{name}_distance_m": distance, **speed}
+
+
+def _moving(net: Net, leg: Leg) -> Fields:
+    """States the vehicle of a leg; the word of its turn chooses lane and route."""
+
+    def chosen(values: Sequence[Any]) -> Any:
+        if all(value == values[0] for value in values):
+            return values[0]
+        return {"by": f"{leg.name}_turn", "of": dict(zip(leg.words, values, strict=True))}
+
+    lane, route = (chosen([part(net, way) for way in leg.turns]) for part in (lane_of, route_of))
+    before = "stop_line" if leg.signalised else "junction"
+    start = {"lane": lane, "before": before, "distance_m": f"{leg.name}_distance_m"}
+    return {"start": start, "speed": f"{leg.name}_speed_mps", "route": route}
 
 
 def approach(net: Net, edge: Edge) -> Approach:
@@ -115,17 +206,31 @@ def leg(net: Net, road: Approach, name: str, onward_s: float) -> Leg:
     Raises:
       NoFit: no way has room.
     """
-    tracks, whys = [], []
+    links, tracks, whys = list[Link](), list[Track](), list[NoFit]()
     check_limit(road.links[0].source)
     limit_mps = road.links[0].source.limit_mps
     for link in road.links:
         try:
-            tracks.append(roomy(turn(net, link, onward_s), road.edge.id, junction.room_wanted_m(limit_mps)))
+            tracks.append(roomy(turn(net, link, onward_s), road.edge.id, _room_wanted_m(limit_mps)))
+            links.append(link)
         except NoFit as why:
             whys.append(why)
     if not tracks:
         raise whys[0]
-    return Leg(name=name, speed_limit_mps=limit_mps, turns=tuple(tracks))
+    signalised = all(any(other.signal for other in net.onward[link.source.id]) for link in links)
+    return Leg(name, limit_mps, _words(links), tuple(tracks), signalised)
+
+
+def _words(links: Sequence[Link]) -> tuple[str, ...]:
+    """Names ways from left to right: left, straight and right where these tell them apart, else numbers."""
+    turns_rad = [0.0 if abs(link.turn_rad) <= STRAIGHT_RAD else link.turn_rad for link in links]
+    words = tuple("left" if turn_rad > 0.0 else "right" if turn_rad < 0.0 else "straight" for turn_rad in turns_rad)
+    return words if len(set(words)) == len(words) else tuple(f"way_{i + 1}" for i in range(len(links)))
+
+
+def _room_wanted_m(limit_mps: float) -> float:
+    """Least room before a stop line."""
+    return NEAREST_M + LEAST_RANGE_M + CAR_LENGTH_M + LEAD_IN_S * top_speed(limit_mps)
 
 
 def roomy(track: Track, edge: str, wanted_m: float) -> Track:
@@ -173,7 +278,7 @@ def stream(net: Net, road: Approach) -> Track | None:
         return None
     with suppress(NoFit):
         found = turn(net, min(links, key=lambda link: abs(link.turn_rad)), ONWARD_S)
-        return roomy(found, road.edge.id, junction.room_of_a_stream_m())
+        return roomy(found, road.edge.id, STREAM_ROOM_M)
     return None
 
 

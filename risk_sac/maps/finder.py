@@ -1,4 +1,4 @@
-"""Finds the places of a map, and keeps them as families."""
+"""Finds the places of a map, and keeps them as scenarios."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
@@ -6,11 +6,11 @@ from types import ModuleType
 
 from risk_sac.errors import MapError
 from risk_sac.maps import find_crossing, find_junction, find_stretch
-from risk_sac.maps.cut import cut, ground_around, tracks
+from risk_sac.maps.cut import cut
 from risk_sac.maps.found import Fit, Misfit, NoFit, Pattern, Spot, Survey
+from risk_sac.maps.scenarios import NET
 from risk_sac.maps.ways import check_lengths
 from risk_sac.scenario import library
-from risk_sac.scenario.place import CrossingPlace, JunctionPlace
 from risk_sac.world.net import Net
 from risk_sac.world.read_net import read_net, read_tree
 
@@ -29,7 +29,7 @@ CANDIDATES: dict[Pattern, str] = {  # what their spots are
 def survey(
     net: Net, patterns: Collection[Pattern] = tuple(FINDERS), tell: Callable[[float], None] = lambda share: None
 ) -> Survey:
-    """All places where patterns fit, without their ground, and why elsewhere they do not.
+    """All places where patterns fit, and why elsewhere they do not.
 
     Args:
       net: where.
@@ -50,7 +50,7 @@ def survey(
 
 
 def place_at(net: Net, pattern: Pattern, id_: str) -> Fit:
-    """Makes the place of a pattern at a spot, with its ground.
+    """Makes the place of a pattern at a spot.
 
     Raises:
       MapError: the map has no such spot, or the pattern does not fit there.
@@ -59,17 +59,9 @@ def place_at(net: Net, pattern: Pattern, id_: str) -> Fit:
     if spot is None:
         raise MapError("place", _nowhere(net, pattern, id_))
     try:
-        return with_ground(net, _fit(net, spot))
+        return _fit(net, spot)
     except NoFit as error:
         raise MapError("place", f"{pattern} does not fit at {id_!r}: {error}") from error
-
-
-def with_ground(net: Net, fit: Fit) -> Fit:
-    """The same, with what verdicts have to know of the ground around it."""
-    place = fit.place
-    walked = isinstance(place, CrossingPlace) or (isinstance(place, JunctionPlace) and place.walk is not None)
-    ground = ground_around(net, fit.spot.x_m, fit.spot.y_m, walked=walked)
-    return Fit(fit.spot, place.model_copy(update={"ground": ground, "wary": True}))
 
 
 def _spots(net: Net, patterns: Collection[Pattern]) -> Iterator[Spot]:
@@ -79,9 +71,9 @@ def _spots(net: Net, patterns: Collection[Pattern]) -> Iterator[Spot]:
 
 def _fit(net: Net, spot: Spot) -> Fit:
     """Makes the place of a spot; raises `NoFit` where there is none."""
-    place = FINDERS[spot.pattern].place(net, spot)
-    check_lengths(net, tracks(place))
-    return Fit(spot, place)
+    fit: Fit = FINDERS[spot.pattern].fit(net, spot)
+    check_lengths(net, fit.tracks)
+    return fit
 
 
 def _no_spot(net: Net, pattern: Pattern) -> str:
@@ -120,5 +112,4 @@ class Map:
 
     def keep(self, fit: Fit) -> str:
         """Puts a place into the library; returns the name of its family."""
-        fit = with_ground(self.net, fit)
-        return library.keep(fit.place, cut(self.net, self._root, fit), fit.spot.id)
+        return library.keep(fit.scenario, {NET: cut(self.net, self._root, fit)})

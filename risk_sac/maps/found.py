@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from risk_sac.scenario.place import Place, Stretch
+from risk_sac.config import Scenario
+from risk_sac.scenario.tracks import Track
 
 Pattern = Literal["car_following", "crossing", "junction"]
 TITLES: dict[Pattern, str] = {  # what people read
@@ -35,17 +36,16 @@ class Fit:
     """A spot where a pattern fits."""
 
     spot: Spot
-    place: Place
-
-    @property
-    def rare(self) -> bool:
-        """Whether contacts are hardly possible: 24 such places had none in 1,920 episodes."""
-        return isinstance(self.place, Stretch) and self.place.left is None and self.place.right is None
+    scenario: Scenario
+    tracks: tuple[Track, ...]
+    """On which vehicles may start."""
+    rare: bool = False
+    """Whether contacts are hardly possible."""
 
     @property
     def summary(self) -> str:
         """Summarises the place and its rare contacts."""
-        return self.place.plain_summary + (" Contacts are rare here: no vehicle can cut in." if self.rare else "")
+        return self.scenario.summary + (" Contacts are rare here: no vehicle can cut in." if self.rare else "")
 
     def told(self) -> dict[str, object]:
         """The place as it is written as JSON."""

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from risk_sac.maps.found import NoFit, lacking
 from risk_sac.scenario.clearance import too_near
-from risk_sac.scenario.place import Piece, Track
+from risk_sac.scenario.tracks import Piece, Track
 from risk_sac.world.net import Link, Net, NetLane, once
 
 DRIVEN_S = 17.0  # longer than an episode: the ego must not reach the end of the map

@@ -137,7 +137,7 @@ def inline(svg: bytes) -> str:
 
 def again(spec: RunSpec, spec_file: str) -> str:
     """Returns the command that repeats a run of the campaign in a file."""
-    picked = ["--family", spec.family, "--method", spec.method, "--seed", str(spec.seed)]
+    picked = ["--scenario", spec.family, "--method", spec.method, "--seed", str(spec.seed)]
     return shlex.join(["risk-sac", "run", "--spec", spec_file, *picked, "--out", "repeated"])
 
 

@@ -1,22 +1,21 @@
 """Scenario families by name: those shipped, and those at places that the library keeps."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
-from risk_sac.config import CrossingType, Interval, Odd, Scenario, SignalType
-from risk_sac.errors import ConfigError, InfeasibleScene
-from risk_sac.scenario import car_following, hidden_pedestrian, junction
+from risk_sac.config import CrossingType, Interval, Like, Odd, Scenario, SignalType
+from risk_sac.errors import ConfigError, InfeasibleScene, did_you_mean
 from risk_sac.scenario.behaviour import behaving
 from risk_sac.scenario.family import Family, usual_odd
 from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.library import kept
-from risk_sac.scenario.place import CrossingPlace, JunctionPlace, Place, Stretch
-from risk_sac.scenario.shipped import nets_of, shipped_document, shipped_names
-from risk_sac.scenario.space import SceneSpace
+from risk_sac.scenario.odd import SIGNAL_OF
+from risk_sac.scenario.shipped import PAPER_FAMILIES, nets_of, shipped_document, shipped_names
 
 SAMPLED = 64  # scenes whose layouts say which roads a scenario has
 
@@ -34,7 +33,9 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
     """
     of = Interpreter(document, nets)
     vehicles, pedestrians = of.adversaries
-    space = SceneSpace(name or document.name, of.space.parameters)
+    if document.like is not None:
+        _check_like(document.like, vehicles, pedestrians)
+    space = replace(of.space, family=name or document.name)
     return Family(
         name=name or document.name,
         summary=document.summary,
@@ -48,6 +49,22 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
         requirements=document.requirements,
         judge=document.judge,
     )
+
+
+def _check_like(like: Like, vehicles: Sequence[str], pedestrians: Sequence[str]) -> None:
+    """Refuses a shipped family without a prior, and adversaries that stand for none of its adversaries."""
+    if like.family not in PAPER_FAMILIES:
+        remedy = did_you_mean(like.family, PAPER_FAMILIES) or "leave `like` out to search without a prior"
+        raise ConfigError("like.family", repr(like.family), f"one of {', '.join(PAPER_FAMILIES)}", remedy)
+    if unknown := sorted(like.actors.keys() - {*vehicles, *pedestrians}):
+        wanted = f"one of {', '.join((*vehicles, *pedestrians))}"
+        raise ConfigError(f"like.actors.{unknown[0]}", "the name of no adversary", wanted)
+    document = shipped_document(like.family)
+    for own, known in zip((vehicles, pedestrians), Interpreter(document, nets_of(document)).adversaries, strict=True):
+        for name in own:
+            if (other := like.actors.get(name, name)) not in known:
+                wanted = f"one of {', '.join(known)}" if known else f"a family with an actor that moves as {name} does"
+                raise ConfigError(f"like.actors.{name}", repr(other), wanted, did_you_mean(other, known))
 
 
 def sampled(of: Interpreter, count: int = SAMPLED) -> Iterator[Layout | InfeasibleScene]:
@@ -70,10 +87,11 @@ def _odd(of: Interpreter) -> Odd:
     counts = [len(net.edges[net.lanes[lane].edge].drivable) for net, lane in lanes]
     kinds: dict[bool, SignalType] = {False: "none", True: "fixed_time"}
     crossings: set[CrossingType] = {kind for layout in layouts for kind in of.crossings(layout.net)} or {"none"}
+    met = {SIGNAL_OF[kind] for kind in crossings if kind in SIGNAL_OF}
     usual = usual_odd(
         lanes=Interval(low=min(counts), high=max(counts)),
         limit_mps=Interval(low=min(limits_mps), high=max(limits_mps)),
-        signals=tuple(sorted({kinds[layout.signal is not None] for layout in layouts})),
+        signals=tuple(sorted({kinds[layout.signal is not None] for layout in layouts} | met)),
         crossings=tuple(sorted(crossings)),
         walked=any(layout.pedestrians for layout in layouts),
     )
@@ -111,14 +129,6 @@ def _shipped(name: str) -> Family:
     return family_of(document, nets_of(document))
 
 
-ALIKE: Mapping[str, str] = {"car_following": "low", "crossing": "mixed", "junction": "dense"}
-
-
-def shipped_alike(name: str) -> str:
-    """Returns the shipped family of a family's pattern."""
-    return name if name in FAMILIES else next(shipped for pattern, shipped in ALIKE.items() if name.startswith(pattern))
-
-
 def family_named(name: str) -> Family:
     """Returns a family, shipped or of the library; raises `ConfigError` if none has this name."""
     return FAMILIES[name] if name in FAMILIES else _kept(name)
@@ -126,15 +136,5 @@ def family_named(name: str) -> Family:
 
 @cache  # a name holds a digest of what it stands for
 def _kept(name: str) -> Family:
-    return family_at(name, kept(name))
-
-
-def family_at(name: str, place: Place) -> Family:
-    """Returns the family of a place's pattern under this name."""
-    match place:
-        case Stretch():
-            return car_following.family(name, place)
-        case CrossingPlace():
-            return hidden_pedestrian.family(name, place)
-        case JunctionPlace():
-            return junction.family(name, place)
+    document, folder = kept(name)
+    return family_of(document, nets_of(document, folder), name)

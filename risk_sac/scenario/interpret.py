@@ -104,7 +104,15 @@ class Interpreter:
             categories = parameter.words if binary and parameter.words else ()
             meaning = parameter.meaning or name.replace("_", " ")
             parameters.append(Parameter(name, parameter.unit, low, high, meaning, parameter.odd, categories))
-        return SceneSpace(self.document.name, tuple(parameters))
+        return SceneSpace(self.document.name, tuple(parameters), self.holds if self.document.constraints else None)
+
+    def holds(self, xi: Mapping[str, float]) -> bool:
+        """Whether a scene keeps all constraints."""
+        value = self.value(xi)
+        try:
+            return all(map(value.holds, self.document.constraints))
+        except ConfigError:  # a value that does not exist there
+            return False
 
     def value(self, xi: Mapping[str, float]) -> Value:
         """What the parameters say in a scene."""
@@ -144,7 +152,8 @@ class Interpreter:
         """The track from a lane's beginning or its end, where an actor goes; `before_m` is 0."""
         route, turn = value.choose(moving.route), value.word(moving.turn)
         turn = value.words.get(turn, turn)
-        here = lane_named(net, lane, f"{path}.start.lane", turn or _after(route, lane))
+        field = f"{path}.lane" if isinstance(moving, Stream) else f"{path}.start.lane"
+        here = lane_named(net, lane, field, turn or _after(route, lane))
         reference_m = 0.0 if begin else here.length_m
         if route is not None:
             track = routed(net, here, reference_m, route, f"{path}.route")
@@ -169,7 +178,7 @@ class Interpreter:
         driven, walking = list[str](), list[str]()
         for name, actor in self.document.actors.items():
             if actor.role == "adversary":
-                bodies = self._alternatives(actor.body)
+                bodies = self.alternatives(actor.body)
                 motions = {self.moves(name, body_named(body, f"actors.{name}.body")) for body in bodies}
                 if len(motions) > 1:
                     wanted = "bodies that all drive in lanes, or all move freely"
@@ -177,7 +186,7 @@ class Interpreter:
                 (walking if motions == {"freely"} else driven).append(name)
         return tuple(driven), tuple(walking)
 
-    def _alternatives(self, name: "str | Chosen[str]") -> tuple[str, ...]:
+    def alternatives(self, name: "str | Chosen[str]") -> tuple[str, ...]:
         """All names that a field may stand for, over the words of parameters."""
         if isinstance(name, Chosen):
             return tuple(name.of.values())
@@ -317,8 +326,14 @@ class _Scene:
             self._check_reference(place.lane, start.before, f"{path}.start.before")
         if begin:
             before_m = -of(start.at_m or 0.0, f"{path}.start.at_m")
+            if not 0.0 <= -before_m <= place.lane.length_m:
+                wanted = f"0 to {place.lane.length_m:g}"
+                raise ConfigError(f"{path}.start.at_m", f"{-before_m:g} m along {place.lane.id!r}", wanted)
         else:
             before_m = of(start.distance_m or 0.0, f"{path}.start.distance_m")
+            if not 0.0 <= before_m <= place.track.room_m:
+                got = f"{before_m:g} m before the end of {place.lane.id!r}"
+                raise ConfigError(f"{path}.start.distance_m", got, f"0 to {place.track.room_m:g}")
         return place._replace(before_m=before_m, lead_in=start.lead_in is not False)
 
     def _beside(self, there: OnTrack, moving: Moving, path: str) -> OnTrack:

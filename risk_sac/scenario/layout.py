@@ -1,15 +1,13 @@
 """Start of an episode: vehicles, pedestrians, and areas of the ground."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 import shapely
 
 from risk_sac.scenario.bodies import BODIES, BodyName
-from risk_sac.scenario.place import Place, PlaceGround, Track, Walk
 from risk_sac.world.types import Point, Role
 
 SAME_POINT_M = 1e-6
@@ -168,72 +166,3 @@ class Layout:
     friction: float = 1.0
     horizon_steps: int = 150  # of 0.1 s
     wary: bool = False  # whether drivers stop for an ego that stands askew; SUMO tells them of a box along its lane
-
-
-def layout_at(
-    place: Place,
-    xi: Mapping[str, float],
-    ego: VehicleStart,
-    vehicles: Iterable[VehicleStart],
-    pedestrians: tuple[PedestrianStart, ...] = (),
-) -> Layout:
-    """The layout of a scene at a place, given where its actors start."""
-    crossings, roadway, junctions = _areas(place.ground)
-    return Layout(
-        net=place.net,
-        ego=ego,
-        vehicles=tuple(vehicles),
-        pedestrians=pedestrians,
-        crossings=crossings,
-        roadway=roadway,
-        junctions=junctions,
-        lane_width_m=place.lane_width_m,
-        signal=None if place.signal is None else place.signal.id,
-        signal_offset_s=xi.get("signal_offset_s", 0.0),
-        friction=xi["friction"],
-        wary=place.wary,
-    )
-
-
-def vehicle(
-    id_: str,
-    role: Role,
-    track: Track,
-    before_m: float,
-    speed_mps: float,
-    lead_m: float | None = None,
-    body: BodyName = "car",
-) -> VehicleStart:
-    """A vehicle whose front is `before_m` before its track's reference once the adversaries are released.
-
-    Until then it drives `lead_m`; if that is not given, it keeps its speed.
-    """
-    route, piece, position_m = track.start(before_m, LEAD_IN_S * speed_mps if lead_m is None else lead_m)
-    return VehicleStart(
-        id=id_,
-        role=role,
-        route=route,
-        lane=piece.lane,
-        position_m=position_m,
-        speed_mps=min(speed_mps, piece.limit_mps),  # SUMO refuses a faster start
-        body=body,
-    )
-
-
-def pedestrian(walk: Walk, xi: Mapping[str, float]) -> PedestrianStart:
-    """A pedestrian at the kerb, and further along the road by the offset."""
-    along_x, along_y, offset_m = walk.along_x, walk.along_y, xi["pedestrian_offset_m"]
-    setback_m, lead_m = xi["pedestrian_setback_m"], LEAD_IN_S * xi["pedestrian_speed_mps"]
-    return PedestrianStart(
-        id="pedestrian",
-        role=Role.ADVERSARY,
-        x_m=walk.x_m - along_x * setback_m - along_x * lead_m + along_y * offset_m,
-        y_m=walk.y_m - along_y * setback_m - along_y * lead_m - along_x * offset_m,
-        heading_rad=math.atan2(along_y, along_x),
-        speed_mps=xi["pedestrian_speed_mps"],
-    )
-
-
-@cache  # every episode asks for it
-def _areas(ground: PlaceGround) -> tuple[tuple[Area, ...], tuple[Area, ...], tuple[Area, ...]]:
-    return areas(ground.crossings), areas(ground.roadway), areas(ground.junctions)

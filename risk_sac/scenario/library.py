@@ -1,9 +1,9 @@
-"""Library of places on users' nets, a folder.
+"""Library of users' scenarios, a folder.
 
-A place is stored with a piece of its net, under a name that holds the digest of both.
+A scenario is stored as its document and its nets, under a name that holds the digest of all of them.
 
-`RISK_SAC_PLACES` says where it is. Campaigns name the places of maps like families, so a process that plays or draws an
-episode needs the folder that its place was kept in.
+`RISK_SAC_PLACES` says where it is. Campaigns name these scenarios like shipped ones, so a process that plays or draws
+an episode needs the folder that its scenario was kept in.
 """
 
 import hashlib
@@ -12,18 +12,21 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from risk_sac.config import FAMILY_NAME
-from risk_sac.errors import ConfigError, DamagedError
+import yaml
+
+from risk_sac.config import Scenario
+from risk_sac.errors import ConfigError, DamagedError, did_you_mean
 from risk_sac.host.machine import UNWRITABLE, user_cache
-from risk_sac.scenario.place import PLACES, Place
+from risk_sac.scenario.shipped import document_of, networks, shipped_names
 
 VARIABLE = "RISK_SAC_PLACES"
-NET, PLACE = "net.xml", "place.json"
+DOCUMENT = "scenario.yaml"
 DIGITS = 12
-LONGEST_ID = 40  # of it in a name
+KEPT = re.compile(rf"[a-z][a-z0-9_]{{0,46}}_[0-9a-f]{{{DIGITS}}}")
+_NET_FILE = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _NEW, _GONE = ".new-", ".gone-"
 
 
@@ -34,37 +37,44 @@ def library() -> Path:
         return Path(told)
     cache = user_cache()
     if cache is None:
-        raise ConfigError(VARIABLE, "nothing, and this user has no home folder", "a folder for places on maps")
+        raise ConfigError(VARIABLE, "nothing, and this user has no home folder", "a folder for scenarios")
     return cache / "risk-sac" / "places"
 
 
-def keep(place: Place, net: bytes, id_: str = "") -> str:
-    """Puts a place and its piece of net into the library.
+def written(document: Scenario) -> str:
+    """Writes a document as YAML, without the fields that have their defaults."""
+    fields = document.model_dump(mode="json", exclude_defaults=True)
+    return yaml.safe_dump(fields, sort_keys=False, allow_unicode=True, width=120, default_flow_style=None)
+
+
+def keep(document: Scenario, nets: Mapping[str, bytes]) -> str:
+    """Puts a scenario into the library.
 
     Args:
-      place: on the piece.
-      net: the piece, as SUMO reads it.
-      id_: the map's name of the place; its letters and digits become part of the family's name.
+      document: of the scenario.
+      nets: network of the document → its SUMO net; shipped ones are left out.
 
     Returns:
-      The name of its family.
+      Its name, that of the document and a digest.
+
+    Raises:
+      ConfigError: a net has no name of a file, or the library cannot be written.
     """
-    text = place.model_copy(update={"net": NET}).model_dump_json().encode()
-    words = re.sub("^-", "minus_", id_.lower())  # of two directions of a road
-    told = re.sub("[^a-z0-9]+", "_", words).strip("_")[:LONGEST_ID].strip("_")
-    name = "_".join(filter(None, (place.pattern, told, _digest(text, net))))
-    put(name, text, net)
+    files = {DOCUMENT: written(document).encode(), **nets}
+    name = f"{document.name}_{_digest(files)}"
+    put(name, files)
     return name
 
 
-def put(name: str, text: bytes, net: bytes) -> None:
+def put(name: str, files: Mapping[str, bytes]) -> None:
     """Puts what `files_of` returned into the library, unless it is there and whole.
 
     Raises:
-      ConfigError: it is not what its name says.
+      ConfigError: the files are not those of the name, or the library cannot be written.
     """
-    if not name.endswith(f"_{_digest(text, net)}"):
-        raise ConfigError("family", f"the place {name!r} is not what its name says")
+    if not KEPT.fullmatch(name) or not name.endswith(f"_{_digest(files)}"):
+        raise ConfigError("family", f"a scenario {name!r} whose digest is another", "one that was kept under its name")
+    _check(files)
     folder = library() / name
     if folder.is_dir():
         try:
@@ -81,10 +91,10 @@ def put(name: str, text: bytes, net: bytes) -> None:
         if error.errno not in UNWRITABLE:
             raise
         got = f"{folder.parent}, which cannot be written ({error.strerror})"
-        raise ConfigError(VARIABLE, got, "a folder for places on maps that can be written") from error
+        raise ConfigError(VARIABLE, got, "a folder for scenarios that can be written") from error
     new.chmod(0o755)
-    (new / NET).write_bytes(net)
-    (new / PLACE).write_bytes(text)
+    for file, content in files.items():
+        (new / file).write_bytes(content)
     try:
         new.rename(folder)
     except OSError:  # another process was quicker
@@ -93,8 +103,8 @@ def put(name: str, text: bytes, net: bytes) -> None:
             raise
 
 
-def files_of(name: str) -> tuple[bytes, bytes]:
-    """A place and the piece of net around it, as they are kept.
+def files_of(name: str) -> Mapping[str, bytes]:
+    """Reads the files of a kept scenario: its document first, then its nets.
 
     Raises:
       ConfigError: there is none of this name.
@@ -102,45 +112,65 @@ def files_of(name: str) -> tuple[bytes, bytes]:
     """
     folder = library() / name
     try:
-        if not FAMILY_NAME.fullmatch(name):
+        if not KEPT.fullmatch(name):
             raise FileNotFoundError
-        text, net = (folder / PLACE).read_bytes(), (folder / NET).read_bytes()
+        paths = sorted(path for path in folder.iterdir() if path.name != DOCUMENT)
+        files = {path.name: path.read_bytes() for path in (folder / DOCUMENT, *paths)}
     except OSError:
-        remedy = f"name low, mixed, dense, or one that lies in {library()} ({VARIABLE} names another folder)"
-        raise ConfigError("family", f"there is no place {name!r}", remedy=remedy) from None
-    if not name.endswith(f"_{_digest(text, net)}"):
-        raise DamagedError(f"the place {name!r} in {library()} is damaged; name the place on its map once more")
-    return text, net
+        known = shipped_names()
+        remedy = did_you_mean(name, known) or f"{VARIABLE} names the folder of others, now {library()}"
+        wanted = f"one of {', '.join(known)}, or a scenario of {library()}"
+        raise ConfigError("family", f"{name!r}, which is no scenario", wanted, remedy) from None
+    if not name.endswith(f"_{_digest(files)}"):
+        raise DamagedError(f"the scenario {name!r} in {library()} is damaged; keep it once more")
+    return files
 
 
-def kept(name: str) -> Place:
-    """A place of the library; raises what `files_of` does."""
-    text, _ = files_of(name)
-    return PLACES.validate_json(text).model_copy(update={"net": str((library() / name / NET).absolute())})
+def kept(name: str) -> tuple[Scenario, Path]:
+    """Reads the document of a kept scenario, and its folder; raises what `files_of` does."""
+    return document_of(yaml.safe_load(files_of(name)[DOCUMENT])), (library() / name).absolute()
+
+
+def listed() -> list[str]:
+    """Names of all kept scenarios."""
+    return sorted(path.name for path in library().glob("*") if KEPT.fullmatch(path.name))
 
 
 def prune(folder: Path, named: Collection[str], unused_s: float, started_at: float) -> list[str]:
-    """Removes a service's places that are old and not named.
+    """Removes a service's scenarios that are old and not named.
 
     Returns their names.
 
     Args:
       folder: the library; never that of a person, whose run folders are unknown.
-      named: families that stay.
-      unused_s: least time since a place was last put there.
+      named: scenarios that stay.
+      unused_s: least time since a scenario was last put there.
       started_at: when the service started, s since the epoch; what was half put there before is removed.
     """
     removed = []
     for path in sorted(folder.glob("*")):
-        ours = FAMILY_NAME.fullmatch(path.name) is not None and path.name not in named
+        ours = KEPT.fullmatch(path.name) is not None and path.name not in named
         oldest = started_at if path.name.startswith(_NEW) else time.time() - unused_s
         if (ours or path.name.startswith(_NEW)) and path.stat().st_mtime < oldest:
-            path.rename(path.with_name(f"{_GONE}{path.name}"))  # so that half of it is never found
+            path.rename(path.with_name(f"{_GONE}{path.name}"))  # so that no process reads half of it
             removed += [path.name] if ours else []
     for path in folder.glob(f"{_GONE}*"):
         shutil.rmtree(path)
     return removed
 
 
-def _digest(text: bytes, net: bytes) -> str:
-    return hashlib.sha256(text + b"\0" + net).hexdigest()[:DIGITS]
+def _check(files: Mapping[str, bytes]) -> None:
+    """Refuses files that are no document and its nets; raises `ConfigError`."""
+    document = document_of(yaml.safe_load(files[DOCUMENT])) if DOCUMENT in files else None
+    if document is None:
+        raise ConfigError("family", "a scenario without a document", DOCUMENT)
+    for name in files.keys() - {DOCUMENT}:
+        if not _NET_FILE.fullmatch(name) or name not in networks(document):
+            raise ConfigError("network", repr(name), "a file name that the document names as a network")
+
+
+def _digest(files: Mapping[str, bytes]) -> str:
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        digest.update(f"{name}\0{len(files[name])}\0".encode() + files[name])
+    return digest.hexdigest()[:DIGITS]

@@ -12,6 +12,7 @@ from risk_sac.config import Scenario, field_errors
 from risk_sac.errors import ConfigError, did_you_mean
 
 FOLDER = Path(str(files("sumo_nets")))
+PAPER_FAMILIES = ("low", "mixed", "dense")  # families of the paper, which have priors
 
 
 def scenario_file(name: str) -> Path:
@@ -22,9 +23,8 @@ def scenario_file(name: str) -> Path:
 @cache
 def shipped_names() -> tuple[str, ...]:
     """Names of the shipped scenarios: the three families of the paper, then the others by name."""
-    first = ("low", "mixed", "dense")
     others = sorted(path.parent.name for path in FOLDER.glob("*/*.yaml") if path.parent.name == path.stem)
-    return (*first, *(name for name in others if name not in first))
+    return (*PAPER_FAMILIES, *(name for name in others if name not in PAPER_FAMILIES))
 
 
 @cache

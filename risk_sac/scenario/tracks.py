@@ -130,7 +130,7 @@ def routed(net: Net, lane: NetLane, reference_m: float, route: Sequence[str], fi
             break
         links.insert(0, min(arriving, key=lambda link: abs(link.turn_rad)))
         lanes.insert(0, links[0].source)
-    return _track(lanes, links, lanes.index(lane), reference_m, *_ahead(net, lane, edges[own + 1 :]))
+    return _track(lanes, links, lanes.index(lane), reference_m, *_ahead(net, lane, edges[own + 1 :], route[own + 1 :]))
 
 
 def straight_on(net: Net, lane: NetLane, reference_m: float, metres: float, turn: str | None, field: str) -> Track:
@@ -169,14 +169,23 @@ def straight_on(net: Net, lane: NetLane, reference_m: float, metres: float, turn
             break
         back.insert(0, min(arriving, key=lambda link: abs(link.turn_rad)))
         lanes.insert(0, back[0].source)
-    return _track(lanes, back, len(lanes) - 1, reference_m, *_ahead(net, lane, ahead))
+    return _track(lanes, back, len(lanes) - 1, reference_m, *_ahead(net, lane, ahead, ahead))
 
 
-def _ahead(net: Net, lane: NetLane, edges: Sequence[str]) -> tuple[list[NetLane], list[Link], list[str]]:
-    """Lanes that follow a lane without a lane change, the links to them, and the edges after these."""
+def _ahead(
+    net: Net, lane: NetLane, edges: Sequence[str], route: Sequence[str]
+) -> tuple[list[NetLane], list[Link], list[str]]:
+    """Lanes that follow a lane without a lane change, the links to them, and the edges after these.
+
+    Args:
+      net: where.
+      lane: the first one.
+      edges: after its own.
+      route: the same, each as an edge, or as the lane to take.
+    """
     lanes, links = [lane], list[Link]()
-    for edge in edges:
-        on = _links(net, lanes[-1], edge)
+    for edge, item in zip(edges, route, strict=True):
+        on = [link for link in _links(net, lanes[-1], edge) if item in (edge, link.target.id)]
         if not on:
             break
         links.append(on[0])

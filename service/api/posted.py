@@ -15,7 +15,7 @@ from pydantic_core import from_json
 from risk_sac.config import CampaignSpec, Settings
 from risk_sac.errors import ConfigError
 from risk_sac.maps.found import Pattern
-from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS
+from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS
 from service.api.context import Caller, Context, CurrentCaller, Service
 from service.api.problems import ProblemError, Reason, invalid, invalid_field
 from service.errors import NotFoundError
@@ -134,6 +134,11 @@ class CampaignPlaces(Settings):
 
 async def _campaign(request: Request, service: Service, caller: CurrentCaller) -> CampaignSpec:
     content, value = await _read_json(request)
+    if isinstance(value, dict) and "scenarios" in value:
+        if "families" in value:
+            raise invalid_field("scenarios", value["scenarios"], "either scenarios or families, which mean the same")
+        value = {"families": value.pop("scenarios")} | value
+        content = json.dumps(value).encode()
     if isinstance(value, dict) and "network" in value:
         if "families" in value:
             wanted = "either families or a network with its places, not both"

@@ -179,7 +179,7 @@ class Priors:
         """Returns the scripts that a campaign's prior names; None where it names none.
 
         Raises:
-          ConfigError: there is no such campaign, it followed no scripts, or it is of another pattern.
+          ConfigError: there is no such campaign, it followed no scripts, or is like another family.
         """
         if spec.prior in SHIPPED_OR_NONE:
             return None

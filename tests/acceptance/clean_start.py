@@ -72,7 +72,7 @@ def main() -> None:
             folder = options.out / f"{family}-{method}"
             if not (folder / RESULTS).exists() or not read_results(folder).finished:
                 budget = ("--episodes", str(options.episodes), "--seed", str(options.seed))
-                command = [sys.executable, "-m", "risk_sac", "run", "--family", family, "--method", method, *budget]
+                command = [sys.executable, "-m", "risk_sac", "run", "--scenario", family, "--method", method, *budget]
                 subprocess.run([*command, "--out", str(folder)], check=True, stdout=subprocess.DEVNULL)
             row = row_of(folder)
             reasons = ", ".join(f"{count} {reason}" for reason, count in row.rejected.most_common()) or "0"

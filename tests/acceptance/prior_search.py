@@ -1,6 +1,6 @@
 """What searches find with and without the prior, at equal steps: at families, or at places of an invented town.
 
-    python -m tests.acceptance.prior_search OUT --egos fiss-plus [--families low mixed dense] [--seeds 3] [--steps 5000]
+    python -m tests.acceptance.prior_search OUT --egos fiss-plus [--scenario low mixed dense] [--seeds 3] [--steps 5000]
     python -m tests.acceptance.prior_search OUT --egos idm-aeb --town
 
 plays what OUT lacks, and rewrites OUT/searches.csv after each run.
@@ -14,7 +14,7 @@ from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
-from risk_sac.config import SHIPPED, Budget, EgoConfig, RunMethod, RunSpec
+from risk_sac.config import Budget, EgoConfig, RunMethod, RunSpec
 from risk_sac.egos.registry import pinned
 from risk_sac.execution.recorder import Recorder
 from risk_sac.lab.figures.planner_table import spent
@@ -24,6 +24,7 @@ from risk_sac.maps.convert import present_net
 from risk_sac.maps.finder import Map
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.results import EPISODES, records_from_lines
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.loop import execute_run
 from risk_sac.verdicts.distinct import variant_name
 from tests.maps import osm_town
@@ -104,7 +105,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--egos", nargs="+", required=True, metavar="EGO")
-    parser.add_argument("--families", nargs="+", choices=SHIPPED, default=list(SHIPPED))
+    parser.add_argument("--scenario", dest="families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
     parser.add_argument("--town", action="store_true", help="at places of the town instead of at families")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--steps", type=int, default=5000)

@@ -27,7 +27,7 @@ from risk_sac.run_folder.arrays import MOST_ARRAYS, MOST_BYTES
 from risk_sac.run_folder.results import read_results
 from risk_sac.scenario import library
 
-RUN = ["--family", "dense", "--method", "random", "--seed", "1", "--episodes", "20"]
+RUN = ["--scenario", "dense", "--method", "random", "--seed", "1", "--episodes", "20"]
 NET = Path(sumo_nets.__path__[0]) / "dense" / "dense.net.xml"
 Arrays = dict[str, np.ndarray]
 

@@ -30,7 +30,7 @@ learner:
   scenes: {initial_scenes: 2, candidates: 32}
   checkpoint_every: 2
 """
-FLAGS = ["--spec", "spec.yaml", "--families", "low", "--episodes", "6", "--jobs", "2", "--verify", "1", "--out", "out"]
+FLAGS = ["--spec", "spec.yaml", "--scenario", "low", "--episodes", "6", "--jobs", "2", "--verify", "1", "--out", "out"]
 RUNS = 4
 
 
@@ -146,7 +146,7 @@ def crash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], No
     return arrange
 
 
-ONE = ["--families", "low", "--methods", "random", "--seeds", "1", "--first-seed", "4", "--episodes", "1"]
+ONE = ["--scenario", "low", "--methods", "random", "--seeds", "1", "--first-seed", "4", "--episodes", "1"]
 ONE += ["--verify", "0", "--out"]
 
 

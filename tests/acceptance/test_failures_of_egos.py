@@ -17,7 +17,7 @@ from risk_sac.run_folder.results import first_of_variants, read_results, read_ve
 from tests.acceptance.conftest import Tell
 from tests.ego_processes import served
 
-RUN = ["--family", "low", "--method", "archive", "--seed", "41", "--episodes", "30", "--behaviour", "emergency"]
+RUN = ["--scenario", "low", "--method", "archive", "--seed", "41", "--episodes", "30", "--behaviour", "emergency"]
 
 
 @dataclass(frozen=True)

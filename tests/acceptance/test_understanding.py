@@ -30,7 +30,7 @@ from risk_sac.search.frozen_policy import FrozenPolicy
 from tests.acceptance.conftest import Tell
 from tests.acceptance.test_bundle import changed, manifest, series
 
-RUN = ["--family", "low", "--method", "archive", "--seed", "3", "--episodes", "60", "--behaviour", "emergency"]
+RUN = ["--scenario", "low", "--method", "archive", "--seed", "3", "--episodes", "60", "--behaviour", "emergency"]
 
 
 @pytest.fixture(scope="module")
@@ -247,7 +247,7 @@ def test_a_policy_acts_on_when_the_recorded_actions_have_ended(failure):
 
 
 def test_a_run_that_learned_has_a_policy_and_one_that_did_not_has_none(run, tmp_path):
-    learner = ["run", "--family", "low", "--method", "risk-sac", "--seed", "3", "--episodes", "9"]
+    learner = ["run", "--scenario", "low", "--method", "risk-sac", "--seed", "3", "--episodes", "9"]
     learner += ["--behaviour", "emergency"]
     subprocess.run([sys.executable, "-m", "risk_sac", *learner, "--out", tmp_path / "run"], check=True)
     results = read_results(tmp_path / "run")

@@ -23,7 +23,7 @@ from risk_sac.run_folder.results import RecordedFailure
 FOLDER = Path(__file__).with_name("examples")
 FAMILIES = ("low", "mixed", "dense")
 SHOWN = "low"  # family of the examples
-SEARCH = ("--family", "mixed", "--method", "archive", "--episodes", "60", "--seed", "601")
+SEARCH = ("--scenario", "mixed", "--method", "archive", "--episodes", "60", "--seed", "601")
 
 
 def played_here(bundle: Bundle) -> Bundle:

@@ -24,7 +24,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "run",
             "--spec",
             str(spec),
-            "--family",
+            "--scenario",
             family,
             "--method",
             method,

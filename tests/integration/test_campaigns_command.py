@@ -21,8 +21,8 @@ from risk_sac.client import Client
 from service.keys import KeyFile, Scope
 from tests.server import LONG_S, Service
 
-SUBMIT = ["submit", "--families", "low", "--methods", "random", "--seeds", "2", "--episodes", "6"]
-LONG = ["submit", "--families", "low", "--methods", "random", "--episodes", "5000"]
+SUBMIT = ["submit", "--scenario", "low", "--methods", "random", "--seeds", "2", "--episodes", "6"]
+LONG = ["submit", "--scenario", "low", "--methods", "random", "--episodes", "5000"]
 FAILS = 3  # a seed with which the scripted worker ends with an error
 
 
@@ -108,7 +108,7 @@ def test_a_requirement_that_no_family_has_is_refused_before_anything_is_queued(f
 
 def test_a_campaign_that_failed_could_not_run_and_says_why(answer, call, capsys, tmp_path):
     file = tmp_path / "junit.xml"
-    arguments = ["submit", "--families", "low", "--methods", "random", "--first-seed", FAILS, "--episodes", 6]
+    arguments = ["submit", "--scenario", "low", "--methods", "random", "--first-seed", FAILS, "--episodes", 6]
     results = answer(*arguments, "--watch", "--junit", file, status=2)
     assert results["state"] == "failed"
     (error,) = ElementTree.parse(file).getroot().iter("error")
@@ -142,7 +142,7 @@ def test_list_is_newest_first_filtered_and_bounded(answer, call, capsys, monkeyp
     assert [each["id"] for each in answer("list", "--limit", 2)] == ids[:0:-1]
     assert [each["id"] for each in answer("list", "--label", "x", "--limit", 2)] == ids[1::-1]
     assert answer("results")["campaign_id"] == ids[-1]  # of the newest, where none is named
-    assert answer("list", "--state", "failed", "--family", "dense") == []
+    assert answer("list", "--state", "failed", "--scenario", "dense") == []
     assert answer("list", "--label", hostile)[0]["label"] == hostile
     monkeypatch.setenv("COLUMNS", "120")
     for words in (["list"], ["list", "--json"]):
@@ -183,9 +183,9 @@ def test_a_campaign_on_an_uploaded_map_is_submitted_by_its_names(service, answer
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["submit"], "--families is missing; "),
+        (["submit"], "--scenario is missing; "),
         ([*SUBMIT, "--max-ecr", "0.1"], "--max-ecr: got it without --watch"),
-        (["submit", "--families", "high"], "--families: "),
+        (["submit", "--scenario", "high"], "--scenario: "),
         (["submit", "--spec", "nowhere.yaml"], "--spec: "),
         (["watch", "c0000"], "http://"),
         (["list", "--state", "asleep"], "http://"),

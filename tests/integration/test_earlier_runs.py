@@ -31,7 +31,7 @@ from tests.server import Service
 def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a finished run that has contacts."""
     root = tmp_path_factory.mktemp("runs")
-    command = ["run", "--family", "low", "--method", "archive", "--seed", "3", "--episodes", "16"]
+    command = ["run", "--scenario", "low", "--method", "archive", "--seed", "3", "--episodes", "16"]
     assert cli.main([*command, "--out", str(root / "mine")]) == 0
     return root
 

@@ -70,7 +70,7 @@ def test_what_an_ego_prints_spoils_no_replay(install, tmp_path, monkeypatch):
 def test_an_ego_that_interrupts_its_worker_has_crashed(install, tmp_path, monkeypatch):
     install("raise KeyboardInterrupt")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))  # of the worker
-    flags = "--families low --methods random --seeds 1 --episodes 3 --ego example --out"
+    flags = "--scenario low --methods random --seeds 1 --episodes 3 --ego example --out"
     assert cli.main(["evaluate", *flags.split(), str(tmp_path / "out")]) == 0
     (lines,) = (tmp_path / "out" / "runs").glob("*/episodes.jsonl")
     records = [EpisodeRecord.model_validate_json(line) for line in lines.read_bytes().splitlines()]

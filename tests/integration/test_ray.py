@@ -35,7 +35,7 @@ def serve(cluster: Cluster, tmp_path: Path) -> Iterator[object]:
 
 def evaluated(folder: Path, families: list[str], **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "risk_sac", "evaluate", "--families", *families, *TINY, "--out", str(folder)],
+        [sys.executable, "-m", "risk_sac", "evaluate", "--scenario", *families, *TINY, "--out", str(folder)],
         env=os.environ | environment, cwd=ROOT, capture_output=True, text=True, timeout=LONG_S, check=False,
     )  # fmt: skip
 

@@ -13,7 +13,7 @@ from risk_sac.execution.jobs import worker_program
 from risk_sac.execution.ray.executor import RayExecutor
 from tests.ray_cluster import LONG_S, ROOT, Cluster, needs_ray, running
 
-TINY = ["--families", "low", "--methods", "random", "--seeds", "1", "--episodes", "1", "--out", "out"]
+TINY = ["--scenario", "low", "--methods", "random", "--seeds", "1", "--episodes", "1", "--out", "out"]
 # As if Ray were not installed, wherever it is.
 WITHOUT_RAY = """
 import sys

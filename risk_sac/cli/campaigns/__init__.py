@@ -33,7 +33,10 @@ def add_management(commands: Commands) -> None:
         commands, "list", _list, "list campaigns, newest first", example="campaigns list --state running"
     )
     for name in FILTERS:
-        parser.group("choice of campaigns").add_argument(f"--{name}", metavar=name.upper(), help=f"only this {name}")
+        shown = name.replace("family", "scenario")
+        parser.group("choice of campaigns").add_argument(
+            f"--{shown}", dest=name, metavar=shown.upper(), help=f"only this {shown}"
+        )
     add_limit(parser)
 
     parser = add_campaign_command(
@@ -149,7 +152,7 @@ def add(commands: Commands) -> None:
         commands,
         "campaigns",
         "submit, follow and read campaigns of a running service",
-        example="campaigns submit --families low --watch --max-pcr 0.1",
+        example="campaigns submit --scenario low --watch --max-pcr 0.1",
         epilog=EPILOG,
     )
     campaigns = group.add_subparsers(required=True, metavar="COMMAND")

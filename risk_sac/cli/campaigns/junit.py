@@ -135,7 +135,7 @@ class Names:
         lines = [f"{run.id}: {counted(run.metrics.failures, 'valid failure')}, of which the first {len(failures)}:"]
         for failure in failures:
             lines += self._of_failure(failure)
-        pick = f"--family {run.family} --method {run.method} --seed {run.seed} --out {run.id}"
+        pick = f"--scenario {run.family} --method {run.method} --seed {run.seed} --out {run.id}"
         lines.append(f"To have them again without the service: save {self.url}/spec?format=yaml as spec.yaml, then")
         lines.append(f"  risk-sac run --spec spec.yaml {pick}")
         return printable("\n".join(lines))

@@ -22,6 +22,7 @@ from risk_sac.cli.flags import (
     scene_flags,
 )
 from risk_sac.cli.parser import Commands, Parser, add_command
+from risk_sac.cli.scenarios import document_at, is_file, own_nets
 from risk_sac.client import Campaign, Client, Episode, Results
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import read_posted
@@ -29,6 +30,7 @@ from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import complain, notes
 from risk_sac.records import Grade
+from risk_sac.scenario.shipped import nets_of
 
 SEEDS = 1  # number of seeds if neither the file nor a flag names any
 RATE = number(float, 0, 1)
@@ -44,7 +46,7 @@ def add(commands: Commands) -> None:
         _submit,
         "queue a campaign",
         more="With --watch, follows it, shows its results and judges them as `watch` does.",
-        example="campaigns submit --families low --episodes 50 --watch --max-pcr 0.1",
+        example="campaigns submit --scenario low --episodes 50 --watch --max-pcr 0.1",
     )
     add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
     add_scene_flags(parser)
@@ -85,7 +87,7 @@ def _prepare(options: argparse.Namespace) -> GateBounds:
 def _check_names(bounds: GateBounds, spec: CampaignSpec) -> None:
     """Refuses a bound of a requirement that no campaign ships and this one does not add."""
     if bounds.requirements:
-        from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS  # here, because loading it takes a while
+        from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS  # here, because loading it takes a while
 
         bounds.check_names([*SHIPPED_REQUIREMENTS, *(each.name for each in spec.requirements)])
 
@@ -209,11 +211,22 @@ def _network_id(client: Client, called: object) -> object:
     return matches[0].id if matches else called
 
 
+def _uploaded(name_or_file: str, url: str | None) -> str:
+    """Returns the name of a scenario in the service; a file is uploaded with its nets."""
+    if not is_file(name_or_file):
+        return name_or_file
+    document, folder = document_at(name_or_file)
+    nets = own_nets(nets_of(document, folder))
+    with Client.from_environment(url) as client:
+        return client.add_scenario(document, nets).name
+
+
 def _submit(options: argparse.Namespace) -> int:
     for name in ("max_ecr", "max_pcr", "max_rate", "max_preventable", "no_new_failures", "junit", "timeout"):
         if getattr(options, name) is not None and not options.watch:
             raise ConfigError(f"--{name.replace('_', '-')}", "it without --watch", "both")
     bounds = _prepare(options)
+    options.families = options.families and [_uploaded(name, options.url) for name in options.families]
     flags = campaign_flags(options, SEEDS) | scene_flags(options)
     flags |= {name: getattr(options, name) for name in ("label", "network", "pattern", "place", "places")}
     spec = read_posted(options.spec, flags)

@@ -18,7 +18,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from risk_sac.config import SHIPPED, RunSpec
+from risk_sac.config import RunSpec
 from risk_sac.egos import registry
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Cause, ClusterState, Exited, Messages, WorkerProgram, taken
@@ -27,6 +27,7 @@ from risk_sac.execution.ray import ADDRESS, read_settings
 from risk_sac.execution.ray.node import Order
 from risk_sac.run_folder.durable import scratch_name
 from risk_sac.scenario import library
+from risk_sac.scenario.shipped import shipped_names
 from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, file_of
 
 logger = logging.getLogger(__name__)
@@ -81,16 +82,16 @@ class RayExecutor:
                 self._lose(order)
 
     def _order(self, number: int, spec: RunSpec, folder: Path) -> Order:
-        """An attempt, with the egos that the server's operator has registered and the run's place."""
+        """An attempt, with the egos that the server's operator has registered and the run's scenario."""
         scratch = self._scratch / scratch_name()
         beside: dict[str, Path] = {}
         environment = {registry.FILE: ""}  # whatever a node registers by itself does not count
         if registered := os.environ.get(registry.FILE):
             beside["egos.toml"] = Path(registered).resolve()
             environment[registry.FILE] = str(scratch / "egos.toml")
-        if spec.family not in SHIPPED:
-            place = (library.library() / spec.family).resolve()
-            beside |= {f"places/{spec.family}/{file.name}": file for file in place.iterdir()}
+        if spec.family not in shipped_names():
+            kept = (library.library() / spec.family).resolve()
+            beside |= {f"places/{spec.family}/{file.name}": file for file in kept.iterdir()}
         if spec.prior not in SHIPPED_OR_NONE:
             beside[f"places/{file_of(spec.prior)}"] = (library.library() / file_of(spec.prior)).resolve()
         if any(name.startswith("places/") for name in beside):

@@ -32,7 +32,7 @@ def play(out: Path, seeds: int, episodes: int) -> None:
     path = os.pathsep.join(filter(None, (str(Path(__file__).parents[1] / "egos"), os.environ.get("PYTHONPATH"))))
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         for ego in EGOS:
-            arguments = ["--families", *FAMILIES, "--methods", *METHODS, "--seeds", "1", "--first-seed", str(seed)]
+            arguments = ["--scenario", *FAMILIES, "--methods", *METHODS, "--seeds", "1", "--first-seed", str(seed)]
             arguments += ["--episodes", str(episodes), "--ego", ego, "--verify", "0", "--jobs", "1"]
             arguments += ["--out", str(out / f"{ego}-{seed}")]
             command = [sys.executable, "-m", "risk_sac", "evaluate", *arguments]

@@ -1,6 +1,6 @@
 """Compares egos by the failures that the same scenes and scripts bring about.
 
-    python -m risk_sac.lab.figures.common_scripts OUT [--families NAME ...] [--episodes N] [--seed N]
+    python -m risk_sac.lab.figures.common_scripts OUT [--scenario NAME ...] [--episodes N] [--seed N]
 
 plays what OUT lacks, one file for each family and ego, and prints each ego's rate of plausible, preventable failures.
 Half of the points are uniform; the others take a row of the shipped library, moved by a normal deviation of 0.05. The
@@ -85,7 +85,7 @@ def main() -> None:
     """Plays, writes and prints."""
     parser = argparse.ArgumentParser(prog="python -m risk_sac.lab.figures.common_scripts", description=__doc__)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--families", nargs="+", default=["low", "mixed", "dense"])
+    parser.add_argument("--scenario", dest="families", nargs="+", default=["low", "mixed", "dense"])
     parser.add_argument("--episodes", type=int, default=500)
     parser.add_argument("--seed", type=int, default=961)
     options = parser.parse_args()

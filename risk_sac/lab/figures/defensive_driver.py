@@ -1,6 +1,6 @@
 """Plays the defensive driver in undisturbed traffic beside SUMO's own.
 
-    python -m risk_sac.lab.figures.defensive_driver OUT [--scenes 500] [--family mixed]
+    python -m risk_sac.lab.figures.defensive_driver OUT [--scenes 500] [--scenario mixed]
 
 plays random scenes in which nothing attacks, each with SUMO's driver and with the profile `defensive` on top of it.
 OUT is a CSV file with a line per scene; what it holds is not played again. A table is printed in the end.
@@ -87,7 +87,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--scenes", type=int, default=500)
-    parser.add_argument("--family", choices=FAMILIES, action="append")
+    parser.add_argument("--scenario", dest="family", choices=FAMILIES, action="append")
     options = parser.parse_args()
     done: set[tuple[str, str]] = set()
     if options.out.exists():

@@ -1,6 +1,6 @@
 """Counts headline failures of better and worse egos.
 
-    python -m risk_sac.lab.figures.ego_ladder OUT [--families NAME ...] [--seeds N] [--steps N]
+    python -m risk_sac.lab.figures.ego_ladder OUT [--scenario NAME ...] [--seeds N] [--steps N]
 
 plays what OUT lacks, seed by seed, and writes OUT/ladder.csv and OUT/ladder.md from the runs that have ended. A run
 ends with the episode in which it has spent its steps; without its ladder.json it is counted again, by the rules of now.
@@ -180,7 +180,7 @@ def main() -> None:
     """Plays, counts and writes."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--families", nargs="+", default=FAMILIES)
+    parser.add_argument("--scenario", dest="families", nargs="+", default=FAMILIES)
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--steps", type=int, default=STEPS)
     given = parser.parse_args()

@@ -1,6 +1,6 @@
 """Compares what archive and random search find in a planner.
 
-    python -m risk_sac.lab.figures.planner_table OUT [--ego NAME] [--families NAME ...] [--methods NAME ...] [--seeds N]
+    python -m risk_sac.lab.figures.planner_table OUT [--ego NAME] [--scenario NAME ...] [--methods NAME ...] [--seeds N]
         [--steps N] [--finished DIR]
 
 plays what OUT lacks, seeds outermost, and rewrites OUT/table.md and OUT/table.csv after each run. A run ends with the
@@ -132,7 +132,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--ego", default="fiss-plus", help="(default: %(default)s)")
-    parser.add_argument("--families", nargs="+", default=["low", "mixed", "dense"], metavar="NAME")
+    parser.add_argument("--scenario", dest="families", nargs="+", default=["low", "mixed", "dense"], metavar="NAME")
     parser.add_argument("--methods", nargs="+", default=["archive", "random"], metavar="NAME")
     parser.add_argument("--seeds", type=int, default=5, metavar="N", help="(default: %(default)s)")
     parser.add_argument("--steps", type=int, default=5_000, metavar="N", help="of each run (default: %(default)s)")

@@ -1,6 +1,6 @@
 """Trains and compares variants of the pretrained policy.
 
-    python -m risk_sac.lab.figures.policy_variants OUT [--variants shipped kinds ...] [--family low] [--episodes 1500]
+    python -m risk_sac.lab.figures.policy_variants OUT [--variants shipped kinds ...] [--scenario low] [--episodes 1500]
       [--seed 21] [--jobs 2]
 
 trains each as the first stage of `risk-sac pretrain` does, and plays it frozen in random scenes before EGOS. `one kind`
@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from risk_sac.config import SHIPPED
 from risk_sac.lab.figures.pretrained_policy import EPISODES, episodes
 from risk_sac.lab.pretraining.policy import AGENT, STAGES, Goals, PolicyTraining
 from risk_sac.lab.pretraining.rollouts import PolicyEpisode
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.agents.replay import Transition
 
 EGOS = ("fiss-plus", "idm-aeb+slow-replanning", "default")
@@ -150,7 +150,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--variants", nargs="+", choices=VARIANTS, default=list(VARIANTS), metavar="NAME")
-    parser.add_argument("--family", choices=SHIPPED, default="low")
+    parser.add_argument("--scenario", dest="family", choices=PAPER_FAMILIES, default="low")
     parser.add_argument("--episodes", type=int, default=1500)
     parser.add_argument("--scenes", type=int, default=6 * EPISODES)
     parser.add_argument("--seed", type=int, default=21)

@@ -1,6 +1,6 @@
 """Plays a family's frozen policy in random scenes, beside random actions.
 
-    python -m risk_sac.lab.figures.pretrained_policy [--family low] [--policy FILE] [--seed 301] [--episodes 60] EGO ...
+    python -m risk_sac.lab.figures.pretrained_policy [--scenario low] [--policy FILE] [--seed 301] [--episodes 60] EGO …
 
 FILE is what `risk-sac pretrain` has written; without it, the shipped policy plays. An ego is `default`, a driver, or a
 driver and a defect such as `idm-aeb+latency`. The policy is asked for any failure, and for each kind that it knows in
@@ -11,9 +11,10 @@ import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from risk_sac.config import SHIPPED, EgoConfig, RewardConfig
+from risk_sac.config import EgoConfig, RewardConfig
 from risk_sac.egos.registry import pinned
 from risk_sac.lab.pretraining.rollouts import PolicyEpisode, Turn, play_turn
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.frozen_policy import Layers
 from risk_sac.search.prior.policy import read_policy, shipped_policy
 
@@ -41,14 +42,14 @@ def main() -> None:
     """Prints a row for each ego and driver."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("egos", nargs="+", metavar="EGO")
-    parser.add_argument("--family", choices=SHIPPED, default="low")
+    parser.add_argument("--scenario", dest="family", choices=PAPER_FAMILIES, default="low")
     parser.add_argument("--policy", type=Path, metavar="FILE")
     parser.add_argument("--seed", type=int, default=301)
     parser.add_argument("--episodes", type=int, default=60)
     options = parser.parse_args()
     pretrained = read_policy(options.policy) if options.policy else shipped_policy(options.family)
     if pretrained is None:
-        parser.error(f"--family: {options.family} has no shipped policy")
+        parser.error(f"--scenario: {options.family} has no shipped policy")
     asked = [k % (len(pretrained.goals) + 1) for k in range(options.episodes)]
     layers = [layer[0] if layer.shape[1] > 1 else layer[0, 0] for layer in pretrained.policy]
     print("| ego | driven by | failures | distinct | candidates, distinct | steps |\n|---|---|---|---|---|---|")

@@ -1,6 +1,6 @@
 """Compares the realism cost of `risk-sac`, which λ bounds, with that of `sac`, which nothing bounds.
 
-    python -m risk_sac.lab.figures.realism_constraint OUT [--family mixed] [--episodes 1000] [--seed 7] [--jobs 2]
+    python -m risk_sac.lab.figures.realism_constraint OUT [--scenario mixed] [--episodes 1000] [--seed 7] [--jobs 2]
 
 plays what OUT lacks and writes OUT/table.md: per family the mean cost d over the last 200 episodes of both methods. An
 interrupted run goes on where it was; `--table` only reads what there is.
@@ -26,7 +26,7 @@ HEAD = "| family | episodes | d of risk-sac | d of sac | ratio | λ |\n|---|---|
 
 def play(options: argparse.Namespace, family: FamilyName, method: str) -> None:
     """Plays a run in a process of its own, which learns with one thread."""
-    arguments = ["run", "--family", family, "--method", method, "--ego", options.ego, "--seed", str(options.seed)]
+    arguments = ["run", "--scenario", family, "--method", method, "--ego", options.ego, "--seed", str(options.seed)]
     arguments += ["--episodes", str(options.episodes), "--prior", "none", "--out", str(options.out / family / method)]
     subprocess.run([sys.executable, "-m", "risk_sac", *arguments], check=True, stdout=subprocess.DEVNULL)
 
@@ -53,7 +53,7 @@ def main() -> None:
     """Plays what is missing and writes the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--family", choices=FAMILIES, action="append")
+    parser.add_argument("--scenario", dest="family", choices=FAMILIES, action="append")
     parser.add_argument("--ego", default="idm-aeb")
     parser.add_argument("--episodes", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=7)

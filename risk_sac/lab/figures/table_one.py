@@ -1,6 +1,6 @@
 """Measures Table I of the paper, while methods search and frozen.
 
-    python -m risk_sac.lab.figures.table_one OUT [--families NAME …] [--seeds N] [--episodes N] [--uniform N] [--jobs N]
+    python -m risk_sac.lab.figures.table_one OUT [--scenario NAME …] [--seeds N] [--episodes N] [--uniform N] [--jobs N]
 
 plays what OUT lacks, seeds outermost, and rewrites OUT/runs.csv after each run; at the end it writes OUT/table.md and
 OUT/curves.svg. A frozen policy is played in scenes of its method's own sampler and in uniformly drawn ones, which are
@@ -19,7 +19,7 @@ from statistics import mean, stdev
 import numpy as np
 from matplotlib.figure import Figure
 
-from risk_sac.config import SHIPPED, Budget, MethodName, RunSpec
+from risk_sac.config import Budget, MethodName, RunSpec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.execution.evaluate import run
@@ -28,6 +28,7 @@ from risk_sac.failures.from_above import canvas, picture
 from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.report.drawing import LOOKS, STYLE
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.agents.controls import Held
 from risk_sac.search.frozen_policy import FrozenPolicy
 
@@ -115,11 +116,11 @@ def lines(rows: Sequence[Row]) -> Iterator[str]:
     last = [name for name in rows[0] if name.startswith("ecr_")][-2:]
     yield f"| family | method | seeds | ECR in the paper | ECR of the last 200 | {' | '.join(names)} |"
     yield "|---" * (5 + len(names)) + "|"
-    for family, method in product(SHIPPED, METHODS):
+    for family, method in product(PAPER_FAMILIES, METHODS):
         of = [row for row in rows if (row["family"], row["method"]) == (family, method)]
         if not of:
             continue
-        paper = f"{PAPER[method][SHIPPED.index(family)]:.2f}" if method in PAPER else "–"
+        paper = f"{PAPER[method][PAPER_FAMILIES.index(family)]:.2f}" if method in PAPER else "–"
         cells = [_cell([mean(row[name] for name in last) for row in of])]
         cells += [_cell([row[name] for row in of]) for name in names]
         yield f"| {family} | `{method}` | {len(of)} | {paper} | {' | '.join(cells)} |"
@@ -128,9 +129,9 @@ def lines(rows: Sequence[Row]) -> Iterator[str]:
 def curves(rows: Sequence[Row]) -> Figure:
     """Draws the ECR of each window of the search: mean over the seeds, a panel per family."""
     figure = canvas((9.0, 3.2))
-    panels = figure.subplots(1, len(SHIPPED), sharey=True)
+    panels = figure.subplots(1, len(PAPER_FAMILIES), sharey=True)
     names = [name for name in rows[0] if name.startswith("ecr_")]
-    for axes, family in zip(panels, SHIPPED, strict=True):
+    for axes, family in zip(panels, PAPER_FAMILIES, strict=True):
         axes.set(title=family, xlabel="search episode", ylim=(0.0, 1.0))
         for method in METHODS:
             of = [row for row in rows if (row["family"], row["method"]) == (family, method)]
@@ -153,7 +154,7 @@ def main() -> None:
     """Plays what is missing."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--families", nargs="+", choices=SHIPPED, default=list(SHIPPED))
+    parser.add_argument("--scenario", dest="families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS))
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)

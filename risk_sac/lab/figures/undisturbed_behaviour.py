@@ -1,6 +1,6 @@
 """Measures what SUMO's drivers do in undisturbed scenes, and writes what plausibility is calibrated on.
 
-    python -m risk_sac.lab.figures.undisturbed_behaviour OUT [--scenes 2000] [--family mixed] [--ship]
+    python -m risk_sac.lab.figures.undisturbed_behaviour OUT [--scenes 2000] [--scenario mixed] [--ship]
 
 plays random scenes in which nothing attacks. OUT/FAMILY.jsonl has a line per scene; what it holds is not played again.
 `--ship` makes `risk_sac/verdicts/undisturbed.json` of the scenes with even seeds and checks it on the odd ones.
@@ -109,7 +109,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--scenes", type=int, default=2000)
-    parser.add_argument("--family", choices=FAMILIES, action="append")
+    parser.add_argument("--scenario", dest="family", choices=FAMILIES, action="append")
     parser.add_argument("--ship", action="store_true", help="only make the file of what was played")
     options = parser.parse_args()
     if options.ship:

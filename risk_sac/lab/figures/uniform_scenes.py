@@ -1,6 +1,6 @@
 """Compares scripts in uniformly drawn scenes: chosen, random and best.
 
-    python -m risk_sac.lab.figures.uniform_scenes OUT --egos NAME ... [--families NAME ...] [--drivers NAME ...]
+    python -m risk_sac.lab.figures.uniform_scenes OUT --egos NAME ... [--scenario NAME ...] [--drivers NAME ...]
         [--scenes N] [--scripts N]
 
 plays each driver before each ego, and rewrites OUT/scenes.csv after each. All meet the same scenes, and nothing is
@@ -18,12 +18,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.config import SHIPPED, RunSpec
+from risk_sac.config import RunSpec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.lab.figures.pretrained_policy import ego_of
 from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.lab.pretraining.episodes import ScriptEpisode, outcome_of, play
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.prior.start import Start, start_of
 from risk_sac.search.scene_optimizer.archive import mutated
@@ -51,6 +52,8 @@ def script(random: np.random.Generator, start: Start, genes: int) -> Floats:
 def chosen(random: np.random.Generator, start: Start, scene: Floats, genes: int) -> Floats:
     """Returns the script that the model holds to be worth most in a scene."""
     points = np.array([np.concatenate([scene, script(random, start, genes)]) for _ in range(CHOICE)])
+    assert start.model is not None
+    assert start.translation is not None
     prediction = start.model.predict(start.translation.known(points), start.belief)
     best: Floats = points[int((prediction.fails + 4.0 * prediction.candidate).argmax())][-genes:]
     return best
@@ -63,6 +66,7 @@ def found(cell: Matchup, scenes: int, scripts: int) -> Iterator[ScriptEpisode]:
     with closing(RiskSacEnv.of(spec)) as env:
         space, horizon = env.problem.space, env.problem.family.horizon_steps
         follower, start = ScriptFollower(env.problem.family), start_of(env.problem, "shipped")
+        assert start is not None  # shipped families have priors
         while scenes:
             scene, seed, episode = drawn.random(space.dimension), int(drawn.integers(1 << 30)), None
             for _ in range(scripts if cell.driver == "any" else 1):
@@ -103,7 +107,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--egos", nargs="+", required=True, metavar="EGO", help="as pretrained_policy takes them")
-    parser.add_argument("--families", nargs="+", choices=SHIPPED, default=list(SHIPPED))
+    parser.add_argument("--scenario", dest="families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
     parser.add_argument("--drivers", nargs="+", choices=DRIVERS, default=list(DRIVERS))
     parser.add_argument("--scenes", type=int, default=60)
     parser.add_argument("--scripts", type=int, default=500)

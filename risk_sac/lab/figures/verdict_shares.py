@@ -48,7 +48,7 @@ class JudgedAgain(NamedTuple):
 
 def play(folder: Path, ego: str, family: str, seed: int, episodes: int) -> None:
     """Plays a run, or goes on with it."""
-    search = ["--family", family, "--method", "archive", "--seed", str(seed), "--episodes", str(episodes)]
+    search = ["--scenario", family, "--method", "archive", "--seed", str(seed), "--episodes", str(episodes)]
     command = [sys.executable, "-m", "risk_sac", "run", *search, "--ego", ego, "--out", str(folder)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
 

@@ -49,14 +49,14 @@ class Coordinates(NamedTuple):
     """Meaning of a point's coordinates."""
 
     space: SceneSpace
-    adversaries: tuple[str, ...]
+    adversaries: tuple[str, ...]  # those of the shipped family that they stand for
     mirrored: bool
 
     @classmethod
     def of(cls, posed: Problem | Family) -> Self:
         """Returns the coordinates of a problem's points, or of a family's."""
         family = posed.family if isinstance(posed, Problem) else posed
-        return cls(posed.space, family.adversaries, family.mirrored)
+        return cls(posed.space, family.stand_ins, family.mirrored)
 
     @property
     def dimension(self) -> int:
@@ -66,7 +66,7 @@ class Coordinates(NamedTuple):
     @property
     def symmetric(self) -> bool:
         """Whether the ego has a neighbour on either side, so that the mirror image of a point is a point too."""
-        return set(OTHER_SIDE) <= set(self.adversaries)
+        return two_sided(self.adversaries, self.space.names)
 
     def reflected(self, points: Floats) -> Floats:
         """Returns the mirror images of points, `n x dimension`; the coordinates are symmetric."""
@@ -79,7 +79,7 @@ class Coordinates(NamedTuple):
         return Scripted(self.space.names, values, self.adversaries, points[:, size:], self.mirrored)
 
     def placed(self, scripted: Scripted) -> Floats:
-        """Returns the points of scenes and scripts of any family of the pattern, `n x dimension`.
+        """Returns the points of scenes and scripts of any family that is like the same one, `n x dimension`.
 
         Values are clipped to the bounds. A missing parameter is put to its middle, and a missing adversary is passive.
         """
@@ -93,7 +93,8 @@ class Coordinates(NamedTuple):
         for i, adversary in enumerate(self.adversaries):
             genes: Floats | Genes = PASSIVE
             if adversary in scripted.adversaries:
-                first = SIZE * scripted.adversaries.index(adversary)
+                same = tuple(scripted.adversaries) == self.adversaries  # of which several may have one name
+                first = SIZE * (i if same else scripted.adversaries.index(adversary))
                 genes = scripted.genes[:, first : first + SIZE]
             points[:, size + SIZE * i : size + SIZE * (i + 1)] = genes
         return points
@@ -123,6 +124,13 @@ def other_side(name: str) -> str:
     """Exchanges left and right at the beginning of a name."""
     side, _, rest = name.partition("_")
     return "_".join(filter(None, (OTHER_SIDE.get(side, side), rest)))
+
+
+def two_sided(adversaries: Sequence[str], parameters: Sequence[str]) -> bool:
+    """Tells whether names of adversaries and parameters on the left have their like on the right, and vice versa."""
+    sides = [name for name in parameters if other_side(name) != name]
+    both = all(other_side(name) in parameters for name in sides)
+    return bool(sides) and both and set(OTHER_SIDE) <= set(adversaries) and len(set(adversaries)) == len(adversaries)
 
 
 def _unit(values: Floats, low: Floats, width: Floats) -> Floats:

@@ -21,7 +21,7 @@ from risk_sac.host.machine import UNWRITABLE
 from risk_sac.records import EpisodeRecord, Outcome, worst_of
 from risk_sac.run_folder.durable import LOCK, lock, read_sealed, replace_file, seal
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results
-from risk_sac.scenario.families import family_named, shipped_alike
+from risk_sac.scenario.families import family_named
 from risk_sac.scenario.library import library
 from risk_sac.verdicts.distinct import variant_name
 
@@ -57,8 +57,9 @@ class PlayedScript:
 class FamilyScripts:
     """Scripts that runs of one family played."""
 
-    adversaries: tuple[str, ...]
+    adversaries: tuple[str, ...]  # those of the shipped family that they stand for
     mirrored: bool
+    like: str | None  # shipped family whose prior fits
     failures: tuple[PlayedScript, ...]  # one of each variant first, and candidates for the headline before others
     latest: tuple[PlayedScript, ...]  # whatever they ended in
 
@@ -74,8 +75,9 @@ class FamilyScripts:
         failures = [played[number] for *_, number in sorted(places)[:MOST_FAILURES]]
         of = family_named(family)
         return cls(
-            adversaries=of.adversaries,
+            adversaries=of.stand_ins,
             mirrored=of.mirrored,
+            like=of.like.family if of.like else None,
             failures=tuple(failures),
             latest=tuple(played[-LATEST:]),
         )
@@ -88,11 +90,11 @@ class EarlierScripts:
     families: Mapping[str, FamilyScripts]
 
     def alike(self, family: str) -> tuple[FamilyScripts, ...]:
-        """Returns the scripts of this family or, without any, those of all families of its pattern."""
+        """Returns the scripts of this family or, without any, those of all that are like the same shipped one."""
         if family in self.families:
             return (self.families[family],)
-        pattern = shipped_alike(family)
-        return tuple(found for name, found in self.families.items() if shipped_alike(name) == pattern)
+        like = family_named(family).like
+        return tuple(found for found in self.families.values() if like is not None and found.like == like.family)
 
 
 def pinned_prior(prior: str, families: Sequence[str]) -> str:
@@ -103,7 +105,7 @@ def pinned_prior(prior: str, families: Sequence[str]) -> str:
       families: that are to be searched.
 
     Raises:
-      ConfigError: there is no such run, it followed no scripts, or it is of another pattern.
+      ConfigError: there is no such run, it followed no scripts, or is like another family.
     """
     if prior in SHIPPED_OR_NONE:
         return prior
@@ -119,22 +121,24 @@ def is_kept(prior: str) -> bool:
 class PriorContent:
     """Scripts as they are copied, of which a server reads the families alone."""
 
-    families: tuple[str, ...]
+    families: Mapping[str, str | None]  # family → the shipped one whose prior fits
     sealed: str
 
     @classmethod
     def read(cls, prior: str, folder: Path | None) -> Self:
         """Reads the scripts of a run's or campaign's folder, or of the copy that the prior names."""
         scripts = kept(prior) if folder is None else _taken(prior, folder)
-        return cls(families=tuple(scripts.families), sealed=seal(scripts).decode())
+        families = {family: found.like for family, found in scripts.families.items()}
+        return cls(families=families, sealed=seal(scripts).decode())
 
     def checked(self, prior: str, families: Sequence[str]) -> Self:
-        """Raises ConfigError for a family that none of the scripts is of, nor of its pattern."""
-        patterns = {shipped_alike(found) for found in self.families}
+        """Raises ConfigError for a family that none of the scripts is of, nor of one that is like the same one."""
         for family in families:
-            if family not in self.families and shipped_alike(family) not in patterns:
+            like = None if family in self.families else family_named(family).like
+            if family not in self.families and (like is None or like.family not in self.families.values()):
                 got = f"{prior}, whose runs are of {', '.join(self.families)}"
-                raise ConfigError("prior", got, f"one with a run of {family}, or of the same pattern")
+                wanted = f"one with a run of {family}" + (f", or of a scenario like {like.family}" if like else "")
+                raise ConfigError("prior", got, wanted)
         return self
 
 

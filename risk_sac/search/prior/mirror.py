@@ -6,7 +6,7 @@ import numpy as np
 
 from risk_sac.env.observation_layout import LATERAL_ADVERSARY, LATERAL_EGO, PER_ADVERSARY, PER_EGO
 from risk_sac.search.agents.replay import Transition
-from risk_sac.search.prior.coordinates import other_side
+from risk_sac.search.prior.coordinates import other_side, two_sided
 from risk_sac.search.prior.policy import PolicyLayout
 from risk_sac.world.types import Vector
 
@@ -32,7 +32,7 @@ class Mirror:
     @classmethod
     def of(cls, layout: PolicyLayout) -> "Mirror | None":
         """Returns the mirror of a family with a neighbour on either side; None for the others."""
-        return cls(layout) if {"left", "right"} <= set(layout.adversaries) else None
+        return cls(layout) if two_sided(layout.adversaries, [name for name, *_ in layout.scene]) else None
 
     def observation(self, seen: Vector) -> Vector:
         """Returns what is observed in the mirrored scene."""

@@ -20,7 +20,7 @@ from risk_sac.env.observation_layout import MOTION_PER_ADVERSARY, PER_ADVERSARY,
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.records import Collision, Violation
-from risk_sac.scenario.families import family_named, shipped_alike
+from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 from risk_sac.search.prior.files import DATA, arrays_of, write_arrays
 from risk_sac.world.types import Vector
@@ -35,7 +35,7 @@ Arrays = tuple[NDArray[np.float32], ...]
 class PolicyLayout:
     """Meaning of the entries of an observation and of an action."""
 
-    adversaries: tuple[str, ...]
+    adversaries: tuple[str, ...]  # those of the shipped family that they stand for
     scene: tuple[tuple[str, float, float], ...]  # name, least and greatest value of each parameter
     requirements: tuple[str, ...]
     per_adversary: int = PER_ADVERSARY  # entries of each adversary; its motion comes first
@@ -45,7 +45,7 @@ class PolicyLayout:
         """Returns the layout of a problem's observations and actions."""
         space = problem.space
         scene = zip(space.names, space.low.tolist(), space.high.tolist(), strict=True)
-        return cls(problem.family.adversaries, tuple(scene), tuple(each.name for each in problem.requirements))
+        return cls(problem.family.stand_ins, tuple(scene), tuple(each.name for each in problem.requirements))
 
     @property
     def observation_size(self) -> int:
@@ -149,20 +149,21 @@ def shipped_policy(family: str) -> PretrainedPolicy | None:
 
 
 def pretrained_for(family: Family) -> PretrainedPolicy | None:
-    """Returns the pretrained policy of a family's pattern; None without one, and at mirrored places."""
-    return None if family.mirrored else shipped_policy(shipped_alike(family.name))
+    """Returns the pretrained policy of the family that one is like; None without one, and if it is mirrored."""
+    return None if family.like is None or family.like.mirrored else shipped_policy(family.like.family)
 
 
 def check_prior(name: RunMethod, family: FamilyName, prior: str) -> None:
-    """Refuses a method that starts from what is not there.
+    """Refuses a method that starts from what is not there; a family that is like no other one needs no prior.
 
     Raises:
-      ConfigError: the method starts from a prior, and there is none at this family.
+      ConfigError: the method starts from a prior, and none is wanted or there is none of this family.
     """
     wanted = method_of(name).prior
     if wanted in ("library", "policy") and prior == "none":
         raise ConfigError("prior", f"none, and the method {name}", "one", "choose archive or risk-sac instead")
-    if wanted == "policy" and pretrained_for(family_named(family)) is None:
+    searched = family_named(family)
+    if wanted == "policy" and searched.like is not None and pretrained_for(searched) is None:
         got = f"{name} at {family}, which has no pretrained policy"
         raise ConfigError("method", got, "a family that has one", "choose risk-sac there")
 

@@ -117,20 +117,21 @@ class PriorOptimizer(ArchiveOptimizer):
 
     def _from_model(self) -> Floats:
         """Returns the best of many points: in one random scene, or in several."""
+        assert self._model is not None
+        assert self._translation is not None
         size = self._translation.scene_size
         scenes = SCENES if self._random.random() < FREE_SCENES else 1
         points = np.empty((CANDIDATES, self._dimension))
         points[:, :size] = np.repeat(self._random.random((scenes, size)), CANDIDATES // scenes, axis=0)
-        points[:, size:] = self._scripts(CANDIDATES)
+        points[:, size:] = self._scripts(CANDIDATES, size)
         prediction = self._model.predict(self._translation.known(points), self._belief)
         worth = NEW_VARIANT * (prediction.fails + CANDIDATE * prediction.candidate)
         novelty = np.array([_novelty(self._finds.variants[kind]) for kind in self._model.kinds])
         best: Floats = points[int((worth * (prediction.kinds @ novelty)).argmax())]
         return best
 
-    def _scripts(self, count: int) -> Floats:
+    def _scripts(self, count: int, size: int) -> Floats:
         """Draws scripts, `count x genes`: mutated ones of the library and of the own elites, and random ones."""
-        size = self._translation.scene_size
         known = np.concatenate([self._library, *(each.point[None] for each in self._elites.pool())])[:, size:]
         parents = known[self._random.integers(len(known), size=count)]
         changed = self._random.random(parents.shape) < self._random.choice(SHARES, size=(count, 1))
@@ -146,7 +147,7 @@ class PriorOptimizer(ArchiveOptimizer):
         if mean_return is None:
             return
         self._yields.tell(self._arm, self._finds.add(encounter.valid_violations))
-        if Arm.MODEL in self.arms:
+        if Arm.MODEL in self.arms and self._model is not None and self._translation is not None:
             known = self._translation.known(point[None])[0]
             self._belief = self._model.believe(self._belief, known, failed=bool(encounter.valid_violations))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from risk_sac.env.problem import Problem
-from risk_sac.scenario.families import FAMILIES, shipped_alike
+from risk_sac.scenario.families import FAMILIES
 from risk_sac.search.prior.coordinates import Coordinates, Scripted, Translation
 from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, FamilyScripts, PlayedScript, kept
 from risk_sac.search.prior.script_model import ScriptModel
@@ -24,8 +24,8 @@ class Start:
       earlier: rows of the library, the first ones, that an earlier run has found.
     """
 
-    model: ScriptModel
-    translation: Translation
+    model: ScriptModel | None  # None: of no shipped family
+    translation: Translation | None
     library: Floats  # n x d
     library_kinds: tuple[str, ...]  # n, names of variants
     library_worth: Floats  # n; less than 1 where a row fails less often here than where it was found
@@ -33,19 +33,24 @@ class Start:
     earlier: int = 0
 
 
-def start_of(problem: Problem, prior: str) -> Start:
-    """Returns what a search at a problem starts from.
+def start_of(problem: Problem, prior: str) -> Start | None:
+    """Returns what a search at a problem starts from; None if there is nothing.
 
     Args:
-      problem: at a shipped family, or at a place of one's own.
+      problem: of a scenario; without `like`, an earlier run's scripts are all that it may start from.
       prior: `shipped`, or scripts that `pinned_prior` has copied.
 
     Raises:
-      ConfigError: there is no such copy, or it has no scripts of the problem's pattern.
+      ConfigError: there is no such copy.
     """
-    shipped = shipped_prior(shipped_alike(problem.family.name))
-    own = Coordinates.of(problem)
-    there = Coordinates.of(FAMILIES[shipped.family])
+    own, like = Coordinates.of(problem), problem.family.like
+    start = None if like is None else _shipped(own, like.family)
+    return start if prior in SHIPPED_OR_NONE else _after(start, own, kept(prior).alike(problem.family.name))
+
+
+def _shipped(own: Coordinates, family: str) -> Start:
+    """What was trained on a shipped family."""
+    shipped, there = shipped_prior(family), Coordinates.of(FAMILIES[family])
     translation, model, known, kinds = Translation(own, there), shipped.model, shipped.library, shipped.library_kinds
     if there.symmetric:
         model = model.symmetric(there.reflected)
@@ -53,7 +58,7 @@ def start_of(problem: Problem, prior: str) -> Start:
         known, kinds = np.concatenate([known, there.reflected(known)]), kinds * 2
     library, unknown = translation.own(known), model.unknown()
     fails_there, fails_here = (model.predict(rows, unknown).fails for rows in (known, translation.known(library)))
-    start = Start(
+    return Start(
         model=model,
         translation=translation,
         library=library,
@@ -61,18 +66,29 @@ def start_of(problem: Problem, prior: str) -> Start:
         library_worth=np.minimum(fails_here / fails_there, 1.0).astype(np.float64),
         belief=unknown,
     )
-    return start if prior in SHIPPED_OR_NONE else _after(start, own, kept(prior).alike(problem.family.name))
 
 
-def _after(start: Start, own: Coordinates, earlier: tuple[FamilyScripts, ...]) -> Start:
+def _after(start: Start | None, own: Coordinates, earlier: tuple[FamilyScripts, ...]) -> Start | None:
     """Puts what earlier runs found before the shipped library, and believes in what their egos did."""
+    failures = np.concatenate([np.empty((0, own.dimension)), *(_points(own, each, each.failures) for each in earlier)])
+    kinds = tuple(script.kind for each in earlier for script in each.failures)
+    if start is None or start.model is None or start.translation is None:
+        worth, none = np.ones(len(kinds)), np.empty(0)
+        alone = Start(
+            model=None,
+            translation=None,
+            library=failures,
+            library_kinds=kinds,
+            library_worth=worth,
+            belief=none,
+            earlier=len(kinds),
+        )
+        return alone if kinds else None
     model, belief = start.model, start.belief
     for each in earlier:
         known = start.translation.known(_points(own, each, each.latest))
         for point, script in zip(known, each.latest, strict=True):
             belief = model.believe(belief, point, failed=bool(script.kind))
-    failures = np.concatenate([_points(own, each, each.failures) for each in earlier])
-    kinds = tuple(script.kind for each in earlier for script in each.failures)
     return Start(
         model=model,
         translation=start.translation,

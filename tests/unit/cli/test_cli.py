@@ -32,13 +32,13 @@ def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder, tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--family", "high"], "--family: "),
-        (["--family", "low", "--method", "magic"], "--method: "),
-        (["--family", "low", "--ego", "nobody-s"], "--ego: "),
-        (["--family", "low", "--ego", "No/body"], "--ego: "),
-        (["--family", "low", "--episodes", "-3"], "--episodes: "),
-        (["--family", "low", "--seed", "-1"], "--seed: "),
-        ([], "--family is missing; choose low, mixed or dense"),
+        (["--scenario", "high"], "--scenario: "),
+        (["--scenario", "low", "--method", "magic"], "--method: "),
+        (["--scenario", "low", "--ego", "nobody-s"], "--ego: "),
+        (["--scenario", "low", "--ego", "No/body"], "--ego: "),
+        (["--scenario", "low", "--episodes", "-3"], "--episodes: "),
+        (["--scenario", "low", "--seed", "-1"], "--seed: "),
+        ([], "--scenario is missing; choose low, mixed or dense"),
         (["--spec", "nowhere.yaml"], "--spec: "),
     ],
 )
@@ -52,14 +52,14 @@ def test_wrong_settings_name_the_field_and_leave_no_folder(arguments, complaint,
 
 def test_folder_of_another_run_is_refused_and_kept(folder, capsys):
     before = (folder / "results.json").read_bytes()
-    assert cli.main(["run", "--family", "low", "--method", "sac", "--episodes", "8", "--out", str(folder)]) == 2
+    assert cli.main(["run", "--scenario", "low", "--method", "sac", "--episodes", "8", "--out", str(folder)]) == 2
     assert "holds a run with another method, seed" in capsys.readouterr().err
     assert (folder / "results.json").read_bytes() == before
 
 
 def test_a_folder_that_cannot_be_written_is_one_line(tmp_path, capsys):
     (tmp_path / "file").write_text("")
-    assert cli.main(["run", "--family", "low", "--method", "random", "--out", str(tmp_path / "file" / "out")]) == 2
+    assert cli.main(["run", "--scenario", "low", "--method", "random", "--out", str(tmp_path / "file" / "out")]) == 2
     complaint = capsys.readouterr().err
     assert re.fullmatch(r"--out: got .*/file/out, which cannot be written \(Not a directory\); wanted .*\n", complaint)
 

@@ -1,0 +1,183 @@
+"""`risk-sac scenarios`: lists, shows, checks, draws and copies scenario documents."""
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich.box import SIMPLE_HEAD
+from rich.markup import escape
+from rich.table import Table
+
+from risk_sac.cli.console import FAILED, OK, print_answer, say
+from risk_sac.cli.parser import Commands, Parser, add_command, add_group, add_json_flag
+from risk_sac.config import Scenario
+from risk_sac.errors import ConfigError
+from risk_sac.host.terminal import console
+from risk_sac.scenario import library
+from risk_sac.scenario.check import check_document
+from risk_sac.scenario.reading import read_document
+from risk_sac.scenario.shipped import FOLDER, nets_of, networks, scenario_file, shipped_document, shipped_names
+
+FILE_HELP = "a scenario document, YAML or JSON, with its nets beside it"
+
+
+def add(commands: Commands) -> None:
+    """Adds the commands."""
+    group = add_group(
+        commands,
+        "scenarios",
+        "list, show, check, draw and copy scenarios",
+        example="scenarios check my_scenario.yaml",
+    )
+    inner = group.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
+    listing = add_command(inner, "list", _list, "list the scenarios that ship and those kept", example="scenarios list")
+    add_json_flag(listing)
+    showing = add_command(inner, "show", _show, "print a scenario's document", example="scenarios show low")
+    showing.add_argument("name", metavar="NAME", help="of a scenario, shipped or kept")
+    checking = add_command(
+        inner,
+        "check",
+        _check,
+        "check a document and play 20 scenes without an attack",
+        example="scenarios check my_scenario.yaml",
+    )
+    checking.add_argument("file", metavar="FILE", help=f"{FILE_HELP}; or the name of a scenario")
+    checking.add_argument("--out", type=Path, metavar="FILE.png", help="draw the scenario too")
+    add_json_flag(checking)
+    drawing = add_command(
+        inner,
+        "draw",
+        _draw,
+        "draw a scenario from above with the ranges of all starts",
+        example="scenarios draw my_scenario.yaml --out my_scenario.png",
+    )
+    drawing.add_argument("file", metavar="FILE", help=f"{FILE_HELP}; or the name of a scenario")
+    drawing.add_argument("--out", type=Path, metavar="FILE.png", help="(default: beside FILE, or NAME.png)")
+    copying = add_command(
+        inner, "copy", _copy, "copy a scenario to a file, to edit it", example="scenarios copy low mine.yaml"
+    )
+    copying.add_argument("name", metavar="NAME", help="of a scenario, shipped or kept")
+    copying.add_argument("file", type=Path, metavar="FILE", help="that is written, its nets beside it")
+
+
+def kept_name(name_or_file: str) -> str:
+    """Returns the name of a scenario; a file's is put into the library first.
+
+    Raises:
+      ConfigError: the document has a fault, or there is none.
+    """
+    if not is_file(name_or_file):
+        return name_or_file
+    try:
+        document, folder = document_at(name_or_file)
+        nets = nets_of(document, folder)
+        check_document(document, nets)
+    except ConfigError as error:
+        for fault in (error, *error.others):
+            fault.field = f"{name_or_file}: {fault.field}".removesuffix(": ")
+        raise
+    return library.keep(document, own_nets(nets))
+
+
+def own_nets(nets: Mapping[str, str]) -> dict[str, bytes]:
+    """Reads the nets that do not ship, by the document's names for them."""
+    return {name: Path(file).read_bytes() for name, file in nets.items() if Path(file).is_absolute()}
+
+
+def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
+    """Returns a scenario's document, and the folder of its own nets if it has one.
+
+    Raises:
+      ConfigError: there is no such scenario or file, or the document has a fault.
+    """
+    if is_file(name_or_file):
+        return read_document(Path(name_or_file)), Path(name_or_file).absolute().parent
+    if name_or_file in shipped_names():
+        return shipped_document(name_or_file), None
+    return library.kept(name_or_file)
+
+
+def is_file(name_or_file: str) -> bool:
+    """Whether it names a file; one with a folder or an ending does, although it may not be there."""
+    if Path(name_or_file).suffix or "/" in name_or_file:
+        if not Path(name_or_file).is_file():
+            remedy = "check its path, or name a scenario of `risk-sac scenarios list`"
+            raise ConfigError("scenario", f"{name_or_file}, which is no file", "a document", remedy)
+        return True
+    return False
+
+
+def _list(options: argparse.Namespace) -> int:
+    documents = {name: document_at(name)[0] for name in (*shipped_names(), *library.listed())}
+    rows = [
+        {
+            "name": name,
+            "summary": of.summary,
+            "tags": of.tags,
+            "parameters": list(of.parameters),
+            "actors": list(of.actors),
+        }
+        for name, of in documents.items()
+    ]
+    table = Table("name", "actors", "summary", "tags", box=SIMPLE_HEAD)
+    for row, of in zip(rows, documents.values(), strict=True):
+        table.add_row(*map(escape, (str(row["name"]), ", ".join(of.actors), of.summary, " ".join(of.tags))))
+    print_answer(options, rows, table)
+    return OK
+
+
+def _show(options: argparse.Namespace) -> int:
+    console.out(_text(options.name).rstrip(), highlight=False)
+    return OK
+
+
+def _text(name: str) -> str:
+    document, _ = document_at(name)
+    return scenario_file(name).read_text() if name in shipped_names() else library.written(document)
+
+
+def _check(options: argparse.Namespace) -> int:
+    """Fails if the ego is touched without an attack, or if nothing could be played."""
+    document, folder = document_at(options.file)
+    nets = nets_of(document, folder)
+    from risk_sac.failures.scenario_trial import try_document  # here, because loading the simulator takes a second
+
+    checked = try_document(document, nets)
+    table = Table("", "", box=None, show_header=False)
+    refused = ", ".join(f"{count} by {rule}" for rule, count in checked.refused.items())
+    table.add_row("scenes", f"{checked.scenes}, of which {checked.played} are played")
+    table.add_row("refused", refused or "none")
+    table.add_row("contacts without an attack", str(checked.contacts))
+    table.add_row("out of reach", ", ".join(checked.out_of_reach) or "none")
+    table.add_row("parameters without effect", ", ".join(checked.without_effect) or "none")
+    texts = [f"- {remark}" for remark in checked.remarks] or ["Nothing is wrong."]
+    if options.out is not None:
+        from risk_sac.failures.scenario_picture import scenario_png
+
+        options.out.write_bytes(scenario_png(document, nets))
+        texts.append(f"Drawn: {options.out}")
+    print_answer(options, {**checked.model_dump(mode="json"), "remarks": checked.remarks}, table, *texts)
+    return FAILED if checked.contacts or not checked.played else OK
+
+
+def _draw(options: argparse.Namespace) -> int:
+    document, folder = document_at(options.file)
+    from risk_sac.failures.scenario_picture import scenario_png  # here, because loading matplotlib takes a second
+
+    out = options.out or Path(options.file).with_suffix(".png").absolute()
+    out.write_bytes(scenario_png(document, nets_of(document, folder)))
+    say(f"Drawn: {out}")
+    return OK
+
+
+def _copy(options: argparse.Namespace) -> int:
+    document, folder = document_at(options.name)
+    if options.file.exists():
+        raise ConfigError("file", f"{options.file}, which is there", "a new file", "choose another name")
+    for name in networks(document):
+        if folder is not None and (folder / name).is_file():
+            (options.file.parent / name).write_bytes((folder / name).read_bytes())
+    options.file.write_text(_text(options.name))
+    own = "its nets beside it" if folder is not None else f"its net ships: {FOLDER / document.name}"
+    say(f"Written: {options.file}; {own}.")
+    return OK

@@ -1,0 +1,250 @@
+"""Static check of a scenario document against its nets: names, units, ranges, starts and routes."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from risk_sac.config import Odd
+from risk_sac.config.scenario import EGO, AllOf, Constraint, Scenario
+from risk_sac.config.values import Comparison, Expression, Term, comparison, term
+from risk_sac.errors import ConfigError, InfeasibleScene, did_you_mean
+from risk_sac.scenario.bodies import BODIES
+from risk_sac.scenario.ground import net_of
+from risk_sac.scenario.interpret import Interpreter, body_named
+from risk_sac.scenario.layout import LEAD_IN_S, Layout, VehicleStart
+from risk_sac.scenario.odd import paths
+from risk_sac.scenario.shipped import nets_of, shipped_document, shipped_names
+from risk_sac.world.net import Net
+from risk_sac.world.types import Floats, Scene
+
+UNITS = ("1", "m", "s", "m/s", "m/s²", "km", "1/m", "1/km", "1/s", "1/h", "rad", "deg", "kg", "%")
+SCENES = 200  # drawn all over the space, beside the ends of each parameter
+LEAST_WAY_M = 20.0  # of road ahead of the ego; choice
+TOUCHING_M = 0.01  # by which bodies side by side may overlap
+
+
+def check_document(document: Scenario, nets: Mapping[str, str]) -> None:
+    """Refuses a document that cannot be played as it is written.
+
+    Args:
+      document: of the scenario.
+      nets: the file of each network that it names.
+
+    Raises:
+      ConfigError: with the path of the fault in the document.
+    """
+    of = Interpreter(document, nets)
+    _check_parameters(document)
+    for path, expression in document.values:
+        _check_range(term(expression), of, path, expression)
+    for path, text in _comparisons(document):
+        _check_range(comparison(text), of, path, text)
+    _check_horizon(of)
+    _check_bodies(of)
+    _check_like(of)
+    _check_layouts(of)
+
+
+def scenes(of: Interpreter, count: int = SCENES) -> Iterator[Scene]:
+    """Scenes of the whole space: the middle, each parameter at both ends, and so many at random."""
+    dimension = of.space.dimension
+    middle = np.full(dimension, 0.5)
+    yield of.space.from_unit(middle)
+    for axis in range(dimension):
+        for end in (0.0, 1.0):
+            yield of.space.from_unit(np.where(np.arange(dimension) == axis, end, middle))
+    for point in np.random.default_rng(0).random((count, dimension)):
+        yield of.space.from_unit(point)
+
+
+def bodies_of(layout: Layout, net: Net, after_s: float = 0.0) -> dict[str, Floats]:
+    """Corners of each actor, `4 x 2`, m.
+
+    Args:
+      layout: of the scene.
+      net: of the layout.
+      after_s: time since the start, in which all go on straight ahead at their initial speeds.
+    """
+    boxes = {start.id: _in_lane(start, net) for start in (layout.ego, *layout.vehicles)}
+    boxes |= {s.id: _box(s.x_m, s.y_m, s.heading_rad, s.body) for s in (*layout.pedestrians, *layout.statics)}
+    for start in (layout.ego, *layout.vehicles, *layout.pedestrians):
+        box = boxes[start.id]
+        boxes[start.id] = box + (box[1] - box[2]) / np.linalg.norm(box[1] - box[2]) * start.speed_mps * after_s
+    return boxes
+
+
+def _in_lane(start: VehicleStart, net: Net) -> Floats:
+    line = np.array(net.lanes[f"{start.route[0]}_{start.lane}"].line)
+    lengths = np.hypot(*np.diff(line, axis=0).T)
+    stations = np.concatenate([[0.0], lengths.cumsum()])
+    segment = int(np.clip(np.searchsorted(stations, start.position_m) - 1, 0, len(lengths) - 1))
+    along = (line[segment + 1] - line[segment]) / lengths[segment]
+    middle = line[segment] + along * (start.position_m - stations[segment] - BODIES[start.body].length_m / 2)
+    return _box(float(middle[0]), float(middle[1]), math.atan2(along[1], along[0]), start.body)
+
+
+def _box(x_m: float, y_m: float, heading_rad: float, body: str) -> Floats:
+    row = BODIES[body]  # type: ignore[index] # a row of the table
+    along = np.array((math.cos(heading_rad), math.sin(heading_rad))) * row.length_m / 2
+    left = np.array((-math.sin(heading_rad), math.cos(heading_rad))) * row.width_m / 2
+    return np.array((x_m, y_m)) + np.array((along + left, along - left, -along - left, -along + left))
+
+
+def _check_parameters(document: Scenario) -> None:
+    known = list(paths(Odd()))
+    columns = {name: path for path, parameter in document.parameters.items() for name in parameter.names}
+    for name, parameter in document.parameters.items():
+        path = f"parameters.{name}"
+        if parameter.unit not in UNITS:
+            remedy = did_you_mean(parameter.unit, UNITS) or "values are in SI units; write `value * 3.6` for another"
+            raise ConfigError(f"{path}.unit", repr(parameter.unit), f"one of {', '.join(UNITS)}", remedy)
+        if parameter.odd is not None and parameter.odd not in known:
+            remedy = did_you_mean(parameter.odd, known)
+            raise ConfigError(f"{path}.odd", repr(parameter.odd), f"one of {', '.join(known)}", remedy)
+        if name in columns:
+            raise ConfigError(path, f"a name of the rows of {columns[name]!r}, too", "each name once", "rename one")
+
+
+def _check_range(of_term: Term, of: Interpreter, path: str, text: Expression) -> None:
+    """Refuses names that are no numbers of the document, and values that do not exist within the ranges."""
+    if unknown := sorted(of_term.names() - of.ranges.keys()):
+        name, known = unknown[0], sorted(of.ranges)
+        words = name in of.document.parameters and of.document.parameters[name].words is not None
+        got = f"{name!r} in {text!r}, {'whose values are words' if words else 'which is no parameter'}"
+        remedy = did_you_mean(name, known) or f"add it below `parameters`{'' if words else ', or write a number'}"
+        raise ConfigError(path, got, f"numbers and {', '.join(known) or 'there is no parameter with numbers'}", remedy)
+    try:
+        of_term.range(of.ranges)
+    except ConfigError as error:
+        remedy = error.remedy or "narrow a range, or bound it with min or max"
+        raise ConfigError(path, f"{text!r}: {error.got}", error.expected or "a number everywhere", remedy) from error
+
+
+def _comparisons(document: Scenario) -> Iterator[tuple[str, Comparison]]:
+    for i, constraint in enumerate(document.constraints):
+        yield from _leaves(f"constraints[{i}]", constraint)
+    for name, actor in document.actors.items():
+        if actor.when is not None:
+            yield f"actors.{name}.when", actor.when
+
+
+def _leaves(path: str, constraint: Constraint) -> Iterator[tuple[str, Comparison]]:
+    if isinstance(constraint, str):
+        yield path, constraint
+        return
+    kind, inner = ("all", constraint.all) if isinstance(constraint, AllOf) else ("any", constraint.any)
+    for i, part in enumerate(inner):
+        yield from _leaves(f"{path}.{kind}[{i}]", part)
+
+
+def _check_horizon(of: Interpreter) -> None:
+    bounds = term(of.document.horizon_s).range(of.ranges)
+    for horizon_s in (bounds.low, bounds.high):
+        of.steps(horizon_s)
+
+
+def _check_bodies(of: Interpreter) -> None:
+    document = of.document
+    moving = {EGO: document.ego, **{f"actors.{name}": actor for name, actor in document.actors.items()}}
+    for path, actor in (*moving.items(), *((f"streams.{name}", stream) for name, stream in document.streams.items())):
+        for name in of.alternatives(actor.body):
+            body = body_named(name, f"{path}.body")
+            motion = of.moves(path.removeprefix("actors."), body) if path in moving else "lanes"
+            if motion not in BODIES[body].moves and motion != "not":
+                fits = [name for name, row in BODIES.items() if motion in row.moves]
+                wanted = f"one that moves {motion if motion == 'freely' else 'in lanes'}: {', '.join(fits)}"
+                raise ConfigError(f"{path}.body", repr(name), wanted)
+    of.adversaries  # noqa: B018 # raises `ConfigError` for bodies that move differently
+
+
+def _check_like(of: Interpreter) -> None:
+    like = of.document.like
+    if like is None:
+        return
+    if like.family not in shipped_names():
+        remedy = did_you_mean(like.family, shipped_names())
+        raise ConfigError("like.family", repr(like.family), f"one of {', '.join(shipped_names())}", remedy)
+    shipped = shipped_document(like.family)
+    theirs = [name for names in Interpreter(shipped, nets_of(shipped)).adversaries for name in names]
+    own = [name for names in of.adversaries for name in names]
+    for name, other in like.actors.items():
+        if name not in own:
+            wanted = f"an adversary of this document: {', '.join(own) or 'there is none'}"
+            raise ConfigError(f"like.actors.{name}", "a name", wanted, did_you_mean(name, own))
+        if other not in theirs:
+            wanted = f"an adversary of {like.family}: {', '.join(theirs)}"
+            raise ConfigError(f"like.actors.{name}", repr(other), wanted, did_you_mean(other, theirs))
+    if left_out := [name for name in own if name not in like.actors and name not in theirs]:
+        wanted = f"{left_out[0]} and which of {', '.join(theirs)} it stands for"
+        raise ConfigError("like.actors", ", ".join(like.actors) or "nothing", wanted, "or leave `like` out")
+
+
+def _check_layouts(of: Interpreter) -> None:
+    """Refuses what sampled scenes show: bad places on the net, nothing left, and actors inside each other."""
+    layouts, refused = list[Layout](), list[InfeasibleScene]()
+    for scene in scenes(of):
+        try:
+            layouts.append(of.layout(scene.values))
+        except InfeasibleScene as error:
+            if isinstance(error.__cause__, ConfigError):
+                raise error.__cause__ from error
+            refused.append(error)
+    if not layouts:
+        got = f"none of {len(refused)} scenes that keeps them; in the first, {refused[0]}"
+        raise ConfigError("constraints", got, "constraints that leave some scenes", "widen a range or drop one")
+    for layout in layouts:
+        _check_way(layout)
+    _check_apart(of, layouts)
+
+
+def _check_way(layout: Layout) -> None:
+    net, ego = net_of(layout.net), layout.ego
+    first = net.edges[ego.route[0]].lanes[ego.lane]
+    way_m = first.length_m - ego.position_m
+    way_m += sum(net.edges[edge].lanes[0].length_m for edge in ego.route[1:])
+    if way_m < LEAST_WAY_M:
+        got = f"{way_m:.0f} m of road ahead of the ego on {' '.join(ego.route)}"
+        raise ConfigError("ego.start", got, f"{LEAST_WAY_M:g} m or more", "start it earlier, or name a route")
+
+
+def _check_apart(of: Interpreter, layouts: Sequence[Layout]) -> None:
+    met: dict[tuple[str, str], list[bool]] = {}
+    for layout in layouts:
+        shapes = [
+            {name: shapely.Polygon(box).buffer(-TOUCHING_M, join_style="mitre") for name, box in boxes.items()}
+            for boxes in (bodies_of(layout, net_of(layout.net), after_s) for after_s in (0.0, LEAD_IN_S))
+        ]
+        for one, other in combinations(shapes[0], 2):
+            inside = any(at_once[one].intersects(at_once[other]) for at_once in shapes)
+            met.setdefault((one, other), []).append(inside)
+    for (one, other), met_in in met.items():
+        if all(met_in):
+            name = other if other in of.document.actors else one
+            path = f"actors.{name}.start" if name in of.document.actors else f"streams.{name.rpartition('_')[0]}"
+            got = f"a start inside {one if name == other else other!r} in each of {len(met_in)} scenes"
+            raise ConfigError(path, got, "a start clear of it", "mind lengths: a gap is from bumper to bumper")
+
+
+def without_effect(of: Interpreter, layouts: int = 5) -> list[str]:
+    """Names of parameters that change no layout when they alone go from low to high."""
+    draw, names = np.random.default_rng(1), list[str]()
+    for axis, name in enumerate(of.space.names):
+        points = draw.random((layouts * 4, of.space.dimension))
+        if not any(_moved(of, point, axis) for point in points):
+            names.append(name)
+    return names
+
+
+def _moved(of: Interpreter, point: Floats, axis: int) -> bool:
+    ends = []
+    for end in (0.0, 1.0):
+        point = point.copy()
+        point[axis] = end
+        try:
+            ends.append(of.layout(of.space.from_unit(point).values))
+        except InfeasibleScene:
+            ends.append(None)
+    return ends[0] != ends[1]
