@@ -1,4 +1,4 @@
-"""Names the settings that a family or an ego does not support as they are written."""
+"""The problem that a run poses, and the settings of it that a family or an ego does not support as written."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
