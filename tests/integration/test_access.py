@@ -4,6 +4,7 @@ import json
 import time
 import uuid
 from contextlib import contextmanager
+from functools import reduce
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,6 +24,14 @@ ROADS = Path(__file__).parents[2] / "sumo_nets" / "low" / "low.net.xml"
 SPEC = {"families": ["low"], "methods": ["random"], "budget": {"episodes": 4}}
 REGRESSIONS = "/v1/regressions"
 CAMPAIGN, NETWORK = "/v1/campaigns/{campaign_id}", "/v1/networks/{network_id}"
+SCENARIOS, SCENARIO = "/v1/scenarios", "/v1/scenarios/{scenario}"
+DOCUMENT = {
+    "summary": "A van ahead of the ego brakes.",
+    "network": "low",
+    "parameters": {"gap": {"unit": "m", "range": [20, 50]}},
+    "ego": {"start": {"lane": "road_1", "at_m": 200}, "speed": 12},
+    "actors": {"van": {"body": "van", "start": {"ahead_of": "ego", "gap_m": "gap"}, "speed": 12}},
+}
 CHECK = "/v1/campaigns/check"
 TRIAGE = f"{CAMPAIGN}/failures/{{failure_id}}/triage"
 
@@ -75,6 +84,7 @@ def world(serve_shared, scripted, tmp_path_factory):
             failure=failure,
             run=service.get(campaign)["runs"][0]["id"],
             network=upload(service),
+            scenario=post_scenario(service),
             nobody=nobody,
         )
 
@@ -85,10 +95,18 @@ def upload(service):
     return service.client.post("/v1/networks", content=content, headers=headers).raise_for_status().json()["id"]
 
 
+def post_scenario(service):
+    document = DOCUMENT | {
+        "name": "vans",
+        "summary": uuid.uuid4().hex,
+    }  # its name is as long as UNKNOWN
+    return service.client.post(SCENARIOS, json=document).raise_for_status().json()["name"]
+
+
 def ask(world, method, path, key=None, known=True, **headers):
     """Returns a route's answer to the holder of a key; of a stream, its beginning."""
-    ids = (world.campaign, world.network) if known else (UNKNOWN, UNKNOWN)
-    parts = {"campaign_id": ids[0], "network_id": ids[1], "failure_id": world.failure}
+    ids = (world.campaign, world.network, world.scenario) if known else (UNKNOWN,) * 3
+    parts = {"campaign_id": ids[0], "network_id": ids[1], "scenario": ids[2], "failure_id": world.failure}
     parts |= {"regression_id": f"{ids[0]}-{'0' * 16}", "twin": "idle", "run_id": world.run}
     url = path.format(**parts, name="ecr_low", format="png")
     if key is not None:
@@ -103,6 +121,8 @@ def ask(world, method, path, key=None, known=True, **headers):
         headers["content-type"] = "application/json"
     elif (method, path) == ("POST", "/v1/networks"):
         content, headers["content-type"] = b"<roads/>", "application/xml"
+    elif method == "POST" and path in (SCENARIOS, f"{SCENARIOS}/check"):
+        content, headers["content-type"] = b"name: nothing else", "application/yaml"
     with world.nobody.stream(method, url, content=content, headers=headers) as response:
         streams = response.headers.get("content-type", "").startswith("text/event-stream")
         text = next(response.iter_text()) if streams else response.read().decode("latin-1")
@@ -118,7 +138,8 @@ def assert_refused(answer, status, reason):
 def assert_alike(world, known, unknown):
     """Whether answers differ by nothing but the id that was asked for."""
     assert known.status == unknown.status
-    assert known.text.replace(world.campaign, UNKNOWN).replace(world.network, UNKNOWN) == unknown.text
+    ids = (world.campaign, world.network, world.scenario)
+    assert reduce(lambda text, id_: text.replace(id_, UNKNOWN), ids, known.text) == unknown.text
     changing = ("date", "x-request-id")
     first, second = ({k: v for k, v in each.headers.items() if k not in changing} for each in (known, unknown))
     assert first == second
@@ -131,7 +152,8 @@ def unchanged(world):
     def seen():
         campaigns = json.loads(ask(world, "GET", "/v1/campaigns", "own").text)["items"]
         states = [(each["id"], each["state"]) for each in campaigns]
-        return states, ask(world, "GET", "/v1/networks", "own").text, world.file.path.read_bytes()
+        kept = [ask(world, "GET", path, "own").text for path in ("/v1/networks", SCENARIOS)]
+        return states, kept, world.file.path.read_bytes()
 
     before = seen()
     yield
@@ -156,13 +178,14 @@ def test_a_route_refuses_whoever_may_not_and_tells_nothing(world, unchanged, pat
     refused += [("reader", 403, "forbidden")] * (wanted in (Scope.RUN, Scope.ADMIN))
     if wanted is Scope.ADMIN:
         refused.append(("other", 403, "forbidden"))
-    elif path.startswith((CAMPAIGN, NETWORK, f"{REGRESSIONS}/")) or path == REGRESSIONS:
+    elif path.startswith((CAMPAIGN, NETWORK, SCENARIO, f"{REGRESSIONS}/")) or path == REGRESSIONS:
         refused.append(("other", 404, "unknown_id"))
     else:
         answer = ask(world, method, path, "other")
         assert_let_in(answer)
         assert world.campaign not in answer.text
         assert world.network not in answer.text
+        assert world.scenario not in answer.text
     for key, status, reason in refused:
         answer = ask(world, method, path, key)
         assert_refused(answer, status, reason)
@@ -192,6 +215,7 @@ def test_a_route_lets_in_whoever_may(world, path, method):
         if method in ("DELETE", "PUT") or path.endswith("/cancel"):  # not the ones that the other tests look at
             own = SimpleNamespace(**vars(world) | {"campaign": world.service.post(budget={"episodes": 100_000})})
             own.network = upload(world.service) if path == NETWORK else None
+            own.scenario = post_scenario(world.service) if path == SCENARIO else None
         answer = ask(own, method, path, holder, **origin)
         assert_let_in(answer)
         assert answer.headers["x-content-type-options"] == "nosniff"
