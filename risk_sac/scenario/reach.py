@@ -48,7 +48,7 @@ def out_of_reach(layouts: Sequence[Layout], limits: Limits) -> list[str]:
 
 def _way(net: Net, start: VehicleStart, route: Sequence[str], most_m: float) -> shapely.Geometry:
     """All lanes of a route from a start on, and the ways between them."""
-    shapes = list(_rest(net, start))
+    shapes = list(_rest(net, start, most_m))
     left_m = most_m - (net.edges[route[0]].lanes[0].length_m - start.position_m)
     for edge, following in pairwise(route):
         if left_m <= 0.0:
@@ -64,7 +64,10 @@ def _way(net: Net, start: VehicleStart, route: Sequence[str], most_m: float) -> 
 def _anywhere(net: Net, start: VehicleStart, most_m: float) -> shapely.Geometry:
     """All lanes that a vehicle may get to."""
     first = start.route[0]
-    shapes, been = list(_rest(net, start)), {first: most_m - net.edges[first].lanes[0].length_m + start.position_m}
+    shapes, been = (
+        list(_rest(net, start, most_m)),
+        {first: most_m - net.edges[first].lanes[0].length_m + start.position_m},
+    )
     waiting = [first]
     while waiting:
         edge = waiting.pop()
@@ -80,10 +83,10 @@ def _anywhere(net: Net, start: VehicleStart, most_m: float) -> shapely.Geometry:
     return shapely.union_all(shapes)
 
 
-def _rest(net: Net, start: VehicleStart) -> Iterator[shapely.Geometry]:
+def _rest(net: Net, start: VehicleStart, most_m: float) -> Iterator[shapely.Geometry]:
     for lane in net.edges[start.route[0]].drivable:
         line = shapely.LineString(lane.line)
-        yield substring(line, min(start.position_m, line.length), line.length)
+        yield substring(line, min(start.position_m, line.length), min(start.position_m + most_m, line.length))
 
 
 def _lines(lines: Iterable[Sequence[tuple[float, float]]]) -> list[shapely.Geometry]:
