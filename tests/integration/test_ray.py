@@ -10,9 +10,9 @@ from pathlib import Path
 
 import psutil
 import pytest
+from risk_sac.scenario.place import PLACES
 
 from risk_sac.scenario import library
-from risk_sac.scenario.place import PLACES
 from tests.integration.scripted_worker import DIES, ONCE, WAITS, WELL_BEHAVED
 from tests.ray_cluster import LONG_S, ROOT, Cluster, needs_ray, running, wait_until
 from tests.server import servers

@@ -5,13 +5,12 @@ import pytest
 
 from risk_sac.config import EgoConfig
 from risk_sac.errors import InfeasibleScene
-from risk_sac.scenario import junction
 from risk_sac.scenario.bodies import BODIES
-from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.families import FAMILIES, family_of
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
-from risk_sac.scenario.place import PLACES, JunctionPlace
-from risk_sac.sim.sumo import NETS, SumoSimulation
+from risk_sac.scenario.shipped import nets_of, shipped_document
+from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.world.types import Kind, Scene
 
 LEAST_GAPS_M = {"low": 8.0, "mixed": 8.0, "dense": 8.0}  # between vehicles on one lane at the start
@@ -102,15 +101,10 @@ def test_background_traffic_makes_way_for_who_turns_right_from_its_lane():
 
 
 def test_background_traffic_without_room_behind_others_is_left_out():
-    place = PLACES.validate_json((NETS / "dense" / "place.json").read_bytes())
-    assert isinstance(place, JunctionPlace)
-    short = junction.room_of_a_stream_m()
-    pieces = [piece.model_copy(update={"reach_m": short, "length_m": short}) for piece in place.streams[2].track.pieces]
-    track = place.streams[2].track.model_copy(update={"pieces": tuple(pieces)})
-    streams = [s.model_copy(update={"track": track}) if s.name == "east" else s for s in place.streams]
-    family = junction.family("dense", place.model_copy(update={"streams": tuple(streams)}))
-    values = family.space.from_unit(np.full(family.space.dimension, 0.5)).values
-    crowded = {"background_gap_m": 40.0, "from_right_turn": 0.9, "from_right_speed_mps": 13.8}
-    layouts = [family.layout(dict(values) | crowded | {"from_right_distance_m": m}) for m in (30.0, 90.0)]
-    names = [{start.id for start in layout.vehicles} for layout in layouts]
-    assert names[0] - names[1] == {"east_1"}
+    document = shipped_document("dense")
+    north = document.streams["north"].model_copy(update={"from_m": 135.0})
+    streams = {name: north if name == "north" else stream for name, stream in document.streams.items()}
+    family = family_of(document.model_copy(update={"streams": streams}), nets_of(document))
+    middle = family.space.from_unit(np.full(family.space.dimension, 0.5)).values
+    names = [{start.id for start in family.layout({**middle, "background_gap_m": m}).vehicles} for m in (15.0, 40.0)]
+    assert names[0] - names[1] == {"north_1"}
