@@ -31,7 +31,8 @@ def out_of_reach(layouts: Sequence[Layout], limits: Limits) -> list[str]:
     for layout in layouts:
         net, horizon_s = net_of(layout.net), layout.horizon_steps * STEP_S
         ego_way = _way(net, layout.ego, layout.ego.route, horizon_s * limits.speed_mps)
-        for start in (*layout.vehicles, *layout.pedestrians):
+        starts: tuple[VehicleStart | PedestrianStart, ...] = (*layout.vehicles, *layout.pedestrians)
+        for start in starts:
             if start.role.name != "ADVERSARY" or reached.get(start.id):
                 continue
             bounds = limits.of(BODIES[start.body])
