@@ -18,18 +18,30 @@ from service.api.metrics import registry, request_latencies
 from service.api.middleware import add_middleware
 from service.api.pages import Cursors
 from service.api.problems import add_problem_handlers
-from service.api.routes import campaigns, catalogue, episodes, events, exports, networks, regressions, reports, server
+from service.api.routes import (
+    campaigns,
+    catalogue,
+    episodes,
+    events,
+    exports,
+    networks,
+    regressions,
+    reports,
+    scenarios,
+    server,
+)
 from service.api.stream import Streams
 from service.host import hold_data_folder
 from service.keys import check_exposure
 from service.networks.network_store import NetworkStore
+from service.networks.scenarios import Scenarios
 from service.networks.surveys import Surveys
 from service.runs.manager import Manager, worker_program
 from service.runs.regressions import Regressions
 from service.settings import ServiceSettings
 from service.store.database import READERS, cursor_secret, held
 from service.store.reading import Store
-from service.views.on_demand import KEPT, Helper
+from service.views.on_demand import KEPT, Helper, OnDemandCache
 from service.views.reports import Reports
 from service.views.series import pictures as pictures_of_failures
 from service.views.studies import EpisodeTables, Studies
@@ -67,7 +79,7 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
         redoc_url=None,
     )
     shown = (episodes, exports, events, reports)
-    for routes in (campaigns, *shown, regressions, networks, catalogue, server):
+    for routes in (campaigns, *shown, regressions, networks, scenarios, catalogue, server):
         app.include_router(routes.router)
     app.router.routes += server.page_routes()
     add_problem_handlers(app)
@@ -96,9 +108,10 @@ def opened(settings: ServiceSettings, executor: Executor, latencies: Histogram) 
         manager = Manager(settings, store, executor)
         regression_queue, helper = Regressions(settings), Helper(settings)
         reports = Reports(settings)
-        views, priors = (Views(settings, store, reports, helper, kept) for kept in (VIEWS_KEPT, KEPT))
+        views, priors = (Views(settings, store, reports, helper, most) for most in (VIEWS_KEPT, KEPT))
         uploaded = NetworkStore(settings.networks_dir)
         surveys = Surveys(uploaded, settings.places_dir, helper.stopping)
+        kept = Scenarios(settings.scenarios_dir, settings.places_dir, helper.stopping)
         manager.start()
         try:
             regression_queue.start()
@@ -115,6 +128,8 @@ def opened(settings: ServiceSettings, executor: Executor, latencies: Histogram) 
                 regressions=regression_queue,
                 networks=uploaded,
                 surveys=surveys,
+                scenarios=kept,
+                scenario_pictures=OnDemandCache(kept.picture, "pictures of scenarios", at_once=2),
                 streams=Streams(store),
                 cursors=Cursors(cursor_secret(store.engine)),
                 metrics=registry(latencies, store, manager),

@@ -138,6 +138,11 @@ class ServiceSettings(RaySettings, BaseSettings):
         """Uploaded road networks."""
         return self.data_dir / "networks"
 
+    @property
+    def scenarios_dir(self) -> Path:
+        """Records of the scenarios that projects have posted."""
+        return self.data_dir / "scenarios"
+
     def campaign_folder(self, campaign_id: str) -> Path:
         """Folder of one campaign's files."""
         return self.data_dir / "campaigns" / campaign_id

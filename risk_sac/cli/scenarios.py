@@ -156,7 +156,7 @@ def _check(options: argparse.Namespace) -> int:
 
         options.out.write_bytes(scenario_png(document, nets))
         texts.append(f"Drawn: {options.out}")
-    print_answer(options, {**checked.model_dump(mode="json"), "remarks": checked.remarks}, table, *texts)
+    print_answer(options, checked, table, *texts)
     return FAILED if checked.contacts or not checked.played else OK
 
 

@@ -1,7 +1,9 @@
 """One RISK-SAC service, as Python methods."""
 
+import io
 import json
 import os
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal, Self, TypeVar
 from urllib.parse import quote
@@ -9,7 +11,7 @@ from uuid import uuid4
 
 from risk_sac.client.following import AWAY_S, Event, events, follow
 from risk_sac.client.transport import DEFAULT_URL, Transport, UnexpectedAnswer, api_key, checked_key, checked_url, read
-from risk_sac.config import CampaignSpec, EgoConfig
+from risk_sac.config import CampaignSpec, EgoConfig, Scenario
 from risk_sac.failures.cases import CampaignRegression
 from risk_sac.failures.studied import Aim
 from risk_sac.records import (
@@ -29,6 +31,8 @@ from risk_sac.records import (
     Results,
     Severity,
 )
+from risk_sac.records.scenario import ScenarioDetails, ScenarioList, ScenarioSummary
+from risk_sac.scenario.library import written
 
 TIMEOUT_S = 30.0  # longest silence within one answer
 PATIENCE_S = 10.0  # longest wait for a service that does not answer
@@ -137,6 +141,38 @@ class Client:
     def networks(self) -> Iterator[NetworkName]:
         """Uploaded networks, newest first."""
         return self._items(NetworkNames, "v1/networks", {"limit": PAGE})
+
+    def scenarios(self) -> list[ScenarioSummary]:
+        """Scenarios that ship with the service, then the project's own, newest first."""
+        return self._get(ScenarioList, "v1/scenarios").items
+
+    def scenario(self, name: str) -> ScenarioDetails:
+        """Returns a scenario with its document."""
+        return self._get(ScenarioDetails, f"v1/scenarios/{_part(name)}")
+
+    def add_scenario(self, document: Scenario, nets: Mapping[str, bytes] = {}) -> ScenarioDetails:
+        """Keeps a scenario, for campaigns to name; the same again gives the one that there is.
+
+        Args:
+          document: of the scenario.
+          nets: network of the document → its SUMO net; shipped ones are left out.
+        """
+        content = io.BytesIO()
+        with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("scenario.yaml", written(document))
+            for name, net in nets.items():
+                archive.writestr(name, net)
+        headers = {"Content-Type": "application/zip"}
+        response = self._transport.ask("POST", "v1/scenarios", headers=headers, body=content.getvalue())
+        return read(ScenarioDetails, response)
+
+    def scenario_picture(self, name: str) -> bytes:
+        """Returns a scenario from above as a PNG, with the ranges of all starts."""
+        return self._transport.ask("GET", f"v1/scenarios/{_part(name)}/picture.png", patience_s=MAKING_S).content
+
+    def delete_scenario(self, name: str) -> None:
+        """Deletes a scenario that no campaign names."""
+        self._transport.ask("DELETE", f"v1/scenarios/{_part(name)}")
 
     def campaign(self, campaign_id: str) -> Campaign:
         """State, progress and runs of a campaign."""

@@ -185,7 +185,7 @@ class Transport:
         patience_s: float | None = None,
         query: Mapping[str, str | int | None] | None = None,
         headers: Mapping[str, str] = {},
-        body: str | None = None,
+        body: str | bytes | None = None,
         repeatable: bool = True,
     ) -> httpx.Response:
         """The answer to a request, or 304.
@@ -196,7 +196,7 @@ class Transport:
           patience_s: no further attempt begins after this time; by default the client's.
           query: parameters; None leaves one out.
           headers: of the request.
-          body: JSON.
+          body: JSON, unless the headers say otherwise.
           repeatable: whether the request may be sent twice.
 
         Raises:
@@ -205,7 +205,7 @@ class Transport:
         """
         given = {name: value for name, value in (query or {}).items() if value is not None}
         if body is not None:
-            headers = {**headers, "Content-Type": "application/json"}
+            headers = {"Content-Type": "application/json", **headers}
         try:
             request = self._http.build_request(method, path, params=given, headers=headers, content=body)
         except UnicodeEncodeError as error:

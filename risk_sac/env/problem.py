@@ -1,4 +1,4 @@
-"""Names the settings that a family or an ego does not support as they are written."""
+"""The problem that a run poses, and the settings of it that a family or an ego does not support as written."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -238,7 +238,12 @@ def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
     for method in spec.methods:
         check_installed(method)
     alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()  # the i.i.d. phase's among them
-    for family in spec.families:
+    for number, family in enumerate(spec.families):
+        try:
+            family_named(family)
+        except ConfigError as error:
+            field = f"families[{number}]" if error.field == "family" else error.field
+            raise ConfigError(field, error.got, error.expected, error.remedy) from error
         first, *others = (run for run in alike if run.family == family)
         problem = Problem.from_spec(first)
         for run in others:

@@ -1,61 +1,25 @@
 """Plays a scenario document without an attack, and says what a user has to know before a search."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import closing
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 
 from risk_sac.config import RunSpec, Scenario
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.env.problem import Problem
 from risk_sac.errors import EgoFailed, InfeasibleScene, SimulationError
-from risk_sac.records import Record
+from risk_sac.records.scenario import ScenarioCheck
 from risk_sac.scenario.check import check_document, scenes, without_effect
 from risk_sac.scenario.families import family_of
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.scenario.reach import out_of_reach
+from risk_sac.world.types import STEP_S
 
 SCENES = 20
-
-
-class ScenarioCheck(Record):
-    """What 20 scenes without an attack show of a scenario."""
-
-    name: str
-    scenes: int
-    """Drawn at random."""
-    played: int
-    refused: Mapping[str, int]
-    """By the rule that refused them: `constraint`, `scenario` or a rule of C_hard."""
-    contacts: int
-    """Episodes in which the default ego touched something although no adversary attacked."""
-    invalid: tuple[str, ...]
-    """Why episodes could not be played to their end."""
-    out_of_reach: tuple[str, ...]
-    """Adversaries that in no scene can come near the ego's way."""
-    without_effect: tuple[str, ...]
-    """Parameters that change no start, whatever their value."""
-    seconds: Annotated[float, Field(ge=0)]
-    """Simulated time of all episodes."""
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What is to be mended, one sentence each."""
-        said = list[str]()
-        if self.contacts:
-            said.append(f"the default ego touches something in {self.contacts} of {self.played} scenes unattacked")
-        if not self.played:
-            said.append("every scene is refused: move the starts apart, or lower the speeds")
-        elif self.played < self.scenes / 2:
-            said.append(f"{self.scenes - self.played} of {self.scenes} scenes are refused: a search loses them")
-        said += [f"{name} cannot come near the ego's way within the horizon" for name in self.out_of_reach]
-        said += [f"the parameter {name} changes no start" for name in self.without_effect]
-        return (*said, *(f"an episode ended early: {why}" for why in self.invalid))
 
 
 def try_document(document: Scenario, nets: Mapping[str, str], count: int = SCENES, seed: int = 0) -> ScenarioCheck:
@@ -90,7 +54,7 @@ def try_document(document: Scenario, nets: Mapping[str, str], count: int = SCENE
                 refused[infeasible.reason] += 1
             except (SimulationError, EgoFailed) as error:
                 invalid[str(error)] = None
-    return ScenarioCheck(
+    checked = ScenarioCheck(
         name=document.name,
         scenes=count,
         played=played,
@@ -99,8 +63,22 @@ def try_document(document: Scenario, nets: Mapping[str, str], count: int = SCENE
         invalid=tuple(invalid),
         out_of_reach=tuple(out_of_reach(_layouts(of), limits_from_odd(family.odd, 1.0))),
         without_effect=tuple(without_effect(of)),
-        seconds=round(steps / 10, 1),
+        seconds=round(steps * STEP_S, 1),
     )
+    return checked.model_copy(update={"remarks": tuple(_remarks(checked))})
+
+
+def _remarks(checked: ScenarioCheck) -> Iterator[str]:
+    """What is to be mended, one sentence each."""
+    if checked.contacts:
+        yield f"the default ego touches something in {checked.contacts} of {checked.played} scenes unattacked"
+    if not checked.played:
+        yield "every scene is refused: move the starts apart, or lower the speeds"
+    elif 2 * checked.played < checked.scenes:
+        yield f"{checked.scenes - checked.played} of {checked.scenes} scenes are refused: a search loses them"
+    yield from (f"{name} cannot come near the ego's way within the horizon" for name in checked.out_of_reach)
+    yield from (f"the parameter {name} changes no start" for name in checked.without_effect)
+    yield from (f"an episode ended early: {why}" for why in checked.invalid)
 
 
 def _layouts(of: Interpreter) -> list[Layout]:

@@ -31,7 +31,7 @@ UNREAD_S = 60.0  # for which a client may take nothing of its answer
 MOST_HEAD_BYTES = 1 << 16  # of a head, and of a chunk's first line and the trailers of a body
 PIECE_BYTES = 1 << 13  # that h11 reads at once
 CALM_S = 60.0  # between two log lines about a full room
-UPLOADS = "/v1/networks"
+UPLOADS = ("/v1/networks", "/v1/scenarios")
 
 logger = logging.getLogger(__name__)
 

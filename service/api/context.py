@@ -12,6 +12,7 @@ from service.api.problems import ProblemError, Reason
 from service.api.stream import Streams
 from service.keys import Scope
 from service.networks.network_store import NetworkStore
+from service.networks.scenarios import Scenarios
 from service.networks.surveys import Surveys
 from service.runs.manager import Manager
 from service.runs.regressions import Regressions
@@ -41,6 +42,8 @@ class Context:
     regressions: Regressions
     networks: NetworkStore
     surveys: Surveys
+    scenarios: Scenarios
+    scenario_pictures: OnDemandCache[str]
     streams: Streams
     cursors: Cursors
     metrics: CollectorRegistry

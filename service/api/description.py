@@ -48,6 +48,7 @@ PARAMETERS: Mapping[str, str] = {
     "twin": "idle",
     "name": "ecr_low",
     "format": "png",
+    "scenario": "low",
 }
 """Of what a path has to name."""
 QUERIES: Mapping[str, Mapping[str, str]] = {

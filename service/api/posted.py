@@ -1,4 +1,4 @@
-"""Names of requirements for filters and metric labels."""
+"""Bodies of requests, and the dependency that checks a filter by requirement."""
 
 import codecs
 import json

@@ -56,6 +56,8 @@ class Reason(StrEnum):
     NOT_PLAYABLE = "not_playable"
     NOT_INSTALLED = "not_installed"
     TOO_MANY_NETWORKS = "too_many_networks"
+    TOO_MANY_SCENARIOS = "too_many_scenarios"
+    SCENARIO_IN_USE = "scenario_in_use"
     UNSUPPORTED_MEDIA_TYPE = "unsupported_media_type"
     INVALID_FIELD = "invalid_field"
     QUOTA_EXCEEDED = "quota_exceeded"
@@ -184,7 +186,8 @@ def _problem(request: Request, error: Exception) -> ProblemError:
         case HTTPException():
             return _http_error(request, error)
         case ConfigError():
-            return invalid(said, _field_problem(error, said))
+            faults = (error, *error.others)
+            return invalid("; ".join(map(str, faults)), *(_field_problem(fault, str(fault)) for fault in faults))
         case NotFoundError():
             item = FieldProblem(field=error.field, message=said, got=shown(error.got), wanted="an existing id")
             return ProblemError(HTTPStatus.NOT_FOUND, Reason.UNKNOWN_ID, said, item)

@@ -152,7 +152,7 @@ class Retention:
 
     def __init__(self, settings: ServiceSettings, store: Store) -> None:
         self._days = settings.retention_days
-        self._places = settings.places_dir
+        self._places, self._scenarios = settings.places_dir, settings.scenarios_dir
         self._store = store
         self._started_at = time.time()
         self._retire_at = self._prune_at = 0.0  # monotonic times
@@ -172,7 +172,8 @@ class Retention:
         if time.monotonic() < self._prune_at:
             return
         try:
-            removed = library.prune(self._places, self._store.families(), UNUSED_S, self._started_at)
+            posted = {record.name for record in self._scenarios.glob("*/*")}
+            removed = library.prune(self._places, self._store.families() | posted, UNUSED_S, self._started_at)
             earlier.prune(self._places, self._store.priors, time.time() - UNUSED_S)
         except OSError as error:
             raise StorageError(f"the library of places cannot be tidied ({error.strerror})") from error

@@ -1,0 +1,114 @@
+"""Checks, keeps and draws scenarios in a process of its own.
+
+`service.networks.scenarios` starts `service.networks.scenario_helper QUESTION ANSWER ACTION`:
+
+    add            checks the document, or the archive, that the question holds, keeps it, and answers with its name
+    check          checks it, plays 20 scenes of it, and answers with a `ScenarioCheck`
+    picture NAME   answers with a PNG
+"""
+
+import io
+import json
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+from risk_sac.config import Scenario
+from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.maps.convert import present_net
+from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
+from risk_sac.scenario import library
+from risk_sac.scenario.check import check_document
+from risk_sac.scenario.reading import MOST_BYTES, document_from
+from risk_sac.scenario.shipped import nets_of, networks, shipped_document, shipped_names
+from service.networks.schemas import SCENARIO_MEMORY_BYTES
+
+DOCUMENT_ENDS = (".yaml", ".yml", ".json")
+WANTED = "one document (.yaml or .json) and the nets that it names"
+
+
+def main() -> None:
+    """Does what the arguments say, and writes the answer."""
+    question, answer, action, *arguments = sys.argv[1:]
+    try:
+        content = _picture(*arguments) if action == "picture" else _posted(Path(question).read_bytes(), action)
+    except ConfigError as error:
+        faults = [(fault.field, fault.got, fault.expected, fault.remedy) for fault in (error, *error.others)]
+        content = json.dumps({"faults": faults}).encode()
+    except DamagedError as error:
+        content = json.dumps({"damaged": str(error)}).encode()
+    except MemoryError:
+        got = f"a scenario whose check needs more than {SCENARIO_MEMORY_BYTES >> 20} MiB"
+        content = json.dumps({"faults": [("network", got, "a smaller network", "")]}).encode()
+    Path(answer).write_bytes(content)
+
+
+def _posted(upload: bytes, action: str) -> bytes:
+    with tempfile.TemporaryDirectory() as scratch:
+        document, folder = _unpacked(upload, Path(scratch))
+        nets = nets_of(document, folder)
+        if action == "check":
+            from risk_sac.failures.scenario_trial import try_document  # here, because loading libsumo takes a second
+
+            return json.dumps(try_document(document, nets).model_dump(mode="json")).encode()
+        check_document(document, nets)
+        own = {name: Path(file).read_bytes() for name, file in nets.items() if Path(file).is_absolute()}
+        return json.dumps({"name": library.keep(document, own)}).encode()
+
+
+def _unpacked(upload: bytes, folder: Path) -> tuple[Scenario, Path]:
+    """Reads a document and puts its nets into a folder, as SUMO nets of the present format.
+
+    Raises:
+      ConfigError: the upload is neither a document nor an archive of one, or a net cannot be read.
+    """
+    if not upload.startswith(b"PK"):
+        return document_from(_text(upload)), folder
+    try:
+        archive = zipfile.ZipFile(io.BytesIO(upload))
+        entries = [entry for entry in archive.infolist() if not entry.is_dir()]
+        if len(entries) > MAX_FILES or sum(entry.file_size for entry in entries) > MAX_BYTES:
+            got = f"an archive of {len(entries)} files"
+            raise ConfigError("", got, f"at most {MAX_FILES}, and {MAX_BYTES >> 20} MiB once unpacked")
+        documents = [entry for entry in entries if entry.filename.endswith(DOCUMENT_ENDS)]
+        if len(documents) != 1:
+            raise ConfigError("", f"an archive with {len(documents)} documents", WANTED)
+        if documents[0].file_size > MOST_BYTES:
+            raise ConfigError("", f"a document of {documents[0].file_size} bytes", f"at most {MOST_BYTES}")
+        document = document_from(_text(archive.read(documents[0])))
+        for entry in entries:
+            if entry is not documents[0]:
+                _put_net(archive.read(entry), Path(entry.filename).name, document, folder)
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
+        raise ConfigError("", f"an archive that cannot be read ({error})", WANTED) from error
+    return document, folder
+
+
+def _put_net(content: bytes, name: str, document: Scenario, folder: Path) -> None:
+    if name not in networks(document):
+        named = ", ".join(networks(document))
+        raise ConfigError("network", f"a file {name!r} that the document does not name", f"one of {named}")
+    with tempfile.TemporaryDirectory() as scratch:
+        upload = Path(scratch, "upload")
+        upload.write_bytes(content)
+        present_net(upload, Path(scratch), name).file.rename(folder / name)
+
+
+def _text(content: bytes) -> str:
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        got = f"a document that is no UTF-8 from byte {error.start} on"
+        raise ConfigError("", got, "a text", "save it as UTF-8") from error
+
+
+def _picture(name: str) -> bytes:
+    from risk_sac.failures.scenario_picture import scenario_png  # here, because loading matplotlib takes a second
+
+    document, folder = (shipped_document(name), None) if name in shipped_names() else library.kept(name)
+    return scenario_png(document, nets_of(document, folder))
+
+
+if __name__ == "__main__":
+    main()

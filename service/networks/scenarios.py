@@ -1,0 +1,208 @@
+"""Scenarios of the service: those that ship, and those that projects have posted.
+
+Documents and nets lie in the library, under names that hold their digest. Beside it is a record for each project that
+posted one. What reads a net runs in a process of its own.
+"""
+
+import json
+import logging
+import os
+import secrets
+import shutil
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from risk_sac.config import Scenario
+from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.execution.helper import ANSWER, QUESTION, run_helper
+from risk_sac.records.scenario import ScenarioCheck, ScenarioDetails, ScenarioSummary, summary_of
+from risk_sac.run_folder.durable import replace_file
+from risk_sac.scenario import library
+from risk_sac.scenario.shipped import scenario_file, shipped_document, shipped_names
+from service.errors import BusyError, ConflictError, NotFoundError, StorageError
+from service.networks.schemas import SCENARIO_MEMORY_BYTES, SCENARIO_S
+
+logger = logging.getLogger(__name__)
+
+HELPER = "service.networks.scenario_helper"
+NICENESS = 5
+AT_ONCE = 2
+MOST_WAITING = 8
+MOST = 200  # scenarios of one project
+RETRY_AFTER_S = 5
+
+
+class Scenarios:
+    """Lists, checks, keeps, draws and deletes scenarios; used by many threads."""
+
+    def __init__(self, folder: Path, places: Path, stopping: Callable[[], bool] = lambda: False) -> None:
+        """Starts nothing.
+
+        Args:
+          folder: of the records, one below each project's name.
+          places: the library.
+          stopping: ends what is at work once it is true.
+        """
+        self._folder, self._places, self._stopping = folder, places, stopping
+        self._turn, self._lock, self._waiting = threading.BoundedSemaphore(AT_ONCE), threading.Lock(), 0
+
+    def list(self, project: str | None) -> list[ScenarioSummary]:
+        """Returns the shipped scenarios, then a project's own, newest first; None: those of all projects."""
+        own = dict[str, ScenarioSummary]()
+        for record in self._records(project):
+            try:
+                own[record.name] = summary_of(record.name, library.kept(record.name)[0], _time(record))
+            except (ConfigError, DamagedError, OSError) as error:
+                logger.warning("scenario %s cannot be read: %s", record.name, error)
+        newest = sorted(own.values(), key=lambda row: (row.created_at, row.name), reverse=True)
+        return [*(summary_of(name, shipped_document(name)) for name in shipped_names()), *newest]
+
+    def get(self, name: str, project: str | None) -> ScenarioDetails:
+        """Returns a scenario with its document; raises `NotFoundError` if the project has none of this name."""
+        if name in shipped_names():
+            row, text = summary_of(name, shipped_document(name)), scenario_file(name).read_text()
+        else:
+            record = self._record(name, project)
+            document = self._document(name)
+            row, text = summary_of(name, document, _time(record)), library.written(document)
+        return ScenarioDetails(**row.model_dump(), document=text)
+
+    def add(self, upload: bytes, project: str) -> tuple[ScenarioDetails, bool]:
+        """Keeps a document, or an archive of it and its nets.
+
+        Returns:
+          The scenario, and whether it is new to the project.
+
+        Raises:
+          ConfigError: the document has faults, with their paths; nothing is stored.
+          ConflictError: the project has as many scenarios as it may.
+        """
+        if sum(1 for _ in self._records(project)) >= MOST:
+            said = f"project {project!r} has {MOST} scenarios; wanted fewer: delete one first"
+            raise ConflictError(said, reason="too_many_scenarios")
+        name = str(self._helped("add", upload)["name"])
+        record = self._folder / project / name
+        new = not record.exists()
+        if new:
+            with _refusals("a scenario cannot be stored"):
+                record.parent.mkdir(parents=True, exist_ok=True)
+                replace_file(record, datetime.now(UTC).isoformat().encode())
+        return self.get(name, project), new
+
+    def check(self, upload: bytes) -> ScenarioCheck:
+        """Checks a document and plays 20 scenes of it; raises `ConfigError` as `add` does, and stores nothing."""
+        return ScenarioCheck.model_validate(self._helped("check", upload))
+
+    def picture(self, name: str) -> bytes:
+        """Draws a scenario that `get` has returned."""
+        content = self._run("picture", b"", name)
+        return content if content.startswith(b"\x89PNG") else _refused(content)
+
+    def delete(self, name: str, project: str | None, in_use: Callable[[], set[str]]) -> None:
+        """Removes a project's scenario.
+
+        Args:
+          name: of the scenario.
+          project: whose; None: of all projects.
+          in_use: names that campaigns have.
+
+        Raises:
+          NotFoundError: the project has none of this name.
+          ConflictError: it ships, or a campaign names it.
+        """
+        if name in shipped_names():
+            raise ConflictError(f"{name} ships with the service; it cannot be deleted", reason="scenario_in_use")
+        self._record(name, project)
+        if name in in_use():
+            raise ConflictError(
+                f"a campaign names {name}; wanted none: delete its campaigns first", reason="scenario_in_use"
+            )
+        with _refusals("a scenario cannot be deleted"):
+            for record in list(self._records(project)):
+                if record.name == name:
+                    record.unlink(missing_ok=True)
+            if name not in self.names():
+                grave = self._places / f".gone-{name}-{secrets.token_hex(4)}"
+                (self._places / name).rename(grave)
+                shutil.rmtree(grave)
+
+    def names(self) -> set[str]:
+        """Names that any project has posted, which the library must not lose."""
+        return {record.name for record in self._records(None)}
+
+    def _document(self, name: str) -> Scenario:
+        with _refusals("a scenario cannot be read"):
+            return library.kept(name)[0]
+
+    def _records(self, project: str | None) -> Iterator[Path]:
+        homes = self._folder.glob("[!.]*") if project is None else [self._folder / project]
+        return (path for home in homes if home.is_dir() for path in home.glob("[!.]*"))
+
+    def _record(self, name: str, project: str | None) -> Path:
+        for record in self._records(project):
+            if record.name == name:
+                return record
+        raise NotFoundError(f"there is no scenario {name!r}", field="scenario", got=name)
+
+    def _helped(self, action: str, upload: bytes) -> dict[str, Any]:
+        content = self._run(action, upload)
+        report: dict[str, Any] = json.loads(content)
+        return _refused(content) if report.keys() & {"faults", "damaged"} else report
+
+    def _run(self, action: str, upload: bytes, *arguments: str) -> bytes:
+        """Runs the helper in turn; returns its answer."""
+        with self._lock:
+            if self._waiting >= MOST_WAITING:
+                said = f"{MOST_WAITING} scenarios are checked or drawn; wanted fewer: try again in {RETRY_AFTER_S} s"
+                raise BusyError(said, RETRY_AFTER_S)
+            self._waiting += 1
+        environment = {**os.environ, library.VARIABLE: str(self._places.absolute())}
+        environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        try:
+            with self._turn, _refusals("a scenario cannot be checked"):
+                result = run_helper(
+                    HELPER,
+                    [QUESTION, ANSWER, action, *arguments],
+                    question=upload,
+                    wall_s=SCENARIO_S,
+                    memory_bytes=SCENARIO_MEMORY_BYTES,
+                    niceness=NICENESS,
+                    environment=environment,
+                    stopping=self._stopping,
+                )
+        finally:
+            with self._lock:
+                self._waiting -= 1
+        if result.timed_out:
+            got = f"one whose check takes more than {SCENARIO_S} s"
+            raise ConfigError("", got, "a shorter horizon or a smaller network")
+        if not result.answer:
+            logger.error("the helper ended with status %d: %s", result.status, result.log)
+            raise StorageError(f"the scenario cannot be checked ({result.reason})")
+        return result.answer
+
+
+def _refused(content: bytes) -> Any:
+    """Raises the error that a helper has answered with."""
+    report = json.loads(content)
+    if "damaged" in report:
+        raise StorageError(str(report["damaged"]))
+    first, *others = (ConfigError(*fault) for fault in report["faults"])
+    first.others = tuple(others)
+    raise first
+
+
+def _time(record: Path) -> datetime:
+    return datetime.fromisoformat(record.read_text())
+
+
+@contextmanager
+def _refusals(what: str) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise StorageError(f"{what} ({error.strerror})") from error

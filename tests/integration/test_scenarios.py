@@ -1,0 +1,112 @@
+"""Scenarios of a user's own on a real server."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from risk_sac.client import Client, Refused
+from risk_sac.scenario.reading import document_from
+from tests.hostile_networks import zipped
+
+NET = (Path(__file__).parents[2] / "sumo_nets/low/low.net.xml").read_text()
+DOCUMENT: dict[str, Any] = {
+    "name": "braking_van",
+    "summary": "A van ahead of the ego brakes.",
+    "tags": ["iso34502:deceleration"],
+    "network": "low",
+    "horizon_s": 4,
+    "parameters": {"gap": {"unit": "m", "range": [20, 50]}},
+    "ego": {"start": {"lane": "road_1", "at_m": 200}, "speed": 12},
+    "actors": {"van": {"body": "van", "start": {"ahead_of": "ego", "gap_m": "gap"}, "speed": 12}},
+}
+CAMPAIGN = {"methods": ["random"], "budget": {"episodes": 2}}
+
+
+def post(shared, document: object, path: str = "/v1/scenarios"):
+    return shared.client.post(path, json=document, timeout=120)
+
+
+def test_posted_scenario_is_listed_drawn_searched_and_deleted(shared):
+    answer = post(shared, DOCUMENT)
+    assert answer.status_code == 201, answer.text
+    scenario = answer.json()
+    name = scenario["name"]
+    assert answer.headers["location"] == f"/v1/scenarios/{name}"
+    assert post(shared, DOCUMENT).status_code == 200
+    assert document_from(scenario["document"]).name == "braking_van"
+    rows = {row["name"]: row for row in shared.client.get("/v1/scenarios").json()["items"]}
+    assert rows["low"]["shipped"]
+    assert not rows[name]["shipped"]
+    assert rows[name]["actors"] == ["van"]
+    assert rows[name]["parameters"][0]["range"] == [20, 50]
+    picture = shared.client.get(f"/v1/scenarios/{name}/picture.png", timeout=120)
+    assert picture.headers["content-type"] == "image/png"
+    assert picture.content.startswith(b"\x89PNG")
+
+    campaign = shared.client.post("/v1/campaigns", json=CAMPAIGN | {"scenarios": [name]})
+    assert campaign.status_code == 202, campaign.text
+    assert campaign.json()["spec"]["families"] == [name]
+    assert shared.client.delete(f"/v1/scenarios/{name}").status_code == 409
+
+    other = post(shared, DOCUMENT | {"name": "unused"}).json()["name"]
+    assert shared.client.delete(f"/v1/scenarios/{other}").status_code == 204
+    assert shared.client.get(f"/v1/scenarios/{other}").status_code == 404
+    assert shared.client.post("/v1/campaigns", json=CAMPAIGN | {"scenarios": [other]}).status_code == 422
+
+
+def test_net_comes_in_an_archive(shared):
+    document = yaml.safe_dump(DOCUMENT | {"name": "own_road", "network": "road.net.xml"})
+    content = zipped(document, NET, names=("own_road.yaml", "road.net.xml"))
+    headers = {"content-type": "application/zip"}
+    answer = shared.client.post("/v1/scenarios", content=content, headers=headers, timeout=120)
+    assert answer.status_code == 201, answer.text
+    answer = post(shared, DOCUMENT | {"name": "own_road", "network": "road.net.xml"})
+    assert answer.json()["errors"][0]["field"] == "network"
+
+
+@pytest.mark.parametrize("path", ["/v1/scenarios", "/v1/scenarios/check"])
+def test_fault_is_named_and_nothing_is_stored(shared, path):
+    before = shared.client.get("/v1/scenarios").json()
+    actors = {"van": DOCUMENT["actors"]["van"] | {"start": {"lane": "rode_1", "at_m": 240}}}
+    answer = post(shared, DOCUMENT | {"actors": actors}, path)
+    assert answer.status_code == 422
+    (error,) = answer.json()["errors"]
+    assert (error["field"], error["got"]) == ("actors.van.start.lane", "'rode_1'")
+    assert "road_1" in answer.json()["detail"]
+    assert shared.client.get("/v1/scenarios").json() == before
+
+
+def test_check_plays_scenes(shared):
+    answer = post(shared, DOCUMENT | {"name": "checked_only"}, "/v1/scenarios/check")
+    assert answer.status_code == 200, answer.text
+    assert answer.json()["played"] == 20
+    assert answer.json()["contacts"] == 0
+    assert answer.json()["remarks"] == []
+
+
+def test_several_faults_are_all_named(shared):
+    answer = post(shared, DOCUMENT | {"colour": 1, "parameters": {"gap": {"range": [9, 1]}}})
+    assert {error["field"] for error in answer.json()["errors"]} == {"colour", "parameters.gap.range"}
+
+
+def test_shipped_scenario_is_not_deleted(shared):
+    answer = shared.client.delete("/v1/scenarios/low")
+    assert (answer.status_code, answer.json()["reason"]) == (409, "scenario_in_use")
+
+
+def test_unknown_scenario_of_a_campaign_lists_those_that_ship(shared):
+    answer = shared.client.post("/v1/campaigns", json=CAMPAIGN | {"scenarios": ["mixd"]})
+    assert answer.status_code == 422
+    assert "did you mean mixed?" in answer.json()["detail"]
+
+
+def test_client_adds_and_deletes(shared):
+    with Client(str(shared.client.base_url)) as client:
+        kept = client.add_scenario(document_from(yaml.safe_dump(DOCUMENT | {"name": "of_the_client"})))
+        assert kept.name in [row.name for row in client.scenarios()]
+        assert client.scenario(kept.name).document == kept.document
+        client.delete_scenario(kept.name)
+        with pytest.raises(Refused):
+            client.scenario(kept.name)
