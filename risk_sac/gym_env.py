@@ -16,7 +16,8 @@ from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError, SimulationError
 from risk_sac.failures.export.gif import EGO, OTHER, STRIKER, Canvas
 from risk_sac.failures.net import shipped_net, shipped_surfaces
-from risk_sac.world.types import STEP_S, Kind, Role
+from risk_sac.scenario.bodies import body_of
+from risk_sac.world.types import STEP_S, Role
 
 RGB = "rgb_array"
 
@@ -75,7 +76,7 @@ class NamedEnv(RiskSacEnv):
                 (frame.x_m[actor], frame.y_m[actor], frame.heading_rad[actor]),
                 (frame.length_m[actor], frame.width_m[actor]),
                 EGO if actor == 0 else STRIKER if driven else OTHER,
-                person=frame.kind[actor] == Kind.PEDESTRIAN,
+                person=body_of(int(frame.body[actor])).shape == "person",
                 known=True,
             )
         return np.asarray(canvas.picture())

@@ -34,6 +34,9 @@ def run_folder(folder: Path, family: FamilyName = "low", *, scripts: bool = True
     folder.mkdir(parents=True, exist_ok=True)
     spec = RunSpec(family=family, method="archive", seed=0)
     write_results(folder, RunResults(spec=spec, spec_digest=spec.digest, finished=True))
-    lines = (record.model_dump_json() + "\n" for record in _episodes(family, scripts=scripts))
+    lines = (
+        record.model_dump_json() + "\n"
+        for record in _episodes(family if family in FAMILIES else "low", scripts=scripts)
+    )
     (folder / EPISODES).write_text("".join(lines))
     return folder

@@ -1,6 +1,6 @@
 """The closed loop as a Gymnasium environment: adversaries act, SUMO and its ego answer.
 
-Importing this module registers RiskSAC/Low-v0, RiskSAC/Mixed-v0 and RiskSAC/Dense-v0, and
+Importing this module registers RiskSAC/Low-v0, RiskSAC/MotorwayCutIn-v0 and so on for each shipped scenario, and
 `gymnasium.make("risk_sac.env.env:RiskSAC/Low-v0", ego="careful")` imports it first; see `risk_sac.gym_env`.
 The reward is R_risk alone; the realism cost and the robustness come in `info`, because λ and the
 shaping belong to the learner.
@@ -32,9 +32,9 @@ from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.realism import refuse_danger, refuse_overlap
 from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
 from risk_sac.run_folder.series import Trace
-from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
 from risk_sac.scenario.limits import conditions, limits_from_odd
+from risk_sac.scenario.shipped import shipped_names
 from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries, RecordedAdversaries, shares_of
 from risk_sac.sim.ego import EVERYTHING, Perception, sight
@@ -309,10 +309,9 @@ def make_default(family: FamilyName) -> RiskSacEnv:
     return RiskSacEnv.of(RunSpec(family=family, method="risk-sac", seed=0))
 
 
-for _family in FAMILIES:
+for _family in shipped_names():  # names alone: reading all documents takes a second
     gym.register(
-        f"RiskSAC/{_family.capitalize()}-v0",
+        f"RiskSAC/{''.join(map(str.capitalize, _family.split('_')))}-v0",
         entry_point="risk_sac.gym_env:NamedEnv",
         kwargs={"family": _family},
-        max_episode_steps=FAMILIES[_family].horizon_steps,
     )

@@ -1,30 +1,29 @@
-"""Names the settings that a family or an ego does not support as they are written."""
+"""The problem that a run poses, and the settings of it that a family or an ego does not support as written."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
-from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Interval, Odd, Requirement, RunSpec
+from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Interval, JudgeConfig, Odd, Requirement, RunSpec
 from risk_sac.config.campaign import check_demand
 from risk_sac.config.methods import MethodName
 from risk_sac.egos.registry import pinned
 from risk_sac.env.observation_layout import observation_size
 from risk_sac.errors import ConfigError, OddError
 from risk_sac.records import NO_CONTACT, Adjustment
+from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import parsed
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import GRAVITY_MPS2, VISIBILITY, limits_from_odd, with_environment
 from risk_sac.scenario.odd import (
-    SHIPPED_REQUIREMENTS,
     TINY,
     field,
     intersect,
     narrow,
     paths,
-    requirements_from_odd,
     text_of,
     widest,
 )
@@ -139,11 +138,12 @@ class Problem:
             )
         shipped = {each.name: each for each in requirements_from_odd(odd, ego.response_s)}
         own = {}
-        for i, requirement in enumerate(spec.requirements):
-            wanted = _own(f"requirements[{i}]", requirement, shipped)
-            if wanted is not None:
-                parsed(i, wanted, STEP_S, family.horizon_steps)
-                own[wanted.name] = wanted
+        for source, requirements in (("scenario.", family.requirements), ("", spec.requirements)):
+            for i, requirement in enumerate(requirements):
+                wanted = _own(f"{source}requirements[{i}]", requirement, shipped)
+                if wanted is not None:
+                    parsed(i, wanted, STEP_S, family.horizon_steps)
+                    own[wanted.name] = wanted
         problem = cls(
             family=family,
             odd=odd,
@@ -151,7 +151,7 @@ class Problem:
             ego=ego,
             requirements=tuple((shipped | own).values()),
             rss=_rss_parameters(odd),
-            drivers=spec.judge.drivers,
+            drivers=(family.judge or spec.judge if spec.judge == JudgeConfig() else spec.judge).drivers,
         )
         problem.check_demand(spec)
         return problem
@@ -238,7 +238,12 @@ def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
     for method in spec.methods:
         check_installed(method)
     alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()  # the i.i.d. phase's among them
-    for family in spec.families:
+    for number, family in enumerate(spec.families):
+        try:
+            family_named(family)
+        except ConfigError as error:
+            field = f"families[{number}]" if error.field == "family" else error.field
+            raise ConfigError(field, error.got, error.expected, error.remedy) from error
         first, *others = (run for run in alike if run.family == family)
         problem = Problem.from_spec(first)
         for run in others:

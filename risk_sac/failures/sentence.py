@@ -6,7 +6,7 @@ from itertools import groupby
 import numpy as np
 
 from risk_sac.failures.recording import Series
-from risk_sac.records import Collision, Violation
+from risk_sac.records import Collision, ConflictType, Violation
 from risk_sac.scenario.bodies import body_of
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
 from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
@@ -17,6 +17,8 @@ from risk_sac.world.types import STEP_S, Floats, Kind, Role
 IN_LANE_M = 1.5  # a vehicle nearer to the ego's axis leads it, or follows
 ACROSS_MPS = 0.2  # slower lateral motion does not change the place in a lane
 ACTS_MPS2 = 1.5
+GAINS_MPS, MOVES_M = 0.3, 0.2  # least change of speed and of place across that is told
+DRIVING = {"left_turn": " turning left", "right_turn": " turning right", "lane_change": " changing lanes"}
 
 
 def sentence(series: Series, collision: Collision) -> str:
@@ -31,9 +33,12 @@ def sentence(series: Series, collision: Collision) -> str:
     begins = int(np.searchsorted(since, -1e-6))
     does = _does(series, striker, begins)
     first = min(began, does[0]) if does else began
-    who = _who(series, striker, first, _broke(judged.broke))
+    hidden = " from hiding" if judged.hidden else ""
+    leads = judged.conflict_type is ConflictType.LEADER
+    who = _who(series, striker, first, f"{hidden}{_broke(judged.broke)}", leads=leads)
     what = does[1] if does else f"goes on at {series['speed_mps'][first, striker]:.0f} m/s"
-    ego = f"ego at {series['speed_mps'][began, 0]:.0f} m/s{_broke(judged.ego_broke)}"
+    manoeuvre = DRIVING.get(judged.ego_manoeuvre, "")
+    ego = f"ego at {series['speed_mps'][began, 0]:.0f} m/s{manoeuvre}{_broke(judged.ego_broke)}"
     return f"{who}, {what}; {ego} {_response(series, began, judged.ego_response)}"
 
 
@@ -58,8 +63,11 @@ def _broke(offences: tuple[str, ...]) -> str:
     return "".join(f" {IN_WORDS[name]}" for name in offences)
 
 
-def _who(series: Series, striker: int, at: int, broke: str) -> str:
-    """Returns name, offences and place of the striker in the ego's frame."""
+def _who(series: Series, striker: int, at: int, more: str, *, leads: bool = False) -> str:
+    """Returns name and place of the striker in the ego's frame, with `more` between them.
+
+    One that `leads` is the leader wherever the ego has swerved to.
+    """
     x, y = (series[name][at, striker] - series[name][at, 0] for name in ("x_m", "y_m"))
     heading = series["heading_rad"][at, 0]
     turn = series["heading_rad"][at, striker] - heading
@@ -69,13 +77,15 @@ def _who(series: Series, striker: int, at: int, broke: str) -> str:
     if body.shape != "vehicle" or series["role"][striker] == Role.STATIC:
         standing = "standing " if series["role"][striker] == Role.STATIC else ""
         name = f"{standing}{body.name} on the {side}"
+    elif leads:
+        name = "leader"
     elif math.cos(turn) > SAME_WAY_COS:
         name = f"{side} neighbour" if abs(left_m) > IN_LANE_M else "leader" if ahead_m > 0.0 else "follower"
     elif math.cos(turn) < ONCOMING_COS:
         name = "oncoming vehicle"
     else:
         name = f"vehicle from the {'right' if math.sin(turn) > 0.0 else 'left'}"  # as its kind says it
-    name += broke
+    name += more
     if abs(ahead_m) < 1.0:
         return f"{name}, level with it"
     return f"{name}, {abs(ahead_m):.0f} m {'ahead' if ahead_m > 0.0 else 'behind'}"
@@ -89,12 +99,14 @@ def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
     accel, across = series["accel_mps2"][begins:, striker], series["lateral_mps"][begins:, striker]
     vehicle = series["kind"][striker] == Kind.VEHICLE
     acts = ACTS_MPS2 if vehicle else ACTS_MPS2 / 3
-    motions = [("brakes", -accel, acts, "m/s²"), ("speeds up", accel, acts, "m/s²")]
+    slows = "brakes" if vehicle else "slows down"
+    motions = [(slows, -accel, acts, GAINS_MPS, "m/s²"), ("speeds up", accel, acts, GAINS_MPS, "m/s²")]
     if vehicle:
-        motions += [("moves left", across, ACROSS_MPS, "m/s"), ("moves right", -across, ACROSS_MPS, "m/s")]
+        motions.append(("moves left", across, ACROSS_MPS, MOVES_M, "m/s"))
+        motions.append(("moves right", -across, ACROSS_MPS, MOVES_M, "m/s"))
     parts = []
-    for verb, values, limit, unit in motions:
-        if frames := _lasting(values, limit):
+    for verb, values, limit, least, unit in motions:
+        if frames := _lasting(values, limit, least):
             lasts_s = len(frames) * STEP_S
             parts.append((frames[0], f"{verb} at {values[frames].max():.1f} {unit} for {lasts_s:.1f} s"))
     if not parts:
@@ -103,10 +115,11 @@ def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
     return begins + parts[0][0], ", then ".join(text for _, text in parts)
 
 
-def _lasting(values: Floats, limit: float) -> list[int]:
-    """Returns the last stretch of two frames or more above a limit."""
+def _lasting(values: Floats, limit: float, least: float) -> list[int]:
+    """Returns the last stretch of two frames or more above a limit, in which the values sum up to `least` over time."""
     stretches = [list(frames) for above, frames in groupby(range(len(values)), lambda t: values[t] > limit) if above]
-    return next((frames for frames in reversed(stretches) if len(frames) >= 2), [])
+    enough = (frames for frames in reversed(stretches) if len(frames) >= 2 and values[frames].sum() * STEP_S >= least)
+    return next(enough, [])
 
 
 def _response(series: Series, began: int, response: str) -> str:
@@ -117,8 +130,11 @@ def _response(series: Series, began: int, response: str) -> str:
         return f"brakes {late_s:.1f} s late" if late_s >= STEP_S / 2 else RESPONSES[response]
     if response == "braking":
         return "brakes, and touches it still"
-    if response == "standing" and series["speed_mps"][began, 0] >= STANDING_MPS:
+    speed = series["speed_mps"][began:, 0]
+    if response == "standing" and speed[0] >= STANDING_MPS:
         return "has stopped"
+    if response == "starting" and speed[0] >= STANDING_MPS > speed.min():
+        return "stops, then starts"
     if response == "none" and len(braked):
         return "brakes no longer"
     return RESPONSES[response]

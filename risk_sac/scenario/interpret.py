@@ -104,7 +104,15 @@ class Interpreter:
             categories = parameter.words if binary and parameter.words else ()
             meaning = parameter.meaning or name.replace("_", " ")
             parameters.append(Parameter(name, parameter.unit, low, high, meaning, parameter.odd, categories))
-        return SceneSpace(self.document.name, tuple(parameters))
+        return SceneSpace(self.document.name, tuple(parameters), self.holds if self.document.constraints else None)
+
+    def holds(self, xi: Mapping[str, float]) -> bool:
+        """Whether a scene keeps all constraints."""
+        value = self.value(xi)
+        try:
+            return all(map(value.holds, self.document.constraints))
+        except ConfigError:  # a value that does not exist there
+            return False
 
     def value(self, xi: Mapping[str, float]) -> Value:
         """What the parameters say in a scene."""
@@ -291,7 +299,15 @@ class _Scene:
         path = name if name == EGO else f"actors.{name}"
         self._placed[name] = place = self._place(name, moving, path)
         self._speeds[name] = speed_mps = self._value.of(moving.speed, f"{path}.speed")
-        return _started(name, role, place, speed_mps, self._bodies[name])
+        start = moving.start
+        if (turned := self._value.of(start.heading_deg, f"{path}.start.heading_deg")) != 0.0:
+            wanted = "0 for what drives in a lane"
+            raise ConfigError(f"{path}.start.heading_deg", f"{turned:g}", wanted, "let it move freely, or be static")
+        left_m, width_m = self._value.of(start.left_m, f"{path}.start.left_m"), place.lane.width_m
+        if not abs(left_m) <= width_m / 2:
+            wanted = f"at most half of {place.lane.id!r}, {width_m / 2:g} m"
+            raise ConfigError(f"{path}.start.left_m", f"{left_m:g}", wanted, "lanes_left, or a start on another lane")
+        return replace(_started(name, role, place, speed_mps, self._bodies[name]), left_m=left_m)
 
     def _place(self, name: str, moving: Moving, path: str) -> OnTrack:
         """Where on its track an actor starts."""

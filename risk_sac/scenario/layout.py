@@ -120,6 +120,7 @@ class VehicleStart:
     lane: int  # index on the first edge, 0 is the rightmost
     position_m: float  # of the front bumper along the first edge
     speed_mps: float
+    left_m: float = 0.0  # of the lane's middle
     body: BodyName = "car"  # one that moves in lanes
     uses_oncoming: bool = False  # whether an adversary may leave its edge for oncoming lanes beside it
 

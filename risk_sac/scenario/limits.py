@@ -67,7 +67,7 @@ class Limits:
         if name not in PRESETS:
             return 1.0
         field, end = PRESETS[name]
-        preset = float(abs(getattr(BOUNDS[field], self.behaviour)[end]))
+        preset = abs(float(getattr(BOUNDS[field], self.behaviour)[end]))
         return min(float(getattr(self, name)) / preset, 1.0)
 
     @cached_property

@@ -1,8 +1,8 @@
 """The scene space of a family: the named, bounded parameters ξ of its episodes."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,8 @@ import numpy as np
 from risk_sac.config import Interval
 from risk_sac.errors import SceneError
 from risk_sac.world.types import Floats, Scene
+
+POOL = 4096  # points among which one is looked for that keeps all constraints
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +38,12 @@ class Parameter:
 
 @dataclass(frozen=True)
 class SceneSpace:
-    """A box of scenes."""
+    """A box of scenes, and the constraints that they keep."""
 
     family: str
     parameters: tuple[Parameter, ...]
+    holds: Callable[[Mapping[str, float]], bool] | None = field(default=None, compare=False)
+    """Whether the values of a scene keep the scenario's constraints; None: it has none."""
 
     @property
     def dimension(self) -> int:
@@ -70,6 +74,29 @@ class SceneSpace:
             raise SceneError(f"point is {point.tolist()}; wanted every coordinate in [0, 1]")
         values = np.minimum(self.low + point * (self.high - self.low), self.high)  # rounding may pass the bound
         return Scene(self.family, dict(zip(self.names, values.tolist(), strict=True)))
+
+    def allows(self, point: Floats) -> bool:
+        """Whether the scene at a point of the unit cube, `d`, keeps the constraints."""
+        return self.holds is None or self.holds(self.from_unit(point).values)
+
+    def nearest_allowed(self, point: Floats) -> Floats:
+        """Returns the point itself, `d`, or the nearest of a pool of points that keep the constraints.
+
+        Raises:
+          SceneError: no point of the pool does.
+        """
+        if self.allows(point):
+            return point
+        if not len(self._allowed):
+            raise SceneError(f"none of {POOL} scenes of {self.family!r} keeps the constraints")
+        nearest: Floats = self._allowed[((self._allowed - point) ** 2).sum(axis=1).argmin()]
+        return nearest
+
+    @cached_property
+    def _allowed(self) -> Floats:
+        """Points of a fixed pool that keep the constraints, `n x d`."""
+        points = np.random.default_rng(0).random((POOL, self.dimension))
+        return points[[self.allows(point) for point in points]]
 
     def to_unit(self, scene: Scene) -> Floats:
         """Maps a scene into the unit cube, `d`.

@@ -142,8 +142,8 @@ def episode(run: RunState, env: GuardedEnv) -> EpisodeRecord:
     agent, learning, tally = run.searchers.agent, run.learning, EpisodeSums()
     seed = episode_seed(run.spec.stream, len(run.records))
     env.begin(len(run.records))
-    sampler, actor = run.searchers.next(learning=learning)
-    point = sampler.ask()  # Alg. 1, l. 4
+    actor = run.searchers.next(learning=learning).actor
+    point = run.searchers.ask()  # Alg. 1, l. 4
     driven_by = run.searchers.driven_by(learning=learning)
     scene, genes = run.searchers.split(point)
     run.searchers.begin(genes)

@@ -133,6 +133,20 @@ class Searchers:
         frozen = isinstance(actor, Learner) and not learning
         return DrivenBy.POLICY if frozen else actor.driven_by
 
+    def ask(self) -> Floats:
+        """Returns the next point of the searcher chosen last; its scene keeps the scenario's constraints.
+
+        A sampler is asked again for a point whose scene does not, so that random scenes stay uniform among those that
+        do; after `TRIES` the nearest scene of a pool takes its place.
+        """
+        sampler, size = self._next.sampler, self._space.dimension
+        point = sampler.ask()
+        for _ in range(sampler.tries):
+            if self._space.allows(point[:size]):
+                return point
+            point = sampler.ask()
+        return np.concatenate((self._space.nearest_allowed(point[:size]), point[size:]))
+
     def split(self, point: Floats) -> tuple[Scene, Floats]:
         """Splits a proposed point into its scene and the actor's genes."""
         size = self._space.dimension

@@ -122,7 +122,8 @@ class Adversaries:
     def __init__(self, family: Family, limits: Limits, frame: Frame) -> None:
         """Starts from the motion in `frame`."""
         f, rows = frame, {id_: row for row, id_ in enumerate(frame.ids)}
-        own = {id_: limits.of(body_of(int(frame.body[rows[id_]]))) for id_ in family.adversaries}
+        there = [id_ for id_ in family.adversaries if id_ in rows]  # a document may leave one out of a scene
+        own = {id_: limits.of(body_of(int(frame.body[rows[id_]]))) for id_ in there}
         self._vehicles = {
             id_: VehicleControl(own[id_], *(float(a[rows[id_]]) for a in (f.speed_mps, f.accel_mps2, f.lateral_mps)))
             for id_ in family.vehicles

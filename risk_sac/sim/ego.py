@@ -7,7 +7,7 @@ import numpy as np
 
 from risk_sac.config import SensorConfig
 from risk_sac.scenario.bodies import body_of
-from risk_sac.world.geometry import Sight, frame_view, in_sight
+from risk_sac.world.geometry import Sight, bodies_in_sight, frame_view
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import HEADING, VX, VY, Bools, Floats, Frame, X, Y
 
@@ -124,7 +124,7 @@ def _look(
     unlit_m: float,
 ) -> tuple[Bools, Bools, Floats]:
     """Updates the memory; returns which of the others are in sight, and both parts of the belief."""
-    seen = in_sight(frame_view(state), conceals, lit, Sight(reach_m, half_view_rad, occlusion, unlit_m))
+    seen = bodies_in_sight(frame_view(state), conceals, lit, Sight(reach_m, half_view_rad, occlusion, unlit_m))
     n = state.shape[1]
     known, believed = np.ones(n, dtype=np.bool_), state.copy()
     for i in range(1, n):

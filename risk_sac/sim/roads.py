@@ -319,6 +319,14 @@ def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None
         _set_signal(layout.signal, layout.signal_offset_s)
 
 
+def keep_aside(starts: Iterable[VehicleStart]) -> None:
+    """Moves vehicles that start beside their lane's middle there; SUMO's driver keeps to it."""
+    for start in starts:
+        if start.left_m != 0.0:
+            libsumo.vehicle.setLateralAlignment(start.id, f"{start.left_m:g}")
+            libsumo.vehicle.setLateralLanePosition(start.id, start.left_m)
+
+
 def hand_over(start: VehicleStart) -> None:
     """Makes a vehicle drive as commanded, whatever is in its way."""
     libsumo.vehicle.setType(start.id, _type("adversary", start.body))

@@ -93,10 +93,10 @@ def _around(e: Evidence, actor: int, frames: NDArray[np.intp]) -> tuple[Floats, 
 
 
 def _lines(
-    e: Evidence, actor: int, frames: NDArray[np.intp], within: Bools, around: tuple[Floats, Floats, Floats]
+    e: Evidence, actor: int, frames: NDArray[np.intp], within: Bools, others: tuple[Floats, Floats, Floats]
 ) -> Iterator[Observed]:
     """Measures lane changes, and how long it keeps to a line or over it; outside junctions."""
-    ahead_m, left_m, cos = around
+    ahead_m, left_m, cos = others
     offset, lane_m = e.lane_offset_m[frames, actor], e.ground.lane_width_m
     over = np.abs(offset) + e.width_m[actor] / 2 - lane_m / 2
     over[within | np.isnan(over)] = -np.inf
@@ -158,10 +158,10 @@ def _pacing(
 
 
 def _junctions(
-    e: Evidence, actor: int, frames: NDArray[np.intp], within: Bools, around: tuple[Floats, Floats]
+    e: Evidence, actor: int, frames: NDArray[np.intp], within: Bools, others: tuple[Floats, Floats]
 ) -> Iterator[Observed]:
     """Measures entries on red or without priority, and how long it stops or crawls in a junction."""
-    ahead_m, left_m = around
+    ahead_m, left_m = others
     link, speed = e.link[frames, actor], e.speed_mps[frames, actor]
     enters = (link[:-1] != 0) & ((link[1:] == 0) | (within[1:] & ~within[:-1])) & (speed[1:] > MOVES_MPS)
     for t in np.flatnonzero(enters).tolist():

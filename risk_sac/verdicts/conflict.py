@@ -12,6 +12,7 @@ import numpy as np
 from risk_sac.records import ConflictType
 from risk_sac.verdicts.course import (
     HORIZON_S,
+    MARKING_S,
     WANDER_M,
     YIELDING_MPS2,
     BodyOnPath,
@@ -109,7 +110,7 @@ def find_conflict(evidence: Evidence, striker: int) -> Conflict:
     if left is not None:
         frame, noticed, unseen = (max(left, each) for each in (frame, noticed, unseen))
     return Conflict(
-        type=_type(evidence, striker, frame, same_way, seen.across_m, came_over=left is not None),
+        type=_type(evidence, striker, frame, same_way, seen, came_over=left is not None),
         frame=frame,
         time_s=float(evidence.time_s[frame]),
         noticed_s=float(evidence.time_s[min(noticed, frame)]),
@@ -273,7 +274,7 @@ def _cannot_stop(to_go_m: Floats, evidence: Evidence, striker: int, *, wary: boo
 
 
 def _type(
-    evidence: Evidence, striker: int, frame: int, same_way: bool, across_m: Floats, *, came_over: bool
+    evidence: Evidence, striker: int, frame: int, same_way: bool, seen: BodyOnPath[Floats], *, came_over: bool
 ) -> ConflictType:
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         return ConflictType.PEDESTRIAN
@@ -281,7 +282,19 @@ def _type(
         return ConflictType.CROSSING
     first = int(np.searchsorted(evidence.time_s, evidence.time_s[frame] - SETTLED_S - 1e-6))
     width_m = lanes_of(evidence, 0, first).width_m[: frame + 1 - first]
-    settled = (np.abs(across_m[first : frame + 1]) <= width_m / 2).all()
+    settled = (np.abs(seen.across_m[first : frame + 1]) <= width_m / 2).all()
     if settled:
         return ConflictType.LEADER
-    return ConflictType.MERGE if came_over else ConflictType.CUT_IN
+    if came_over:
+        return ConflictType.MERGE
+    ahead = seen.gap_m[frame] > 0.0
+    return ConflictType.LEADER if ahead and _keeps_lane(evidence, striker, frame) else ConflictType.CUT_IN
+
+
+def _keeps_lane(evidence: Evidence, striker: int, frame: int) -> bool:
+    """Tells whether the striker stayed within 0.375 m of its lane's centre.
+
+    It did so in the last 3 s, and from 1 s before the conflict began in `frame`. False without recorded offsets.
+    """
+    first = min(evidence.since(TURN_WINDOW_S), max(frame - round(MARKING_S / evidence.step_s), 0))
+    return bool((np.abs(evidence.lane_offset_m[first:, striker]) <= WANDER_M).all())

@@ -272,6 +272,7 @@ INTRUSION_M = 0.3  # into the ego's lane, from which a cut-in counts
 R157_BRAKES_MPS2, R157_CUT_IN_S = 6.0, 0.35
 R157_GAP_M = 2.0  # 5.2.3.3: the least distance to a vehicle ahead at any speed
 CHECKS_MPS2, CHECKS_STEPS = 4.0, 5  # 0.5 s: longer than it takes to come over in front of the ego
+ROUNDING_MPS2 = 0.01  # drivers of ordinary behaviour brake with exactly 4 m/s²
 CLEAR_M = 30.0  # a vehicle without any other this near ahead, from its front, brakes for none
 STEPS_ASIDE_M = 1.0  # a pedestrian this far beside a vehicle's way may be about to step into it
 STOPPING_LETTERS = tuple(b"ruygos")  # signals at which a vehicle may have to stop
@@ -334,7 +335,8 @@ def checks_brakes(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], be
     first = min(began, e.since(RECENT_S))
     behind = (seen.gap_m > 0.0) & (seen.gap_m <= HORIZON_S * e.speed_mps[:, 0])
     behind &= np.abs(seen.across_m) <= lanes_of(e, EGO).width_m / 2
-    braked = behind & (e.accel_mps2[:, striker] < -CHECKS_MPS2) & ~np.isin(e.link[:, striker], STOPPING_LETTERS)
+    hard = e.accel_mps2[:, striker] < -CHECKS_MPS2 - ROUNDING_MPS2
+    braked = behind & hard & ~np.isin(e.link[:, striker], STOPPING_LETTERS)
     frames = first + np.flatnonzero(braked[first:])
     return bool(np.count_nonzero(~_any_ahead(e, striker, frames)) >= CHECKS_STEPS)
 

@@ -195,7 +195,13 @@ class Sight(NamedTuple):
 
 
 @compiled
-def in_sight(view: RelativeView, conceals: Bools, lit: Bools, sight: Sight) -> Bools:
+def in_sight(view: RelativeView, vehicle: Bools, sight: Sight) -> Bools:
+    """See `bodies_in_sight`; all vehicles conceal and carry lights, and pedestrians do neither."""
+    return bodies_in_sight(view, vehicle, vehicle, sight)
+
+
+@compiled
+def bodies_in_sight(view: RelativeView, conceals: Bools, lit: Bools, sight: Sight) -> Bools:
     """Which of the `n` others are within reach, inside the field of view and not hidden; see `line_of_sight`.
 
     Bodies that conceal hide what is behind them; those without lights are seen less far at night.

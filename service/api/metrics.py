@@ -14,7 +14,7 @@ from pydantic_core import from_json
 
 from risk_sac.execution.executor import ClusterNode, ClusterState
 from risk_sac.records import State
-from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS
+from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS
 from service.errors import StorageError
 from service.runs.manager import Manager
 from service.store.queries import Statistics, read_statistics

@@ -1,4 +1,4 @@
-"""Names of requirements for filters and metric labels."""
+"""Bodies of requests, and the dependency that checks a filter by requirement."""
 
 import codecs
 import json
@@ -15,7 +15,7 @@ from pydantic_core import from_json
 from risk_sac.config import CampaignSpec, Settings
 from risk_sac.errors import ConfigError
 from risk_sac.maps.found import Pattern
-from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS
+from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS
 from service.api.context import Caller, Context, CurrentCaller, Service
 from service.api.problems import ProblemError, Reason, invalid, invalid_field
 from service.errors import NotFoundError

@@ -224,6 +224,9 @@ def test_a_failure_that_does_not_repeat_gets_no_bundle(bundle, tmp_path, monkeyp
     assert not (tmp_path / "a.npz").exists()
 
 
+NET_ARRAY = f"{bundles.SCENARIO}net.xml"
+
+
 @pytest.fixture(scope="module")
 def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A bundle of a contact on a user's map, whose library of places is gone."""
@@ -252,11 +255,18 @@ def test_a_failure_on_a_map_is_played_again_where_nobody_has_the_map(placed, tmp
     assert len(list((tmp_path / "places").iterdir())) == 1
 
 
+def without_scenario(arrays: Arrays) -> None:
+    for name in (NET_ARRAY, f"{bundles.SCENARIO}{library.DOCUMENT}"):
+        arrays.pop(name)
+
+
 def repack(arrays: Arrays, net: bytes) -> None:
     """Another net under a name that has its digest, as an attacker would forge it."""
-    text = arrays[bundles.PLACE].tobytes()
-    arrays[bundles.NET] = np.frombuffer(net, dtype=np.uint8)
-    digest = hashlib.sha256(text + b"\0" + net).hexdigest()[: library.DIGITS]
+    text = arrays[f"{bundles.SCENARIO}{library.DOCUMENT}"].tobytes()
+    arrays[NET_ARRAY] = np.frombuffer(net, dtype=np.uint8)
+    files = {"net.xml": net, library.DOCUMENT: text}
+    content = b"".join(f"{name}\0{len(files[name])}\0".encode() + files[name] for name in files)
+    digest = hashlib.sha256(content).hexdigest()[: library.DIGITS]
     spec = json.loads(str(arrays[MANIFEST]))["spec"] | {"family": f"junction_{digest}"}
     manifest(arrays, spec=spec)
 
@@ -267,7 +277,7 @@ def repack(arrays: Arrays, net: bytes) -> None:
         ('<tlLogic id="t"><param key="file" value="/tmp/x"/></tlLogic>', "its net has a <param>"),
         ('<include href="/etc/passwd"/>', "its net has a <include>"),
         ('<type id="${HOME}"/>', "says $"),
-        ("</edge>", "cannot be played at: mismatched tag"),
+        ("</edge>", "cannot be played: mismatched tag"),
     ],
 )
 def test_a_carried_net_that_says_more_than_roads_reaches_nobody(placed, tmp_path, monkeypatch, inside, says):
@@ -280,11 +290,11 @@ def test_a_carried_net_that_says_more_than_roads_reaches_nobody(placed, tmp_path
 
 def test_a_bundle_that_lost_its_place_or_carries_another_is_refused(placed, tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path / "places"))
-    told = replayed_elsewhere(changed(placed, tmp_path / "a.npz", lambda arrays: arrays.pop(bundles.NET)), tmp_path)
-    assert (told.returncode, "there is no place 'junction_" in told.stderr.replace("\n", " ")) == (2, True), told.stderr
+    told = replayed_elsewhere(changed(placed, tmp_path / "a.npz", without_scenario), tmp_path)
+    assert (told.returncode, "which is no scenario" in told.stderr.replace("\n", " ")) == (2, True), told.stderr
     doctype = np.frombuffer(b"<!DOCTYPE net [<!ENTITY a 'b'>]><net/>", dtype=np.uint8)
     with pytest.raises(ConfigError, match="DTD"):
-        read_bundle(changed(placed, tmp_path / "b.npz", lambda arrays: arrays.update({bundles.NET: doctype})))
+        read_bundle(changed(placed, tmp_path / "b.npz", lambda arrays: arrays.update({NET_ARRAY: doctype})))
     other = np.frombuffer(b"<net/>", dtype=np.uint8)
-    with pytest.raises(ConfigError, match="not what its name says"):
-        read_bundle(changed(placed, tmp_path / "c.npz", lambda arrays: arrays.update({bundles.NET: other})))
+    with pytest.raises(ConfigError, match="whose digest is another"):
+        read_bundle(changed(placed, tmp_path / "c.npz", lambda arrays: arrays.update({NET_ARRAY: other})))

@@ -9,9 +9,9 @@ from pydantic import ValidationError
 
 from risk_sac.config import DynamicElements, Environment, Interval, Odd, Requirement, Scenery
 from risk_sac.errors import FormulaError
+from risk_sac.risk.requirements import requirements_from_odd
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.risk.stl import Monitor
-from risk_sac.scenario.odd import requirements_from_odd
 from tests.hostile_formulas import formulas
 
 BUDGET_US = 40.0

@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 from risk_sac.scenario import library
-from risk_sac.scenario.place import PLACES
+from risk_sac.scenario.shipped import shipped_document
 from tests.integration.scripted_worker import DIES, ONCE, WAITS, WELL_BEHAVED
 from tests.ray_cluster import LONG_S, ROOT, Cluster, needs_ray, running, wait_until
 from tests.server import servers
@@ -64,10 +64,10 @@ def folder_beside(cluster: Cluster, run: str, *others: Path) -> Path:
 
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A place of a map, in a library that no node has."""
+    """A scenario with its net, in a library that no node has."""
     monkeypatch.setenv("RISK_SAC_PLACES", str(tmp_path / "places"))
-    place = PLACES.validate_json((ROOT / "sumo_nets" / "low" / "place.json").read_bytes())
-    return library.keep(place, (ROOT / "sumo_nets" / place.net).read_bytes())
+    document = shipped_document("low").model_copy(update={"network": "net.xml"})
+    return library.keep(document, {"net.xml": (ROOT / "sumo_nets" / "low" / "low.net.xml").read_bytes()})
 
 
 def test_a_comparison_comes_to_the_same_on_a_cluster_and_leaves_nothing_there(cluster, place, tmp_path):

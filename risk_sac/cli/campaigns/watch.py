@@ -87,7 +87,7 @@ def _prepare(options: argparse.Namespace) -> GateBounds:
 def _check_names(bounds: GateBounds, spec: CampaignSpec) -> None:
     """Refuses a bound of a requirement that no campaign ships and this one does not add."""
     if bounds.requirements:
-        from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS  # here, because loading it takes a while
+        from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS  # here, because loading it takes a while
 
         bounds.check_names([*SHIPPED_REQUIREMENTS, *(each.name for each in spec.requirements)])
 

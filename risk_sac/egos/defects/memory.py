@@ -25,7 +25,7 @@ class NoMemory(Defective):
     def sees(self, p: Perceived) -> Perceived:
         """Drops what others hide, where it is expected to be."""
         view = Sight(reach_m=math.inf, half_view_rad=math.pi, occlusion=True, unlit_m=math.inf)
-        seen = in_sight(frame_view(p.state), *2 * (p.kind[1:] == VEHICLE,), view)
+        seen = in_sight(frame_view(p.state), p.kind[1:] == VEHICLE, view)
         self._seen_s |= {id_: p.time_s for id_, visible in zip(p.ids[1:], seen, strict=True) if visible}
         latest = [self._seen_s.get(id_, -math.inf) for id_ in p.ids]
         return only(p, p.time_s - np.array(latest) < self.value + 1e-6)

@@ -114,6 +114,7 @@ class SceneOptimizer(ABC):
     """
 
     kind: ClassVar[str]
+    tries: ClassVar[int] = 1000  # further points that it may be asked for where one breaks the scenario's constraints
     driven_by: DrivenBy | None = None
 
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:

@@ -118,6 +118,7 @@ class BotorchOptimizer(SceneOptimizer):
     Every random number of an ask derives from the seed and the number of asks, so the generator has no state to save.
     """
 
+    tries = 5  # each is an optimisation
     kind = "botorch"
 
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:  # Alg. 1, l. 1

@@ -21,10 +21,11 @@ from risk_sac.egos.defects.catalogue import DEFECTS, DefectKind
 from risk_sac.egos.registry import cards
 from risk_sac.failures.export.formats import FORMATS, FormatName
 from risk_sac.records import Record
+from risk_sac.risk.requirements import requirements_from_odd
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.behaviour import behaving
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.odd import requirements_from_odd, widest
+from risk_sac.scenario.odd import widest
 
 R = TypeVar("R", bound=BaseModel)
 

@@ -31,7 +31,7 @@ def yaml_file(folder: Path, text: str) -> Path:
     ("text", "field"),
     [
         ("method: sac\nseed: 0", "family"),
-        ("family: high\nmethod: sac\nseed: 0", "family"),
+        ("family: High\nmethod: sac\nseed: 0", "family"),
         ("family: low\nmethod: sac\nseed: '3'", "seed"),
         ("family: low\nmethod: sac\nseed: 0\nbudget: {episodes: .nan}", "budget.episodes"),
         ("family: low\nrequirements: [{name: a, formula: x, scale: -1}]", "requirements[0].scale"),

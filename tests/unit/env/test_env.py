@@ -19,6 +19,7 @@ from risk_sac.errors import InfeasibleScene
 from risk_sac.records import Collision, Grade, Severity
 from risk_sac.risk.rss import time_to_encounter
 from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.shipped import shipped_names
 from risk_sac.world.geometry import relative_view
 from risk_sac.world.types import Frame, Kind, Scene
 from tests.unit.env.episodes import Outcome, episode, same
@@ -44,8 +45,13 @@ def middle(family: FamilyName, **changes: float) -> Scene:
 @each_family
 def test_gymnasiums_checker_accepts_the_registered_environment(family):
     with closing(gym.make(f"RiskSAC/{family.capitalize()}-v0", render_mode="rgb_array")) as env:
-        assert env.spec.max_episode_steps == FAMILIES[family].horizon_steps
         check_env(env.unwrapped, skip_render_check=True)  # which opens a second one; libsumo has one simulation
+
+
+def test_every_shipped_scenario_is_registered():
+    registered = {spec.kwargs.get("family") for id_, spec in gym.registry.items() if id_.startswith("RiskSAC/")}
+    assert registered == set(shipped_names())
+    assert gym.spec("RiskSAC/MotorwayCutIn-v0").kwargs == {"family": "motorway_cut_in"}
 
 
 @each_family

@@ -16,7 +16,9 @@ from risk_sac.failures.recording import Recording, trajectory_digest
 from risk_sac.failures.sentence import sentence, story
 from risk_sac.failures.show import draw_recording
 from risk_sac.failures.thumbnail import EGO, HEIGHT, STRIKER, WIDTH, thumbnail
+from risk_sac.records import ConflictType
 from risk_sac.run_folder.results import RecordedFailure
+from risk_sac.scenario.bodies import CODES
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.world.read_net import read_net
 from tests.builders import collision, judgement, violation
@@ -191,6 +193,8 @@ def encounter(*, kind: int = 0, x_m: float = 4.0, y_m: float = 3.2, heading: flo
         "released_s": np.array(RELEASE / 10),
         "ids": np.array(["ego", "lead"]),
         "kind": np.array([0, kind], np.int8),
+        "body": np.array([CODES["car"], CODES["pedestrian" if kind else "car"]], np.int8),
+        "role": np.array([0, 1], np.int8),
     }
 
 
@@ -200,8 +204,15 @@ def during(first_s: float, last_s: float, value: float) -> np.ndarray:
     return np.where((time_s > first_s - 0.05) & (time_s < last_s - 0.05), value, 0.0)
 
 
-def said(response: str = "none", broke: tuple[str, ...] = (), ego_broke: tuple[str, ...] = (), **changes: Any) -> str:
-    judged = judgement(conflict_s=1.0, broke=broke, ego_broke=ego_broke, ego_response=response)
+def said(
+    response: str = "none",
+    broke: tuple[str, ...] = (),
+    ego_broke: tuple[str, ...] = (),
+    of_judgement: dict[str, Any] | None = None,
+    **changes: Any,
+) -> str:
+    stated = {"broke": broke, "ego_broke": ego_broke, "ego_response": response, **(of_judgement or {})}
+    judged = judgement(conflict_s=1.0, **stated)
     return sentence(encounter(**changes), collision(time_s=3.5, judgement=judged))
 
 
@@ -231,6 +242,35 @@ def test_in_the_mirror_the_sides_are_exchanged():
 )
 def test_who_strikes_is_told_from_where_it_is(who, where):
     assert said(**where).startswith(f"{who}, goes on at 14 m/s; ")
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_vehicle_ahead_leads_wherever_the_ego_has_swerved_to(side):
+    beside = {"x_m": 12.0, "y_m": 3.2 * side}
+    assert "neighbour" in said(**beside)
+    assert said(of_judgement={"conflict_type": ConflictType.LEADER}, **beside).startswith("leader, 12 m ahead")
+
+
+def test_the_sentence_tells_the_ego_s_manoeuvre_and_that_the_striker_was_hidden():
+    told = said(of_judgement={"hidden": True, "ego_manoeuvre": "lane_change"})
+    assert (
+        told == "left neighbour from hiding, 4 m ahead, goes on at 14 m/s; ego at 14 m/s changing lanes does not brake"
+    )
+
+
+def test_an_ego_that_stops_in_the_conflict_is_told_apart_from_one_that_stood_before():
+    stops = encounter()
+    stops["speed_mps"][-RELEASE:, 0] = 0.2
+    starts = collision(time_s=3.5, judgement=judgement(conflict_s=1.0, ego_response="starting"))
+    assert sentence(stops, starts).endswith("stops, then starts")
+    assert sentence(encounter(), starts).endswith("ego at 14 m/s starts")
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_flicker_of_motion_is_not_told(side):
+    flicker = during(1.0, 1.2, 0.3 * side)
+    assert "goes on at 14 m/s" in said(lateral_mps=flicker)
+    assert "goes on at 14 m/s" in said(accel_mps2=np.sign(flicker) * 1.4)
 
 
 def test_a_violation_without_contact_tells_what_the_nearest_actor_did_until_then():

@@ -1,5 +1,6 @@
 import math
 import re
+from collections.abc import Mapping
 from contextlib import closing, nullcontext
 from pathlib import Path
 
@@ -13,17 +14,19 @@ from shapely.affinity import affine_transform
 
 import sumo_nets
 from risk_sac.config import EgoConfig
-from risk_sac.errors import ConfigError, DamagedError, MapError
+from risk_sac.errors import DamagedError, MapError
 from risk_sac.maps.convert import present_net
-from risk_sac.maps.cut import walk_over
 from risk_sac.maps.find_junction import turn
 from risk_sac.maps.finder import Map, place_at, survey
-from risk_sac.maps.found import NoFit, lacking
+from risk_sac.maps.found import NoFit, Pattern, lacking
+from risk_sac.maps.scenarios import NET
 from risk_sac.maps.ways import way_back, way_on
 from risk_sac.scenario import library
 from risk_sac.scenario.clearance import too_near, truck_reaches, waits_in_the_way
-from risk_sac.scenario.families import FAMILIES, family_at, family_named
-from risk_sac.scenario.place import PLACES, CrossingPlace, JunctionPlace
+from risk_sac.scenario.families import FAMILIES, family_named, family_of
+from risk_sac.scenario.family import Family
+from risk_sac.scenario.ground import kerb_of
+from risk_sac.scenario.layout import VehicleStart
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.world.net import Crossing, Edge, Link, Net, NetLane
 from risk_sac.world.read_net import read_net
@@ -42,8 +45,19 @@ def road(id_: str, a: str, b: str, metres: float, line: str) -> str:
 NETS = Path(sumo_nets.__path__[0])
 
 
-def shipped(name: str):
-    return PLACES.validate_json((NETS / name / "place.json").read_bytes())
+def found_at(name: str, pattern: Pattern, place: str) -> Family:
+    """A place on a shipped net, as a family."""
+    file = NETS / name / f"{name}.net.xml"
+    return family_of(place_at(read_net(file), pattern, place).scenario, {NET: str(file)})
+
+
+def scenes(family: Family, count: int, seed: int) -> list[Mapping[str, float]]:
+    points = np.random.default_rng(seed).random((count, family.space.dimension))
+    return [family.space.from_unit(point).values for point in points]
+
+
+def where(start: VehicleStart) -> tuple[object, ...]:
+    return start.route[0], start.lane, pytest.approx(start.position_m), start.speed_mps, start.body
 
 
 @pytest.fixture(scope="module")
@@ -53,41 +67,42 @@ def town(tmp_path_factory):
     return Map(present_net(folder / "town.osm", folder).file)
 
 
-def test_the_finder_finds_the_place_of_the_junction_that_is_shipped():
-    found = place_at(read_net(NETS / "dense" / "dense.net.xml"), "junction", "from_south").place
-    ours = shipped("dense")
-    assert isinstance(found, JunctionPlace)
-    assert found.ego == ours.ego
-    assert found.others == ours.others
-    assert found.signal == ours.signal
-    assert [stream.track for stream in found.streams] == [stream.track for stream in ours.streams]
-    # The finder leaves room for cars that turn round the corner.
-    assert (found.walk.x_m, found.walk.y_m) == pytest.approx((ours.walk.x_m, ours.walk.y_m), abs=1.0)
-    assert (found.walk.along_x, found.walk.along_y) == pytest.approx((ours.walk.along_x, ours.walk.along_y))
-    family, theirs = family_at("dense", found), FAMILIES["dense"]
-    assert family.space == theirs.space
-    assert family.odd == theirs.odd
+def test_the_finder_finds_the_junction_that_is_shipped():
+    found, shipped = found_at("dense", "junction", "from_south"), FAMILIES["dense"]
+    assert found.adversaries == shipped.adversaries
+    bounds = [[(p.name, p.low, p.high, p.odd) for p in family.space.parameters] for family in (found, shipped)]
+    assert bounds[0] == bounds[1]
+    assert found.odd == shipped.odd
+    for scene in scenes(shipped, 50, 1):
+        mine, ours = found.layout(scene), shipped.layout(scene)
+        assert where(mine.ego) == where(ours.ego)
+        assert sorted(map(where, mine.vehicles), key=str) == sorted(map(where, ours.vehicles), key=str)
+        assert (mine.signal, mine.signal_offset_s) == (ours.signal, ours.signal_offset_s)
+        (walker,), (other,) = mine.pedestrians, ours.pedestrians
+        # The finder leaves room for cars that turn round the corner.
+        assert (walker.x_m, walker.y_m) == pytest.approx((other.x_m, other.y_m), abs=1.0)
+        assert walker.heading_rad == pytest.approx(other.heading_rad)
 
 
-@pytest.mark.parametrize(("edge", "site"), [("e1", 0), ("e2", 1)])
-def test_the_finder_finds_the_crossings_that_are_shipped(edge, site):
-    found = place_at(read_net(NETS / "mixed" / "mixed.net.xml"), "crossing", edge).place
-    assert isinstance(found, CrossingPlace)
-    ours = shipped("mixed").sites[site]
-    for name in ("ego", "occluder"):
-        (mine,), (theirs,) = getattr(found.sites[0], name).pieces, getattr(ours, name).pieces[-1:]
-        assert (mine.edge, mine.lane, mine.length_m) == (theirs.edge, theirs.lane, theirs.length_m)
-        assert mine.reach_m == pytest.approx(theirs.reach_m)
-    assert found.sites[0].signalised == ours.signalised
-    assert {piece.edge for track in found.sites[0].oncoming for piece in track.pieces[-1:]} == {
-        track.pieces[-1].edge for track in ours.oncoming
-    }
-    assert (found.sites[0].walk.x_m, found.sites[0].walk.y_m) == pytest.approx((ours.walk.x_m, ours.walk.y_m))
+@pytest.mark.parametrize(("edge", "crossing"), [("e1", 0.0), ("e2", 1.0)])
+def test_the_finder_finds_the_crossings_that_are_shipped(edge, crossing):
+    found, shipped = found_at("mixed", "crossing", edge), FAMILIES["mixed"]
+    assert found.adversaries == shipped.adversaries
+    near = {"ego_distance_m": 30.0, "occluder_distance_m": 5.0, "ego_speed_mps": 6.0, "occluder_speed_mps": 0.0}
+    for scene in scenes(shipped, 20, 1):
+        scene = {**scene, **near, "crossing": crossing}
+        mine, ours = found.layout(scene), shipped.layout(scene)
+        starts, others = ({start.id: where(start) for start in layout.vehicles} for layout in (mine, ours))
+        assert (where(mine.ego), starts["occluder"]) == (where(ours.ego), others["occluder"])
+        assert {start[0] for name, start in starts.items() if name.startswith("oncoming")} == {
+            start[0] for name, start in others.items() if name.startswith("oncoming")
+        }
+        (walker,), (other,) = mine.pedestrians, ours.pedestrians
+        assert (walker.x_m, walker.y_m) == pytest.approx((other.x_m, other.y_m))
 
 
 def test_ground_that_is_found_is_the_ground_that_was_drawn_by_hand():
-    found = place_at(read_net(NETS / "dense" / "dense.net.xml"), "junction", "from_south").place
-    mine, ours = family_at("dense", found), FAMILIES["dense"]
+    mine, ours = found_at("dense", "junction", "from_south"), FAMILIES["dense"]
     middle = ours.space.from_unit(np.full(ours.space.dimension, 0.5)).values
     layouts = mine.layout(middle), ours.layout(middle)
     points = np.random.default_rng(2).uniform((-7.9, -30.0), (7.9, -4.0), (300, 2))  # the ego's road and its crossing
@@ -108,6 +123,7 @@ def test_a_town_has_places_of_all_patterns_and_each_is_kept_as_a_small_net(town,
         minus = "minus_" * fit.spot.id.startswith("-")
         assert name.startswith(f"{fit.spot.pattern}_{minus}{fit.spot.id.lstrip('-').replace('#', '_')}_")
         assert town.keep(fit) == name
+        assert library.kept(name)[0] == fit.scenario
         family = family_named(name)
         layout = family.layout(family.space.from_unit(np.full(family.space.dimension, 0.5)).values)
         assert layout.wary
@@ -123,19 +139,19 @@ def test_a_town_has_places_of_all_patterns_and_each_is_kept_as_a_small_net(town,
 def test_a_kept_place_that_was_changed_is_refused(town, tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     name = town.keep(survey(town.net, ("junction",)).fits[0])
-    net = tmp_path / name / library.NET
+    net = tmp_path / name / NET
     net.write_bytes(net.read_bytes() + b" ")
-    with pytest.raises(DamagedError, match="name the place on its map once more"):
+    with pytest.raises(DamagedError, match="keep it once more"):
         library.kept(name)
     assert town.keep(survey(town.net, ("junction",)).fits[0]) == name
     assert library.kept(name)
-    with pytest.raises(ConfigError, match="there is no place 'junction_000000000000'"):
-        family_named("junction_000000000000")
 
 
 def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_the_left(town, tmp_path, monkeypatch):
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
-    fits = [fit for fit in survey(town.net, ("crossing",)).fits if fit.place.sites[0].beyond]
+    fits = [
+        fit for fit in survey(town.net, ("crossing",)).fits if fit.scenario.actors["pedestrian"].start.side == "left"
+    ]
     assert len(fits) > 10
     family = family_named(town.keep(fits[0]))
     scene = family.space.from_unit(np.full(family.space.dimension, 0.5)).values
@@ -147,8 +163,9 @@ def test_on_a_road_of_one_lane_who_came_the_other_way_hides_a_pedestrian_from_th
     at = [Point(x, y) for x, y in zip(frame.x_m, frame.y_m, strict=True)]
     cos, sin = np.cos(frame.heading_rad[occluder]), np.sin(frame.heading_rad[occluder])
     body = affine_transform(box(-4.0, -1.2, 4.0, 1.2), [cos, -sin, sin, cos, at[occluder].x, at[occluder].y])
-    walk = fits[0].place.sites[0].walk
-    over = [Point(walk.x_m + m * walk.along_x, walk.y_m + m * walk.along_y) for m in np.arange(0.0, 12.0, 0.5)]
+    (start,) = family.layout({**scene, **hidden, "pedestrian_offset_m": 0.0}).pedestrians
+    walk = np.cos(start.heading_rad), np.sin(start.heading_rad)
+    over = [Point(start.x_m + m * walk[0], start.y_m + m * walk[1]) for m in np.arange(0.3, 12.3, 0.5)]
     assert sum(LineString([at[ego], point]).crosses(body) for point in over) >= 4  # 2 m of its way, or more
     ahead, aside = at[pedestrian].x - at[ego].x, at[pedestrian].y - at[ego].y
     assert aside * np.cos(frame.heading_rad[ego]) - ahead * np.sin(frame.heading_rad[ego]) > 3.0  # on its left
@@ -227,7 +244,7 @@ def test_nobody_is_led_where_a_signal_stays_red(tmp_path):
     turned = tmp_path / "map.net.xml"
     turned.write_text(shipped_net.replace("<junction", stays.format("rrrrgGGgrrrrgGGgGrGr"), 1))
     net = read_net(turned)
-    assert place_at(net, "junction", "from_east").place
+    assert place_at(net, "junction", "from_east").scenario
     with pytest.raises(MapError, match=r"'from_south' leads nowhere: .* its signal ever lets anybody take"):
         place_at(net, "junction", "from_south")
     turned.write_text(shipped_net.replace("<junction", stays.format("rrrrrrrrrrrrrGGgrrrr"), 1))
@@ -300,7 +317,7 @@ def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radiu
     crossing = Crossing("crossing", "j", ("a",), ((0.0, 0.0), (-6.4 * side, 0.0)), 4.0, None)
     net = Net(edges={"a": Edge("a", "i", "j", (source,))}, crossings=[crossing])
     net.onward["a"] = [Link(source, target, (middle,), None, 0)]
-    walk = walk_over(net, crossing, side * math.pi / 2)
+    walk = kerb_of(net, crossing, side * math.pi / 2)
     assert (walk.along_x, walk.along_y) == (-side, 0.0)
     waiting = [
         (walk.x_m + 0.3 * side, y) for y in np.linspace(-1.9, 1.9, 39)
@@ -311,6 +328,22 @@ def test_who_waits_at_a_kerb_is_clear_of_a_car_that_turns_round_the_corner(radiu
         car = chord.buffer(1.85 / 2, cap_style="flat")
         assert min(car.distance(Point(point)) for point in waiting) > 0.25 + 0.1  # half a person, and a little
     assert (walk.x_m == pytest.approx(-0.05 * side)) == (radius_m == 12.0)  # none is sent back without need
+
+
+LIKE = {"car_following": "low", "crossing": "mixed", "junction": "dense"}
+
+
+@pytest.mark.parametrize("pattern", LIKE)
+def test_every_place_is_a_scenario_whose_prior_fits(town, tmp_path, monkeypatch, pattern):
+    monkeypatch.setenv(library.VARIABLE, str(tmp_path))
+    for fit in survey(town.net, (pattern,)).fits[::20]:
+        family = family_named(town.keep(fit))
+        assert family.like.family == LIKE[pattern]
+        assert family.stand_ins == family.adversaries
+        assert set(family.like.actors) == set(family.adversaries)
+        for scene in scenes(family, 10, 2):
+            layout = family.layout(scene)
+            assert all(start.position_m >= 0.0 for start in (layout.ego, *layout.vehicles))
 
 
 def test_a_pattern_without_any_candidate_says_why():

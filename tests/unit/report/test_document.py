@@ -159,7 +159,7 @@ def test_a_family_whose_place_on_a_map_is_gone_is_named_and_the_others_are_told(
     monkeypatch.setenv("RISK_SAC_PLACES", str(tmp_path))
     gone = CampaignSpec.model_validate(spec.model_dump() | {"families": ("low", "junction_0123456789ab")})
     for text in both(compare(gone, [], "")):
-        assert "junction_0123456789ab: family: there is no" in text
+        assert "junction_0123456789ab: family: got" in text
         assert "scenery.speed_limit_mps" in text
 
 

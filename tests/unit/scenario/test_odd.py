@@ -7,10 +7,11 @@ from hypothesis import strategies as st
 
 from risk_sac.config import Behaviour, DynamicElements, Environment, Interval, Odd, Scenery
 from risk_sac.errors import OddError
+from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.stl import Monitor
 from risk_sac.scenario.behaviour import BOUNDS, preset
 from risk_sac.scenario.limits import limits_from_odd
-from risk_sac.scenario.odd import SHIPPED_REQUIREMENTS, intersect, requirements_from_odd
+from risk_sac.scenario.odd import intersect
 
 
 def interval(low: float, high: float) -> Interval:

@@ -52,6 +52,13 @@ def test_who_drifts_over_alongside_is_in_conflict_whatever_its_speed(found):
     assert conflict.time_s == pytest.approx(2.3125, abs=0.1)
 
 
+def test_a_vehicle_that_keeps_its_lane_does_not_cut_in_on_an_ego_that_swerves_out_behind_it(found):
+    """The ego is 1.7 m aside, more than half a lane, and touches the rear corner."""
+    swerves = sideways(straight(0.0, 0.0, 0.0, 12.0), 0.5, 0.8, 1.7)
+    conflict = found(stage(swerves, straight(60.0, 0.0, 0.0, 5.0)))
+    assert (conflict.type, conflict.came_over) == (ConflictType.LEADER, False)
+
+
 def test_who_hangs_over_alongside_is_noticed_and_in_conflict_once_it_comes(found):
     conflict = found(hangs_over(at_s=1.0, comes_at_s=3.0))
     assert (conflict.type, conflict.position) == (ConflictType.CUT_IN, "alongside")

@@ -230,6 +230,11 @@ def test_a_leader_that_brakes_for_nobody(ahead_m, y_m, kind, expected):
     assert named(led(8.0, other, kinds=(kind,))) == expected
 
 
+@pytest.mark.parametrize(("braking", "expected"), [(4.0, ()), (4.0 + 1e-6, ()), (4.1, CHECKS)])
+def test_a_brake_check_is_harder_than_drivers_of_ordinary_behaviour_brake(braking, expected):
+    assert named(led(braking)) == expected
+
+
 def walks(x_m: float, y_m: float, turn_rad: float, at_s: float) -> Motion:
     """Along the kerb towards the ego, and from `at_s` on to its right by `turn_rad`."""
     along = straight(x_m, y_m, math.pi, 1.4)

@@ -2,6 +2,7 @@
 
 import shutil
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.run_folder.results import EPISODES
 from risk_sac.scenario import library
+from risk_sac.scenario.shipped import shipped_document
 from risk_sac.search.prior.earlier import EarlierScripts, FamilyScripts, kept, pinned_prior
-from risk_sac.search.prior.sampler import PriorOptimizer
+from risk_sac.search.prior.sampler import PriorOptimizer, ReplayOptimizer
 from risk_sac.search.prior.shipped import inputs_of, shipped_prior
 from risk_sac.search.prior.start import start_of
 from tests.earlier_runs import FAILURES, SAFE, run_folder
@@ -78,10 +80,23 @@ def test_what_cannot_be_gone_on_from_is_refused_in_one_line(tmp_path, monkeypatc
     assert "\n" not in str(refused.value)
 
 
-def test_places_of_one_pattern_share_scripts_and_a_places_own_come_first():
-    scripts = FamilyScripts(adversaries=("lead",), mirrored=False, failures=(), latest=())
-    here, there = "car_following_000000000000", "car_following_111111111111"
-    subject = EarlierScripts(families={here: scripts, there: scripts, "mixed": scripts})
-    assert len(subject.alike(here)) == 1
+def test_scenarios_that_are_like_one_family_share_scripts_and_their_own_come_first():
+    scripts = FamilyScripts(adversaries=("lead",), mirrored=False, like="low", failures=(), latest=())
+    other = replace(scripts, like="mixed")
+    subject = EarlierScripts(families={"gone_000000000000": scripts, "gone_111111111111": scripts, "mixed": other})
+    assert len(subject.alike("mixed")) == 1
     assert len(subject.alike("low")) == 2
     assert subject.alike("dense") == ()
+
+
+def test_a_scenario_without_like_goes_on_from_its_own_scripts_alone(tmp_path):
+    name = library.keep(shipped_document("low").model_copy(update={"like": None}), {})
+    with pytest.raises(ConfigError):
+        pinned_prior(str(run_folder(tmp_path / "low")), [name])
+    prior = pinned_prior(str(run_folder(tmp_path / "own", name)), [name])
+    start = start_of(Problem.from_spec(RunSpec(family=name, method="risk-sac-diverse", seed=0)), prior)
+    assert (start.model, start.earlier, len(start.library)) == (None, FAILURES, FAILURES)
+    subject = ReplayOptimizer(inputs_of("low"), SceneOptimizerConfig(), 1, start)
+    for _ in range(40):
+        subject.tell(subject.ask(), 0.0)
+    assert set(subject.state()["played"]) <= set(range(FAILURES))

@@ -1,28 +1,33 @@
 from dataclasses import replace
-from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from risk_sac.config import Interval, RunSpec
+from risk_sac.config import METHODS, Interval, Like, RunSpec
 from risk_sac.env.problem import Problem
-from risk_sac.scenario import car_following
-from risk_sac.scenario.families import FAMILIES
+from risk_sac.errors import ConfigError
+from risk_sac.scenario import library
+from risk_sac.scenario.families import FAMILIES, family_of
 from risk_sac.scenario.family import Family
-from risk_sac.scenario.place import PLACES, Stretch
+from risk_sac.scenario.shipped import nets_of, shipped_document
 from risk_sac.search.prior.coordinates import Coordinates, Translation
 from risk_sac.search.prior.shipped import inputs_of, shipped_prior
 from risk_sac.search.prior.start import start_of
 from risk_sac.search.scripts import SIZE, Genes
+from risk_sac.search.searchers import Searchers
 
 
 def low_with(*sides: str) -> Family:
-    """The pattern of low where there is no lane on the other sides."""
-    place = PLACES.validate_json((Path(str(files("sumo_nets"))) / "low" / "place.json").read_bytes())
-    assert isinstance(place, Stretch)
-    gone = {side: None for side in ("left", "right") if side not in sides}
-    return car_following.family("car_following_000000000000", place.model_copy(update=gone))
+    """The scenario low without the vehicles on the other sides; mirrored where one is on the right alone."""
+    document = shipped_document("low")
+    gone = {side for side in ("left", "right") if side not in sides}
+    parameters = {name: each for name, each in document.parameters.items() if name.partition("_")[0] not in gone}
+    actors = {name: actor for name, actor in document.actors.items() if name not in gone}
+    like = Like(family="low", mirrored=sides == ("right",))
+    return family_of(
+        document.model_copy(update={"name": "narrow", "parameters": parameters, "actors": actors, "like": like}),
+        nets_of(document),
+    )
 
 
 def problem_at(family: Family) -> Problem:
@@ -63,24 +68,64 @@ def test_an_adversary_that_the_place_lacks_is_passive_to_the_model():
 
 def test_scripts_from_the_left_are_played_from_the_right_where_there_is_no_lane_on_the_left():
     place = low_with("right")
-    library = shipped_prior("low").library
-    own = translation(place, "low").own(library)
-    np.testing.assert_array_equal(genes_of(own, place, "right"), genes_of(library, FAMILIES["low"], "left"))
+    rows = shipped_prior("low").library
+    own = translation(place, "low").own(rows)
+    np.testing.assert_array_equal(genes_of(own, place, "right"), genes_of(rows, FAMILIES["low"], "left"))
     offset, shipped = place.space.names.index("right_offset_m"), FAMILIES["low"].space.names.index("left_offset_m")
-    np.testing.assert_allclose(own[:, offset], library[:, shipped])
+    np.testing.assert_allclose(own[:, offset], rows[:, shipped])
 
 
 def test_a_pedestrian_from_the_left_turns_the_other_way():
     mixed = FAMILIES["mixed"]
-    library = shipped_prior("mixed").library
-    subject = translation(replace(mixed, mirrored=True), "mixed")
-    own = subject.own(library)
+    rows = shipped_prior("mixed").library
+    subject = translation(replace(mixed, like=Like(family="mixed", mirrored=True)), "mixed")
+    own = subject.own(rows)
     steer, offset = Genes._fields.index("steer"), mixed.space.names.index("pedestrian_offset_m")
-    there, here = genes_of(library, mixed, "pedestrian"), genes_of(own, mixed, "pedestrian")
+    there, here = genes_of(rows, mixed, "pedestrian"), genes_of(own, mixed, "pedestrian")
     np.testing.assert_allclose(here[:, steer], 1.0 - there[:, steer])
-    np.testing.assert_allclose(own[:, offset], 1.0 - library[:, offset])
+    np.testing.assert_allclose(own[:, offset], 1.0 - rows[:, offset])
     np.testing.assert_allclose(np.delete(here, steer, 1), np.delete(there, steer, 1))
-    np.testing.assert_allclose(subject.known(own), library, atol=1e-12)
+    np.testing.assert_allclose(subject.known(own), rows, atol=1e-12)
+
+
+def test_actors_take_the_scripts_of_those_that_they_stand_for():
+    document = shipped_document("low")
+    actors = {"truck" if name == "left" else name: actor for name, actor in document.actors.items()}
+    like = Like(family="low", actors={"truck": "left"})
+    family = family_of(document.model_copy(update={"actors": actors, "like": like}), nets_of(document))
+    rows = shipped_prior("low").library
+    own = translation(family, "low").own(rows)
+    np.testing.assert_array_equal(genes_of(own, family, "truck"), genes_of(rows, FAMILIES["low"], "left"))
+    np.testing.assert_allclose(translation(family, "low").known(own), rows, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("like", "field"),
+    [
+        (Like(family="high"), "like.family"),
+        (Like(family="low"), "like.actors.occluder"),
+        (Like(family="mixed", actors={"occluder": "pedestrian"}), "like.actors.occluder"),
+        (Like(family="mixed", actors={"follower": "occluder"}), "like.actors.follower"),
+    ],
+)
+def test_a_prior_that_does_not_fit_is_refused(like, field):
+    document = shipped_document("mixed")
+    with pytest.raises(ConfigError) as refused:
+        family_of(document.model_copy(update={"like": like}), nets_of(document))
+    assert refused.value.field == field
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_scenario_without_like_is_searched_cold_by_every_method(method, tmp_path, monkeypatch):
+    if METHODS[method].needs:
+        pytest.importorskip(METHODS[method].needs)
+    monkeypatch.setenv(library.VARIABLE, str(tmp_path))
+    name = library.keep(shipped_document("mixed").model_copy(update={"like": None}), {})
+    spec = RunSpec(family=name, method=method, seed=0)
+    problem = Problem.from_spec(spec)
+    assert start_of(problem, "shipped") is None
+    searchers = Searchers(spec, problem, problem.observation_size, problem.action_size)
+    assert searchers.next(learning=True).sampler.ask().shape[-1] >= problem.space.dimension
 
 
 def test_rows_that_depend_on_a_missing_adversary_are_drawn_less_often():
