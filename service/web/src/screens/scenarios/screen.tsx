@@ -36,6 +36,7 @@ export function ScenariosScreen({ query }: { query: URLSearchParams }) {
                   <input
                     type="search"
                     maxLength={200}
+                    size={30}
                     placeholder="words of a name, summary or tag"
                     value={text}
                     onInput={(event) => replace(address(["scenarios"], { search: event.currentTarget.value }))}
