@@ -38,7 +38,7 @@ def test_show_draws_by_the_services_id_or_any_part_that_tells_it(folder, tmp_pat
         (["--scenario", "low", "--ego", "No/body"], "--ego: "),
         (["--scenario", "low", "--episodes", "-3"], "--episodes: "),
         (["--scenario", "low", "--seed", "-1"], "--seed: "),
-        ([], "--scenario is missing; choose low, mixed, dense"),
+        ([], "--scenario is missing; choose low, mixed or dense"),
         (["--spec", "nowhere.yaml"], "--spec: "),
     ],
 )
