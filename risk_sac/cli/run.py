@@ -108,8 +108,8 @@ def _run(options: argparse.Namespace) -> int:
     if families:
         options.family = families[0]
     if options.spec is None and options.family is None:
-        remedy = "or a map with --network, or a file with --spec"
-        raise ConfigError("family", "nothing", "low, mixed, dense, another scenario or a file", remedy)
+        remedy = "or another scenario or its file, a map with --network, or settings with --spec"
+        raise ConfigError("family", "nothing", "low, mixed or dense", remedy)
     options.family = options.family and kept_name(options.family)
     named = {name: getattr(options, name) for name in ("family", "method", "seed", "prior")}
     spec = read_spec(options.spec, named | budget_flags(options) | scene_flags(options))

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from risk_sac.config import Odd
-from risk_sac.config.scenario import EGO, AllOf, Constraint, Scenario
+from risk_sac.config.scenario import EGO, AllOf, Constraint, Moving, Scenario, Stream
 from risk_sac.config.values import Comparison, Expression, Term, comparison, term
 from risk_sac.errors import ConfigError, InfeasibleScene, did_you_mean
 from risk_sac.scenario.bodies import BODIES
@@ -69,11 +69,13 @@ def bodies_of(layout: Layout, net: Net, after_s: float = 0.0) -> dict[str, Float
       after_s: time since the start, in which all go on straight ahead at their initial speeds.
     """
     boxes = {start.id: _in_lane(start, net) for start in (layout.ego, *layout.vehicles)}
-    boxes |= {s.id: _box(s.x_m, s.y_m, s.heading_rad, s.body) for s in (*layout.pedestrians, *layout.statics)}
-    for start in (layout.ego, *layout.vehicles, *layout.pedestrians):
-        box = boxes[start.id]
-        boxes[start.id] = box + (box[1] - box[2]) / np.linalg.norm(box[1] - box[2]) * start.speed_mps * after_s
-    return boxes
+    boxes |= {start.id: _box(start.x_m, start.y_m, start.heading_rad, start.body) for start in layout.pedestrians}
+    speeds_mps = {start.id: start.speed_mps for start in (layout.ego, *layout.vehicles)}
+    speeds_mps |= {start.id: start.speed_mps for start in layout.pedestrians}
+    for name, speed_mps in speeds_mps.items():
+        along = boxes[name][1] - boxes[name][2]
+        boxes[name] = boxes[name] + along / np.linalg.norm(along) * speed_mps * after_s
+    return boxes | {start.id: _box(start.x_m, start.y_m, start.heading_rad, start.body) for start in layout.statics}
 
 
 def _in_lane(start: VehicleStart, net: Net) -> Floats:
@@ -148,8 +150,9 @@ def _check_horizon(of: Interpreter) -> None:
 
 def _check_bodies(of: Interpreter) -> None:
     document = of.document
-    moving = {EGO: document.ego, **{f"actors.{name}": actor for name, actor in document.actors.items()}}
-    for path, actor in (*moving.items(), *((f"streams.{name}", stream) for name, stream in document.streams.items())):
+    moving: dict[str, Moving] = {EGO: document.ego, **{f"actors.{name}": a for name, a in document.actors.items()}}
+    streams: dict[str, Moving | Stream] = {f"streams.{name}": stream for name, stream in document.streams.items()}
+    for path, actor in (moving | streams).items():
         for name in of.alternatives(actor.body):
             body = body_named(name, f"{path}.body")
             motion = of.moves(path.removeprefix("actors."), body) if path in moving else "lanes"
@@ -239,7 +242,7 @@ def without_effect(of: Interpreter, layouts: int = 5) -> list[str]:
 
 
 def _moved(of: Interpreter, point: Floats, axis: int) -> bool:
-    ends = []
+    ends = list[Layout | None]()
     for end in (0.0, 1.0):
         point = point.copy()
         point[axis] = end

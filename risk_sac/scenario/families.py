@@ -77,20 +77,22 @@ def sampled(of: Interpreter, count: int = SAMPLED) -> Iterator[Layout | Infeasib
 
 
 def _odd(of: Interpreter) -> Odd:
-    """The default ODD: the roads that the ego drives on, what goes on anywhere, and what the document says of it."""
+    """The default ODD: the roads of the ego's way, what goes on anywhere, and what the document says of it."""
     layouts = [layout for layout in sampled(of) if isinstance(layout, Layout)]
     if not layouts:
         refused = next(str(refused) for refused in sampled(of) if isinstance(refused, InfeasibleScene))
         raise ConfigError("constraints", f"none of {SAMPLED} scenes is possible; in the first, {refused}")
     lanes = [(net_of(layout.net), f"{layout.ego.route[0]}_{layout.ego.lane}") for layout in layouts]
     limits_mps = [net.lanes[lane].limit_mps for net, lane in lanes]
+    driven = {(layout.net, edge) for layout in layouts for edge in layout.ego.route}
+    fastest_mps = max(lane.limit_mps for file, edge in driven for lane in net_of(file).edges[edge].drivable)
     counts = [len(net.edges[net.lanes[lane].edge].drivable) for net, lane in lanes]
     kinds: dict[bool, SignalType] = {False: "none", True: "fixed_time"}
     crossings: set[CrossingType] = {kind for layout in layouts for kind in of.crossings(layout.net)} or {"none"}
     met = {SIGNAL_OF[kind] for kind in crossings if kind in SIGNAL_OF}
     usual = usual_odd(
         lanes=Interval(low=min(counts), high=max(counts)),
-        limit_mps=Interval(low=min(limits_mps), high=max(limits_mps)),
+        limit_mps=Interval(low=min(limits_mps), high=fastest_mps),
         signals=tuple(sorted({kinds[layout.signal is not None] for layout in layouts} | met)),
         crossings=tuple(sorted(crossings)),
         walked=any(layout.pedestrians for layout in layouts),

@@ -31,7 +31,8 @@ def out_of_reach(layouts: Sequence[Layout], limits: Limits) -> list[str]:
     for layout in layouts:
         net, horizon_s = net_of(layout.net), layout.horizon_steps * STEP_S
         ego_way = _way(net, layout.ego, layout.ego.route, horizon_s * limits.speed_mps)
-        for start in (*layout.vehicles, *layout.pedestrians):
+        starts: tuple[VehicleStart | PedestrianStart, ...] = (*layout.vehicles, *layout.pedestrians)
+        for start in starts:
             if start.role.name != "ADVERSARY" or reached.get(start.id):
                 continue
             bounds = limits.of(BODIES[start.body])
@@ -47,7 +48,7 @@ def out_of_reach(layouts: Sequence[Layout], limits: Limits) -> list[str]:
 
 def _way(net: Net, start: VehicleStart, route: Sequence[str], most_m: float) -> shapely.Geometry:
     """All lanes of a route from a start on, and the ways between them."""
-    shapes = list(_rest(net, start))
+    shapes = list(_rest(net, start, most_m))
     left_m = most_m - (net.edges[route[0]].lanes[0].length_m - start.position_m)
     for edge, following in pairwise(route):
         if left_m <= 0.0:
@@ -63,7 +64,10 @@ def _way(net: Net, start: VehicleStart, route: Sequence[str], most_m: float) -> 
 def _anywhere(net: Net, start: VehicleStart, most_m: float) -> shapely.Geometry:
     """All lanes that a vehicle may get to."""
     first = start.route[0]
-    shapes, been = list(_rest(net, start)), {first: most_m - net.edges[first].lanes[0].length_m + start.position_m}
+    shapes, been = (
+        list(_rest(net, start, most_m)),
+        {first: most_m - net.edges[first].lanes[0].length_m + start.position_m},
+    )
     waiting = [first]
     while waiting:
         edge = waiting.pop()
@@ -79,10 +83,10 @@ def _anywhere(net: Net, start: VehicleStart, most_m: float) -> shapely.Geometry:
     return shapely.union_all(shapes)
 
 
-def _rest(net: Net, start: VehicleStart) -> Iterator[shapely.Geometry]:
+def _rest(net: Net, start: VehicleStart, most_m: float) -> Iterator[shapely.Geometry]:
     for lane in net.edges[start.route[0]].drivable:
         line = shapely.LineString(lane.line)
-        yield substring(line, min(start.position_m, line.length), line.length)
+        yield substring(line, min(start.position_m, line.length), min(start.position_m + most_m, line.length))
 
 
 def _lines(lines: Iterable[Sequence[tuple[float, float]]]) -> list[shapely.Geometry]:

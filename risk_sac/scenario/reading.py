@@ -135,10 +135,9 @@ def _in_document(location: Location, fields: Any, *, missing: bool) -> Location:
     """A location without the names that pydantic gives to the alternatives of a field."""
     path, here = list[int | str](), fields
     for i, part in enumerate(location):
-        if (isinstance(here, dict) and part in here) or (
-            isinstance(here, list | tuple) and isinstance(part, int) and part < len(here)
-        ):
-            here = here[part]
+        inner: Any = dict(enumerate(here)) if isinstance(here, list) else here
+        if isinstance(inner, dict) and part in inner:
+            here = inner[part]
         elif not (missing and i == len(location) - 1):
             continue
         path.append(part)

@@ -48,7 +48,7 @@ PARAMETERS: Mapping[str, str] = {
     "twin": "idle",
     "name": "ecr_low",
     "format": "png",
-    "scenario": "low",
+    "scenario": "bus_pulls_out_aaab21bcb1e7",
 }
 """Of what a path has to name."""
 QUERIES: Mapping[str, Mapping[str, str]] = {
@@ -79,7 +79,18 @@ CAMPAIGNS = {
         "methods": ["archive"],
     },
 }
+SCENARIOS = {
+    "A van ahead of the ego": {
+        "name": "braking_van",
+        "network": "low",
+        "parameters": {"gap": {"unit": "m", "range": [20, 50]}},
+        "ego": {"start": {"lane": "road_1", "at_m": 200}, "speed": 12},
+        "actors": {"van": {"body": "van", "start": {"ahead_of": "ego", "gap_m": "gap"}, "speed": 12}},
+    }
+}
 BODIES: Mapping[str, Mapping[str, Any]] = {
+    "post_scenario": SCENARIOS,
+    "check_scenario": SCENARIOS,
     "post_campaign": CAMPAIGNS,
     "check_campaign": CAMPAIGNS,
     "put_triage": {"A confirmed failure": {"state": "confirmed", "comment": "late braking, see ticket 12"}},
@@ -99,7 +110,8 @@ def describe_calls(paths: dict[str, dict[str, Any]]) -> None:
                 if parameter.get("required"):
                     parameter["example"] = example_of(name, parameter["name"])
             bodies = BODIES.get(name, {})
-            for content in operation.get("requestBody", {}).get("content", {}).values() if bodies else ():
+            content = operation.get("requestBody", {}).get("content", {}).get("application/json")
+            if bodies and content is not None:
                 content["examples"] = {said: {"value": value} for said, value in bodies.items()}
             operation["description"] += f"\n\nExample: `{command(method, path, name)}`"
 

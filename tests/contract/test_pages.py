@@ -16,6 +16,7 @@ from risk_sac.failures.from_above import MARKS
 from risk_sac.maps.found import TITLES, Pattern
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from service.api.routes.catalogue import list_families
 
 ROOT = Path(__file__).parents[2]
@@ -101,7 +102,7 @@ def signal_rows() -> list[str]:
 def requirement_rows() -> list[str]:
     """Each once, with the families that have it."""
     families: dict[Requirement, list[str]] = {}
-    for family in FAMILIES:
+    for family in PAPER_FAMILIES:
         for requirement in defaults(family):
             families.setdefault(requirement, []).append(family)
     return [

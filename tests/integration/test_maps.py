@@ -97,7 +97,7 @@ def _refuses(service: Service, ground: dict[str, str]) -> None:
         assert says in answer.text
         assert answer.json()["errors"][0]["field"] == field, answer.text
     answer = service.client.post("/v1/campaigns/check", json={"families": ["junction_000000000000"]})
-    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "family")
+    assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "families[0]")
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,9 @@ import { MapsScreen } from "./screens/maps/screen";
 import { NewScreen } from "./screens/new/screen";
 import { PairScreen } from "./screens/pair/screen";
 import { ReplayScreen } from "./screens/replay/screen";
+import { EditorScreen } from "./screens/scenarios/editor";
+import { ScenarioScreen } from "./screens/scenarios/one";
+import { ScenariosScreen } from "./screens/scenarios/screen";
 import { useSignal } from "./signal";
 import { Login } from "./ui/login";
 import { Empty } from "./ui/states";
@@ -38,6 +41,7 @@ export function App() {
         <nav aria-label="Main">
           <Tab to="#/campaigns">Campaigns</Tab>
           <Tab to="#/new">New campaign</Tab>
+          <Tab to="#/scenarios">Scenarios</Tab>
           <Tab to="#/maps">Maps</Tab>
           <Tab to="#/compare">Compare</Tab>
           <a href={absolute("docs")}>API</a>
@@ -75,6 +79,10 @@ function screen({ parts, query }: Place): ComponentChildren {
   const [room = "campaigns", id, part, failure, twin, kind] = parts;
   if (room === "campaigns" && id === undefined) return <CampaignsScreen query={query} />;
   if (room === "new") return <NewScreen query={query} />;
+  if (room === "scenarios" && part === undefined) {
+    if (id === undefined) return <ScenariosScreen query={query} />;
+    return id === "new" ? <EditorScreen query={query} /> : <ScenarioScreen name={id} key={id} />;
+  }
   if (room === "maps" && part === undefined) return id === undefined ? <MapsScreen /> : <MapScreen id={id} query={query} key={id} />;
   if (room === "compare") return <CompareScreen query={query} />;
   if (room === "campaigns" && id !== undefined) {

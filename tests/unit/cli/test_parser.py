@@ -72,6 +72,6 @@ def test_keys_hands_its_words_on_with_their_flags():
 
 
 def test_a_flag_may_be_shortened_and_words_after_two_dashes_are_no_flags():
-    options, unknown = cli._parser().parse_known_args(["run", "--fam", "low", "--out", "x"])
+    options, unknown = cli._parser().parse_known_args(["run", "--scen", "low", "--out", "x"])
     assert (options.family, unknown) == ("low", [])
     assert cli._parser().parse_known_args(["show", "--", "--results"])[0].results.name == "--results"

@@ -83,3 +83,9 @@ def test_a_scene_without_some_of_its_adversaries_plays() -> None:
             assert there == set(family.vehicles) & set(env.trace.frames[-1].ids)
     finally:
         env.close()
+
+
+def test_speeds_of_the_whole_way_belong_to_the_odd() -> None:
+    odd = FAMILIES["ramp_merge_ego"].odd  # it begins on a ramp of 22.22 m/s and merges onto a motorway of 36 m/s
+    assert odd.scenery.speed_limit_mps is not None
+    assert (odd.scenery.speed_limit_mps.low, odd.scenery.speed_limit_mps.high) == (22.22, 36.0)

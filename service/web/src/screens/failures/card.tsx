@@ -10,7 +10,7 @@ import { NO_CONTACT } from "../../ui/violations";
 import { variantOf } from "./filters";
 import type { Found } from "./found";
 import { halves, TRIAGE } from "./naming";
-import { useThumbnail } from "./thumbnails";
+import { useThumbnail } from "../../ui/thumbnails";
 import type { FailureTable } from "./wire";
 
 interface Props {

@@ -233,19 +233,23 @@ interface Offered {
   costs?: Values;
   /** Those that are shown first; the others are folded away. Without it all are shown. */
   first?: readonly string[];
+  /** What is offered, where the API's description has no list of it. */
+  offers?: readonly string[];
+  /** Leaves out what is not chosen and does not match. */
+  matches?: (option: string) => boolean;
   help?: string;
   /** Called when one was chosen or dropped. */
   changed?: () => void;
 }
 
 /** Some of a few names, each with a box. */
-export function Choices({ field, path, abouts = {}, costs = {}, first, help, changed }: Offered) {
+export function Choices({ field, path, abouts = {}, costs = {}, first, help, changed, offers, matches = () => true }: Offered) {
   const { id, value, change, wrong } = useField<string[]>(path, true);
-  const offered = field.shape.kind === "list" && field.shape.item.kind === "choice" ? field.shape.item.options : [];
+  const offered = offers ? offers : field.shape.kind === "list" && field.shape.item.kind === "choice" ? field.shape.item.options : [];
   const options = [...new Set([...offered, ...value])]; // a clone may have what a form does not offer: a place of a map
   const toggle = (option: string) => options.filter((each) => (each === option) !== value.includes(each));
-  const shown = first ? [...first.filter((each) => options.includes(each))] : options;
-  const folded = options.filter((each) => !shown.includes(each));
+  const shown = first ? [...first.filter((each) => options.includes(each))] : options.filter((option) => value.includes(option) || matches(option));
+  const folded = first ? options.filter((each) => !shown.includes(each)) : [];
   const picked = folded.filter((each) => value.includes(each)).length;
   const [opened, setOpened] = useState(picked > 0);
   useEffect(() => {

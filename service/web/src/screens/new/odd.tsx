@@ -15,7 +15,7 @@ const BEHAVIOUR: Path = ["odd", "dynamic", "behaviour"];
 
 export function OddFields({ shape, families }: { shape: Shape; families: readonly Family[] }) {
   if (shape.kind !== "object") return null;
-  if (families.length === 0) return <p class="help">Choose a family first: it says what there is to narrow.</p>;
+  if (families.length === 0) return <p class="help">Choose a shipped scenario: it says what there is to narrow. A scenario of your own has its domain in its document.</p>;
   return (
     <>
       {shape.fields.map((branch) => (

@@ -18,11 +18,12 @@ import { applied, isOf, PRESETS } from "./presets";
 import { Preview } from "./preview";
 import { Requirements } from "./requirements";
 import { posted, type Description, type Field, type Json, type Shape, type Values } from "./schema";
+import { Scenarios } from "./scenarios";
 import { Submit } from "./submit";
 import { filled, leaves, put, type Path } from "./values";
 import "./new.css";
 
-type Known = [Description, Body<"Families">, Body<"Methods">];
+type Known = [Description, Body<"Families">, Body<"Methods">, Body<"ScenarioList">];
 
 export function NewScreen({ query }: { query: URLSearchParams }) {
   useTitle("New campaign");
@@ -31,6 +32,8 @@ export function NewScreen({ query }: { query: URLSearchParams }) {
   const description = useAsked<Description>("openapi.json");
   const families = useAsked<Body<"Families">>("v1/families");
   const methods = useAsked<Body<"Methods">>("v1/methods");
+  const scenarios = useAsked<Body<"ScenarioList">>("v1/scenarios");
+  const scenario = query.get("scenario");
   const cloned = useAsked<Values>(from === null ? null : `v1/campaigns/${encodeURIComponent(from)}/spec?format=json`);
   return (
     <>
@@ -42,15 +45,21 @@ export function NewScreen({ query }: { query: URLSearchParams }) {
           <Shown asked={families} what="the families">
             {(known) => (
               <Shown asked={methods} what="the methods">
-                {(search) => {
-                  const given: Known = [described, known, search];
-                  if (from === null) return <CampaignForm key={JSON.stringify(ground)} known={given} ground={ground} />;
-                  return (
-                    <Shown asked={cloned} what="the campaign to begin with">
-                      {(spec) => <CampaignForm key={from} known={given} from={{ id: from, spec }} ground={null} />}
-                    </Shown>
-                  );
-                }}
+                {(search) => (
+                  <Shown asked={scenarios} what="the scenarios">
+                    {(offered) => {
+                      const given: Known = [described, known, search, offered];
+                      if (from === null) {
+                        return <CampaignForm key={JSON.stringify([ground, scenario])} known={given} ground={ground} scenario={scenario} />;
+                      }
+                      return (
+                        <Shown asked={cloned} what="the campaign to begin with">
+                          {(spec) => <CampaignForm key={from} known={given} from={{ id: from, spec }} ground={null} />}
+                        </Shown>
+                      );
+                    }}
+                  </Shown>
+                )}
               </Shown>
             )}
           </Shown>
@@ -65,12 +74,16 @@ interface Begun {
   from?: { id: string; spec: Values };
   /** Where on a map, if on one. */
   ground: Ground | null;
+  /** The scenario to begin with. */
+  scenario?: string | null;
 }
 
-function CampaignForm({ known: [description, families, methods], from, ground }: Begun) {
+function CampaignForm({ known: [description, families, methods, scenarios], from, ground, scenario }: Begun) {
   const shape = useMemo(() => posted(description, "/v1/campaigns"), [description]);
   const [spec, setSpec] = useState<Values>(() =>
-    from ? (filled(shape, from.spec) as Values) : applied(PRESETS[0]!, filled(shape, {}) as Values),
+    from
+      ? (filled(shape, from.spec) as Values)
+      : { ...applied(PRESETS[0]!, filled(shape, {}) as Values), ...(scenario ? { families: [scenario] } : {}) },
   );
   const body = useMemo(() => {
     const whole = bodyOf(shape, spec);
@@ -105,7 +118,7 @@ function CampaignForm({ known: [description, families, methods], from, ground }:
             {ground ? (
               <OnMap ground={ground} extent={extent} />
             ) : (
-              <Choices field={field("families")} path={["families"]} abouts={summaries(families.items)} />
+              <Scenarios field={field("families")} items={scenarios.items} />
             )}
             <Choices
               field={field("methods")}

@@ -33,7 +33,7 @@ export function Submit({ spec, places, verdict, wrong, refused, busy }: Ready) {
         </span>
       </div>
       <p class="help">
-        {places === null ? plural(length("families"), "family", "families") : plural(places ?? 0, "place", "places")} × {plural(length("methods"), "method", "methods")} ×{" "}
+        {places === null ? plural(length("families"), "scenario", "scenarios") : plural(places ?? 0, "place", "places")} × {plural(length("methods"), "method", "methods")} ×{" "}
         {plural(length("seeds"), "seed", "seeds")}
         {spec.iid && ", and the i.i.d. phase"}
       </p>

@@ -1,15 +1,20 @@
-/** Small pictures of failures: asked for when a card stays in view, and kept for when it comes back. */
+/** Small pictures on cards: requested once a card stays in view, and kept for its return. */
 
 import { useEffect, useState } from "preact/hooks";
-import { call, Problem } from "../../api/client";
+import { call, Problem } from "../api/client";
+import type { Turn } from "../api/turn";
 
 const KEPT = 400;
 const STAYS_MS = 90; // cards that only fly by are not asked for
 const AGAIN_MS = 2000;
 const kept = new Map<string, string>(); // path -> blob URL, the one used last at the end
 
-/** The picture's address; null while it loads, empty where there is none. */
-export function useThumbnail(path: string): string | null {
+/**
+ * The picture's address; null while it loads, empty where there is none.
+ *
+ * @param turn delays the request, where the service draws few pictures at once.
+ */
+export function useThumbnail(path: string, turn: Turn = (act) => act()): string | null {
   const [state, setState] = useState<{ path: string; url: string | null }>({ path, url: used(path) });
   useEffect(() => {
     const there = used(path);
@@ -19,7 +24,7 @@ export function useThumbnail(path: string): string | null {
     let timer: ReturnType<typeof setTimeout>;
     const ask = async () => {
       try {
-        const picture = await (await call(path, { signal: left.signal })).blob();
+        const picture = await turn(async () => (await call(path, { signal: left.signal })).blob());
         if (!left.signal.aborted) setState({ path, url: keep(path, URL.createObjectURL(picture)) });
       } catch (error) {
         if (left.signal.aborted) return;
