@@ -22,7 +22,7 @@ def requirement(formula):
     [
         ("{}", "families", "nothing", "a value"),
         ("[]", "", "[]", "a JSON object"),
-        ('{"families": ["high"]}', "families[0]", '"high"', "'low', 'mixed' or 'dense'"),
+        ('{"families": ["high"]}', "families[0]", "'high', which is no scenario", "one of low, mixed, dense,"),
         ('{"families": []}', "families", "[]", "at least 1 entries"),
         ('{"families": ["low", "low"]}', "families", "['low', 'low']", "each value once"),
         (low(methods=["sca"]), "methods[0]", '"sca"', "'risk-sac'"),
