@@ -88,7 +88,7 @@ def test_a_refusal_stands_beside_its_field(page_at: Callable[..., Page], service
     episodes = page.locator(".field", has=page.get_by_label("Episodes", exact=True))
     expect(episodes.get_by_role("alert")).to_contain_text("greater than or equal to 1")
     expect(page.get_by_label("Episodes", exact=True)).to_have_attribute("aria-invalid", "true")
-    expect(page.get_by_role("group", name="Families").get_by_role("alert")).to_contain_text("at least 1 item")
+    expect(page.get_by_role("group", name="Scenarios").get_by_role("alert")).to_contain_text("at least 1 item")
     page.get_by_role("button", name="budget.episodes").click()
     expect(page.get_by_label("Episodes", exact=True)).to_be_focused()
     page.get_by_label("Episodes", exact=True).fill("3")
