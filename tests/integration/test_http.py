@@ -27,7 +27,14 @@ def test_head_answers_as_get_does_without_the_body(client, campaign):
     paths = [path for path, methods in client.get("/openapi.json").json()["paths"].items() if "get" in methods]
     assert len(paths) > 15
     for path in [*paths, "/docs", "/docs/swagger-ui.css", "/nothing"]:
-        ids = {"campaign_id": campaign, "failure_id": "x", "network_id": "x", "regression_id": "x", "run_id": "x"}
+        ids = {
+            "campaign_id": campaign,
+            "failure_id": "x",
+            "network_id": "x",
+            "regression_id": "x",
+            "run_id": "x",
+            "scenario": "low",
+        }
         url = path.format(**ids, name="ecr_low", format="png", twin="idle")
         with client.stream("GET", url) as got:
             pass

@@ -6,7 +6,7 @@ import pytest
 from risk_sac.config import RunSpec, SceneOptimizerConfig
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
-from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.prior.files import DATA, MOST_BYTES
 from risk_sac.search.prior.sampler import Arm, PriorOptimizer, Yields
 from risk_sac.search.prior.shipped import Prior, inputs_of, read_prior, shipped_prior, write_prior
@@ -25,9 +25,9 @@ def optimizer(kind: type[PriorOptimizer] = PriorOptimizer, seed: int = 1) -> Pri
 
 
 def test_a_prior_is_shipped_for_each_family_within_three_megabytes():
-    assert {path.stem for path in DATA.glob("*.npz")} == {*FAMILIES, "low-policy", "mixed-policy"}
+    assert {path.stem for path in DATA.glob("*.npz")} == {*PAPER_FAMILIES, "low-policy", "mixed-policy"}
     assert sum(path.stat().st_size for path in DATA.glob("*.npz")) <= MOST_BYTES
-    for family in FAMILIES:
+    for family in PAPER_FAMILIES:
         prior = shipped_prior(family)
         assert prior.library.shape == (len(prior.library_kinds), inputs_of(family))
         assert len(prior.library) <= 300
@@ -36,7 +36,7 @@ def test_a_prior_is_shipped_for_each_family_within_three_megabytes():
 def test_the_test_set_and_planners_are_not_among_the_training_egos():
     from risk_sac.egos.defects.catalogue import DEFECTS
 
-    for family in FAMILIES:
+    for family in PAPER_FAMILIES:
         prior = shipped_prior(family)
         egos = set(prior.model.egos)
         assert not egos & {name for name, defect in DEFECTS.items() if defect.test_set}
