@@ -1,7 +1,6 @@
 """`risk-sac scenarios`: lists, shows, checks, draws and copies scenario documents."""
 
 import argparse
-from collections.abc import Mapping
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
@@ -76,12 +75,7 @@ def kept_name(name_or_file: str) -> str:
         for fault in (error, *error.others):
             fault.field = f"{name_or_file}: {fault.field}".removesuffix(": ")
         raise
-    return library.keep(document, own_nets(nets))
-
-
-def own_nets(nets: Mapping[str, str]) -> dict[str, bytes]:
-    """Reads the nets that do not ship, by the document's names for them."""
-    return {name: Path(file).read_bytes() for name, file in nets.items() if Path(file).is_absolute()}
+    return library.keep(document, library.own_nets(nets))
 
 
 def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
@@ -98,7 +92,7 @@ def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
 
 
 def is_file(name_or_file: str) -> bool:
-    """Whether it names a file; one with a folder or an ending does, although it may not be there."""
+    """Whether a word names a file: it has a folder or an ending."""
     if Path(name_or_file).suffix or "/" in name_or_file:
         if not Path(name_or_file).is_file():
             remedy = "check its path, or name a scenario of `risk-sac scenarios list`"

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Generic, Literal, Self, TypeVar, get_args
 
 from pydantic import Field, StringConstraints, model_validator
+from pydantic.fields import FieldInfo
 
 from risk_sac.config.base import Settings
 from risk_sac.config.campaign import JudgeConfig, Requirement
@@ -78,7 +79,10 @@ class ScenarioParameter(Settings):
 
 
 class Start(Settings):
-    """Where an actor starts: on or beside a lane, relative to another actor, at a crossing's kerb, or at a point."""
+    """Where an actor starts.
+
+    On or beside a lane, relative to another actor, at a crossing's kerb, or at a point.
+    """
 
     lane: Lane | None = None
     """Lane, such as `road_1`, or an edge, of which the leftmost lane is taken that leads where the actor goes."""
@@ -120,14 +124,13 @@ class Start(Settings):
         given = [name for name in _FORMS if getattr(self, name) is not None]
         if len(given) != 1:
             raise ConfigError("", " and ".join(given) or "none of them", f"one of {', '.join(_FORMS)}")
-        form = given[0]
-        belongs = ["at_m", "before", "distance_m", "gap_m", "ahead_m", "y_m"]
-        wanted = _FORMS[form]
-        for name in belongs:
-            if getattr(self, name) is None and name in wanted and form != "lane":
+        form, belongs = given[0], _FORMS[given[0]]
+        for name, field in type(self).model_fields.items():
+            stated = getattr(self, name) != field.default
+            if stated and name not in (form, *belongs, "lead_in"):
+                raise ConfigError(name, "a value", f"nothing beside {form}, which goes with {', '.join(belongs)}")
+            if not stated and name in belongs and field.default is None and form != "lane":
                 raise ConfigError(name, "nothing", f"a value, beside {form}")
-            if getattr(self, name) is not None and name not in wanted:
-                raise ConfigError(name, "a value", f"nothing beside {form}")
         if form == "lane" and (self.at_m is None) == (self.before is None):
             raise ConfigError("", "at_m and before" if self.before else "neither at_m nor before", "one of them")
         if self.before is not None and self.distance_m is None:
@@ -140,24 +143,25 @@ class Start(Settings):
         return self.ahead_of or self.behind or self.beside
 
 
-_FORMS: Mapping[str, tuple[str, ...]] = {
-    "lane": ("at_m", "before", "distance_m"),
-    "ahead_of": ("gap_m",),
-    "behind": ("gap_m",),
-    "beside": ("ahead_m",),
-    "crossing": (),
-    "x_m": ("y_m",),
+_WALK = ("setback_m", "offset_m")
+_BESIDE = ("lanes_left", "left_m", "heading_deg")
+_FORMS: Mapping[str, tuple[str, ...]] = {  # field that tells a form → those that go with it
+    "lane": ("at_m", "before", "distance_m", "left_m", "heading_deg", *_WALK),
+    "ahead_of": ("gap_m", *_BESIDE),
+    "behind": ("gap_m", *_BESIDE),
+    "beside": ("ahead_m", *_BESIDE),
+    "crossing": ("side", *_WALK),
+    "x_m": ("y_m", "heading_deg", *_WALK),
 }
 
 
-class Moving(Settings):
-    """What the ego and other actors have in common."""
+class Driven(Settings):
+    """What all that moves has in common."""
 
     body: Word | Chosen[Word] = "car"
     """Row of the table of bodies, or a parameter whose words are such rows."""
-    start: Start
     speed: Expression = 0.0
-    """Initial speed, m/s; along the actor's heading."""
+    """Initial speed, m/s; along the heading."""
     route: Route | Chosen[Route] | None = None
     """Edges, or lanes, in the order of driving; without it the straightest way on."""
     turn: Word | Chosen[Word] | None = None
@@ -170,10 +174,18 @@ class Moving(Settings):
         return self
 
 
+class Moving(Driven):
+    """The ego, or another actor."""
+
+    start: Start
+
+
 class Actor(Moving):
     """Any road user but the ego."""
 
     role: ActorRole = "adversary"
+    """The search drives adversaries, SUMO `background`; `story` follows a story, which documents cannot state yet, and
+    until then SUMO drives it too; `static` never moves."""
     moves: Literal["lanes", "freely"] | None = None
     """In lanes as a vehicle or anywhere as a pedestrian; without it as its body usually does."""
     uses_oncoming: bool = False
@@ -182,8 +194,8 @@ class Actor(Moving):
     """Scenes in which it is there."""
 
 
-class Stream(Settings):
-    """Background traffic on a lane, a gap between any two vehicles; kept clear of other actors."""
+class Stream(Driven):
+    """Background traffic on a lane, with equal gaps and clear of other actors."""
 
     lane: Lane | Chosen[tuple[NetName, ...]] | Annotated[tuple[NetName, ...], Field(min_length=1)]
     """Lane, or several, which the vehicles take in turns."""
@@ -192,11 +204,8 @@ class Stream(Settings):
     """Where the traffic begins: this far before the reference; the first vehicle is a gap behind that."""
     gap_m: Expression
     """Between fronts."""
-    count: Annotated[int, Field(ge=1, le=100)] = 2
     speed: Expression
-    body: Word | Chosen[Word] = "car"
-    route: Route | Chosen[Route] | None = None
-    turn: Word | Chosen[Word] | None = None
+    count: Annotated[int, Field(ge=1, le=100)] = 2
     lead_in: bool = True
     clear_m: Annotated[float, Field(ge=0, le=1000)] = 10.0
     """Least gap to other actors on its lane; a vehicle without room starts behind them, or is left out."""
@@ -265,12 +274,12 @@ class Scenario(Settings):
     @property
     def values(self) -> Iterator[tuple[str, Expression]]:
         """All expressions, each with its path in the document."""
-        yield from _expressions("", self)
+        return ((path, value) for path, field, value in _leaves("", self) if _is_expression(field))
 
     @property
     def choices(self) -> Iterator[tuple[str, "Chosen[Any]"]]:
         """All values that a parameter's word chooses, each with its path in the document."""
-        yield from _choices("", self)
+        return ((path, value) for path, _, value in _leaves("", self) if isinstance(value, Chosen))
 
     @model_validator(mode="after")
     def _names(self) -> Self:
@@ -315,26 +324,18 @@ class Scenario(Settings):
         return self
 
 
-def _expressions(path: str, value: object) -> Iterator[tuple[str, Expression]]:
-    for name, field in type(value).model_fields.items() if isinstance(value, Settings) else ():
-        here, there = f"{path}.{name}".removeprefix("."), getattr(value, name)
-        marks = [field.metadata, *(getattr(kind, "__metadata__", ()) for kind in get_args(field.annotation))]
-        if any(ARITHMETIC in mark for mark in marks):
-            yield from [] if there is None else [(here, there)]
-        elif isinstance(there, Mapping):
-            for key, inner in there.items():
-                yield from _expressions(f"{here}.{key}", inner)
-        elif isinstance(there, Settings):
-            yield from _expressions(here, there)
+def _leaves(path: str, within: Settings) -> Iterator[tuple[str, FieldInfo, Any]]:
+    """Fields of settings and of all settings in them that hold a value and no settings, each with its path."""
+    for name, field in type(within).model_fields.items():
+        here, value = f"{path}.{name}".removeprefix("."), getattr(within, name)
+        inner = value if isinstance(value, Mapping) else {"": value}
+        for key, part in inner.items():
+            if isinstance(part, Settings) and not isinstance(part, Chosen):
+                yield from _leaves(f"{here}.{key}".removesuffix("."), part)
+            elif part is not None:
+                yield f"{here}.{key}".removesuffix("."), field, part
 
 
-def _choices(path: str, value: object) -> "Iterator[tuple[str, Chosen[Any]]]":
-    for name in type(value).model_fields if isinstance(value, Settings) else ():
-        here, there = f"{path}.{name}".removeprefix("."), getattr(value, name)
-        if isinstance(there, Chosen):
-            yield here, there
-        elif isinstance(there, Mapping):
-            for key, inner in there.items():
-                yield from _choices(f"{here}.{key}", inner)
-        else:
-            yield from _choices(here, there)
+def _is_expression(field: FieldInfo) -> bool:
+    marks = [field.metadata, *(getattr(kind, "__metadata__", ()) for kind in get_args(field.annotation))]
+    return any(ARITHMETIC in mark for mark in marks)

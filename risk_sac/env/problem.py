@@ -144,6 +144,7 @@ class Problem:
                 if wanted is not None:
                     parsed(i, wanted, STEP_S, family.horizon_steps)
                     own[wanted.name] = wanted
+        judge = spec.judge if family.judge is None or spec.judge != JudgeConfig() else family.judge
         problem = cls(
             family=family,
             odd=odd,
@@ -151,7 +152,7 @@ class Problem:
             ego=ego,
             requirements=tuple((shipped | own).values()),
             rss=_rss_parameters(odd),
-            drivers=(family.judge or spec.judge if spec.judge == JudgeConfig() else spec.judge).drivers,
+            drivers=judge.drivers,
         )
         problem.check_demand(spec)
         return problem

@@ -18,7 +18,6 @@ import numpy as np
 from defusedxml.ElementTree import fromstring
 from numpy.typing import NDArray
 from pydantic import ValidationError
-from yaml import YAMLError
 
 from risk_sac.config import FamilyName, RunSpec
 from risk_sac.env.problem import Problem
@@ -62,7 +61,7 @@ def unpack(family: FamilyName, arrays: MutableMapping[str, NDArray[Any]]) -> Non
             if name != library.DOCUMENT:
                 check_net(content)
         library.put(family, files)
-    except (ValueError, YAMLError, ParseError) as error:
+    except (ValueError, ParseError) as error:
         raise ValueError(f"the scenario that it carries cannot be played: {error}") from error
 
 

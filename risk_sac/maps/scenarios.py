@@ -8,7 +8,7 @@ from typing import Any
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError
 from risk_sac.maps.found import NoFit, Spot
-from risk_sac.scenario.shipped import document_of
+from risk_sac.scenario.reading import document_from_fields
 from risk_sac.scenario.tracks import Piece, Track
 from risk_sac.world.net import Net
 
@@ -32,7 +32,7 @@ def scenario_of(spot: Spot, summary: str, tags: Sequence[str], like: Mapping[str
       NoFit: the net's names are none that a document may have.
     """
     try:
-        return document_of(
+        return document_from_fields(
             {
                 "name": _name_of(spot),
                 "summary": summary[:LONGEST_SUMMARY],

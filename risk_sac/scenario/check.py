@@ -12,11 +12,12 @@ from risk_sac.config.scenario import EGO, AllOf, Constraint, Moving, Scenario, S
 from risk_sac.config.values import Comparison, Expression, Term, comparison, term
 from risk_sac.errors import ConfigError, InfeasibleScene, did_you_mean
 from risk_sac.scenario.bodies import BODIES
+from risk_sac.scenario.families import check_like
 from risk_sac.scenario.ground import net_of
-from risk_sac.scenario.interpret import Interpreter, body_named
+from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.layout import LEAD_IN_S, Layout, VehicleStart
 from risk_sac.scenario.odd import paths
-from risk_sac.scenario.shipped import nets_of, shipped_document, shipped_names
+from risk_sac.scenario.scene import body_named, motion_of, steps_of
 from risk_sac.world.net import Net
 from risk_sac.world.types import Floats, Scene
 
@@ -44,7 +45,8 @@ def check_document(document: Scenario, nets: Mapping[str, str]) -> None:
         _check_range(comparison(text), of, path, text)
     _check_horizon(of)
     _check_bodies(of)
-    _check_like(of)
+    if document.like is not None:
+        check_like(document.like, *of.adversaries)
     _check_layouts(of)
 
 
@@ -145,7 +147,7 @@ def _leaves(path: str, constraint: Constraint) -> Iterator[tuple[str, Comparison
 def _check_horizon(of: Interpreter) -> None:
     bounds = term(of.document.horizon_s).range(of.ranges)
     for horizon_s in (bounds.low, bounds.high):
-        of.steps(horizon_s)
+        steps_of(horizon_s)
 
 
 def _check_bodies(of: Interpreter) -> None:
@@ -155,34 +157,12 @@ def _check_bodies(of: Interpreter) -> None:
     for path, actor in (moving | streams).items():
         for name in of.alternatives(actor.body):
             body = body_named(name, f"{path}.body")
-            motion = of.moves(path.removeprefix("actors."), body) if path in moving else "lanes"
+            motion = motion_of(document, path.removeprefix("actors."), body) if path in moving else "lanes"
             if motion not in BODIES[body].moves and motion != "not":
                 fits = [name for name, row in BODIES.items() if motion in row.moves]
                 wanted = f"one that moves {motion if motion == 'freely' else 'in lanes'}: {', '.join(fits)}"
                 raise ConfigError(f"{path}.body", repr(name), wanted)
     of.adversaries  # noqa: B018 # raises `ConfigError` for bodies that move differently
-
-
-def _check_like(of: Interpreter) -> None:
-    like = of.document.like
-    if like is None:
-        return
-    if like.family not in shipped_names():
-        remedy = did_you_mean(like.family, shipped_names())
-        raise ConfigError("like.family", repr(like.family), f"one of {', '.join(shipped_names())}", remedy)
-    shipped = shipped_document(like.family)
-    theirs = [name for names in Interpreter(shipped, nets_of(shipped)).adversaries for name in names]
-    own = [name for names in of.adversaries for name in names]
-    for name, other in like.actors.items():
-        if name not in own:
-            wanted = f"an adversary of this document: {', '.join(own) or 'there is none'}"
-            raise ConfigError(f"like.actors.{name}", "a name", wanted, did_you_mean(name, own))
-        if other not in theirs:
-            wanted = f"an adversary of {like.family}: {', '.join(theirs)}"
-            raise ConfigError(f"like.actors.{name}", repr(other), wanted, did_you_mean(other, theirs))
-    if left_out := [name for name in own if name not in like.actors and name not in theirs]:
-        wanted = f"{left_out[0]} and which of {', '.join(theirs)} it stands for"
-        raise ConfigError("like.actors", ", ".join(like.actors) or "nothing", wanted, "or leave `like` out")
 
 
 def _check_layouts(of: Interpreter) -> None:

@@ -15,6 +15,7 @@ from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.library import kept
 from risk_sac.scenario.odd import SIGNAL_OF
+from risk_sac.scenario.scene import steps_of
 from risk_sac.scenario.shipped import PAPER_FAMILIES, nets_of, shipped_document, shipped_names
 
 SAMPLED = 64  # scenes whose layouts say which roads a scenario has
@@ -34,7 +35,7 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
     of = Interpreter(document, nets)
     vehicles, pedestrians = of.adversaries
     if document.like is not None:
-        _check_like(document.like, vehicles, pedestrians)
+        check_like(document.like, vehicles, pedestrians)
     space = replace(of.space, family=name or document.name)
     return Family(
         name=name or document.name,
@@ -44,14 +45,14 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
         vehicles=vehicles,
         pedestrians=pedestrians,
         layout=of.layout,
-        horizon_steps=of.steps(of.horizon_s),
+        horizon_steps=steps_of(of.horizon_s),
         like=document.like,
         requirements=document.requirements,
         judge=document.judge,
     )
 
 
-def _check_like(like: Like, vehicles: Sequence[str], pedestrians: Sequence[str]) -> None:
+def check_like(like: Like, vehicles: Sequence[str], pedestrians: Sequence[str]) -> None:
     """Refuses a shipped family without a prior, and adversaries that stand for none of its adversaries."""
     if like.family not in PAPER_FAMILIES:
         remedy = did_you_mean(like.family, PAPER_FAMILIES) or "leave `like` out to search without a prior"
@@ -64,7 +65,8 @@ def _check_like(like: Like, vehicles: Sequence[str], pedestrians: Sequence[str])
         for name in own:
             if (other := like.actors.get(name, name)) not in known:
                 wanted = f"one of {', '.join(known)}" if known else f"a family with an actor that moves as {name} does"
-                raise ConfigError(f"like.actors.{name}", repr(other), wanted, did_you_mean(other, known))
+                got = repr(other) if name in like.actors else "nothing"
+                raise ConfigError(f"like.actors.{name}", got, wanted, did_you_mean(other, known))
 
 
 def sampled(of: Interpreter, count: int = SAMPLED) -> Iterator[Layout | InfeasibleScene]:

@@ -1,88 +1,19 @@
-"""Layouts of a scenario document: where its actors start in a scene, on the roads of its net."""
+"""A scenario document as the search sees it: a scene space, and the layout of each scene."""
 
-import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 from risk_sac.config import CrossingType, Interval
-from risk_sac.config.scenario import (
-    EGO,
-    LONGEST_HORIZON_S,
-    AllOf,
-    AnyOf,
-    Chosen,
-    Constraint,
-    Moving,
-    Scenario,
-    Start,
-    Stream,
-)
-from risk_sac.config.values import Comparison, Expression, comparison, term
-from risk_sac.errors import ConfigError, InfeasibleScene, did_you_mean
-from risk_sac.scenario.bodies import BODIES, BodyName, Motion
-from risk_sac.scenario.ground import ground_of, kerb_of, net_of
-from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, StaticStart, VehicleStart
+from risk_sac.config.scenario import Chosen, Scenario
+from risk_sac.config.values import term
+from risk_sac.errors import ConfigError, InfeasibleScene
+from risk_sac.scenario.ground import net_of
+from risk_sac.scenario.layout import Layout
+from risk_sac.scenario.scene import SceneLayout, Value, body_named, motion_of
 from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.scenario.tracks import Track, lane_named, routed, straight_on
-from risk_sac.world.net import Crossing, Link, Net, NetLane, direction
-from risk_sac.world.types import STEP_S, Point, Role
-
-ROLES = {
-    "adversary": Role.ADVERSARY,
-    "story": Role.BACKGROUND,
-    "background": Role.BACKGROUND,
-    "static": Role.BACKGROUND,
-}
-GRID_M = 20.0  # of the places that ground is computed for
-UNIT_DIGITS = 12  # of a direction's cosine and sine, so that those of 90 degrees are 0 and 1
-
-
-class Value(NamedTuple):
-    """What the parameters of a scene say."""
-
-    numbers: Mapping[str, float]
-    words: Mapping[str, str]
-
-    def of(self, expression: Expression, path: str = "") -> float:
-        """The value of an expression; raises `ConfigError` with its path where it has none."""
-        try:
-            return term(expression).value(self.numbers)
-        except ConfigError as error:
-            raise ConfigError(path, error.got, error.expected, error.remedy) from error
-
-    def choose(self, choice: Any) -> Any:
-        """What a parameter's word chooses; anything else is returned as it is."""
-        return choice.of[self.words[choice.by]] if isinstance(choice, Chosen) else choice
-
-    def word(self, name: Any) -> Any:
-        """The word of a parameter if one has this name, else the name."""
-        name = self.choose(name)
-        return self.words.get(name, name)
-
-    def holds(self, constraint: Constraint) -> bool:
-        """Whether a constraint holds."""
-        if isinstance(constraint, AllOf):
-            return all(map(self.holds, constraint.all))
-        if isinstance(constraint, AnyOf):
-            return any(map(self.holds, constraint.any))
-        return self.true(constraint)
-
-    def true(self, text: Comparison) -> bool:
-        """Whether a comparison holds."""
-        return bool(comparison(text).value(self.numbers))
-
-
-class OnTrack(NamedTuple):
-    """A place on a track, by the front bumper."""
-
-    track: Track
-    lane: NetLane
-    before_m: float  # of the track's reference
-    lead_in: bool
-    begin: bool  # whether the reference is the lane's beginning; else it is its end
+from risk_sac.world.net import Net
 
 
 @dataclass(frozen=True)
@@ -139,7 +70,7 @@ class Interpreter:
             if not value.holds(constraint):
                 raise InfeasibleScene(f"constraints[{number}] does not hold: {constraint}", reason="constraint")
         try:
-            return _Scene(self, value).layout()
+            return SceneLayout(self.document, value, *self.net(value), self.horizon_s).layout()
         except ConfigError as error:
             raise InfeasibleScene(str(error), reason="scenario") from error
 
@@ -148,30 +79,6 @@ class Interpreter:
         file = self.nets[value.word(self.document.network)]
         return file, net_of(file)
 
-    def track(self, net: Net, lane: str, moving: Moving | Stream, value: Value, path: str, *, begin: bool) -> OnTrack:
-        """The track from a lane's beginning or its end, where an actor goes; `before_m` is 0."""
-        route, turn = value.choose(moving.route), value.word(moving.turn)
-        turn = value.words.get(turn, turn)
-        field = f"{path}.lane" if isinstance(moving, Stream) else f"{path}.start.lane"
-        here = lane_named(net, lane, field, turn or _after(route, lane))
-        reference_m = 0.0 if begin else here.length_m
-        if route is not None:
-            track = routed(net, here, reference_m, route, f"{path}.route")
-        else:
-            metres = self._most_m(here) + reference_m
-            track = straight_on(net, here, reference_m, metres, turn, f"{path}.turn")
-        return OnTrack(track, here, 0.0, True, begin)
-
-    def _most_m(self, lane: NetLane) -> float:
-        return lane.limit_mps * (self.horizon_s + LEAD_IN_S)
-
-    def moves(self, name: str, body: BodyName) -> Motion:
-        """How an actor with a body moves."""
-        actor = self.document.actors.get(name)
-        if actor is None:
-            return "lanes"
-        return "not" if actor.role == "static" else actor.moves or BODIES[body].moves[0]
-
     @property
     def adversaries(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Names of the adversaries that drive in lanes, and of those that move freely."""
@@ -179,7 +86,7 @@ class Interpreter:
         for name, actor in self.document.actors.items():
             if actor.role == "adversary":
                 bodies = self.alternatives(actor.body)
-                motions = {self.moves(name, body_named(body, f"actors.{name}.body")) for body in bodies}
+                motions = {motion_of(self.document, name, body_named(body, f"actors.{name}.body")) for body in bodies}
                 if len(motions) > 1:
                     wanted = "bodies that all drive in lanes, or all move freely"
                     raise ConfigError(f"actors.{name}.body", ", ".join(bodies), wanted, "make two actors of it")
@@ -209,13 +116,6 @@ class Interpreter:
         horizon = self.document.horizon_s
         return horizon if isinstance(horizon, float) else term(horizon).range(self.ranges).high
 
-    @staticmethod
-    def steps(horizon_s: float) -> int:
-        """Steps of an episode; raises `ConfigError` if it is too short or too long."""
-        if not 1.0 <= horizon_s <= LONGEST_HORIZON_S:
-            raise ConfigError("horizon_s", f"{horizon_s:g}", f"1 to {LONGEST_HORIZON_S:g} s")
-        return round(horizon_s / STEP_S)
-
     @cached_property
     def ranges(self) -> Mapping[str, Any]:
         """Range of each number of the document."""
@@ -231,288 +131,6 @@ class Interpreter:
         return ranges
 
 
-def body_named(name: str, path: str) -> BodyName:
-    """Returns a row's name in the table of bodies; raises `ConfigError` if there is none."""
-    if name not in BODIES:
-        raise ConfigError(path, repr(name), f"one of {', '.join(BODIES)}", did_you_mean(name, list(BODIES)))
-    return name  # type: ignore[return-value] # mypy narrows no string by a mapping's keys
-
-
 def _part(share: float, parts: int) -> int:
     """Which of equal parts of [0, 1] a share lies in."""
     return min(int(share * parts), parts - 1)
-
-
-def _after(route: tuple[str, ...] | None, lane: str) -> tuple[str, ...]:
-    """The route after an edge."""
-    return route[route.index(lane) + 1 :] if route and lane in route else ()
-
-
-class _Scene:
-    """One scene of a document while its layout is made."""
-
-    def __init__(self, of: Interpreter, value: Value) -> None:
-        self._of, self._value, self._document = of, value, of.document
-        self._file, self._net = of.net(value)
-        self._placed: dict[str, OnTrack] = {}
-        self._bodies: dict[str, BodyName] = {}
-        self._speeds: dict[str, float] = {}
-
-    def layout(self) -> Layout:
-        document, value = self._document, self._value
-        actors = {name: actor for name, actor in document.actors.items() if not actor.when or value.true(actor.when)}
-        self._bodies = {
-            name: body_named(value.word(moving.body), f"{name}.body")
-            for name, moving in ((EGO, document.ego), *actors.items())
-        }
-        ego = self._vehicle(EGO, Role.EGO, document.ego)
-        vehicles, pedestrians, statics = list[VehicleStart](), list[PedestrianStart](), list[StaticStart]()
-        for name, actor in actors.items():
-            motion = self._of.moves(name, self._bodies[name])
-            if motion == "freely":
-                pedestrians.append(self._pedestrian(name, ROLES[actor.role], actor))
-            elif motion == "not":
-                statics.append(self._static(name, actor))
-            else:
-                start = self._vehicle(name, ROLES[actor.role], actor)
-                vehicles.append(replace(start, uses_oncoming=actor.uses_oncoming))
-        vehicles += [start for name, stream in document.streams.items() for start in self._stream(name, stream)]
-        places = [(p.x_m, p.y_m) for p in pedestrians] or [self._placed[EGO].lane.line[-1]]
-        ground = ground_of(self._file, tuple(map(_on_grid, places)), walked=bool(pedestrians))
-        signal = self._signal()
-        return Layout(
-            net=self._file,
-            ego=ego,
-            vehicles=tuple(vehicles),
-            pedestrians=tuple(pedestrians),
-            statics=tuple(statics),
-            **ground._asdict(),
-            lane_width_m=self._placed[EGO].lane.width_m,
-            signal=signal,
-            signal_offset_s=value.of(document.signal.offset_s, "signal.offset_s") if signal else 0.0,
-            friction=value.of(document.friction, "friction"),
-            horizon_steps=self._of.steps(value.of(document.horizon_s, "horizon_s")),
-            wary=document.wary,
-        )
-
-    def _vehicle(self, name: str, role: Role, moving: Moving) -> VehicleStart:
-        path = name if name == EGO else f"actors.{name}"
-        self._placed[name] = place = self._place(name, moving, path)
-        self._speeds[name] = speed_mps = self._value.of(moving.speed, f"{path}.speed")
-        start = moving.start
-        if (turned := self._value.of(start.heading_deg, f"{path}.start.heading_deg")) != 0.0:
-            wanted = "0 for what drives in a lane"
-            raise ConfigError(f"{path}.start.heading_deg", f"{turned:g}", wanted, "let it move freely, or be static")
-        left_m, width_m = self._value.of(start.left_m, f"{path}.start.left_m"), place.lane.width_m
-        if not abs(left_m) <= width_m / 2:
-            wanted = f"at most half of {place.lane.id!r}, {width_m / 2:g} m"
-            raise ConfigError(f"{path}.start.left_m", f"{left_m:g}", wanted, "lanes_left, or a start on another lane")
-        return replace(_started(name, role, place, speed_mps, self._bodies[name]), left_m=left_m)
-
-    def _place(self, name: str, moving: Moving, path: str) -> OnTrack:
-        """Where on its track an actor starts."""
-        start, of = moving.start, self._value.of
-        if (other := start.reference) is not None:
-            if other not in self._placed:
-                wanted = "an actor that is there and comes before it"
-                raise ConfigError(f"{path}.start", f"a start relative to {other!r}", wanted)
-            there = self._placed[other]
-            place = self._beside(there, moving, path)
-            if start.ahead_of is not None:
-                before_m = there.before_m - (of(start.gap_m or 0.0, f"{path}.start.gap_m") + self._length_m(name))
-            elif start.behind is not None:
-                before_m = there.before_m + (of(start.gap_m or 0.0, f"{path}.start.gap_m") + self._length_m(other))
-            else:
-                before_m = there.before_m - of(start.ahead_m or 0.0, f"{path}.start.ahead_m")
-            lead_in = there.lead_in if start.lead_in is None else start.lead_in
-            return place._replace(before_m=before_m, lead_in=lead_in)
-        if start.lane is None:
-            raise ConfigError(f"{path}.start", "no lane", f"a lane, since a {self._bodies[name]} drives on one")
-        begin = start.at_m is not None
-        place = self._of.track(self._net, self._value.choose(start.lane), moving, self._value, path, begin=begin)
-        if start.before is not None:
-            self._check_reference(place.lane, start.before, f"{path}.start.before")
-        if begin:
-            before_m = -of(start.at_m or 0.0, f"{path}.start.at_m")
-            if not 0.0 <= -before_m <= place.lane.length_m:
-                wanted = f"0 to {place.lane.length_m:g}"
-                raise ConfigError(f"{path}.start.at_m", f"{-before_m:g} m along {place.lane.id!r}", wanted)
-        else:
-            before_m = of(start.distance_m or 0.0, f"{path}.start.distance_m")
-            if not 0.0 <= before_m <= place.track.room_m:
-                got = f"{before_m:g} m before the end of {place.lane.id!r}"
-                raise ConfigError(f"{path}.start.distance_m", got, f"0 to {place.track.room_m:g}")
-        return place._replace(before_m=before_m, lead_in=start.lead_in is not False)
-
-    def _beside(self, there: OnTrack, moving: Moving, path: str) -> OnTrack:
-        """The track from the lane of another actor's reference, or one beside it."""
-        left = round(self._value.of(moving.start.lanes_left, f"{path}.start.lanes_left"))
-        lane = self._net.lanes.get(f"{there.lane.edge}_{there.lane.index + left}")
-        if lane is None or not lane.drivable:
-            got = f"{left} lanes left of {there.lane.id!r}"
-            raise ConfigError(f"{path}.start.lanes_left", got, f"a lane for cars of {there.lane.edge!r}")
-        if left == 0 and moving.route is None and moving.turn is None:
-            return there
-        return self._of.track(self._net, lane.id, moving, self._value, path, begin=there.begin)
-
-    def _check_reference(self, lane: NetLane, reference: str, path: str) -> None:
-        if reference == "crossing":
-            self._crossing(lane.edge, path)
-        elif reference == "stop_line" and not any(link.signal for link in self._net.onward.get(lane.id, ())):
-            raise ConfigError(path, f"the stop line of lane {lane.id!r}, which has no signal", "junction or lane_end")
-
-    def _crossing(self, edge: str, path: str) -> Crossing:
-        crossings = self._net.crossings_of.get((self._net.edges[edge].end, edge)) if edge in self._net.edges else None
-        if not crossings:
-            edges = sorted({edge for crossing in self._net.crossings for edge in crossing.edges})
-            wanted = f"an edge that a crossing crosses at its end: {', '.join(edges) or 'there is none'}"
-            raise ConfigError(path, repr(edge), wanted)
-        return crossings[0]
-
-    def _length_m(self, name: str) -> float:
-        return BODIES[self._bodies[name]].length_m
-
-    def _pedestrian(self, name: str, role: Role, actor: Moving) -> PedestrianStart:
-        path, start = f"actors.{name}", actor.start
-        x_m, y_m, along_x, along_y = self._facing(start, path)
-        speed_mps = self._value.of(actor.speed, f"{path}.speed")
-        setback_m = self._value.of(start.setback_m, f"{path}.start.setback_m")
-        offset_m = self._value.of(start.offset_m, f"{path}.start.offset_m")
-        lead_m = 0.0 if start.lead_in is False else LEAD_IN_S * speed_mps
-        return PedestrianStart(
-            id=name,
-            role=role,
-            x_m=x_m - along_x * setback_m - along_x * lead_m + along_y * offset_m,
-            y_m=y_m - along_y * setback_m - along_y * lead_m - along_x * offset_m,
-            heading_rad=math.atan2(along_y, along_x),
-            speed_mps=speed_mps,
-            body=self._bodies[name],
-        )
-
-    def _static(self, name: str, actor: Moving) -> StaticStart:
-        path, body = f"actors.{name}", self._bodies[name]
-        if actor.start.reference is None:
-            x_m, y_m, along_x, along_y = self._facing(actor.start, path)
-            heading_rad = math.atan2(along_y, along_x)
-        else:
-            self._speeds[name], self._placed[name] = 0.0, self._place(name, actor, path)
-            _, piece, front_m = self._placed[name].track.start(self._placed[name].before_m)
-            lane = self._net.lanes[f"{piece.edge}_{piece.lane}"]
-            x_m, y_m, heading_rad = _point_of(lane, max(front_m - BODIES[body].length_m / 2, 0.0))
-            left_m = self._value.of(actor.start.left_m, f"{path}.start.left_m")
-            x_m, y_m = x_m - math.sin(heading_rad) * left_m, y_m + math.cos(heading_rad) * left_m
-            heading_rad += math.radians(self._value.of(actor.start.heading_deg, f"{path}.start.heading_deg"))
-        return StaticStart(id=name, x_m=x_m, y_m=y_m, heading_rad=heading_rad, body=body)
-
-    def _facing(self, start: Start, path: str) -> tuple[float, float, float, float]:
-        """A point, and the unit vector of the direction that an actor faces there."""
-        of, path = self._value.of, f"{path}.start"
-        turned = math.radians(of(start.heading_deg, f"{path}.heading_deg"))
-        if start.crossing is not None:
-            edge = self._value.choose(start.crossing)
-            crossing = self._crossing(edge, f"{path}.crossing")
-            driven = self._net.edges[edge].drivable[-1].way_out_rad + (math.pi if start.side == "left" else 0.0)
-            return kerb_of(self._net, crossing, driven)
-        if start.x_m is not None and start.y_m is not None:
-            return of(start.x_m, f"{path}.x_m"), of(start.y_m, f"{path}.y_m"), *_unit(turned)
-        if start.lane is None:
-            raise ConfigError(path, "a start relative to another actor", "a crossing, a point or a lane")
-        lane = lane_named(self._net, self._value.choose(start.lane), f"{path}.lane")
-        if start.at_m is not None:
-            at_m = of(start.at_m, f"{path}.at_m")
-        else:
-            at_m = lane.length_m - of(start.distance_m or 0.0, f"{path}.distance_m")
-        if not 0.0 <= at_m <= lane.length_m:
-            raise ConfigError(f"{path}.at_m", f"{at_m:g} m along {lane.id!r}", f"0 to {lane.length_m:g}")
-        x_m, y_m, along_rad = _point_of(lane, at_m)
-        left_m = of(start.left_m, f"{path}.left_m")
-        x_m, y_m = x_m - math.sin(along_rad) * left_m, y_m + math.cos(along_rad) * left_m
-        return x_m, y_m, *_unit(along_rad + turned)
-
-    def _stream(self, name: str, stream: Stream) -> Iterator[VehicleStart]:
-        """Its vehicles.
-
-        One that would be too close to another on its lane starts behind that, or is left out where the road is too
-        short.
-        """
-        value, path = self._value, f"streams.{name}"
-        body = body_named(value.word(stream.body), f"{path}.body")
-        gap_m, speed_mps = value.of(stream.gap_m, f"{path}.gap_m"), value.of(stream.speed, f"{path}.speed")
-        from_m, lanes = value.of(stream.from_m, f"{path}.from_m"), value.choose(stream.lane)
-        lanes = (lanes,) if isinstance(lanes, str) else lanes
-        tracks = [self._of.track(self._net, lane, stream, value, path, begin=False) for lane in lanes]
-        for i in range(stream.count):
-            place = tracks[i % len(tracks)]._replace(lead_in=stream.lead_in)
-            before_m = from_m + (i + 1) * gap_m
-            taken = [_taken_m(at_m, mps, speed_mps, stream.clear_m) for at_m, mps in self._on(place.track)]
-            while crowded := [last_m for first_m, last_m in taken if first_m < before_m < last_m]:
-                before_m = max(crowded)
-            lead_m = LEAD_IN_S * speed_mps if stream.lead_in else 0.0
-            if before_m + BODIES[body].length_m + lead_m <= place.track.room_m:
-                place = place._replace(before_m=before_m)
-                self._placed[f"{name}_{i}"], self._speeds[f"{name}_{i}"] = place, speed_mps
-                yield _started(f"{name}_{i}", Role.BACKGROUND, place, speed_mps, body)
-
-    def _on(self, track: Track) -> Iterator[tuple[float, float]]:
-        """Vehicles that start on a lane of a track: how far before its reference, and their speed."""
-        reach_m = {(piece.edge, piece.lane): piece.reach_m for piece in track.pieces}
-        for name, place in self._placed.items():
-            _, piece, _ = place.track.start(place.before_m)
-            if (piece.edge, piece.lane) in reach_m:
-                yield place.before_m + (reach_m[piece.edge, piece.lane] - piece.reach_m), self._speeds[name]
-
-    def _signal(self) -> str | None:
-        """The traffic light that `signal` names: the first on the ego's way, or the only one of the net."""
-        named = self._document.signal.id
-        if named is not None and named not in self._net.programs:
-            known = ", ".join(self._net.programs) or "the net has none"
-            raise ConfigError("signal.id", repr(named), "a traffic light of the net", f"known: {known}")
-        edges = self._placed[EGO].track.edges
-        lit = {(link.source.edge, link.target.edge): link.signal for link in _all_links(self._net) if link.signal}
-        met = (lit.get(pair) for pair in pairwise(edges))
-        only = next(iter(self._net.programs), None) if len(self._net.programs) == 1 else None
-        return named or next(filter(None, met), only)
-
-
-def _all_links(net: Net) -> Iterator[Link]:
-    return (link for links in net.onward.values() for link in links)
-
-
-def _started(name: str, role: Role, place: OnTrack, speed_mps: float, body: BodyName) -> VehicleStart:
-    lead_m = LEAD_IN_S * speed_mps if place.lead_in else 0.0
-    route, piece, position_m = place.track.start(place.before_m, lead_m)
-    return VehicleStart(
-        id=name,
-        role=role,
-        route=route,
-        lane=piece.lane,
-        position_m=position_m,
-        speed_mps=min(speed_mps, piece.limit_mps),  # SUMO refuses a faster start
-        body=body,
-    )
-
-
-def _taken_m(other_m: float, other_mps: float, speed_mps: float, clear_m: float) -> tuple[float, float]:
-    """The range closed to a vehicle of a stream at the release; there it would be too close then or at the start."""
-    least_m, gains_m = BODIES["car"].length_m + clear_m, LEAD_IN_S * (other_mps - speed_mps)
-    return other_m - least_m + min(gains_m, 0.0), other_m + least_m + max(gains_m, 0.0)
-
-
-def _unit(angle_rad: float) -> tuple[float, float]:
-    return round(math.cos(angle_rad), UNIT_DIGITS), round(math.sin(angle_rad), UNIT_DIGITS)
-
-
-def _point_of(lane: NetLane, at_m: float) -> tuple[float, float, float]:
-    """A point of a lane's middle, and the lane's direction there."""
-    for a, b in pairwise(lane.line):
-        length_m = math.dist(a, b)
-        if at_m <= length_m or b == lane.line[-1]:
-            share = at_m / length_m
-            return a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), direction(a, b)
-        at_m -= length_m
-    raise AssertionError("a lane has two points")
-
-
-def _on_grid(place: tuple[float, float]) -> Point:
-    """So that scenes share their ground."""
-    return round(place[0] / GRID_M) * GRID_M, round(place[1] / GRID_M) * GRID_M

@@ -20,7 +20,8 @@ import yaml
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError, did_you_mean
 from risk_sac.host.machine import UNWRITABLE, user_cache
-from risk_sac.scenario.shipped import document_of, networks, shipped_names
+from risk_sac.scenario.reading import document_from
+from risk_sac.scenario.shipped import networks, shipped_names
 
 VARIABLE = "RISK_SAC_PLACES"
 DOCUMENT = "scenario.yaml"
@@ -45,6 +46,11 @@ def written(document: Scenario) -> str:
     """Writes a document as YAML, without the fields that have their defaults."""
     fields = document.model_dump(mode="json", exclude_defaults=True)
     return yaml.safe_dump(fields, sort_keys=False, allow_unicode=True, width=120, default_flow_style=None)
+
+
+def own_nets(nets: Mapping[str, str]) -> dict[str, bytes]:
+    """Reads the nets that do not ship, by a document's names for them; `nets` as `nets_of` returns it."""
+    return {name: Path(file).read_bytes() for name, file in nets.items() if Path(file).is_absolute()}
 
 
 def keep(document: Scenario, nets: Mapping[str, bytes]) -> str:
@@ -128,7 +134,7 @@ def files_of(name: str) -> Mapping[str, bytes]:
 
 def kept(name: str) -> tuple[Scenario, Path]:
     """Reads the document of a kept scenario, and its folder; raises what `files_of` does."""
-    return document_of(yaml.safe_load(files_of(name)[DOCUMENT])), (library() / name).absolute()
+    return document_from(files_of(name)[DOCUMENT].decode()), (library() / name).absolute()
 
 
 def listed() -> list[str]:
@@ -161,7 +167,7 @@ def prune(folder: Path, named: Collection[str], unused_s: float, started_at: flo
 
 def _check(files: Mapping[str, bytes]) -> None:
     """Refuses files that are no document and its nets; raises `ConfigError`."""
-    document = document_of(yaml.safe_load(files[DOCUMENT])) if DOCUMENT in files else None
+    document = document_from(files[DOCUMENT].decode()) if DOCUMENT in files else None
     if document is None:
         raise ConfigError("family", "a scenario without a document", DOCUMENT)
     for name in files.keys() - {DOCUMENT}:

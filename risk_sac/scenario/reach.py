@@ -13,7 +13,7 @@ from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.layout import Layout, PedestrianStart, VehicleStart
 from risk_sac.scenario.limits import Limits
 from risk_sac.world.net import Net
-from risk_sac.world.types import STEP_S
+from risk_sac.world.types import STEP_S, Role
 
 NEAR_M = 5.0  # between the middles of two ways on which bodies may touch; choice
 
@@ -33,7 +33,7 @@ def out_of_reach(layouts: Sequence[Layout], limits: Limits) -> list[str]:
         ego_way = _way(net, layout.ego, layout.ego.route, horizon_s * limits.speed_mps)
         starts: tuple[VehicleStart | PedestrianStart, ...] = (*layout.vehicles, *layout.pedestrians)
         for start in starts:
-            if start.role.name != "ADVERSARY" or reached.get(start.id):
+            if start.role is not Role.ADVERSARY or reached.get(start.id):
                 continue
             bounds = limits.of(BODIES[start.body])
             if isinstance(start, PedestrianStart):

@@ -5,11 +5,9 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
-import yaml
-from pydantic import ValidationError
-
-from risk_sac.config import Scenario, field_errors
+from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, did_you_mean
+from risk_sac.scenario.reading import document_from
 
 FOLDER = Path(str(files("sumo_nets")))
 PAPER_FAMILIES = ("low", "mixed", "dense")  # families of the paper, which have priors
@@ -33,15 +31,7 @@ def shipped_document(name: str) -> Scenario:
     if name not in shipped_names():
         known = shipped_names()
         raise ConfigError("scenario", repr(name), f"one of {', '.join(known)}", did_you_mean(name, known))
-    return document_of(yaml.safe_load(scenario_file(name).read_text()))
-
-
-def document_of(fields: object) -> Scenario:
-    """Reads a document from its fields; raises `ConfigError` with the path of what is wrong."""
-    try:
-        return Scenario.model_validate(fields)
-    except ValidationError as error:
-        raise field_errors(error, Scenario) from error
+    return document_from(scenario_file(name).read_text())
 
 
 def shipped_net(name: str) -> str:

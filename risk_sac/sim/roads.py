@@ -1,5 +1,6 @@
 """Lanes, signals and lateral room around the route; placing of vehicles."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from itertools import takewhile
@@ -31,6 +32,7 @@ from risk_sac.sim.paths import (
 from risk_sac.sim.reading import COLOURS
 from risk_sac.world.types import Floats, Lane, Road, Signal, StopLine
 
+KEEP_ROUTE = 1  # of SUMO's `moveToXY`: the nearest place on the route
 REACH_M = 600.0  # of the route; no episode drives farther
 LEFT, RIGHT = 1, -1
 NONE = Signal.NONE  # to look it up in the class takes longer than all else in `signals_at`
@@ -319,14 +321,6 @@ def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None
         _set_signal(layout.signal, layout.signal_offset_s)
 
 
-def keep_aside(starts: Iterable[VehicleStart]) -> None:
-    """Moves vehicles that start beside their lane's middle there; SUMO's driver keeps to it."""
-    for start in starts:
-        if start.left_m != 0.0:
-            libsumo.vehicle.setLateralAlignment(start.id, f"{start.left_m:g}")
-            libsumo.vehicle.setLateralLanePosition(start.id, start.left_m)
-
-
 def hand_over(start: VehicleStart) -> None:
     """Makes a vehicle drive as commanded, whatever is in its way."""
     libsumo.vehicle.setType(start.id, _type("adversary", start.body))
@@ -365,6 +359,13 @@ def _insert(start: VehicleStart, type_id: str) -> None:
     )
     if needs_lane_change(start.route, f"{start.route[0]}_{start.lane}"):
         libsumo.vehicle.setParameter(start.id, ASSERTIVE, MERGING)
+    if start.left_m != 0.0:  # SUMO's driver keeps to it
+        edge, lane = start.route[0], start.lane
+        x, y = libsumo.simulation.convert2D(edge, start.position_m, lane)
+        way_rad = math.radians(90.0 - libsumo.lane.getAngle(f"{edge}_{lane}", start.position_m))
+        x, y = x - start.left_m * math.sin(way_rad), y + start.left_m * math.cos(way_rad)
+        libsumo.vehicle.setLateralAlignment(start.id, f"{start.left_m:g}")
+        libsumo.vehicle.moveToXY(start.id, edge, lane, x, y, keepRoute=KEEP_ROUTE)
 
 
 def _set_signal(signal: str, offset_s: float) -> None:

@@ -13,8 +13,8 @@ import libsumo
 from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.layout import StaticStart
 from risk_sac.sim.paths import CAR, car_may_use
+from risk_sac.sim.roads import KEEP_ROUTE
 
-KEEP_ROUTE = 1  # of SUMO's `moveToXY`: the nearest place on the route
 LEAST_M = 0.05  # of a body's width in the lane; less hinders no vehicle
 ALONG_RAD = 0.35  # greatest angle to the lane of a body that a stand-in along the lane can stand for; choice
 

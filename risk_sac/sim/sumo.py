@@ -23,7 +23,7 @@ from risk_sac.sim.oncoming import OncomingVehicle, leaves
 from risk_sac.sim.paths import Along
 from risk_sac.sim.pilot import MovedVehicle, Pilot
 from risk_sac.sim.reading import Reader, Reading
-from risk_sac.sim.roads import LateralRoom, Roads, hand_over, keep_aside, place
+from risk_sac.sim.roads import LateralRoom, Roads, hand_over, place
 from risk_sac.sim.solid import VehicleCommand, Walker
 from risk_sac.sim.standing import stand_in_lanes
 from risk_sac.world.types import STEP_S, Floats, Frame, Role
@@ -162,7 +162,6 @@ class SumoSimulation:
         absent = {start.id for start in (layout.ego, *layout.vehicles)} - set(libsumo.vehicle.getIDList())
         if absent:
             raise SimulationError(f"SUMO did not insert {sorted(absent)}")
-        keep_aside((layout.ego, *layout.vehicles))
         self._layout = layout
         self._walkers = {p.id: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps) for p in layout.pedestrians}
         self._roads.enter(layout)

@@ -53,8 +53,7 @@ def _posted(upload: bytes, action: str) -> bytes:
 
             return json.dumps(try_document(document, nets).model_dump(mode="json")).encode()
         check_document(document, nets)
-        own = {name: Path(file).read_bytes() for name, file in nets.items() if Path(file).is_absolute()}
-        return json.dumps({"name": library.keep(document, own)}).encode()
+        return json.dumps({"name": library.keep(document, library.own_nets(nets))}).encode()
 
 
 def _unpacked(upload: bytes, folder: Path) -> tuple[Scenario, Path]:

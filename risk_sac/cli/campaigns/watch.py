@@ -22,7 +22,7 @@ from risk_sac.cli.flags import (
     scene_flags,
 )
 from risk_sac.cli.parser import Commands, Parser, add_command
-from risk_sac.cli.scenarios import document_at, is_file, own_nets
+from risk_sac.cli.scenarios import document_at, is_file
 from risk_sac.client import Campaign, Client, Episode, Results
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import read_posted
@@ -30,6 +30,7 @@ from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import complain, notes
 from risk_sac.records import Grade
+from risk_sac.scenario import library
 from risk_sac.scenario.shipped import nets_of
 
 SEEDS = 1  # number of seeds if neither the file nor a flag names any
@@ -216,7 +217,7 @@ def _uploaded(name_or_file: str, url: str | None) -> str:
     if not is_file(name_or_file):
         return name_or_file
     document, folder = document_at(name_or_file)
-    nets = own_nets(nets_of(document, folder))
+    nets = library.own_nets(nets_of(document, folder))
     with Client.from_environment(url) as client:
         return client.add_scenario(document, nets).name
 

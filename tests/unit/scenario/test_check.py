@@ -90,7 +90,7 @@ FAULTS: dict[str, tuple[str, Any, str]] = {  # what it is -> where it is written
     "horizon too long": ("horizon_s", "speed * 100", "horizon_s"),
     "number that is none": ("horizon_s", [1], "horizon_s"),
     "unknown family": ("like", {"family": "lo", "actors": {"truck": "lead"}}, "like.family"),
-    "adversary left out of like": ("like", {"family": "low"}, "like.actors"),
+    "adversary left out of like": ("like", {"family": "low"}, "like.actors.truck"),
     "unknown actor of like": ("like", {"family": "low", "actors": {"truck": "led"}}, "like.actors.truck"),
     "no ego": ("ego", None, "ego"),
     "name that is none": ("name", "My Scenario", "name"),
@@ -186,3 +186,25 @@ def test_parameter_without_effect_is_named() -> None:
 def test_shipped_documents_have_no_fault(name: str) -> None:
     document = document_from(scenario_file(name).read_text())
     check_document(document, nets_of(document))
+
+
+@pytest.mark.parametrize(
+    ("start", "path"),
+    [
+        ({"lane": "road_1", "at_m": 260, "lanes_left": 1}, "actors.lead.start.lanes_left"),
+        ({"ahead_of": "ego", "gap_m": 20, "side": "left"}, "actors.lead.start.side"),
+        ({"lane": "road_1", "at_m": 260, "setback_m": 2}, "actors.lead.start.setback_m"),
+    ],
+)
+def test_what_would_have_no_effect_is_refused(start: dict[str, object], path: str) -> None:
+    fields = {"name": "a", "network": "low", "ego": {"start": {"lane": "road_1", "at_m": 200}, "speed": 10}}
+    with pytest.raises(ConfigError) as refused:
+        checked(yaml.safe_dump(fields | {"actors": {"lead": {"start": start}}}))
+    assert refused.value.field == path
+
+
+def test_turn_that_is_none_is_refused() -> None:
+    ego = {"start": {"lane": "from_south", "before": "lane_end", "distance_m": 50}, "turn": "lefft"}
+    with pytest.raises(ConfigError) as refused:
+        checked(yaml.safe_dump({"name": "a", "network": "dense", "ego": ego}))
+    assert (refused.value.field, refused.value.expected) == ("ego.turn", "one of left, straight, right")

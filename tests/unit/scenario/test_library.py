@@ -3,12 +3,12 @@
 import os
 
 import pytest
-import yaml
 
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, family_named
-from risk_sac.scenario.shipped import FOLDER, PAPER_FAMILIES, document_of, shipped_document
+from risk_sac.scenario.reading import document_from
+from risk_sac.scenario.shipped import FOLDER, PAPER_FAMILIES, shipped_document
 
 
 @pytest.fixture(autouse=True)
@@ -25,7 +25,7 @@ def kept_with_net(name: str) -> str:
 @pytest.mark.parametrize("name", PAPER_FAMILIES)
 def test_written_documents_read_back_equal(name):
     document = shipped_document(name)
-    assert document_of(yaml.safe_load(library.written(document))) == document
+    assert document_from(library.written(document)) == document
 
 
 @pytest.mark.parametrize("name", PAPER_FAMILIES)
