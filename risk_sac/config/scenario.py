@@ -79,7 +79,7 @@ class ScenarioParameter(Settings):
 
 
 class Start(Settings):
-    """Where an actor starts.
+    """Start of an actor.
 
     On or beside a lane, relative to another actor, at a crossing's kerb, or at a point.
     """
@@ -156,7 +156,7 @@ _FORMS: Mapping[str, tuple[str, ...]] = {  # field that tells a form → those t
 
 
 class Driven(Settings):
-    """What all that moves has in common."""
+    """Body, initial speed and way of a road user."""
 
     body: Word | Chosen[Word] = "car"
     """Row of the table of bodies, or a parameter whose words are such rows."""
@@ -237,7 +237,7 @@ Constraint = Comparison | AllOf | AnyOf
 
 
 class SignalTiming(Settings):
-    """When in its cycle a traffic light is at the start."""
+    """Position of a traffic light in its cycle at the start."""
 
     id: NetName | None = None
     """Without it the first on the ego's way, or the only one of the net."""
@@ -325,7 +325,7 @@ class Scenario(Settings):
 
 
 def _leaves(path: str, within: Settings) -> Iterator[tuple[str, FieldInfo, Any]]:
-    """Fields of settings and of all settings in them that hold a value and no settings, each with its path."""
+    """Yields the fields of nested settings that hold a plain value, each with its path."""
     for name, field in type(within).model_fields.items():
         here, value = f"{path}.{name}".removeprefix("."), getattr(within, name)
         inner = value if isinstance(value, Mapping) else {"": value}

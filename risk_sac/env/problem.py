@@ -1,4 +1,4 @@
-"""The problem that a run poses, and the settings of it that a family or an ego does not support as written."""
+"""Poses the problem of a run, and names its settings that are not supported as written."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -69,7 +69,7 @@ def try_document(document: Scenario, nets: Mapping[str, str], count: int = SCENE
 
 
 def _remarks(checked: ScenarioCheck) -> Iterator[str]:
-    """What is to be mended, one sentence each."""
+    """Lists what is to be mended, one sentence each."""
     if checked.contacts:
         yield f"the default ego touches something in {checked.contacts} of {checked.played} scenes unattacked"
     if not checked.played:

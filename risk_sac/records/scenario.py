@@ -8,7 +8,7 @@ from risk_sac.records.base import Record
 
 
 class ScenarioCheck(Record):
-    """What scenes without an attack show of a scenario."""
+    """Result of a check: scenes played without an attack."""
 
     name: str
     scenes: int

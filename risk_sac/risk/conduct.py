@@ -118,7 +118,7 @@ TERMS = 12
 
 
 class RoadFacts(NamedTuple):
-    """What the cost depends on of a place."""
+    """Facts of the road that the cost depends on."""
 
     lane_width_m: float  # of all lanes
     limit_mps: float

@@ -33,7 +33,7 @@ UNIT_DIGITS = 12  # of a direction's cosine and sine, so that those of 90 degree
 
 
 class Value(NamedTuple):
-    """What the parameters of a scene say."""
+    """Values and words of a scene's parameters."""
 
     numbers: Mapping[str, float]
     words: Mapping[str, str]
@@ -46,7 +46,7 @@ class Value(NamedTuple):
             raise ConfigError(path, error.got, error.expected, error.remedy) from error
 
     def choose(self, choice: Any) -> Any:
-        """What a parameter's word chooses; anything else is returned as it is."""
+        """Resolves a choice by a parameter's word; anything else stays as it is."""
         return choice.of[self.words[choice.by]] if isinstance(choice, Chosen) else choice
 
     def word(self, name: Any) -> Any:
@@ -92,7 +92,7 @@ def body_named(name: str, path: str) -> BodyName:
 
 
 def motion_of(document: Scenario, name: str, body: BodyName) -> Motion:
-    """How an actor of a document moves with a body."""
+    """Returns how an actor of a document moves with a body."""
     actor = document.actors.get(name)
     if actor is None:
         return "lanes"
@@ -196,7 +196,7 @@ class SceneLayout:
                 raise ConfigError(f"{path}.start.{field}", f"{stated:g}", "0 for an actor that moves so", remedy)
 
     def _place(self, name: str, moving: Moving, path: str) -> OnTrack:
-        """Where on its track an actor starts."""
+        """Places an actor on its track."""
         start, of = moving.start, self._value.of
         if (other := start.reference) is not None:
             if other not in self._placed:
@@ -349,7 +349,7 @@ class SceneLayout:
                 yield place.before_m + (reach_m[piece.edge, piece.lane] - piece.reach_m), self._speeds[name]
 
     def _signal(self) -> str | None:
-        """The traffic light that `signal` names: the first on the ego's way, or the only one of the net."""
+        """Returns the traffic light that the document's `signal` times; see `SignalTiming`."""
         named = self._document.signal.id
         if named is not None and named not in self._net.programs:
             known = ", ".join(self._net.programs) or "the net has none"
@@ -380,7 +380,7 @@ def _started(name: str, role: Role, place: OnTrack, speed_mps: float, body: Body
 
 
 def _taken_m(other_m: float, other_mps: float, speed_mps: float, clear_m: float) -> tuple[float, float]:
-    """The range closed to a vehicle of a stream at the release; there it would be too close then or at the start."""
+    """Returns the range where a stream's vehicle would be too close to another."""
     least_m, gains_m = BODIES["car"].length_m + clear_m, LEAD_IN_S * (other_mps - speed_mps)
     return other_m - least_m + min(gains_m, 0.0), other_m + least_m + max(gains_m, 0.0)
 

@@ -19,7 +19,7 @@ STRAIGHT_RAD = 0.02  # between heading and direction of motion, up to which SUMO
 
 
 class OncomingVehicle(MovedVehicle):
-    """An adversary outside its own lanes, in SUMO; its command is of speed and lateral speed along its path."""
+    """Adversary outside its own lanes, commanded by speeds along and across its path."""
 
     def __init__(self, vehicle: str, state: Floats, roads: Roads) -> None:
         """Takes over a vehicle, given its column of the latest frame."""
@@ -39,7 +39,7 @@ class OncomingVehicle(MovedVehicle):
         self.told = self.told._replace(lateral_mps=self._command.lateral_mps)
 
     def is_back(self, own: LateralRoom) -> bool:
-        """Whether its body is between the edges of its own lanes and straight, given the room beside its body."""
+        """Whether its body is straight and within its own lanes, given its room there."""
         turned = self.motion.heading_rad - float(self.along.path[HEADING, segment(self.along)])
         drifts = math.atan2(self._command.lateral_mps, max(self._command.speed_mps, 1e-3))
         straight = abs(math.remainder(turned - drifts, math.tau)) <= STRAIGHT_RAD
@@ -82,5 +82,5 @@ def segment(along: Along) -> int:
 
 
 def leaves(own: LateralRoom, command: VehicleCommand) -> bool:
-    """Whether a command takes a vehicle beyond the left edge of its own lanes, given the room beside its body."""
+    """Whether a command takes a vehicle beyond its own lanes' left edge."""
     return command.lateral_mps * STEP_S > own.left_m - OWN_EDGE_M
