@@ -65,7 +65,10 @@ def friction() -> Fields:
 
 
 def initial_speed(name: str, low: float, limit_mps: float, meaning: str) -> Fields:
-    """States the parameter of a vehicle's initial speed, from `low`, or half the road's limit if that is lower."""
+    """States the parameter of a vehicle's initial speed.
+
+    It begins at `low`, or at half the road's limit if that is lower.
+    """
     odd = "dynamic.ego_speed_mps" if name.startswith("ego") else "dynamic.vehicle_speed_mps"
     high = top_speed(limit_mps)
     return {name: number((at_most(low, high / 2), at_most(high, high)), "m/s", meaning, odd)}
@@ -96,7 +99,7 @@ def pedestrian(edge: str, side: str = "right") -> Fields:
 
 
 def signal_parts(net: Net, ids: Iterable[str | None]) -> tuple[Fields, Fields]:
-    """States when the first of the signals that are there is in its cycle, as a parameter and the document's signal."""
+    """States the parameter of the first signal's offset, and the document's `signal`."""
     cycles_s = ((id_, net.programs[id_].cycle_s) for id_ in ids if id_ in net.programs)
     for id_, cycle_s in cycles_s:
         if cycle_s > 0.0:
@@ -121,7 +124,7 @@ def own_piece(track: Track) -> Piece:
 
 
 def lane_of(net: Net, track: Track) -> str:
-    """Returns the name of the lane with the track's reference; raises `NoFit` if an edge has the same name."""
+    """Names the lane with the track's reference; raises `NoFit` if an edge has that name."""
     return _lane(net, own_piece(track))
 
 
