@@ -65,6 +65,7 @@ def test_a_key_is_asked_for_and_kept_in_the_tab_alone(new_page: Callable[..., Pa
         page.get_by_role("button", name="Log out").click()
         expect(page.get_by_label("Key")).to_be_visible()
         assert page.evaluate("Object.values(sessionStorage)") == []
+        page.close()  # it must ask for nothing once the service is gone
 
 
 def _make_key(service: Service) -> str:

@@ -22,7 +22,7 @@ from risk_sac.host.process_state import TINY, Preserved, preserved
 
 
 def reset_signal() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # a start in the background ignores SIGINT already
 
 
 def replace_streams() -> None:
@@ -31,7 +31,7 @@ def replace_streams() -> None:
 
 QUICK: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
     "folder": (lambda: os.chdir("/"), os.getcwd),
-    "signals": (reset_signal, lambda: signal.getsignal(signal.SIGINT)),
+    "signals": (reset_signal, lambda: signal.getsignal(signal.SIGTERM)),
     "locale": (lambda: locale.setlocale(locale.LC_CTYPE, "C"), lambda: locale.setlocale(locale.LC_ALL)),
     "warnings": (lambda: warnings.simplefilter("error"), lambda: list(warnings.filters)),
     "arithmetic": (lambda: np.seterr(all="raise"), np.geterr),
