@@ -13,11 +13,13 @@ from pydantic.fields import FieldInfo
 from risk_sac.config.base import Settings
 from risk_sac.config.campaign import JudgeConfig, Requirement
 from risk_sac.config.odd import Odd
+from risk_sac.config.story import Position, Story
 from risk_sac.config.values import ARITHMETIC, Comparison, Expression
 from risk_sac.errors import ConfigError, did_you_mean
 
 T = TypeVar("T")
-Word = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
+Word = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$")]
+ScenarioName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 NetName = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\s]+$")]
 EGO = "ego"
 LONGEST_HORIZON_S = 400.0
@@ -50,14 +52,18 @@ class ScenarioParameter(Settings):
     """Alternatives, each an equal part of the axis from 0 to 1."""
     rows: Annotated[tuple[Mapping[Word, float], ...], Field(min_length=1, max_length=10_000)] | None = None
     """Values of several names that vary together, each row an equal part of the axis from 0 to 1."""
-    value: float | None = None
-    """Of a constant."""
+    value: Expression | None = None
+    """Of a constant, or arithmetic over parameters before it."""
+    step: Annotated[float, Field(gt=0)] | None = None
+    """Of a range's grid, from the lower bound on."""
     odd: Annotated[str, Field(max_length=60)] | None = None
     """ODD field that bounds it too, such as `dynamic.vehicle_speed_mps`."""
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         given = [name for name in ("range", "words", "rows", "value") if getattr(self, name) is not None]
+        if self.step is not None and self.range is None:
+            raise ConfigError("step", f"{self.step:g} without a range", "a range beside it")
         if len(given) != 1:
             raise ConfigError("", " and ".join(given) or "none of them", "one of range, words, rows and value")
         if self.range is not None and self.range[0] > self.range[1]:
@@ -84,6 +90,8 @@ class Start(Settings):
     On or beside a lane, relative to another actor, at a crossing's kerb, or at a point.
     """
 
+    position: Position | None = None
+    """In the road file's coordinates, of the actor's reference point: its rear axle or, of one without, its middle."""
     lane: Lane | None = None
     """Lane, such as `road_1`, or an edge, of which the leftmost lane is taken that leads where the actor goes."""
     at_m: Expression | None = None
@@ -152,6 +160,7 @@ _FORMS: Mapping[str, tuple[str, ...]] = {  # field that tells a form → those t
     "beside": ("ahead_m", *_BESIDE),
     "crossing": ("side", *_WALK),
     "x_m": ("y_m", "heading_deg", *_WALK),
+    "position": (),
 }
 
 
@@ -184,8 +193,7 @@ class Actor(Moving):
     """Any road user but the ego."""
 
     role: ActorRole = "adversary"
-    """The search drives adversaries, SUMO `background`; `story` follows a story, which documents cannot state yet, and
-    until then SUMO drives it too; `static` never moves."""
+    """The search drives adversaries, SUMO `background`; `story` follows the document's story; `static` never moves."""
     moves: Literal["lanes", "freely"] | None = None
     """In lanes as a vehicle or anywhere as a pedestrian; without it as its body usually does."""
     uses_oncoming: bool = False
@@ -247,7 +255,7 @@ class SignalTiming(Settings):
 class Scenario(Settings):
     """A scenario, from which scenes are drawn."""
 
-    name: Word
+    name: ScenarioName
     summary: Annotated[str, Field(max_length=300)] = ""
     tags: Annotated[tuple[Annotated[str, Field(max_length=60)], ...], Field(max_length=30)] = ()
     """Such as `iso34502:cut-in`, `ncap:CCRb`, or free words."""
@@ -262,6 +270,9 @@ class Scenario(Settings):
     actors: Annotated[Mapping[Word, Actor], Field(max_length=100)] = {}
     streams: Annotated[Mapping[Word, Stream], Field(max_length=50)] = {}
     constraints: Annotated[tuple[Constraint, ...], Field(max_length=100)] = ()
+    road: NetName | None = None
+    """OpenDRIVE file beside the net, which positions of a story are stated in."""
+    story: Story | None = None
     signal: SignalTiming = SignalTiming()
     friction: Expression = 1.0
     """Of tyres on the road."""
@@ -328,12 +339,23 @@ def _leaves(path: str, within: Settings) -> Iterator[tuple[str, FieldInfo, Any]]
     """Yields the fields of nested settings that hold a plain value, each with its path."""
     for name, field in type(within).model_fields.items():
         here, value = f"{path}.{name}".removeprefix("."), getattr(within, name)
-        inner = value if isinstance(value, Mapping) else {"": value}
-        for key, part in inner.items():
+        for key, part in _parts(value):
             if isinstance(part, Settings) and not isinstance(part, Chosen):
-                yield from _leaves(f"{here}.{key}".removesuffix("."), part)
+                yield from _leaves(f"{here}{key}", part)
             elif part is not None:
-                yield f"{here}.{key}".removesuffix("."), field, part
+                yield f"{here}{key}", field, part
+
+
+def _parts(value: Any) -> Iterator[tuple[str, Any]]:
+    """Yields the members of nested mappings and tuples of settings, each with its path."""
+    if isinstance(value, Mapping):
+        for key, member in value.items():
+            yield from ((f".{key}{inner}", part) for inner, part in _parts(member))
+    elif isinstance(value, tuple) and any(isinstance(member, Settings | tuple) for member in value):
+        for i, member in enumerate(value):
+            yield from ((f"[{i}]{inner}", part) for inner, part in _parts(member))
+    else:
+        yield "", value
 
 
 def _is_expression(field: FieldInfo) -> bool:

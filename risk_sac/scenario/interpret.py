@@ -50,7 +50,7 @@ class Interpreter:
         numbers, words = dict[str, float](), dict[str, str]()
         for name, parameter in self.document.parameters.items():
             if parameter.value is not None:
-                numbers[name] = parameter.value
+                numbers[name] = Value(numbers, words).of(parameter.value, f"parameters.{name}.value")
             elif parameter.words is not None:
                 words[name] = parameter.words[_part(xi[name], len(parameter.words))]
             elif parameter.rows is not None:
@@ -119,10 +119,10 @@ class Interpreter:
     @cached_property
     def ranges(self) -> Mapping[str, Any]:
         """Range of each number of the document."""
-        ranges = {}
+        ranges = dict[str, Interval]()
         for name, parameter in self.document.parameters.items():
             if parameter.value is not None:
-                ranges[name] = Interval(low=parameter.value, high=parameter.value)
+                ranges[name] = term(parameter.value).range(ranges)
             elif parameter.range is not None:
                 ranges[name] = Interval(low=parameter.range[0], high=parameter.range[1])
             for column in parameter.names:
