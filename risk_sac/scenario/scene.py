@@ -1,70 +1,31 @@
 """Layout of one scene: where the actors of a scenario document start, given the values of its parameters."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, NamedTuple, get_args
+from typing import NamedTuple, get_args
 
 from risk_sac.config.scenario import (
     EGO,
     LONGEST_HORIZON_S,
-    AllOf,
-    AnyOf,
-    Chosen,
-    Constraint,
     Driven,
     Moving,
     Scenario,
     Start,
     Stream,
 )
-from risk_sac.config.values import Comparison, Expression, comparison, term
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.bodies import BODIES, BodyName, Motion
 from risk_sac.scenario.ground import ground_of, kerb_of
 from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, StaticStart, VehicleStart
 from risk_sac.scenario.tracks import Track, Turn, lane_named, routed, straight_on
+from risk_sac.scenario.value import Value
 from risk_sac.world.net import Crossing, Link, Net, NetLane, direction
 from risk_sac.world.types import STEP_S, Point, Role
 
 GRID_M = 20.0  # of the places that ground is computed for
 UNIT_DIGITS = 12  # of a direction's cosine and sine, so that those of 90 degrees are 0 and 1
-
-
-class Value(NamedTuple):
-    """Values and words of a scene's parameters."""
-
-    numbers: Mapping[str, float]
-    words: Mapping[str, str]
-
-    def of(self, expression: Expression, path: str = "") -> float:
-        """The value of an expression; raises `ConfigError` with its path where it has none."""
-        try:
-            return term(expression).value(self.numbers)
-        except ConfigError as error:
-            raise ConfigError(path, error.got, error.expected, error.remedy) from error
-
-    def choose(self, choice: Any) -> Any:
-        """Resolves a choice by a parameter's word; anything else stays as it is."""
-        return choice.of[self.words[choice.by]] if isinstance(choice, Chosen) else choice
-
-    def word(self, name: Any) -> Any:
-        """The word of a parameter if one has this name, else the name."""
-        name = self.choose(name)
-        return self.words.get(name, name)
-
-    def holds(self, constraint: Constraint) -> bool:
-        """Whether a constraint holds."""
-        if isinstance(constraint, AllOf):
-            return all(map(self.holds, constraint.all))
-        if isinstance(constraint, AnyOf):
-            return any(map(self.holds, constraint.any))
-        return self.true(constraint)
-
-    def true(self, text: Comparison) -> bool:
-        """Whether a comparison holds."""
-        return bool(comparison(text).value(self.numbers))
 
 
 class OnTrack(NamedTuple):
