@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from risk_sac.config.scenario import AllOf, AnyOf, Chosen, Constraint
+from risk_sac.config.base import Chosen
+from risk_sac.config.scenario import AllOf, AnyOf, Constraint
 from risk_sac.config.values import Comparison, Expression, comparison, term
 from risk_sac.errors import ConfigError
 
