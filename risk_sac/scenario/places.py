@@ -11,10 +11,10 @@ import numpy as np
 
 from risk_sac.config.story import Position, Story
 from risk_sac.errors import ConfigError
-from risk_sac.maps.road_geometry import TOLERANCE_M, Across, RoadFile, Roadway
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of
 from risk_sac.scenario.value import Value
 from risk_sac.world.net import Net, NetLane, once
+from risk_sac.world.road_geometry import TOLERANCE_M, Across, RoadFile, Roadway
 from risk_sac.world.types import Floats
 
 FARTHEST_M = 30.0  # of a pose from the line of its lane
@@ -83,7 +83,7 @@ class Places:
             case "lane":
                 lane = round(number(position.lane, "lane"))
                 s_m, offset_m = number(position.s_m, "s_m"), number(position.offset_m, "offset_m")
-                return self._on_lane(OnRoad(position.road, lane, s_m, offset_m))
+                return self._on_lane(OnRoad(self._value.choose(position.road), lane, s_m, offset_m))
             case "relative_lane":
                 here = self.opendrive(of(position.to))
                 lane = lanes_beside(here.lane, round(number(position.lanes, "lanes")))

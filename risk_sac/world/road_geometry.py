@@ -18,7 +18,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import parse
 
 from risk_sac.errors import ConfigError, MapError, did_you_mean
-from risk_sac.maps.plane_curves import Begin, Clothoid, CubicCurve, Curve
+from risk_sac.world.plane_curves import Begin, Clothoid, CubicCurve, Curve
 from risk_sac.world.types import Floats
 
 End = Literal["start", "end"]
