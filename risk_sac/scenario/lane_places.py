@@ -48,7 +48,7 @@ def lane_line(lane: NetLane) -> TravelLine:
     return line_of(lane.centre)
 
 
-def nearest_spot(
+def nearest_lane(
     net: Net, x_m: float, y_m: float, heading_rad: float | None, among: Collection[str] = ()
 ) -> Spot | None:
     """Returns the place on the nearest lane for cars within 30 m.

@@ -11,8 +11,9 @@ from risk_sac.config.scenario import EGO, Moving, Scenario
 from risk_sac.config.story import Story, VariableCondition
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.bodies import BODIES, BodyName
+from risk_sac.scenario.lane_places import Spot, nearest_lane
 from risk_sac.scenario.layout import VehicleStart
-from risk_sac.scenario.places import Places, Spot, nearest_lane
+from risk_sac.scenario.places import Places
 from risk_sac.scenario.story_plan import Deviation, Reach, StoryActor, StoryPlan, settled
 from risk_sac.scenario.travel_line import Pose, line_of
 from risk_sac.scenario.value import Value
