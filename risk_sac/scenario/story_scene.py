@@ -103,7 +103,7 @@ class StoryScene:
         return spot
 
     def route(self, name: str, lane: NetLane, metres: float) -> tuple[str, ...] | None:
-        """Returns the edges of an actor's first trajectory or route of the story, from a lane on, and straight on after.
+        """Returns the edges of an actor's first trajectory or route of the story, and straight on after it.
 
         Args:
           name: the actor.
