@@ -152,7 +152,7 @@ class Roadway:
         """Whether a lane's traffic drives against the reference line."""
         return (lane > 0) != self.keeps_left if lane else False
 
-    def lanevalue_at(self, s_m: float, t_m: float) -> int:
+    def lane_at(self, s_m: float, t_m: float) -> int:
         """Returns the lane at a lateral place, or the outermost one beside it."""
         section, t_m = self.section(s_m), t_m - value_at(self.offsets, s_m).t_m
         side = 1 if t_m > 0 else -1
