@@ -10,6 +10,7 @@ import numpy as np
 from risk_sac.world.types import Floats
 
 SAME_M = 1e-9
+NEAR_RAD = 0.05  # a heading that differs less from a piece is that of the curve that the piece stands for
 
 
 class Pose(NamedTuple):
@@ -72,6 +73,21 @@ class TravelLine:
         i = int(real[np.argmin(np.hypot(beyond, left)[real])])
         on = min(max(float(along[i]), float(low[i])), float(high[i]))
         return float(self.station_m[i]) + on, float(left[i]) if beyond[i] == 0.0 else _side(left[i], beyond[i])
+
+    def direction_rad(self, station_m: float) -> float:
+        """Returns the direction of travel at a station, whatever the body's heading."""
+        i = self._piece(station_m)
+        dx, dy = self.points[i + 1] - self.points[i]
+        along = math.atan2(dy, dx)
+        heading = self.pose(station_m).heading_rad
+        return heading if abs(math.remainder(heading - along, math.tau)) < NEAR_RAD else along
+
+    def cut(self, from_m: float, to_m: float) -> "TravelLine":
+        """Returns the part of an untimed line between two stations."""
+        inner = (self.station_m > from_m + SAME_M) & (self.station_m < to_m - SAME_M)
+        ends = [self.pose(from_m), self.pose(to_m)]
+        points = np.concatenate(([ends[0][:2]], self.points[inner], [ends[1][:2]]))
+        return line_of(points, np.array([ends[0].heading_rad, *self.heading[inner], ends[1].heading_rad]))
 
     def time_s(self, station_m: float) -> float:
         """Returns when a station of a timed line is passed."""

@@ -23,6 +23,7 @@ from risk_sac.world.types import Floats
 
 End = Literal["start", "end"]
 TOLERANCE_M = 0.01  # by which a place may lie beyond a road's end
+NEAR_M = 60.0  # of a reference line; choice: half of the widest road
 SAMPLE_M = 1.0  # between the places of a reference line that a point is compared with first
 
 
@@ -114,9 +115,29 @@ class Roadway:
             rows[piece == i] = self.curves[i].at(s_m[piece == i] - self.starts_m[i])
         return rows
 
+    def section_index(self, s_m: float) -> int:
+        """Returns which lane section a place lies in."""
+        return max(bisect_right(self.sections, s_m, key=attrgetter("start_m")) - 1, 0)
+
     def section(self, s_m: float) -> Section:
         """Returns the lane section at a place."""
-        return self.sections[max(bisect_right(self.sections, s_m, key=attrgetter("start_m")) - 1, 0)]
+        return self.sections[self.section_index(s_m)]
+
+    @cached_property
+    def breaks_m(self) -> tuple[float, ...]:
+        """Places where a piece of the reference line, a lane section, a width or an offset begins."""
+        lanes = [(section.start_m, lane) for section in self.sections for lane in section.lanes.values()]
+        widths = [start + cubic.start_m for start, lane in lanes for cubic in (*lane.widths, *lane.borders)]
+        starts = [cubic.start_m for cubic in self.offsets] + [section.start_m for section in self.sections]
+        return tuple(sorted({*self.starts_m, *starts, *widths}))
+
+    def is_plain(self, s_m: float) -> bool:
+        """Whether widths and offset are constant around a place."""
+        section = self.section(s_m)
+        lanes = [_active(lane.widths, s_m - section.start_m) for lane in section.lanes.values()]
+        lanes += [_active(lane.borders, s_m - section.start_m) for lane in section.lanes.values()]
+        cubics = [cubic for cubic in (*lanes, _active(self.offsets, s_m)) if cubic is not None]
+        return all(cubic.b == cubic.c == cubic.d == 0.0 for cubic in cubics)
 
     def middle(self, lane: int, s_m: float) -> Across:
         """Returns the middle of a lane; raises `ConfigError` if it is not there."""
@@ -224,6 +245,30 @@ class RoadFile:
             roads[road.id] = road
         return cls(roads, {junction.get("id", ""): _connections(junction) for junction in root.findall("junction")})
 
+    def near(self, x_m: float, y_m: float) -> list[tuple[Roadway, float]]:
+        """Returns the roads near a point, each with the sample of its reference line that is nearest.
+
+        Near are those whose reference line is within 60 m, or else the nearest one.
+        """
+        roads, firsts, samples = self._samples
+        if not roads:
+            return []
+        apart = np.hypot(samples[:, 1] - x_m, samples[:, 2] - y_m)
+        least = np.minimum.reduceat(apart, firsts)
+        places = []
+        for i in np.flatnonzero(least <= max(NEAR_M, float(least.min()))).tolist():
+            end = firsts[i + 1] if i + 1 < len(firsts) else len(samples)
+            nearest = int(firsts[i] + np.argmin(apart[firsts[i] : end]))
+            places.append((roads[i], float(samples[nearest, 0])))
+        return places
+
+    @cached_property
+    def _samples(self) -> tuple[list[Roadway], list[int], Floats]:
+        """Roads, where the samples of each begin, and all samples."""
+        roads = list(self.roads.values())
+        firsts = np.cumsum([0, *(len(road.samples) for road in roads)])[:-1].tolist()
+        return roads, firsts, np.concatenate([road.samples for road in roads] or [np.empty((0, 3))])
+
     def road(self, id_: str) -> Roadway:
         """Returns a road; raises `ConfigError` if there is none of this name."""
         if id_ not in self.roads:
@@ -233,9 +278,15 @@ class RoadFile:
         return self.roads[id_]
 
 
-def _at(cubics: Sequence[Cubic], s_m: float) -> Across:
+def _active(cubics: Sequence[Cubic], s_m: float) -> Cubic | None:
+    """Returns the polynomial that holds at a place."""
     i = bisect_right(cubics, s_m, key=attrgetter("start_m")) - 1
-    return Across(cubics[i].value(s_m), cubics[i].slope(s_m)) if i >= 0 else Across(0.0, 0.0)
+    return cubics[i] if i >= 0 else None
+
+
+def _at(cubics: Sequence[Cubic], s_m: float) -> Across:
+    cubic = _active(cubics, s_m)
+    return Across(0.0, 0.0) if cubic is None else Across(cubic.value(s_m), cubic.slope(s_m))
 
 
 def _number(element: Element, name: str, default: float | None = None) -> float:
