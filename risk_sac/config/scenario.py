@@ -5,35 +5,24 @@ layouts of it.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Generic, Literal, Self, TypeVar, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, StringConstraints, model_validator
 from pydantic.fields import FieldInfo
 
-from risk_sac.config.base import Settings
+from risk_sac.config.base import Chosen, Settings, Word
 from risk_sac.config.campaign import JudgeConfig, Requirement
 from risk_sac.config.odd import Odd
 from risk_sac.config.story import Position, Story
 from risk_sac.config.values import ARITHMETIC, Comparison, Expression
 from risk_sac.errors import ConfigError, did_you_mean
 
-T = TypeVar("T")
-Word = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$")]
 ScenarioName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 NetName = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\s]+$")]
 EGO = "ego"
 LONGEST_HORIZON_S = 400.0
 Reference = Literal["stop_line", "crossing", "junction", "lane_end"]
 ActorRole = Literal["adversary", "story", "background", "static"]
-
-
-class Chosen(Settings, Generic[T]):
-    """A value for each word of a parameter."""
-
-    by: Word
-    """Parameter with words."""
-    of: Annotated[Mapping[Word, T], Field(min_length=1)]
-    """Word → value."""
 
 
 Net = NetName | Chosen[NetName]
@@ -50,8 +39,9 @@ class ScenarioParameter(Settings):
     """Least and greatest value."""
     words: Annotated[tuple[Word, ...], Field(min_length=1, max_length=50)] | None = None
     """Alternatives, each an equal part of the axis from 0 to 1."""
-    rows: Annotated[tuple[Mapping[Word, float], ...], Field(min_length=1, max_length=10_000)] | None = None
-    """Values of several names that vary together, each row an equal part of the axis from 0 to 1."""
+    rows: Annotated[tuple[Mapping[Word, float | Word], ...], Field(min_length=1, max_length=10_000)] | None = None
+    """Numbers or words of names that vary together, each row an equal part of the axis from 0 to 1.
+    The parameter's own name may be one of them, which makes a set of numbers."""
     value: Expression | None = None
     """Of a constant, or arithmetic over parameters before it."""
     step: Annotated[float, Field(gt=0)] | None = None
@@ -76,12 +66,21 @@ class ScenarioParameter(Settings):
                 raise ConfigError(
                     f"rows[{i}]", ", ".join(row), f"the names of the first row: {', '.join(self.rows[0])}"
                 )
+            for name in row:
+                if self.rows and isinstance(row[name], str) != isinstance(self.rows[0][name], str):
+                    raise ConfigError(f"rows[{i}].{name}", repr(row[name]), "words alone, or numbers alone")
         return self
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names that its rows give values to."""
         return tuple(self.rows[0]) if self.rows else ()
+
+    def alternatives(self, name: str) -> tuple[str, ...]:
+        """Words that a name may have: its own, or those of a column of its rows; empty for numbers."""
+        if self.rows is None:
+            return self.words or ()
+        return tuple(dict.fromkeys(word for row in self.rows if isinstance(word := row.get(name), str)))
 
 
 class Start(Settings):
@@ -164,6 +163,15 @@ _FORMS: Mapping[str, tuple[str, ...]] = {  # field that tells a form → those t
 }
 
 
+class Box(Settings):
+    """Bounding box of an actor in the file that its scenario comes from."""
+
+    length_m: Annotated[float, Field(gt=0, le=200)]
+    width_m: Annotated[float, Field(gt=0, le=50)]
+    ahead_m: Annotated[float, Field(ge=-100, le=100)] = 0.0
+    """From the reference point, such as the rear axle's middle, forward to the box's middle."""
+
+
 class Driven(Settings):
     """Body, initial speed and way of a road user."""
 
@@ -187,6 +195,9 @@ class Moving(Driven):
     """The ego, or another actor."""
 
     start: Start
+    box: Box | Chosen[Box] | None = None
+    """Places the body by the reference point, and ends the distances of a story. Without it the body's own box, of
+    which the reference point is the middle."""
 
 
 class Actor(Moving):
@@ -270,7 +281,7 @@ class Scenario(Settings):
     actors: Annotated[Mapping[Word, Actor], Field(max_length=100)] = {}
     streams: Annotated[Mapping[Word, Stream], Field(max_length=50)] = {}
     constraints: Annotated[tuple[Constraint, ...], Field(max_length=100)] = ()
-    road: NetName | None = None
+    road: Net | None = None
     """OpenDRIVE file beside the net, which positions of a story are stated in."""
     story: Story | None = None
     signal: SignalTiming = SignalTiming()
@@ -292,23 +303,33 @@ class Scenario(Settings):
         """All values that a parameter's word chooses, each with its path in the document."""
         return ((path, value) for path, _, value in _leaves("", self) if isinstance(value, Chosen))
 
+    @property
+    def words(self) -> Mapping[str, tuple[str, ...]]:
+        """Each name that stands for words, and these words."""
+        pairs = [
+            (name, parameter.alternatives(name))
+            for own, parameter in self.parameters.items()
+            for name in parameter.names or (own,)
+        ]
+        return {name: words for name, words in pairs if words}
+
     @model_validator(mode="after")
     def _names(self) -> Self:
         if EGO in self.actors:
             raise ConfigError("actors.ego", "an actor of this name", "another name", "the ego has a part of its own")
         if both := sorted(self.actors.keys() & self.streams.keys()):
             raise ConfigError(f"streams.{both[0]}", "the name of an actor", "another name")
+        words = self.words
         for path, choice in self.choices:
-            parameter = self.parameters.get(choice.by)
-            if parameter is None or parameter.words is None:
-                words = [name for name, other in self.parameters.items() if other.words]
+            if choice.by not in words:
                 wanted = f"a parameter with words: {', '.join(words) or 'there is none'}"
                 raise ConfigError(f"{path}.by", repr(choice.by), wanted, did_you_mean(choice.by, words))
-            if missing := sorted(set(parameter.words) - choice.of.keys()):
+            if missing := sorted(set(words[choice.by]) - choice.of.keys()):
                 raise ConfigError(f"{path}.of", ", ".join(choice.of), f"a value for {', '.join(missing)} too")
-            if unknown := sorted(choice.of.keys() - set(parameter.words)):
-                remedy = did_you_mean(unknown[0], list(parameter.words))
-                raise ConfigError(f"{path}.of.{unknown[0]}", "a word", f"one of {', '.join(parameter.words)}", remedy)
+            if unknown := sorted(choice.of.keys() - set(words[choice.by])):
+                remedy = did_you_mean(unknown[0], words[choice.by])
+                wanted = f"one of {', '.join(words[choice.by])}"
+                raise ConfigError(f"{path}.of.{unknown[0]}", "a word", wanted, remedy)
         for name, actor in self.actors.items():
             other = actor.start.reference
             if other is not None and other != EGO and other not in self.actors:

@@ -10,13 +10,16 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from risk_sac.config.base import Settings
+from risk_sac.config.base import Chosen, Settings
 from risk_sac.config.values import Expression
 from risk_sac.errors import ConfigError
 
 ElementName = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 ActorName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$")]
 RoadId = Annotated[str, StringConstraints(min_length=1, max_length=100)]
+AnyRoad = RoadId | Chosen[RoadId]
+AnyName = ElementName | Chosen[ElementName]
+"""A name, or one for each word of a parameter: `scenario.scene.Value.choose` tells which it is in a scene."""
 Rule = Literal["greater", "greater_or_equal", "less", "less_or_equal", "equal", "not_equal"]
 Coordinates = Literal["entity", "lane", "road", "trajectory"]
 Along = Literal["euclidean", "longitudinal", "lateral"]
@@ -49,7 +52,7 @@ class LanePosition(_Turned):
     """Point of an OpenDRIVE lane."""
 
     kind: Literal["lane"]
-    road: RoadId
+    road: AnyRoad
     lane: Expression
     """OpenDRIVE's lane id, a whole number."""
     s_m: Expression
@@ -62,7 +65,7 @@ class RoadPosition(_Turned):
     """Point given by an OpenDRIVE road's reference line."""
 
     kind: Literal["road"]
-    road: RoadId
+    road: AnyRoad
     s_m: Expression
     t_m: Expression = 0.0
 
@@ -103,7 +106,7 @@ class RoutePosition(_Turned):
     """Point along a route."""
 
     kind: Literal["on_route"]
-    route: ElementName
+    route: AnyName
     s_m: Expression
     """Along the reference lines of the route's roads, from its first waypoint's road's begin of use."""
     lane: Expression | None = None
@@ -116,7 +119,7 @@ class TrajectoryPosition(_Turned):
     """Point along a trajectory."""
 
     kind: Literal["on_trajectory"]
-    trajectory: ElementName
+    trajectory: AnyName
     s_m: Expression
     t_m: Expression = 0.0
 
@@ -323,7 +326,7 @@ class FollowTrajectoryAction(Settings):
     """Follows a trajectory, at its own speed or at the times of its points."""
 
     kind: Literal["follow_trajectory"]
-    trajectory: ElementName
+    trajectory: AnyName
     timing: TrajectoryTiming | None = None
     mode: Literal["position", "follow"] = "position"
     from_m: Expression = 0.0
@@ -334,7 +337,7 @@ class AssignRouteAction(Settings):
     """Follows a route from now on."""
 
     kind: Literal["assign_route"]
-    route: ElementName
+    route: AnyName
 
 
 class AcquirePositionAction(Settings):

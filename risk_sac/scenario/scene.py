@@ -6,12 +6,12 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple, get_args
 
+from risk_sac.config.base import Chosen
 from risk_sac.config.scenario import (
     EGO,
     LONGEST_HORIZON_S,
     AllOf,
     AnyOf,
-    Chosen,
     Constraint,
     Driven,
     Moving,

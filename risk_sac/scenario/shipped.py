@@ -1,11 +1,12 @@
 """Scenarios that ship with the package: a document and its net in each folder of `sumo_nets/`."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
 from risk_sac.config import Scenario
+from risk_sac.config.scenario import Net
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.reading import document_from
 
@@ -44,9 +45,17 @@ def shipped_net(name: str) -> str:
 
 def networks(document: Scenario) -> Iterator[str]:
     """All networks that a document names."""
-    network = document.network
-    words = document.parameters[network].words if isinstance(network, str) and network in document.parameters else None
-    yield from network.of.values() if not isinstance(network, str) else words or (network,)
+    yield from _alternatives(document, document.network)
+
+
+def roads(document: Scenario) -> Iterator[str]:
+    """All road files that a document names."""
+    if document.road is not None:
+        yield from _alternatives(document, document.road)
+
+
+def _alternatives(document: Scenario, name: Net) -> Iterable[str]:
+    return document.words.get(name, (name,)) if isinstance(name, str) else name.of.values()
 
 
 def nets_of(document: Scenario, folder: Path | None = None) -> Mapping[str, str]:
