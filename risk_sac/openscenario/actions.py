@@ -57,6 +57,8 @@ _EFFECTS = {
     "SetMonitorAction": "nothing is monitored",
 }
 _READ = "an action on speed, lane, distance, route, place, visibility or a variable"
+WAYS = AssignRouteAction | FollowTrajectoryAction | AcquirePositionAction
+"""Actions that say where an actor goes; the ego drives there."""
 EGO_EFFECT = "the ego drives by itself"
 
 
@@ -99,9 +101,8 @@ class Actions:
             action = self.private(holder)
         except Unread as error:
             return self._reported(error)
-        if actors == (EGO,) and not isinstance(action, AssignRouteAction | FollowTrajectoryAction | NoAction):
-            if not isinstance(action, AcquirePositionAction):
-                return self._none(holder, EGO_EFFECT)
+        if actors == (EGO,) and not isinstance(action, WAYS | NoAction):
+            return self._none(holder, EGO_EFFECT)
         return action
 
     def private(self, holder: At) -> Action:
@@ -237,7 +238,9 @@ class Actions:
         speed: Any = inner.number("value")
         if inner.tag == "RelativeSpeedToMaster":
             how = inner.one_of("speedTargetValueType", _HOW, "delta")
-            speed = inner.build(RelativeTarget, to=self._entities.named(action, "masterEntityRef"), value=speed, how=how)
+            speed = inner.build(
+                RelativeTarget, to=self._entities.named(action, "masterEntityRef"), value=speed, how=how
+            )
         holder = inner.maybe("SteadyState") or inner
         metres, seconds = holder.maybe("TargetDistanceSteadyState"), holder.maybe("TargetTimeSteadyState")
         return inner.build(

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from risk_sac.config.base import Chosen
-from risk_sac.errors import did_you_mean
 from risk_sac.openscenario.elements import Element
 from risk_sac.openscenario.parameters import TEXTS, read_declaration
-from risk_sac.openscenario.scope import At, Meaning, Scope, Text
+from risk_sac.openscenario.scope import At, Meaning, Text
 from risk_sac.openscenario.sources import Sources
 
 ENDING = "*.xosc"
@@ -35,7 +34,9 @@ class Catalogs:
           locations: its element `CatalogLocations`.
         """
         self._sources, self._file = sources, file
-        self._folders = [folder for kind in locations.element.children for folder in _folders(kind)] if locations else []
+        self._folders = (
+            [folder for kind in locations.element.children for folder in _folders(kind)] if locations else []
+        )
         self._catalogs: dict[str, Element] | None = None
         self._references = 0
 
@@ -50,14 +51,10 @@ class Catalogs:
             raise reference.refusal(f"more than {MOST_REFERENCES} references to catalogs", "fewer")
         catalogs = self._read()
         if catalog not in catalogs:
-            known = ", ".join(catalogs) or "none"
-            got = f"the catalog {catalog[:80]!r}"
-            remedy = did_you_mean(catalog, list(catalogs)) or "add its file, or its folder to CatalogLocations"
-            raise reference.refusal(got, f"one of {known}", remedy)
+            raise reference.unknown("the catalog", catalog, catalogs)
         entries = {entry.attributes.get("name", ""): entry for entry in catalogs[catalog].children}
         if name not in entries:
-            got = f"the entry {name[:80]!r} of the catalog {catalog[:80]!r}"
-            raise reference.refusal(got, f"one of {', '.join(entries)}"[:500], did_you_mean(name, list(entries)))
+            raise reference.unknown(f"in the catalog {catalog[:80]!r} the entry", name, entries)
         entry = entries[name]
         if entry.tag not in tags:
             raise reference.refusal(f"the entry {name[:80]!r}, a {entry.tag[:80]}", f"a {' or '.join(tags)}")
@@ -125,7 +122,11 @@ def _names(catalog: Element | None) -> set[str]:
 def assignments(reference: At) -> dict[str, Meaning]:
     """Returns the values that a reference assigns to an entry's parameters, as its own scope has them."""
     block = reference.maybe("ParameterAssignments")
-    return {one.constant("parameterRef"): one.meaning("value") for one in block.all("ParameterAssignment")} if block else {}
+    return (
+        {one.constant("parameterRef"): one.meaning("value") for one in block.all("ParameterAssignment")}
+        if block
+        else {}
+    )
 
 
 def parametrised(at: At, assigned: Mapping[str, Meaning]) -> At:
@@ -152,9 +153,5 @@ def parametrised(at: At, assigned: Mapping[str, Meaning]) -> At:
         for group in declaration.all("ConstraintGroup"):
             group.element.use_all()
     if unknown := sorted(assigned.keys() - own.keys()):
-        got = f"a value for the parameter {unknown[0][:80]!r}"
-        known = ", ".join(own) or "none"
-        raise at.refusal(got, f"one of its parameters: {known}", did_you_mean(unknown[0], list(own)))
+        raise at.unknown("a value for the parameter", unknown[0], own)
     return At(at.element, at.scope.inner(own)) if own else at
-
-

@@ -117,7 +117,9 @@ class Conditions:
 
     def _by_value(self, holder: At, common: dict[str, Any]) -> Condition:
         if (at := holder.maybe("SimulationTimeCondition")) is not None:
-            return at.build(TimeCondition, kind="time", rule=at.one_of("rule", RULES), value=at.number("value"), **common)
+            return at.build(
+                TimeCondition, kind="time", rule=at.one_of("rule", RULES), value=at.number("value"), **common
+            )
         if (at := holder.maybe("StoryboardElementStateCondition")) is not None:
             return at.build(
                 StateCondition,
@@ -134,7 +136,10 @@ class Conditions:
     def _by_entity(self, holder: At, common: dict[str, Any]) -> Condition:
         triggering = holder.one("TriggeringEntities")
         names = [name for ref in triggering.all("EntityRef") for name in self._entities.members(ref)]
-        common |= {"of": tuple(dict.fromkeys(names)), "which": triggering.one_of("triggeringEntitiesRule", _WHICH, "any")}
+        common |= {
+            "of": tuple(dict.fromkeys(names)),
+            "which": triggering.one_of("triggeringEntitiesRule", _WHICH, "any"),
+        }
         if not names:
             raise triggering.refusal("no entity", "an EntityRef at least")
         inner = holder.one("EntityCondition")

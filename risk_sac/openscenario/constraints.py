@@ -37,7 +37,9 @@ def _of(declared: Declared, parameters: Parameters) -> Iterator[Constraint]:
         return
     meaning = parameters.meaning(declared.name)
     if meaning is None or meaning.expression is None:
-        if declared.name not in parameters.varied and not allowed(declared, parameters, meaning.text if meaning else ""):
+        if declared.name not in parameters.varied and not allowed(
+            declared, parameters, meaning.text if meaning else ""
+        ):
             raise declared.at.refusal(f"the value {declared.value[:80]!r}", "one that its constraints allow")
         return
     parts = [[_number(member, coded(meaning.expression).text) for member in group] for group in groups]

@@ -51,7 +51,7 @@ class Element:
 
     def refusal(self, got: str, expected: str = "", remedy: str = "") -> ConfigError:
         """Returns the error of something that is wrong here."""
-        return ConfigError(self.place, got[:_SHOWN * 4], expected, remedy)
+        return ConfigError(self.place, got[: _SHOWN * 4], expected, remedy)
 
     def unread(self, expected: str, effect: str) -> Unread:
         """Returns the error of something here that is valid but not read."""

@@ -3,11 +3,9 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 from risk_sac.config.base import Chosen
 from risk_sac.config.scenario import EGO, Box
-from risk_sac.errors import did_you_mean
 from risk_sac.openscenario.catalogs import Alternatives, Catalogs, parametrised
 from risk_sac.openscenario.scope import At
 from risk_sac.scenario.bodies import BODIES, BodyName
@@ -16,9 +14,9 @@ KINDS = ("Vehicle", "Pedestrian", "MiscObject")
 MOST = 100
 _FREE = ("pedestrian", "child")
 _VEHICLES: Mapping[str, tuple[BodyName, ...]] = {
-    "car": ("car",),
+    "car": ("car", "van"),
     "van": ("van", "car"),
-    "truck": ("truck",),
+    "truck": ("truck", "van"),
     "trailer": ("truck",),
     "semitrailer": ("truck",),
     "bus": ("bus",),
@@ -96,14 +94,12 @@ class Entities:
         if name in self._groups:
             selection = self._groups[name].one("Members")
             return tuple(member for ref in selection.all("EntityRef") for member in self._own(ref))
-        known = [*self._names, *self._groups]
-        raise at.refusal(f"{attribute}: {name[:80]!r}", f"one of {', '.join(known)}"[:500], did_you_mean(name, known))
+        raise at.unknown(attribute, name, [*self._names, *self._groups])
 
     def _own(self, at: At) -> tuple[str, ...]:
         name = at.constant("entityRef")
         if name not in self._names:
-            known = list(self._names)
-            raise at.refusal(f"{name[:80]!r}", f"one of {', '.join(known)}"[:500], did_you_mean(name, known))
+            raise at.unknown("entityRef", name, self._names)
         return (self._names[name],)
 
     def _read(self, at: At, given: str) -> Entity:
@@ -180,14 +176,16 @@ def _ego(block: At, objects: list[At], wanted: str | None) -> str:
     names = [at.constant("name") for at in objects]
     if wanted is not None:
         if wanted not in names:
-            raise block.refusal(f"no entity {wanted[:80]!r}", f"one of {', '.join(names)}"[:500], did_you_mean(wanted, names))
+            raise block.unknown("the ego", wanted, names)
         return wanted
     called = [name for name in names if name.lower() in ("ego", "ego_vehicle", "hero")]
     controlled = [at.constant("name") for at in objects if at.maybe("ObjectController")]
     exact = [name for name in called if name == "Ego"]
     egos = exact if len(exact) == 1 else called or controlled
     if len(egos) != 1:
-        got = f"{len(egos)} egos: {', '.join(egos)[:200]}" if egos else "no entity that is named Ego or has a controller"
+        got = (
+            f"{len(egos)} egos: {', '.join(egos)[:200]}" if egos else "no entity that is named Ego or has a controller"
+        )
         raise block.refusal(got, "one ego", "name it: --ego-entity NAME")
     return egos[0]
 
@@ -204,5 +202,3 @@ def _document_names(given: list[str], ego: str) -> dict[str, str]:
             plain = f"{plain}_"
         names[name] = plain
     return names
-
-

@@ -6,13 +6,14 @@ the document, where it stands for itself.
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 from risk_sac.config.base import Word
+from risk_sac.config.distribution import WeightsLaw
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.config.values import CONSTANTS, FUNCTIONS, term
-from risk_sac.errors import ConfigError
+from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.openscenario.elements import Element
 from risk_sac.openscenario.scope import At, Meaning, Scope, literal
 
@@ -35,6 +36,8 @@ class Varied:
     """A range; else there are rows."""
     rows: tuple[Mapping[str, str], ...] = ()
     """Name → text, of each row."""
+    weights: WeightsLaw | None = None
+    """Of the rows."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -67,8 +70,9 @@ class Parameters:
         """
         self.declared: dict[str, Declared] = {}
         self.scope = Scope(self.meaning, lambda: list(self.declared))
-        self.varied = {name: part for part in varied for name in part.names}
-        self._parts = tuple(varied)
+        self._parts = tuple(part for part in varied if len(part.rows) != 1)
+        self.varied = {name: part for part in self._parts for name in part.names}
+        fixed = {name: text for part in varied if len(part.rows) == 1 for name, text in part.rows[0].items()}
         self._open = list[str]()
         self._meanings = dict[str, Meaning | None]()
         self._as_words = set[str]()  # numbers that choose texts, such as a road's id, too
@@ -76,13 +80,16 @@ class Parameters:
             declared = read_declaration(at)
             if declared.name in self.declared:
                 raise at.refusal(f"the parameter {declared.name!r} once more", "each name once")
-            self.declared[declared.name] = declared
+            value = fixed.get(declared.name, declared.value)
+            self.declared[declared.name] = replace(declared, at=At(at.element, self.scope), value=value)
         if len(self.declared) > MOST:
             raise declarations[0].refusal(f"{len(self.declared)} parameters", f"at most {MOST}")
-        for name, part in self.varied.items():
-            if name not in self.declared:
-                known = ", ".join(list(self.declared)[:20]) or "none"
-                raise part.place.refusal(f"the parameter {name[:80]!r}", f"a declared one: {known}")
+        for part in varied:
+            for name in part.names:
+                if name not in self.declared:
+                    known = ", ".join(list(self.declared)[:20]) or "none"
+                    remedy = did_you_mean(name, self.declared)
+                    raise part.place.refusal(f"the parameter {name[:80]!r}", f"a declared one: {known}", remedy)
 
     def meaning(self, name: str) -> Meaning | None:
         """Returns what a parameter's name stands for, a number by its name; None if there is no such parameter."""
@@ -100,7 +107,7 @@ class Parameters:
             raise declared.at.refusal(f"parameters that name each other: {chain}", "a chain that ends at a number")
         self._open.append(name)
         try:
-            meaning = declared.at.meaning("value")
+            meaning = declared.at.meant("value", declared.value)
         finally:
             self._open.pop()
         if meaning.expression is None and declared.kind not in TEXTS:
@@ -192,10 +199,10 @@ class Parameters:
     def _rows(self, part: Varied) -> ScenarioParameter:
         """Returns rows of numbers and words, or words if it has no more than those of one name."""
         if part.names == (part.name,) and not self.is_number(part.name):
-            words = [self.word(part.name, row[part.name]) for row in part.rows]
-            return part.place.build(ScenarioParameter, words=tuple(dict.fromkeys(words)))
-        rows = [self._row(row) for row in part.rows]
-        return part.place.build(ScenarioParameter, rows=tuple(rows))
+            words = tuple(self.word(part.name, row[part.name]) for row in part.rows)
+            return part.place.build(ScenarioParameter, words=words, distribution=part.weights)
+        rows = tuple(self._row(row) for row in part.rows)
+        return part.place.build(ScenarioParameter, rows=rows, distribution=part.weights)
 
     def _row(self, texts: Mapping[str, str]) -> dict[Word, float | Word]:
         row = dict[Word, float | Word]()

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any
 
 from risk_sac.config.base import Chosen
@@ -136,9 +137,7 @@ class Positions:
     def _on_trajectory(self, at: At) -> TrajectoryPosition:
         trajectory = self.trajectory(at.one("TrajectoryRef"))
         where = {"s_m": at.number("s"), "t_m": at.number_or("t", 0.0)}
-        return at.build(
-            TrajectoryPosition, kind="on_trajectory", trajectory=trajectory, **where, **self._turned(at)
-        )
+        return at.build(TrajectoryPosition, kind="on_trajectory", trajectory=trajectory, **where, **self._turned(at))
 
     # Routes
 
@@ -243,6 +242,6 @@ def _check_times(at: At, vertices: list[Vertex]) -> None:
     times = [vertex.time_s for vertex in vertices]
     if any(time is None for time in times) and any(time is not None for time in times):
         raise at.refusal("times at some vertices", "a time at each vertex, or at none")
-    for before, after in zip(times, times[1:], strict=False):
+    for before, after in pairwise(times):
         if isinstance(before, float) and isinstance(after, float) and after < before:
             raise at.refusal(f"the time {after:g} s after {before:g} s", "times that do not go backwards")

@@ -1,7 +1,7 @@
 """Attributes of elements as values: numbers, texts, and what parameters make of them."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -103,11 +103,15 @@ class At:
 
     def _meaning(self, name: str) -> Meaning | None:
         raw = self.element.attribute(name)
-        if raw is None:
-            return None
+        return None if raw is None else self.meant(name, raw)
+
+    def meant(self, name: str, raw: str) -> Meaning:
+        """Returns what a value of an attribute stands for here."""
         try:
             return self.scope.meaning(raw)
         except ConfigError as error:
+            if error.field:
+                raise
             raise self.refusal(f"{name}: {error.got}", error.expected, error.remedy) from None
 
     def _required(self, name: str) -> Meaning:
@@ -194,6 +198,12 @@ class At:
     def refusal(self, got: str, expected: str = "", remedy: str = "") -> ConfigError:
         """Returns the error of something that is wrong here."""
         return self.element.refusal(got, expected, remedy)
+
+    def unknown(self, what: str, name: str, known: Iterable[str]) -> ConfigError:
+        """Returns the error of a name that is none of those that are known."""
+        names = list(known)
+        wanted = f"one of {', '.join(names)}"[:500] if names else "none: there is none"
+        return self.refusal(f"{what} {name[:80]!r}", wanted, did_you_mean(name, names))
 
     def unread(self, expected: str, effect: str) -> Unread:
         """Returns the error of something here that is not read."""

@@ -20,7 +20,7 @@ class Sources:
           within: the folder that no file may lie outside of; None: any that the user may read.
         """
         self._within = within.resolve() if within is not None else None
-        self._roots: dict[Path, Element] = {}
+        self._roots: dict[Path, Element] = {}  # of files that were read
         self._count = 0
 
     def find(self, name: str, beside: Path, place: Element) -> Path:
@@ -60,6 +60,11 @@ class Sources:
             return path.read_bytes()
         except OSError as error:
             raise ConfigError(place, f"{path.name!r}, which cannot be read ({error.strerror})", "a file") from error
+
+    @property
+    def roots(self) -> list[Element]:
+        """Root elements of all OpenSCENARIO files that were read."""
+        return list(self._roots.values())
 
     def root(self, path: Path, place: str) -> Element:
         """Reads an OpenSCENARIO file, once; raises `ConfigError` for another root or an unknown version."""

@@ -4,7 +4,7 @@ from typing import Any
 
 from risk_sac.config.story import VariableAction, VariableCondition
 from risk_sac.config.values import Expression
-from risk_sac.errors import did_you_mean
+from risk_sac.errors import ConfigError
 from risk_sac.openscenario.parameters import TEXTS, Parameters
 from risk_sac.openscenario.scope import At
 
@@ -53,9 +53,18 @@ class Variables:
         if attribute == "parameterRef":
             self.add(name)
         if name not in self.numbers and name not in self.words:
-            known = [*self.numbers, *self.words]
-            raise at.refusal(f"{attribute}: {name[:80]!r}", f"one of {', '.join(known)}"[:500], did_you_mean(name, known))
+            raise at.unknown(attribute, name, [*self.numbers, *self.words])
         return name
+
+    def begin(self, actions: list[VariableAction]) -> None:
+        """Gives variables the values that are set at time 0; raises `ConfigError` for other changes."""
+        for action in actions:
+            if action.how != "set":
+                raise ConfigError("Init", f"a change of the variable {action.variable!r}", "a SetAction")
+            if action.word is not None:
+                self.words[action.variable] = action.word
+            else:
+                self.numbers[action.variable] = action.value
 
     def add(self, parameter: str) -> None:
         """Makes a variable of a parameter."""
@@ -80,15 +89,16 @@ class Variables:
         rule = at.one_of("rule", RULES)
         if at.tag == "VariableCondition":
             name = self._name(at, "variableRef")
-            return at.build(VariableCondition, kind="variable", variable=name, rule=rule, **self._value(at, name), **common)
+            return at.build(
+                VariableCondition, kind="variable", variable=name, rule=rule, **self._value(at, name), **common
+            )
         name = at.constant("parameterRef")
         meaning = self._parameters.meaning(name)
         if meaning is None:
-            known = list(self._parameters.declared)
-            raise at.refusal(f"parameterRef: {name[:80]!r}", f"one of {', '.join(known)}"[:500], did_you_mean(name, known))
-        if name in self.numbers or name in self.words:  # an action sets it
-            return at.build(VariableCondition, kind="variable", variable=name, rule=rule, **self._value(at, name), **common)
+            raise at.unknown("parameterRef", name, self._parameters.declared)
         fields = {"variable": name, "rule": rule, **common}
+        if name in self.numbers or name in self.words:  # an action sets it
+            return at.build(VariableCondition, kind="variable", **self._value(at, name), **fields)
         if self._parameters.is_number(name):
             return at.build(VariableCondition, kind="parameter", value=at.number("value"), **fields)
         wanted = at.meaning("value").text
