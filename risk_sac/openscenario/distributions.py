@@ -59,7 +59,7 @@ class Variation:
             for at in part.all("DeterministicSingleParameterDistribution"):
                 varied += self._single(at)
             for at in part.all("DeterministicMultiParameterDistribution"):
-                varied += self._several(at, len(varied))
+                varied += self._several(at, sum(len(one.names) > 1 for one in varied))
         for part in block.all("Stochastic"):
             for name in ("numberOfTestRuns", "randomSeed"):
                 part.number_or(name, 0.0)
