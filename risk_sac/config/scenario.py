@@ -318,7 +318,7 @@ class Scenario(Settings):
     @property
     def values(self) -> Iterator[tuple[str, Expression]]:
         """All expressions, each with its path in the document."""
-        return ((path, value) for path, field, value in _leaves("", self) if _is_expression(field))
+        return ((path, value) for path, field, value in _leaves("", self) if is_expression(field))
 
     @property
     def choices(self) -> Iterator[tuple[str, "Chosen[Any]"]]:
@@ -401,6 +401,7 @@ def _parts(value: Any) -> Iterator[tuple[str, Any]]:
         yield "", value
 
 
-def _is_expression(field: FieldInfo) -> bool:
+def is_expression(field: FieldInfo) -> bool:
+    """Whether a field holds expressions."""
     marks = [field.metadata, *(getattr(kind, "__metadata__", ()) for kind in get_args(field.annotation))]
     return any(ARITHMETIC in mark for mark in marks)

@@ -642,6 +642,17 @@ class InitAction(Settings):
     do: Action
 
 
+class DeviationBounds(Settings):
+    """How far a search may lead the actors of a story away from it; with zeros they follow it exactly."""
+
+    accel_mps2: Annotated[float, Field(ge=0, le=10)] = 1.5
+    """Added to the acceleration."""
+    lateral_mps: Annotated[float, Field(ge=0, le=3)] = 0.5
+    """Added to the speed across."""
+    trigger_s: Annotated[float, Field(ge=0, le=10)] = 0.0
+    """By which the events of an actor may come later."""
+
+
 class Story(Settings):
     """What story actors do from time 0 on, and when the episode ends."""
 
@@ -656,3 +667,5 @@ class Story(Settings):
     stories: Annotated[Mapping[ElementName, tuple[Act, ...]], Field(max_length=100)] = {}
     stop: Trigger | None = None
     """Ends the episode."""
+    deviation: DeviationBounds = DeviationBounds()
+    """Of methods that act; a zero action is the story."""

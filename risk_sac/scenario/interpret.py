@@ -12,8 +12,9 @@ from risk_sac.config.values import term
 from risk_sac.errors import ConfigError, InfeasibleScene
 from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.layout import Layout
-from risk_sac.scenario.scene import SceneLayout, Value, body_named, motion_of
+from risk_sac.scenario.scene import SceneLayout, body_named, motion_of
 from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.scenario.value import Value
 from risk_sac.world.net import Net
 
 
