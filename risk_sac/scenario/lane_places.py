@@ -48,7 +48,7 @@ def lane_line(lane: NetLane) -> TravelLine:
     return line_of(lane.centre)
 
 
-def nearest_spot(
+def nearest_lane(
     net: Net, x_m: float, y_m: float, heading_rad: float | None, among: Collection[str] = ()
 ) -> Spot | None:
     """Returns the place on the nearest lane for cars within 30 m.
@@ -141,3 +141,18 @@ def joined(net: Net, edges: Iterable[str]) -> list[str]:
         elif edge != path[-1]:
             path += (edge_path(net, path[-1], edge) or [edge])[1:]
     return path
+
+
+def extended(net: Net, edges: Sequence[str], metres: float) -> tuple[str, ...]:
+    """Returns edges of a way, and those straight on after it, until it is long enough or no way goes on."""
+    way = list(edges)
+    left_m = metres - sum(net.edges[edge].lanes[0].length_m for edge in way)
+    while left_m > 0.0:
+        links = [link for lane in net.edges[way[-1]].drivable for link in net.onward.get(lane.id, ())]
+        links = [link for link in links if link.target.edge not in way]
+        if not links:
+            break
+        link = min(links, key=lambda link: abs(link.turn_rad))
+        way.append(link.target.edge)
+        left_m -= link.inside_m + link.target.length_m
+    return tuple(way)

@@ -19,7 +19,7 @@ from risk_sac.scenario.lane_places import (
     joined,
     lane_line,
     lanes_ahead,
-    nearest_spot,
+    nearest_lane,
     spot_pose,
 )
 from risk_sac.scenario.trajectories import trajectory_line
@@ -88,7 +88,7 @@ class Places:
         here = self._shifted(x_m, y_m, 0.0)
         if position.heading_rad is not None:
             return here._replace(heading_rad=self._number(position.heading_rad, "heading_rad"))
-        near = nearest_spot(self._net, here.x_m, here.y_m, None)
+        near = nearest_lane(self._net, here.x_m, here.y_m, None)
         return here if near is None else here._replace(heading_rad=spot_pose(near).heading_rad)
 
     def _base(self, position: Position, of: Of) -> Pose:
@@ -211,7 +211,7 @@ class Places:
           on: place on the road file's lane, whose lanes of the net are preferred.
         """
         among = (f"{on.road}_{on.lane}",) if on is not None else ()
-        return nearest_spot(self._net, pose.x_m, pose.y_m, pose.heading_rad, among)
+        return nearest_lane(self._net, pose.x_m, pose.y_m, pose.heading_rad, among)
 
     def beside(self, spot: Spot, lanes: int) -> Spot | None:
         """Returns the place as many lanes to the left, at the same height; None if no car drives there."""

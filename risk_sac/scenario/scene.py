@@ -187,10 +187,13 @@ class SceneLayout:
         if lane.use != "lane":
             raise ConfigError(f"{path}.start.position", f"a place inside junction {lane.edge!r}", "a place on a road")
         at_m = min(max(spot.at_m * lane.length_m / line_of(lane.centre).length_m, 0.0), lane.length_m)
+        if moving.route is None and moving.turn is None:
+            metres = lane.limit_mps * self._driven_s
+            moving = moving.model_copy(update={"route": self._story.route(name, lane, metres)})
         place = self._track(lane.id, moving, path, begin=True)._replace(before_m=-at_m, lead_in=False)
         self._placed[name] = place
         start = _started(name, role, place, self._speeds[name], self._bodies[name])
-        return replace(start, left_m=spot.left_m)
+        return replace(start, left_m=spot.left_m, speed_mps=self._speeds[name])
 
     def _refuse(self, start: Start, fields: Sequence[str], path: str, remedy: str) -> None:
         """Refuses fields of a start that would have no effect."""

@@ -8,15 +8,23 @@ from typing import Any
 
 from risk_sac.config.base import Settings
 from risk_sac.config.scenario import EGO, Moving, Scenario
-from risk_sac.config.story import Story, VariableCondition
+from risk_sac.config.story import (
+    AcquirePositionAction,
+    Action,
+    AssignRouteAction,
+    FollowTrajectoryAction,
+    Story,
+    VariableCondition,
+)
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.bodies import BODIES, BodyName
+from risk_sac.scenario.lane_places import Spot, extended, joined, nearest_lane
 from risk_sac.scenario.layout import VehicleStart
-from risk_sac.scenario.places import Places, Spot, nearest_lane
+from risk_sac.scenario.places import Places
 from risk_sac.scenario.story_plan import Deviation, Reach, StoryActor, StoryPlan, settled
 from risk_sac.scenario.travel_line import Pose, line_of
 from risk_sac.scenario.value import Value
-from risk_sac.world.net import Net
+from risk_sac.world.net import Net, NetLane
 from risk_sac.world.road_geometry import RoadFile
 
 
@@ -94,6 +102,40 @@ class StoryScene:
             raise ConfigError(f"{path}.start.position", got, "a place near a lane")
         return spot
 
+    def route(self, name: str, lane: NetLane, metres: float) -> tuple[str, ...] | None:
+        """Returns the edges of an actor's first trajectory or route of the story, and straight on after it.
+
+        Args:
+          name: the actor.
+          lane: on which it starts.
+          metres: after which the way may end.
+
+        Returns:
+          The edges, or None where the story states no way.
+
+        Raises:
+          ConfigError: there is no such way.
+        """
+        for action in actions_of(self.story, name):
+            try:
+                if isinstance(action, FollowTrajectoryAction):
+                    line = self.places.trajectory(str(action.trajectory), self.pose, self.pose(name))
+                    edges = self.places.edges(line)
+                elif isinstance(action, AssignRouteAction):
+                    edges = self.places.route(str(action.route), self.pose).edges
+                elif isinstance(action, AcquirePositionAction):
+                    spot = self.places.spot(self.places.pose(action.position, self.pose))
+                    edges = () if spot is None else (spot.lane.edge,)
+                else:
+                    continue
+            except ConfigError as error:
+                field = f"story.{error.field}".removesuffix(".")
+                raise ConfigError(field, error.got, error.expected, error.remedy) from error
+            if lane.edge in edges:
+                edges = edges[edges.index(lane.edge) :]
+            return extended(self._net, joined(self._net, (lane.edge, *edges)), metres)
+        return None
+
     def put_vehicle(self, start: VehicleStart) -> None:
         """Notes where a vehicle starts that is placed by its lane."""
         lane = self._net.lanes[f"{start.route[0]}_{start.lane}"]
@@ -134,6 +176,16 @@ class StoryScene:
             places=self.places,
             deviation=Deviation(float(bound.accel_mps2), float(bound.lateral_mps), float(bound.trigger_s)),
         )
+
+
+def actions_of(story: Story, name: str) -> Iterator[Action]:
+    """Yields the actions of an actor: those of the start first, then in the order of the story."""
+    yield from (init.do for init in story.init if init.actor == name)
+    for acts in story.stories.values():
+        for group in (group for act in acts for group in act.groups if name in group.actors):
+            yield from (
+                named.do for maneuver in group.maneuvers for event in maneuver.events for named in event.actions
+            )
 
 
 def ahead_of(pose: Pose, by_m: float) -> Pose:
