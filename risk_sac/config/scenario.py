@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 
 from risk_sac.config.base import Chosen, Settings, Word
 from risk_sac.config.campaign import JudgeConfig, Requirement
+from risk_sac.config.distribution import Distribution, WeightsLaw, check_distribution
 from risk_sac.config.odd import Odd
 from risk_sac.config.story import Position, Story
 from risk_sac.config.values import ARITHMETIC, Comparison, Expression
@@ -46,6 +47,8 @@ class ScenarioParameter(Settings):
     """Of a constant, or arithmetic over parameters before it."""
     step: Annotated[float, Field(gt=0)] | None = None
     """Of a range's grid, from the lower bound on."""
+    distribution: Distribution | None = None
+    """How likely its values are, truncated to the range; weights of words or rows. Without it all are alike."""
     odd: Annotated[str, Field(max_length=60)] | None = None
     """ODD field that bounds it too, such as `dynamic.vehicle_speed_mps`."""
 
@@ -69,14 +72,33 @@ class ScenarioParameter(Settings):
             for name in row:
                 if self.rows and isinstance(row[name], str) != isinstance(self.rows[0][name], str):
                     raise ConfigError(f"rows[{i}].{name}", repr(row[name]), "words alone, or numbers alone")
+        if self.distribution is not None:
+            check_distribution(self.distribution, self.range, self.alternatives)
         return self
+
+    @property
+    def alternatives(self) -> int:
+        """Number of its words or rows; 0: it has none."""
+        return len(self.words or self.rows or ())
+
+    def drawn(self, share: float) -> float:
+        """The point of its axis at a share in [0, 1] of its distribution; uniform shares give samples.
+
+        Of words and rows it is the middle of one's part of the axis from 0 to 1.
+        """
+        law, low, high = self.distribution, *(self.range or (0.0, 1.0))
+        if isinstance(law, WeightsLaw):
+            return (law.index(share) + 0.5) / self.alternatives
+        if self.alternatives:
+            return (min(int(share * self.alternatives), self.alternatives - 1) + 0.5) / self.alternatives
+        return low + share * (high - low) if law is None else law.quantile(share, low, high)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names that its rows give values to."""
         return tuple(self.rows[0]) if self.rows else ()
 
-    def alternatives(self, name: str) -> tuple[str, ...]:
+    def words_of(self, name: str) -> tuple[str, ...]:
         """Words that a name may have: its own, or those of a column of its rows; empty for numbers."""
         if self.rows is None:
             return self.words or ()
@@ -263,6 +285,19 @@ class SignalTiming(Settings):
     offset_s: Expression = 0.0
 
 
+class Origin(Settings):
+    """File of another format that a scenario was imported from."""
+
+    file: Annotated[str, Field(max_length=200)]
+    """Its name."""
+    actors: Annotated[Mapping[Word, Annotated[str, Field(max_length=200)]], Field(max_length=101)] = {}
+    """Actor → its name in that file."""
+    entries: Annotated[Mapping[Word, Annotated[str, Field(max_length=200)]], Field(max_length=101)] = {}
+    """Actor → catalog and entry of its body, such as `vehicle_catalog/car`, if no parameter chooses it."""
+    remarks: Annotated[tuple[Annotated[str, Field(max_length=1000)], ...], Field(max_length=1000)] = ()
+    """What was not read, and what changes on the way, each with its place."""
+
+
 class Scenario(Settings):
     """A scenario, from which scenes are drawn."""
 
@@ -284,6 +319,7 @@ class Scenario(Settings):
     road: Net | None = None
     """OpenDRIVE file beside the net, which positions of a story are stated in."""
     story: Story | None = None
+    origin: Origin | None = None
     signal: SignalTiming = SignalTiming()
     friction: Expression = 1.0
     """Of tyres on the road."""
@@ -307,7 +343,7 @@ class Scenario(Settings):
     def words(self) -> Mapping[str, tuple[str, ...]]:
         """Each name that stands for words, and these words."""
         pairs = [
-            (name, parameter.alternatives(name))
+            (name, parameter.words_of(name))
             for own, parameter in self.parameters.items()
             for name in parameter.names or (own,)
         ]

@@ -280,7 +280,8 @@ class DistanceAction(Settings):
     """Of a longitudinal distance: over the own speed."""
     freespace: bool = False
     continuous: bool = False
-    displacement: Literal["any", "ahead", "behind"] = "any"
+    displacement: Literal["any", "ahead", "behind", "left", "right"] = "any"
+    """On which side of the other actor."""
     coordinates: Coordinates = "entity"
     accel_mps2: Expression | None = None
     """Without bounds the distance is reached at once."""
@@ -366,6 +367,8 @@ class DeleteAction(Settings):
     """Leaves the scenario."""
 
     kind: Literal["delete"]
+    actor: ActorName | None = None
+    """Without it the actors of the group."""
 
 
 class VariableAction(Settings):
@@ -377,6 +380,12 @@ class VariableAction(Settings):
     word: ElementName | None = None
     """In place of a number."""
     how: Literal["set", "add", "multiply"] = "set"
+
+
+class NoAction(Settings):
+    """Ends at once; stands for an action that has no effect here."""
+
+    kind: Literal["none"]
 
 
 Action = Annotated[
@@ -392,7 +401,8 @@ Action = Annotated[
     | TeleportAction
     | VisibilityAction
     | DeleteAction
-    | VariableAction,
+    | VariableAction
+    | NoAction,
     Field(discriminator="kind"),
 ]
 

@@ -17,6 +17,8 @@ from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.scenario.value import Value
 from risk_sac.world.net import Net
 
+LEAST_WAY_M = 20.0  # of road ahead of the ego; choice
+
 
 @dataclass(frozen=True)
 class Interpreter:
@@ -79,9 +81,11 @@ class Interpreter:
         except ConfigError as error:
             raise InfeasibleScene(str(error), reason="constraint") from None
         try:
-            return SceneLayout(self.document, value, *self.net(value), self.horizon_s).layout()
+            layout = SceneLayout(self.document, value, *self.net(value), self.horizon_s).layout()
+            _check_way(layout)
         except ConfigError as error:
             raise InfeasibleScene(str(error), reason="scenario") from error
+        return layout
 
     def net(self, value: Value) -> tuple[str, Net]:
         """The net of a scene: its file and its contents."""
@@ -93,7 +97,7 @@ class Interpreter:
         """Names of the adversaries that drive in lanes, and of those that move freely."""
         driven, walking = list[str](), list[str]()
         for name, actor in self.document.actors.items():
-            if actor.role == "adversary":
+            if actor.role == "adversary" or (actor.role == "story" and self._deviates(name)):
                 bodies = self.alternatives(actor.body)
                 motions = {motion_of(self.document, name, body_named(body, f"actors.{name}.body")) for body in bodies}
                 if len(motions) > 1:
@@ -101,6 +105,13 @@ class Interpreter:
                     raise ConfigError(f"actors.{name}.body", ", ".join(bodies), wanted, "make two actors of it")
                 (walking if motions == {"freely"} else driven).append(name)
         return tuple(driven), tuple(walking)
+
+    def _deviates(self, name: str) -> bool:
+        """Whether methods may lead an actor away from the document's story."""
+        story, bodies = self.document.story, self.alternatives(self.document.actors[name].body)
+        if story is None or not (story.deviation.accel_mps2 or story.deviation.lateral_mps):
+            return False
+        return all(motion_of(self.document, name, body_named(body, f"actors.{name}.body")) != "not" for body in bodies)
 
     def alternatives(self, name: "str | Chosen[str]") -> tuple[str, ...]:
         """All names that a field may stand for, over the words of parameters."""
@@ -144,6 +155,16 @@ class Interpreter:
                 if values:
                     ranges[column] = Interval(low=min(values), high=max(values))
         return ranges
+
+
+def _check_way(layout: Layout) -> None:
+    net, ego = net_of(layout.net), layout.ego
+    first = net.edges[ego.route[0]].lanes[ego.lane]
+    way_m = first.length_m - ego.position_m
+    way_m += sum(net.edges[edge].lanes[0].length_m for edge in ego.route[1:])
+    if way_m < LEAST_WAY_M:
+        got = f"{way_m:.0f} m of road ahead of the ego on {' '.join(ego.route)}"
+        raise ConfigError("ego.start", got, f"{LEAST_WAY_M:g} m or more", "start it earlier, or name a route")
 
 
 def _part(share: float, parts: int) -> int:

@@ -66,10 +66,18 @@ def nets_of(document: Scenario, folder: Path | None = None) -> Mapping[str, str]
       folder: beside which its own nets lie; None: it has shipped ones alone.
 
     Raises:
-      ConfigError: a net is not there.
+      ConfigError: a net or a road file is not there.
     """
+    for name in roads(document):
+        if folder is None or not _beside(name, folder):
+            raise ConfigError("road", repr(name), "an OpenDRIVE file beside the document and its net")
     nets = {}
     for name in networks(document):
-        own = None if folder is None or "/" in name or name.startswith(".") else folder / name
-        nets[name] = str(own.absolute()) if own is not None and own.is_file() else shipped_net(name)
+        own = folder is not None and _beside(name, folder)
+        nets[name] = str((folder / name).absolute()) if folder is not None and own else shipped_net(name)
     return nets
+
+
+def _beside(name: str, folder: Path) -> bool:
+    """Whether a name is that of a file in a folder."""
+    return "/" not in name and not name.startswith(".") and (folder / name).is_file()
