@@ -12,6 +12,7 @@ from pydantic.fields import FieldInfo
 
 from risk_sac.config.base import Settings
 from risk_sac.config.campaign import JudgeConfig, Requirement
+from risk_sac.config.distribution import Distribution, WeightsLaw, check_distribution
 from risk_sac.config.odd import Odd
 from risk_sac.config.story import Position, Story
 from risk_sac.config.values import ARITHMETIC, Comparison, Expression
@@ -56,6 +57,8 @@ class ScenarioParameter(Settings):
     """Of a constant, or arithmetic over parameters before it."""
     step: Annotated[float, Field(gt=0)] | None = None
     """Of a range's grid, from the lower bound on."""
+    distribution: Distribution | None = None
+    """How likely its values are, truncated to the range; weights of words or rows. Without it all are alike."""
     odd: Annotated[str, Field(max_length=60)] | None = None
     """ODD field that bounds it too, such as `dynamic.vehicle_speed_mps`."""
 
@@ -76,7 +79,26 @@ class ScenarioParameter(Settings):
                 raise ConfigError(
                     f"rows[{i}]", ", ".join(row), f"the names of the first row: {', '.join(self.rows[0])}"
                 )
+        if self.distribution is not None:
+            check_distribution(self.distribution, self.range, self.alternatives)
         return self
+
+    @property
+    def alternatives(self) -> int:
+        """Number of its words or rows; 0: it has none."""
+        return len(self.words or self.rows or ())
+
+    def drawn(self, share: float) -> float:
+        """The point of its axis at a share in [0, 1] of its distribution; uniform shares give samples.
+
+        Of words and rows it is the middle of one's part of the axis from 0 to 1.
+        """
+        law, low, high = self.distribution, *(self.range or (0.0, 1.0))
+        if isinstance(law, WeightsLaw):
+            return (law.index(share) + 0.5) / self.alternatives
+        if self.alternatives:
+            return (min(int(share * self.alternatives), self.alternatives - 1) + 0.5) / self.alternatives
+        return low + share * (high - low) if law is None else law.quantile(share, low, high)
 
     @property
     def names(self) -> tuple[str, ...]:
