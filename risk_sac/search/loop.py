@@ -245,6 +245,7 @@ def _record(
         violations=encounter.violations,
         collision=encounter.collision,
         defect_reached_s=run.env.defect_reached_s if tally.steps else None,
+        avoided_by=run.env.avoided_by() if unplayable is None else None,
     )
 
 
