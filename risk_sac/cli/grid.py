@@ -63,11 +63,16 @@ def _over(named: Sequence[str] | None, grids: Sequence[PlayedGrid]) -> tuple[str
     """The parameters of the picture's axes: those named, or the first two of which scenes have several values."""
     if named is not None:
         return named[0], named[1]
-    points = [point.values for grid in grids for point in grid.points]
-    varied = [name for name in (points[0] if points else ()) if len({values.get(name) for values in points}) > 1]
+    varied = _varied([point for grid in grids for point in grid.points])
     if len(varied) < 2:
         raise ConfigError("--over", f"{len(varied)} parameters that vary", "two, for a picture")
     return varied[0], varied[1]
+
+
+def _varied(points: Sequence[PlayedPoint]) -> list[str]:
+    """Parameters of which the scenes have several values."""
+    names = points[0].values if points else ()
+    return [name for name in names if len({point.values.get(name) for point in points}) > 1]
 
 
 def _fixed(text: str) -> tuple[str, str]:
@@ -88,7 +93,10 @@ def _table(grids: Sequence[PlayedGrid]) -> Table:
 
 
 def grid_junit(grids: Sequence[PlayedGrid]) -> bytes:
-    """Writes a suite for each run and a case for each scene, grouped by the value of the first parameter that varies."""
+    """Writes a suite for each run and a case for each scene.
+
+    Cases are grouped by the value of the first parameter that varies.
+    """
     report = JUnitXml("risk-sac grid")
     for grid in grids:
         suite = TestSuite(printable(f"{grid.spec.family}.{grid.ego}"))

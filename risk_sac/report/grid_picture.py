@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
@@ -90,7 +91,7 @@ def _figure(
         axes.set_title(f"{grid.spec.family}: {grid.ego}" + (f"\n{where}" if where else ""), fontsize=8, loc="left")
         axes.set_xlabel(over[0])
     panels[0].set_ylabel(over[1])
-    handles: dict[str, object] = {}
+    handles: dict[str, Artist] = {}
     for axes in panels:
         handles |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(list(handles.values()), list(handles), loc="outside right upper", fontsize=7)
@@ -115,13 +116,15 @@ def _panel(axes: Axes, points: Sequence[PlayedPoint], over: tuple[str, str], wor
         at = np.array([place for place, found in worst.items() if found is verdict]).reshape(-1, 2)
         if len(at):
             label = verdict.value.replace("_", " ")
-            axes.scatter(at[:, 0], at[:, 1], size, colour, marker, label=label, linewidths=0.8, zorder=3)
+            axes.scatter(*at.T, s=size, c=colour, marker=marker, label=label, linewidths=0.8, zorder=3)
     for driver, (name, colour, dashes) in DRIVERS.items():
         _bound(axes, _shares(places, driver), f"bound of {name}", colour, dashes)
     for axis, known in ((axes.xaxis, words[0]), (axes.yaxis, words[1])):
         if known:
             axis.set_ticks(range(len(known)), known)
-    axes.margins(0.06)
+    for axis, values in ((axes.xaxis, [x for x, _ in places]), (axes.yaxis, [y for _, y in places])):
+        room = 0.06 * (max(values) - min(values)) or 0.5
+        axis.set_view_interval(min(values) - room, max(values) + room, ignore=True)
 
 
 def _coordinate(value: float | str, words: Sequence[str]) -> float:
