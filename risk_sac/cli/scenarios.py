@@ -1,7 +1,9 @@
-"""`risk-sac scenarios`: lists, shows, checks, draws and copies scenario documents."""
+"""`risk-sac scenarios`: lists, shows, checks, imports, draws and copies scenario documents."""
 
 import argparse
+import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
 from rich.markup import escape
@@ -11,12 +13,24 @@ from risk_sac.cli.console import FAILED, OK, print_answer, say
 from risk_sac.cli.parser import Commands, Parser, add_command, add_group, add_json_flag
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError
-from risk_sac.host.terminal import console
+from risk_sac.host.terminal import complain, console
 from risk_sac.scenario import library
 from risk_sac.scenario.check import check_document
 from risk_sac.scenario.reading import read_document
-from risk_sac.scenario.shipped import FOLDER, nets_of, networks, scenario_file, shipped_document, shipped_names
+from risk_sac.scenario.shipped import (
+    FOLDER,
+    nets_of,
+    networks,
+    roads,
+    scenario_file,
+    shipped_document,
+    shipped_names,
+)
 
+if TYPE_CHECKING:
+    from risk_sac.openscenario.scenario_file import Imported
+
+OPENSCENARIO = ".xosc"
 FILE_HELP = "a scenario document, YAML or JSON, with its nets beside it"
 
 
@@ -25,7 +39,7 @@ def add(commands: Commands) -> None:
     group = add_group(
         commands,
         "scenarios",
-        "list, show, check, draw and copy scenarios",
+        "list, show, check, import, draw and copy scenarios",
         example="scenarios check my_scenario.yaml",
     )
     inner = group.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
@@ -43,6 +57,24 @@ def add(commands: Commands) -> None:
     checking.add_argument("file", metavar="FILE", help=f"{FILE_HELP}; or the name of a scenario")
     checking.add_argument("--out", type=Path, metavar="FILE.png", help="draw the scenario too")
     add_json_flag(checking)
+    importing = add_command(
+        inner,
+        "import",
+        _import,
+        "import an OpenSCENARIO file with its roads and catalogs",
+        example="scenarios import cut_in.xosc --out cut_in.yaml",
+    )
+    importing.add_argument("file", type=Path, metavar="FILE.xosc", help="a scenario, or a variation file that names it")
+    importing.add_argument(
+        "--out",
+        type=Path,
+        metavar="DOC.yaml",
+        help="write the document, its roads beside it (default: keep it by name)",
+    )
+    importing.add_argument(
+        "--ego-entity", metavar="NAME", help="the ego (default: the entity named Ego, or the one with a controller)"
+    )
+    add_json_flag(importing)
     drawing = add_command(
         inner,
         "draw",
@@ -60,13 +92,15 @@ def add(commands: Commands) -> None:
 
 
 def kept_name(name_or_file: str) -> str:
-    """Returns the name of a scenario; a file's is put into the library first.
+    """Returns the name of a scenario; a document's or an OpenSCENARIO file's is put into the library first.
 
     Raises:
       ConfigError: the document has a fault, or there is none.
     """
     if not is_file(name_or_file):
         return name_or_file
+    if is_openscenario(name_or_file):
+        return _kept(_imported(Path(name_or_file)))
     try:
         document, folder = document_at(name_or_file)
         nets = nets_of(document, folder)
@@ -75,7 +109,31 @@ def kept_name(name_or_file: str) -> str:
         for fault in (error, *error.others):
             fault.field = f"{name_or_file}: {fault.field}".removesuffix(": ")
         raise
-    return library.keep(document, library.own_nets(nets))
+    return library.keep(document, library.own_files(document, nets))
+
+
+def is_openscenario(file: str) -> bool:
+    """Whether a file is OpenSCENARIO XML, by its ending."""
+    return Path(file).suffix.lower() == OPENSCENARIO
+
+
+def _imported(file: Path, ego: str | None = None) -> "Imported":
+    """Imports an OpenSCENARIO file, and says what differs from it."""
+    from risk_sac.openscenario.scenario_file import import_scenario  # imported here: few commands need it
+
+    imported = import_scenario(file, ego=ego)
+    for remark in imported.remarks:
+        complain(f"warning: {remark}")
+    return imported
+
+
+def _kept(imported: "Imported") -> str:
+    """Puts an imported scenario into the library, once its document is checked; returns its name."""
+    with tempfile.TemporaryDirectory() as folder:
+        for name, content in imported.files.items():
+            Path(folder, name).write_bytes(content)
+        check_document(imported.document, nets_of(imported.document, Path(folder)))
+    return library.keep(imported.document, imported.files)
 
 
 def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
@@ -84,6 +142,8 @@ def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
     Raises:
       ConfigError: there is no such scenario or file, or the document has a fault.
     """
+    if is_file(name_or_file) and is_openscenario(name_or_file):
+        return library.kept(kept_name(name_or_file))
     if is_file(name_or_file):
         return read_document(Path(name_or_file)), Path(name_or_file).absolute().parent
     if name_or_file in shipped_names():
@@ -164,11 +224,44 @@ def _draw(options: argparse.Namespace) -> int:
     return OK
 
 
+def _import(options: argparse.Namespace) -> int:
+    if options.out is not None and options.out.exists():
+        raise ConfigError("out", f"{options.out}, which is there", "a new file", "choose another name")
+    imported = _imported(options.file, options.ego_entity)
+    document = imported.document
+    if options.out is not None:
+        for name, content in imported.files.items():
+            (options.out.parent / name).write_bytes(content)
+        options.out.write_text(library.written(document))
+        where = f"Written: {options.out}; its roads and nets beside it."
+    else:
+        where = f"Kept as {_kept(imported)}."
+    table = Table("", "", box=None, show_header=False)
+    table.add_row("actors", ", ".join(document.actors) or "none")
+    table.add_row("parameters that vary", ", ".join(axes(document)) or "none")
+    table.add_row("points of the grid", str(imported.points))
+    table.add_row("roads", ", ".join(roads(document)))
+    answer = {
+        "where": where,
+        "actors": list(document.actors),
+        "parameters": axes(document),
+        "points": imported.points,
+        "remarks": list(imported.remarks),
+    }
+    print_answer(options, answer, table, where)
+    return OK
+
+
+def axes(document: Scenario) -> list[str]:
+    """Names of the parameters that vary."""
+    return [name for name, parameter in document.parameters.items() if parameter.value is None]
+
+
 def _copy(options: argparse.Namespace) -> int:
     document, folder = document_at(options.name)
     if options.file.exists():
         raise ConfigError("file", f"{options.file}, which is there", "a new file", "choose another name")
-    for name in networks(document):
+    for name in (*networks(document), *roads(document)):
         if folder is not None and (folder / name).is_file():
             (options.file.parent / name).write_bytes((folder / name).read_bytes())
     options.file.write_text(_text(options.name))

@@ -6,10 +6,10 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Generic, Self, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 from risk_sac.errors import ConfigError, did_you_mean
 
@@ -22,6 +22,19 @@ class Settings(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+
+
+T = TypeVar("T")
+Word = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$")]
+
+
+class Chosen(Settings, Generic[T]):
+    """A value for each word of a parameter."""
+
+    by: Word
+    """Parameter with words, or column of a parameter's rows that has words."""
+    of: Annotated[Mapping[Word, T], Field(min_length=1)]
+    """Word → value."""
 
 
 class Interval(Settings):

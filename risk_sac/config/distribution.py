@@ -4,6 +4,7 @@ They are those of OpenSCENARIO XML 1.3: uniform, normal, log-normal, Poisson, hi
 """
 
 import math
+from collections.abc import Sequence
 from itertools import accumulate, pairwise
 from statistics import NormalDist
 from typing import Annotated, Literal, Self
@@ -220,6 +221,10 @@ class WeightsLaw(Settings):
         if math.fsum(self.weights) <= 0.0:
             raise ConfigError("weights", "weights that sum to 0", "a sum above 0")
         return self
+
+    def kept(self, which: Sequence[bool]) -> "WeightsLaw":
+        """Returns the weights of the words or rows that are kept."""
+        return WeightsLaw(kind="weights", weights=tuple(w for w, keep in zip(self.weights, which, strict=True) if keep))
 
     def index(self, share: float) -> int:
         """Which word or row lies at a share in [0, 1] of all probability."""

@@ -5,12 +5,12 @@ layouts of it.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Generic, Literal, Self, TypeVar, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, StringConstraints, model_validator
 from pydantic.fields import FieldInfo
 
-from risk_sac.config.base import Settings
+from risk_sac.config.base import Chosen, Settings, Word
 from risk_sac.config.campaign import JudgeConfig, Requirement
 from risk_sac.config.distribution import Distribution, WeightsLaw, check_distribution
 from risk_sac.config.odd import Odd
@@ -18,23 +18,12 @@ from risk_sac.config.story import Position, Story
 from risk_sac.config.values import ARITHMETIC, Comparison, Expression
 from risk_sac.errors import ConfigError, did_you_mean
 
-T = TypeVar("T")
-Word = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$")]
 ScenarioName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 NetName = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\s]+$")]
 EGO = "ego"
 LONGEST_HORIZON_S = 400.0
 Reference = Literal["stop_line", "crossing", "junction", "lane_end"]
 ActorRole = Literal["adversary", "story", "background", "static"]
-
-
-class Chosen(Settings, Generic[T]):
-    """A value for each word of a parameter."""
-
-    by: Word
-    """Parameter with words."""
-    of: Annotated[Mapping[Word, T], Field(min_length=1)]
-    """Word → value."""
 
 
 Net = NetName | Chosen[NetName]
@@ -51,8 +40,9 @@ class ScenarioParameter(Settings):
     """Least and greatest value."""
     words: Annotated[tuple[Word, ...], Field(min_length=1, max_length=50)] | None = None
     """Alternatives, each an equal part of the axis from 0 to 1."""
-    rows: Annotated[tuple[Mapping[Word, float], ...], Field(min_length=1, max_length=10_000)] | None = None
-    """Values of several names that vary together, each row an equal part of the axis from 0 to 1."""
+    rows: Annotated[tuple[Mapping[Word, float | Word], ...], Field(min_length=1, max_length=10_000)] | None = None
+    """Numbers or words of names that vary together, each row an equal part of the axis from 0 to 1.
+    The parameter's own name may be one of them, which makes a set of numbers."""
     value: Expression | None = None
     """Of a constant, or arithmetic over parameters before it."""
     step: Annotated[float, Field(gt=0)] | None = None
@@ -79,6 +69,9 @@ class ScenarioParameter(Settings):
                 raise ConfigError(
                     f"rows[{i}]", ", ".join(row), f"the names of the first row: {', '.join(self.rows[0])}"
                 )
+            for name in row:
+                if self.rows and isinstance(row[name], str) != isinstance(self.rows[0][name], str):
+                    raise ConfigError(f"rows[{i}].{name}", repr(row[name]), "words alone, or numbers alone")
         if self.distribution is not None:
             check_distribution(self.distribution, self.range, self.alternatives)
         return self
@@ -104,6 +97,12 @@ class ScenarioParameter(Settings):
     def names(self) -> tuple[str, ...]:
         """Names that its rows give values to."""
         return tuple(self.rows[0]) if self.rows else ()
+
+    def words_of(self, name: str) -> tuple[str, ...]:
+        """Words that a name may have: its own, or those of a column of its rows; empty for numbers."""
+        if self.rows is None:
+            return self.words or ()
+        return tuple(dict.fromkeys(word for row in self.rows if isinstance(word := row.get(name), str)))
 
 
 class Start(Settings):
@@ -186,6 +185,15 @@ _FORMS: Mapping[str, tuple[str, ...]] = {  # field that tells a form → those t
 }
 
 
+class Box(Settings):
+    """Bounding box of an actor in the file that its scenario comes from."""
+
+    length_m: Annotated[float, Field(gt=0, le=200)]
+    width_m: Annotated[float, Field(gt=0, le=50)]
+    ahead_m: Annotated[float, Field(ge=-100, le=100)] = 0.0
+    """From the reference point, such as the rear axle's middle, forward to the box's middle."""
+
+
 class Driven(Settings):
     """Body, initial speed and way of a road user."""
 
@@ -209,6 +217,9 @@ class Moving(Driven):
     """The ego, or another actor."""
 
     start: Start
+    box: Box | Chosen[Box] | None = None
+    """Places the body by the reference point, and ends the distances of a story. Without it the body's own box, of
+    which the reference point is the middle."""
 
 
 class Actor(Moving):
@@ -292,7 +303,7 @@ class Scenario(Settings):
     actors: Annotated[Mapping[Word, Actor], Field(max_length=100)] = {}
     streams: Annotated[Mapping[Word, Stream], Field(max_length=50)] = {}
     constraints: Annotated[tuple[Constraint, ...], Field(max_length=100)] = ()
-    road: NetName | None = None
+    road: Net | None = None
     """OpenDRIVE file beside the net, which positions of a story are stated in."""
     story: Story | None = None
     signal: SignalTiming = SignalTiming()
@@ -307,12 +318,22 @@ class Scenario(Settings):
     @property
     def values(self) -> Iterator[tuple[str, Expression]]:
         """All expressions, each with its path in the document."""
-        return ((path, value) for path, field, value in _leaves("", self) if _is_expression(field))
+        return ((path, value) for path, field, value in _leaves("", self) if is_expression(field))
 
     @property
     def choices(self) -> Iterator[tuple[str, "Chosen[Any]"]]:
         """All values that a parameter's word chooses, each with its path in the document."""
         return ((path, value) for path, _, value in _leaves("", self) if isinstance(value, Chosen))
+
+    @property
+    def words(self) -> Mapping[str, tuple[str, ...]]:
+        """Each name that stands for words, and these words."""
+        pairs = [
+            (name, parameter.words_of(name))
+            for own, parameter in self.parameters.items()
+            for name in parameter.names or (own,)
+        ]
+        return {name: words for name, words in pairs if words}
 
     @model_validator(mode="after")
     def _names(self) -> Self:
@@ -320,17 +341,17 @@ class Scenario(Settings):
             raise ConfigError("actors.ego", "an actor of this name", "another name", "the ego has a part of its own")
         if both := sorted(self.actors.keys() & self.streams.keys()):
             raise ConfigError(f"streams.{both[0]}", "the name of an actor", "another name")
+        words = self.words
         for path, choice in self.choices:
-            parameter = self.parameters.get(choice.by)
-            if parameter is None or parameter.words is None:
-                words = [name for name, other in self.parameters.items() if other.words]
+            if choice.by not in words:
                 wanted = f"a parameter with words: {', '.join(words) or 'there is none'}"
                 raise ConfigError(f"{path}.by", repr(choice.by), wanted, did_you_mean(choice.by, words))
-            if missing := sorted(set(parameter.words) - choice.of.keys()):
+            if missing := sorted(set(words[choice.by]) - choice.of.keys()):
                 raise ConfigError(f"{path}.of", ", ".join(choice.of), f"a value for {', '.join(missing)} too")
-            if unknown := sorted(choice.of.keys() - set(parameter.words)):
-                remedy = did_you_mean(unknown[0], list(parameter.words))
-                raise ConfigError(f"{path}.of.{unknown[0]}", "a word", f"one of {', '.join(parameter.words)}", remedy)
+            if unknown := sorted(choice.of.keys() - set(words[choice.by])):
+                remedy = did_you_mean(unknown[0], words[choice.by])
+                wanted = f"one of {', '.join(words[choice.by])}"
+                raise ConfigError(f"{path}.of.{unknown[0]}", "a word", wanted, remedy)
         for name, actor in self.actors.items():
             other = actor.start.reference
             if other is not None and other != EGO and other not in self.actors:
@@ -380,6 +401,7 @@ def _parts(value: Any) -> Iterator[tuple[str, Any]]:
         yield "", value
 
 
-def _is_expression(field: FieldInfo) -> bool:
+def is_expression(field: FieldInfo) -> bool:
+    """Whether a field holds expressions."""
     marks = [field.metadata, *(getattr(kind, "__metadata__", ()) for kind in get_args(field.annotation))]
     return any(ARITHMETIC in mark for mark in marks)

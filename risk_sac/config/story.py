@@ -10,13 +10,16 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from risk_sac.config.base import Settings
+from risk_sac.config.base import Chosen, Settings
 from risk_sac.config.values import Expression
 from risk_sac.errors import ConfigError
 
 ElementName = Annotated[str, StringConstraints(min_length=1, max_length=200)]
 ActorName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]{0,63}$")]
 RoadId = Annotated[str, StringConstraints(min_length=1, max_length=100)]
+AnyRoad = RoadId | Chosen[RoadId]
+AnyName = ElementName | Chosen[ElementName]
+"""A name, or one for each word of a parameter: `scenario.scene.Value.choose` tells which it is in a scene."""
 Rule = Literal["greater", "greater_or_equal", "less", "less_or_equal", "equal", "not_equal"]
 Coordinates = Literal["entity", "lane", "road", "trajectory"]
 Along = Literal["euclidean", "longitudinal", "lateral"]
@@ -49,7 +52,7 @@ class LanePosition(_Turned):
     """Point of an OpenDRIVE lane."""
 
     kind: Literal["lane"]
-    road: RoadId
+    road: AnyRoad
     lane: Expression
     """OpenDRIVE's lane id, a whole number."""
     s_m: Expression
@@ -62,7 +65,7 @@ class RoadPosition(_Turned):
     """Point given by an OpenDRIVE road's reference line."""
 
     kind: Literal["road"]
-    road: RoadId
+    road: AnyRoad
     s_m: Expression
     t_m: Expression = 0.0
 
@@ -103,7 +106,7 @@ class RoutePosition(_Turned):
     """Point along a route."""
 
     kind: Literal["on_route"]
-    route: ElementName
+    route: AnyName
     s_m: Expression
     """Along the reference lines of the route's roads, from its first waypoint's road's begin of use."""
     lane: Expression | None = None
@@ -116,7 +119,7 @@ class TrajectoryPosition(_Turned):
     """Point along a trajectory."""
 
     kind: Literal["on_trajectory"]
-    trajectory: ElementName
+    trajectory: AnyName
     s_m: Expression
     t_m: Expression = 0.0
 
@@ -277,7 +280,8 @@ class DistanceAction(Settings):
     """Of a longitudinal distance: over the own speed."""
     freespace: bool = False
     continuous: bool = False
-    displacement: Literal["any", "ahead", "behind"] = "any"
+    displacement: Literal["any", "ahead", "behind", "left", "right"] = "any"
+    """On which side of the other actor."""
     coordinates: Coordinates = "entity"
     accel_mps2: Expression | None = None
     """Without bounds the distance is reached at once."""
@@ -323,7 +327,7 @@ class FollowTrajectoryAction(Settings):
     """Follows a trajectory, at its own speed or at the times of its points."""
 
     kind: Literal["follow_trajectory"]
-    trajectory: ElementName
+    trajectory: AnyName
     timing: TrajectoryTiming | None = None
     mode: Literal["position", "follow"] = "position"
     from_m: Expression = 0.0
@@ -334,7 +338,7 @@ class AssignRouteAction(Settings):
     """Follows a route from now on."""
 
     kind: Literal["assign_route"]
-    route: ElementName
+    route: AnyName
 
 
 class AcquirePositionAction(Settings):
@@ -363,6 +367,8 @@ class DeleteAction(Settings):
     """Leaves the scenario."""
 
     kind: Literal["delete"]
+    actor: ActorName | None = None
+    """Without it the actors of the group."""
 
 
 class VariableAction(Settings):
@@ -374,6 +380,12 @@ class VariableAction(Settings):
     word: ElementName | None = None
     """In place of a number."""
     how: Literal["set", "add", "multiply"] = "set"
+
+
+class NoAction(Settings):
+    """Ends at once; stands for an action that has no effect here."""
+
+    kind: Literal["none"]
 
 
 Action = Annotated[
@@ -389,7 +401,8 @@ Action = Annotated[
     | TeleportAction
     | VisibilityAction
     | DeleteAction
-    | VariableAction,
+    | VariableAction
+    | NoAction,
     Field(discriminator="kind"),
 ]
 
@@ -629,6 +642,17 @@ class InitAction(Settings):
     do: Action
 
 
+class DeviationBounds(Settings):
+    """How far a search may lead the actors of a story away from it; with zeros they follow it exactly."""
+
+    accel_mps2: Annotated[float, Field(ge=0, le=10)] = 1.5
+    """Added to the acceleration."""
+    lateral_mps: Annotated[float, Field(ge=0, le=3)] = 0.5
+    """Added to the speed across."""
+    trigger_s: Annotated[float, Field(ge=0, le=10)] = 0.0
+    """By which the events of an actor may come later."""
+
+
 class Story(Settings):
     """What story actors do from time 0 on, and when the episode ends."""
 
@@ -643,3 +667,5 @@ class Story(Settings):
     stories: Annotated[Mapping[ElementName, tuple[Act, ...]], Field(max_length=100)] = {}
     stop: Trigger | None = None
     """Ends the episode."""
+    deviation: DeviationBounds = DeviationBounds()
+    """Of methods that act; a zero action is the story."""

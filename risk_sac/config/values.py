@@ -14,8 +14,8 @@ from pydantic import AfterValidator, Field
 from risk_sac.config.base import Interval
 from risk_sac.errors import ConfigError, did_you_mean
 
-LONGEST = 300  # characters
-MOST_DEPTH = 20  # nested operations
+LONGEST = 1000  # characters
+MOST_DEPTH = 40  # nested operations
 MOST_MAGNITUDE = 1e9
 CONSTANTS = {"pi": math.pi}
 
@@ -28,7 +28,7 @@ _GRAMMAR = r"""
        | NAME "(" sum ("," sum)* ")" -> call | "(" sum ")"
 COMPARE: "<=" | ">=" | "<" | ">"
 SUM: "+" | "-"
-PRODUCT: "*" | "/"
+PRODUCT: "*" | "/" | "%"
 NAME: /[A-Za-z_]\w*/
 NUMBER: /(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?/
 %ignore /\s+/
@@ -41,6 +41,13 @@ def _divided(a: float, b: float) -> float:
     return a / b
 
 
+def _remainder(a: float, b: float) -> float:
+    """Remainder with the sign of the dividend."""
+    if b == 0.0:
+        raise ZeroDivisionError
+    return math.fmod(a, b)
+
+
 def _power(a: float, b: float) -> float:
     return math.pow(a, b)
 
@@ -50,6 +57,7 @@ _BINARY: Mapping[str, Callable[[float, float], float]] = {
     "-": lambda a, b: a - b,
     "*": lambda a, b: a * b,
     "/": _divided,
+    "%": _remainder,
     "<=": lambda a, b: float(a <= b),
     ">=": lambda a, b: float(a >= b),
     "<": lambda a, b: float(a < b),
@@ -60,9 +68,15 @@ FUNCTIONS: Mapping[str, tuple[int | None, Callable[..., float]]] = {  # number o
     "sqrt": (1, math.sqrt),
     "sin": (1, math.sin),
     "cos": (1, math.cos),
+    "tan": (1, math.tan),
+    "asin": (1, math.asin),
     "acos": (1, math.acos),
+    "atan": (1, math.atan),
     "abs": (1, abs),
+    "sign": (1, lambda a: float((a > 0.0) - (a < 0.0))),
+    "round": (1, lambda a: float(math.floor(a + 0.5))),  # a half is rounded up
     "floor": (1, lambda a: float(math.floor(a))),
+    "ceil": (1, lambda a: float(math.ceil(a))),
     "min": (None, min),
     "max": (None, max),
 }
@@ -110,14 +124,23 @@ class Term:
         if self.op == "name":
             return of[self.name]
         ranges = [child.range(of) for child in self.children]
-        if self.op == "/" and ranges[1].low <= 0.0 <= ranges[1].high:
+        if self.op in "/%" and ranges[1].low <= 0.0 <= ranges[1].high:
             low, high = ranges[1].low, ranges[1].high
             raise ConfigError("", f"a division by {low:g} to {high:g}", "a divisor that is never 0 within the ranges")
-        if self.op in ("sqrt", "acos") and (ranges[0].low < 0.0 if self.op == "sqrt" else not _unit(ranges[0])):
+        if self.op in ("sqrt", "asin", "acos") and (ranges[0].low < 0.0 if self.op == "sqrt" else not _unit(ranges[0])):
             wanted = "0 or more" if self.op == "sqrt" else "-1 to 1"
             raise ConfigError("", f"{self.op} of {ranges[0].low:g} to {ranges[0].high:g}", wanted)
         if self.op in ("sin", "cos"):
             return Interval(low=-1.0, high=1.0)
+        if self.op == "tan" and not (-math.pi / 2 < ranges[0].low and ranges[0].high < math.pi / 2):
+            return Interval(low=-MOST_MAGNITUDE, high=MOST_MAGNITUDE)
+        if self.op == "%":
+            most = max(abs(ranges[1].low), abs(ranges[1].high))
+            return Interval(low=-most if ranges[0].low < 0.0 else 0.0, high=most if ranges[0].high > 0.0 else 0.0)
+        if self.op in ("min", "max"):
+            ends = [[bound.low for bound in ranges], [bound.high for bound in ranges]]
+            low, high = (FUNCTIONS[self.op][1](*end) for end in ends)
+            return Interval(low=low, high=high)
         corners = product(*((bound.low, bound.high) for bound in ranges))
         leaf = Term(self.op, tuple(Term("name", name=str(i)) for i in range(len(ranges))))
         values = [leaf.value({str(i): value for i, value in enumerate(corner)}) for corner in corners]
@@ -191,7 +214,7 @@ def _parsed(text: str, start: str, expected: str) -> Term:
 def term(expression: "float | str") -> Term:
     """Parses an expression, or takes a number; raises `ConfigError` for anything but arithmetic."""
     if isinstance(expression, str):
-        return _parsed(expression, "start", f"arithmetic over parameters: + - * / and {', '.join(FUNCTIONS)}")
+        return _parsed(expression, "start", f"arithmetic over parameters: + - * / % and {', '.join(FUNCTIONS)}")
     return Term("number", number=float(expression))
 
 
@@ -215,6 +238,6 @@ ARITHMETIC = AfterValidator(_checked)  # what tells an expression from other fie
 Expression = Annotated[
     Annotated[float, Field(ge=-MOST_MAGNITUDE, le=MOST_MAGNITUDE)] | Annotated[str, Field(min_length=1)], ARITHMETIC
 ]
-"""A number, or arithmetic over parameters: `+ - * /`, pow, sqrt, sin, cos, acos, abs, floor, min, max and pi."""
+"""A number, or arithmetic over parameters: `+ - * / %`, the functions of `FUNCTIONS`, and pi."""
 Comparison = Annotated[str, Field(min_length=1), AfterValidator(_compared)]
 """Two expressions with `<=`, `<`, `>=` or `>` between them."""

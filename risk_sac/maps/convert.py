@@ -31,7 +31,7 @@ _OSM = (
     "--tls.default-type static --sidewalks.guess --crossings.guess --walkingareas --no-turnarounds "
     "--output.street-names --osm-files"
 )
-_OPENDRIVE = "--tls.default-type static --no-turnarounds --opendrive-files"
+_OPENDRIVE = "--tls.default-type static --no-turnarounds --output.original-names --opendrive-files"
 OPTIONS: dict[str, list[str]] = {  # by the root of a map
     "net": ["--sumo-net-file"],
     "osm": _OSM.split(),

@@ -222,7 +222,7 @@ def _draw(geometry: ET.Element) -> None:
 
 def _cut(road: ET.Element, cuts: Set[float], lost: Counter[str]) -> None:
     """Writes limits into the lanes of a road; begins a lane section where one changes, and at cuts."""
-    types = _sorted((float(kind.attrib["s"]), _mps(kind.find("speed"), lost)) for kind in road.iterfind("type"))
+    types = _sorted((float(kind.attrib["s"]), _of_type(kind, lost)) for kind in road.iterfind("type"))
     lanes = road.find("lanes")
     sections = [] if lanes is None else lanes.findall("laneSection")
     starts = [float(section.attrib["s"]) for section in sections]
@@ -247,6 +247,12 @@ def _cut(road: ET.Element, cuts: Set[float], lost: Counter[str]) -> None:
                 copy.set("s", repr(start + begin))
                 lanes.insert(list(lanes).index(copies[i - 1]) + 1, copy)
     lost[UNLIMITED] += unlimited and road.get("junction", "-1") == "-1"
+
+
+def _of_type(kind: ET.Element, lost: Counter[str]) -> float | None:
+    """The limit of a road type; a motorway that states none has none."""
+    speed = kind.find("speed")
+    return NO_LIMIT_MPS if speed is None and kind.get("type") == "motorway" else _mps(speed, lost)
 
 
 def _pieces(

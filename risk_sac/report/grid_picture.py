@@ -116,7 +116,7 @@ def _panel(axes: Axes, points: Sequence[PlayedPoint], over: tuple[str, str], wor
         at = np.array([place for place, found in worst.items() if found is verdict]).reshape(-1, 2)
         if len(at):
             label = verdict.value.replace("_", " ")
-            axes.scatter(*at.T, s=size, c=colour, marker=marker, label=label, linewidths=0.8, zorder=3)
+            axes.scatter(at[:, 0], at[:, 1], s=size, c=colour, marker=marker, label=label, linewidths=0.8, zorder=3)
     for driver, (name, colour, dashes) in DRIVERS.items():
         _bound(axes, _shares(places, driver), f"bound of {name}", colour, dashes)
     for axis, known in ((axes.xaxis, words[0]), (axes.yaxis, words[1])):

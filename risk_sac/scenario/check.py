@@ -40,9 +40,15 @@ def check_document(document: Scenario, nets: Mapping[str, str]) -> None:
     of = Interpreter(document, nets)
     _check_parameters(document)
     for path, expression in document.values:
-        _check_range(term(expression), of, path, expression)
+        if document.story is None:
+            _check_range(term(expression), of, path, expression)
+        else:  # bounds of the longer arithmetic of stories are too wide to tell
+            _check_names(term(expression), of, path, expression)
     for path, text in _comparisons(document):
-        _check_range(comparison(text), of, path, text)
+        if document.story is None:
+            _check_range(comparison(text), of, path, text)
+        else:
+            _check_names(comparison(text), of, path, text)
     _check_horizon(of)
     _check_bodies(of)
     if document.like is not None:
@@ -99,32 +105,48 @@ def _box(x_m: float, y_m: float, heading_rad: float, body: str) -> Floats:
 
 def _check_parameters(document: Scenario) -> None:
     known = list(paths(Odd()))
-    columns = {name: path for path, parameter in document.parameters.items() for name in parameter.names}
+    columns = [(name, own) for own, parameter in document.parameters.items() for name in parameter.names]
+    before = set[str]()
     for name, parameter in document.parameters.items():
         path = f"parameters.{name}"
+        if parameter.value is not None and (later := sorted(term(parameter.value).names() - before)):
+            known_before = ", ".join(sorted(before)) or "there is none"
+            remedy = did_you_mean(later[0], before)
+            raise ConfigError(f"{path}.value", repr(later[0]), f"parameters before it: {known_before}", remedy)
+        before |= {*parameter.names, name}
         if parameter.unit not in UNITS:
             remedy = did_you_mean(parameter.unit, UNITS) or "values are in SI units; write `value * 3.6` for another"
             raise ConfigError(f"{path}.unit", repr(parameter.unit), f"one of {', '.join(UNITS)}", remedy)
         if parameter.odd is not None and parameter.odd not in known:
             remedy = did_you_mean(parameter.odd, known)
             raise ConfigError(f"{path}.odd", repr(parameter.odd), f"one of {', '.join(known)}", remedy)
-        if name in columns:
-            raise ConfigError(path, f"a name of the rows of {columns[name]!r}, too", "each name once", "rename one")
+        for column, own in columns:
+            others = [other for again, other in columns if again == column and other != own]
+            if (column == name != own) or others:
+                got = f"a name of the rows of {own!r}, too"
+                raise ConfigError(
+                    path if not others else f"parameters.{others[0]}", got, "each name once", "rename one"
+                )
 
 
 def _check_range(of_term: Term, of: Interpreter, path: str, text: Expression) -> None:
     """Refuses names that are no numbers of the document, and values that do not exist within the ranges."""
-    if unknown := sorted(of_term.names() - of.ranges.keys()):
-        name, known = unknown[0], sorted(of.ranges)
-        words = name in of.document.parameters and of.document.parameters[name].words is not None
-        got = f"{name!r} in {text!r}, {'whose values are words' if words else 'which is no parameter'}"
-        remedy = did_you_mean(name, known) or f"add it below `parameters`{'' if words else ', or write a number'}"
-        raise ConfigError(path, got, f"numbers and {', '.join(known) or 'there is no parameter with numbers'}", remedy)
+    _check_names(of_term, of, path, text)
     try:
         of_term.range(of.ranges)
     except ConfigError as error:
         remedy = error.remedy or "narrow a range, or bound it with min or max"
         raise ConfigError(path, f"{text!r}: {error.got}", error.expected or "a number everywhere", remedy) from error
+
+
+def _check_names(of_term: Term, of: Interpreter, path: str, text: Expression) -> None:
+    """Refuses names that are no numbers of the document."""
+    if unknown := sorted(of_term.names() - of.numbers):
+        name, known = unknown[0], sorted(of.numbers)
+        words = name in of.document.words
+        got = f"{name!r} in {text!r}, {'whose values are words' if words else 'which is no parameter'}"
+        remedy = did_you_mean(name, known) or f"add it below `parameters`{'' if words else ', or write a number'}"
+        raise ConfigError(path, got, f"numbers and {', '.join(known) or 'there is no parameter with numbers'}", remedy)
 
 
 def _comparisons(document: Scenario) -> Iterator[tuple[str, Comparison]]:
@@ -145,8 +167,9 @@ def _leaves(path: str, constraint: Constraint) -> Iterator[tuple[str, Comparison
 
 
 def _check_horizon(of: Interpreter) -> None:
-    bounds = term(of.document.horizon_s).range(of.ranges)
-    for horizon_s in (bounds.low, bounds.high):
+    horizon = of.document.horizon_s
+    bounds = [horizon] if isinstance(horizon, float) else list(term(horizon).range(of.ranges).model_dump().values())
+    for horizon_s in bounds:
         steps_of(horizon_s)
 
 

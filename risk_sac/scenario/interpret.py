@@ -6,13 +6,15 @@ from functools import cached_property
 from typing import Any
 
 from risk_sac.config import CrossingType, Interval
-from risk_sac.config.scenario import Chosen, Scenario
+from risk_sac.config.base import Chosen
+from risk_sac.config.scenario import Scenario
 from risk_sac.config.values import term
 from risk_sac.errors import ConfigError, InfeasibleScene
 from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.layout import Layout
-from risk_sac.scenario.scene import SceneLayout, Value, body_named, motion_of
+from risk_sac.scenario.scene import SceneLayout, body_named, motion_of
 from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.scenario.value import Value
 from risk_sac.world.net import Net
 
 
@@ -39,8 +41,8 @@ class Interpreter:
 
     def holds(self, xi: Mapping[str, float]) -> bool:
         """Whether a scene keeps all constraints."""
-        value = self.value(xi)
         try:
+            value = self.value(xi)
             return all(map(value.holds, self.document.constraints))
         except ConfigError:  # a value that does not exist there
             return False
@@ -54,7 +56,11 @@ class Interpreter:
             elif parameter.words is not None:
                 words[name] = parameter.words[_part(xi[name], len(parameter.words))]
             elif parameter.rows is not None:
-                numbers |= parameter.rows[_part(xi[name], len(parameter.rows))]
+                for column, member in parameter.rows[_part(xi[name], len(parameter.rows))].items():
+                    if isinstance(member, str):
+                        words[column] = member
+                    else:
+                        numbers[column] = member
             else:
                 numbers[name] = xi[name]
         return Value(numbers, words)
@@ -65,10 +71,13 @@ class Interpreter:
         Raises:
           InfeasibleScene: a constraint does not hold, or a value does not exist.
         """
-        value = self.value(xi)
-        for number, constraint in enumerate(self.document.constraints):
-            if not value.holds(constraint):
-                raise InfeasibleScene(f"constraints[{number}] does not hold: {constraint}", reason="constraint")
+        try:
+            value = self.value(xi)
+            for number, constraint in enumerate(self.document.constraints):
+                if not value.holds(constraint):
+                    raise InfeasibleScene(f"constraints[{number}] does not hold: {constraint}", reason="constraint")
+        except ConfigError as error:
+            raise InfeasibleScene(str(error), reason="constraint") from None
         try:
             return SceneLayout(self.document, value, *self.net(value), self.horizon_s).layout()
         except ConfigError as error:
@@ -97,8 +106,7 @@ class Interpreter:
         """All names that a field may stand for, over the words of parameters."""
         if isinstance(name, Chosen):
             return tuple(name.of.values())
-        parameter = self.document.parameters.get(name)
-        return (name,) if parameter is None or parameter.words is None else parameter.words
+        return self.document.words.get(name, (name,))
 
     def crossings(self, file: str) -> set[CrossingType]:
         """Kinds of the crossings whose kerbs its actors start at, on one of its nets."""
@@ -117,6 +125,12 @@ class Interpreter:
         return horizon if isinstance(horizon, float) else term(horizon).range(self.ranges).high
 
     @cached_property
+    def numbers(self) -> frozenset[str]:
+        """Names of the document that stand for numbers."""
+        names = {name for own, one in self.document.parameters.items() for name in one.names or (own,)}
+        return frozenset(names - self.document.words.keys())
+
+    @cached_property
     def ranges(self) -> Mapping[str, Any]:
         """Range of each number of the document."""
         ranges = dict[str, Interval]()
@@ -126,8 +140,9 @@ class Interpreter:
             elif parameter.range is not None:
                 ranges[name] = Interval(low=parameter.range[0], high=parameter.range[1])
             for column in parameter.names:
-                values = [row[column] for row in parameter.rows or ()]
-                ranges[column] = Interval(low=min(values), high=max(values))
+                values = [member for row in parameter.rows or () if not isinstance(member := row[column], str)]
+                if values:
+                    ranges[column] = Interval(low=min(values), high=max(values))
         return ranges
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from risk_sac.scenario.bodies import BODIES, BodyName
+from risk_sac.scenario.story_plan import StoryPlan
 from risk_sac.world.types import Point, Role
 
 SAME_POINT_M = 1e-6
@@ -167,3 +168,4 @@ class Layout:
     friction: float = 1.0
     horizon_steps: int = 150  # of 0.1 s
     wary: bool = False  # whether drivers stop for an ego that stands askew; SUMO tells them of a box along its lane
+    story: StoryPlan | None = None  # what actors of the role `STORY` do; without a lead-in

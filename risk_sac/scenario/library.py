@@ -7,6 +7,7 @@ an episode needs the folder that its scenario was kept in.
 """
 
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -20,8 +21,8 @@ import yaml
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError, did_you_mean
 from risk_sac.host.machine import UNWRITABLE, user_cache
-from risk_sac.scenario.reading import document_from
-from risk_sac.scenario.shipped import networks, shipped_names
+from risk_sac.scenario.reading import MOST_BYTES, document_from
+from risk_sac.scenario.shipped import networks, roads, shipped_names
 
 VARIABLE = "RISK_SAC_PLACES"
 DOCUMENT = "scenario.yaml"
@@ -43,22 +44,33 @@ def library() -> Path:
 
 
 def written(document: Scenario) -> str:
-    """Writes a document as YAML, without the fields that have their defaults."""
+    """Writes a document as YAML, or as JSON if it is long, without the fields that have their defaults."""
     fields = document.model_dump(mode="json", exclude_defaults=True)
+    as_json = json.dumps(fields)
+    if len(as_json) > MOST_BYTES // 2:  # YAML of so much is slow to read
+        return as_json
     return yaml.safe_dump(fields, sort_keys=False, allow_unicode=True, width=120, default_flow_style=None)
 
 
-def own_nets(nets: Mapping[str, str]) -> dict[str, bytes]:
-    """Reads the nets that do not ship, by a document's names for them; `nets` as `nets_of` returns it."""
-    return {name: Path(file).read_bytes() for name, file in nets.items() if Path(file).is_absolute()}
+def own_files(document: Scenario, nets: Mapping[str, str]) -> dict[str, bytes]:
+    """Reads the nets that do not ship, and the road files beside them, by a document's names for them.
+
+    Args:
+      document: of the scenario.
+      nets: as `nets_of` returns them.
+    """
+    own = {name: Path(file) for name, file in nets.items() if Path(file).is_absolute()}
+    folders = {file.parent for file in own.values()}
+    own |= {name: folder / name for name in roads(document) for folder in folders if (folder / name).is_file()}
+    return {name: file.read_bytes() for name, file in own.items()}
 
 
-def keep(document: Scenario, nets: Mapping[str, bytes]) -> str:
+def keep(document: Scenario, own: Mapping[str, bytes]) -> str:
     """Puts a scenario into the library.
 
     Args:
       document: of the scenario.
-      nets: network of the document → its SUMO net; shipped ones are left out.
+      own: network of the document → its SUMO net, shipped ones left out; road → its OpenDRIVE file.
 
     Returns:
       Its name, that of the document and a digest.
@@ -66,7 +78,7 @@ def keep(document: Scenario, nets: Mapping[str, bytes]) -> str:
     Raises:
       ConfigError: a net has no name of a file, or the library cannot be written.
     """
-    files = {DOCUMENT: written(document).encode(), **nets}
+    files = {DOCUMENT: written(document).encode(), **own}
     name = f"{document.name}_{_digest(files)}"
     put(name, files)
     return name
@@ -171,8 +183,8 @@ def _check(files: Mapping[str, bytes]) -> None:
     if document is None:
         raise ConfigError("family", "a scenario without a document", DOCUMENT)
     for name in files.keys() - {DOCUMENT}:
-        if not _NET_FILE.fullmatch(name) or name not in networks(document):
-            raise ConfigError("network", repr(name), "a file name that the document names as a network")
+        if not _NET_FILE.fullmatch(name) or name not in (*networks(document), *roads(document)):
+            raise ConfigError("network", repr(name), "a file name that the document names as a network or road")
 
 
 def _digest(files: Mapping[str, bytes]) -> str:

@@ -1,70 +1,36 @@
 """Layout of one scene: where the actors of a scenario document start, given the values of its parameters."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import pairwise
-from typing import Any, NamedTuple, get_args
+from typing import NamedTuple, get_args
 
 from risk_sac.config.scenario import (
     EGO,
     LONGEST_HORIZON_S,
-    AllOf,
-    AnyOf,
-    Chosen,
-    Constraint,
     Driven,
     Moving,
     Scenario,
     Start,
     Stream,
 )
-from risk_sac.config.values import Comparison, Expression, comparison, term
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.bodies import BODIES, BodyName, Motion
 from risk_sac.scenario.ground import ground_of, kerb_of
 from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, StaticStart, VehicleStart
+from risk_sac.scenario.story_plan import StoryPlan
+from risk_sac.scenario.story_scene import StoryScene
 from risk_sac.scenario.tracks import Track, Turn, lane_named, routed, straight_on
+from risk_sac.scenario.travel_line import Pose, line_of
+from risk_sac.scenario.value import Value
 from risk_sac.world.net import Crossing, Link, Net, NetLane, direction
 from risk_sac.world.types import STEP_S, Point, Role
 
+ROLES = {"adversary": Role.ADVERSARY, "story": Role.STORY, "background": Role.BACKGROUND, "static": Role.STATIC}
 GRID_M = 20.0  # of the places that ground is computed for
 UNIT_DIGITS = 12  # of a direction's cosine and sine, so that those of 90 degrees are 0 and 1
-
-
-class Value(NamedTuple):
-    """Values and words of a scene's parameters."""
-
-    numbers: Mapping[str, float]
-    words: Mapping[str, str]
-
-    def of(self, expression: Expression, path: str = "") -> float:
-        """The value of an expression; raises `ConfigError` with its path where it has none."""
-        try:
-            return term(expression).value(self.numbers)
-        except ConfigError as error:
-            raise ConfigError(path, error.got, error.expected, error.remedy) from error
-
-    def choose(self, choice: Any) -> Any:
-        """Resolves a choice by a parameter's word; anything else stays as it is."""
-        return choice.of[self.words[choice.by]] if isinstance(choice, Chosen) else choice
-
-    def word(self, name: Any) -> Any:
-        """The word of a parameter if one has this name, else the name."""
-        name = self.choose(name)
-        return self.words.get(name, name)
-
-    def holds(self, constraint: Constraint) -> bool:
-        """Whether a constraint holds."""
-        if isinstance(constraint, AllOf):
-            return all(map(self.holds, constraint.all))
-        if isinstance(constraint, AnyOf):
-            return any(map(self.holds, constraint.any))
-        return self.true(constraint)
-
-    def true(self, text: Comparison) -> bool:
-        """Whether a comparison holds."""
-        return bool(comparison(text).value(self.numbers))
 
 
 class OnTrack(NamedTuple):
@@ -122,6 +88,11 @@ class SceneLayout:
         self._placed: dict[str, OnTrack] = {}
         self._bodies: dict[str, BodyName] = {}
         self._speeds: dict[str, float] = {}
+        self._has_lead_in = document.story is None
+
+    @cached_property
+    def _story(self) -> StoryScene:
+        return StoryScene(self._document, self._value, self._file, self._net)
 
     def layout(self) -> Layout:
         """Places all actors; raises `ConfigError` with the path of what does not fit the net."""
@@ -132,7 +103,7 @@ class SceneLayout:
         ego = self._vehicle(EGO, Role.EGO, document.ego)
         vehicles, pedestrians, statics = list[VehicleStart](), list[PedestrianStart](), list[StaticStart]()
         for name, actor in actors.items():
-            role = Role.ADVERSARY if actor.role == "adversary" else Role.BACKGROUND
+            role = ROLES[actor.role]
             motion = motion_of(document, name, self._bodies[name])
             if motion == "freely":
                 pedestrians.append(self._pedestrian(name, role, actor))
@@ -158,7 +129,25 @@ class SceneLayout:
             friction=value.of(document.friction, "friction"),
             horizon_steps=steps_of(value.of(document.horizon_s, "horizon_s")),
             wary=document.wary,
+            story=None if document.story is None else self._plan((ego, *vehicles), pedestrians, statics),
         )
+
+    def _plan(
+        self,
+        vehicles: Sequence[VehicleStart],
+        pedestrians: Sequence[PedestrianStart],
+        statics: Sequence[StaticStart],
+    ) -> StoryPlan:
+        """What the document's story needs; streams are no part of it."""
+        own = {start.id: start for start in vehicles if start.id in self._bodies}
+        for vehicle in own.values():
+            self._story.put_vehicle(vehicle)
+        bodies: list[PedestrianStart | StaticStart] = [*pedestrians, *statics]
+        for body in bodies:
+            self._story.put(body.id, Pose(body.x_m, body.y_m, body.heading_rad), body.body)
+        walking = {start.id: start.speed_mps for start in pedestrians}
+        moves = {name: name in walking for name in (*own, *walking)}
+        return self._story.plan(self._bodies, self._speeds | walking, moves, own[EGO])
 
     def _track(self, lane: str, driven: Driven, path: str, *, begin: bool) -> OnTrack:
         """The track from a lane's beginning or its end, where an actor goes; `before_m` is 0."""
@@ -179,15 +168,32 @@ class SceneLayout:
 
     def _vehicle(self, name: str, role: Role, moving: Moving) -> VehicleStart:
         path = name if name == EGO else f"actors.{name}"
-        self._placed[name] = place = self._place(name, moving, path)
-        self._speeds[name] = speed_mps = self._value.of(moving.speed, f"{path}.speed")
         start = moving.start
+        self._speeds[name] = speed_mps = self._value.of(moving.speed, f"{path}.speed")
+        if start.position is not None:
+            return self._vehicle_at(name, role, moving, path)
+        self._placed[name] = place = self._place(name, moving, path)
         self._refuse(start, ("heading_deg", "setback_m", "offset_m"), path, "let it move freely")
         left_m, width_m = self._value.of(start.left_m, f"{path}.start.left_m"), place.lane.width_m
         if not abs(left_m) <= width_m / 2:
             wanted = f"at most half of {place.lane.id!r}, {width_m / 2:g} m"
             raise ConfigError(f"{path}.start.left_m", f"{left_m:g}", wanted, "lanes_left, or a start on another lane")
         return replace(_started(name, role, place, speed_mps, self._bodies[name]), left_m=left_m)
+
+    def _vehicle_at(self, name: str, role: Role, moving: Moving, path: str) -> VehicleStart:
+        """A vehicle that starts at a position of the road file."""
+        spot = self._story.front_spot(name, self._bodies[name])
+        lane = spot.lane
+        if lane.use != "lane":
+            raise ConfigError(f"{path}.start.position", f"a place inside junction {lane.edge!r}", "a place on a road")
+        at_m = min(max(spot.at_m * lane.length_m / line_of(lane.centre).length_m, 0.0), lane.length_m)
+        if moving.route is None and moving.turn is None:
+            metres = lane.limit_mps * self._driven_s
+            moving = moving.model_copy(update={"route": self._story.route(name, lane, metres)})
+        place = self._track(lane.id, moving, path, begin=True)._replace(before_m=-at_m, lead_in=False)
+        self._placed[name] = place
+        start = _started(name, role, place, self._speeds[name], self._bodies[name])
+        return replace(start, left_m=spot.left_m, speed_mps=self._speeds[name])
 
     def _refuse(self, start: Start, fields: Sequence[str], path: str, remedy: str) -> None:
         """Refuses fields of a start that would have no effect."""
@@ -210,7 +216,7 @@ class SceneLayout:
                 before_m = there.before_m + (of(start.gap_m or 0.0, f"{path}.start.gap_m") + self._length_m(other))
             else:
                 before_m = there.before_m - of(start.ahead_m or 0.0, f"{path}.start.ahead_m")
-            lead_in = there.lead_in if start.lead_in is None else start.lead_in
+            lead_in = (there.lead_in if start.lead_in is None else start.lead_in) and self._has_lead_in
             return place._replace(before_m=before_m, lead_in=lead_in)
         if start.lane is None:
             raise ConfigError(f"{path}.start", "no lane", f"a lane, since a {self._bodies[name]} drives on one")
@@ -228,7 +234,7 @@ class SceneLayout:
             if not 0.0 <= before_m <= place.track.room_m:
                 got = f"{before_m:g} m before the end of {place.lane.id!r}"
                 raise ConfigError(f"{path}.start.distance_m", got, f"0 to {place.track.room_m:g}")
-        return place._replace(before_m=before_m, lead_in=start.lead_in is not False)
+        return place._replace(before_m=before_m, lead_in=start.lead_in is not False and self._has_lead_in)
 
     def _beside(self, there: OnTrack, moving: Moving, path: str) -> OnTrack:
         """The track from the lane of another actor's reference, or one beside it."""
@@ -260,11 +266,14 @@ class SceneLayout:
 
     def _pedestrian(self, name: str, role: Role, actor: Moving) -> PedestrianStart:
         path, start = f"actors.{name}", actor.start
-        x_m, y_m, along_x, along_y = self._facing(start, path)
         speed_mps = self._value.of(actor.speed, f"{path}.speed")
+        if start.position is not None:
+            pose, body = self._story.middle(name, self._bodies[name]), self._bodies[name]
+            return PedestrianStart(id=name, role=role, **pose._asdict(), speed_mps=speed_mps, body=body)
+        x_m, y_m, along_x, along_y = self._facing(start, path)
         setback_m = self._value.of(start.setback_m, f"{path}.start.setback_m")
         offset_m = self._value.of(start.offset_m, f"{path}.start.offset_m")
-        lead_m = 0.0 if start.lead_in is False else LEAD_IN_S * speed_mps
+        lead_m = LEAD_IN_S * speed_mps if start.lead_in is not False and self._has_lead_in else 0.0
         return PedestrianStart(
             id=name,
             role=role,
@@ -278,7 +287,9 @@ class SceneLayout:
     def _static(self, name: str, actor: Moving) -> StaticStart:
         path, body = f"actors.{name}", self._bodies[name]
         self._refuse(actor.start, ("setback_m", "offset_m"), path, "state left_m or another place")
-        if actor.start.reference is None:
+        if actor.start.position is not None:
+            x_m, y_m, heading_rad = self._story.middle(name, body)
+        elif actor.start.reference is None:
             x_m, y_m, along_x, along_y = self._facing(actor.start, path)
             heading_rad = math.atan2(along_y, along_x)
         else:
@@ -329,12 +340,13 @@ class SceneLayout:
         lanes = (lanes,) if isinstance(lanes, str) else lanes
         tracks = [self._track(lane, stream, path, begin=False) for lane in lanes]
         for i in range(stream.count):
-            place = tracks[i % len(tracks)]._replace(lead_in=stream.lead_in)
+            leads_in = stream.lead_in and self._has_lead_in
+            place = tracks[i % len(tracks)]._replace(lead_in=leads_in)
             before_m = from_m + (i + 1) * gap_m
             taken = [_taken_m(at_m, mps, speed_mps, stream.clear_m) for at_m, mps in self._on(place.track)]
             while crowded := [last_m for first_m, last_m in taken if first_m < before_m < last_m]:
                 before_m = max(crowded)
-            lead_m = LEAD_IN_S * speed_mps if stream.lead_in else 0.0
+            lead_m = LEAD_IN_S * speed_mps if leads_in else 0.0
             if before_m + BODIES[body].length_m + lead_m <= place.track.room_m:
                 place = place._replace(before_m=before_m)
                 self._placed[f"{name}_{i}"], self._speeds[f"{name}_{i}"] = place, speed_mps

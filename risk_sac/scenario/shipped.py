@@ -1,11 +1,12 @@
 """Scenarios that ship with the package: a document and its net in each folder of `sumo_nets/`."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
 from risk_sac.config import Scenario
+from risk_sac.config.scenario import Net
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.reading import document_from
 
@@ -44,9 +45,17 @@ def shipped_net(name: str) -> str:
 
 def networks(document: Scenario) -> Iterator[str]:
     """All networks that a document names."""
-    network = document.network
-    words = document.parameters[network].words if isinstance(network, str) and network in document.parameters else None
-    yield from network.of.values() if not isinstance(network, str) else words or (network,)
+    yield from _alternatives(document, document.network)
+
+
+def roads(document: Scenario) -> Iterator[str]:
+    """All road files that a document names."""
+    if document.road is not None:
+        yield from _alternatives(document, document.road)
+
+
+def _alternatives(document: Scenario, name: Net) -> Iterable[str]:
+    return document.words.get(name, (name,)) if isinstance(name, str) else name.of.values()
 
 
 def nets_of(document: Scenario, folder: Path | None = None) -> Mapping[str, str]:
@@ -57,10 +66,18 @@ def nets_of(document: Scenario, folder: Path | None = None) -> Mapping[str, str]
       folder: beside which its own nets lie; None: it has shipped ones alone.
 
     Raises:
-      ConfigError: a net is not there.
+      ConfigError: a net or a road file is not there.
     """
+    for name in roads(document):
+        if folder is None or not _beside(name, folder):
+            raise ConfigError("road", repr(name), "an OpenDRIVE file beside the document and its net")
     nets = {}
     for name in networks(document):
-        own = None if folder is None or "/" in name or name.startswith(".") else folder / name
-        nets[name] = str(own.absolute()) if own is not None and own.is_file() else shipped_net(name)
+        own = folder is not None and _beside(name, folder)
+        nets[name] = str((folder / name).absolute()) if folder is not None and own else shipped_net(name)
     return nets
+
+
+def _beside(name: str, folder: Path) -> bool:
+    """Whether a name is that of a file in a folder."""
+    return "/" not in name and not name.startswith(".") and (folder / name).is_file()

@@ -357,6 +357,8 @@ def _insert(start: VehicleStart, type_id: str) -> None:
         departPos=repr(start.position_m),
         departSpeed=repr(start.speed_mps),
     )
+    if start.speed_mps > (limit_mps := libsumo.lane.getMaxSpeed(f"{start.route[0]}_{start.lane}")):
+        libsumo.vehicle.setSpeedFactor(start.id, start.speed_mps / limit_mps)  # SUMO refuses a faster start
     if needs_lane_change(start.route, f"{start.route[0]}_{start.lane}"):
         libsumo.vehicle.setParameter(start.id, ASSERTIVE, MERGING)
     if start.left_m != 0.0:  # SUMO's driver keeps to it

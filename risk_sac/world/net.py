@@ -66,6 +66,7 @@ class NetLane:
     height_m: tuple[float, ...] = ()  # of the ground, at each point of the line
     next: list[str] = field(default_factory=list)  # lanes that follow
     heads: list[Head] = field(default_factory=list)  # at its end
+    original: tuple[str, ...] = ()  # road and lane of OpenDRIVE that it was made of, such as `0_-4`
 
     @property
     def centre(self) -> Floats:
@@ -164,6 +165,7 @@ class Net:
     waits_for: dict[str, tuple[NetLane, ...]] = field(default_factory=dict)
     walkways: dict[str, list[tuple[Point, ...]]] = field(default_factory=lambda: defaultdict(list))  # by junction
     keeps_left: bool = False
+    shift_m: Point = (0.0, 0.0)  # of its coordinates beside those of the file that it was converted from
     known: dict[Hashable, object] = field(default_factory=dict)  # what was found out; see `once`
 
     @cached_property

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from risk_sac.errors import MapError
 from risk_sac.world.net import Crossing, Edge, Head, Junction, LaneUse, Link, Net, NetLane, Program
+from risk_sac.world.types import Point
 
 DRIVER = "passenger"  # the class of every vehicle of ours
 TURNAROUND = "t"
@@ -18,6 +19,7 @@ DEFAULT_WIDTH_M = 3.2
 LEAST_LIMIT_MPS = 0.01  # of a closed lane, so that driving it takes a finite time
 FARTHEST = 1e8  # m; the Earth's circumference is 4e7
 LONGEST_NAME = 200
+ORIGINAL = "origId"  # parameter that netconvert writes
 REPAIR = "run netconvert over it, or save it with netedit"
 
 
@@ -56,12 +58,12 @@ def parse_net(root: ET.Element) -> Net:
 
 
 def _net(root: ET.Element) -> Net:
-    net = Net(keeps_left=root.get("lefthand", "false").lower() in ("true", "1"))
+    net = Net(keeps_left=root.get("lefthand", "false").lower() in ("true", "1"), shift_m=_shift(root))
     crossings = []
     for edge in root.iter("edge"):
         id_, function = edge.attrib["id"], edge.get("function", "normal")
         junction = id_.rpartition("_")[0][1:]  # of an edge inside one
-        lanes = tuple(_lane(id_, i, lane.attrib, function) for i, lane in enumerate(edge.iter("lane")))
+        lanes = tuple(_lane(id_, i, lane, function) for i, lane in enumerate(edge.iter("lane")))
         if function in USES:
             net.lanes |= {lane.id: lane for lane in lanes}
         if function == "internal":
@@ -141,7 +143,14 @@ def _edge(edge: ET.Element, lanes: tuple[NetLane, ...]) -> Edge:
     return Edge(id_, edge.attrib["from"], edge.attrib["to"], lanes)
 
 
-def _lane(edge: str, index: int, a: Mapping[str, str], function: str) -> NetLane:
+def _shift(root: ET.Element) -> Point:
+    location = root.find("location")
+    x, y = ("0,0" if location is None else location.get("netOffset", "0,0")).split(",")
+    return _number(x), _number(y)
+
+
+def _lane(edge: str, index: int, lane: ET.Element, function: str) -> NetLane:
+    a = lane.attrib
     points = _points(a["shape"])
     if not points:
         raise ValueError(f"lane {a['id']!r} has no shape")
@@ -160,6 +169,9 @@ def _lane(edge: str, index: int, a: Mapping[str, str], function: str) -> NetLane
         drivable=_admits(a.get("allow"), a.get("disallow")),
         use="sidewalk" if walks else USES.get(function, "lane"),
         height_m=tuple(z for _, _, z in points),
+        original=tuple(
+            name for p in lane.iter("param") if p.get("key") == "origId" for name in p.get("value", "").split()
+        ),
     )
 
 

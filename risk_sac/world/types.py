@@ -36,6 +36,7 @@ class Role(IntEnum):
     ADVERSARY = 1
     BACKGROUND = 2
     STATIC = 3
+    STORY = 4  # follows the scenario's story; one that a method leads away from it is an adversary from then on
 
 
 class Signal(IntEnum):
@@ -166,7 +167,7 @@ class Series(BaseModel):
     body: list[str]
     """n; car | van | truck | bus | motorcycle | bicycle | pedestrian | child | obstacle."""
     role: list[str]
-    """n; ego | adversary | background | static."""
+    """n; ego | adversary | background | static | story."""
     length_m: Reals
     """n."""
     width_m: Reals

@@ -53,7 +53,7 @@ def _posted(upload: bytes, action: str) -> bytes:
 
             return json.dumps(try_document(document, nets).model_dump(mode="json")).encode()
         check_document(document, nets)
-        return json.dumps({"name": library.keep(document, library.own_nets(nets))}).encode()
+        return json.dumps({"name": library.keep(document, library.own_files(document, nets))}).encode()
 
 
 def _unpacked(upload: bytes, folder: Path) -> tuple[Scenario, Path]:

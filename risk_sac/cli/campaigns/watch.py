@@ -217,7 +217,7 @@ def _uploaded(name_or_file: str, url: str | None) -> str:
     if not is_file(name_or_file):
         return name_or_file
     document, folder = document_at(name_or_file)
-    nets = library.own_nets(nets_of(document, folder))
+    nets = library.own_files(document, nets_of(document, folder))
     with Client.from_environment(url) as client:
         return client.add_scenario(document, nets).name
 

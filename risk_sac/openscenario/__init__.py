@@ -1,0 +1,1 @@
+"""Reads OpenSCENARIO XML with its roads and catalogs into scenario documents."""

@@ -1,0 +1,326 @@
+"""Actions of the storyboard."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from risk_sac.config.scenario import EGO
+from risk_sac.config.story import (
+    AcquirePositionAction,
+    Action,
+    AssignRouteAction,
+    DeleteAction,
+    DistanceAction,
+    Dynamics,
+    FinalSpeed,
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    LaneTarget,
+    NoAction,
+    RelativeTarget,
+    SpeedAction,
+    SpeedEntry,
+    SpeedProfileAction,
+    SynchroniseAction,
+    TeleportAction,
+    TrajectoryTiming,
+    VisibilityAction,
+)
+from risk_sac.openscenario.elements import Unread
+from risk_sac.openscenario.entities import Entities
+from risk_sac.openscenario.positions import Positions
+from risk_sac.openscenario.scope import At
+from risk_sac.openscenario.variables import Variables
+
+_SHAPES = {name: name for name in ("step", "linear", "sinusoidal", "cubic")}
+_BY = {name: name for name in ("time", "rate", "distance")}
+_HOW = {name: name for name in ("delta", "factor")}
+_MODES = {name: name for name in ("position", "follow")}
+COORDINATES = {name: name for name in ("entity", "lane", "road", "trajectory")}
+_SIDES = {
+    "any": "any",
+    "leadingReferencedEntity": "ahead",
+    "trailingReferencedEntity": "behind",
+    "leftToReferencedEntity": "left",
+    "rightToReferencedEntity": "right",
+}
+_ONLY_EGO = ("ControllerAction", "ActivateControllerAction", "AssignControllerAction")
+_EFFECTS = {
+    "EnvironmentAction": "weather, light and friction stay as the document has them",
+    "AppearanceAction": "lights and animations are not shown",
+    "InfrastructureAction": "signals keep the program of the road",
+    "TrafficAction": "this traffic does not appear",
+    "ParameterAction": "the parameter keeps its value",
+    "MonitorAction": "nothing is monitored",
+    "TrailerAction": "no trailer is coupled",
+    "UserDefinedAction": "the command is not carried out",
+    "SetMonitorAction": "nothing is monitored",
+}
+_READ = "an action on speed, lane, distance, route, place, visibility or a variable"
+WAYS = AssignRouteAction | FollowTrajectoryAction | AcquirePositionAction
+"""Actions that say where an actor goes; the ego drives there."""
+EGO_EFFECT = "the ego drives by itself"
+
+
+class Actions:
+    """Reads actions."""
+
+    def __init__(self, positions: Positions, entities: Entities, variables: Variables, remarks: list[str]) -> None:
+        """Prepares to read.
+
+        Args:
+          positions: reads places.
+          entities: that actions name.
+          variables: that actions set.
+          remarks: to which actions that are not read are added.
+        """
+        self._positions, self._entities, self._variables, self._remarks = positions, entities, variables, remarks
+        self._readers: Mapping[str, Callable[[At], Any]] = {
+            "SpeedAction": self._speed,
+            "SpeedProfileAction": self._profile,
+            "LaneChangeAction": self._lane_change,
+            "LaneOffsetAction": self._lane_offset,
+            "LongitudinalDistanceAction": self._distance,
+            "LateralDistanceAction": self._distance,
+            "SynchronizeAction": self._synchronise,
+            "FollowTrajectoryAction": self._follow,
+            "AssignRouteAction": self._assign,
+            "AcquirePositionAction": self._acquire,
+            "TeleportAction": self._teleport,
+            "VisibilityAction": self._visibility,
+        }
+
+    def of_event(self, at: At, actors: tuple[str, ...]) -> Action:
+        """Reads an element `Action` of an event; one that is not read does nothing, and is reported."""
+        holder = at.one("PrivateAction", "GlobalAction", "UserDefinedAction")
+        if holder.tag == "UserDefinedAction":
+            return self._none(holder, _EFFECTS[holder.tag])
+        try:
+            if holder.tag == "GlobalAction":
+                return self.on_all(holder)
+            action = self.private(holder)
+        except Unread as error:
+            return self._reported(error)
+        if actors == (EGO,) and not isinstance(action, WAYS | NoAction):
+            return self._none(holder, EGO_EFFECT)
+        return action
+
+    def private(self, holder: At) -> Action:
+        """Reads an element `PrivateAction`.
+
+        Raises:
+          ConfigError: it is wrong.
+          Unread: something in it is not read, and matters.
+        """
+        here = holder
+        while here.tag in ("PrivateAction", "LongitudinalAction", "LateralAction", "RoutingAction"):
+            children = here.element.children
+            if len(children) != 1:
+                raise here.refusal(f"{len(children)} actions", "one")
+            children[0].used = True
+            here = At(children[0], here.scope)
+        if here.tag in self._readers:
+            action: Action = self._readers[here.tag](here)
+            return action
+        if here.tag in _ONLY_EGO:
+            return self._none(here, "controllers are ignored: the ego is the one that is tested")
+        if here.tag in _EFFECTS:
+            return self._none(here, _EFFECTS[here.tag])
+        here.element.use_all()
+        raise here.unread(_READ, "the action does nothing")
+
+    def on_all(self, holder: At) -> Action:
+        """Reads an element `GlobalAction`; one that is not read does nothing, and is reported."""
+        if len(holder.element.children) != 1:
+            raise holder.refusal(f"{len(holder.element.children)} actions", "one")
+        here = At(holder.element.children[0], holder.scope)
+        here.element.used = True
+        if here.tag == "EntityAction":
+            if here.maybe("DeleteEntityAction") is not None:
+                name = self._entities.named(here)
+                return here.build(DeleteAction, kind="delete", actor=name)
+            here.element.use_all()
+            raise here.unread("DeleteEntityAction", "the entity does not appear")
+        if here.tag in ("VariableAction", "ParameterAction"):
+            return self._variables.action(here)
+        return self._none(here, _EFFECTS.get(here.tag, "the action does nothing"))
+
+    def _none(self, at: At, effect: str) -> NoAction:
+        at.element.use_all()
+        return self._reported(at.unread(_READ, effect))
+
+    def _reported(self, error: Unread) -> NoAction:
+        self._remarks.append(f"{error.field}: not read; {error.effect}")
+        return NoAction(kind="none")
+
+    # Along
+
+    def _speed(self, at: At) -> SpeedAction:
+        dynamics = self._dynamics(at.one("SpeedActionDynamics"))
+        goal = at.one("SpeedActionTarget")
+        target: Any
+        if (absolute := goal.maybe("AbsoluteTargetSpeed")) is not None:
+            target = absolute.number("value")
+        else:
+            relative = goal.one("RelativeTargetSpeed")
+            target = relative.build(
+                RelativeTarget,
+                to=self._entities.named(relative),
+                value=relative.number("value"),
+                how=relative.one_of("speedTargetValueType", _HOW, "delta"),
+                continuous=relative.flag("continuous", False),
+            )
+        return at.build(SpeedAction, kind="speed", target=target, dynamics=dynamics)
+
+    def _dynamics(self, at: At) -> Dynamics:
+        at.constant("followingMode", "position")
+        return at.build(
+            Dynamics,
+            shape=at.one_of("dynamicsShape", _SHAPES),
+            by=at.one_of("dynamicsDimension", _BY, "time"),
+            value=at.number_or("value", 0.0),
+        )
+
+    def _profile(self, at: At) -> SpeedProfileAction:
+        entries = [
+            entry.build(SpeedEntry, speed=entry.number("speed"), time_s=entry.number_or("time", None))
+            for entry in at.all("SpeedProfileEntry")
+        ]
+        return at.build(
+            SpeedProfileAction,
+            kind="speed_profile",
+            entries=tuple(entries),
+            to=self._entities.named(at) if "entityRef" in at.element.attributes else None,
+            mode=at.one_of("followingMode", _MODES, "position"),
+            **{name: value for name, value in self._bounds(at).items() if name != "speed_mps"},
+        )
+
+    def _bounds(self, at: At) -> dict[str, Any]:
+        """Bounds of an element with a child `DynamicConstraints`."""
+        if (bounds := at.maybe("DynamicConstraints")) is None:
+            return {}
+        for name in ("maxAccelerationRate", "maxDecelerationRate"):
+            bounds.number_or(name, 0.0)
+        names = {"accel_mps2": "maxAcceleration", "brake_mps2": "maxDeceleration", "speed_mps": "maxSpeed"}
+        return {name: bounds.number_or(attribute, None) for name, attribute in names.items()}
+
+    def _distance(self, at: At) -> DistanceAction:
+        along = at.tag == "LongitudinalDistanceAction"
+        default = "trailingReferencedEntity" if along else "any"
+        return at.build(
+            DistanceAction,
+            kind="longitudinal_distance" if along else "lateral_distance",
+            to=self._entities.named(at),
+            distance_m=at.number_or("distance", None),
+            time_gap_s=at.number_or("timeGap", None),
+            freespace=at.flag("freespace"),
+            continuous=at.flag("continuous"),
+            displacement=at.one_of("displacement", _SIDES, default),
+            coordinates=at.one_of("coordinateSystem", COORDINATES, "entity"),
+            **self._bounds(at),
+        )
+
+    def _synchronise(self, at: At) -> SynchroniseAction:
+        goal = at.maybe("FinalSpeed")
+        return at.build(
+            SynchroniseAction,
+            kind="synchronise",
+            master=self._entities.named(at, "masterEntityRef"),
+            master_target=self._positions.position(at.one("TargetPositionMaster")),
+            target=self._positions.position(at.one("TargetPosition")),
+            final_speed=self._final_speed(goal, at) if goal is not None else None,
+            master_tolerance_m=at.number_or("targetToleranceMaster", 0.0),
+            tolerance_m=at.number_or("targetTolerance", 0.0),
+        )
+
+    def _final_speed(self, at: At, action: At) -> FinalSpeed:
+        inner = at.one("AbsoluteSpeed", "RelativeSpeedToMaster")
+        speed: Any = inner.number("value")
+        if inner.tag == "RelativeSpeedToMaster":
+            how = inner.one_of("speedTargetValueType", _HOW, "delta")
+            speed = inner.build(
+                RelativeTarget, to=self._entities.named(action, "masterEntityRef"), value=speed, how=how
+            )
+        holder = inner.maybe("SteadyState") or inner
+        metres, seconds = holder.maybe("TargetDistanceSteadyState"), holder.maybe("TargetTimeSteadyState")
+        return inner.build(
+            FinalSpeed,
+            speed=speed,
+            steady_m=metres.number("distance") if metres is not None else None,
+            steady_s=seconds.number("time") if seconds is not None else None,
+        )
+
+    # Across
+
+    def _lane_change(self, at: At) -> LaneChangeAction:
+        goal = at.one("LaneChangeTarget")
+        target: Any
+        if (absolute := goal.maybe("AbsoluteTargetLane")) is not None:
+            target = absolute.number("value")
+        else:
+            relative = goal.one("RelativeTargetLane")
+            target = relative.build(LaneTarget, to=self._entities.named(relative), lanes=relative.number("value"))
+        return at.build(
+            LaneChangeAction,
+            kind="lane_change",
+            target=target,
+            offset_m=at.number_or("targetLaneOffset", 0.0),
+            dynamics=self._dynamics(at.one("LaneChangeActionDynamics")),
+        )
+
+    def _lane_offset(self, at: At) -> LaneOffsetAction:
+        goal, dynamics = at.one("LaneOffsetTarget"), at.one("LaneOffsetActionDynamics")
+        target: Any
+        if (absolute := goal.maybe("AbsoluteTargetLaneOffset")) is not None:
+            target = absolute.number("value")
+        else:
+            relative = goal.one("RelativeTargetLaneOffset")
+            target = relative.build(RelativeTarget, to=self._entities.named(relative), value=relative.number("value"))
+        return at.build(
+            LaneOffsetAction,
+            kind="lane_offset",
+            target=target,
+            shape=dynamics.one_of("dynamicsShape", _SHAPES),
+            lateral_mps2=dynamics.number_or("maxLateralAcc", None),
+            continuous=at.flag("continuous", False),
+        )
+
+    # Ways and places
+
+    def _follow(self, at: At) -> FollowTrajectoryAction:
+        holder = at.maybe("TrajectoryRef") or at
+        times, mode = at.maybe("TimeReference"), at.maybe("TrajectoryFollowingMode")
+        timing = times.maybe("Timing") if times is not None else None
+        if times is not None:
+            times.maybe("None")
+        return at.build(
+            FollowTrajectoryAction,
+            kind="follow_trajectory",
+            trajectory=self._positions.trajectory(holder),
+            timing=self._timing(timing) if timing is not None else None,
+            mode=mode.one_of("followingMode", _MODES) if mode is not None else "position",
+            from_m=at.number_or("initialDistanceOffset", 0.0),
+        )
+
+    def _timing(self, at: At) -> TrajectoryTiming:
+        domains = {"absolute": "absolute", "relative": "relative"}
+        return at.build(
+            TrajectoryTiming,
+            domain=at.one_of("domainAbsoluteRelative", domains, "absolute"),
+            scale=at.number_or("scale", 1.0),
+            offset_s=at.number_or("offset", 0.0),
+        )
+
+    def _assign(self, at: At) -> AssignRouteAction:
+        return at.build(AssignRouteAction, kind="assign_route", route=self._positions.route(at))
+
+    def _acquire(self, at: At) -> AcquirePositionAction:
+        position = self._positions.position(at.one("Position"))
+        return at.build(AcquirePositionAction, kind="acquire_position", position=position)
+
+    def _teleport(self, at: At) -> TeleportAction:
+        return at.build(TeleportAction, kind="teleport", position=self._positions.position(at.one("Position")))
+
+    def _visibility(self, at: At) -> VisibilityAction:
+        at.flag("graphics", True)
+        return at.build(VisibilityAction, kind="visibility", traffic=at.flag("traffic"), sensors=at.flag("sensors"))

@@ -1,0 +1,204 @@
+"""Entities of a scenario: names, bodies, boxes, and which of them is the ego."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from risk_sac.config.base import Chosen
+from risk_sac.config.scenario import EGO, Box
+from risk_sac.openscenario.catalogs import Alternatives, Catalogs, parametrised
+from risk_sac.openscenario.scope import At
+from risk_sac.scenario.bodies import BODIES, BodyName
+
+KINDS = ("Vehicle", "Pedestrian", "MiscObject")
+MOST = 100
+_FREE = ("pedestrian", "child")
+_VEHICLES: Mapping[str, tuple[BodyName, ...]] = {
+    "car": ("car", "van"),
+    "van": ("van", "car"),
+    "truck": ("truck", "van"),
+    "trailer": ("truck",),
+    "semitrailer": ("truck",),
+    "bus": ("bus",),
+    "motorbike": ("motorcycle",),
+    "bicycle": ("bicycle",),
+    "train": ("bus",),
+    "tram": ("bus",),
+    "standup_scooter": ("bicycle",),
+    "wheelchair": ("pedestrian",),
+    "work_machine": ("truck",),
+}
+"""vehicleCategory → bodies, of which the one of the nearest size is taken."""
+_SAME_M = 0.05  # difference of size that is not reported
+_CHILD_M = 1.4  # height below which a pedestrian is a child; choice
+
+
+@dataclass(frozen=True)
+class Entity:
+    """An object of the scenario."""
+
+    at: At
+    name: str
+    """In the document."""
+    body: str | Chosen[str]
+    box: Box | Chosen[Box] | None
+    static: bool
+    """Whether it is an object that never moves."""
+    freely: bool | None
+    """Whether it moves anywhere, as a pedestrian; None: as a parameter's word has it."""
+    controlled: bool
+    """Whether it has a controller."""
+
+
+class Entities:
+    """All entities of a scenario file, by the file's names."""
+
+    def __init__(self, block: At, catalogs: Catalogs, remarks: list[str], ego: str | None) -> None:
+        """Reads the entities.
+
+        Args:
+          block: the element `Entities`.
+          catalogs: where references lead.
+          remarks: to which differences of size are added.
+          ego: name of the ego; None: the one that is named Ego, or the only one with a controller.
+
+        Raises:
+          ConfigError: there is no ego or more than one, or an entity cannot be read.
+        """
+        self._catalogs, self._remarks = catalogs, remarks
+        self._names: dict[str, str] = {}
+        objects = block.all("ScenarioObject")
+        if len(objects) > MOST:
+            raise block.refusal(f"{len(objects)} entities", f"at most {MOST}")
+        given = [at.constant("name") for at in objects]
+        for at, name in zip(objects, given, strict=True):
+            if given.count(name) > 1:
+                raise at.refusal(f"the name {name[:80]!r} once more", "each name once")
+        self.ego = _ego(block, objects, ego)
+        self._names = _document_names(given, self.ego)
+        self._groups = {at.constant("name"): at for at in block.all("EntitySelection")}
+        self.all = {name: self._read(at, name) for at, name in zip(objects, given, strict=True)}
+
+    def named(self, at: At, attribute: str = "entityRef") -> str:
+        """Returns the document's name of the one entity that an element names; raises `ConfigError`."""
+        names = self.members(at, attribute)
+        if len(names) != 1:
+            raise at.refusal(f"{attribute}, a selection of {len(names)} entities", "one entity")
+        return names[0]
+
+    def members(self, at: At, attribute: str = "entityRef") -> tuple[str, ...]:
+        """Returns the document's names of the entities that an element names, alone or as a selection."""
+        name = at.constant(attribute)
+        if name in self._names:
+            return (self._names[name],)
+        if name in self._groups:
+            selection = self._groups[name].one("Members")
+            return tuple(member for ref in selection.all("EntityRef") for member in self._own(ref))
+        raise at.unknown(attribute, name, [*self._names, *self._groups])
+
+    def _own(self, at: At) -> tuple[str, ...]:
+        name = at.constant("entityRef")
+        if name not in self._names:
+            raise at.unknown("entityRef", name, self._names)
+        return (self._names[name],)
+
+    def _read(self, at: At, given: str) -> Entity:
+        name = self._names[given]
+        inline = at.maybe(*KINDS)
+        if inline is not None:
+            entries: At | Alternatives = parametrised(inline, {})
+        elif (reference := at.maybe("CatalogReference")) is not None:
+            entries = self._catalogs.alternatives(reference, *KINDS)
+        else:
+            tags = ", ".join(dict.fromkeys(child.tag for child in at.element.children)) or "nothing"
+            raise at.refusal(f"an entity with {tags[:200]}", f"one of {', '.join(KINDS)} and CatalogReference")
+        controllers = at.all("ObjectController")
+        for controller in controllers:
+            controller.element.use_all()
+        of = entries.of if isinstance(entries, Alternatives) else {"": entries}
+        bodies = {word: self._body(entry, given) for word, entry in of.items()}
+        boxes = {word: _box(entry) for word, entry in of.items()}
+        kinds = {word: entry.tag for word, entry in of.items()}
+        free = {body in _FREE for body in bodies.values()}
+        chosen = entries.by if isinstance(entries, Alternatives) else None
+        same = chosen is None or (len(set(bodies.values())) == 1 and len(set(boxes.values())) == 1)
+        return Entity(
+            at=at,
+            name=name,
+            body=next(iter(bodies.values())) if same or chosen is None else Chosen[str](by=chosen, of=bodies),
+            box=next(iter(boxes.values())) if same or chosen is None else Chosen[Box](by=chosen, of=boxes),
+            static=set(kinds.values()) == {"MiscObject"},
+            freely=free.pop() if len(free) == 1 else None,
+            controlled=bool(controllers),
+        )
+
+    def _body(self, entry: At, given: str) -> BodyName:
+        """Returns the body of the category and of the nearest size, and reports the difference."""
+        box = _box(entry)
+        if entry.tag == "Vehicle":
+            category = entry.constant("vehicleCategory", "car")
+            near = min(_VEHICLES.get(category, ("car",)), key=lambda name: _difference(name, box))
+            if category not in _VEHICLES:
+                near = min(("car", "van", "truck", "bus"), key=lambda name: _difference(name, box))
+        elif entry.tag == "Pedestrian":
+            height = entry.one("BoundingBox").one("Dimensions").number("height")
+            near = "child" if isinstance(height, float) and height < _CHILD_M else "pedestrian"
+        else:
+            near = "obstacle"
+        body = BODIES[near]
+        if max(abs(body.length_m - box.length_m), abs(body.width_m - box.width_m)) > _SAME_M:
+            sizes = f"{box.length_m:g} x {box.width_m:g} m in the file, {body.length_m:g} x {body.width_m:g} m here"
+            remark = f"{entry.element.place}: {given} is a {near}: {sizes}"
+            if remark not in self._remarks:
+                self._remarks.append(remark)
+        return near
+
+
+def _difference(name: str, box: Box) -> float:
+    body = BODIES[name]  # type: ignore[index] # a row of the table
+    return abs(body.length_m - box.length_m) + abs(body.width_m - box.width_m)
+
+
+def _box(entry: At) -> Box:
+    box = entry.one("BoundingBox")
+    size, centre = box.one("Dimensions"), box.one("Center")
+    ahead, left = centre.number("x"), centre.number("y")
+    for value in (size.number("height"), centre.number("z")):
+        del value  # read, since nothing is above or below another thing here
+    numbers = [size.number("length"), size.number("width"), ahead]
+    if not all(isinstance(value, float) for value in numbers) or left != 0.0:
+        raise box.refusal("a box whose size varies, or whose middle is not ahead of the reference point", "constants")
+    return box.build(Box, length_m=numbers[0], width_m=numbers[1], ahead_m=numbers[2])
+
+
+def _ego(block: At, objects: list[At], wanted: str | None) -> str:
+    """Returns the file's name of the ego."""
+    names = [at.constant("name") for at in objects]
+    if wanted is not None:
+        if wanted not in names:
+            raise block.unknown("the ego", wanted, names)
+        return wanted
+    called = [name for name in names if name.lower() in ("ego", "ego_vehicle", "hero")]
+    controlled = [at.constant("name") for at in objects if at.maybe("ObjectController")]
+    exact = [name for name in called if name == "Ego"]
+    egos = exact if len(exact) == 1 else called or controlled
+    if len(egos) != 1:
+        got = (
+            f"{len(egos)} egos: {', '.join(egos)[:200]}" if egos else "no entity that is named Ego or has a controller"
+        )
+        raise block.refusal(got, "one ego", "name it: --ego-entity NAME")
+    return egos[0]
+
+
+def _document_names(given: list[str], ego: str) -> dict[str, str]:
+    """Returns the document's name of each entity: its own as far as it is one."""
+    names = {ego: EGO}
+    for name in given:
+        if name == ego:
+            continue
+        plain = re.sub(r"\W", "_", name, flags=re.ASCII)[:60]
+        plain = plain if plain[:1].isalpha() or plain[:1] == "_" else f"_{plain}"
+        while plain in names.values():
+            plain = f"{plain}_"
+        names[name] = plain
+    return names

@@ -1,0 +1,218 @@
+"""Imports a scenario file, or a variation file with the scenario that it names, as a document."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from risk_sac.config.base import Chosen, field_errors
+from risk_sac.config.scenario import EGO, Actor, Moving, Scenario, Start
+from risk_sac.config.story import FollowTrajectoryAction, Story
+from risk_sac.errors import ConfigError
+from risk_sac.openscenario.actions import Actions
+from risk_sac.openscenario.catalogs import Catalogs
+from risk_sac.openscenario.conditions import Conditions
+from risk_sac.openscenario.constraints import allowed, constraints_of
+from risk_sac.openscenario.distributions import NO_SCOPE, Variation, points_of
+from risk_sac.openscenario.entities import Entities, Entity
+from risk_sac.openscenario.parameters import Parameters, Varied
+from risk_sac.openscenario.positions import Positions
+from risk_sac.openscenario.road import Roads, converted, missing
+from risk_sac.openscenario.scope import At, Scope
+from risk_sac.openscenario.sources import Sources
+from risk_sac.openscenario.storyboard import Init, Storyboard, horizon_of
+from risk_sac.openscenario.unread import unread
+from risk_sac.openscenario.variables import Variables
+
+_VARIATION = "ParameterValueDistribution"
+_LONGEST_NAME, _LONGEST_SUMMARY = 40, 300
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A scenario document with its files, and what differs from the scenario file."""
+
+    document: Scenario
+    files: dict[str, bytes]
+    """Nets and road files, by the document's names."""
+    remarks: tuple[str, ...]
+    """What was not read and what changes on the way, each with its place."""
+    points: int
+    """Of the grid that a variation file spans, with those that are left out; a range without a step counts once."""
+
+
+def import_scenario(file: Path, within: Path | None = None, ego: str | None = None) -> Imported:
+    """Reads a scenario or variation file.
+
+    Args:
+      file: of OpenSCENARIO XML 1.0 to 1.3.
+      within: the folder that no other file may lie outside of; None: any that the user may read.
+      ego: the entity that is the ego; None: the one that is named Ego, or the only one with a controller.
+
+    Raises:
+      ConfigError: with file, line and element of what is wrong, or cannot be read and matters.
+    """
+    try:
+        return _Import(Sources(within), ego).read(file.absolute())
+    except RecursionError:
+        raise ConfigError(file.name, "elements or parameters that are nested too deep", "less depth") from None
+
+
+class _Import:
+    """One import."""
+
+    def __init__(self, sources: Sources, ego: str | None) -> None:
+        self._sources, self._ego = sources, ego
+        self._remarks: list[str] = []
+
+    def read(self, file: Path) -> Imported:
+        name, root = file.stem, self._sources.root(file, "scenario")
+        variation = At(root, NO_SCOPE).maybe(_VARIATION)
+        if variation is not None:
+            at = variation.one("ScenarioFile")
+            file = self._sources.find(at.constant("filepath"), file, at.element)
+            root = self._sources.root(file, at.element.place)
+        if not any(child.tag == "Storyboard" for child in root.children):
+            tags = ", ".join(dict.fromkeys(child.tag for child in root.children))[:200] or "nothing"
+            remedy = "name the scenario file that uses it" if "Catalog" in tags else ""
+            raise root.refusal(f"a file of {tags}", "a scenario, or a variation of one", remedy)
+        imported = self._scenario(At(root, NO_SCOPE), file, name, variation)
+        self._remarks += [line for read in self._sources.roots for line in unread(read)]
+        return replace(imported, remarks=tuple(dict.fromkeys(self._remarks)))
+
+    def _scenario(self, top: At, file: Path, name: str, variation: At | None) -> Imported:
+        blocks = top.all("ParameterDeclarations")
+        declarations = [at for block in blocks for at in block.all("ParameterDeclaration")]
+        kinds = {at.element.attributes.get(key, ""): at for at in declarations for key in ("name",)}
+        types = {name: at.element.attributes.get("parameterType", "") for name, at in kinds.items()}
+        varied = Variation(types, self._remarks).read(variation) if variation is not None else []
+        points = math.prod(points_of(part) for part in varied)
+        varied = self._allowed(varied, Parameters(declarations, varied))
+        network = top.one("RoadNetwork").one("LogicFile")
+        varied = self._with_roads(varied, network, Parameters(declarations, varied).scope, file)
+        parameters = Parameters(declarations, varied)
+        top = At(top.element, parameters.scope)
+        document, roads = self._document(top, file, name, parameters)
+        return Imported(document, roads.files, (), points)
+
+    def _allowed(self, varied: Sequence[Varied], parameters: Parameters) -> list[Varied]:
+        """Leaves out texts that constraints do not allow."""
+
+        def fits(row: dict[str, str] | object) -> bool:
+            assert isinstance(row, dict)
+            words = {name: text for name, text in row.items() if not parameters.is_number(name)}
+            return all(allowed(parameters.declared[name], parameters, text) for name, text in words.items())
+
+        return [self._filtered(part, list(map(fits, part.rows)), "its constraints do not allow it") for part in varied]
+
+    def _with_roads(self, varied: Sequence[Varied], at: At, scope: Scope, file: Path) -> list[Varied]:
+        """Leaves out texts of a parameter that name roads which are not there; raises `ConfigError` if none is."""
+        at = At(at.element, scope)
+        text = at.text("filepath")
+        absent = missing(at, text, self._sources, file)
+        by = text.by if isinstance(text, Chosen) else ""
+        return [
+            self._filtered(part, [row[by] not in absent for row in part.rows], "its road is not there")
+            if by in part.names
+            else part
+            for part in varied
+        ]
+
+    def _filtered(self, part: Varied, kept: Sequence[bool], why: str) -> Varied:
+        """Leaves out rows, and reports them."""
+        if not part.rows or all(kept):
+            return part
+        for row, keep in zip(part.rows, kept, strict=True):
+            if not keep:
+                texts = ", ".join(f"{name} = {text}" for name, text in row.items())
+                self._remarks.append(f"{part.place.place}: left out: {texts[:300]}: {why}")
+        rows = tuple(row for row, keep in zip(part.rows, kept, strict=True) if keep)
+        if not rows:
+            raise part.place.refusal(f"no value is left of {', '.join(part.names)[:200]}: {why}", "one at least")
+        return replace(part, rows=rows, weights=part.weights and part.weights.kept(kept))
+
+    def _document(self, top: At, file: Path, name: str, parameters: Parameters) -> tuple[Scenario, Roads]:
+        catalogs = Catalogs(self._sources, file, top.maybe("CatalogLocations"))
+        entities = Entities(top.one("Entities"), catalogs, self._remarks, self._ego)
+        block = top.maybe("VariableDeclarations")
+        variables = Variables(block.all("VariableDeclaration") if block is not None else [], parameters)
+        for element in top.element.below():
+            if element.tag == "ParameterAction":
+                variables.add(element.attributes.get("parameterRef", ""))
+        positions = Positions(catalogs, entities)
+        actions = Actions(positions, entities, variables, self._remarks)
+        conditions = Conditions(positions, entities, variables, self._remarks)
+        board = Storyboard(actions, conditions, entities, catalogs, self._remarks)
+        storyboard = top.one("Storyboard")
+        init = board.init(storyboard.one("Init"))
+        stories, stop = board.stories(storyboard), board.stop(storyboard)
+        variables.begin(init.variables)
+        for given, text in parameters.texts.items():
+            if text and given not in variables.words:
+                self._remarks.append(
+                    f"{file.name}: {given} = {text[:100]!r} stands for itself, and is no parameter here"
+                )
+        at = top.one("RoadNetwork").one("LogicFile")
+        roads = converted(at, at.text("filepath"), self._sources, file, self._remarks)
+        story = storyboard.build(
+            Story,
+            routes=positions.routes,
+            trajectories=positions.trajectories,
+            variables=variables.numbers,
+            words=variables.words,
+            init=tuple(init.actions),
+            stories=stories,
+            stop=stop,
+        )
+        horizon = horizon_of(stop, self._remarks)
+        constraints = tuple(constraints_of(parameters))
+        actors = {entity.name: _actor(entity, init) for entity in entities.all.values() if entity.name != EGO}
+        ego = entities.all[entities.ego]
+        header = top.one("FileHeader")
+        fields = {
+            "name": _name(name),
+            "summary": header.element.attributes.get("description", "")[:_LONGEST_SUMMARY],
+            "tags": ("openscenario",),
+            "network": roads.network,
+            "road": roads.road,
+            "horizon_s": horizon,
+            "parameters": parameters.document(),
+            "ego": Moving(body=ego.body, box=ego.box, speed=init.starts[EGO].speed, start=_start(ego, init)),
+            "actors": actors,
+            "constraints": constraints,
+            "story": story,
+        }
+        try:
+            return Scenario(**fields), roads  # type: ignore[arg-type] # checked by the model
+        except ValidationError as error:
+            fault = field_errors(error, Scenario)
+            fault.field = f"{file.name}: {fault.field}"
+            raise fault from error
+
+
+def _start(entity: Entity, init: Init) -> Start:
+    return entity.at.build(Start, position=init.starts[entity.name].position)
+
+
+def _actor(entity: Entity, init: Init) -> Actor:
+    """Returns an actor of the story; one on a trajectory that is no car moves freely."""
+    follows = any(one.actor == entity.name and isinstance(one.do, FollowTrajectoryAction) for one in init.actions)
+    freely = entity.freely or (entity.body == "bicycle" and follows)
+    return entity.at.build(
+        Actor,
+        role="static" if entity.static else "story",
+        moves="freely" if freely and not entity.static else None,
+        body=entity.body,
+        box=entity.box,
+        speed=init.starts[entity.name].speed,
+        start=_start(entity, init),
+    )
+
+
+def _name(stem: str) -> str:
+    """Returns a document's name for a file's."""
+    plain = re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_")
+    return (plain if plain[:1].isalpha() else f"scenario_{plain}")[:_LONGEST_NAME].strip("_")

@@ -1,0 +1,214 @@
+"""Attributes of elements as values: numbers, texts, and what parameters make of them."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from risk_sac.config.base import Chosen
+from risk_sac.config.values import MOST_MAGNITUDE, Expression
+from risk_sac.errors import ConfigError, did_you_mean
+from risk_sac.openscenario.elements import Built, Element, Unread
+from risk_sac.openscenario.expressions import translated
+
+Text = str | Chosen[str]
+T = TypeVar("T")
+NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?")
+_REFERENCE = re.compile(r"\$([A-Za-z_][\w.:-]*)")
+_LITERALS = {"true": 1.0, "false": 0.0, "INF": MOST_MAGNITUDE, "-INF": -MOST_MAGNITUDE}
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What an attribute's value or a parameter stands for."""
+
+    text: str = ""
+    """As it stands in the file; of a parameter its constant or default value."""
+    expression: Expression | None = None
+    """Number or arithmetic; None: it is a word."""
+    words: Mapping[str, str] = field(default_factory=dict)
+    """Word of the document → text that it stands for; empty: the text is constant."""
+    by: Callable[[], str] | None = None
+    """Returns the name of the document's parameter with these words."""
+
+
+def literal(text: str) -> Meaning:
+    """Returns the meaning of a value without parameters."""
+    stripped = text.strip()
+    if stripped in _LITERALS:
+        return Meaning(stripped, _LITERALS[stripped])
+    if NUMBER.fullmatch(stripped) and abs(float(stripped)) <= MOST_MAGNITUDE:
+        return Meaning(stripped, float(stripped))
+    return Meaning(text)
+
+
+class Scope:
+    """Names that `$name` may stand for."""
+
+    def __init__(self, find: Callable[[str], Meaning | None], names: Callable[[], list[str]]) -> None:
+        """Prepares to look names up.
+
+        Args:
+          find: the meaning of a name, or None.
+          names: all names, to suggest one.
+        """
+        self._find, self._names = find, names
+
+    def inner(self, own: Mapping[str, Meaning]) -> "Scope":
+        """Returns a scope with further names, which hide those of this one."""
+        return Scope(lambda name: own.get(name) or self._find(name), lambda: [*own, *self._names()])
+
+    def name(self, name: str) -> Meaning:
+        """Returns what a name stands for; raises `ConfigError` if there is no such parameter."""
+        if (meaning := self._find(name)) is None:
+            remedy = did_you_mean(name, self._names()) or "declare it"
+            raise ConfigError("", f"${name[:80]}, which is no parameter", "a declared parameter", remedy)
+        return meaning
+
+    def number(self, name: str) -> Expression:
+        """Returns the number that a name stands for; raises `ConfigError`."""
+        meaning = self.name(name)
+        if meaning.expression is None:
+            raise ConfigError("", f"${name[:80]}, which is no number", "a parameter with a number")
+        return meaning.expression
+
+    def meaning(self, text: str) -> Meaning:
+        """Returns what a value stands for; raises `ConfigError` without a place."""
+        stripped = text.strip()
+        if stripped.startswith("${"):
+            if not stripped.endswith("}"):
+                raise ConfigError("", repr(text[:80]), "an expression between ${ and }")
+            value = translated(stripped[2:-1], self.number)
+            return Meaning(text_of(value), value)
+        if match := _REFERENCE.fullmatch(stripped):
+            return self.name(match[1])
+        if "$" in stripped:
+            raise ConfigError("", repr(text[:80]), "$name or ${expression} alone")
+        return literal(text)
+
+
+def text_of(value: Expression) -> str:
+    """Returns a number as a file would write it, a whole one without a fraction."""
+    if isinstance(value, float) and value.is_integer():
+        return str(int(value))
+    return str(value)
+
+
+@dataclass(frozen=True)
+class At:
+    """An element, and the parameters that its values may name."""
+
+    element: Element
+    scope: Scope
+
+    def _meaning(self, name: str) -> Meaning | None:
+        raw = self.element.attribute(name)
+        return None if raw is None else self.meant(name, raw)
+
+    def meant(self, name: str, raw: str) -> Meaning:
+        """Returns what a value of an attribute stands for here."""
+        try:
+            return self.scope.meaning(raw)
+        except ConfigError as error:
+            if error.field:
+                raise
+            raise self.refusal(f"{name}: {error.got}", error.expected, error.remedy) from None
+
+    def _required(self, name: str) -> Meaning:
+        if (meaning := self._meaning(name)) is None:
+            raise self.refusal(f"no {name}", f"the attribute {name}")
+        return meaning
+
+    def number(self, name: str) -> Expression:
+        """Returns a number or arithmetic; raises `ConfigError` if it is missing or a word."""
+        meaning = self._required(name)
+        if meaning.expression is None:
+            raise self.refusal(f"{name}: {meaning.text[:80]!r}", "a number")
+        return meaning.expression
+
+    def number_or(self, name: str, default: T) -> Expression | T:
+        """Returns a number or arithmetic, or the default where it is missing."""
+        return default if name not in self.element.attributes else self.number(name)
+
+    def text(self, name: str) -> Text:
+        """Returns a text, or one for each word of a parameter."""
+        meaning = self._required(name)
+        if meaning.words and meaning.by is not None:
+            return Chosen[str](by=meaning.by(), of=meaning.words)
+        if isinstance(meaning.expression, str) and literal(meaning.text).expression is None:
+            wanted = "a constant, or a parameter with a set of values"
+            raise self.refusal(f"{name}: {meaning.expression[:80]!r}, which varies", wanted)
+        return meaning.text
+
+    def meaning(self, name: str) -> Meaning:
+        """Returns whatever an attribute stands for."""
+        return self._required(name)
+
+    def constant(self, name: str, default: str | None = None) -> str:
+        """Returns a text that no parameter varies."""
+        if default is not None and name not in self.element.attributes:
+            return default
+        text = self.text(name)
+        if isinstance(text, Chosen):
+            raise self.refusal(f"{name}, which the parameter {text.by!r} varies", "a constant")
+        return text
+
+    def flag(self, name: str, default: bool | None = None) -> bool:
+        """Returns whether an attribute is true."""
+        if default is not None and name not in self.element.attributes:
+            return default
+        value = self.constant(name)
+        if value not in ("true", "false", "1", "0"):
+            raise self.refusal(f"{name}: {value[:80]!r}", "true or false")
+        return value in ("true", "1")
+
+    def one_of(self, name: str, table: Mapping[str, T], default: str | None = None) -> T:
+        """Returns what a word stands for in a table; raises `ConfigError` for another word."""
+        word = self.constant(name, default)
+        if word not in table:
+            got = f"{name}: {word[:80]!r}"
+            raise self.refusal(got, f"one of {', '.join(table)}", did_you_mean(word, list(table)))
+        return table[word]
+
+    def all(self, *tags: str) -> list["At"]:
+        """Returns the children of some names."""
+        return [At(child, self.scope) for child in self.element.all(*tags)]
+
+    def maybe(self, *tags: str) -> "At | None":
+        """Returns the first child of some names, or None."""
+        return next(iter(self.all(*tags)), None)
+
+    def one(self, *tags: str) -> "At":
+        """Returns the only child of some names; raises `ConfigError` if there is none or more."""
+        children = self.all(*tags)
+        if len(children) != 1:
+            got = f"{len(children)} children <{'> or <'.join(tags[:8])}>" if children else self._children()
+            raise self.refusal(got, f"one of <{'>, <'.join(tags)}>")
+        return children[0]
+
+    def _children(self) -> str:
+        tags = list(dict.fromkeys(child.tag for child in self.element.children))
+        return f"only <{'>, <'.join(tags[:5])}>" if tags else "no child"
+
+    @property
+    def tag(self) -> str:
+        """The element's name."""
+        return self.element.tag
+
+    def refusal(self, got: str, expected: str = "", remedy: str = "") -> ConfigError:
+        """Returns the error of something that is wrong here."""
+        return self.element.refusal(got, expected, remedy)
+
+    def unknown(self, what: str, name: str, known: Iterable[str]) -> ConfigError:
+        """Returns the error of a name that is none of those that are known."""
+        names = list(known)
+        wanted = f"one of {', '.join(names)}"[:500] if names else "none: there is none"
+        return self.refusal(f"{what} {name[:80]!r}", wanted, did_you_mean(name, names))
+
+    def unread(self, expected: str, effect: str) -> Unread:
+        """Returns the error of something here that is not read."""
+        return self.element.unread(expected, effect)
+
+    def build(self, model: type[Built], **fields: Any) -> Built:
+        """Makes a model of what was read here."""
+        return self.element.build(model, **fields)

@@ -1,0 +1,1 @@
+"""Story of a scenario document, played within the step; independent of SUMO."""

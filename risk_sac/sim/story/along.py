@@ -1,0 +1,186 @@
+"""Actions that control an actor's motion along its line: speeds and distances."""
+
+import math
+
+import numpy as np
+
+from risk_sac.config.story import (
+    DistanceAction,
+    Dynamics,
+    RelativeTarget,
+    SpeedAction,
+    SpeedEntry,
+    SpeedProfileAction,
+)
+from risk_sac.sim.story.cast import Mover, Present
+from risk_sac.sim.story.course import SAME, Course, length_of
+from risk_sac.sim.story.doing import ALONG
+from risk_sac.sim.story.stage import Stage, extent
+from risk_sac.world.types import STEP_S
+
+NEAR_M, NEAR_MPS = 0.05, 0.1  # of a distance and its change, within which it is reached; choice
+
+
+class ChangeSpeed:
+    """Brings an actor to a speed."""
+
+    controls = ALONG
+
+    def __init__(self, do: SpeedAction) -> None:
+        """Takes the action."""
+        self._target, self._dynamics = do.target, do.dynamics
+        self._gone = 0.0
+
+    def begin(self, mover: Mover, stage: Stage) -> bool:
+        """See `Doing.begin`."""
+        self._fixed_mps = target_mps(self._target, mover, stage)
+        change = self._fixed_mps - mover.story_mps
+        self._course = Course(self._dynamics.shape, mover.story_mps, length_of(self._dynamics, change))
+        if self._course.is_over(0.0):
+            mover.story_mps = self._fixed_mps
+            return not self._continues
+        return False
+
+    @property
+    def _continues(self) -> bool:
+        return isinstance(self._target, RelativeTarget) and self._target.continuous
+
+    def step(self, mover: Mover, stage: Stage) -> bool:
+        """See `Doing.step`."""
+        self._gone += STEP_S if self._dynamics.by != "distance" else mover.speed_mps * STEP_S
+        target = target_mps(self._target, mover, stage) if self._continues else self._fixed_mps
+        mover.wanted_mps = self._course.value(self._gone, target)
+        return self._course.is_over(self._gone) and not self._continues
+
+
+def target_mps(target: "float | str | RelativeTarget", mover: Mover, stage: Stage) -> float:
+    """The speed that a target means now; the actor's own if the other actor is not there."""
+    if not isinstance(target, RelativeTarget):
+        return float(target)
+    other = stage.present.get(target.to)
+    if other is None:
+        return mover.story_mps
+    value, its = float(target.value), other.along(other.heading_rad)[0]
+    return its + value if target.how == "delta" else its * value
+
+
+class FollowProfile:
+    """Brings an actor through a series of speeds, each reached linearly.
+
+    Choice: also in the mode that smooths the corners.
+    """
+
+    controls = ALONG
+
+    def __init__(self, do: SpeedProfileAction) -> None:
+        """Takes the action."""
+        self._do, self._gone_s = do, 0.0
+
+    def begin(self, mover: Mover, stage: Stage) -> bool:
+        """See `Doing.begin`."""
+        self._times_s, self._speeds = [0.0], [mover.story_mps - self._others_mps(stage)]
+        for entry in self._do.entries:
+            change = float(entry.speed) - self._speeds[-1]
+            self._times_s.append(self._times_s[-1] + self._length_s(entry, change))
+            self._speeds.append(float(entry.speed))
+        if self._times_s[-1] <= 0.0:
+            mover.story_mps = self._speeds[-1] + self._others_mps(stage)
+            return True
+        return False
+
+    def _others_mps(self, stage: Stage) -> float:
+        other = stage.present.get(self._do.to) if self._do.to else None
+        return 0.0 if other is None else other.along(other.heading_rad)[0]
+
+    def _length_s(self, entry: SpeedEntry, change: float) -> float:
+        if entry.time_s is not None:
+            return float(entry.time_s)
+        bound = self._do.accel_mps2 if change > 0.0 else self._do.brake_mps2
+        return 0.0 if bound is None else length_of(Dynamics(shape="linear", by="rate", value=bound), change)
+
+    def step(self, mover: Mover, stage: Stage) -> bool:
+        """See `Doing.step`."""
+        self._gone_s += STEP_S
+        mover.wanted_mps = float(np.interp(self._gone_s, self._times_s, self._speeds)) + self._others_mps(stage)
+        return self._gone_s >= self._times_s[-1] - SAME
+
+
+class KeepAhead:
+    """Brings an actor to a distance along from another one.
+
+    Without bounds it is there at once; with bounds it closes in by v² = 2 a e, e the distance that is left.
+    """
+
+    controls = ALONG
+
+    def __init__(self, do: DistanceAction) -> None:
+        """Takes the action."""
+        self._do, self._side = do, {"ahead": 1.0, "behind": -1.0, "any": 0.0}[do.displacement]
+
+    @property
+    def _bounded(self) -> bool:
+        do = self._do
+        return any(bound is not None for bound in (do.accel_mps2, do.brake_mps2, do.speed_mps))
+
+    def begin(self, mover: Mover, stage: Stage) -> bool:
+        """See `Doing.begin`."""
+        other = stage.present.get(self._do.to)
+        if other is None:
+            return True
+        apart = stage.apart(other, stage.present[mover.name], self._do.coordinates)
+        self._side = self._side or (1.0 if apart.ahead_m >= 0.0 else -1.0)
+        if self._do.distance_m is None and self._do.time_gap_s is None:
+            self._fixed_m: float | None = self._gap_m(other, stage.present[mover.name], apart.ahead_m)
+        else:
+            self._fixed_m = None
+        if not self._bounded:
+            mover.station_m -= self._too_far_m(mover, other, stage)
+            stage.onto_way(mover)
+            stage.look_again(mover.name)
+            return not self._do.continuous
+        return False
+
+    def _gap_m(self, other: Present, own: Present, ahead_m: float) -> float:
+        """Distance of the two on the side where the actor is to be."""
+        if not self._do.freespace:
+            return self._side * ahead_m
+        (low, high), (own_low, own_high) = extent(other.reach, 0.0)[0], extent(own.reach, 0.0)[0]
+        return ahead_m + own_low - high if self._side > 0.0 else low - ahead_m - own_high
+
+    def _too_far_m(self, mover: Mover, other: Present, stage: Stage) -> float:
+        """How far the actor is ahead of where it should be."""
+        own = stage.present[mover.name]
+        gap_m = self._gap_m(other, own, stage.apart(other, own, self._do.coordinates).ahead_m)
+        if self._do.time_gap_s is not None:
+            wanted_m = float(self._do.time_gap_s) * abs(mover.speed_mps)
+        elif self._do.distance_m is not None:
+            wanted_m = float(self._do.distance_m)
+        else:
+            wanted_m = self._fixed_m or 0.0
+        return self._side * (gap_m - wanted_m)
+
+    def step(self, mover: Mover, stage: Stage) -> bool:
+        """See `Doing.step`."""
+        other = stage.present.get(self._do.to)
+        if other is None:
+            return True
+        too_far_m = self._too_far_m(mover, other, stage)
+        its_mps = other.along(mover.line.pose(mover.station_m).heading_rad)[0]
+        if not self._bounded:
+            mover.wanted_station_m = mover.station_m - too_far_m + its_mps * STEP_S - mover.drift.ahead_m
+            mover.wanted_mps = its_mps
+            return False
+        accel, brake = _bound(self._do.accel_mps2), _bound(self._do.brake_mps2)
+        close = brake if too_far_m < 0.0 else accel  # what ends the closing in
+        closing = min(math.sqrt(2 * close * abs(too_far_m)), abs(too_far_m) / STEP_S)
+        wanted = its_mps - math.copysign(closing, too_far_m)
+        if self._do.speed_mps is not None:
+            wanted = min(wanted, float(self._do.speed_mps))
+        change = min(max(wanted - mover.story_mps, -brake * STEP_S), accel * STEP_S)
+        mover.wanted_mps = max(mover.story_mps + change, 0.0)
+        there = abs(too_far_m) < NEAR_M and abs(mover.story_mps - its_mps) < NEAR_MPS
+        return there and not self._do.continuous
+
+
+def _bound(value: float | str | None) -> float:
+    return math.inf if value is None else float(value)

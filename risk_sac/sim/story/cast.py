@@ -1,0 +1,140 @@
+"""Actors of a story: where each is at present, and how the engine moves its own."""
+
+import math
+from typing import NamedTuple
+
+from risk_sac.scenario.story_plan import Reach, StoryActor
+from risk_sac.scenario.travel_line import Pose, TravelLine
+from risk_sac.world.types import STEP_S
+
+STANDS_MPS = 1e-3  # slower is no motion
+
+
+class Present(NamedTuple):
+    """An actor at one moment; its place is its reference point's."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    vx_mps: float
+    vy_mps: float
+    accel_mps2: float
+    reach: Reach
+
+    @classmethod
+    def moving(cls, pose: Pose, speed_mps: float, accel_mps2: float, reach: Reach, slip_rad: float = 0.0) -> "Present":
+        """An actor whose velocity is along its heading, or `slip_rad` to the left of it."""
+        way = pose.heading_rad + slip_rad
+        return cls(*pose, speed_mps * math.cos(way), speed_mps * math.sin(way), accel_mps2, reach)
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of its reference point."""
+        return Pose(self.x_m, self.y_m, self.heading_rad)
+
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Middle of its bounding box."""
+        ahead_m = self.reach.ahead_m
+        return self.x_m + ahead_m * math.cos(self.heading_rad), self.y_m + ahead_m * math.sin(self.heading_rad)
+
+    @property
+    def speed_mps(self) -> float:
+        """Size of its velocity."""
+        return math.hypot(self.vx_mps, self.vy_mps)
+
+    def along(self, heading_rad: float) -> tuple[float, float]:
+        """Its velocity along a heading and to the left of it."""
+        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+        return self.vx_mps * cos + self.vy_mps * sin, self.vy_mps * cos - self.vx_mps * sin
+
+
+class Drift(NamedTuple):
+    """How far an actor is from its story."""
+
+    mps: float = 0.0
+    lateral_mps: float = 0.0
+    ahead_m: float = 0.0
+    left_m: float = 0.0
+
+
+class Mover:
+    """An actor that the engine moves along a line.
+
+    Its reference point follows the line at a lateral offset, and the body points to where that point moves.
+
+    Attributes:
+      line: that it follows.
+      station_m: on the line.
+      story_left_m: to the left of the line, as the story says.
+      story_mps: along the line, as the story says.
+      drift: from the story.
+      edges: of the net, along its route; empty without one.
+      guided: whether the line is a trajectory, which lane changes leave.
+      gone: whether it was deleted.
+      visible: to traffic, and to sensors.
+      wanted_mps: of the next step, set by the action that controls its speed; None keeps `story_mps`.
+      wanted_left_m: of the next step, set by the action that controls its place across; None keeps it.
+      wanted_station_m: of the next step, set by an action that says where it is; None: where its speed leads it.
+    """
+
+    line: TravelLine
+
+    def __init__(self, name: str, start: StoryActor) -> None:
+        """Takes its start; the engine puts it on a line."""
+        self.name, self.reach, self.free = name, start.reach, start.free
+        self.station_m = self.story_left_m = 0.0
+        self.story_mps, self.accel_mps2, self.lateral_mps = start.speed_mps, 0.0, 0.0
+        self.drift = Drift()
+        self.edges: tuple[str, ...] = ()
+        self.guided = False
+        self.gone, self.visible = False, (True, True)
+        self.wanted_mps: float | None = None
+        self.wanted_left_m: float | None = None
+        self.wanted_station_m: float | None = None
+
+    def follow(self, line: TravelLine, station_m: float, left_m: float = 0.0) -> None:
+        """Puts it on a line, at a place that its drift is part of."""
+        self.line, self.station_m, self.story_left_m = line, station_m, left_m - self.drift.left_m
+
+    @property
+    def speed_mps(self) -> float:
+        """Along the line."""
+        return self.story_mps + self.drift.mps
+
+    @property
+    def left_m(self) -> float:
+        """To the left of the line."""
+        return self.story_left_m + self.drift.left_m
+
+    @property
+    def pose(self) -> Pose:
+        """Pose of its reference point."""
+        x, y, heading = self.line.pose(self.station_m, self.left_m)
+        turns = not self.free and abs(self.speed_mps) >= STANDS_MPS
+        return Pose(x, y, heading + (math.atan(self.lateral_mps / self.speed_mps) if turns else 0.0))
+
+    @property
+    def present(self) -> Present:
+        """What others see of it."""
+        way = self.line.pose(self.station_m).heading_rad
+        cos, sin, speed, lateral = math.cos(way), math.sin(way), self.speed_mps, self.lateral_mps
+        velocity = speed * cos - lateral * sin, speed * sin + lateral * cos
+        return Present(*self.pose, *velocity, self.accel_mps2, self.reach)
+
+    def move(self, drift: Drift) -> None:
+        """Moves it by a step, at the end of which it has this drift from its story."""
+        before_mps, before_left_m, before = self.speed_mps, self.left_m, self.drift
+        if self.wanted_station_m is not None:
+            gone_m = self.wanted_station_m + drift.ahead_m - self.station_m
+            self.story_mps = self.story_mps if self.wanted_mps is None else self.wanted_mps
+        else:
+            story_mps = self.story_mps if self.wanted_mps is None else self.wanted_mps
+            gone_m = (self.story_mps + story_mps) / 2 * STEP_S + drift.ahead_m - before.ahead_m
+            self.story_mps = story_mps
+        self.station_m += gone_m
+        self.story_left_m = self.story_left_m if self.wanted_left_m is None else self.wanted_left_m
+        self.drift = drift
+        self.lateral_mps = (self.left_m - before_left_m) / STEP_S
+        self.accel_mps2 = (self.speed_mps - before_mps) / STEP_S
+        self.wanted_mps = self.wanted_left_m = self.wanted_station_m = None

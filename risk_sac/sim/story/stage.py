@@ -1,0 +1,286 @@
+"""What conditions and actions of a story refer to: its actors at present, the roads, the variables and the time."""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from risk_sac.config.story import Along, Coordinates, LanePosition, LaneTarget, Position
+from risk_sac.errors import ConfigError
+from risk_sac.scenario.places import OnRoad, Places, Spot
+from risk_sac.scenario.story_plan import Reach, StoryPlan
+from risk_sac.scenario.travel_line import Pose, TravelLine, line_of
+from risk_sac.sim.story.cast import STANDS_MPS, Mover, Present
+from risk_sac.world.types import STEP_S
+
+LINE_M = 3000.0  # of the way ahead of a lane's beginning; an actor that comes to its end gets the next piece
+A_POINT = Reach(0.0, 0.0)
+STRAIGHT_M = 1000.0
+
+
+class Apart(NamedTuple):
+    """One actor seen from another: ahead and to the left, m, and how fast both grow."""
+
+    ahead_m: float
+    left_m: float
+    ahead_mps: float
+    left_mps: float
+
+
+class Stage:
+    """The present of a story.
+
+    Attributes:
+      time_s: since the story's start.
+      present: all actors that are there, by name.
+      movers: those that the engine moves.
+      numbers: variables that hold numbers.
+      words: variables that hold words.
+      travelled_m: of each actor since the story's start, without teleports.
+      stood_s: how long each actor has stood.
+      unmet: actions that could not be done, in words.
+    """
+
+    def __init__(self, plan: StoryPlan) -> None:
+        """Puts all actors of the story where they start."""
+        self.plan, self.time_s = plan, 0.0
+        self.present: dict[str, Present] = {}
+        self.movers = {name: Mover(name, start) for name, start in plan.actors.items()}
+        story = plan.story
+        self.numbers = {name: float(value) for name, value in story.variables.items()}
+        self.words = dict(story.words)
+        self.travelled_m: dict[str, float] = {}
+        self.stood_s: dict[str, float] = {}
+        self.unmet: set[str] = set()
+        self._off_s: dict[str, float | None] = {}
+        self._end_s: dict[str, float | None] = {}
+        self._lines: dict[tuple[str, tuple[str, ...]], TravelLine] = {}
+        self.places: Places = plan.places
+        for name, start in plan.actors.items():
+            self.onto_road(self.movers[name], start.pose)
+
+    def look(self, others: Mapping[str, Present]) -> None:
+        """Takes in where all actors are now."""
+        before = self.present
+        moved = {name: mover.present for name, mover in self.movers.items() if not mover.gone}
+        self.present = {**others, **moved}
+        for name, actor in self.present.items():
+            gone_m = math.dist(actor[:2], before[name][:2]) if name in before else 0.0
+            self.travelled_m[name] = self.travelled_m.get(name, 0.0) + gone_m
+            self.stood_s[name] = self.stood_s.get(name, 0.0) + STEP_S if self.stands(name) and name in before else 0.0
+
+    def look_again(self, name: str) -> None:
+        """Takes in that an actor of the story is elsewhere, which is no way that it travelled."""
+        self.present[name] = self.movers[name].present
+
+    def stands(self, name: str) -> bool:
+        """Whether an actor does not move."""
+        return self.present[name].speed_mps < STANDS_MPS
+
+    def of(self, name: str) -> Pose:
+        """Reference pose of an actor."""
+        return self.present[name].pose
+
+    def pose(self, position: Position) -> Pose:
+        """Pose of a position now."""
+        return self.places.pose(position, self.of)
+
+    def target(self, to: "str | Position") -> Present | None:
+        """An actor, or a place that stands; None if the actor is not there."""
+        if isinstance(to, str):
+            return self.present.get(to)
+        return Present.moving(self.pose(to), 0.0, 0.0, A_POINT)
+
+    # Roads
+
+    def onto_road(self, mover: Mover, pose: Pose) -> None:
+        """Puts an actor on the way ahead of it: its lane's, or straight on."""
+        spot = None if mover.free else self.places.spot(pose)
+        if spot is None:
+            mover.follow(straight(pose), 0.0)
+            return
+        line = self.lane_line(spot, mover.name)
+        mover.follow(line, *line.project(pose.x_m, pose.y_m))
+
+    def onto_way(self, mover: Mover) -> None:
+        """Puts an actor that left its line at an end on the way from there."""
+        if mover.station_m >= mover.line.length_m or (mover.station_m < 0.0 and not mover.guided):
+            mover.guided = False
+            self.onto_road(mover, mover.line.pose(mover.station_m, mover.left_m))
+
+    def lane_line(self, spot: Spot, of: str = "") -> TravelLine:
+        """The way ahead from the beginning of a spot's lane, along an actor's route if it has one."""
+        edges = self.movers[of].edges if of in self.movers else self.plan.edges.get(of, ())
+        key = spot.lane.id, edges
+        if key not in self._lines:
+            self._lines[key] = self.places.ahead(Spot(spot.lane, 0.0, 0.0), LINE_M, edges)
+        return self._lines[key]
+
+    def way_to(self, name: str, target: Pose) -> tuple[float, float]:
+        """Distance along an actor's way to a place, m, and its speed."""
+        actor = self.present[name]
+        if name in self.movers:
+            line: TravelLine | None = self.movers[name].line
+        else:
+            spot = self.places.spot(actor.pose)
+            line = None if spot is None else self.lane_line(spot, name)
+        if line is None:
+            return math.dist(actor[:2], target[:2]), actor.speed_mps
+        return line.project(*target[:2])[0] - line.project(*actor[:2])[0], actor.speed_mps
+
+    def way_between(self, here: Pose, there: Pose) -> tuple[TravelLine, tuple[str, ...]] | None:
+        """Line along lanes from one place to another, and its edges; None if no lanes lead there."""
+        return None
+
+    def lane_of(self, target: "float | LaneTarget", own: Pose) -> Spot | None:
+        """Spot beside a pose, on the lane that a lane change leads to; None if there is none."""
+        here = self.places.spot(own)
+        if here is None:
+            return None
+        if isinstance(target, LaneTarget):
+            other = self.present.get(target.to)
+            there = None if other is None else self.places.spot(other.pose)
+            if other is None or there is None:
+                return None
+            lanes = round(float(target.lanes))
+            if there.lane.edge == here.lane.edge:
+                return self.places.beside(here, there.lane.index + lanes - here.lane.index)
+            place = self.on_road(other.pose)
+            if place is None:
+                return self.places.beside(here, there.lane.index + lanes - here.lane.index)
+            return self._numbered(_lane_beside(place.lane, lanes), own, here)
+        return self._numbered(round(float(target)), own, here)
+
+    def _numbered(self, lane: int, own: Pose, here: Spot) -> Spot | None:
+        """Spot on the lane of this OpenDRIVE id beside a pose."""
+        place = self.on_road(own)
+        if place is None:
+            return None
+        if place.lane * lane > 0:  # the same direction: ids count away from the middle, on both sides
+            return self.places.beside(here, abs(place.lane) - abs(lane))
+        across = LanePosition(kind="lane", road=place.road, lane=float(lane), s_m=place.s_m)
+        return self.places.spot(self.pose(across))
+
+    def on_road(self, pose: Pose) -> OnRoad | None:
+        """Place on a road of the OpenDRIVE file; None without one."""
+        try:
+            return self.places.opendrive(pose)
+        except ConfigError:
+            return None
+
+    def offset_m(self, name: str) -> float:
+        """Offset of an actor from its lane's middle; 0 where it is on none."""
+        spot = self.places.spot(self.of(name))
+        return 0.0 if spot is None else spot.left_m
+
+    def lane_heading(self, name: str) -> float:
+        """Direction of an actor's lane; its own where it is on none."""
+        pose = self.of(name)
+        spot = self.places.spot(pose)
+        return pose.heading_rad if spot is None else line_of(spot.lane.centre).pose(spot.at_m).heading_rad
+
+    def off_road_s(self, name: str) -> float | None:
+        """How long an actor has been beside all lanes; None if it is on one."""
+        spot = self.places.spot(self.of(name))
+        return self._since(self._off_s, name, spot is None or abs(spot.left_m) > spot.lane.width_m / 2)
+
+    def at_end_s(self, name: str) -> float | None:
+        """How long an actor of the story has been at the end of its way; None if it is not."""
+        mover = self.movers.get(name)
+        return self._since(self._end_s, name, mover is not None and mover.station_m >= mover.line.length_m)
+
+    def _since(self, times_s: dict[str, float | None], name: str, true: bool) -> float | None:
+        since_s = times_s.get(name)
+        since_s = times_s[name] = (self.time_s if since_s is None else since_s) if true else None
+        return None if since_s is None else self.time_s - since_s
+
+    # Distances
+
+    def apart(self, one: Present, other: Present, coordinates: Coordinates) -> Apart:
+        """Finds where one actor's reference point is, seen from another's, along its axes or along the lanes."""
+        if coordinates != "entity" and (found := self._along_lanes(one, other)) is not None:
+            return found
+        ahead, left = _turned(other.x_m - one.x_m, other.y_m - one.y_m, one.heading_rad)
+        own, its = one.along(one.heading_rad), other.along(one.heading_rad)
+        return Apart(ahead, left, its[0] - own[0], its[1] - own[1])
+
+    def _along_lanes(self, one: Present, other: Present) -> Apart | None:
+        """The same along the lane that leads from the one behind to the other; None if neither lane does."""
+        for first, second, sign in ((one, other, 1.0), (other, one, -1.0)):
+            spot = self.places.spot(first.pose)
+            if spot is None:
+                continue
+            line = self.lane_line(spot)
+            from_m, from_left_m = line.project(first.x_m, first.y_m)
+            to_m, to_left_m = line.project(second.x_m, second.y_m)
+            if not 0.0 < to_m < line.length_m or to_m < from_m:
+                continue
+            slow = first.along(line.pose(from_m).heading_rad)
+            fast = second.along(line.pose(to_m).heading_rad)
+            apart = (to_m - from_m, to_left_m - from_left_m, fast[0] - slow[0], fast[1] - slow[1])
+            return Apart(*(sign * value for value in apart))
+        return None
+
+    def distance(
+        self, one: Present, other: Present, along: Along, coordinates: Coordinates, *, freespace: bool
+    ) -> tuple[float, float]:
+        """Distance of two actors, m, and how fast it falls, m/s; never negative.
+
+        Without `freespace` it is that of their reference points, else that of their boxes.
+        """
+        if along == "euclidean":
+            dx, dy = other.x_m - one.x_m, other.y_m - one.y_m
+            apart_m = math.hypot(dx, dy)
+            rate = (dx * (other.vx_mps - one.vx_mps) + dy * (other.vy_mps - one.vy_mps)) / max(apart_m, 1e-9)
+            return (float(shapely.distance(box(one), box(other))) if freespace else apart_m), -rate
+        apart = self.apart(one, other, coordinates)
+        if along == "longitudinal":
+            from_to, rate, side = apart.ahead_m, apart.ahead_mps, 0
+        else:
+            from_to, rate, side = apart.left_m, apart.left_mps, 1
+        sign = 1.0 if from_to >= 0.0 else -1.0
+        if not freespace:
+            return abs(from_to), -sign * rate
+        own, its = extent(one.reach, 0.0), extent(other.reach, other.heading_rad - one.heading_rad)
+        (own_low, own_high), (low, high) = own[side], its[side]
+        gap_m = max(from_to + low - own_high, own_low - from_to - high)
+        return max(gap_m, 0.0), -sign * rate
+
+
+def straight(pose: Pose, length_m: float = STRAIGHT_M) -> TravelLine:
+    """A line straight on."""
+    way = np.array((math.cos(pose.heading_rad), math.sin(pose.heading_rad)))
+    return line_of(np.array((pose.x_m, pose.y_m)) + np.outer((0.0, length_m), way), np.full(2, pose.heading_rad))
+
+
+def box(actor: Present) -> shapely.Polygon:
+    """Bounding box of an actor."""
+    (x, y), reach = actor.middle, actor.reach
+    cos, sin = math.cos(actor.heading_rad), math.sin(actor.heading_rad)
+    along = np.array((cos, sin)) * max(reach.length_m, 1e-6) / 2
+    left = np.array((-sin, cos)) * max(reach.width_m, 1e-6) / 2
+    return shapely.Polygon(np.array((x, y)) + np.array((along + left, along - left, -along - left, left - along)))
+
+
+def extent(reach: Reach, turned_rad: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    """How far a turned box reaches behind and ahead, and to the right and the left, of its reference point."""
+    cos, sin = math.cos(turned_rad), math.sin(turned_rad)
+    half_length, half_width = reach.length_m / 2, reach.width_m / 2
+    along = abs(cos) * half_length + abs(sin) * half_width
+    across = abs(sin) * half_length + abs(cos) * half_width
+    ahead, left = reach.ahead_m * cos, reach.ahead_m * sin
+    return (ahead - along, ahead + along), (left - across, left + across)
+
+
+def _turned(dx: float, dy: float, heading_rad: float) -> tuple[float, float]:
+    """A vector along a heading and to the left of it."""
+    cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+    return dx * cos + dy * sin, dy * cos - dx * sin
+
+
+def _lane_beside(lane: int, left: int) -> int:
+    """OpenDRIVE id of the lane some lanes to the left of another, without lane 0."""
+    wanted = lane + left if lane < 0 else lane - left
+    return wanted - int(math.copysign(1, lane)) if wanted == 0 or (wanted > 0) != (lane > 0) else wanted

@@ -1,0 +1,104 @@
+"""Curves in the plane by arc length: clothoids, of which lines and arcs are special ones, and cubic polynomials."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from risk_sac.world.types import Floats
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
+TURN_RAD = 1.5  # of one interval of the quadrature, whose error is then below 1e-12 of its length
+TABLE_M = 0.05  # of arc length between the entries of a polynomial's table
+MOST_ENTRIES = 20_000
+
+
+class Begin(NamedTuple):
+    """Where a curve begins: m, m, rad."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True)
+class Clothoid:
+    """Curve whose curvature changes in proportion to its length.
+
+    x(s) = x0 + ∫ cos θ, y(s) = y0 + ∫ sin θ, θ(u) = θ0 + κ0 u + (κ1 - κ0) u² / (2 L)
+    """
+
+    begin: Begin
+    curvature_start: float  # 1/m, positive to the left
+    curvature_end: float
+    length_m: float
+
+    def at(self, s_m: Floats) -> Floats:
+        """Returns x, y, heading and curvature at arc lengths, `n` → `n x 4`; beyond its ends the shape goes on."""
+        x_m, y_m, heading_rad = self.begin
+        k0, rate = self.curvature_start, (self.curvature_end - self.curvature_start) / max(self.length_m, 1e-9)
+        heading = heading_rad + k0 * s_m + rate * s_m**2 / 2
+        if k0 == 0.0 and rate == 0.0:
+            dx, dy = s_m * math.cos(heading_rad), s_m * math.sin(heading_rad)
+        else:
+            turned = float(np.max(np.abs(s_m) * (abs(k0) + np.abs(rate * s_m)), initial=0.0))
+            parts = max(1, math.ceil(turned / TURN_RAD))
+            share = (np.arange(parts)[:, None] + (_NODES + 1.0) / 2).ravel() / parts
+            u = s_m[:, None] * share
+            theta = heading_rad + k0 * u + rate * u**2 / 2
+            weights = np.tile(_WEIGHTS, parts) / (2 * parts)
+            dx, dy = s_m * (np.cos(theta) @ weights), s_m * (np.sin(theta) @ weights)
+        return np.column_stack((x_m + dx, y_m + dy, heading, k0 + rate * s_m))
+
+
+@dataclass(frozen=True)
+class CubicCurve:
+    """Curve u(p), v(p) of cubic polynomials along and across its begin's heading, by its arc length.
+
+    The table of arc lengths is scaled to the stated length, so that a rounded length does not move the end.
+    """
+
+    begin: Begin
+    u: Sequence[float]  # coefficients of p⁰ to p³
+    v: Sequence[float]
+    p_end: float
+    length_m: float
+
+    @cached_property
+    def _table(self) -> tuple[Floats, Floats]:
+        """Parameters and the arc lengths up to them."""
+        n = min(max(200, math.ceil(self.length_m / TABLE_M)), MOST_ENTRIES)
+        p = np.linspace(0.0, self.p_end, n + 1)
+        middle = (p[:-1] + p[1:]) / 2
+        speeds = [np.hypot(_slope(self.u, at), _slope(self.v, at)) for at in (p[:-1], middle, p[1:])]
+        pieces = (speeds[0] + 4 * speeds[1] + speeds[2]) * (self.p_end / n / 6)  # Simpson's rule
+        return p, np.concatenate(([0.0], np.cumsum(pieces)))
+
+    def at(self, s_m: Floats) -> Floats:
+        """Returns x, y, heading and curvature at arc lengths, `n` → `n x 4`; beyond its ends the tangent goes on."""
+        parameters, lengths = self._table
+        scaled = s_m * (lengths[-1] / max(self.length_m, 1e-9))
+        p = np.interp(scaled, lengths, parameters)
+        du, dv = _slope(self.u, p), _slope(self.v, p)
+        size = np.maximum(np.hypot(du, dv), 1e-12)
+        beyond = scaled - scaled.clip(0.0, lengths[-1])  # along the tangent
+        u = np.polynomial.polynomial.polyval(p, self.u) + beyond * du / size
+        v = np.polynomial.polynomial.polyval(p, self.v) + beyond * dv / size
+        bend_u, bend_v = 2 * self.u[2] + 6 * self.u[3] * p, 2 * self.v[2] + 6 * self.v[3] * p
+        x_m, y_m, heading_rad = self.begin
+        cos, sin = math.cos(heading_rad), math.sin(heading_rad)
+        heading = heading_rad + np.arctan2(dv, du)
+        curvature = (du * bend_v - dv * bend_u) / size**3
+        return np.column_stack((x_m + u * cos - v * sin, y_m + u * sin + v * cos, heading, curvature))
+
+
+def _slope(coefficients: Sequence[float], p: Floats) -> Floats:
+    _, b, c, d = coefficients
+    slope: Floats = b + p * (2 * c + p * 3 * d)
+    return slope
+
+
+Curve = Clothoid | CubicCurve
