@@ -106,11 +106,22 @@ def lanes_ahead(net: Net, lane: NetLane, length_m: float, edges: Sequence[str] =
     return lanes
 
 
+def _through(net: Net, lane: NetLane) -> Link | None:
+    """Returns the link that a lane inside a junction is part of."""
+    return next((link for links in net.onward.values() for link in links if lane in link.inside), None)
+
+
+def entry_of(net: Net, lane: NetLane) -> NetLane | None:
+    """Returns the lane before one inside a junction."""
+    link = _through(net, lane)
+    return None if link is None else link.source
+
+
 def _links(net: Net, lane: NetLane) -> list[Link]:
-    """Links of a lane, or of the lane that one inside a junction leads to; the straightest first."""
+    """Links of a lane, or the rest of the link that one inside a junction is part of; the straightest first."""
     if lane.use == "inside":
-        ends = [link for links in net.onward.values() for link in links if lane in link.inside]
-        return [Link(lane, link.target, link.inside[link.inside.index(lane) + 1 :], None, None) for link in ends[:1]]
+        link = _through(net, lane)
+        return [] if link is None else [Link(lane, link.target, link.inside[link.inside.index(lane) + 1 :], None, None)]
     return sorted(net.onward.get(lane.id, ()), key=lambda link: abs(link.turn_rad))
 
 
