@@ -211,6 +211,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self, scene: Scene, motions: Mapping[str, NDArray[Any]] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         self._unit_scene = self.problem.space.to_unit(scene)
+        self.trace = Trace(self._gauge.names)  # of this scene, even where it has no layout
         layout = self.layout = self.problem.family.layout(scene.values)
         limits = limits_from_odd(self.problem.odd, layout.friction)
         self._ground = Ground.of(layout, self.problem.speed_limit_mps)
@@ -218,7 +219,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._reflex = reflex_of(self.problem.ego.profile, self._ground)
         self._gauge.reset(carriageway_of(layout.net))
-        self.trace = Trace(self._gauge.names)
         sensor = self.problem.ego.sensor
         visible = conditions(self.problem.odd, scene.values, sensor=sensor is not None)
         self._perception.sight = sight(sensor, visible.visibility_m, visible.unlit_m)
