@@ -69,7 +69,7 @@ def add(commands: Commands) -> None:
         "--out",
         type=Path,
         metavar="DOC.yaml",
-        help="write the document, its roads beside it (default: keep it by name)",
+        help="write the document and its roads (default: keep it by name)",
     )
     importing.add_argument(
         "--ego-entity", metavar="NAME", help="the ego (default: the entity named Ego, or the one with a controller)"

@@ -42,12 +42,8 @@ class Entity:
     """In the document."""
     body: str | Chosen[str]
     box: Box | Chosen[Box] | None
-    static: bool
-    """Whether it is an object that never moves."""
     freely: bool | None
     """Whether it moves anywhere, as a pedestrian; None: as a parameter's word has it."""
-    controlled: bool
-    """Whether it has a controller."""
 
 
 class Entities:
@@ -112,13 +108,11 @@ class Entities:
         else:
             tags = ", ".join(dict.fromkeys(child.tag for child in at.element.children)) or "nothing"
             raise at.refusal(f"an entity with {tags[:200]}", f"one of {', '.join(KINDS)} and CatalogReference")
-        controllers = at.all("ObjectController")
-        for controller in controllers:
+        for controller in at.all("ObjectController"):
             controller.element.use_all()
         of = entries.of if isinstance(entries, Alternatives) else {"": entries}
         bodies = {word: self._body(entry, given) for word, entry in of.items()}
         boxes = {word: _box(entry) for word, entry in of.items()}
-        kinds = {word: entry.tag for word, entry in of.items()}
         free = {body in _FREE for body in bodies.values()}
         chosen = entries.by if isinstance(entries, Alternatives) else None
         same = chosen is None or (len(set(bodies.values())) == 1 and len(set(boxes.values())) == 1)
@@ -127,9 +121,7 @@ class Entities:
             name=name,
             body=next(iter(bodies.values())) if same or chosen is None else Chosen[str](by=chosen, of=bodies),
             box=next(iter(boxes.values())) if same or chosen is None else Chosen[Box](by=chosen, of=boxes),
-            static=set(kinds.values()) == {"MiscObject"},
             freely=free.pop() if len(free) == 1 else None,
-            controlled=bool(controllers),
         )
 
     def _body(self, entry: At, given: str) -> BodyName:

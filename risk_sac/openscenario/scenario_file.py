@@ -23,7 +23,7 @@ from risk_sac.openscenario.positions import Positions
 from risk_sac.openscenario.road import Roads, converted, missing
 from risk_sac.openscenario.scope import At, Scope
 from risk_sac.openscenario.sources import Sources
-from risk_sac.openscenario.storyboard import Init, Storyboard, horizon_of
+from risk_sac.openscenario.storyboard import Init, Storyboard, horizon_of, moving_actors
 from risk_sac.openscenario.unread import unread
 from risk_sac.openscenario.variables import Variables
 
@@ -169,7 +169,12 @@ class _Import:
         )
         horizon = horizon_of(stop, self._remarks)
         constraints = tuple(constraints_of(parameters))
-        actors = {entity.name: _actor(entity, init) for entity in entities.all.values() if entity.name != EGO}
+        moved = moving_actors(init, stories)
+        actors = {
+            entity.name: _actor(entity, init, moves=entity.name in moved)
+            for entity in entities.all.values()
+            if entity.name != EGO
+        }
         ego = entities.all[entities.ego]
         header = top.one("FileHeader")
         fields = {
@@ -197,14 +202,14 @@ def _start(entity: Entity, init: Init) -> Start:
     return entity.at.build(Start, position=init.starts[entity.name].position)
 
 
-def _actor(entity: Entity, init: Init) -> Actor:
-    """Returns an actor of the story; one on a trajectory that is no car moves freely."""
+def _actor(entity: Entity, init: Init, *, moves: bool) -> Actor:
+    """Returns an actor; a bicycle on a trajectory moves freely, and what nothing moves is static."""
     follows = any(one.actor == entity.name and isinstance(one.do, FollowTrajectoryAction) for one in init.actions)
     freely = entity.freely or (entity.body == "bicycle" and follows)
     return entity.at.build(
         Actor,
-        role="static" if entity.static else "story",
-        moves="freely" if freely and not entity.static else None,
+        role="story" if moves else "static",
+        moves="freely" if freely and moves else None,
         body=entity.body,
         box=entity.box,
         speed=init.starts[entity.name].speed,

@@ -8,6 +8,7 @@ from risk_sac.config.story import (
     AcquirePositionAction,
     Act,
     AssignRouteAction,
+    DeleteAction,
     Event,
     FollowTrajectoryAction,
     InitAction,
@@ -233,6 +234,19 @@ def _refuse_cycles(starts: Mapping[str, Begun], block: At) -> None:
                 raise block.refusal(got[:300], "a chain that ends at a place")
             chain.append(other)
             here = other
+
+
+def moving_actors(init: Init, stories: Mapping[str, tuple[Act, ...]]) -> set[str]:
+    """Returns the names of actors that start with a speed, or that an action moves or takes away."""
+    names = {name for name, start in init.starts.items() if start.speed != 0.0}
+    names |= {action.actor for action in init.actions}
+    for group in (group for acts in stories.values() for act in acts for group in act.groups):
+        for do in (one.do for part in group.maneuvers for event in part.events for one in event.actions):
+            if isinstance(do, DeleteAction) and do.actor is not None:
+                names.add(do.actor)
+            elif not isinstance(do, NoAction | VariableAction):
+                names |= set(init.starts if group.triggering else group.actors)
+    return names
 
 
 def horizon_of(stop: Trigger | None, remarks: list[str]) -> Expression:

@@ -23,7 +23,6 @@ from risk_sac.world.types import Floats, Scene
 
 UNITS = ("1", "m", "s", "m/s", "m/s²", "km", "1/m", "1/km", "1/s", "1/h", "rad", "deg", "kg", "%")
 SCENES = 200  # drawn all over the space, beside the ends of each parameter
-LEAST_WAY_M = 20.0  # of road ahead of the ego; choice
 TOUCHING_M = 0.01  # by which bodies side by side may overlap
 
 
@@ -195,25 +194,15 @@ def _check_layouts(of: Interpreter) -> None:
         try:
             layouts.append(of.layout(scene.values))
         except InfeasibleScene as error:
-            if isinstance(error.__cause__, ConfigError):
+            if isinstance(error.__cause__, ConfigError) and of.document.story is None:
                 raise error.__cause__ from error
             refused.append(error)
     if not layouts:
+        if isinstance(refused[0].__cause__, ConfigError):
+            raise refused[0].__cause__ from refused[0]
         got = f"none of {len(refused)} scenes that keeps them; in the first, {refused[0]}"
         raise ConfigError("constraints", got, "constraints that leave some scenes", "widen a range or drop one")
-    for layout in layouts:
-        _check_way(layout)
     _check_apart(of, layouts)
-
-
-def _check_way(layout: Layout) -> None:
-    net, ego = net_of(layout.net), layout.ego
-    first = net.edges[ego.route[0]].lanes[ego.lane]
-    way_m = first.length_m - ego.position_m
-    way_m += sum(net.edges[edge].lanes[0].length_m for edge in ego.route[1:])
-    if way_m < LEAST_WAY_M:
-        got = f"{way_m:.0f} m of road ahead of the ego on {' '.join(ego.route)}"
-        raise ConfigError("ego.start", got, f"{LEAST_WAY_M:g} m or more", "start it earlier, or name a route")
 
 
 def _check_apart(of: Interpreter, layouts: Sequence[Layout]) -> None:

@@ -17,6 +17,8 @@ from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.scenario.value import Value
 from risk_sac.world.net import Net
 
+LEAST_WAY_M = 20.0  # of road ahead of the ego; choice
+
 
 @dataclass(frozen=True)
 class Interpreter:
@@ -79,9 +81,11 @@ class Interpreter:
         except ConfigError as error:
             raise InfeasibleScene(str(error), reason="constraint") from None
         try:
-            return SceneLayout(self.document, value, *self.net(value), self.horizon_s).layout()
+            layout = SceneLayout(self.document, value, *self.net(value), self.horizon_s).layout()
+            _check_way(layout)
         except ConfigError as error:
             raise InfeasibleScene(str(error), reason="scenario") from error
+        return layout
 
     def net(self, value: Value) -> tuple[str, Net]:
         """The net of a scene: its file and its contents."""
@@ -151,6 +155,16 @@ class Interpreter:
                 if values:
                     ranges[column] = Interval(low=min(values), high=max(values))
         return ranges
+
+
+def _check_way(layout: Layout) -> None:
+    net, ego = net_of(layout.net), layout.ego
+    first = net.edges[ego.route[0]].lanes[ego.lane]
+    way_m = first.length_m - ego.position_m
+    way_m += sum(net.edges[edge].lanes[0].length_m for edge in ego.route[1:])
+    if way_m < LEAST_WAY_M:
+        got = f"{way_m:.0f} m of road ahead of the ego on {' '.join(ego.route)}"
+        raise ConfigError("ego.start", got, f"{LEAST_WAY_M:g} m or more", "start it earlier, or name a route")
 
 
 def _part(share: float, parts: int) -> int:
