@@ -13,7 +13,7 @@ from risk_sac.env.problem import Problem
 from risk_sac.scenario.families import family_of
 from risk_sac.scenario.reading import document_from
 from risk_sac.scenario.shipped import nets_of
-from risk_sac.world.types import Frame, Role, Scene
+from risk_sac.world.types import Frame, Scene
 
 CUT_IN = """
 name: story_cut_in

@@ -19,6 +19,7 @@ from risk_sac.world.types import STEP_S
 WIDTH_M = 3.5
 CAR = Reach(4.0, 2.0, 1.0)
 POINT = Reach(0.0, 0.0)
+ORIGIN = Pose(0.0, 0.0, 0.0)
 
 
 def straight_net(lanes: int = 3, length_m: float = 5000.0) -> Net:
@@ -78,7 +79,7 @@ class Drive:
         actors: Mapping[str, StoryActor],
         *,
         ego_mps: float = 10.0,
-        ego: Pose = Pose(0.0, 0.0, 0.0),
+        ego: Pose = ORIGIN,
         reach: Reach = CAR,
         others: Mapping[str, Present] | None = None,
         numbers: Mapping[str, float] | None = None,
