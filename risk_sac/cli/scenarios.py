@@ -122,7 +122,8 @@ def _imported(file: Path, ego: str | None = None) -> "Imported":
     from risk_sac.openscenario.scenario_file import import_scenario  # imported here: few commands need it
 
     imported = import_scenario(file, ego=ego)
-    for remark in imported.remarks:
+    origin = imported.document.origin
+    for remark in origin.remarks if origin is not None else ():
         complain(f"warning: {remark}")
     return imported
 
@@ -246,7 +247,7 @@ def _import(options: argparse.Namespace) -> int:
         "actors": list(document.actors),
         "parameters": axes(document),
         "points": imported.points,
-        "remarks": list(imported.remarks),
+        "remarks": list(document.origin.remarks) if document.origin is not None else [],
     }
     print_answer(options, answer, table, where)
     return OK

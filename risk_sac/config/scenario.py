@@ -285,6 +285,19 @@ class SignalTiming(Settings):
     offset_s: Expression = 0.0
 
 
+class Origin(Settings):
+    """File of another format that a scenario was imported from."""
+
+    file: Annotated[str, Field(max_length=200)]
+    """Its name."""
+    actors: Annotated[Mapping[Word, Annotated[str, Field(max_length=200)]], Field(max_length=101)] = {}
+    """Actor → its name in that file."""
+    entries: Annotated[Mapping[Word, Annotated[str, Field(max_length=200)]], Field(max_length=101)] = {}
+    """Actor → catalog and entry of its body, such as `vehicle_catalog/car`, if no parameter chooses it."""
+    remarks: Annotated[tuple[Annotated[str, Field(max_length=1000)], ...], Field(max_length=1000)] = ()
+    """What was not read, and what changes on the way, each with its place."""
+
+
 class Scenario(Settings):
     """A scenario, from which scenes are drawn."""
 
@@ -306,6 +319,7 @@ class Scenario(Settings):
     road: Net | None = None
     """OpenDRIVE file beside the net, which positions of a story are stated in."""
     story: Story | None = None
+    origin: Origin | None = None
     signal: SignalTiming = SignalTiming()
     friction: Expression = 1.0
     """Of tyres on the road."""

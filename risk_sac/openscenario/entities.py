@@ -42,6 +42,8 @@ class Entity:
     """In the document."""
     body: str | Chosen[str]
     box: Box | Chosen[Box] | None
+    entry: str
+    """Its catalog and entry, such as `vehicle_catalog/car`; empty: it has none, or a parameter chooses it."""
     freely: bool | None
     """Whether it moves anywhere, as a pedestrian; None: as a parameter's word has it."""
 
@@ -121,6 +123,7 @@ class Entities:
             name=name,
             body=next(iter(bodies.values())) if same or chosen is None else Chosen[str](by=chosen, of=bodies),
             box=next(iter(boxes.values())) if same or chosen is None else Chosen[Box](by=chosen, of=boxes),
+            entry="" if inline is not None or chosen is not None else _entry(at),
             freely=free.pop() if len(free) == 1 else None,
         )
 
@@ -144,6 +147,11 @@ class Entities:
             if remark not in self._remarks:
                 self._remarks.append(remark)
         return near
+
+
+def _entry(at: At) -> str:
+    reference = at.one("CatalogReference")
+    return f"{reference.constant('catalogName')}/{reference.constant('entryName')}"[:200]
 
 
 def _difference(name: str, box: Box) -> float:

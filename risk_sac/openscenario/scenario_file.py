@@ -9,7 +9,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from risk_sac.config.base import Chosen, field_errors
-from risk_sac.config.scenario import EGO, Actor, Moving, Scenario, Start
+from risk_sac.config.scenario import EGO, Actor, Moving, Origin, Scenario, Start
 from risk_sac.config.story import FollowTrajectoryAction, Story
 from risk_sac.errors import ConfigError
 from risk_sac.openscenario.actions import Actions
@@ -33,13 +33,11 @@ _LONGEST_NAME, _LONGEST_SUMMARY = 40, 300
 
 @dataclass(frozen=True)
 class Imported:
-    """A scenario document with its files, and what differs from the scenario file."""
+    """A scenario document with its files; its origin says what differs from the scenario file."""
 
     document: Scenario
     files: dict[str, bytes]
     """Nets and road files, by the document's names."""
-    remarks: tuple[str, ...]
-    """What was not read and what changes on the way, each with its place."""
     points: int
     """Of the grid that a variation file spans, with those that are left out; a range without a step counts once."""
 
@@ -81,7 +79,11 @@ class _Import:
             raise root.refusal(f"a file of {tags}", "a scenario, or a variation of one", remedy)
         imported = self._scenario(At(root, NO_SCOPE), file, name, variation)
         self._remarks += [line for read in self._sources.roots for line in unread(read)]
-        return replace(imported, remarks=tuple(dict.fromkeys(self._remarks)))
+        remarks = tuple(line[:1000] for line in dict.fromkeys(self._remarks))[:1000]
+        origin = imported.document.origin
+        assert origin is not None
+        document = imported.document.model_copy(update={"origin": origin.model_copy(update={"remarks": remarks})})
+        return replace(imported, document=document)
 
     def _scenario(self, top: At, file: Path, name: str, variation: At | None) -> Imported:
         blocks = top.all("ParameterDeclarations")
@@ -96,7 +98,7 @@ class _Import:
         parameters = Parameters(declarations, varied)
         top = At(top.element, parameters.scope)
         document, roads = self._document(top, file, name, parameters)
-        return Imported(document, roads.files, (), points)
+        return Imported(document, roads.files, points)
 
     def _allowed(self, varied: Sequence[Varied], parameters: Parameters) -> list[Varied]:
         """Leaves out texts that constraints do not allow."""
@@ -189,9 +191,14 @@ class _Import:
             "actors": actors,
             "constraints": constraints,
             "story": story,
+            "origin": Origin(
+                file=f"{name}{file.suffix}"[:200],
+                actors={entity.name: given[:200] for given, entity in entities.all.items()},
+                entries={entity.name: entity.entry for entity in entities.all.values() if entity.entry},
+            ),
         }
         try:
-            return Scenario(**fields), roads  # type: ignore[arg-type] # checked by the model
+            return Scenario(**fields), roads
         except ValidationError as error:
             fault = field_errors(error, Scenario)
             fault.field = f"{file.name}: {fault.field}"

@@ -18,6 +18,8 @@ from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
+from risk_sac.openscenario.archive import holds_scenario, unpack
+from risk_sac.openscenario.scenario_file import import_scenario
 from risk_sac.scenario import library
 from risk_sac.scenario.check import check_document
 from risk_sac.scenario.reading import MOST_BYTES, document_from
@@ -25,7 +27,7 @@ from risk_sac.scenario.shipped import nets_of, networks, shipped_document, shipp
 from service.networks.schemas import SCENARIO_MEMORY_BYTES
 
 DOCUMENT_ENDS = (".yaml", ".yml", ".json")
-WANTED = "one document (.yaml or .json) and the nets that it names"
+WANTED = "one document (.yaml or .json) and the nets that it names, or an OpenSCENARIO file with what it names"
 
 
 def main() -> None:
@@ -64,6 +66,8 @@ def _unpacked(upload: bytes, folder: Path) -> tuple[Scenario, Path]:
     """
     if not upload.startswith(b"PK"):
         return document_from(_text(upload)), folder
+    if holds_scenario(upload):
+        return _imported(upload, folder)
     try:
         archive = zipfile.ZipFile(io.BytesIO(upload))
         entries = [entry for entry in archive.infolist() if not entry.is_dir()]
@@ -82,6 +86,16 @@ def _unpacked(upload: bytes, folder: Path) -> tuple[Scenario, Path]:
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
         raise ConfigError("", f"an archive that cannot be read ({error})", WANTED) from error
     return document, folder
+
+
+def _imported(upload: bytes, folder: Path) -> tuple[Scenario, Path]:
+    """Imports an archive of OpenSCENARIO, and puts its nets and roads into a folder."""
+    with tempfile.TemporaryDirectory() as scratch:
+        inside = Path(scratch).resolve()
+        imported = import_scenario(unpack(upload, inside), within=inside)
+    for name, content in imported.files.items():
+        (folder / name).write_bytes(content)
+    return imported.document, folder
 
 
 def _put_net(content: bytes, name: str, document: Scenario, folder: Path) -> None:

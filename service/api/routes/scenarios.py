@@ -33,7 +33,8 @@ IN_USE = problem(409, "It ships with the service, or a campaign names it")
 DRAWN: Responses = {200: {"content": {"image/png": {}}}}
 BODY = f"""The body is the document as JSON or YAML, at most {MOST_BYTES} bytes, or a zip archive of it and its nets, \
 at most {MAX_FILES} files and {MAX_BYTES >> 20} MiB once unpacked. A net is one of those that ship, or a file of the \
-archive that `network` names."""
+archive that `network` names. Or it is a zip archive of an OpenSCENARIO scenario, and of its variation file if it has \
+one, with their catalogs and OpenDRIVE roads; the document's `origin` says what was not read."""
 DOCUMENTED_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
