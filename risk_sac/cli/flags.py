@@ -52,11 +52,13 @@ def add_budget_flags(parser: Parser) -> None:
     for name, (type_, metavar, what) in BUDGET.items():
         flag = f"--{name.replace('_', '-')}"
         parser.group("budget").add_argument(flag, type=type_, metavar=metavar, help=what)
+    every = "refuse story-sweep if its grid has more points than --episodes, instead of playing a stratified sample"
+    parser.group("budget").add_argument("--all-points", action="store_true", default=None, help=every)
 
 
 def budget_flags(options: argparse.Namespace) -> dict[str, Any]:
     """The fields of a budget; None where a flag was not given."""
-    return {name: getattr(options, name) for name in BUDGET}
+    return {name: getattr(options, name) for name in (*BUDGET, "all_points")}
 
 
 def add_scene_flags(parser: Parser) -> None:

@@ -53,6 +53,9 @@ class Budget(Settings):
     on the processor."""
     least_episodes: Annotated[int, Field(ge=1, le=100_000)] = 1
     """Search episodes that are played whatever the processor time, so that one run serves two budgets."""
+    all_points: bool = False
+    """Whether `story-sweep` has to play every point of the grid; it is refused if these are more than `episodes`.
+    False: where they are more, it plays a stratified sample of `episodes` points."""
 
     @model_validator(mode="after")
     def _least_is_affordable(self) -> Self:

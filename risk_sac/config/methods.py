@@ -21,6 +21,9 @@ MethodName = Literal[
     "bo-only",
     "random",
     "no-adversary",
+    "story-sweep",
+    "story-random",
+    "story-bo",
 ]
 IidName = Literal["iid-undisturbed", "iid-random"]
 """How the runs of a campaign's i.i.d. phase are made, see `Iid`; a spec cannot name them."""
@@ -39,9 +42,12 @@ class Method(Settings):
     shaping: bool = False
     """Whether robustness shapes the reward (Eq. 6-8)."""
     replay: Literal["uniform", "rper"] = "uniform"
-    scenes: Literal["botorch", "archive", "sobol", "iid"] = "sobol"
-    """`archive`: bred from those that led to distinct failures, together with the scripts' genes; `iid`: drawn one
-    independently of the other, uniformly over the ODD."""
+    story: bool = False
+    """Whether the scenario is played as it is written: others follow its story, and nothing deviates from it."""
+    scenes: Literal["botorch", "archive", "sobol", "iid", "grid"] = "sobol"
+    """`grid`: each point of the grid of the parameters, or of a stratified sample of it; `archive`: bred from
+    those that led to distinct failures, together with the scripts' genes; `iid`: drawn one independently of the other,
+    uniformly over the ODD."""
     takes_turns: bool = False
     """Whether a learner's warm start goes on beside it: scripts and policy act in turn, by what they yield."""
     prior: Literal["none", "library", "policy", "all"] = "none"
@@ -122,6 +128,21 @@ METHODS: dict[MethodName, Method] = {
     ),
     "random": Method(agent="random", summary="Control: Sobol scenes and random actions, held for a second on average."),
     "no-adversary": Method(agent="none", summary="Control without an attack; what remains is the artefact rate."),
+    "story-sweep": Method(
+        agent="none",
+        story=True,
+        scenes="grid",
+        summary="The grid of the scenario's parameters, without an attack: all points, or a stratified sample.",
+    ),
+    "story-random": Method(
+        agent="none", story=True, summary="Sobol scenes of the scenario as it is written, without an attack."
+    ),
+    "story-bo": Method(
+        agent="none",
+        story=True,
+        scenes="botorch",
+        summary="BoTorch searches the scenario's parameters; others follow its story, without an attack.",
+    ),
 }
 
 # What a bound may be drawn from: no search, and so none of METHODS.

@@ -10,6 +10,7 @@ Source: RISK-SAC, Alg. 1, l. 5 and 8.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import gymnasium as gym
@@ -39,6 +40,7 @@ from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries, RecordedAdversaries, shares_of
 from risk_sac.sim.ego import EVERYTHING, Perception, sight
 from risk_sac.sim.sumo import SumoSimulation
+from risk_sac.verdicts.competent import avoided_by
 from risk_sac.verdicts.course import Path, polyline
 from risk_sac.verdicts.evidence import Evidence, Ground
 from risk_sac.verdicts.judge import collision_of, requirement_results, violations_of
@@ -57,20 +59,23 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     metadata = {"render_modes": []}  # noqa: RUF012  # Gymnasium's own declaration
 
-    def __init__(self, problem: Problem, reward: RewardConfig, *, controlled: bool = True) -> None:
+    def __init__(
+        self, problem: Problem, reward: RewardConfig, *, controlled: bool = True, as_written: bool = False
+    ) -> None:
         """Prepares, but starts no simulation.
 
         Args:
           problem: what to falsify.
           reward: the terms of R_risk, and β of the soft minimum.
           controlled: False leaves the adversary vehicles to SUMO and lets pedestrians stand: a control.
+          as_written: whether nothing deviates from the scenario, so that the others' behaviour is not judged.
 
         Raises:
           ConfigError: the problem's ego is not registered, in another version, or cannot be loaded.
         """
         self.problem = problem
         self._reward = reward
-        self._controlled = controlled
+        self._controlled, self._as_written = controlled, as_written
         sensor, horizon_steps = problem.ego.sensor, problem.family.horizon_steps
         self._perception = Perception(sensor.memory_s if sensor else 0.0, EVERYTHING)
         ego = load(problem.ego)
@@ -91,7 +96,9 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         Raises:
           ConfigError: the spec poses no problem that can be run.
         """
-        return cls(Problem.from_spec(spec), spec.learner.reward, controlled=method_of(spec.method).agent != "none")
+        method = method_of(spec.method)
+        controlled = method.agent != "none"
+        return cls(Problem.from_spec(spec), spec.learner.reward, controlled=controlled, as_written=method.story)
 
     # The state of an episode, set by `_start`.
     layout: Layout  # of the episode's start
@@ -105,6 +112,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     _steps: int
     _contact_s: float | None  # from the release
     _artefacts: dict[str, float]  # rule that the episode broke -> when it first did
+    _way: Path  # the ego's way ahead at the release
 
     @c_numbers()
     def reset(
@@ -203,6 +211,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self, scene: Scene, motions: Mapping[str, NDArray[Any]] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         self._unit_scene = self.problem.space.to_unit(scene)
+        self.trace = Trace(self._gauge.names)  # of this scene, even where it has no layout
         layout = self.layout = self.problem.family.layout(scene.values)
         limits = limits_from_odd(self.problem.odd, layout.friction)
         self._ground = Ground.of(layout, self.problem.speed_limit_mps)
@@ -210,7 +219,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._reflex = reflex_of(self.problem.ego.profile, self._ground)
         self._gauge.reset(carriageway_of(layout.net))
-        self.trace = Trace(self._gauge.names)
         sensor = self.problem.ego.sensor
         visible = conditions(self.problem.odd, scene.values, sensor=sensor is not None)
         self._perception.sight = sight(sensor, visible.visibility_m, visible.unlit_m)
@@ -230,6 +238,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             refuse_danger(danger, scene)
         self.start_danger = danger  # of a story, which is not refused for it
         self._violated.begin(self._measures.robustness)
+        self._way = self._ego_path()
         self._sim.hand_over_ego()
         if self._controlled:
             self._sim.release()
@@ -301,7 +310,15 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     def evidence(self) -> Evidence:
         """Returns the evidence of the episode so far, for the judge."""
-        return Evidence.from_series(self.trace.series(), self._ground, self._released_s)
+        evidence = Evidence.from_series(self.trace.series(), self._ground, self._released_s)
+        return replace(evidence, as_written=self._as_written)
+
+    def avoided_by(self) -> Mapping[str, bool] | None:
+        """Which competent drivers avoid a contact, whatever the ego did; None where others deviate from the scenario.
+
+        See `risk_sac.verdicts.competent`.
+        """
+        return avoided_by(self.evidence(), self._way) if self._as_written else None
 
     def _observe(self) -> Observation:
         time_left = 1.0 - self._steps / self.layout.horizon_steps

@@ -7,7 +7,7 @@ from typing import Any
 
 from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Interval, JudgeConfig, Odd, Requirement, RunSpec
 from risk_sac.config.campaign import check_demand
-from risk_sac.config.methods import MethodName
+from risk_sac.config.methods import MethodName, method_of
 from risk_sac.egos.registry import pinned
 from risk_sac.env.observation_layout import observation_size
 from risk_sac.errors import ConfigError, OddError
@@ -17,6 +17,7 @@ from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import parsed
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
+from risk_sac.scenario.grid import DEFAULT_LEVELS, Grid, grid_of
 from risk_sac.scenario.limits import GRAVITY_MPS2, VISIBILITY, limits_from_odd, with_environment
 from risk_sac.scenario.odd import (
     TINY,
@@ -63,11 +64,27 @@ def _of_family(family: Family, spec: RunSpec | CampaignSpec) -> Iterator[Adjustm
             if parameter.odd == path and isinstance(used, Interval) and _beyond(used, bounds):
                 yield _adjusted(path, used, bounds, f"scenes begin with {parameter.name} in {text_of(bounds)}")
     yield from _of_sensor(whole, ego, stated=VISIBILITY in space.names)
+    methods = (spec.method,) if isinstance(spec, RunSpec) else spec.methods
+    if any(method_of(method).scenes == "grid" for method in methods):
+        yield from _of_grid(grid_of(space, family.parameters), spec.budget.episodes)
     shipped = {each.name for each in requirements_from_odd(whole, ego.response_s)}
     for i, requirement in enumerate(spec.requirements):
         if not requirement.formula and requirement.name not in shipped:
             why = f"there is no {requirement.name}"
             yield Adjustment(families=(), field=f"requirements[{i}]", asked=requirement.counts, used="nothing", why=why)
+
+
+def _of_grid(grid: Grid, episodes: int) -> Iterator[Adjustment]:
+    """What a sweep makes of a grid: values that the scenario does not state, and a sample."""
+    for name in grid.unstated:
+        why = "the scenario states no step"
+        yield Adjustment(
+            families=(), field=f"parameters.{name}.step", asked="none", used=f"{DEFAULT_LEVELS} values", why=why
+        )
+    if grid.size > episodes:
+        points = f"{grid.size:,} points"
+        why = "the budget's episodes are fewer; the sample is stratified"
+        yield Adjustment(families=(), field="budget.episodes", asked=points, used=f"{episodes:,} of them", why=why)
 
 
 def _of_sensor(odd: Odd, ego: EgoConfig, *, stated: bool) -> Iterator[Adjustment]:
@@ -155,6 +172,7 @@ class Problem:
             drivers=judge.drivers,
         )
         problem.check_demand(spec)
+        problem.check_grid(spec)
         return problem
 
     def check_demand(self, spec: RunSpec) -> None:
@@ -164,6 +182,25 @@ class Problem:
           ConfigError: naming the field that takes most of it.
         """
         check_demand(spec, self.observation_size, self.action_size, self.family.horizon_steps)
+
+    def check_grid(self, spec: RunSpec) -> None:
+        """Refuses a sweep of all points if the grid has more than the budget's episodes.
+
+        Raises:
+          ConfigError: with the size of the grid.
+        """
+        if method_of(spec.method).scenes != "grid":
+            return
+        size = self.grid.size
+        if spec.budget.all_points and size > spec.budget.episodes:
+            got = f"true, for a grid of {size:,} points"
+            wanted = f"at most {spec.budget.episodes:,}, the budget's episodes"
+            raise ConfigError("budget.all_points", got, wanted, "leave it out, and a stratified sample is played")
+
+    @property
+    def grid(self) -> Grid:
+        """The grid of its scene space."""
+        return grid_of(self.space, self.family.parameters)
 
     @property
     def observation_size(self) -> int:
@@ -249,6 +286,7 @@ def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
         problem = Problem.from_spec(first)
         for run in others:
             problem.check_demand(run)
+            problem.check_grid(run)
     return spec
 
 

@@ -93,6 +93,9 @@ class EpisodeRecord(Record):
     """Rule for safe starts that the start of a story breaks, which is played all the same; null: none."""
     defect_reached_s: float | None = None
     """When a planted defect first changed a command, from the release; null if none did."""
+    avoided_by: Mapping[str, bool] | None = None
+    """r157 | fsm → whether this driver avoids a contact where an ego kept its lane and its first speed. Null but for
+    methods that play a scenario as it is written, and where nothing was played."""
 
     @property
     def valid_violations(self) -> tuple[Collision | Violation, ...]:

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from risk_sac.records import SeriesFile
 from risk_sac.risk.measures import Measures
 from risk_sac.risk.publish import AHEAD, ENCOUNTER, GAP, RSS_LATERAL, RSS_LONGITUDINAL, SEEN, TTC
+from risk_sac.risk.rss import TTC_CAP_S
+from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.verdicts.evidence import PER_ACTOR as MOTION
 from risk_sac.world.types import Frame
@@ -49,13 +51,13 @@ class Trace:
 
     @property
     def min_ttc_s(self) -> float:
-        """Smallest TTC since the release, over the actors the ego answers for."""
-        return min(m.signals["ttc_s"] for m in self.since_release)
+        """Smallest TTC since the release, over the actors the ego answers for; the cap where nothing was played."""
+        return min((m.signals["ttc_s"] for m in self.since_release), default=TTC_CAP_S)
 
     @property
     def min_robustness(self) -> float:
-        """Smallest soft-min robustness since the release."""
-        return min(m.soft_min for m in self.since_release)
+        """Smallest soft-min robustness since the release; the cap where nothing was played."""
+        return min((m.soft_min for m in self.since_release), default=ROBUSTNESS_CLIP)
 
     def encounters_s(self, actors: Collection[str]) -> dict[str, float]:
         """Computes the smallest time to encounter of each of some actors, s.

@@ -49,6 +49,7 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
         like=document.like,
         requirements=document.requirements,
         judge=document.judge,
+        parameters=document.parameters,
     )
 
 

@@ -1,7 +1,7 @@
 """Scenario families, and their usual ODD."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from risk_sac.config import (
     CrossingType,
@@ -16,6 +16,7 @@ from risk_sac.config import (
     Scenery,
     SignalType,
 )
+from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.scenario.behaviour import preset
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.space import SceneSpace
@@ -38,6 +39,7 @@ class Family:
     like: Like | None = None  # shipped family whose prior fits
     requirements: tuple[Requirement, ...] = ()  # of the scenario, beside the ODD's
     judge: JudgeConfig | None = None  # None: the campaign's
+    parameters: Mapping[str, ScenarioParameter] = field(default_factory=dict)  # of the document
 
     @property
     def adversaries(self) -> tuple[str, ...]:

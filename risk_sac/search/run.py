@@ -86,10 +86,11 @@ class RunState:
     @property
     def learning(self) -> bool:
         """Whether the next episode belongs to the search; in the evaluation the policy is frozen."""
-        budget, played = self.spec.budget, self._search.episodes
+        budget, played, points = self.spec.budget, self._search.episodes, self.searchers.points
+        most = budget.episodes if points is None else min(budget.episodes, points)
         if played < budget.least_episodes or budget.cpu_s is None:
-            return played < budget.episodes
-        return played < budget.episodes and self._episode_cpu_s[played - 1] < budget.cpu_s
+            return played < most
+        return played < most and self._episode_cpu_s[played - 1] < budget.cpu_s
 
     @property
     def phase(self) -> Phase:

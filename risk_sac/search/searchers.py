@@ -24,6 +24,7 @@ from risk_sac.search.scene_optimizer import (
     BotorchOptimizer,
     DiscountedBandit,
     Encounter,
+    GridSampler,
     IidSampler,
     SceneOptimizer,
     SobolOptimizer,
@@ -37,7 +38,7 @@ CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
     "none": IdleAgent,
 }
 OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
-    each.kind: each for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler)
+    each.kind: each for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler, GridSampler)
 }
 Actor = Learner | IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
 """A joint policy that drives all adversaries."""
@@ -80,7 +81,7 @@ class Searchers:
     def __init__(self, spec: RunSpec, problem: Problem, observation_size: int, action_size: int) -> None:
         method = method_of(spec.method)
         check_prior(spec.method, spec.family, spec.prior)
-        self._space = problem.space
+        self._problem, self._space = problem, problem.space
         self._spec = spec
         self._coordinates = Coordinates.of(problem)
         self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
@@ -137,10 +138,12 @@ class Searchers:
         """Returns the next point of the searcher chosen last; its scene keeps the scenario's constraints.
 
         A sampler is asked again for a point whose scene does not, so that random scenes stay uniform among those that
-        do; after `TRIES` the nearest scene of a pool takes its place.
+        do; after `tries` the nearest scene of a pool takes its place. One without tries has its points refused.
         """
         sampler, size = self._next.sampler, self._space.dimension
         point = sampler.ask()
+        if not sampler.tries:
+            return point
         for _ in range(sampler.tries):
             if self._space.allows(point[:size]):
                 return point
@@ -149,8 +152,15 @@ class Searchers:
 
     def split(self, point: Floats) -> tuple[Scene, Floats]:
         """Splits a proposed point into its scene and the actor's genes."""
-        size = self._space.dimension
+        size, sampler = self._space.dimension, self._next.sampler
+        if isinstance(sampler, GridSampler):
+            return sampler.scene(point, self._space), point[size:]
         return self._space.from_unit(point[:size]), point[size:]
+
+    @property
+    def points(self) -> int | None:
+        """Number of scenes of a method that plays each once; None: it has no end."""
+        return self._own.sampler.points
 
     def begin(self, genes: Floats) -> None:
         """Begins an episode for its actor and for the learner that observes it."""
@@ -198,7 +208,10 @@ class Searchers:
     def _searcher(self, actor: Actor, sampler: type[SceneOptimizer]) -> Searcher:
         dimension = self._space.dimension + actor.genes
         arguments = dimension, self._spec.learner.scenes, self._spec.stream
-        if self._start is None or not actor.genes:
+        made: SceneOptimizer
+        if sampler is GridSampler:
+            made = GridSampler(*arguments, self._problem.grid, self._spec.budget.episodes)
+        elif self._start is None or not actor.genes:
             made = sampler(*arguments)
         else:
             whole = method_of(self._spec.method).prior == "all" and self._start.model is not None

@@ -79,6 +79,7 @@ class Evidence:
     known: Bools  # in the ego's sight
     ground: Ground = Ground()
     step_s: float = STEP_S
+    as_written: bool = False  # nothing deviates from the scenario, so that the others' behaviour is not judged
 
     @classmethod
     def from_series(cls, series: Mapping[str, NDArray[Any]], ground: Ground, released_s: float) -> "Evidence":

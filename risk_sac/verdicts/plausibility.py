@@ -47,8 +47,12 @@ class Judged(NamedTuple):
 
 
 def plausibility_of(evidence: Evidence) -> Plausibility:
-    """Judges what the adversaries did from the release to the last frame."""
-    return judge_observed(observed_of(evidence), evidence.ids, undisturbed())
+    """Judges what the adversaries did from the release to the last frame.
+
+    Where nothing deviates from the scenario it is ordinary: its author answers for what it says.
+    """
+    observed = () if evidence.as_written else observed_of(evidence)
+    return judge_observed(observed, evidence.ids, undisturbed())
 
 
 def judge_observed(observed: Iterable[Observed], ids: Sequence[str], traffic: Undisturbed) -> Plausibility:

@@ -42,7 +42,7 @@ from risk_sac.verdicts.rollout import (
     meets,
     stopping_distance,
 )
-from risk_sac.world.geometry import Size, contact_point, frame_view, zone
+from risk_sac.world.geometry import Pose, Size, contact_point, frame_view, zone
 from risk_sac.world.types import (
     ACCEL,
     HEADING,
@@ -168,16 +168,20 @@ def _outcome(evidence: Evidence, other: int, ending: RolloutEnd | None, *, kept:
     if ending is None:
         return AVOIDED if kept else ReferenceOutcome(avoids=False, impact_speed_mps=float(evidence.speed_mps[-1, 0]))
     size, other_size = recorded_size(evidence, 0), recorded_size(evidence, other)
-    blameless = not ending.touched or ending.speed_mps <= STANDING_MPS or _from_behind(ending, size, other_size)
+    blameless = (
+        not ending.touched
+        or ending.speed_mps <= STANDING_MPS
+        or from_behind(ending.pose, ending.other, size, other_size)
+    )
     if blameless and (kept or ending.lead_m <= LEAD_M):
         return AVOIDED
     return ReferenceOutcome(avoids=False, impact_speed_mps=float(ending.passing_mps if blameless else ending.speed_mps))
 
 
-def _from_behind(ending: RolloutEnd, size: Size, other_size: Size) -> bool:
-    """Whether the contact lies on the ego's rear."""
+def from_behind(pose: Pose, other: Pose, size: Size, other_size: Size) -> bool:
+    """Whether the contact of the ego with another body lies on the ego's rear."""
     state = np.zeros((WIDTH + 1, 2))
-    state[[X, Y, HEADING]] = np.transpose((ending.pose, ending.other))
+    state[[X, Y, HEADING]] = np.transpose((pose, other))
     state[[LENGTH, WIDTH]] = 2 * np.transpose((size, other_size))
     return zone(*contact_point(frame_view(state)), *size) == "rear"
 

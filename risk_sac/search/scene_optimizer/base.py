@@ -115,6 +115,7 @@ class SceneOptimizer(ABC):
 
     kind: ClassVar[str]
     tries: ClassVar[int] = 1000  # further points that it may be asked for where one breaks the scenario's constraints
+    points: int | None = None  # number of different ones; None: there is no end
     driven_by: DrivenBy | None = None
 
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:

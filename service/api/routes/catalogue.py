@@ -45,6 +45,9 @@ EPISODE_COST: Mapping[str, float] = {
     "ddpg": 8.5,
     "bo-only": 1.3,
     "no-adversary": 0.7,
+    "story-sweep": 0.7,
+    "story-random": 0.7,
+    "story-bo": 1.1,
     "iid-random": 1.0,
     "iid-undisturbed": 0.7,
 }

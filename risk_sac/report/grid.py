@@ -1,0 +1,187 @@
+"""The standard's verdict on each scene of a run that plays a scenario as it is written.
+
+A scene passes where the ego does not fail. Where it does, the regulation asks more than it may if a competent driver
+would not have avoided the contact either: such a scene is out of scope.
+"""
+
+import csv
+import io
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import Literal, get_args
+
+from risk_sac.config import RunSpec, method_of
+from risk_sac.config.scenario import ScenarioParameter
+from risk_sac.errors import ConfigError
+from risk_sac.records import EpisodeRecord, Outcome, Record
+from risk_sac.report.runs import read_records
+from risk_sac.run_folder.results import EPISODES, RESULTS, RunResults, read_results
+from risk_sac.scenario.families import family_named
+
+Standard = Literal["r157", "fsm", "either"]
+STANDARDS: tuple[Standard, ...] = get_args(Standard)
+RUNS = "runs"  # below a campaign's folder
+
+
+class StandardVerdict(StrEnum):
+    """What a standard says of the ego in a scene."""
+
+    PASS = "pass"  # it does not fail
+    FAIL = "fail"  # it does, and the competent driver would not
+    OUT_OF_SCOPE = "out_of_scope"  # both do
+    REFUSED = "refused"  # the scene cannot be played
+    UNJUDGED = "unjudged"  # a rule refuses the violation, or the ego did not answer
+
+
+class PlayedPoint(Record):
+    """A scene, how it ended for the ego, and what the standard says of it."""
+
+    id: str
+    """Of the episode."""
+    values: Mapping[str, float | str]
+    """Parameter → number or word, in the order of the document."""
+    outcome: Outcome
+    reason: str
+    """Why the scene was refused, or which rules refuse its violation."""
+    kind: str
+    """Of the ego's failure; empty without one."""
+    grade: str
+    """Of the ego's failure, by all reference drivers; empty without one."""
+    r157: bool | None
+    """Whether R157's competent driver avoids a contact in this scene; null where nothing was played."""
+    fsm: bool | None
+    """The same of the fuzzy safety model."""
+    verdict: StandardVerdict
+
+
+class PlayedGrid(Record):
+    """The scenes of one run."""
+
+    spec: RunSpec
+    standard: Standard
+    points: tuple[PlayedPoint, ...]
+
+    @property
+    def counts(self) -> Mapping[StandardVerdict, int]:
+        """Verdict → number of scenes, of each verdict."""
+        counts = Counter(point.verdict for point in self.points)
+        return {verdict: counts[verdict] for verdict in StandardVerdict}
+
+    @property
+    def ego(self) -> str:
+        """The ego in a word or two."""
+        ego = self.spec.ego
+        return "+".join((ego.driver or ego.profile, *ego.defects))
+
+
+def played_grids(paths: Sequence[Path], standard: Standard = "r157") -> tuple[PlayedGrid, ...]:
+    """Reads the scenes of runs, finished or not.
+
+    Args:
+      paths: folders of runs; or of campaigns, whose runs of other methods are left out.
+      standard: the driver that tells a failure from a scene that is out of scope.
+
+    Raises:
+      ConfigError: there is no such run.
+    """
+    grids = []
+    for path in paths:
+        below = sorted(file.parent for file in (path / RUNS).glob(f"*/{RESULTS}"))
+        runs = [(folder, read_results(folder)) for folder in below or [path]]
+        told = [(folder, results) for folder, results in runs if method_of(results.spec.method).story]
+        if not told:
+            raise ConfigError("RUN", f"{path}, with {_methods(runs)}", "a run of story-sweep, story-random or story-bo")
+        grids += [
+            PlayedGrid(
+                spec=results.spec,
+                standard=standard,
+                points=played_points(results.spec, read_records(folder / EPISODES), standard),
+            )
+            for folder, results in told
+        ]
+    return tuple(grids)
+
+
+def _methods(runs: Sequence[tuple[Path, RunResults]]) -> str:
+    return ", ".join(dict.fromkeys(results.spec.method for _, results in runs))
+
+
+def played_points(spec: RunSpec, records: Sequence[EpisodeRecord], standard: Standard) -> tuple[PlayedPoint, ...]:
+    """The scenes of a run's episodes, in their order."""
+    parameters = family_named(spec.family).parameters
+    return tuple(_point(spec, record, parameters, standard) for record in records)
+
+
+def _point(
+    spec: RunSpec, record: EpisodeRecord, parameters: Mapping[str, ScenarioParameter], standard: Standard
+) -> PlayedPoint:
+    worst = record.worst_violation if record.outcome is Outcome.FAILURE else None
+    avoided = record.avoided_by or {}
+    return PlayedPoint(
+        id=record.id_in(spec.id),
+        values=named_values(record.scene, parameters),
+        outcome=record.outcome,
+        reason=record.reason,
+        kind="" if worst is None else worst.kind,
+        grade="" if worst is None or worst.graded is None else worst.graded.value,
+        r157=avoided.get("r157"),
+        fsm=avoided.get("fsm"),
+        verdict=verdict_on(record, standard),
+    )
+
+
+def verdict_on(record: EpisodeRecord, standard: Standard) -> StandardVerdict:
+    """What a standard says of the ego in an episode.
+
+    A failure without contact is always one: no competent driver leaves the road or enters on red.
+    """
+    if record.outcome is Outcome.REJECTED:
+        return StandardVerdict.REFUSED
+    if record.outcome is Outcome.SAFE:
+        return StandardVerdict.PASS
+    if record.outcome is not Outcome.FAILURE:
+        return StandardVerdict.UNJUDGED
+    avoided = record.avoided_by or {}
+    drivers = ("r157", "fsm") if standard == "either" else (standard,)
+    contact = record.collision is not None and record.collision.valid
+    if not contact or any(avoided.get(driver, False) for driver in drivers):
+        return StandardVerdict.FAIL
+    return StandardVerdict.OUT_OF_SCOPE
+
+
+def named_values(scene: Mapping[str, float], parameters: Mapping[str, ScenarioParameter]) -> dict[str, float | str]:
+    """Parameter → number, or word, of a scene; rows by the names of their columns."""
+    values: dict[str, float | str] = {}
+    for name, value in scene.items():
+        parameter = parameters.get(name)
+        part = 0 if parameter is None else min(int(value * parameter.alternatives), parameter.alternatives - 1)
+        if parameter is not None and parameter.words:
+            values[name] = parameter.words[part]
+        elif parameter is not None and parameter.rows:
+            values |= parameter.rows[part]
+        else:
+            values[name] = value
+    return values
+
+
+def grid_csv(grids: Sequence[PlayedGrid]) -> str:
+    """A row for each scene; parameters that a run does not have are empty."""
+    names = dict.fromkeys(name for grid in grids for point in grid.points for name in point.values)
+    own = ("outcome", "reason", "kind", "grade", "r157", "fsm", "verdict")
+    text = io.StringIO()
+    writer = csv.DictWriter(text, ["id", "scenario", "ego", *names, *own], restval="", lineterminator="\n")
+    writer.writeheader()
+    for grid in grids:
+        for point in grid.points:
+            judged = {name: getattr(point, name) for name in own}
+            row = {"id": point.id, "scenario": grid.spec.family, "ego": grid.ego, **point.values, **judged}
+            writer.writerow({name: _cell(value) for name, value in row.items()})
+    return text.getvalue()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.12g}" if isinstance(value, float) else value
