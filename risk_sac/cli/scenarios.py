@@ -166,12 +166,17 @@ def _draw(options: argparse.Namespace) -> int:
 
 def _copy(options: argparse.Namespace) -> int:
     document, folder = document_at(options.name)
-    if options.file.exists():
-        raise ConfigError("file", f"{options.file}, which is there", "a new file", "choose another name")
+    files = {options.file: _text(options.name).encode()}
     for name in networks(document):
         if folder is not None and (folder / name).is_file():
-            (options.file.parent / name).write_bytes((folder / name).read_bytes())
-    options.file.write_text(_text(options.name))
+            files[options.file.parent / name] = (folder / name).read_bytes()
+    if not options.file.parent.is_dir():
+        raise ConfigError("file", f"a folder {options.file.parent}, which is not there", "a folder", "make it first")
+    for file, content in files.items():
+        if file.exists() and (file == options.file or file.read_bytes() != content):
+            raise ConfigError("file", f"{file}, which is there", "a new file", "choose another name or folder")
+    for file, content in files.items():
+        file.write_bytes(content)
     own = "its nets beside it" if folder is not None else f"its net ships: {FOLDER / document.name}"
     say(f"Written: {options.file}; {own}.")
     return OK
