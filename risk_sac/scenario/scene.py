@@ -24,6 +24,7 @@ from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.bodies import BODIES, BodyName, Motion
 from risk_sac.scenario.ground import ground_of, kerb_of
 from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, StaticStart, VehicleStart
+from risk_sac.scenario.odd import FRICTION
 from risk_sac.scenario.tracks import Track, Turn, lane_named, routed, straight_on
 from risk_sac.world.net import Crossing, Link, Net, NetLane, direction
 from risk_sac.world.types import STEP_S, Point, Role
@@ -155,10 +156,17 @@ class SceneLayout:
             lane_width_m=self._placed[EGO].lane.width_m,
             signal=signal,
             signal_offset_s=value.of(document.signal.offset_s, "signal.offset_s") if signal else 0.0,
-            friction=value.of(document.friction, "friction"),
+            friction=self._friction(),
             horizon_steps=steps_of(value.of(document.horizon_s, "horizon_s")),
             wary=document.wary,
         )
+
+    def _friction(self) -> float:
+        friction = self._value.of(self._document.friction, "friction")
+        if not FRICTION.low <= friction <= FRICTION.high:
+            wanted = f"{FRICTION.low:g} to {FRICTION.high:g}"
+            raise ConfigError("friction", f"{friction:g}", wanted, "bound it with min or max")
+        return friction
 
     def _track(self, lane: str, driven: Driven, path: str, *, begin: bool) -> OnTrack:
         """The track from a lane's beginning or its end, where an actor goes; `before_m` is 0."""

@@ -87,6 +87,8 @@ FAULTS: dict[str, tuple[str, Any, str]] = {  # what it is -> where it is written
     "name of a parameter in rows": ("parameters.two", {"rows": [{"gap": 1.0}]}, "parameters.gap"),
     "two forms of a start": ("actors.truck.start.lane", "road_1", "actors.truck.start"),
     "start without its gap": ("actors.truck.start", {"ahead_of": "ego"}, "actors.truck.start.gap_m"),
+    "friction of no road": ("friction", "speed / 4", "friction"),
+    "negative friction": ("friction", -1, "friction"),
     "horizon too long": ("horizon_s", "speed * 100", "horizon_s"),
     "number that is none": ("horizon_s", [1], "horizon_s"),
     "unknown family": ("like", {"family": "lo", "actors": {"truck": "lead"}}, "like.family"),
