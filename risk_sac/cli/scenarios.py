@@ -10,7 +10,7 @@ from rich.table import Table
 from risk_sac.cli.console import FAILED, OK, print_answer, say
 from risk_sac.cli.parser import Commands, Parser, add_command, add_group, add_json_flag
 from risk_sac.config import Scenario
-from risk_sac.errors import ConfigError
+from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.host.terminal import console
 from risk_sac.scenario import library
 from risk_sac.scenario.check import check_document
@@ -88,7 +88,13 @@ def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
         return read_document(Path(name_or_file)), Path(name_or_file).absolute().parent
     if name_or_file in shipped_names():
         return shipped_document(name_or_file), None
-    return library.kept(name_or_file)
+    try:
+        return library.kept(name_or_file)
+    except ConfigError as error:
+        known = library.listed()
+        close = next((name for name in known if name.startswith(f"{name_or_file}_")), name_or_file)
+        remedy = did_you_mean(close, (*shipped_names(), *known)) or error.remedy
+        raise ConfigError("scenario", error.got, error.expected, remedy) from None
 
 
 def is_file(name_or_file: str) -> bool:

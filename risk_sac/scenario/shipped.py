@@ -34,11 +34,11 @@ def shipped_document(name: str) -> Scenario:
     return document_from(scenario_file(name).read_text())
 
 
-def shipped_net(name: str) -> str:
-    """Returns a shipped net's file below `sumo_nets/`; raises `ConfigError` if there is none."""
+def shipped_net(name: str, remedy: str = "") -> str:
+    """Returns a shipped net's file below `sumo_nets/`; raises `ConfigError`, with a remedy, if there is none."""
     known = sorted(path.parent.name for path in FOLDER.glob("*/*.net.xml"))
     if name not in known:
-        raise ConfigError("network", repr(name), f"a net beside the document, or one of {', '.join(known)}")
+        raise ConfigError("network", repr(name), f"a net beside the document, or one of {', '.join(known)}", remedy)
     return f"{name}/{name}.net.xml"
 
 
@@ -62,5 +62,9 @@ def nets_of(document: Scenario, folder: Path | None = None) -> Mapping[str, str]
     nets = {}
     for name in networks(document):
         own = None if folder is None or "/" in name or name.startswith(".") else folder / name
-        nets[name] = str(own.absolute()) if own is not None and own.is_file() else shipped_net(name)
+        if own is not None and own.is_file():
+            nets[name] = str(own.absolute())
+        else:
+            beside = own is not None and own.with_name(f"{own.name}.net.xml").is_file()
+            nets[name] = shipped_net(name, f"did you mean {name}.net.xml?" if beside else "")
     return nets
