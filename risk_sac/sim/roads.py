@@ -350,7 +350,8 @@ def _type(driven: str, name: BodyName, class_: str) -> str:
         types.setAccel(id_, body.driver.accel_mps2)
         types.setDecel(id_, body.driver.decel_mps2)
         types.setEmergencyDecel(id_, body.driver.emergency_mps2)
-        types.setVehicleClass(id_, class_)
+        if class_ != CAR:
+            types.setVehicleClass(id_, class_)
     return id_
 
 
