@@ -24,10 +24,10 @@ test("all drivers that would have prevented it are named", () => {
 });
 
 test("what the ego knew is said once, of hiding and time together", () => {
-  expect(knownOf(contact(false, 3))).toBe("The ego had known of lead for 3.0 s without a break.");
-  expect(knownOf(contact(true, 1.2))).toBe("The ego came to know of lead only 1.2 s before the contact.");
-  expect(knownOf(contact(true, 0))).toBe("The ego did not know of lead when the conflict began, nor at the contact.");
-  expect(knownOf(contact(false, 0))).toBe("The ego did not know of lead at the contact, but when the conflict began.");
+  expect(knownOf(contact(false, 3))).toBe("lead had been in the ego's view for 3.0 s without a break.");
+  expect(knownOf(contact(true, 1.2))).toBe("lead came into the ego's view only 1.2 s before the contact.");
+  expect(knownOf(contact(true, 0))).toBe("lead was not in the ego's view when the conflict began, nor at the contact.");
+  expect(knownOf(contact(false, 0))).toBe("lead was not in the ego's view at the contact, but when the conflict began.");
 });
 
 const PART = { seen_s: 2.3, braked_after_s: 1.1, braking_mps2: 4, possible_mps2: 7.6, gained_mps: 0.2, started: false, sight_mps: null, sighted_mps: null, left_first: "striker" };

@@ -52,15 +52,15 @@ export function preventedBy(violation: Collision | Violation): string | null {
   return `${told.length > 0 ? `${told.join(", ")} and ${last}` : last} would have prevented it${byRule}`;
 }
 
-/** Since when the ego knew of the striker. */
+/** Since when the striker was in the ego's view; what a defect keeps from the ego counts too. */
 export function knownOf({ visible_for_s, other_id, judgement }: Collision): string {
   const seen_s = visible_for_s ?? 0;
   if (judgement?.hidden) {
-    if (seen_s > 0) return `The ego came to know of ${other_id} only ${number(seen_s, 1)} s before the contact.`;
-    return `The ego did not know of ${other_id} when the conflict began, nor at the contact.`;
+    if (seen_s > 0) return `${other_id} came into the ego's view only ${number(seen_s, 1)} s before the contact.`;
+    return `${other_id} was not in the ego's view when the conflict began, nor at the contact.`;
   }
-  if (seen_s > 0) return `The ego had known of ${other_id} for ${number(seen_s, 1)} s without a break.`;
-  return `The ego did not know of ${other_id} at the contact${judgement ? ", but when the conflict began" : ""}.`;
+  if (seen_s > 0) return `${other_id} had been in the ego's view for ${number(seen_s, 1)} s without a break.`;
+  return `${other_id} was not in the ego's view at the contact${judgement ? ", but when the conflict began" : ""}.`;
 }
 
 /** The fault, and what the ego did about the striker; null of a refused or an older one. */
