@@ -20,7 +20,7 @@ def prevented_by(violation: Collision | Violation) -> str | None:
     names = [name for name, prevents in violation.prevention.items() if prevents and name != TTC_RULE]
     by_rule = f"; by {DRIVERS[TTC_RULE]} it is preventable" if violation.prevention.get(TTC_RULE) else ""
     if names == [FULL_BRAKING]:
-        return f"only {DRIVERS[FULL_BRAKING]} would have prevented it{by_rule}"
+        return f"of the reference drivers, only {DRIVERS[FULL_BRAKING]} would have prevented it{by_rule}"
     told = [DRIVERS.get(name, f"the {name.replace('_', ' ')} driver") for name in names]
     *first, last = told or ["none of the reference drivers"]
     told_of = f"{', '.join(first)} and {last}" if first else last

@@ -14,11 +14,11 @@ function contact(hidden: boolean, visible_for_s: number): Collision {
 }
 
 test("all drivers that would have prevented it are named", () => {
-  expect(preventedBy(broken("full_braking"))).toBe("only full braking at once would have prevented it");
+  expect(preventedBy(broken("full_braking"))).toBe("of the reference drivers, only full braking at once would have prevented it");
   expect(preventedBy(contact(false, 1))).toBe("the RSS driver and full braking at once would have prevented it");
   expect(preventedBy(broken("r157", "fsm", "full_braking"))).toBe("R157's driver, the fuzzy safety model and full braking at once would have prevented it");
   expect(preventedBy(broken("r157_ttc"))).toBe("none of the reference drivers would have prevented it; by R157's time-to-collision rule it is preventable");
-  expect(preventedBy(broken("full_braking", "r157_ttc"))).toBe("only full braking at once would have prevented it; by R157's time-to-collision rule it is preventable");
+  expect(preventedBy(broken("full_braking", "r157_ttc"))).toBe("of the reference drivers, only full braking at once would have prevented it; by R157's time-to-collision rule it is preventable");
   expect(preventedBy(broken())).toBe("none of the reference drivers would have prevented it");
   expect(preventedBy({ requirement: "x", drivers: {} } as unknown as Violation)).toBeNull();
 });

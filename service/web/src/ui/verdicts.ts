@@ -14,7 +14,7 @@ interface GradeWords {
 
 export const GRADE_WORDS: Record<GradeName, GradeWords> = {
   preventable: { short: "preventable", long: "A reference driver would have prevented it" },
-  full_braking: { short: "by full braking", long: "Only full braking at once would have prevented it" },
+  full_braking: { short: "by full braking", long: "Of the reference drivers, only full braking at once would have prevented it" },
   unavoidable: { short: "unavoidable", long: "Neither a reference driver nor full braking at once would have prevented it" },
   none: { short: "not graded", long: "No reference driver was tried" },
 };
@@ -46,7 +46,7 @@ export function preventedBy(violation: Collision | Violation): string | null {
   if (drivers.length === 0) return null;
   const names = drivers.flatMap(([name, prevents]) => (prevents && name !== TTC_RULE ? [name] : []));
   const byRule = drivers.some(([name, prevents]) => prevents && name === TTC_RULE) ? `; by ${DRIVERS[TTC_RULE]} it is preventable` : "";
-  if (names.length === 1 && names[0] === FULL_BRAKING) return `only ${DRIVERS[FULL_BRAKING]} would have prevented it${byRule}`;
+  if (names.length === 1 && names[0] === FULL_BRAKING) return `of the reference drivers, only ${DRIVERS[FULL_BRAKING]} would have prevented it${byRule}`;
   const told = names.length > 0 ? names.map(driverWords) : ["none of the reference drivers"];
   const last = told.pop()!;
   return `${told.length > 0 ? `${told.join(", ")} and ${last}` : last} would have prevented it${byRule}`;
