@@ -12,7 +12,7 @@ from rich.table import Table
 from risk_sac.cli.console import FAILED, OK, print_answer, say
 from risk_sac.cli.parser import Commands, Parser, add_command, add_group, add_json_flag
 from risk_sac.config import Scenario
-from risk_sac.errors import ConfigError
+from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.host.terminal import complain, console
 from risk_sac.scenario import library
 from risk_sac.scenario.check import check_document
@@ -149,7 +149,13 @@ def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
         return read_document(Path(name_or_file)), Path(name_or_file).absolute().parent
     if name_or_file in shipped_names():
         return shipped_document(name_or_file), None
-    return library.kept(name_or_file)
+    try:
+        return library.kept(name_or_file)
+    except ConfigError as error:
+        known = library.listed()
+        close = next((name for name in known if name.startswith(f"{name_or_file}_")), name_or_file)
+        remedy = did_you_mean(close, (*shipped_names(), *known)) or error.remedy
+        raise ConfigError("scenario", error.got, error.expected, remedy) from None
 
 
 def is_file(name_or_file: str) -> bool:
@@ -260,12 +266,17 @@ def axes(document: Scenario) -> list[str]:
 
 def _copy(options: argparse.Namespace) -> int:
     document, folder = document_at(options.name)
-    if options.file.exists():
-        raise ConfigError("file", f"{options.file}, which is there", "a new file", "choose another name")
+    files = {options.file: _text(options.name).encode()}
     for name in (*networks(document), *roads(document)):
         if folder is not None and (folder / name).is_file():
-            (options.file.parent / name).write_bytes((folder / name).read_bytes())
-    options.file.write_text(_text(options.name))
+            files[options.file.parent / name] = (folder / name).read_bytes()
+    if not options.file.parent.is_dir():
+        raise ConfigError("file", f"a folder {options.file.parent}, which is not there", "a folder", "make it first")
+    for file, content in files.items():
+        if file.exists() and (file == options.file or file.read_bytes() != content):
+            raise ConfigError("file", f"{file}, which is there", "a new file", "choose another name or folder")
+    for file, content in files.items():
+        file.write_bytes(content)
     own = "its nets beside it" if folder is not None else f"its net ships: {FOLDER / document.name}"
     say(f"Written: {options.file}; {own}.")
     return OK

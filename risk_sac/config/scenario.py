@@ -322,7 +322,7 @@ class Scenario(Settings):
     origin: Origin | None = None
     signal: SignalTiming = SignalTiming()
     friction: Expression = 1.0
-    """Of tyres on the road."""
+    """Of tyres on the road, 0.4 to 1."""
     wary: bool = True
     """Whether drivers stop for an ego that stands askew."""
     odd: Odd = Odd()

@@ -15,7 +15,8 @@ from risk_sac.errors import ConfigError
 
 T = TypeVar("T", RunSpec, CampaignSpec, EgoConfig)
 PROFILES: tuple[str, ...] = get_args(EgoConfig.model_fields["profile"].annotation)
-EGO_NAMES, EGO_FILE = f"{', '.join(PROFILES)}, a registered ego", "a YAML file with the fields of a campaign's ego"
+EGO_NAMES = f"{', '.join(PROFILES)}, a registered ego, one of these with a defect as EGO+DEFECT"
+EGO_FILE = "a YAML file with the fields of a campaign's ego"
 DRIVER = re.compile(r"[a-z][a-z0-9_-]{0,39}")
 RUN_DEFAULTS = {"method": "risk-sac", "seed": 0}
 SCENARIOS = {"scenario": "family", "scenarios": "families"}  # as a user writes it -> the field of a spec

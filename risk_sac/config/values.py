@@ -200,13 +200,13 @@ def _parser(start: str) -> Lark:
     return Lark(_GRAMMAR, parser="lalr", start=start, transformer=_Terms())
 
 
-def _parsed(text: str, start: str, expected: str) -> Term:
+def _parsed(text: str, start: str, kind: str, expected: str) -> Term:
     if len(text) > LONGEST:
         raise ConfigError("", f"{len(text)} characters", f"at most {LONGEST}")
     try:
         return _parser(start).parse(text)  # type: ignore[return-value] # what the transformer makes
     except UnexpectedInput as error:
-        where = f", which is none from column {error.column} on" if error.column > 0 else ", which is incomplete"
+        where = f", which is no {kind} from column {error.column} on" if error.column > 0 else ", which is incomplete"
         raise ConfigError("", f"{text!r}{where}", expected) from error
 
 
@@ -214,14 +214,15 @@ def _parsed(text: str, start: str, expected: str) -> Term:
 def term(expression: "float | str") -> Term:
     """Parses an expression, or takes a number; raises `ConfigError` for anything but arithmetic."""
     if isinstance(expression, str):
-        return _parsed(expression, "start", f"arithmetic over parameters: + - * / % and {', '.join(FUNCTIONS)}")
+        wanted = f"arithmetic over parameters: + - * / % and {', '.join(FUNCTIONS)}"
+        return _parsed(expression, "start", "arithmetic", wanted)
     return Term("number", number=float(expression))
 
 
 @cache
 def comparison(text: str) -> Term:
     """Parses a comparison of two expressions, which is 1 or 0; raises `ConfigError`."""
-    return _parsed(text, "comparison", "a comparison such as `lead_gap_m >= 2 * ego_speed_mps`")
+    return _parsed(text, "comparison", "comparison", "a comparison such as `lead_gap_m >= 2 * ego_speed_mps`")
 
 
 def _checked(expression: float | str) -> float | str:

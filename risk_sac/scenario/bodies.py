@@ -1,8 +1,9 @@
 """Table of road users' bodies: size, motion, injury, picture and exports, one row each.
 
 Adding a body is one row here. SUMO's types of car and truck are in `sumo_nets/vtypes.add.xml`; those of other bodies
-that move in lanes are copies of the car's with the row's size and driver. All are of the class passenger, so that a
-net's permissions refuse no body: which lanes a body uses is the scenario's.
+that move in lanes are copies of the car's with the row's size and driver. They are of the class passenger, so that
+lanes for cars refuse no body: which lanes a body uses is the scenario's. One that starts on a lane without cars gets
+its own class, and an adversary there one that SUMO refuses nowhere.
 
 Sources of sizes: car, truck and pedestrian are choices of the shipped scenarios. Van, bus, motorcycle and bicycle have
 the default sizes of SUMO's classes delivery, bus, motorcycle and bicycle (SUMO documentation, vehicle type parameter
@@ -69,6 +70,8 @@ class Body:
     shape: Shape
     """How it is drawn."""
     export: ExportNames
+    sumo_class: str = "passenger"
+    """Its class in permissions of lanes without cars."""
     driver: LaneDriver = CAR_DRIVER
     """As SUMO's class has it, where SUMO drives it."""
     limits: Mapping[str, BodyLimit] = field(default_factory=dict)
@@ -116,25 +119,29 @@ _ROWS = (
     Body(
         name="van", length_m=6.5, width_m=2.16, height_m=2.86, mass_kg=2500.0, moves=("lanes", "not"), conceals=True,
         lit=True, injury="occupant", shape="vehicle", export=ExportNames("van", "car", 6),
+        sumo_class="delivery",
     ),
     Body(
         name="truck", length_m=8.0, width_m=2.4, height_m=3.2, mass_kg=7500.0, moves=("lanes", "not"), conceals=True,
         lit=True, injury="occupant", shape="vehicle", export=ExportNames("truck", "truck", 7),
+        sumo_class="truck",
     ),
     Body(
         name="bus", length_m=12.0, width_m=2.5, height_m=3.4, mass_kg=12000.0, moves=("lanes", "not"), conceals=True,
         lit=True, injury="occupant", shape="vehicle", export=ExportNames("bus", "bus", 12),
-        driver=LaneDriver(1.2, 4.0, 7.0), limits=_BUS,
+        sumo_class="bus", driver=LaneDriver(1.2, 4.0, 7.0), limits=_BUS,
     ),
     Body(
         name="motorcycle", length_m=2.2, width_m=0.9, height_m=1.5, mass_kg=280.0, moves=("lanes", "not"),
         conceals=False, lit=True, injury="motorcyclist", shape="two_wheels",
-        export=ExportNames("motorbike", "motorcycle", 10), driver=LaneDriver(6.0, 10.0, 10.0), limits=_MOTORCYCLE,
+        export=ExportNames("motorbike", "motorcycle", 10), sumo_class="motorcycle",
+        driver=LaneDriver(6.0, 10.0, 10.0), limits=_MOTORCYCLE,
     ),
     Body(
         name="bicycle", length_m=1.6, width_m=0.65, height_m=1.7, mass_kg=90.0, moves=("lanes", "freely", "not"),
         conceals=False, lit=True, injury="cyclist", shape="two_wheels",
-        export=ExportNames("bicycle", "bicycle", 11), driver=LaneDriver(1.2, 3.0, 7.0), limits=_BICYCLE,
+        export=ExportNames("bicycle", "bicycle", 11), sumo_class="bicycle",
+        driver=LaneDriver(1.2, 3.0, 7.0), limits=_BICYCLE,
     ),
     Body(
         name="pedestrian", length_m=0.5, width_m=0.5, height_m=1.75, mass_kg=75.0, moves=("freely", "not"),

@@ -7,12 +7,14 @@ an episode needs the folder that its scenario was kept in.
 """
 
 import hashlib
+import io
 import json
 import os
 import re
 import shutil
 import tempfile
 import time
+import xml.etree.ElementTree as ET
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
@@ -30,6 +32,7 @@ DIGITS = 12
 KEPT = re.compile(rf"[a-z][a-z0-9_]{{0,46}}_[0-9a-f]{{{DIGITS}}}")
 _NET_FILE = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _NEW, _GONE = ".new-", ".gone-"
+_SCHEMA = "{http://www.w3.org/2001/XMLSchema-instance}noNamespaceSchemaLocation"
 
 
 def library() -> Path:
@@ -190,5 +193,14 @@ def _check(files: Mapping[str, bytes]) -> None:
 def _digest(files: Mapping[str, bytes]) -> str:
     digest = hashlib.sha256()
     for name in sorted(files):
-        digest.update(f"{name}\0{len(files[name])}\0".encode() + files[name])
+        content = files[name] if name == DOCUMENT else _canonical(files[name])
+        digest.update(f"{name}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()[:DIGITS]
+
+
+def _canonical(net: bytes) -> bytes:
+    """A net without comments, such as netconvert's date, white space and schema; what is no XML stays as it is."""
+    try:
+        return ET.canonicalize(from_file=io.BytesIO(net), strip_text=True, exclude_attrs=[_SCHEMA]).encode()
+    except (ET.ParseError, LookupError, ValueError):  # the latter two: an encoding that Python lacks
+        return net

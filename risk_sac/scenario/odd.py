@@ -40,9 +40,12 @@ SENSIBLE: dict[str, Interval] = {
     "dynamic.pedestrian_turn_radps": Interval(low=0, high=10),
 }
 
+FRICTION = Interval(low=0.4, high=1.0)
+"""Least, on worn tyres in heavy rain, and greatest friction that is simulated."""
+
 # Widest values that every family supports if a campaign asks for them; a family's defaults are usual values.
 EXTREME: dict[str, Interval | tuple[str, ...]] = {
-    "environment.friction": Interval(low=0.4, high=1.0),  # from worn tyres in heavy rain
+    "environment.friction": FRICTION,
     "environment.visibility_m": Interval(low=40, high=2000),
     "environment.precipitation": ("heavy_rain", "none", "rain"),
     "environment.time_of_day": ("day", "night"),

@@ -10,6 +10,7 @@ from typing import NamedTuple, get_args
 from risk_sac.config.scenario import (
     EGO,
     LONGEST_HORIZON_S,
+    Actor,
     Driven,
     Moving,
     Scenario,
@@ -21,12 +22,14 @@ from risk_sac.scenario.bodies import BODIES, BodyName, Motion
 from risk_sac.scenario.ground import ground_of, kerb_of
 from risk_sac.scenario.lane_places import entry_of, lane_line
 from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, StaticStart, VehicleStart
+from risk_sac.scenario.odd import FRICTION
 from risk_sac.scenario.story_plan import StoryPlan
 from risk_sac.scenario.story_scene import StoryScene
 from risk_sac.scenario.tracks import Track, Turn, lane_named, routed, straight_on
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.scenario.value import Value
 from risk_sac.world.net import Crossing, Link, Net, NetLane, direction
+from risk_sac.world.read_net import DRIVER
 from risk_sac.world.types import STEP_S, Point, Role
 
 ROLES = {"adversary": Role.ADVERSARY, "story": Role.STORY, "background": Role.BACKGROUND, "static": Role.STATIC}
@@ -127,7 +130,7 @@ class SceneLayout:
             lane_width_m=self._placed[EGO].lane.width_m,
             signal=signal,
             signal_offset_s=value.of(document.signal.offset_s, "signal.offset_s") if signal else 0.0,
-            friction=value.of(document.friction, "friction"),
+            friction=self._friction(),
             horizon_steps=steps_of(value.of(document.horizon_s, "horizon_s")),
             wary=document.wary,
             story=None if document.story is None else self._plan((ego, *vehicles), pedestrians, statics),
@@ -150,6 +153,13 @@ class SceneLayout:
         moves = {name: name in walking for name in (*own, *walking)}
         return self._story.plan(self._bodies, self._speeds | walking, moves, own[EGO])
 
+    def _friction(self) -> float:
+        friction = self._value.of(self._document.friction, "friction")
+        if not FRICTION.low <= friction <= FRICTION.high:
+            wanted = f"{FRICTION.low:g} to {FRICTION.high:g}"
+            raise ConfigError("friction", f"{friction:g}", wanted, "bound it with min or max")
+        return friction
+
     def _track(self, lane: str, driven: Driven, path: str, *, begin: bool) -> OnTrack:
         """The track from a lane's beginning or its end, where an actor goes; `before_m` is 0."""
         value, net = self._value, self._net
@@ -158,7 +168,7 @@ class SceneLayout:
             known = get_args(Turn)
             raise ConfigError(f"{path}.turn", repr(turn), f"one of {', '.join(known)}", did_you_mean(turn, known))
         field = f"{path}.lane" if isinstance(driven, Stream) else f"{path}.start.lane"
-        here = lane_named(net, lane, field, turn or _after(route, lane))
+        here = lane_named(net, lane, field, turn or _after(route, lane), self._classes(driven))
         reference_m = 0.0 if begin else here.length_m
         if route is not None:
             track = routed(net, here, reference_m, route, f"{path}.route")
@@ -166,6 +176,14 @@ class SceneLayout:
             metres = here.limit_mps * self._driven_s + reference_m
             track = straight_on(net, here, reference_m, metres, turn, f"{path}.turn")
         return OnTrack(track, here, 0.0, True, begin)
+
+    def _classes(self, driven: Driven) -> tuple[str, ...] | None:
+        """Classes of SUMO of which one must be admitted where an actor starts; None: it starts on any lane."""
+        if isinstance(driven, Actor) and driven.role in ("adversary", "static"):
+            return None
+        body = self._value.word(driven.body)
+        own = DRIVER if driven is self._document.ego or body not in BODIES else BODIES[body].sumo_class
+        return tuple(dict.fromkeys((DRIVER, own)))
 
     def _vehicle(self, name: str, role: Role, moving: Moving) -> VehicleStart:
         path = name if name == EGO else f"actors.{name}"
@@ -245,9 +263,11 @@ class SceneLayout:
         """The track from the lane of another actor's reference, or one beside it."""
         left = round(self._value.of(moving.start.lanes_left, f"{path}.start.lanes_left"))
         lane = self._net.lanes.get(f"{there.lane.edge}_{there.lane.index + left}")
-        if lane is None or not lane.drivable:
+        classes = self._classes(moving)
+        if lane is None or not lane.admits(classes):
             got = f"{left} lanes left of {there.lane.id!r}"
-            raise ConfigError(f"{path}.start.lanes_left", got, f"a lane for cars of {there.lane.edge!r}")
+            wanted = f"a lane of {there.lane.edge!r} for {' or '.join(classes or ('vehicles',))}"
+            raise ConfigError(f"{path}.start.lanes_left", got, wanted)
         if left == 0 and moving.route is None and moving.turn is None:
             return there
         return self._track(lane.id, moving, path, begin=there.begin)
@@ -320,7 +340,7 @@ class SceneLayout:
             return of(start.x_m, f"{path}.x_m"), of(start.y_m, f"{path}.y_m"), *_unit(turned)
         if start.lane is None:
             raise ConfigError(path, "a start relative to another actor", "a crossing, a point or a lane")
-        lane = lane_named(self._net, self._value.choose(start.lane), f"{path}.lane")
+        lane = lane_named(self._net, self._value.choose(start.lane), f"{path}.lane", classes=None)
         if start.at_m is not None:
             at_m = of(start.at_m, f"{path}.at_m")
         else:

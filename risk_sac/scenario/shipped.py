@@ -35,11 +35,11 @@ def shipped_document(name: str) -> Scenario:
     return document_from(scenario_file(name).read_text())
 
 
-def shipped_net(name: str) -> str:
-    """Returns a shipped net's file below `sumo_nets/`; raises `ConfigError` if there is none."""
+def shipped_net(name: str, remedy: str = "") -> str:
+    """Returns a shipped net's file below `sumo_nets/`; raises `ConfigError`, with a remedy, if there is none."""
     known = sorted(path.parent.name for path in FOLDER.glob("*/*.net.xml"))
     if name not in known:
-        raise ConfigError("network", repr(name), f"a net beside the document, or one of {', '.join(known)}")
+        raise ConfigError("network", repr(name), f"a net beside the document, or one of {', '.join(known)}", remedy)
     return f"{name}/{name}.net.xml"
 
 
@@ -73,8 +73,11 @@ def nets_of(document: Scenario, folder: Path | None = None) -> Mapping[str, str]
             raise ConfigError("road", repr(name), "an OpenDRIVE file beside the document and its net")
     nets = {}
     for name in networks(document):
-        own = folder is not None and _beside(name, folder)
-        nets[name] = str((folder / name).absolute()) if folder is not None and own else shipped_net(name)
+        if folder is not None and _beside(name, folder):
+            nets[name] = str((folder / name).absolute())
+        else:
+            beside = folder is not None and _beside(f"{name}.net.xml", folder)
+            nets[name] = shipped_net(name, f"did you mean {name}.net.xml?" if beside else "")
     return nets
 
 

@@ -2,12 +2,13 @@
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.world.net import Link, Net, NetLane
+from risk_sac.world.read_net import DRIVER
 
 Turn = Literal["left", "straight", "right"]
 STRAIGHT_RAD = math.radians(30.0)  # largest bend of a way that goes straight on
@@ -55,14 +56,21 @@ class Track:
         return tuple(piece.edge for piece in self.pieces[first:]) + self.onward, piece, position_m
 
 
-def lane_named(net: Net, name: str, field: str, leading: "Sequence[str] | Turn | None" = None) -> NetLane:
-    """Returns a lane for cars by its name or its edge's; raises `ConfigError` if there is none.
+def lane_named(
+    net: Net,
+    name: str,
+    field: str,
+    leading: "Sequence[str] | Turn | None" = None,
+    classes: Collection[str] | None = (DRIVER,),
+) -> NetLane:
+    """Returns a lane by its name, or one for cars by its edge's; raises `ConfigError` if there is none.
 
     Args:
       net: where.
       name: a lane, or an edge, of which the leftmost lane is taken that leads on.
       field: path of the name in the document.
       leading: edges that the way goes on with, or a turn.
+      classes: of SUMO, of which it has to admit one; None: any lane of a road does.
     """
     if name in net.edges:
         lanes = net.edges[name].drivable
@@ -77,8 +85,9 @@ def lane_named(net: Net, name: str, field: str, leading: "Sequence[str] | Turn |
     lane = net.lanes.get(name)
     if lane is None or lane.use != "lane":
         raise ConfigError(field, repr(name), "a lane or an edge of the net", _near(name, [*net.edges, *net.lanes]))
-    if not lane.drivable:
-        raise ConfigError(field, f"{name!r}, on which no car may drive", "a lane for cars")
+    if classes is not None and not lane.admits(classes):
+        got = f"{name!r}, on which no {' or '.join(classes)} may drive"
+        raise ConfigError(field, got, f"a lane for {' or '.join(classes)}")
     return lane
 
 

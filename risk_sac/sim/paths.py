@@ -22,7 +22,7 @@ CHANGE_M = 50.0  # length before the end of a lane that leads elsewhere on which
 CHANGED = 0.6  # share of that length after which the path has changed
 # Choices: the same two lengths as times at the limit, where roads are fast. A lane change then takes 3 s.
 AHEAD_S, CHANGE_S, FAST_MPS = 7.0, 5.0, 20.0
-CAR = "passenger"  # vehicle class of all our vehicles
+CAR = "passenger"  # vehicle class of all our vehicles that start on lanes for cars
 
 
 # A polyline from the start of a lane on; one column for each point, and these rows.

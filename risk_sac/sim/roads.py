@@ -30,11 +30,12 @@ from risk_sac.sim.paths import (
     way_of,
 )
 from risk_sac.sim.reading import COLOURS
-from risk_sac.world.types import Floats, Lane, Road, Signal, StopLine
+from risk_sac.world.types import Floats, Lane, Road, Role, Signal, StopLine
 
 KEEP_ROUTE = 1  # of SUMO's `moveToXY`: the nearest place on the route
 REACH_M = 600.0  # of the route; no episode drives farther
 LEFT, RIGHT = 1, -1
+ANYWHERE = "ignoring"  # class that SUMO refuses on no lane
 NONE = Signal.NONE  # to look it up in the class takes longer than all else in `signals_at`
 SHOWN = COLOURS | {letter.upper(): colour for letter, colour in COLOURS.items()}
 
@@ -316,23 +317,30 @@ def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None
         if name.startswith(LANE_CHANGE):
             libsumo.vehicle.setParameter(layout.ego.id, name, f"{value:g}")
     for start in layout.vehicles:
-        _insert(start, _type("background", start.body))
+        _insert(start, _type("background", start.body, _class_of(start)))
     if layout.signal is not None:
         _set_signal(layout.signal, layout.signal_offset_s)
 
 
 def hand_over(start: VehicleStart) -> None:
     """Makes a vehicle drive as commanded, whatever is in its way."""
-    libsumo.vehicle.setType(start.id, _type("adversary", start.body))
+    libsumo.vehicle.setType(start.id, _type("adversary", start.body, _class_of(start)))
     for name, value in STEERED.items():  # a change of type leaves the lane-change model as it is
         libsumo.vehicle.setParameter(start.id, f"laneChangeModel.{name}", value)
     libsumo.vehicle.setSpeedMode(start.id, 0)
     libsumo.vehicle.setLaneChangeMode(start.id, 0)
 
 
-def _type(driven: str, name: BodyName) -> str:
+def _class_of(start: VehicleStart) -> str:
+    """Returns SUMO's class of a vehicle: a car's, or one that the lane without cars where it starts does not refuse."""
+    if car_may_use(f"{start.route[0]}_{start.lane}"):
+        return CAR
+    return ANYWHERE if start.role is Role.ADVERSARY else BODIES[start.body].sumo_class
+
+
+def _type(driven: str, name: BodyName, class_: str) -> str:
     """Returns the id of a body's type; one that is not shipped is made from the car's."""
-    id_, types = f"{driven}_{name}", libsumo.vehicletype
+    id_, types = f"{driven}_{name}" if class_ == CAR else f"{driven}_{name}_{class_}", libsumo.vehicletype
     if id_ not in types.getIDList():
         body = BODIES[name]
         types.copy(f"{driven}_car", id_)
@@ -342,6 +350,8 @@ def _type(driven: str, name: BodyName) -> str:
         types.setAccel(id_, body.driver.accel_mps2)
         types.setDecel(id_, body.driver.decel_mps2)
         types.setEmergencyDecel(id_, body.driver.emergency_mps2)
+        if class_ != CAR:
+            types.setVehicleClass(id_, class_)
     return id_
 
 
@@ -361,6 +371,8 @@ def _insert(start: VehicleStart, type_id: str) -> None:
         libsumo.vehicle.setSpeedFactor(start.id, start.speed_mps / limit_mps)  # SUMO refuses a faster start
     if needs_lane_change(start.route, f"{start.route[0]}_{start.lane}"):
         libsumo.vehicle.setParameter(start.id, ASSERTIVE, MERGING)
+    if libsumo.vehicletype.getVehicleClass(type_id) == ANYWHERE:
+        libsumo.vehicle.setLaneChangeMode(start.id, 0)  # to SUMO's driver sidewalks are lanes too
     if start.left_m != 0.0:  # SUMO's driver keeps to it
         edge, lane = start.route[0], start.lane
         x, y = libsumo.simulation.convert2D(edge, start.position_m, lane)

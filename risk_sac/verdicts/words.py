@@ -20,7 +20,7 @@ def prevented_by(violation: Collision | Violation) -> str | None:
     names = [name for name, prevents in violation.prevention.items() if prevents and name != TTC_RULE]
     by_rule = f"; by {DRIVERS[TTC_RULE]} it is preventable" if violation.prevention.get(TTC_RULE) else ""
     if names == [FULL_BRAKING]:
-        return f"only {DRIVERS[FULL_BRAKING]} would have prevented it{by_rule}"
+        return f"of the reference drivers, only {DRIVERS[FULL_BRAKING]} would have prevented it{by_rule}"
     told = [DRIVERS.get(name, f"the {name.replace('_', ' ')} driver") for name in names]
     *first, last = told or ["none of the reference drivers"]
     told_of = f"{', '.join(first)} and {last}" if first else last
@@ -28,18 +28,18 @@ def prevented_by(violation: Collision | Violation) -> str | None:
 
 
 def known(collision: Collision) -> str:
-    """Says for how long the ego had known of the striker.
+    """Says for how long the striker had been in the ego's view.
 
-    It follows the striker's name: "of which it had known for 1.0 s".
+    It follows the striker's name: "which had been in its view for 1.0 s". What a defect keeps from the ego counts too.
     """
     seen_s = collision.visible_for_s
     if collision.judgement.hidden:
         if seen_s > 0.0:
-            return f"of which it came to know only {seen_s:.1f} s before"
-        return "of which it did not know when the conflict began, nor then"
+            return f"which came into its view only {seen_s:.1f} s before"
+        return "which was not in its view when the conflict began, nor then"
     if seen_s > 0.0:
-        return f"of which it had known for {seen_s:.1f} s"
-    return "of which it did not know then, but when the conflict began"
+        return f"which had been in its view for {seen_s:.1f} s"
+    return "which was not in its view then, but when the conflict began"
 
 
 def began(collision: Collision) -> str:

@@ -2,7 +2,7 @@
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Mapping, Sequence, Set
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
 from typing import Concatenate, Literal, ParamSpec, TypeVar, cast
@@ -63,6 +63,7 @@ class NetLane:
     line: tuple[Point, ...]
     drivable: bool
     use: LaneUse = "lane"
+    classes: frozenset[str] = frozenset()  # of SUMO, that may drive on it; those of our bodies
     height_m: tuple[float, ...] = ()  # of the ground, at each point of the line
     next: list[str] = field(default_factory=list)  # lanes that follow
     heads: list[Head] = field(default_factory=list)  # at its end
@@ -72,6 +73,10 @@ class NetLane:
     def centre(self) -> Floats:
         """Its line, `k x 2`, m."""
         return np.array(self.line)
+
+    def admits(self, classes: Collection[str] | None) -> bool:
+        """Whether it is a lane of a road, and for one of SUMO's classes if some are given."""
+        return self.use == "lane" and (classes is None or not self.classes.isdisjoint(classes))
 
     @property
     def way_in_rad(self) -> float:

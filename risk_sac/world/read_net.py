@@ -11,7 +11,8 @@ from risk_sac.errors import MapError
 from risk_sac.world.net import Crossing, Edge, Head, Junction, LaneUse, Link, Net, NetLane, Program
 from risk_sac.world.types import Point
 
-DRIVER = "passenger"  # the class of every vehicle of ours
+DRIVER = "passenger"  # the class of every vehicle of ours on a lane that admits it
+CLASSES = frozenset({DRIVER, "delivery", "truck", "bus", "motorcycle", "bicycle"})  # of our bodies that drive in lanes
 TURNAROUND = "t"
 STOP = "rRyYu"  # red, yellow, and red with yellow: the colours that stop all traffic
 USES: Mapping[str, LaneUse] = {"normal": "lane", "internal": "inside", "crossing": "crossing"}  # by an edge's function
@@ -157,6 +158,7 @@ def _lane(edge: str, index: int, lane: ET.Element, function: str) -> NetLane:
     if len(points) == 1:
         ((x, y, z),) = points
         points = [(x, y, z), (x + 1e-3, y, z)]
+    classes = _admitted(a.get("allow"), a.get("disallow"))
     walks = function != "crossing" and set(a.get("allow", "").split()) == {"pedestrian"}
     return NetLane(
         id=a["id"],
@@ -166,8 +168,9 @@ def _lane(edge: str, index: int, lane: ET.Element, function: str) -> NetLane:
         width_m=_positive(a.get("width", DEFAULT_WIDTH_M)),
         limit_mps=max(_number(a["speed"]), LEAST_LIMIT_MPS),
         line=tuple((x, y) for x, y, _ in points),
-        drivable=_admits(a.get("allow"), a.get("disallow")),
+        drivable=DRIVER in classes,
         use="sidewalk" if walks else USES.get(function, "lane"),
+        classes=classes,
         height_m=tuple(z for _, _, z in points),
         original=tuple(
             name for p in lane.iter("param") if p.get("key") == "origId" for name in p.get("value", "").split()
@@ -175,10 +178,10 @@ def _lane(edge: str, index: int, lane: ET.Element, function: str) -> NetLane:
     )
 
 
-def _admits(allow: str | None, disallow: str | None) -> bool:
-    if allow is not None:
-        return bool({DRIVER, "all"} & set(allow.split()))
-    return not {DRIVER, "all"} & set((disallow or "").split())
+def _admitted(allow: str | None, disallow: str | None) -> frozenset[str]:
+    stated = set((disallow or "" if allow is None else allow).split())
+    named = CLASSES if "all" in stated else CLASSES & stated
+    return CLASSES - named if allow is None else named
 
 
 def _junction(junction: ET.Element) -> Junction:

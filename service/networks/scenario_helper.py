@@ -101,7 +101,8 @@ def _imported(upload: bytes, folder: Path) -> tuple[Scenario, Path]:
 def _put_net(content: bytes, name: str, document: Scenario, folder: Path) -> None:
     if name not in networks(document):
         named = ", ".join(networks(document))
-        raise ConfigError("network", f"a file {name!r} that the document does not name", f"one of {named}")
+        remedy = f"did you mean network: {name}?" if name.startswith(tuple(networks(document))) else ""
+        raise ConfigError("network", f"a file {name!r} that the document does not name", f"one of {named}", remedy)
     with tempfile.TemporaryDirectory() as scratch:
         upload = Path(scratch, "upload")
         upload.write_bytes(content)

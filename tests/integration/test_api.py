@@ -165,3 +165,11 @@ def test_each_answer_is_counted_but_only_the_first_of_several_equal_ones_is_logg
         lines = shared.log.read_text().splitlines()
         assert sum(f"GET {route} 200" in line and f"[campaign {campaign}]" in line for line in lines) == expected
     assert counted() - before == 2 * POLLS
+
+
+def test_list_of_campaigns_names_the_defects_of_their_egos(client):
+    ego = {"driver": "idm-aeb", "defects": ["latency"]}
+    posted = client.post("/v1/campaigns", json=SPEC | {"ego": ego})
+    assert posted.status_code == 202, posted.text
+    rows = {row["id"]: row for row in client.get("/v1/campaigns").json()["items"]}
+    assert rows[posted.json()["id"]]["ego"]["defects"] == ["latency"]

@@ -238,10 +238,10 @@ def test_a_failure_is_named_by_its_number_too(finished, service, call, capsys):
         assert call("failures", "show", one, named) == 2
         assert "'low-random-0-search-5' cannot be shown" in capsys.readouterr().err
     for campaign, named, complaint in (
-        (two, "5", "2 failures are called; wanted one of low-random-"),
-        (two, "search-5", "2 failures are called"),
-        (one, "4", "no failure is called"),
-        (one, "15", "no failure is called"),
+        (two, "5", "is the number of 2 failures; wanted one of low-random-"),
+        (two, "search-5", "is the number of 2 failures"),
+        (one, "4", "is the number of no failure"),
+        (one, "15", "is the number of no failure"),
     ):
         for command in ("show", "bundle"):
             capsys.readouterr()

@@ -66,6 +66,15 @@ def test_net_comes_in_an_archive(shared):
     assert answer.json()["errors"][0]["field"] == "network"
 
 
+def test_net_whose_ending_the_document_leaves_out_is_named(shared):
+    document = yaml.safe_dump(DOCUMENT | {"name": "own_road", "network": "road"})
+    content = zipped(document, NET, names=("own_road.yaml", "road.net.xml"))
+    answer = shared.client.post("/v1/scenarios", content=content, headers={"content-type": "application/zip"})
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == "network"
+    assert "did you mean network: road.net.xml?" in answer.json()["detail"]
+
+
 @pytest.mark.parametrize("path", ["/v1/scenarios", "/v1/scenarios/check"])
 def test_fault_is_named_and_nothing_is_stored(shared, path):
     before = shared.client.get("/v1/scenarios").json()

@@ -83,9 +83,7 @@ def _id_of(client: Client, campaign_id: str, named: str) -> str:
     matches = [id_ for id_ in ids if id_.rpartition("-")[2] == named or id_.endswith(str(wanted))]
     if len(matches) != 1:
         listing = f"`risk-sac campaigns failures list {campaign_id} --raw` lists them"
-        got = (
-            f"{named}, which {len(matches)} failures are called" if matches else f"{named}, which no failure is called"
-        )
+        got = f"{named}, which is the number of {len(matches) or 'no'} failure{'s' * (len(matches) > 1)}"
         raise ConfigError("FAILURE", got, f"one of {', '.join(matches)}" if matches else "the id of one", listing)
     return matches[0]
 

@@ -87,6 +87,8 @@ FAULTS: dict[str, tuple[str, Any, str]] = {  # what it is -> where it is written
     "name of a parameter in rows": ("parameters.two", {"rows": [{"gap": 1.0}]}, "parameters.gap"),
     "two forms of a start": ("actors.truck.start.lane", "road_1", "actors.truck.start"),
     "start without its gap": ("actors.truck.start", {"ahead_of": "ego"}, "actors.truck.start.gap_m"),
+    "friction of no road": ("friction", "speed / 4", "friction"),
+    "negative friction": ("friction", -1, "friction"),
     "horizon too long": ("horizon_s", "speed * 100", "horizon_s"),
     "number that is none": ("horizon_s", [1], "horizon_s"),
     "unknown family": ("like", {"family": "lo", "actors": {"truck": "lead"}}, "like.family"),
@@ -208,3 +210,27 @@ def test_turn_that_is_none_is_refused() -> None:
     with pytest.raises(ConfigError) as refused:
         checked(yaml.safe_dump({"name": "a", "network": "dense", "ego": ego}))
     assert (refused.value.field, refused.value.expected) == ("ego.turn", "one of left, straight, right")
+
+
+KERB = """
+name: kerb
+network: urban_street
+ego: {start: {lane: eastbound_2, at_m: 100}, speed: 10}
+actors:
+  bus: {body: bus, start: {lane: eastbound_1, at_m: 200}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "path"),
+    [
+        ("lane: eastbound_1", "lane: eastbound_0", "actors.bus.start.lane"),  # a sidewalk
+        ("eastbound_2", "eastbound_1", "ego.start.lane"),
+        ("body: bus", "body: bus, role: background", "actors.bus.start.lane"),
+    ],
+)
+def test_only_an_adversary_or_a_static_actor_starts_on_a_lane_that_is_closed_to_it(old, new, path) -> None:
+    checked(KERB)
+    checked(KERB.replace("body: bus", "body: bus, role: static"))
+    checked(KERB.replace("{lane: eastbound_1, at_m: 200}", "{beside: ego, lanes_left: -1, ahead_m: 50}"))
+    assert fault(KERB.replace(old, new)).field == path

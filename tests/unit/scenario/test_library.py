@@ -5,10 +5,11 @@ import os
 import pytest
 
 from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.maps.convert import present_net
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, family_named
 from risk_sac.scenario.reading import document_from
-from risk_sac.scenario.shipped import FOLDER, PAPER_FAMILIES, shipped_document
+from risk_sac.scenario.shipped import FOLDER, PAPER_FAMILIES, networks, shipped_document, shipped_names, shipped_net
 
 
 @pytest.fixture(autouse=True)
@@ -72,11 +73,21 @@ def test_a_net_that_leaves_the_folder_is_refused(folder):
 def test_a_changed_scenario_is_refused_until_it_is_kept_again(folder):
     kept = kept_with_net("low")
     net = folder / kept / "net.xml"
-    net.write_bytes(net.read_bytes() + b" ")
+    net.write_bytes(net.read_bytes().replace(b"3.30", b"3.40", 1))
     with pytest.raises(DamagedError):
         library.kept(kept)
     assert kept_with_net("low") == kept
     assert library.kept(kept)
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_name_depends_on_no_comment_and_no_white_space(name, tmp_path):
+    file = FOLDER / shipped_net(next(networks(shipped_document(name))))
+    document = shipped_document(name).model_copy(update={"network": "net.xml"})
+    again = file.read_bytes().replace(b"?>\n", b"?>\n<!-- generated on 2020-01-01 -->\n\n", 1)
+    rewritten = present_net(file, tmp_path).file.read_bytes()  # as the service keeps it
+    assert len({again, rewritten, file.read_bytes()}) == 3
+    assert len({library.keep(document, {"net.xml": net}) for net in (file.read_bytes(), again, rewritten)}) == 1
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones():

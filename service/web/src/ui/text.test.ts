@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { headlineWords, setting } from "./text";
+import { egoWords, headlineWords, setting } from "./text";
 
 it.each<[number, string]>([
   [2 * Math.PI, "6.283"],
@@ -22,4 +22,11 @@ it.each<[number | null, number, string]>([
   [0, 4, "0 headline failures, 4 candidates wait for verification"],
 ])("%j headline failures and %d candidates", (headline, headline_waiting, wanted) => {
   expect(headlineWords({ headline, headline_waiting })).toBe(wanted);
+});
+
+it.each<[string | null, string[], string]>([
+  [null, [], "default, Krauss"],
+  ["idm-aeb", ["latency", "blind-right"], "idm-aeb + latency + blind-right"],
+])("ego of driver %j with defects %j", (driver, defects, wanted) => {
+  expect(egoWords({ profile: "default", car_following: "Krauss", driver, defects })).toBe(wanted);
 });

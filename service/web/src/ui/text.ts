@@ -43,9 +43,9 @@ export function seconds(value: number | null | undefined): string {
   return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
-/** What drives the ego: a registered driver, or a profile of SUMO's with its model. */
-export function egoWords({ profile, car_following, driver }: Body<"EgoDriver">): string {
-  return driver ?? `${profile}, ${car_following}`;
+/** What drives the ego: a registered driver, or a profile of SUMO's with its model; and its defects. */
+export function egoWords({ profile, car_following, driver, defects }: Body<"EgoDriver">): string {
+  return [driver ?? `${profile}, ${car_following}`, ...(defects ?? [])].join(" + ");
 }
 
 /** `red_light` -> `red light`. */

@@ -14,20 +14,20 @@ function contact(hidden: boolean, visible_for_s: number): Collision {
 }
 
 test("all drivers that would have prevented it are named", () => {
-  expect(preventedBy(broken("full_braking"))).toBe("only full braking at once would have prevented it");
+  expect(preventedBy(broken("full_braking"))).toBe("of the reference drivers, only full braking at once would have prevented it");
   expect(preventedBy(contact(false, 1))).toBe("the RSS driver and full braking at once would have prevented it");
   expect(preventedBy(broken("r157", "fsm", "full_braking"))).toBe("R157's driver, the fuzzy safety model and full braking at once would have prevented it");
   expect(preventedBy(broken("r157_ttc"))).toBe("none of the reference drivers would have prevented it; by R157's time-to-collision rule it is preventable");
-  expect(preventedBy(broken("full_braking", "r157_ttc"))).toBe("only full braking at once would have prevented it; by R157's time-to-collision rule it is preventable");
+  expect(preventedBy(broken("full_braking", "r157_ttc"))).toBe("of the reference drivers, only full braking at once would have prevented it; by R157's time-to-collision rule it is preventable");
   expect(preventedBy(broken())).toBe("none of the reference drivers would have prevented it");
   expect(preventedBy({ requirement: "x", drivers: {} } as unknown as Violation)).toBeNull();
 });
 
 test("what the ego knew is said once, of hiding and time together", () => {
-  expect(knownOf(contact(false, 3))).toBe("The ego had known of lead for 3.0 s without a break.");
-  expect(knownOf(contact(true, 1.2))).toBe("The ego came to know of lead only 1.2 s before the contact.");
-  expect(knownOf(contact(true, 0))).toBe("The ego did not know of lead when the conflict began, nor at the contact.");
-  expect(knownOf(contact(false, 0))).toBe("The ego did not know of lead at the contact, but when the conflict began.");
+  expect(knownOf(contact(false, 3))).toBe("lead had been in the ego's view for 3.0 s without a break.");
+  expect(knownOf(contact(true, 1.2))).toBe("lead came into the ego's view only 1.2 s before the contact.");
+  expect(knownOf(contact(true, 0))).toBe("lead was not in the ego's view when the conflict began, nor at the contact.");
+  expect(knownOf(contact(false, 0))).toBe("lead was not in the ego's view at the contact, but when the conflict began.");
 });
 
 const PART = { seen_s: 2.3, braked_after_s: 1.1, braking_mps2: 4, possible_mps2: 7.6, gained_mps: 0.2, started: false, sight_mps: null, sighted_mps: null, left_first: "striker" };

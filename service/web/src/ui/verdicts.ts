@@ -14,7 +14,7 @@ interface GradeWords {
 
 export const GRADE_WORDS: Record<GradeName, GradeWords> = {
   preventable: { short: "preventable", long: "A reference driver would have prevented it" },
-  full_braking: { short: "by full braking", long: "Only full braking at once would have prevented it" },
+  full_braking: { short: "by full braking", long: "Of the reference drivers, only full braking at once would have prevented it" },
   unavoidable: { short: "unavoidable", long: "Neither a reference driver nor full braking at once would have prevented it" },
   none: { short: "not graded", long: "No reference driver was tried" },
 };
@@ -46,21 +46,21 @@ export function preventedBy(violation: Collision | Violation): string | null {
   if (drivers.length === 0) return null;
   const names = drivers.flatMap(([name, prevents]) => (prevents && name !== TTC_RULE ? [name] : []));
   const byRule = drivers.some(([name, prevents]) => prevents && name === TTC_RULE) ? `; by ${DRIVERS[TTC_RULE]} it is preventable` : "";
-  if (names.length === 1 && names[0] === FULL_BRAKING) return `only ${DRIVERS[FULL_BRAKING]} would have prevented it${byRule}`;
+  if (names.length === 1 && names[0] === FULL_BRAKING) return `of the reference drivers, only ${DRIVERS[FULL_BRAKING]} would have prevented it${byRule}`;
   const told = names.length > 0 ? names.map(driverWords) : ["none of the reference drivers"];
   const last = told.pop()!;
   return `${told.length > 0 ? `${told.join(", ")} and ${last}` : last} would have prevented it${byRule}`;
 }
 
-/** Since when the ego knew of the striker. */
+/** Since when the striker was in the ego's view; what a defect keeps from the ego counts too. */
 export function knownOf({ visible_for_s, other_id, judgement }: Collision): string {
   const seen_s = visible_for_s ?? 0;
   if (judgement?.hidden) {
-    if (seen_s > 0) return `The ego came to know of ${other_id} only ${number(seen_s, 1)} s before the contact.`;
-    return `The ego did not know of ${other_id} when the conflict began, nor at the contact.`;
+    if (seen_s > 0) return `${other_id} came into the ego's view only ${number(seen_s, 1)} s before the contact.`;
+    return `${other_id} was not in the ego's view when the conflict began, nor at the contact.`;
   }
-  if (seen_s > 0) return `The ego had known of ${other_id} for ${number(seen_s, 1)} s without a break.`;
-  return `The ego did not know of ${other_id} at the contact${judgement ? ", but when the conflict began" : ""}.`;
+  if (seen_s > 0) return `${other_id} had been in the ego's view for ${number(seen_s, 1)} s without a break.`;
+  return `${other_id} was not in the ego's view at the contact${judgement ? ", but when the conflict began" : ""}.`;
 }
 
 /** The fault, and what the ego did about the striker; null of a refused or an older one. */

@@ -27,10 +27,7 @@ export function Header({ campaign, again }: { campaign: Campaign; again: () => v
       <dl class="posted">
         <Fact name={spec.families.length > 1 ? "Families" : "Family"}>{spec.families.join(", ")}</Fact>
         <Fact name={spec.methods.length > 1 ? "Methods" : "Method"}>{spec.methods.join(", ")}</Fact>
-        <Fact name="Ego">
-          {egoWords(campaign.ego)}
-          {spec.ego?.defects?.length ? `, with ${spec.ego.defects.join(", ")}` : ""}
-        </Fact>
+        <Fact name="Ego">{egoWords(campaign.ego)}</Fact>
         <Fact name="Behaviour">{spec.odd?.dynamic?.behaviour ?? "ordinary"}</Fact>
         <Fact name={spec.seeds.length > 1 ? "Seeds" : "Seed"}>{spec.seeds.join(", ")}</Fact>
         <Fact name="Posted">{moment(campaign.created_at)}</Fact>
