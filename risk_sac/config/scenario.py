@@ -186,7 +186,7 @@ _FORMS: Mapping[str, tuple[str, ...]] = {  # field that tells a form → those t
 
 
 class Box(Settings):
-    """Bounding box of an actor in the file that its scenario comes from."""
+    """Size of an actor's body, and where its reference point lies."""
 
     length_m: Annotated[float, Field(gt=0, le=200)]
     width_m: Annotated[float, Field(gt=0, le=50)]
@@ -218,8 +218,7 @@ class Moving(Driven):
 
     start: Start
     box: Box | Chosen[Box] | None = None
-    """Places the body by the reference point, and ends the distances of a story. Without it the body's own box, of
-    which the reference point is the middle."""
+    """Without it the usual size of the body, of which the reference point is the middle."""
 
 
 class Actor(Moving):

@@ -11,7 +11,7 @@ defaults). The rest is choice, as all masses are: a kerb mass and a load.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal, NamedTuple, get_args
 
@@ -76,6 +76,10 @@ class Body:
     """As SUMO's class has it, where SUMO drives it."""
     limits: Mapping[str, BodyLimit] = field(default_factory=dict)
     """Field of `Limits` → its bound; those of the ODD hold for the rest."""
+
+    def sized(self, size_m: tuple[float, float] | None) -> "Body":
+        """Returns the body with a length and width of its own; None: its usual ones."""
+        return self if size_m is None else replace(self, length_m=size_m[0], width_m=size_m[1])
 
     @property
     def rides(self) -> bool:

@@ -11,7 +11,7 @@ from risk_sac.config import Odd
 from risk_sac.config.scenario import EGO, AllOf, Constraint, Moving, Scenario, Stream
 from risk_sac.config.values import Comparison, Expression, Term, comparison, term
 from risk_sac.errors import ConfigError, InfeasibleScene, did_you_mean
-from risk_sac.scenario.bodies import BODIES
+from risk_sac.scenario.bodies import BODIES, Body
 from risk_sac.scenario.families import check_like
 from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.interpret import Interpreter
@@ -76,13 +76,13 @@ def bodies_of(layout: Layout, net: Net, after_s: float = 0.0) -> dict[str, Float
       after_s: time since the start, in which all go on straight ahead at their initial speeds.
     """
     boxes = {start.id: _in_lane(start, net) for start in (layout.ego, *layout.vehicles)}
-    boxes |= {start.id: _box(start.x_m, start.y_m, start.heading_rad, start.body) for start in layout.pedestrians}
+    boxes |= {start.id: _box(start.x_m, start.y_m, start.heading_rad, start.shape) for start in layout.pedestrians}
     speeds_mps = {start.id: start.speed_mps for start in (layout.ego, *layout.vehicles)}
     speeds_mps |= {start.id: start.speed_mps for start in layout.pedestrians}
     for name, speed_mps in speeds_mps.items():
         along = boxes[name][1] - boxes[name][2]
         boxes[name] = boxes[name] + along / np.linalg.norm(along) * speed_mps * after_s
-    return boxes | {start.id: _box(start.x_m, start.y_m, start.heading_rad, start.body) for start in layout.statics}
+    return boxes | {start.id: _box(start.x_m, start.y_m, start.heading_rad, start.shape) for start in layout.statics}
 
 
 def _in_lane(start: VehicleStart, net: Net) -> Floats:
@@ -91,14 +91,13 @@ def _in_lane(start: VehicleStart, net: Net) -> Floats:
     stations = np.concatenate([[0.0], lengths.cumsum()])
     segment = int(np.clip(np.searchsorted(stations, start.position_m) - 1, 0, len(lengths) - 1))
     along = (line[segment + 1] - line[segment]) / lengths[segment]
-    middle = line[segment] + along * (start.position_m - stations[segment] - BODIES[start.body].length_m / 2)
-    return _box(float(middle[0]), float(middle[1]), math.atan2(along[1], along[0]), start.body)
+    middle = line[segment] + along * (start.position_m - stations[segment] - start.shape.length_m / 2)
+    return _box(float(middle[0]), float(middle[1]), math.atan2(along[1], along[0]), start.shape)
 
 
-def _box(x_m: float, y_m: float, heading_rad: float, body: str) -> Floats:
-    row = BODIES[body]  # type: ignore[index] # a row of the table
-    along = np.array((math.cos(heading_rad), math.sin(heading_rad))) * row.length_m / 2
-    left = np.array((-math.sin(heading_rad), math.cos(heading_rad))) * row.width_m / 2
+def _box(x_m: float, y_m: float, heading_rad: float, body: Body) -> Floats:
+    along = np.array((math.cos(heading_rad), math.sin(heading_rad))) * body.length_m / 2
+    left = np.array((-math.sin(heading_rad), math.cos(heading_rad))) * body.width_m / 2
     return np.array((x_m, y_m)) + np.array((along + left, along - left, -along - left, -along + left))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from risk_sac.scenario.bodies import BODIES, BodyName
+from risk_sac.scenario.bodies import BODIES, Body, BodyName
 from risk_sac.scenario.story_plan import StoryPlan
 from risk_sac.world.types import Point, Role
 
@@ -112,10 +112,23 @@ TRUCK_LENGTH_M, TRUCK_WIDTH_M = BODIES["truck"].length_m, BODIES["truck"].width_
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VehicleStart:
-    """A vehicle on its route's first edge."""
+class BodyStart:
+    """Body of an actor at its start."""
 
     id: str
+    body: BodyName
+    size_m: tuple[float, float] | None = None  # length and width, if they are not the usual ones of the body
+
+    @property
+    def shape(self) -> Body:
+        """The body in its size."""
+        return BODIES[self.body].sized(self.size_m)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VehicleStart(BodyStart):
+    """A vehicle on its route's first edge."""
+
     role: Role
     route: tuple[str, ...]  # edges of the net
     lane: int  # index on the first edge, 0 is the rightmost
@@ -127,10 +140,9 @@ class VehicleStart:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PedestrianStart:
+class PedestrianStart(BodyStart):
     """An actor that moves anywhere in the plane: a pedestrian, or a bicycle that crosses a road."""
 
-    id: str
     role: Role
     x_m: float
     y_m: float
@@ -140,14 +152,12 @@ class PedestrianStart:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StaticStart:
+class StaticStart(BodyStart):
     """A body that never moves, anywhere in the plane: parked, or in the way."""
 
-    id: str
     x_m: float  # of its centre
     y_m: float
     heading_rad: float
-    body: BodyName
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -197,7 +197,8 @@ class SceneLayout:
         if not abs(left_m) <= width_m / 2:
             wanted = f"at most half of {place.lane.id!r}, {width_m / 2:g} m"
             raise ConfigError(f"{path}.start.left_m", f"{left_m:g}", wanted, "lanes_left, or a start on another lane")
-        return replace(_started(name, role, place, speed_mps, self._bodies[name]), left_m=left_m)
+        start = _started(name, role, place, speed_mps, self._bodies[name])
+        return replace(start, left_m=left_m, size_m=self._size_m(name))
 
     def _vehicle_at(self, name: str, role: Role, moving: Moving, path: str) -> VehicleStart:
         """A vehicle that starts at a position of the road file."""
@@ -216,7 +217,7 @@ class SceneLayout:
         place = self._track(lane.id, moving, path, begin=True)._replace(before_m=-at_m, lead_in=False)
         self._placed[name] = place
         start = _started(name, role, place, self._speeds[name], self._bodies[name])
-        return replace(start, left_m=left_m, speed_mps=self._speeds[name])
+        return replace(start, left_m=left_m, speed_mps=self._speeds[name], size_m=self._size_m(name))
 
     def _refuse(self, start: Start, fields: Sequence[str], path: str, remedy: str) -> None:
         """Refuses fields of a start that would have no effect."""
@@ -287,14 +288,21 @@ class SceneLayout:
         return crossings[0]
 
     def _length_m(self, name: str) -> float:
-        return BODIES[self._bodies[name]].length_m
+        return BODIES[self._bodies[name]].sized(self._size_m(name)).length_m
+
+    def _size_m(self, name: str) -> tuple[float, float] | None:
+        """Length and width that the document states of an actor's body."""
+        moving = self._document.ego if name == EGO else self._document.actors[name]
+        box = self._value.choose(moving.box)
+        return None if box is None else (box.length_m, box.width_m)
 
     def _pedestrian(self, name: str, role: Role, actor: Moving) -> PedestrianStart:
         path, start = f"actors.{name}", actor.start
         speed_mps = self._value.of(actor.speed, f"{path}.speed")
         if start.position is not None:
             pose, body = self._story.middle(name, self._bodies[name]), self._bodies[name]
-            return PedestrianStart(id=name, role=role, **pose._asdict(), speed_mps=speed_mps, body=body)
+            size_m = self._size_m(name)
+            return PedestrianStart(id=name, role=role, **pose._asdict(), speed_mps=speed_mps, body=body, size_m=size_m)
         x_m, y_m, along_x, along_y = self._facing(start, path)
         setback_m = self._value.of(start.setback_m, f"{path}.start.setback_m")
         offset_m = self._value.of(start.offset_m, f"{path}.start.offset_m")
@@ -307,6 +315,7 @@ class SceneLayout:
             heading_rad=math.atan2(along_y, along_x),
             speed_mps=speed_mps,
             body=self._bodies[name],
+            size_m=self._size_m(name),
         )
 
     def _static(self, name: str, actor: Moving) -> StaticStart:
@@ -321,11 +330,11 @@ class SceneLayout:
             self._speeds[name], self._placed[name] = 0.0, self._place(name, actor, path)
             _, piece, front_m = self._placed[name].track.start(self._placed[name].before_m)
             lane = self._net.lanes[f"{piece.edge}_{piece.lane}"]
-            x_m, y_m, heading_rad = _point_of(lane, max(front_m - BODIES[body].length_m / 2, 0.0))
+            x_m, y_m, heading_rad = _point_of(lane, max(front_m - self._length_m(name) / 2, 0.0))
             left_m = self._value.of(actor.start.left_m, f"{path}.start.left_m")
             x_m, y_m = x_m - math.sin(heading_rad) * left_m, y_m + math.cos(heading_rad) * left_m
             heading_rad += math.radians(self._value.of(actor.start.heading_deg, f"{path}.start.heading_deg"))
-        return StaticStart(id=name, x_m=x_m, y_m=y_m, heading_rad=heading_rad, body=body)
+        return StaticStart(id=name, x_m=x_m, y_m=y_m, heading_rad=heading_rad, body=body, size_m=self._size_m(name))
 
     def _facing(self, start: Start, path: str) -> tuple[float, float, float, float]:
         """A point, and the unit vector of the direction that an actor faces there."""

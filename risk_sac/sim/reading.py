@@ -9,7 +9,7 @@ import libsumo
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.scenario.bodies import BODIES, CODES
+from risk_sac.scenario.bodies import CODES
 from risk_sac.scenario.layout import Area, Layout
 from risk_sac.sim.lookout import near_outsiders
 from risk_sac.sim.solid import Walker
@@ -80,9 +80,7 @@ class Reader:
         self._walkers = tuple(walkers)
         self._statics = layout.statics
         self._roles |= {start.id: Role.STATIC for start in layout.statics}
-        self._body = {start.id: BODIES[start.body] for start in starts}
-        self._body |= {start.id: BODIES[start.body] for start in layout.pedestrians}
-        self._body |= {start.id: BODIES[start.body] for start in layout.statics}
+        self._body = {start.id: start.shape for start in (*starts, *layout.pedestrians, *layout.statics)}
         self._signals = libsumo.trafficlight.getIDList()
         self._walk_signals = [place for signal in self._signals for place in _walk_signals(signal, layout.crossings)]
         self._vehicles = tuple(start.id for start in starts)

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 
 from risk_sac.config import EgoConfig
-from risk_sac.scenario.bodies import BODIES, BodyName
+from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.scenario.limits import GRAVITY_MPS2, emergency_decel_mps2
 from risk_sac.sim.paths import (
@@ -313,18 +313,20 @@ def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None
         elif not name.startswith(LANE_CHANGE):
             libsumo.vehicletype.setParameter(ego_type, name, f"{value:g}")
     _insert(layout.ego, ego_type)
+    libsumo.vehicle.setLength(layout.ego.id, layout.ego.shape.length_m)
+    libsumo.vehicle.setWidth(layout.ego.id, layout.ego.shape.width_m)
     for name, value in settings.items():
         if name.startswith(LANE_CHANGE):
             libsumo.vehicle.setParameter(layout.ego.id, name, f"{value:g}")
     for start in layout.vehicles:
-        _insert(start, _type("background", start.body, _class_of(start)))
+        _insert(start, _type("background", start, _class_of(start)))
     if layout.signal is not None:
         _set_signal(layout.signal, layout.signal_offset_s)
 
 
 def hand_over(start: VehicleStart) -> None:
     """Makes a vehicle drive as commanded, whatever is in its way."""
-    libsumo.vehicle.setType(start.id, _type("adversary", start.body, _class_of(start)))
+    libsumo.vehicle.setType(start.id, _type("adversary", start, _class_of(start)))
     for name, value in STEERED.items():  # a change of type leaves the lane-change model as it is
         libsumo.vehicle.setParameter(start.id, f"laneChangeModel.{name}", value)
     libsumo.vehicle.setSpeedMode(start.id, 0)
@@ -338,11 +340,13 @@ def _class_of(start: VehicleStart) -> str:
     return ANYWHERE if start.role is Role.ADVERSARY else BODIES[start.body].sumo_class
 
 
-def _type(driven: str, name: BodyName, class_: str) -> str:
+def _type(driven: str, start: VehicleStart, class_: str) -> str:
     """Returns the id of a body's type; one that is not shipped is made from the car's."""
-    id_, types = f"{driven}_{name}" if class_ == CAR else f"{driven}_{name}_{class_}", libsumo.vehicletype
+    size = () if start.size_m is None else (f"{start.size_m[0]:g}x{start.size_m[1]:g}",)
+    id_ = "_".join((driven, start.body, *(() if class_ == CAR else (class_,)), *size))
+    types = libsumo.vehicletype
     if id_ not in types.getIDList():
-        body = BODIES[name]
+        body = start.shape
         types.copy(f"{driven}_car", id_)
         types.setLength(id_, body.length_m)
         types.setWidth(id_, body.width_m)

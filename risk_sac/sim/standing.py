@@ -10,7 +10,6 @@ from collections.abc import Iterable
 
 import libsumo
 
-from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.layout import StaticStart
 from risk_sac.sim.paths import CAR, car_may_use
 from risk_sac.sim.roads import KEEP_ROUTE
@@ -26,7 +25,7 @@ def stand_in_lanes(statics: Iterable[StaticStart]) -> frozenset[str]:
 
 def _stand_in(start: StaticStart) -> bool:
     """Inserts a stand-in if the body reaches into a lane, and lies along it."""
-    body = BODIES[start.body]
+    body = start.shape
     edge, centre_m, index = libsumo.simulation.convertRoad(start.x_m, start.y_m, False, CAR)
     lane = f"{edge}_{index}"
     if not edge or edge.startswith(":"):

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import libsumo
 
-from risk_sac.scenario.bodies import BODIES, body_of
+from risk_sac.scenario.bodies import body_of
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.story_plan import Reach, StoryActor, StoryPlan
 from risk_sac.scenario.travel_line import Pose
@@ -37,9 +37,7 @@ class StoryTraffic:
         """Begins the story; none of its vehicles is in SUMO yet."""
         self._plan = plan
         self._engine = StoryEngine(plan, {name: present_of(start) for name, start in plan.others.items()})
-        self._lengths_m = {
-            start.id: BODIES[start.body].length_m for start in layout.vehicles if start.id in plan.actors
-        }
+        self._lengths_m = {start.id: start.shape.length_m for start in layout.vehicles if start.id in plan.actors}
         self._free = frozenset(plan.actors) - self._lengths_m.keys()
         self.beside: list[str] = []
         self._take(self._engine.played)
