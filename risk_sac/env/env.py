@@ -29,7 +29,7 @@ from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.records import Collision, RequirementResult, Violation
 from risk_sac.risk.conduct import CONDUCT_ROWS, RoadFacts, conduct_terms, see_signals
 from risk_sac.risk.measures import Gauge, Measures
-from risk_sac.risk.realism import refuse_danger, refuse_overlap
+from risk_sac.risk.realism import HardRule, danger_of, refuse_danger, refuse_overlap
 from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
@@ -96,6 +96,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     # The state of an episode, set by `_start`.
     layout: Layout  # of the episode's start
     trace: Trace  # all that is recorded of it
+    start_danger: HardRule | None  # rule for safe starts that the start breaks
     _adversaries: Adversaries
     _frame: Frame
     _measures: Measures
@@ -175,7 +176,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             self._violated.gained(self._measures.robustness),
             self._reward,
         )
-        truncated = self._sim.ego_arrived or self._steps >= self.layout.horizon_steps
+        over = self._sim.ego_arrived or self._sim.story_over
+        truncated = over or self._steps >= self.layout.horizon_steps
         info: dict[str, Any] = {"cost": cost, "robustness": self._measures.soft_min}
         if collision is not None:
             info["collision"] = collision
@@ -216,14 +218,17 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._artefacts = {}
         self._conduct = np.zeros((CONDUCT_ROWS, len(self.problem.family.adversaries)))
         self._contact_s = None
-        self._lead_in(self._sim.reset(layout, sumo_seed), scene)
+        self._lead_in(self._sim.reset(layout, sumo_seed), scene, 0.0 if layout.story else LEAD_IN_S)
         self._released_s = self._frame.time_s
-        started = self.problem.family, limits, self._frame
+        started = self.problem.family, limits, self._frame, layout.story
         self._adversaries = Adversaries(*started) if motions is None else RecordedAdversaries(*started, motions)
         for frame in self.trace.frames:
             rows = self._adversaries.rows(frame)
             see_signals(rows, self._adversaries.slots, frame.link, self._conduct)
-        refuse_danger(self._measures.assessment, scene, in_conflict=self._r157_driver_in_conflict())
+        danger = danger_of(self._measures.assessment, in_conflict=self._r157_driver_in_conflict())
+        if layout.story is None:
+            refuse_danger(danger, scene)
+        self.start_danger = danger  # of a story, which is not refused for it
         self._violated.begin(self._measures.robustness)
         self._sim.hand_over_ego()
         if self._controlled:
@@ -232,13 +237,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             self._sim.halt_walkers()
         return self._observe(), {"robustness": self._measures.soft_min}
 
-    def _lead_in(self, start: Frame, scene: Scene) -> None:
+    def _lead_in(self, start: Frame, scene: Scene, lead_in_s: float) -> None:
         """Traffic before the release: SUMO drives all vehicles, and pedestrians go on as the scene says."""
         self._frame = start
         self._measures = self._measure(None)
         self.trace.append(start, self._measures, None)
         refuse_overlap(self._frame, scene)
-        for _ in range(round(LEAD_IN_S / STEP_S)):
+        for _ in range(round(lead_in_s / STEP_S)):
             self._sim.walk_on()
             before, self._frame = self._frame, self._sim.step()
             self._measures = self._measure(before)

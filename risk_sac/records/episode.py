@@ -89,6 +89,8 @@ class EpisodeRecord(Record):
     violations: tuple[Violation, ...] = ()
     """Violations without contact of requirements that count."""
     collision: Collision | None = None
+    start_danger: str | None = None
+    """Rule for safe starts that the start of a story breaks, which is played all the same; null: none."""
     defect_reached_s: float | None = None
     """When a planted defect first changed a command, from the release; null if none did."""
 

@@ -9,6 +9,7 @@ mean nothing.
 Source: RISK-SAC, Sec. III-B.
 """
 
+import math
 from typing import Literal, Never
 
 from risk_sac.errors import InfeasibleScene
@@ -29,10 +30,14 @@ def refuse_overlap(frame: Frame, scene: Scene) -> None:
         _refuse(scene, "initial_overlap", f" by {first!r} and {second!r}")
 
 
-def refuse_danger(assessment: Assessment, scene: Scene, *, in_conflict: bool) -> None:
-    """C_hard of (5) for the frame of the release; raises `InfeasibleScene`."""
-    least_gap_m, margin_m = float(assessment.gap_m.min()), worst_rss_margin(assessment)
-    rule = broken_hard_rule(least_gap_m, assessment.least.ttc_s, margin_m, in_conflict=in_conflict)
+def danger_of(assessment: Assessment, *, in_conflict: bool) -> HardRule | None:
+    """C_hard of (5) for the frame of the release: the rule that it breaks, or None."""
+    least_gap_m, margin_m = float(assessment.gap_m.min(initial=math.inf)), worst_rss_margin(assessment)
+    return broken_hard_rule(least_gap_m, assessment.least.ttc_s, margin_m, in_conflict=in_conflict)
+
+
+def refuse_danger(rule: HardRule | None, scene: Scene) -> None:
+    """Refuses a start that breaks a rule; raises `InfeasibleScene`."""
     if rule is not None:
         _refuse(scene, rule)
 

@@ -3,7 +3,7 @@
 import hashlib
 import io
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -82,7 +82,8 @@ class Trace:
     def series(self) -> dict[str, NDArray[np.generic]]:
         """Arrays by name: `T` frames, `n` actors of the first frame, NaN where one has left.
 
-        `actions` is `T x a`, the action that led to the frame; NaN up to the release, which was at `released_s`.
+        `actions` is `T x a`, the action that led to the frame; NaN up to the release, which was at `released_s`. An
+        actor of a story that was led away from it has the role of an adversary.
         """
         first = self.frames[0]
         column = {id_: i for i, id_ in enumerate(first.ids)}
@@ -93,7 +94,7 @@ class Trace:
             "ids": np.array(first.ids),
             "kind": first.kind,
             "body": first.body,
-            "role": first.role,
+            "role": self._roles(column),
             "length_m": first.length_m,
             "width_m": first.width_m,
             "requirements": np.array(self.requirements),
@@ -117,6 +118,14 @@ class Trace:
         none = np.full((self.released + 1, size), np.nan, dtype=np.float32)
         result["actions"] = np.vstack((none, *self.actions))
         return result
+
+    def _roles(self, column: Mapping[str, int]) -> NDArray[np.int8]:
+        """Latest role of each actor, by its column."""
+        roles = self.frames[0].role.copy()
+        for frame in self.frames[1:]:
+            if frame.role is not self.frames[0].role:
+                roles[[column[id_] for id_ in frame.ids]] = frame.role
+        return roles
 
 
 def write_series(path: Path, series: dict[str, NDArray[np.generic]]) -> SeriesFile:

@@ -97,7 +97,7 @@ class Interpreter:
         """Names of the adversaries that drive in lanes, and of those that move freely."""
         driven, walking = list[str](), list[str]()
         for name, actor in self.document.actors.items():
-            if actor.role == "adversary":
+            if actor.role == "adversary" or (actor.role == "story" and self._deviates(name)):
                 bodies = self.alternatives(actor.body)
                 motions = {motion_of(self.document, name, body_named(body, f"actors.{name}.body")) for body in bodies}
                 if len(motions) > 1:
@@ -105,6 +105,13 @@ class Interpreter:
                     raise ConfigError(f"actors.{name}.body", ", ".join(bodies), wanted, "make two actors of it")
                 (walking if motions == {"freely"} else driven).append(name)
         return tuple(driven), tuple(walking)
+
+    def _deviates(self, name: str) -> bool:
+        """Whether methods may lead an actor away from the document's story."""
+        story, bodies = self.document.story, self.alternatives(self.document.actors[name].body)
+        if story is None or not (story.deviation.accel_mps2 or story.deviation.lateral_mps):
+            return False
+        return all(motion_of(self.document, name, body_named(body, f"actors.{name}.body")) != "not" for body in bodies)
 
     def alternatives(self, name: "str | Chosen[str]") -> tuple[str, ...]:
         """All names that a field may stand for, over the words of parameters."""

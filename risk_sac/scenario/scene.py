@@ -19,11 +19,12 @@ from risk_sac.config.scenario import (
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.bodies import BODIES, BodyName, Motion
 from risk_sac.scenario.ground import ground_of, kerb_of
+from risk_sac.scenario.lane_places import entry_of, lane_line
 from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, StaticStart, VehicleStart
 from risk_sac.scenario.story_plan import StoryPlan
 from risk_sac.scenario.story_scene import StoryScene
 from risk_sac.scenario.tracks import Track, Turn, lane_named, routed, straight_on
-from risk_sac.scenario.travel_line import Pose, line_of
+from risk_sac.scenario.travel_line import Pose
 from risk_sac.scenario.value import Value
 from risk_sac.world.net import Crossing, Link, Net, NetLane, direction
 from risk_sac.world.types import STEP_S, Point, Role
@@ -183,17 +184,21 @@ class SceneLayout:
     def _vehicle_at(self, name: str, role: Role, moving: Moving, path: str) -> VehicleStart:
         """A vehicle that starts at a position of the road file."""
         spot = self._story.front_spot(name, self._bodies[name])
-        lane = spot.lane
-        if lane.use != "lane":
-            raise ConfigError(f"{path}.start.position", f"a place inside junction {lane.edge!r}", "a place on a road")
-        at_m = min(max(spot.at_m * lane.length_m / line_of(lane.centre).length_m, 0.0), lane.length_m)
+        lane, left_m = spot.lane, spot.left_m
+        at_m = min(max(spot.at_m * lane.length_m / lane_line(lane).length_m, 0.0), lane.length_m)
+        if lane.use == "inside":  # SUMO inserts no vehicle there: it enters before, and the story puts it into place
+            entry = entry_of(self._net, lane)
+            if role is not Role.STORY or entry is None:
+                got = f"a place inside junction {lane.edge!r}"
+                raise ConfigError(f"{path}.start.position", got, "a place on a road")
+            lane, at_m, left_m = entry, entry.length_m, 0.0
         if moving.route is None and moving.turn is None:
             metres = lane.limit_mps * self._driven_s
             moving = moving.model_copy(update={"route": self._story.route(name, lane, metres)})
         place = self._track(lane.id, moving, path, begin=True)._replace(before_m=-at_m, lead_in=False)
         self._placed[name] = place
         start = _started(name, role, place, self._speeds[name], self._bodies[name])
-        return replace(start, left_m=spot.left_m, speed_mps=self._speeds[name])
+        return replace(start, left_m=left_m, speed_mps=self._speeds[name])
 
     def _refuse(self, start: Start, fields: Sequence[str], path: str, remedy: str) -> None:
         """Refuses fields of a start that would have no effect."""

@@ -244,6 +244,7 @@ def _record(
         requirements=kept or {},
         violations=encounter.violations,
         collision=encounter.collision,
+        start_danger=run.env.start_danger if begun else None,
         defect_reached_s=run.env.defect_reached_s if tally.steps else None,
     )
 

@@ -8,6 +8,7 @@ Vehicles take (longitudinal acceleration, lateral velocity), pedestrians (accele
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,9 @@ from numpy.typing import NDArray
 from risk_sac.scenario.bodies import body_of
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.limits import Limits
+from risk_sac.scenario.story_plan import StoryPlan
 from risk_sac.sim.solid import Others, VehicleCommand, Walker, clip, taper, walks_into
+from risk_sac.sim.story.deviation import DeviationControl, Lead
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.sim.vehicle_control import VehicleControl
 from risk_sac.world.types import LATERAL, SPEED, STEP_S, VX, VY, Frame
@@ -119,18 +122,24 @@ class Adversaries:
 
     slots: NDArray[np.intp]
 
-    def __init__(self, family: Family, limits: Limits, frame: Frame) -> None:
-        """Starts from the motion in `frame`."""
+    def __init__(self, family: Family, limits: Limits, frame: Frame, story: StoryPlan | None = None) -> None:
+        """Starts from the motion in `frame`; those that follow a story deviate from it."""
         f, rows = frame, {id_: row for row, id_ in enumerate(frame.ids)}
         there = [id_ for id_ in family.adversaries if id_ in rows]  # a document may leave one out of a scene
         own = {id_: limits.of(body_of(int(frame.body[rows[id_]]))) for id_ in there}
+        self._deviating = {
+            id_: DeviationControl(story.deviation, own[id_], free=story.actors[id_].free)
+            for id_ in there
+            if story is not None and id_ in story.actors
+        }
+        there = [id_ for id_ in there if id_ not in self._deviating]
         self._vehicles = {
             id_: VehicleControl(own[id_], *(float(a[rows[id_]]) for a in (f.speed_mps, f.accel_mps2, f.lateral_mps)))
             for id_ in family.vehicles
-            if id_ in rows
+            if id_ in there
         }
         self._pedestrians = {}
-        for id_ in (id_ for id_ in family.pedestrians if id_ in rows):
+        for id_ in (id_ for id_ in family.pedestrians if id_ in there):
             walker = Walker(*(float(a[rows[id_]]) for a in (f.x_m, f.y_m, f.heading_rad, f.speed_mps)))
             self._pedestrians[id_] = PedestrianControl(own[id_], walker)
         self._order = family.adversaries
@@ -153,7 +162,15 @@ class Adversaries:
             id_: control.step(first[slot[id_]], second[slot[id_]], (frame.state, rows[id_]))
             for id_, control in self._pedestrians.items()
         }
-        sim.apply(vehicles, walkers)
+        sim.apply(vehicles, walkers, self._leads(action))
+
+    def _leads(self, action: Sequence[float]) -> Mapping[str, Lead]:
+        """What leads actors of the story away from it."""
+        slot = self._slot
+        return {
+            id_: partial(control.step, action[2 * slot[id_]], action[2 * slot[id_] + 1])
+            for id_, control in self._deviating.items()
+        }
 
     def rows(self, frame: Frame) -> NDArray[np.intp]:
         """Rows of the frame that hold adversaries; `slots` are then their places in the family's order."""
@@ -194,9 +211,16 @@ class RecordedAdversaries(Adversaries):
     They keep clear of nothing meanwhile, and their limits are not checked again.
     """
 
-    def __init__(self, family: Family, limits: Limits, frame: Frame, series: Mapping[str, NDArray[Any]]) -> None:
+    def __init__(
+        self,
+        family: Family,
+        limits: Limits,
+        frame: Frame,
+        story: StoryPlan | None,
+        series: Mapping[str, NDArray[Any]],
+    ) -> None:
         """Starts from the motion in `frame`, the recording's moment of release."""
-        super().__init__(family, limits, frame)
+        super().__init__(family, limits, frame, story)
         self._series = series
         self._columns = {str(id_): i for i, id_ in enumerate(series["ids"])}
         self._next = int(np.searchsorted(series["time_s"], series["released_s"])) + 1
@@ -210,7 +234,8 @@ class RecordedAdversaries(Adversaries):
         walkers = {id_: Walker(*self._row(id_, WALK)) for id_ in self._pedestrians}
         for id_, walker in walkers.items():
             self._pedestrians[id_].state = walker
-        sim.apply({id_: each for id_, each in vehicles.items() if np.isfinite(each).all()}, walkers)
+        finite = {id_: command for id_, command in vehicles.items() if np.isfinite(command).all()}
+        sim.apply(finite, walkers, self._leads(self._series["actions"][self._next].tolist()))
         self._next += 1
 
     def keep_limits(self, frame: Frame) -> bool:

@@ -121,6 +121,7 @@ class Drivers:
         self._others = {
             start.id: SumoDriver(start.id, STEP_S, emergency, cruise.get(start.id, OWN_CHOICE_MPS))
             for start in layout.vehicles
+            if start.role is not Role.STORY
         }
         self._released: dict[str, SumoDriver] = {}
         self._ego: SumoDriver | None = SumoDriver(layout.ego.id, reaction_time_s, emergency)
@@ -154,7 +155,7 @@ class Drivers:
           belief: the ego's.
           braking_mps2: least braking of an ego that SUMO drives.
           moved: the ego, if a pilot drives it.
-          beside: adversaries that are beside their own lanes.
+          beside: vehicles that SUMO does not drive and that are beside lanes.
         """
         if self._ego is not None:
             self._tell_ego(self._ego, reading, belief, braking_mps2)

@@ -105,10 +105,17 @@ class Reader:
         self._sizes = np.array([(body.length_m, body.width_m) for body in bodies]).T
 
     def forget(self, gone: Collection[str]) -> None:
-        """Leaves out vehicles that have left the net."""
+        """Leaves out actors that have left."""
         self._told = self._told[[id_ not in gone for id_ in self._ids]]
         self._vehicles = tuple(id_ for id_ in self._vehicles if id_ not in gone)
+        self._walkers = tuple(id_ for id_ in self._walkers if id_ not in gone)
         self._describe()
+
+    def turn_adversaries(self, ids: Collection[str]) -> None:
+        """Notes which actors of a story have been led away from it."""
+        if turned := [id_ for id_ in ids if self._roles[id_] is Role.STORY]:
+            self._roles |= dict.fromkeys(turned, Role.ADVERSARY)
+            self._describe()
 
     def read(self, walkers: Mapping[str, Walker], moved: Mapping[str, Told]) -> Reading:
         """Reads all actors; `moved` is what SUMO would tell of the vehicles that it does not drive."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from weakref import ref
 
 import libsumo
+import numpy as np
 
 from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
@@ -26,6 +27,8 @@ from risk_sac.sim.reading import Reader, Reading
 from risk_sac.sim.roads import LateralRoom, Roads, hand_over, place
 from risk_sac.sim.solid import VehicleCommand, Walker
 from risk_sac.sim.standing import stand_in_lanes
+from risk_sac.sim.story.deviation import NO_LEADS, Lead
+from risk_sac.sim.story.traffic import StoryTraffic
 from risk_sac.world.types import STEP_S, Floats, Frame, Role
 
 
@@ -122,6 +125,8 @@ class SumoSimulation:
     _moved: MovedVehicle | None
     _oncoming: dict[str, OncomingVehicle]  # adversaries outside their own lanes
     _in_lanes: frozenset[str]  # static bodies that SUMO knows too
+    _story: StoryTraffic | None
+    _leads: Mapping[str, Lead]  # of the next step
 
     def __init__(
         self,
@@ -150,11 +155,14 @@ class SumoSimulation:
         Raises:
           SimulationError: SUMO refused the layout, or this process runs another simulation.
         """
+        self._story, self._leads = None if layout.story is None else StoryTraffic(layout, layout.story), NO_LEADS
         net, types = (plain_name(str(NETS / name)) for name in (layout.net, "vtypes.add.xml"))
         options = ["-n", net, "-a", types, "--seed", str(seed), *OPTIONS]
         try:
             LIBSUMO.load(self, options)
             place(layout, self._ego, self._settings)
+            if self._story is not None:
+                self._story.insert()
             self._in_lanes = stand_in_lanes(layout.statics)
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
@@ -164,6 +172,9 @@ class SumoSimulation:
             raise SimulationError(f"SUMO did not insert {sorted(absent)}")
         self._layout = layout
         self._walkers = {p.id: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps) for p in layout.pedestrians}
+        if self._story is not None:
+            self._story.take_over()
+            self._walkers |= self._story.walkers
         self._roads.enter(layout)
         self._reader = Reader(layout, self._walkers)
         self._drivers = Drivers(layout, self._ego.reaction_time_s, self._roads)
@@ -194,8 +205,20 @@ class SumoSimulation:
                 hand_over(start)
                 self._drivers.release(start.id)
 
-    def apply(self, vehicles: Mapping[str, VehicleCommand], walkers: Mapping[str, Walker]) -> None:
-        """Commands the adversaries' next step; vehicles that left the net are skipped."""
+    def apply(
+        self,
+        vehicles: Mapping[str, VehicleCommand],
+        walkers: Mapping[str, Walker],
+        leads: Mapping[str, Lead] = NO_LEADS,
+    ) -> None:
+        """Commands the adversaries' next step; vehicles that left the net are skipped.
+
+        Args:
+          vehicles: commands of those that drive.
+          walkers: next states of those that walk.
+          leads: what leads actors of the story away from it.
+        """
+        self._leads = leads
         for id_, (speed_mps, lateral_mps) in vehicles.items():
             if id_ not in self._reading.row:
                 continue
@@ -229,6 +252,11 @@ class SumoSimulation:
         return self._moved is not None and self._moved.arrived
 
     @property
+    def story_over(self) -> bool:
+        """Whether the scenario's story ends the episode."""
+        return self._story is not None and self._story.stopped
+
+    @property
     def running(self) -> bool:
         """Whether libsumo runs this simulation: it was reset, and neither closed nor replaced since."""
         return LIBSUMO.is_held_by(self)
@@ -245,15 +273,22 @@ class SumoSimulation:
                 motion = self._pilot.drive(self._reading.frame, self._belief, self._moved.along)
                 self._moved.move(motion)
             beside = [id_ for id_, vehicle in self._oncoming.items() if not vehicle.inside]
+            gone: set[str] = set()
+            if self._story is not None:
+                beside += self._story.beside
+                gone |= self._play(self._story)
             self._drivers.tell(self._reading, self._belief, self._reflex_mps2, self._moved, beside)
             libsumo.simulationStep()
         except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
             raise SimulationError(f"SUMO failed during a step: {error}") from error
         if libsumo.simulation.getArrivedNumber():
-            gone = set(libsumo.simulation.getArrivedIDList())
+            gone |= set(libsumo.simulation.getArrivedIDList()).intersection(self._reading.row)
             if self._layout.ego.id in gone:
                 raise SimulationError("the ego left the net before the horizon; lengthen its route")
+        if gone:
             self._reader.forget(gone)
+        if self._story is not None:
+            self._story.settle()
         for vehicle in self._oncoming.values():
             vehicle.settle()
         if self._moved is not None:
@@ -265,6 +300,14 @@ class SumoSimulation:
             self._hide()
         return self._reading.frame
 
+    def _play(self, story: StoryTraffic) -> frozenset[str]:
+        """Plays the story's next step; returns the actors that leave."""
+        gone = story.advance(self._leads)
+        self._leads = NO_LEADS
+        self._walkers = {id_: w for id_, w in self._walkers.items() if id_ not in gone} | story.walkers
+        self._reader.turn_adversaries(story.deviated)
+        return gone
+
     def signal_heads(self) -> bytes:
         """The letters of all signals, one after the other."""
         states = map(libsumo.trafficlight.getRedYellowGreenState, sorted(libsumo.trafficlight.getIDList()))
@@ -275,8 +318,16 @@ class SumoSimulation:
         moved = {id_: vehicle.told for id_, vehicle in self._oncoming.items()}
         if self._moved is not None:
             moved[self._layout.ego.id] = self._moved.told
+        if self._story is not None:
+            moved |= self._story.told
         self._reading = self._reader.read(self._walkers, moved)
-        return self._senses.look(self._reading.frame)
+        frame = self._reading.frame
+        belief = self._senses.look(frame)
+        if self._story is not None:
+            self._story.observe(frame)
+            if hidden := self._story.unsensed:
+                belief = belief._replace(known=belief.known & ~np.isin(frame.ids, sorted(hidden)))
+        return belief
 
     def _hide(self) -> None:
         """Hides the vehicles that the ego does not know from its models; the lane-change model cannot ignore any."""
@@ -329,7 +380,8 @@ class SumoSimulation:
         is a little late or early where a body is turned. None of static bodies, and if we tell SUMO the place of
         either.
         """
-        if self._moved is not None or other in self._oncoming or other not in self._reading.row:
+        told = self._story is not None and other in self._story.told
+        if self._moved is not None or told or other in self._oncoming or other not in self._reading.row:
             return None
         for _ in range(round(LISTED_WITHIN_S / STEP_S)):
             if self._listed(other):

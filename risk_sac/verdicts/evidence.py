@@ -123,6 +123,11 @@ class Evidence:
         """The frame of the adversaries' release; the last one if that comes later."""
         return min(int(np.searchsorted(self.time_s, -self.step_s / 2)), len(self.time_s) - 1)
 
+    @property
+    def tells_story(self) -> bool:
+        """Whether the episode plays a scenario's story, which begins with the release."""
+        return self.released == 0 and len(self.time_s) > 1
+
     def since(self, before_s: float) -> int:
         """The first frame of the last `before_s` seconds."""
         return int(np.searchsorted(self.time_s, self.time_s[-1] - before_s - 1e-6))

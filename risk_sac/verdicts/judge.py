@@ -332,8 +332,11 @@ def _inherited(requirement: Requirement, history: History, time_s: float, met: M
     """Whether the ego inherited a violation at the release.
 
     It did if it was violated within 1 s, if the conflict with the actor that brought it about began within 1 s, or if
-    the signal ahead was yellow or red then and the ego could not stop at leisure any more.
+    the signal ahead was yellow or red then and the ego could not stop at leisure any more. A story prescribes what is
+    there when it begins.
     """
+    if history.evidence.tells_story:
+        return False
     if not begins_after_release(time_s) or (met is not None and not begins_after_release(met.conflict.noticed_s)):
         return True
     if requirement.name != NO_RED_LIGHT_ENTRY:

@@ -16,7 +16,7 @@ from risk_sac.verdicts.evidence import Evidence, column, recorded_motion, record
 from risk_sac.verdicts.offences import EGO, R157_GAP_M, RECENT_S, intrusion, leaves_room, on_inherited_red
 from risk_sac.world.geometry import overlapping_pairs
 from risk_sac.world.jit import compiled
-from risk_sac.world.types import HEADING, LENGTH, WIDTH, Floats, Kind, X, Y
+from risk_sac.world.types import HEADING, LENGTH, WIDTH, Floats, Kind, Role, X, Y
 
 
 class Overlap(NamedTuple):
@@ -82,8 +82,9 @@ def artefact_verdicts(evidence: Evidence, striker: int, conflict: Conflict, fact
     return {
         "no_teleport": not facts.teleported,
         "no_spawn_overlap": not any(each.time_s <= RELEASE_S for each in overlaps),
-        # What was there at the adversaries' release they and the ego inherited.
-        "conflict_after_release": begins_after_release(conflict.noticed_s) and not on_inherited_red(evidence),
+        # What was there at the adversaries' release they and the ego inherited, but for what a story prescribes.
+        "conflict_after_release": evidence.tells_story
+        or (begins_after_release(conflict.noticed_s) and not on_inherited_red(evidence)),
         "inside_limits": facts.inside_limits,
         "inside_grip": inside_grip(evidence, striker),
         "solid_bodies": not any(each.time_s > RELEASE_S for each in overlaps),
@@ -140,9 +141,9 @@ def inside_grip(evidence: Evidence, striker: int) -> bool:
 
     In the last 2 s: |a| ≤ 1.05 μ g.
 
-    |a| covers braking, lane changes and cornering alike. Pedestrians pass.
+    |a| covers braking, lane changes and cornering alike. Pedestrians pass, and actors that follow a story exactly.
     """
-    if evidence.kind[striker] == Kind.PEDESTRIAN:
+    if evidence.kind[striker] == Kind.PEDESTRIAN or evidence.role[striker] == Role.STORY:
         return True
     used = used_grip(evidence, striker)
     return bool(used.max(initial=0.0) <= GRIP_TOLERANCE * evidence.ground.friction * GRAVITY_MPS2)

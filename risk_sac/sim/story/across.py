@@ -221,12 +221,12 @@ class AcquirePosition:
     def begin(self, mover: Mover, stage: Stage) -> bool:
         """See `Doing.begin`."""
         here, there = mover.pose, stage.pose(self._position)
-        line = None if mover.free else stage.way_between(here, there)
-        if line is None:
+        way = None if mover.free else stage.way_between(here, there)
+        if way is None:
             way_rad = math.atan2(there.y_m - here.y_m, there.x_m - here.x_m)
             mover.follow(straight(here._replace(heading_rad=way_rad)), mover.drift.ahead_m)
         else:
-            line, mover.edges = line
+            line, mover.edges = way
             mover.follow(line, *line.project(*here[:2]))
         mover.guided = False
         return True

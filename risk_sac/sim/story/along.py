@@ -12,6 +12,7 @@ from risk_sac.config.story import (
     SpeedEntry,
     SpeedProfileAction,
 )
+from risk_sac.sim.solid import taper
 from risk_sac.sim.story.cast import Mover, Present
 from risk_sac.sim.story.course import SAME, Course, length_of
 from risk_sac.sim.story.doing import ALONG
@@ -108,7 +109,7 @@ class FollowProfile:
 class KeepAhead:
     """Brings an actor to a distance along from another one.
 
-    Without bounds it is there at once; with bounds it closes in by v² = 2 a e, e the distance that is left.
+    Without bounds it is there at once; with bounds it closes in as fast as it can brake to the other's speed there.
     """
 
     controls = ALONG
@@ -172,13 +173,15 @@ class KeepAhead:
             return False
         accel, brake = _bound(self._do.accel_mps2), _bound(self._do.brake_mps2)
         close = brake if too_far_m < 0.0 else accel  # what ends the closing in
-        closing = min(math.sqrt(2 * close * abs(too_far_m)), abs(too_far_m) / STEP_S)
+        closing = taper(abs(too_far_m), close) if math.isfinite(close) else abs(too_far_m) / STEP_S
         wanted = its_mps - math.copysign(closing, too_far_m)
         if self._do.speed_mps is not None:
             wanted = min(wanted, float(self._do.speed_mps))
         change = min(max(wanted - mover.story_mps, -brake * STEP_S), accel * STEP_S)
         mover.wanted_mps = max(mover.story_mps + change, 0.0)
         there = abs(too_far_m) < NEAR_M and abs(mover.story_mps - its_mps) < NEAR_MPS
+        if there:
+            mover.wanted_mps = its_mps
         return there and not self._do.continuous
 
 

@@ -58,6 +58,9 @@ class Drift(NamedTuple):
     left_m: float = 0.0
 
 
+ON_STORY = Drift()
+
+
 class Mover:
     """An actor that the engine moves along a line.
 
@@ -85,7 +88,7 @@ class Mover:
         self.name, self.reach, self.free = name, start.reach, start.free
         self.station_m = self.story_left_m = 0.0
         self.story_mps, self.accel_mps2, self.lateral_mps = start.speed_mps, 0.0, 0.0
-        self.drift = Drift()
+        self.drift = ON_STORY
         self.edges: tuple[str, ...] = ()
         self.guided = False
         self.gone, self.visible = False, (True, True)

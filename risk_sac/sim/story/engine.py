@@ -10,7 +10,8 @@ from risk_sac.scenario.story_plan import StoryPlan
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.sim.story.actions import doing_of, set_variable
 from risk_sac.sim.story.board import Board, Running
-from risk_sac.sim.story.cast import Drift, Mover, Present
+from risk_sac.sim.story.cast import ON_STORY, Mover, Present
+from risk_sac.sim.story.deviation import NO_LEADS, Lead
 from risk_sac.sim.story.stage import Stage
 from risk_sac.world.types import STEP_S
 
@@ -85,22 +86,28 @@ class StoryEngine:
         self._stage.look(others)
         self._board.evaluate()
 
-    def advance(self, drifts: Mapping[str, Drift] | None = None) -> Mapping[str, Played]:
+    def advance(self, leads: Mapping[str, Lead] = NO_LEADS) -> Mapping[str, Played]:
         """Moves all actors of the story by a step, and returns where they are.
 
         Args:
-          drifts: how far each is from its story at the end of the step; none of those left out.
+          leads: what leads actors away from the story.
         """
         stage = self._stage
         self._running.step()
         for name, mover in stage.movers.items():
             if mover.gone:
                 continue
-            mover.move(mover.drift if drifts is None else drifts.get(name, mover.drift))
+            lead = leads.get(name)
+            mover.move(mover.drift if lead is None else lead(mover, stage.room(mover)))
             stage.onto_way(mover)
         self._steps += 1
         stage.time_s = round(self._steps * STEP_S, TIME_DIGITS)
         return self.played
+
+    @property
+    def deviated(self) -> frozenset[str]:
+        """Actors that are not where their story has them."""
+        return frozenset(name for name, mover in self._stage.movers.items() if mover.drift != ON_STORY)
 
 
 def _played(mover: Mover) -> Played:

@@ -13,6 +13,7 @@ from risk_sac.scenario.places import OnRoad, Places, Spot
 from risk_sac.scenario.story_plan import Reach, StoryPlan
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of
 from risk_sac.sim.story.cast import STANDS_MPS, Mover, Present
+from risk_sac.sim.story.deviation import ANYWHERE, Room
 from risk_sac.world.types import STEP_S
 
 LINE_M = 3000.0  # of the way ahead of a lane's beginning; an actor that comes to its end gets the next piece
@@ -134,7 +135,7 @@ class Stage:
         """Line along lanes from one place to another, and its edges; None if no lanes lead there."""
         return None
 
-    def lane_of(self, target: "float | LaneTarget", own: Pose) -> Spot | None:
+    def lane_of(self, target: "float | str | LaneTarget", own: Pose) -> Spot | None:
         """Spot beside a pose, on the lane that a lane change leads to; None if there is none."""
         here = self.places.spot(own)
         if here is None:
@@ -174,6 +175,21 @@ class Stage:
         """Offset of an actor from its lane's middle; 0 where it is on none."""
         spot = self.places.spot(self.of(name))
         return 0.0 if spot is None else spot.left_m
+
+    def room(self, mover: Mover) -> Room:
+        """Room beside an actor's body up to the edges of its road's lanes for cars."""
+        spot = None if mover.free else self.places.spot(mover.pose)
+        if spot is None:
+            return ANYWHERE
+        half_m = spot.lane.width_m / 2 - mover.reach.width_m / 2
+        left_m = right_m = half_m
+        lanes = 1
+        while (other := self.places.beside(spot, lanes)) is not None:
+            left_m, lanes = left_m + other.lane.width_m, lanes + 1
+        lanes = -1
+        while (other := self.places.beside(spot, lanes)) is not None:
+            right_m, lanes = right_m + other.lane.width_m, lanes - 1
+        return Room(left_m - spot.left_m, right_m + spot.left_m)
 
     def lane_heading(self, name: str) -> float:
         """Direction of an actor's lane; its own where it is on none."""

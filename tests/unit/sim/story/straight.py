@@ -10,7 +10,8 @@ from risk_sac.scenario.places import Places
 from risk_sac.scenario.story_plan import Reach, StoryActor, StoryPlan
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.scenario.value import Value
-from risk_sac.sim.story.cast import Drift, Present
+from risk_sac.sim.story.cast import Present
+from risk_sac.sim.story.deviation import NO_LEADS, Lead
 from risk_sac.sim.story.engine import Played, StoryEngine
 from risk_sac.world.net import Edge, Net, NetLane
 from risk_sac.world.types import STEP_S
@@ -18,6 +19,7 @@ from risk_sac.world.types import STEP_S
 WIDTH_M = 3.5
 CAR = Reach(4.0, 2.0, 1.0)
 POINT = Reach(0.0, 0.0)
+ORIGIN = Pose(0.0, 0.0, 0.0)
 
 
 def straight_net(lanes: int = 3, length_m: float = 5000.0) -> Net:
@@ -77,7 +79,7 @@ class Drive:
         actors: Mapping[str, StoryActor],
         *,
         ego_mps: float = 10.0,
-        ego: Pose = Pose(0.0, 0.0, 0.0),
+        ego: Pose = ORIGIN,
         reach: Reach = CAR,
         others: Mapping[str, Present] | None = None,
         numbers: Mapping[str, float] | None = None,
@@ -87,7 +89,6 @@ class Drive:
         plan = StoryPlan(
             story=story,
             actors=actors,
-            reaches={},
             places=Places(straight_net(), None, story, Value({}, {})),
             numbers=numbers or {},
             words=words or {},
@@ -101,10 +102,10 @@ class Drive:
         pose = self._ego._replace(x_m=self._ego.x_m + self.ego_mps * time_s)
         return {"ego": Present.moving(pose, self.ego_mps, 0.0, self._reach), **self._others}
 
-    def to(self, time_s: float, drifts: Mapping[str, Drift] | None = None) -> Mapping[str, Played]:
+    def to(self, time_s: float, leads: Mapping[str, Lead] = NO_LEADS) -> Mapping[str, Played]:
         """Plays on to a time; returns where the actors of the story are then."""
         while self.engine.time_s < time_s - STEP_S / 2:
-            self.engine.advance(drifts)
+            self.engine.advance(leads)
             self.engine.observe(self.present())
             self.history.append(self.engine.played)
         return self.engine.played

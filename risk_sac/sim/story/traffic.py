@@ -1,0 +1,139 @@
+"""Actors of a story in SUMO: vehicles that it puts where the story has them, and walkers.
+
+SUMO maps such a vehicle onto the lane that it is on, so that its drivers follow it. Where the whole body is beside the
+lanes, SUMO keeps it where it is, on no lane.
+"""
+
+import math
+from collections.abc import Mapping
+
+import libsumo
+
+from risk_sac.scenario.bodies import BODIES, body_of
+from risk_sac.scenario.layout import Layout
+from risk_sac.scenario.story_plan import Reach, StoryActor, StoryPlan
+from risk_sac.scenario.travel_line import Pose
+from risk_sac.sim.reading import Told
+from risk_sac.sim.solid import Walker
+from risk_sac.sim.story.cast import Present
+from risk_sac.sim.story.deviation import NO_LEADS, Lead
+from risk_sac.sim.story.engine import Played, StoryEngine
+from risk_sac.world.types import ACCEL, HEADING, SPEED, Frame, X, Y
+
+ANYWHERE = 2  # SUMO's word for a place that need not be on the vehicle's route
+NO_CHECKS, NO_LANE_CHANGE = 0, 0
+
+
+class StoryTraffic:
+    """The actors of one episode's story.
+
+    Attributes:
+      told: what SUMO would tell of the story's vehicles.
+      walkers: the story's free actors.
+      beside: its vehicles that SUMO has on no lane.
+    """
+
+    def __init__(self, layout: Layout, plan: StoryPlan) -> None:
+        """Begins the story; none of its vehicles is in SUMO yet."""
+        self._plan = plan
+        self._engine = StoryEngine(plan, {name: present_of(start) for name, start in plan.others.items()})
+        self._lengths_m = {
+            start.id: BODIES[start.body].length_m for start in layout.vehicles if start.id in plan.actors
+        }
+        self._free = frozenset(plan.actors) - self._lengths_m.keys()
+        self.beside: list[str] = []
+        self._take(self._engine.played)
+
+    def _take(self, played: Mapping[str, Played]) -> None:
+        self._played = played
+        self.walkers = {
+            name: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps, p.accel_mps2)
+            for name, p in played.items()
+            if name in self._free
+        }
+        self.told = {name: self._tell(name, p) for name, p in played.items() if name not in self._free}
+
+    def _tell(self, name: str, p: Played) -> Told:
+        half_m = self._lengths_m[name] / 2
+        x_m, y_m = p.x_m + half_m * math.cos(p.heading_rad), p.y_m + half_m * math.sin(p.heading_rad)
+        angle = 90.0 - math.degrees(p.heading_rad)
+        return Told(x_m, y_m, angle, p.speed_mps, p.lateral_mps, p.accel_mps2, p.left_m, None)
+
+    def insert(self) -> None:
+        """Has SUMO insert the vehicles, which it was given, where the story has them."""
+        for name in self.told:
+            self._put(name)
+
+    def take_over(self) -> None:
+        """Takes the vehicles from SUMO's drivers, once they are inserted."""
+        for name in self.told:
+            libsumo.vehicle.setSpeedMode(name, NO_CHECKS)
+            libsumo.vehicle.setLaneChangeMode(name, NO_LANE_CHANGE)
+            self._correct_speed(name)
+
+    def _put(self, name: str) -> None:
+        told = self.told[name]
+        libsumo.vehicle.moveToXY(name, "", -1, told.front_x_m, told.front_y_m, told.angle_deg, ANYWHERE)
+
+    def _correct_speed(self, name: str) -> None:
+        """Tells SUMO the speed, which it derives from the way along the lane."""
+        speed_mps = max(self.told[name].speed_mps, 0.0)
+        libsumo.vehicle.setPreviousSpeed(name, speed_mps)
+        libsumo.vehicle.setSpeed(name, speed_mps)
+
+    def advance(self, leads: Mapping[str, Lead] = NO_LEADS) -> frozenset[str]:
+        """Plays the story's next step, and has SUMO put the vehicles there in its own.
+
+        Returns:
+          The actors that left the scenario.
+        """
+        before = self._played.keys()
+        self._take(self._engine.advance(leads))
+        gone = frozenset(before - self._played.keys())
+        for name in gone & self._lengths_m.keys():
+            libsumo.vehicle.remove(name)
+        for name in self.told:
+            self._put(name)
+        return gone
+
+    def settle(self) -> None:
+        """Corrects what SUMO made of the vehicles in its step."""
+        self.beside = []
+        for name in self.told:
+            self._correct_speed(name)
+            if not libsumo.vehicle.getLaneID(name):
+                self.beside.append(name)
+
+    def observe(self, frame: Frame) -> None:
+        """Evaluates the story's triggers in a frame."""
+        others = {}
+        for column, name in enumerate(frame.ids):
+            if name in self._plan.actors:
+                continue
+            start, body = self._plan.others.get(name), body_of(int(frame.body[column]))
+            reach = Reach(body.length_m, body.width_m) if start is None else start.reach
+            x_m, y_m, heading, speed, accel = (float(frame.state[row, column]) for row in (X, Y, HEADING, SPEED, ACCEL))
+            back_m = -reach.ahead_m
+            pose = Pose(x_m + back_m * math.cos(heading), y_m + back_m * math.sin(heading), heading)
+            others[name] = Present.moving(pose, speed, accel, reach)
+        self._engine.observe(others)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the story ends the episode."""
+        return self._engine.stopped
+
+    @property
+    def deviated(self) -> frozenset[str]:
+        """Actors that are not where their story has them."""
+        return self._engine.deviated
+
+    @property
+    def unsensed(self) -> frozenset[str]:
+        """Actors that the ego cannot perceive."""
+        return frozenset(name for name, p in self._played.items() if not p.sensed)
+
+
+def present_of(start: StoryActor) -> Present:
+    """An actor at its start."""
+    return Present.moving(start.pose, start.speed_mps, 0.0, start.reach)
