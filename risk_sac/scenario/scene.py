@@ -130,6 +130,7 @@ class SceneLayout:
             friction=value.of(document.friction, "friction"),
             horizon_steps=steps_of(value.of(document.horizon_s, "horizon_s")),
             wary=document.wary,
+            set_speed_mps=math.inf if (told := value.of(document.set_speed, "set_speed")) <= 0.0 else told,
             story=None if document.story is None else self._plan((ego, *vehicles), pedestrians, statics),
         )
 
