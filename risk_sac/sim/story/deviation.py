@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from risk_sac.scenario.limits import Limits
 from risk_sac.scenario.story_plan import Deviation
-from risk_sac.sim.solid import clip
+from risk_sac.sim.solid import clip, taper
 from risk_sac.sim.story.cast import Drift, Mover
 from risk_sac.world.types import STEP_S
 
@@ -98,5 +98,5 @@ class DeviationControl:
         speed = (mover.story_mps if mover.wanted_mps is None else mover.wanted_mps) + mps
         most = min(self._lateral_mps, self._slip * max(speed, 0.0))
         wanted = clip(wanted, min(-most - story_mps, 0.0), max(most - story_mps, 0.0))
-        left, right = (math.sqrt(2 * self._lateral_mps2 * max(side, 0.0)) for side in room)
-        return clip(wanted, -right, left)
+        left_mps, right_mps = (taper(side, self._lateral_mps2) if math.isfinite(side) else math.inf for side in room)
+        return clip(wanted, -right_mps, left_mps)
