@@ -141,7 +141,7 @@ class EgoPilot:
 
     def __init__(self, ego: Guarded) -> None:
         self._ego = ego
-        self._net, self._road_around = "", cache(road_around)
+        self._net, self._set_speed_mps, self._road_around = "", math.inf, cache(road_around)
 
     def begin(self, layout: Layout, seed: int, frame: Frame) -> Motion:
         """See `risk_sac.sim.pilot.Pilot.begin`."""
@@ -150,8 +150,8 @@ class EgoPilot:
         self._vehicle = Vehicle(length_m=length_m, width_m=width_m, brake_mps2=min(BRAKE_MPS2, grip), grip_mps2=grip)
         own = frame.state[[X, Y, HEADING, SPEED, ACCEL], 0].tolist()
         self._motion = Motion(*own)
-        if layout.net != self._net:  # another one may use the same names
-            self._net = layout.net
+        if (layout.net, layout.set_speed_mps) != (self._net, self._set_speed_mps):  # of the same names, or other limits
+            self._net, self._set_speed_mps = layout.net, layout.set_speed_mps
             self._road_around.cache_clear()
         route = layout.ego.route
         self._road = self._road_around(route)

@@ -27,7 +27,7 @@ from risk_sac.env.problem import Problem
 from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.host.process_state import c_numbers
 from risk_sac.maps.carriageway import carriageway_of
-from risk_sac.records import Collision, RequirementResult, Violation
+from risk_sac.records import Collision, RequirementResult, StoryDeviation, Violation
 from risk_sac.risk.conduct import CONDUCT_ROWS, RoadFacts, conduct_terms, see_signals
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.realism import HardRule, danger_of, refuse_danger, refuse_overlap
@@ -312,6 +312,16 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """Returns the evidence of the episode so far, for the judge."""
         evidence = Evidence.from_series(self.trace.series(), self._ground, self._released_s)
         return replace(evidence, as_written=self._as_written)
+
+    @property
+    def deviations(self) -> Mapping[str, StoryDeviation]:
+        """How far each actor was from the scenario's story at most; without those that never left it."""
+        return {
+            name: StoryDeviation(
+                speed_mps=drift.mps, lateral_mps=drift.lateral_mps, along_m=drift.ahead_m, across_m=drift.left_m
+            )
+            for name, drift in self._sim.deviations.items()
+        }
 
     def avoided_by(self) -> Mapping[str, bool] | None:
         """Which competent drivers avoid a contact, whatever the ego did; None where others deviate from the scenario.

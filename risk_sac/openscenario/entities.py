@@ -29,7 +29,6 @@ _VEHICLES: Mapping[str, tuple[BodyName, ...]] = {
     "work_machine": ("truck",),
 }
 """vehicleCategory → bodies, of which the one of the nearest size is taken."""
-_SAME_M = 0.05  # difference of size that is not reported
 _CHILD_M = 1.4  # height below which a pedestrian is a child; choice
 
 
@@ -51,19 +50,18 @@ class Entity:
 class Entities:
     """All entities of a scenario file, by the file's names."""
 
-    def __init__(self, block: At, catalogs: Catalogs, remarks: list[str], ego: str | None) -> None:
+    def __init__(self, block: At, catalogs: Catalogs, ego: str | None) -> None:
         """Reads the entities.
 
         Args:
           block: the element `Entities`.
           catalogs: where references lead.
-          remarks: to which differences of size are added.
           ego: name of the ego; None: the one that is named Ego, or the only one with a controller.
 
         Raises:
           ConfigError: there is no ego or more than one, or an entity cannot be read.
         """
-        self._catalogs, self._remarks = catalogs, remarks
+        self._catalogs = catalogs
         self._names: dict[str, str] = {}
         objects = block.all("ScenarioObject")
         if len(objects) > MOST:
@@ -113,7 +111,7 @@ class Entities:
         for controller in at.all("ObjectController"):
             controller.element.use_all()
         of = entries.of if isinstance(entries, Alternatives) else {"": entries}
-        bodies = {word: self._body(entry, given) for word, entry in of.items()}
+        bodies = {word: _body(entry) for word, entry in of.items()}
         boxes = {word: _box(entry) for word, entry in of.items()}
         free = {body in _FREE for body in bodies.values()}
         chosen = entries.by if isinstance(entries, Alternatives) else None
@@ -127,20 +125,21 @@ class Entities:
             freely=free.pop() if len(free) == 1 else None,
         )
 
-    def _body(self, entry: At, given: str) -> BodyName:
-        """Returns the body of the category and of the nearest size, and reports the difference."""
-        box = _box(entry)
-        if entry.tag == "Vehicle":
-            category = entry.constant("vehicleCategory", "car")
-            near = min(_VEHICLES.get(category, ("car",)), key=lambda name: _difference(name, box))
-            if category not in _VEHICLES:
-                near = min(("car", "van", "truck", "bus"), key=lambda name: _difference(name, box))
-        elif entry.tag == "Pedestrian":
-            height = entry.one("BoundingBox").one("Dimensions").number("height")
-            near = "child" if isinstance(height, float) and height < _CHILD_M else "pedestrian"
-        else:
-            near = "obstacle"
-        return near
+
+def _body(entry: At) -> BodyName:
+    """Returns the body of the category and of the nearest size."""
+    box = _box(entry)
+    if entry.tag == "Vehicle":
+        category = entry.constant("vehicleCategory", "car")
+        near = min(_VEHICLES.get(category, ("car",)), key=lambda name: _difference(name, box))
+        if category not in _VEHICLES:
+            near = min(("car", "van", "truck", "bus"), key=lambda name: _difference(name, box))
+    elif entry.tag == "Pedestrian":
+        height = entry.one("BoundingBox").one("Dimensions").number("height")
+        near = "child" if isinstance(height, float) and height < _CHILD_M else "pedestrian"
+    else:
+        near = "obstacle"
+    return near
 
 
 def _entry(at: At) -> str:

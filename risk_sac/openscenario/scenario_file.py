@@ -141,7 +141,7 @@ class _Import:
 
     def _document(self, top: At, file: Path, name: str, parameters: Parameters) -> tuple[Scenario, Roads]:
         catalogs = Catalogs(self._sources, file, top.maybe("CatalogLocations"))
-        entities = Entities(top.one("Entities"), catalogs, self._remarks, self._ego)
+        entities = Entities(top.one("Entities"), catalogs, self._ego)
         block = top.maybe("VariableDeclarations")
         variables = Variables(block.all("VariableDeclaration") if block is not None else [], parameters)
         for element in top.element.below():
@@ -193,6 +193,7 @@ class _Import:
             "ego": Moving(body=ego.body, box=ego.box, speed=init.starts[EGO].speed, start=_start(ego, init)),
             "actors": actors,
             "constraints": constraints,
+            "set_speed": init.starts[EGO].speed,  # choice: an ego under test drives the speed that it starts with
             "story": story,
             "origin": Origin(
                 file=f"{name}{file.suffix}"[:200],

@@ -31,6 +31,7 @@ from risk_sac.records.episode import (
     Phase,
     Repetition,
     SeriesFile,
+    StoryDeviation,
     Triage,
     TriageState,
 )

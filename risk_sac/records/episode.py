@@ -47,6 +47,16 @@ class EpisodeId:
         return cls(parts[1] or "", phase, int(parts[3])) if parts and phase else None
 
 
+class StoryDeviation(Record):
+    """How far an actor was from the scenario's story at most."""
+
+    speed_mps: Real
+    lateral_mps: Real
+    """Of its speed across."""
+    along_m: Real
+    across_m: Real
+
+
 class EpisodeRecord(Record):
     """One episode as stored, streamed and counted. Plain values only, so it is JSON as it stands."""
 
@@ -93,6 +103,8 @@ class EpisodeRecord(Record):
     """Rule for safe starts that the start of a story breaks, which is played all the same; null: none."""
     defect_reached_s: float | None = None
     """When a planted defect first changed a command, from the release; null if none did."""
+    deviations: Mapping[str, StoryDeviation] = {}
+    """Actor → how far it was from the scenario's story; without those that never left it."""
     avoided_by: Mapping[str, bool] | None = None
     """r157 | fsm → whether this driver avoids a contact where an ego kept its lane and its first speed. Null but for
     methods that play a scenario as it is written, and where nothing was played."""

@@ -27,6 +27,7 @@ from risk_sac.metrics import (
     pooled_requirements,
 )
 from risk_sac.records import PHASES, Counts, DriverPcr, EpisodeRecord, Phase, Record, RequirementCounts
+from risk_sac.report.origins import FailureOrigin, failure_origins
 from risk_sac.report.paired import PairedTest, corrected, paired_tests
 from risk_sac.report.runs import PAID_FOR, TESTED, FinishedRun, found_within
 
@@ -163,6 +164,11 @@ class Comparison:
     def headline_candidates(self) -> int:
         """Those that each search found by itself, verified or not."""
         return sum(metrics.headline_candidates for run in self.runs for metrics in run.metrics.values())
+
+    @property
+    def origins(self) -> tuple[FailureOrigin, ...]:
+        """Where failures of scenarios begin that some method plays as they are written."""
+        return failure_origins(self.runs)
 
     @property
     def reference(self) -> MethodName:

@@ -20,6 +20,7 @@ from risk_sac.metrics import METRICS
 from risk_sac.records import DrivenBy, Fault, Phase, Record, RunMetrics, Severity
 from risk_sac.report.comparison import Cell, Comparison, MissingRun, compare
 from risk_sac.report.figures import FORMATS, figure_files, figure_names
+from risk_sac.report.origins import FailureOrigin
 from risk_sac.report.paired import PairedTest
 from risk_sac.report.rendering import table_markdown, this_platform
 from risk_sac.report.runs import FinishedRun, read_run
@@ -82,6 +83,9 @@ class Table(Record):
     """Of these kinds, those that R157, FSM or RSS prevents."""
     paid_tests: list[PairedTest]
     """Headline failures within 30 processor seconds; declared beforehand, so corrected by themselves."""
+    origins: list[FailureOrigin]
+    """Where failures begin, of scenarios that some method plays as they are written: in the grid, where parameters are
+    searched, or only where others deviate."""
     failures: Mapping[FamilyName, Overview]
     """The kinds of failures that all methods have found together."""
     studies: Mapping[FamilyName, Mapping[str, Studied]]
@@ -118,6 +122,7 @@ def table_of(comparison: Comparison) -> Table:
         reference=comparison.reference,
         cells=list(comparison.cells),
         tests=list(comparison.tests),
+        origins=list(comparison.origins),
         headline=comparison.headline,
         headline_published=comparison.headline_published,
         paid_tests=list(comparison.paid_tests),

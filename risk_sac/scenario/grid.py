@@ -18,7 +18,7 @@ SLACK = 1e-9  # share of a step by which rounding may miss the upper bound
 DIGITS = 12  # significant ones of a level, so that 3 · 0.1 is 0.3
 
 
-class Axis(NamedTuple):
+class GridAxis(NamedTuple):
     """Values of one parameter on the grid."""
 
     name: str
@@ -40,7 +40,7 @@ class Axis(NamedTuple):
 class Grid:
     """All combinations of the axes' values."""
 
-    axes: tuple[Axis, ...]
+    axes: tuple[GridAxis, ...]
 
     @cached_property
     def size(self) -> int:
@@ -91,16 +91,16 @@ def grid_of(space: SceneSpace, parameters: Mapping[str, ScenarioParameter]) -> G
     return Grid(tuple(_axis(parameter, parameters.get(parameter.name)) for parameter in space.parameters))
 
 
-def _axis(parameter: Parameter, stated: ScenarioParameter | None) -> Axis:
+def _axis(parameter: Parameter, stated: ScenarioParameter | None) -> GridAxis:
     low, high = parameter.low, parameter.high
     if stated is not None and stated.alternatives:
         first, step = 0.5 / stated.alternatives, 1.0 / stated.alternatives
     elif stated is not None and stated.step is not None and stated.range is not None:
         first, step = stated.range[0], stated.step
     elif low == high:
-        return Axis(parameter.name, 1, low, 0.0, True)
+        return GridAxis(parameter.name, 1, low, 0.0, True)
     else:
-        return Axis(parameter.name, DEFAULT_LEVELS, low, (high - low) / (DEFAULT_LEVELS - 1), False)
+        return GridAxis(parameter.name, DEFAULT_LEVELS, low, (high - low) / (DEFAULT_LEVELS - 1), False)
     below = max(math.ceil((low - first) / step - SLACK), 0)
     last = math.floor((high - first) / step + SLACK)
     if stated.range is not None:
@@ -109,4 +109,4 @@ def _axis(parameter: Parameter, stated: ScenarioParameter | None) -> Axis:
         got = f"{parameter.name} from {low:g} to {high:g}, where none of its values lies"
         raise ConfigError("odd", got, f"one of {first:g}, {first + step:g} and so on")
     count = last - below + 1
-    return Axis(parameter.name, count, first + below * step, step if count > 1 else 0.0, True)
+    return GridAxis(parameter.name, count, first + below * step, step if count > 1 else 0.0, True)

@@ -133,6 +133,7 @@ class SceneLayout:
             friction=self._friction(),
             horizon_steps=steps_of(value.of(document.horizon_s, "horizon_s")),
             wary=document.wary,
+            set_speed_mps=math.inf if (told := value.of(document.set_speed, "set_speed")) <= 0.0 else told,
             story=None if document.story is None else self._plan((ego, *vehicles), pedestrians, statics),
         )
 
@@ -197,8 +198,8 @@ class SceneLayout:
         if not abs(left_m) <= width_m / 2:
             wanted = f"at most half of {place.lane.id!r}, {width_m / 2:g} m"
             raise ConfigError(f"{path}.start.left_m", f"{left_m:g}", wanted, "lanes_left, or a start on another lane")
-        start = _started(name, role, place, speed_mps, self._bodies[name])
-        return replace(start, left_m=left_m, size_m=self._size_m(name))
+        started = _started(name, role, place, speed_mps, self._bodies[name])
+        return replace(started, left_m=left_m, size_m=self._size_m(name))
 
     def _vehicle_at(self, name: str, role: Role, moving: Moving, path: str) -> VehicleStart:
         """A vehicle that starts at a position of the road file."""

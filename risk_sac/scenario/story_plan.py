@@ -67,7 +67,8 @@ def settled(part: T, of: Callable[[Any, str], float], choose: Callable[[Any], An
       path: of the part in its document.
     """
     if isinstance(part, Chosen):
-        return settled(choose(part), of, choose, path)
+        chosen: T = settled(choose(part), of, choose, path)
+        return chosen
     if isinstance(part, Settings):
         changed = {}
         for name, info in type(part).model_fields.items():
@@ -81,7 +82,7 @@ def settled(part: T, of: Callable[[Any, str], float], choose: Callable[[Any], An
                 after = settled(before, of, choose, here)
             if after is not before:
                 changed[name] = after
-        return part.model_copy(update=changed) if changed else part  # type: ignore[no-any-return]
+        return part.model_copy(update=changed) if changed else part
     if isinstance(part, tuple):
         members = tuple(settled(member, of, choose, f"{path}[{i}]") for i, member in enumerate(part))
         return part if all(map(operator.is_, members, part)) else members  # type: ignore[return-value]

@@ -246,6 +246,7 @@ def _record(
         collision=encounter.collision,
         start_danger=run.env.start_danger if begun else None,
         defect_reached_s=run.env.defect_reached_s if tally.steps else None,
+        deviations=run.env.deviations if unplayable is None else {},
         avoided_by=run.env.avoided_by() if unplayable is None else None,
     )
 

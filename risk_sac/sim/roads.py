@@ -158,6 +158,7 @@ class Roads:
 
     def __init__(self) -> None:
         self._net = ""
+        self._set_speed_mps = math.inf
         self.moved = {}
         self._routes: dict[str, tuple[str, ...]] = {}
 
@@ -166,8 +167,8 @@ class Roads:
         self._routes = {start.id: start.route for start in (layout.ego, *layout.vehicles)}
         self._uses_oncoming = {start.id for start in layout.vehicles if start.uses_oncoming}
         self.moved = {}
-        if layout.net != self._net:  # another one may use the same names
-            self._net = layout.net
+        if (layout.net, layout.set_speed_mps) != (self._net, self._set_speed_mps):  # of the same names, or other limits
+            self._net, self._set_speed_mps = layout.net, layout.set_speed_mps
             self._way, self._room, self._stretch = cache(way_of), cache(_room), cache(_stretch)
             self._oncoming_m = cache(_oncoming_m)
 
@@ -286,6 +287,8 @@ def _width_on_route(lane: str, route: tuple[str, ...]) -> float:
     return float(libsumo.lane.getWidth(lane)) if leads_on(route, lane) else 0.0
 
 
+# SUMO's lane-change mode: strategic changes, none into a vehicle, and movements within a lane.
+FOR_ITS_ROUTE = 0b01_10_00_00_00_01
 EGO_DECEL_MPS2 = 4.5  # SUMO's default for passenger cars
 LANE_CHANGE = "laneChangeModel."
 # So that the commanded lateral speed is the one driven; its limits are those of `risk_sac.sim.control`.
@@ -303,6 +306,7 @@ def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None
       settings: further ones of SUMO's driver of the ego: `tau`, or keys of SUMO's `vehicle.setParameter` for its
         lane-change model, and of `vehicletype.setParameter` for the rest.
     """
+    _limit(layout.set_speed_mps)
     ego_type = f"ego_{ego.car_following}"
     libsumo.vehicletype.setActionStepLength(ego_type, ego.reaction_time_s)
     libsumo.vehicletype.setEmergencyDecel(ego_type, emergency_decel_mps2(layout.friction))
@@ -315,6 +319,8 @@ def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None
     _insert(layout.ego, ego_type)
     libsumo.vehicle.setLength(layout.ego.id, layout.ego.shape.length_m)
     libsumo.vehicle.setWidth(layout.ego.id, layout.ego.shape.width_m)
+    if layout.set_speed_mps < math.inf:
+        libsumo.vehicle.setLaneChangeMode(layout.ego.id, FOR_ITS_ROUTE)
     for name, value in settings.items():
         if name.startswith(LANE_CHANGE):
             libsumo.vehicle.setParameter(layout.ego.id, name, f"{value:g}")
@@ -322,6 +328,14 @@ def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None
         _insert(start, _type("background", start, _class_of(start)))
     if layout.signal is not None:
         _set_signal(layout.signal, layout.signal_offset_s)
+
+
+def _limit(speed_mps: float) -> None:
+    """Limits the speed on all lanes, until the next episode is loaded."""
+    if speed_mps < math.inf:
+        for lane in libsumo.lane.getIDList():
+            if libsumo.lane.getMaxSpeed(lane) > speed_mps:
+                libsumo.lane.setMaxSpeed(lane, speed_mps)
 
 
 def hand_over(start: VehicleStart) -> None:

@@ -27,6 +27,7 @@ from risk_sac.sim.reading import Reader, Reading
 from risk_sac.sim.roads import LateralRoom, Roads, hand_over, place
 from risk_sac.sim.solid import VehicleCommand, Walker
 from risk_sac.sim.standing import stand_in_lanes
+from risk_sac.sim.story.cast import Drift
 from risk_sac.sim.story.deviation import NO_LEADS, Lead
 from risk_sac.sim.story.traffic import StoryTraffic
 from risk_sac.world.types import STEP_S, Floats, Frame, Role
@@ -255,6 +256,11 @@ class SumoSimulation:
     def story_over(self) -> bool:
         """Whether the scenario's story ends the episode."""
         return self._story is not None and self._story.stopped
+
+    @property
+    def deviations(self) -> Mapping[str, Drift]:
+        """How far each actor was from its story at most; without those that never left it."""
+        return {} if self._story is None else self._story.furthest
 
     @property
     def running(self) -> bool:

@@ -1,7 +1,8 @@
 """Competent drivers in an episode of any outcome: in place of an ego that keeps its lane and its first speed.
 
 So the boundary of what a competent driver avoids runs through scenes that the ego itself passes, and is the same for
-all egos. The others move as they did in the recording, in which they may have reacted to the ego.
+all egos. The others move as they did in the recording, in which they may have reacted to the ego. A story may wait for
+a distance from the ego, so until the first of them acts the ego is where it was recorded.
 
 Source: UN Regulation 157, Annex 4, Appendix 3 (00 series): a cut-in is perceived once the vehicle is more than 0.375 m
 off its lane's centre, its risk is evaluated for 0.4 s, it is a danger if the time to collision is then 2 s at most, and
@@ -33,11 +34,12 @@ from risk_sac.verdicts.evidence import Evidence, lane_path, lanes_of, recorded_m
 from risk_sac.verdicts.reference import from_behind, reference_outcomes
 from risk_sac.verdicts.rollout import FUZZY, R157, STANDING_MPS, drive
 from risk_sac.world.geometry import touches
-from risk_sac.world.types import Floats
+from risk_sac.world.types import Floats, Kind
 
 COMPETENT = ("r157", "fsm")  # UN R157's performance models 1 and 2
 BEYOND_S = 4.0  # that the others go on after the recording, with their last velocities; the drivers' look-ahead
 LOOKS_S = 7.0  # before the contact, from when on the FSM looks out; choice
+MOVES_MPS, BRAKES_MPS2 = 0.2, 1.0  # at which another actor acts; choice
 FOLLOWED_S = 20.0  # that a driver is followed for: beyond it all have stopped
 SAME_WAY = (ConflictType.CUT_IN, ConflictType.LEADER)
 
@@ -93,14 +95,14 @@ def becomes_dangerous(evidence: Evidence, striker: int, contact: int) -> int | N
 
 
 def keeping_on(evidence: Evidence, way: Path) -> Evidence:
-    """The episode with an ego that keeps its lane and its speed from the release on, and `BEYOND_S` more."""
-    first, more = evidence.released, round(BEYOND_S / evidence.step_s)
+    """The episode with an ego that keeps its lane and its first speed once the others act, and `BEYOND_S` more."""
+    first, more = first_act(evidence), round(BEYOND_S / evidence.step_s)
     e = _prolonged(evidence, more)
-    lane = lane_path(evidence, first)
-    driven = recorded_path(lane.x[first:], lane.y[first:], lane.heading[first:])
+    lane = lane_path(evidence, evidence.released)
+    driven = recorded_path(*(values[evidence.released :] for values in lane[:3]))
     path = driven if driven.s[-1] >= way.s[-1] else way
-    speed = float(evidence.speed_mps[first, 0])
-    poses = np.array([pose_at(path, speed * t * e.step_s) for t in range(len(e.time_s) - first)])
+    begins_m, speed = float(driven.s[first - evidence.released]), float(evidence.speed_mps[evidence.released, 0])
+    poses = np.array([pose_at(path, begins_m + speed * t * e.step_s) for t in range(len(e.time_s) - first)])
     x, y, heading = poses.T
     moved = {
         "x_m": x,
@@ -115,6 +117,20 @@ def keeping_on(evidence: Evidence, way: Path) -> Evidence:
     }
     changed: dict[str, Any] = {name: _with_ego(getattr(e, name), own, first) for name, own in moved.items()}
     return replace(e, **changed)
+
+
+def first_act(evidence: Evidence) -> int:
+    """The first frame from the release on in which another actor acts, or comes into sight; the release if none does.
+
+    One acts that moves across its lane, brakes, or begins to move.
+    """
+    e, since = evidence, slice(evidence.released, None)
+    walks, stood = e.kind[1:] == Kind.PEDESTRIAN, e.speed_mps[e.released, 1:] < MOVES_MPS
+    acts = (np.abs(e.lateral_mps[since, 1:]) > MOVES_MPS) & ~walks
+    acts |= (e.accel_mps2[since, 1:] < -BRAKES_MPS2) | ((e.speed_mps[since, 1:] > MOVES_MPS) & stood)
+    acts |= e.known[since, 1:] & ~e.known[e.released, 1:]
+    frames = np.flatnonzero(acts.any(axis=1))
+    return e.released + (int(frames[0]) if len(frames) else 0)
 
 
 def first_contact(evidence: Evidence) -> tuple[int, int] | None:

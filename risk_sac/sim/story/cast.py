@@ -72,6 +72,7 @@ class Mover:
       story_left_m: to the left of the line, as the story says.
       story_mps: along the line, as the story says.
       drift: from the story.
+      furthest: size of each part of the drift so far.
       edges: of the net, along its route; empty without one.
       guided: whether the line is a trajectory, which lane changes leave.
       gone: whether it was deleted.
@@ -88,7 +89,7 @@ class Mover:
         self.name, self.reach, self.free = name, start.reach, start.free
         self.station_m = self.story_left_m = 0.0
         self.story_mps, self.accel_mps2, self.lateral_mps = start.speed_mps, 0.0, 0.0
-        self.drift = ON_STORY
+        self.drift = self.furthest = ON_STORY
         self.edges: tuple[str, ...] = ()
         self.guided = False
         self.gone, self.visible = False, (True, True)
@@ -138,6 +139,7 @@ class Mover:
         self.station_m += gone_m
         self.story_left_m = self.story_left_m if self.wanted_left_m is None else self.wanted_left_m
         self.drift = drift
+        self.furthest = Drift(*map(max, self.furthest, map(abs, drift)))
         self.lateral_mps = (self.left_m - before_left_m) / STEP_S
         self.accel_mps2 = (self.speed_mps - before_mps) / STEP_S
         self.wanted_mps = self.wanted_left_m = self.wanted_station_m = None

@@ -10,7 +10,7 @@ from risk_sac.scenario.story_plan import StoryPlan
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.sim.story.actions import doing_of, set_variable
 from risk_sac.sim.story.board import Board, Running
-from risk_sac.sim.story.cast import ON_STORY, Mover, Present
+from risk_sac.sim.story.cast import ON_STORY, Drift, Mover, Present
 from risk_sac.sim.story.deviation import NO_LEADS, Lead
 from risk_sac.sim.story.stage import Stage
 from risk_sac.world.types import STEP_S
@@ -108,6 +108,11 @@ class StoryEngine:
     def deviated(self) -> frozenset[str]:
         """Actors that are not where their story has them."""
         return frozenset(name for name, mover in self._stage.movers.items() if mover.drift != ON_STORY)
+
+    @property
+    def furthest(self) -> Mapping[str, Drift]:
+        """How far each actor was from its story at most; without those that never left it."""
+        return {name: mover.furthest for name, mover in self._stage.movers.items() if mover.furthest != ON_STORY}
 
 
 def _played(mover: Mover) -> Played:

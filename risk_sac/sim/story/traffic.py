@@ -15,7 +15,7 @@ from risk_sac.scenario.story_plan import Reach, StoryActor, StoryPlan
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.sim.reading import Told
 from risk_sac.sim.solid import Walker
-from risk_sac.sim.story.cast import Present
+from risk_sac.sim.story.cast import Drift, Present
 from risk_sac.sim.story.deviation import NO_LEADS, Lead
 from risk_sac.sim.story.engine import Played, StoryEngine
 from risk_sac.world.types import ACCEL, HEADING, SPEED, Frame, X, Y
@@ -125,6 +125,11 @@ class StoryTraffic:
     def deviated(self) -> frozenset[str]:
         """Actors that are not where their story has them."""
         return self._engine.deviated
+
+    @property
+    def furthest(self) -> Mapping[str, Drift]:
+        """How far each actor was from its story at most; without those that never left it."""
+        return self._engine.furthest
 
     @property
     def unsensed(self) -> frozenset[str]:

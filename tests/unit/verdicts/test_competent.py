@@ -62,13 +62,12 @@ def test_the_mirror_image_has_the_same_verdict(gap_m):
 
 @pytest.mark.parametrize("gap_m", [3.0, 8.0, 25.0])
 def test_what_the_ego_did_makes_no_difference(gap_m):
-    """It brakes before the vehicle comes over, or after, or touches it."""
-    egos = (
-        steady(16.7),
-        straight(0, 0, 0, 16.7, (1.0, -3.0), start_s=0.0),
-        straight(0, 0, 0, 16.7, (3.0, -7.0), start_s=0.0),
-    )
-    verdicts = [avoided_by(cut_in(gap_m, 1.2, 8.0, ego, 16.7), WAY) for ego in egos]
+    """It goes on, or brakes once the vehicle comes over; or it was slower, and the vehicle waited for its gap."""
+    brakes = straight(0, 0, 0, 16.7, (BEGINS_S + 0.5, -7.0), start_s=0.0)
+    slower = straight(0, 0, 0, 16.7, (0.2, -4.0), (0.7, 0.0), start_s=0.0)
+    behind_m = 16.7 * BEGINS_S - slower(BEGINS_S)[0]
+    recorded = [(steady(16.7), gap_m), (brakes, gap_m), (slower, gap_m - behind_m)]
+    verdicts = [avoided_by(cut_in(gap, 1.2, 8.0, ego, 16.7), WAY) for ego, gap in recorded]
     assert verdicts[1:] == verdicts[:1] * 2
 
 

@@ -5,13 +5,13 @@ import pytest
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError
-from risk_sac.scenario.grid import Axis, Grid
+from risk_sac.scenario.grid import Grid, GridAxis
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.search.scene_optimizer.grid import GridSampler, grid_sample
 
 
 def grid(*sizes: int) -> Grid:
-    return Grid(tuple(Axis(f"p{i}", size, 0.0, 0.1, True) for i, size in enumerate(sizes)))
+    return Grid(tuple(GridAxis(f"p{i}", size, 0.0, 0.1, True) for i, size in enumerate(sizes)))
 
 
 def sampler(of: Grid, most: int, seed: int = 0) -> GridSampler:
