@@ -22,6 +22,8 @@ from risk_sac.world.plane_curves import Across, Begin, Clothoid, Cubic, CubicCur
 from risk_sac.world.types import Floats
 
 End = Literal["start", "end"]
+LONGEST_M = 1e6  # of a road
+MOST_TURNED_RAD = 200.0  # by one piece of a reference line; choice: 30 rounds
 TOLERANCE_M = 0.01  # by which a place may lie beyond a road's end
 NEAR_M = 60.0  # of a reference line; choice: half of the widest road
 SAMPLE_M = 1.0  # between the places of a reference line that a point is compared with first
@@ -296,9 +298,12 @@ def _road(element: Element) -> Roadway:
                 kind, link.get("elementId", ""), "end" if link.get("contactPoint") == "end" else "start"
             )
     junction = element.get("junction", "-1")
+    length_m = _number(element, "length")
+    if not 0.0 < length_m <= LONGEST_M:
+        raise ValueError(f"length={length_m:g}")
     return Roadway(
         id=element.attrib["id"],
-        length_m=_number(element, "length"),
+        length_m=length_m,
         junction=None if junction == "-1" else junction,
         keeps_left=element.get("rule") == "LHT",
         starts_m=tuple(_number(geometry, "s") for geometry in geometries),
@@ -310,6 +315,17 @@ def _road(element: Element) -> Roadway:
 
 
 def _curve(geometry: Element) -> Curve:
+    curve = _shaped(geometry)
+    if not 0.0 <= curve.length_m <= LONGEST_M:
+        raise ValueError(f"a geometry of {curve.length_m:g} m")
+    if isinstance(curve, Clothoid):
+        turned = max(abs(curve.curvature_start), abs(curve.curvature_end)) * curve.length_m
+        if turned > MOST_TURNED_RAD:
+            raise ValueError(f"a geometry that turns by {turned:g} rad")
+    return curve
+
+
+def _shaped(geometry: Element) -> Curve:
     begin = Begin(_number(geometry, "x"), _number(geometry, "y"), _number(geometry, "hdg"))
     length_m, shape = _number(geometry, "length"), next(iter(geometry), None)
     match shape.tag if shape is not None else "":
