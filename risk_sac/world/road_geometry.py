@@ -22,6 +22,7 @@ from risk_sac.world.plane_curves import Across, Begin, Clothoid, Cubic, CubicCur
 from risk_sac.world.types import Floats
 
 End = Literal["start", "end"]
+FARTHEST = 1e8  # of any number; the Earth's circumference is 4e7 m
 LONGEST_M = 1e6  # of a road
 MOST_TURNED_RAD = 200.0  # by one piece of a reference line; choice: 30 rounds
 TOLERANCE_M = 0.01  # by which a place may lie beyond a road's end
@@ -231,7 +232,15 @@ class RoadFile:
                 got = f"road {element.get('id', '?')[:80]!r} of {file.name} with a missing or broken value: {error}"
                 raise MapError("road", got, "what OpenDRIVE requires") from error
             roads[road.id] = road
-        return cls(roads, {junction.get("id", ""): _connections(junction) for junction in root.findall("junction")})
+        connections = {}
+        for junction in root.findall("junction"):
+            id_ = junction.get("id", "")
+            try:
+                connections[id_] = _connections(junction)
+            except (KeyError, ValueError) as error:
+                got = f"junction {id_[:80]!r} of {file.name} with a missing or broken value: {error}"
+                raise MapError("road", got, "what OpenDRIVE requires") from error
+        return cls(roads, connections)
 
     def near(self, x_m: float, y_m: float) -> list[tuple[Roadway, float]]:
         """Returns the roads near a point, each with the sample of its reference line that is nearest.
@@ -269,7 +278,7 @@ class RoadFile:
 def _number(element: Element, name: str, default: float | None = None) -> float:
     text = element.get(name)
     number = default if text is None and default is not None else float(element.attrib[name])
-    if not math.isfinite(number):
+    if not abs(number) <= FARTHEST:
         raise ValueError(f"{name}={text!r}")
     return number
 
