@@ -91,4 +91,4 @@ def _net(at: At, path: Path, remarks: list[str]) -> bytes:
         except ConfigError as error:
             raise at.refusal(f"{path.name}: {error.got}", error.expected, error.remedy) from error
         remarks += [f"{path.name}: {warning}" for warning in net.warnings]
-        return net.file.read_bytes()
+        return re.sub(rb"<!--.*?-->\s*", b"", net.file.read_bytes(), count=1, flags=re.DOTALL)  # it has the time

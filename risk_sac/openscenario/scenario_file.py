@@ -55,6 +55,9 @@ def import_scenario(file: Path, within: Path | None = None, ego: str | None = No
     """
     try:
         return _Import(Sources(within), ego).read(file.absolute())
+    except ConfigError as error:
+        error.field = error.field or file.name
+        raise
     except RecursionError:
         raise ConfigError(file.name, "elements or parameters that are nested too deep", "less depth") from None
 

@@ -1,0 +1,11 @@
+"""Conversions of roads that take no time, where a test is about something else."""
+
+import pytest
+
+from risk_sac.openscenario import road
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Makes an empty net of each road."""
+    monkeypatch.setattr(road, "_net", lambda *_: b"<net/>")
