@@ -47,11 +47,11 @@ class Element:
     @property
     def place(self) -> str:
         """File, line and name, as messages give them."""
-        return f"{self.file}, line {self.line}, <{self.tag[:_SHOWN]}>"
+        return plain(f"{self.file}, line {self.line}, <{self.tag[:_SHOWN]}>")
 
     def refusal(self, got: str, expected: str = "", remedy: str = "") -> ConfigError:
         """Returns the error of something that is wrong here."""
-        return ConfigError(self.place, got[: _SHOWN * 4], expected, remedy)
+        return ConfigError(self.place, plain(got[: _SHOWN * 4]), plain(expected), plain(remedy))
 
     def unread(self, expected: str, effect: str) -> Unread:
         """Returns the error of something here that is valid but not read."""
@@ -90,6 +90,11 @@ class Element:
         yield self
         for child in self.children:
             yield from child.below()
+
+
+def plain(text: str) -> str:
+    """Returns a text without characters that do not print, such as those that turn its direction."""
+    return text if text.isprintable() else "".join(char if char.isprintable() else "?" for char in text)
 
 
 def parse(content: bytes, file: str) -> Element:

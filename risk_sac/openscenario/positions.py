@@ -25,7 +25,6 @@ from risk_sac.config.story import (
 )
 from risk_sac.openscenario.catalogs import Alternatives, Catalogs, parametrised
 from risk_sac.openscenario.entities import Entities
-from risk_sac.openscenario.expressions import combined
 from risk_sac.openscenario.scope import At, Text
 
 DEEPEST = 8  # trajectories whose points lie on others
@@ -197,7 +196,7 @@ class Positions:
         segment = at.build(
             ClothoidSegment,
             curvature_start=curvature,
-            curvature_end=combined(curvature, "+", combined(prime, "*", length)),
+            curvature_end=at.combined(curvature, "+", at.combined(prime, "*", length)),
             length_m=length,
             position=self.position(at.one("Position")),
             time_s=at.number_or("startTime", None),

@@ -17,6 +17,7 @@ from risk_sac.openscenario.catalogs import Catalogs
 from risk_sac.openscenario.conditions import Conditions
 from risk_sac.openscenario.constraints import allowed, constraints_of
 from risk_sac.openscenario.distributions import NO_SCOPE, Variation, points_of
+from risk_sac.openscenario.elements import plain
 from risk_sac.openscenario.entities import Entities, Entity
 from risk_sac.openscenario.parameters import Parameters, Varied
 from risk_sac.openscenario.positions import Positions
@@ -55,6 +56,9 @@ def import_scenario(file: Path, within: Path | None = None, ego: str | None = No
     """
     try:
         return _Import(Sources(within), ego).read(file.absolute())
+    except ConfigError as error:
+        error.field = error.field or file.name
+        raise
     except RecursionError:
         raise ConfigError(file.name, "elements or parameters that are nested too deep", "less depth") from None
 
@@ -79,7 +83,7 @@ class _Import:
             raise root.refusal(f"a file of {tags}", "a scenario, or a variation of one", remedy)
         imported = self._scenario(At(root, NO_SCOPE), file, name, variation)
         self._remarks += [line for read in self._sources.roots for line in unread(read)]
-        remarks = tuple(line[:1000] for line in dict.fromkeys(self._remarks))[:1000]
+        remarks = tuple(plain(line[:1000]) for line in dict.fromkeys(self._remarks))[:1000]
         origin = imported.document.origin
         assert origin is not None
         document = imported.document.model_copy(update={"origin": origin.model_copy(update={"remarks": remarks})})

@@ -9,7 +9,7 @@ from risk_sac.config.base import Chosen
 from risk_sac.config.values import MOST_MAGNITUDE, Expression
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.openscenario.elements import Built, Element, Unread
-from risk_sac.openscenario.expressions import translated
+from risk_sac.openscenario.expressions import combined, translated
 
 Text = str | Chosen[str]
 T = TypeVar("T")
@@ -125,6 +125,13 @@ class At:
         if meaning.expression is None:
             raise self.refusal(f"{name}: {meaning.text[:80]!r}", "a number")
         return meaning.expression
+
+    def combined(self, left: Expression, operator: str, right: Expression) -> Expression:
+        """Returns two values with an operator between them; raises `ConfigError` if that is no number."""
+        try:
+            return combined(left, operator, right)
+        except ConfigError as error:
+            raise self.refusal(error.got, error.expected, error.remedy) from None
 
     def number_or(self, name: str, default: T) -> Expression | T:
         """Returns a number or arithmetic, or the default where it is missing."""

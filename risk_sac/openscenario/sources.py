@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from risk_sac.errors import ConfigError
-from risk_sac.openscenario.elements import MAX_BYTES, Element, parse
+from risk_sac.openscenario.elements import MAX_BYTES, Element, parse, plain
 
 MAX_FILES = 200
 ROOT = "OpenSCENARIO"
@@ -69,7 +69,7 @@ class Sources:
     def root(self, path: Path, place: str) -> Element:
         """Reads an OpenSCENARIO file, once; raises `ConfigError` for another root or an unknown version."""
         if path not in self._roots:
-            root = parse(self.content(path, place), path.name)
+            root = parse(self.content(path, place), plain(path.name))
             if root.tag != ROOT:
                 remedy = "OpenSCENARIO 2 (.osc) and 0.9 are other languages" if root.tag != "OpenDRIVE" else ""
                 raise root.refusal(f"the root <{root.tag[:80]}>", f"<{ROOT}>", remedy)

@@ -219,7 +219,8 @@ def _resolve_speeds(starts: Mapping[str, Begun]) -> None:
             here = starts[here.relative.to]
         speed: Expression = here.speed
         for step in reversed(steps):
-            speed = combined(speed, "+" if step.how == "delta" else "*", step.value)
+            assert start.at is not None
+            speed = start.at.combined(speed, "+" if step.how == "delta" else "*", step.value)
         start.speed = speed
     for start in starts.values():
         start.relative = None

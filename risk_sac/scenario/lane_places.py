@@ -3,10 +3,12 @@
 import itertools
 import math
 from collections.abc import Collection, Iterable, Sequence
+from functools import lru_cache
 from heapq import heappop, heappush
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of
 from risk_sac.world.net import Link, Net, NetLane, once
@@ -29,6 +31,7 @@ class _Pieces(NamedTuple):
 
     lanes: list[NetLane]
     rows: Floats  # x, y, cos, sin, length and station of each
+    tree: shapely.STRtree  # of the pieces
 
 
 @once
@@ -40,9 +43,12 @@ def _pieces(net: Net) -> _Pieces:
             steps, lengths = np.diff(line.points, axis=0), np.diff(line.station_m)
             rows.append(np.column_stack((line.points[:-1], steps / lengths[:, None], lengths, line.station_m[:-1])))
             lanes += [lane] * len(lengths)
-    return _Pieces(lanes, np.concatenate(rows))
+    pieces = np.concatenate(rows)
+    ends = pieces[:, :2] + pieces[:, 2:4] * pieces[:, 4:5]
+    return _Pieces(lanes, pieces, shapely.STRtree(shapely.linestrings(np.stack((pieces[:, :2], ends), axis=1))))
 
 
+@lru_cache(maxsize=4096)
 def lane_line(lane: NetLane) -> TravelLine:
     """Returns a lane's middle."""
     return line_of(lane.centre)
@@ -60,23 +66,22 @@ def nearest_lane(
       heading_rad: within 90° of which the lane leads; None: any lane.
       among: original names of lanes that are preferred, such as `0_-4`.
     """
-    lanes, rows = _pieces(net)
-    x, y, cos, sin, lengths, stations = rows.T
+    lanes, rows, tree = _pieces(net)
+    near = tree.query(shapely.Point(x_m, y_m), predicate="dwithin", distance=FARTHEST_M)
+    if among:
+        named = [i for i in near.tolist() if not set(among).isdisjoint(lanes[i].original)]
+        near = np.array(named, dtype=np.intp) if named else near
+    x, y, cos, sin, lengths, stations = rows[near].T
     dx, dy = x_m - x, y_m - y
     on = np.clip(dx * cos + dy * sin, 0.0, lengths)
     apart = np.hypot(dx - on * cos, dy - on * sin)
-    close = apart <= FARTHEST_M
     if heading_rad is not None:
         fit = cos * math.cos(heading_rad) + sin * math.sin(heading_rad)
-        close, apart = close & (fit > 0.0), apart + TURNED_M * (1.0 - fit)
-    near = np.flatnonzero(close)
-    if among:
-        named = [i for i in near.tolist() if set(among).intersection(lanes[i].original)]
-        near = np.array(named, dtype=np.intp) if named else near
-    if not len(near):
+        apart = np.where(fit > 0.0, apart + TURNED_M * (1.0 - fit), np.inf)
+    if not len(near) or not np.isfinite(apart.min()):
         return None
-    i = int(near[np.argmin(apart[near])])
-    return Spot(lanes[i], float(stations[i] + on[i]), float(dy[i] * cos[i] - dx[i] * sin[i]))
+    i = int(np.argmin(apart))
+    return Spot(lanes[near[i]], float(stations[i] + on[i]), float(dy[i] * cos[i] - dx[i] * sin[i]))
 
 
 def spot_pose(spot: Spot) -> Pose:

@@ -26,7 +26,8 @@ from risk_sac.scenario.trajectories import trajectory_line
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of
 from risk_sac.scenario.value import Value
 from risk_sac.world.net import Net
-from risk_sac.world.road_geometry import TOLERANCE_M, Across, RoadFile, Roadway
+from risk_sac.world.plane_curves import Across
+from risk_sac.world.road_geometry import TOLERANCE_M, RoadFile, Roadway
 from risk_sac.world.road_links import LaneEnd, Leg, leg_line, onward, road_path
 from risk_sac.world.types import Floats
 

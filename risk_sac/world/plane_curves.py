@@ -1,9 +1,14 @@
-"""Curves in the plane by arc length: clothoids, of which lines and arcs are special ones, and cubic polynomials."""
+"""Curves in the plane by arc length, and polynomials along them.
+
+Clothoids, of which lines and arcs are special ones, and cubic curves.
+"""
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -53,6 +58,23 @@ class Clothoid:
             dx, dy = s_m * (np.cos(theta) @ weights), s_m * (np.sin(theta) @ weights)
         return np.column_stack((x_m + dx, y_m + dy, heading, k0 + rate * s_m))
 
+    def place(self, s_m: float) -> tuple[float, float, float, float]:
+        """Returns what `at` does, at one arc length."""
+        x_m, y_m, heading = self.begin
+        curvature = self.curvature_start
+        if curvature != self.curvature_end:
+            return _row(self.at(np.array([s_m])))
+        if curvature == 0.0:
+            return x_m + s_m * math.cos(heading), y_m + s_m * math.sin(heading), heading, 0.0
+        after = heading + curvature * s_m
+        dx, dy = math.sin(after) - math.sin(heading), math.cos(heading) - math.cos(after)
+        return x_m + dx / curvature, y_m + dy / curvature, after, curvature
+
+
+def _row(rows: Floats) -> tuple[float, float, float, float]:
+    x_m, y_m, heading, curvature = rows[0].tolist()
+    return x_m, y_m, heading, curvature
+
 
 @dataclass(frozen=True)
 class CubicCurve:
@@ -94,6 +116,10 @@ class CubicCurve:
         curvature = (du * bend_v - dv * bend_u) / size**3
         return np.column_stack((x_m + u * cos - v * sin, y_m + u * sin + v * cos, heading, curvature))
 
+    def place(self, s_m: float) -> tuple[float, float, float, float]:
+        """Returns what `at` does, at one arc length."""
+        return _row(self.at(np.array([s_m])))
+
 
 def _slope(coefficients: Sequence[float], p: Floats) -> Floats:
     _, b, c, d = coefficients
@@ -102,3 +128,42 @@ def _slope(coefficients: Sequence[float], p: Floats) -> Floats:
 
 
 Curve = Clothoid | CubicCurve
+
+
+class Cubic(NamedTuple):
+    """Polynomial of the distance from where it begins."""
+
+    start_m: float
+    a: float
+    b: float
+    c: float
+    d: float
+
+    def value(self, s_m: float) -> float:
+        """Its value."""
+        u = s_m - self.start_m
+        return self.a + u * (self.b + u * (self.c + u * self.d))
+
+    def slope(self, s_m: float) -> float:
+        """Its derivative."""
+        u = s_m - self.start_m
+        return self.b + u * (2 * self.c + u * 3 * self.d)
+
+
+class Across(NamedTuple):
+    """Lateral place on a road: t, m, and its change per metre of the reference line."""
+
+    t_m: float
+    slope: float
+
+
+def active(cubics: Sequence[Cubic], s_m: float) -> Cubic | None:
+    """Returns the polynomial that holds at a place."""
+    i = bisect_right(cubics, s_m, key=attrgetter("start_m")) - 1
+    return cubics[i] if i >= 0 else None
+
+
+def value_at(cubics: Sequence[Cubic], s_m: float) -> Across:
+    """Returns the value and the slope at a place, 0 before the first polynomial."""
+    cubic = active(cubics, s_m)
+    return Across(0.0, 0.0) if cubic is None else Across(cubic.value(s_m), cubic.slope(s_m))

@@ -18,40 +18,13 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import parse
 
 from risk_sac.errors import ConfigError, MapError, did_you_mean
-from risk_sac.world.plane_curves import Begin, Clothoid, CubicCurve, Curve
+from risk_sac.world.plane_curves import Across, Begin, Clothoid, Cubic, CubicCurve, Curve, active, value_at
 from risk_sac.world.types import Floats
 
 End = Literal["start", "end"]
 TOLERANCE_M = 0.01  # by which a place may lie beyond a road's end
 NEAR_M = 60.0  # of a reference line; choice: half of the widest road
 SAMPLE_M = 1.0  # between the places of a reference line that a point is compared with first
-
-
-class Cubic(NamedTuple):
-    """Polynomial of the distance from where it begins."""
-
-    start_m: float
-    a: float
-    b: float
-    c: float
-    d: float
-
-    def value(self, s_m: float) -> float:
-        """Its value."""
-        u = s_m - self.start_m
-        return self.a + u * (self.b + u * (self.c + u * self.d))
-
-    def slope(self, s_m: float) -> float:
-        """Its derivative."""
-        u = s_m - self.start_m
-        return self.b + u * (2 * self.c + u * 3 * self.d)
-
-
-class Across(NamedTuple):
-    """Lateral place on a road: t, m, and its change per metre of the reference line."""
-
-    t_m: float
-    slope: float
 
 
 @dataclass(frozen=True)
@@ -78,10 +51,10 @@ class Section:
         for id_ in range(side, lane + side, side) if lane else ():
             other, ds = self.lanes[id_], s_m - self.start_m
             if other.widths or not other.borders:
-                width = _at(other.widths, ds)
+                width = value_at(other.widths, ds)
                 t, slope = t + side * width.t_m, slope + side * width.slope
             else:
-                t, slope = _at(other.borders, ds)
+                t, slope = value_at(other.borders, ds)
         return Across(t, slope)
 
 
@@ -93,7 +66,7 @@ class LinkTo(NamedTuple):
     contact: End
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Roadway:
     """Road of an OpenDRIVE file."""
 
@@ -115,6 +88,11 @@ class Roadway:
             rows[piece == i] = self.curves[i].at(s_m[piece == i] - self.starts_m[i])
         return rows
 
+    def place(self, s_m: float) -> tuple[float, float, float, float]:
+        """Returns x, y, heading and curvature of the reference line at one place."""
+        i = max(bisect_right(self.starts_m, s_m) - 1, 0)
+        return self.curves[i].place(s_m - self.starts_m[i])
+
     def section_index(self, s_m: float) -> int:
         """Returns which lane section a place lies in."""
         return max(bisect_right(self.sections, s_m, key=attrgetter("start_m")) - 1, 0)
@@ -131,17 +109,25 @@ class Roadway:
         starts = [cubic.start_m for cubic in self.offsets] + [section.start_m for section in self.sections]
         return tuple(sorted({*self.starts_m, *starts, *widths}))
 
-    def is_plain(self, s_m: float) -> bool:
-        """Whether widths and offset are constant around a place."""
+    def interval(self, s_m: float) -> int:
+        """Returns how many of `breaks_m` a place is beyond."""
+        return bisect_right(self.breaks_m, s_m)
+
+    @cached_property
+    def plain(self) -> tuple[bool, ...]:
+        """Whether widths and offset are constant, by `interval`."""
+        return tuple(self._is_plain(s_m) for s_m in (0.0, *self.breaks_m))
+
+    def _is_plain(self, s_m: float) -> bool:
         section = self.section(s_m)
-        lanes = [_active(lane.widths, s_m - section.start_m) for lane in section.lanes.values()]
-        lanes += [_active(lane.borders, s_m - section.start_m) for lane in section.lanes.values()]
-        cubics = [cubic for cubic in (*lanes, _active(self.offsets, s_m)) if cubic is not None]
-        return all(cubic.b == cubic.c == cubic.d == 0.0 for cubic in cubics)
+        cubics = [active(lane.widths, s_m - section.start_m) for lane in section.lanes.values()]
+        cubics += [active(lane.borders, s_m - section.start_m) for lane in section.lanes.values()]
+        cubics.append(active(self.offsets, s_m))
+        return all(cubic.b == cubic.c == cubic.d == 0.0 for cubic in cubics if cubic is not None)
 
     def middle(self, lane: int, s_m: float) -> Across:
         """Returns the middle of a lane; raises `ConfigError` if it is not there."""
-        section, offset = self.section(s_m), _at(self.offsets, s_m)
+        section, offset = self.section(s_m), value_at(self.offsets, s_m)
         if lane != 0 and lane not in section.lanes:
             known = ", ".join(map(str, sorted(section.lanes)))
             raise ConfigError("lane", f"{lane} of road {self.id!r} at {s_m:g} m", f"one of {known}")
@@ -158,7 +144,7 @@ class Roadway:
 
         (1 - κ t) ds is the line's progress along the reference line's heading, dt across it.
         """
-        x, y, heading, curvature = self.reference(np.array([s_m]))[0].tolist()
+        x, y, heading, curvature = self.place(s_m)
         turned = math.atan2(across.slope, max(1.0 - curvature * across.t_m, 1e-6))
         return x - math.sin(heading) * across.t_m, y + math.cos(heading) * across.t_m, heading + turned
 
@@ -168,7 +154,7 @@ class Roadway:
 
     def lane_at(self, s_m: float, t_m: float) -> int:
         """Returns the lane at a lateral place, or the outermost one beside it."""
-        section, t_m = self.section(s_m), t_m - _at(self.offsets, s_m).t_m
+        section, t_m = self.section(s_m), t_m - value_at(self.offsets, s_m).t_m
         side = 1 if t_m > 0 else -1
         ids = [id_ for id_ in section.lanes if id_ * side > 0] or [id_ for id_ in section.lanes if id_]
         ids.sort(key=abs)
@@ -193,7 +179,7 @@ class Roadway:
             near_m = float(self.samples[nearest, 0])
         s_m, t_m = near_m, 0.0
         for _ in range(20):  # Newton's method on the point's distance along the tangent
-            x, y, heading, curvature = self.reference(np.array([s_m]))[0].tolist()
+            x, y, heading, curvature = self.place(s_m)
             dx, dy = x_m - x, y_m - y
             along, t_m = (
                 dx * math.cos(heading) + dy * math.sin(heading),
@@ -276,17 +262,6 @@ class RoadFile:
             listed = ", ".join(known[:12]) + (", …" if len(known) > 12 else "")
             raise ConfigError("road", repr(id_), f"a road of the road file: {listed}", did_you_mean(id_, known))
         return self.roads[id_]
-
-
-def _active(cubics: Sequence[Cubic], s_m: float) -> Cubic | None:
-    """Returns the polynomial that holds at a place."""
-    i = bisect_right(cubics, s_m, key=attrgetter("start_m")) - 1
-    return cubics[i] if i >= 0 else None
-
-
-def _at(cubics: Sequence[Cubic], s_m: float) -> Across:
-    cubic = _active(cubics, s_m)
-    return Across(0.0, 0.0) if cubic is None else Across(cubic.value(s_m), cubic.slope(s_m))
 
 
 def _number(element: Element, name: str, default: float | None = None) -> float:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_sac.errors import ConfigError
-from risk_sac.world.plane_curves import Clothoid
-from risk_sac.world.road_geometry import Across, End, RoadFile, Roadway
+from risk_sac.world.plane_curves import Across, Clothoid
+from risk_sac.world.road_geometry import End, RoadFile, Roadway
 from risk_sac.world.types import Floats
 
 SAGITTA_M = 0.001  # between a bent line and the straight pieces that stand for it
@@ -146,6 +146,10 @@ def onward(
     for _ in range(MOST_LEGS):
         road = file.road(here.road)
         to_m, out = lane_end(road, here.lane, from_m, forward=here.forward)
+        if by_lane:
+            most_m = min(abs(to_m - from_m), 2.0 * left_m + LONGEST_M)  # no bend makes a lane half as long
+            near_m = from_m + (most_m if here.forward else -most_m)
+            to_m = near_m if lane_length(road, here.lane, from_m, near_m) >= left_m else to_m
         room_m = lane_length(road, here.lane, from_m, to_m) if by_lane else abs(to_m - from_m)
         if left_m <= room_m + INSIDE_M:
             if by_lane:
@@ -246,26 +250,32 @@ def leg_line(road: Roadway, leg: Leg) -> Floats:
 
     Where the lane is changed, the line passes over evenly from one middle to the other.
     """
-    stations = _stations(road, leg.from_m, leg.to_m, changes=leg.out != _through(road, leg))
-    rows, lane, out = np.empty((len(stations), 3)), leg.lane, leg.out
+    changes = leg.out != lane_through(road, leg.lane, leg.from_m, leg.to_m)
+    stations = _stations(road, leg.from_m, leg.to_m, changes=changes)
+    across, constant = np.empty((len(stations), 2)), dict[int, Across]()
     for i, s_m in enumerate(stations):
-        here = lane_through(road, lane, leg.from_m, s_m) or _nearest(road, lane, s_m)
-        across = road.middle(here, s_m)
-        there = lane_through(road, out, leg.to_m, s_m) or _nearest(road, out, s_m)
-        if there != here:
-            share = abs(s_m - leg.from_m) / max(leg.length_m, 1e-9)
-            share, rate = share**2 * (3 - 2 * share), 6 * share * (1 - share) / max(leg.length_m, 1e-9)
-            other, apart = road.middle(there, s_m), road.middle(there, s_m).t_m - across.t_m
-            slope = across.slope + share * (other.slope - across.slope) + apart * rate * (1 if leg.forward else -1)
-            across = Across(across.t_m + share * apart, slope)
-        rows[i] = road.point(s_m, across)
-    if not leg.forward:
-        rows[:, 2] += math.pi
-    return rows
+        here = road.interval(s_m)
+        across[i] = constant[here] if here in constant else _across(road, leg, s_m)
+        if road.plain[here] and not changes:
+            constant[here] = Across(*across[i].tolist())
+    x_m, y_m, heading, curvature = road.reference(np.array(stations)).T
+    turned = np.arctan2(across[:, 1], np.maximum(1.0 - curvature * across[:, 0], 1e-6))
+    x_m, y_m = x_m - np.sin(heading) * across[:, 0], y_m + np.cos(heading) * across[:, 0]
+    return np.column_stack((x_m, y_m, heading + turned + (0.0 if leg.forward else math.pi)))
 
 
-def _through(road: Roadway, leg: Leg) -> int | None:
-    return lane_through(road, leg.lane, leg.from_m, leg.to_m)
+def _across(road: Roadway, leg: Leg, s_m: float) -> Across:
+    """Returns the lateral place of a leg, and its change per metre of the reference line."""
+    here = lane_through(road, leg.lane, leg.from_m, s_m) or _nearest(road, leg.lane, s_m)
+    there = lane_through(road, leg.out, leg.to_m, s_m) or _nearest(road, leg.out, s_m)
+    across = road.middle(here, s_m)
+    if there == here:
+        return across
+    length_m, other = max(leg.length_m, 1e-9), road.middle(there, s_m)
+    share, apart = abs(s_m - leg.from_m) / length_m, other.t_m - across.t_m
+    share, rate = share**2 * (3 - 2 * share), 6 * share * (1 - share) / length_m
+    slope = across.slope + share * (other.slope - across.slope) + apart * rate * (1 if leg.forward else -1)
+    return Across(across.t_m + share * apart, slope)
 
 
 def _nearest(road: Roadway, lane: int, s_m: float) -> int:
@@ -285,7 +295,7 @@ def _stations(road: Roadway, from_m: float, to_m: float, *, changes: bool = Fals
             curvature = max(abs(piece.curvature_start), abs(piece.curvature_end))
         else:
             curvature = float(np.abs(road.reference(np.linspace(a, b, 9))[:, 3]).max())
-        plain = curvature == 0.0 and not changes and road.is_plain((a + b) / 2)
+        plain = curvature == 0.0 and not changes and road.plain[road.interval((a + b) / 2)]
         step = b - a
         if not plain:
             step = LONGEST_M if curvature == 0.0 else math.sqrt(8 * SAGITTA_M / curvature)

@@ -40,8 +40,8 @@ def crosswalk(*places: float) -> str:
     return f"<objects>{''.join(objects)}</objects>"
 
 
-def kind(speed: str, s: float = 0.0) -> str:
-    return f'<type s="{s}" type="motorway">{speed}</type>'
+def kind(speed: str, s: float = 0.0, of: str = "rural") -> str:
+    return f'<type s="{s}" type="{of}">{speed}</type>'
 
 
 def read(folder: Path, content: str) -> tuple[Net, Converted]:
@@ -75,6 +75,11 @@ def test_the_limit_of_a_road_is_that_of_its_lanes(tmp_path, speed, mps):
     net, made = read(tmp_path, road(section(lane(-1), lane(-2)), types=kind(speed)))
     assert limits(net) == [(0.0, [mps, mps])]
     assert any("without a speed limit" in warning for warning in made.warnings) == (mps == 13.89)
+
+
+def test_a_motorway_that_states_no_limit_has_none(tmp_path):
+    net, _ = read(tmp_path, road(section(lane(-1)), types=kind("", of="motorway")))
+    assert limits(net) == [(0.0, [39.44])]
 
 
 def test_limits_begin_where_they_are_given_and_that_of_a_lane_is_ahead(tmp_path):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from risk_sac.errors import ConfigError
-from risk_sac.openscenario.scenario_file import import_scenario
+from risk_sac.openscenario.scenario_file import Imported, import_scenario
 from risk_sac.scenario.library import written
 from risk_sac.scenario.reading import document_from
 from tests.openscenario_samples import BODIES, FILES, SCENARIO, VARIATION, WAYS, copied
@@ -20,9 +20,9 @@ VALUES = (
     "", "0", "-1", "1e309", "nan", "INF", "-INF", "1e-300", "999999999999", "true", "false", "Ego", "Walker", "$gap",
     "$road", "$model", "$Ego_kph", "$nothing", "${$gap}", "${-$gap}", "${1/0}", "${sqrt(-1)}", "${acos($gap)}",
     "${$gap % 0}", "${max(1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17,18,19,20,21,22,23,24,25,26,27,28,29,30)}",
-    "${pow(10, 400)}", "${" + "(" * 200 + "1" + ")" * 200 + "}", "${" + "-" * 400 + "1}", "${not $brakes and true or e}",
-    "${__import__('os').system('true')}", "x" * 4_000, "x" * 6_000, "ä\u202e\u0000"[:2], "../../../../etc/passwd", "catalogs",
-    "road.xodr", "cut_in.xosc", "variation.xosc", "step", "linear", "rate", "lessThan", "across", "along", "wagon", "ways",
+    "${pow(10, 400)}", "${" + "(" * 200 + "1" + ")" * 200 + "}", "${" + "-" * 400 + "1}", "${not $brakes and 1}",
+    "${__import__('os').system('true')}", "x" * 4_000, "x" * 6_000, "ä\u202e", "../../../../etc/passwd", "catalogs",
+    "road.xodr", "cut_in.xosc", "variation.xosc", "step", "linear", "rate", "lessThan", "across", "along", "wagon",
 )  # fmt: skip
 
 
@@ -86,23 +86,20 @@ def mutate(file: Path, draw: random.Random) -> None:
         file.write_bytes(b"")
 
 
-def try_mutants(folder: Path, seeds: range) -> tuple[int, int]:
-    """Imports mutated files; returns how many are imported and how many refused."""
-    imported = refused = 0
+def try_mutants(folder: Path, seeds: range) -> int:
+    """Imports mutated files; returns how many are not refused."""
+    imported = 0
     there = copied(folder)
     originals = {path: path.read_bytes() for path in there.rglob("*") if path.is_file()}
     for seed in seeds:
         draw = random.Random(seed)
         mutate(there / draw.choice((SCENARIO, SCENARIO, VARIATION, BODIES, WAYS)), draw)
         began = time.process_time()
-        try:
-            result = import_scenario(there / draw.choice((SCENARIO, VARIATION)), within=there)
-        except ConfigError as error:
-            line = str(error)
-            assert line.isprintable(), (seed, line)
-            assert len(line) < LONGEST_LINE, (seed, line)
-            assert error.field, seed
-            refused += 1
+        result = _imported(there / draw.choice((SCENARIO, VARIATION)))
+        if isinstance(result, ConfigError):
+            assert str(result).isprintable(), seed
+            assert len(str(result)) < LONGEST_LINE, seed
+            assert result.field, seed
         else:
             assert document_from(written(result.document)) == result.document, seed
             imported += 1
@@ -110,14 +107,19 @@ def try_mutants(folder: Path, seeds: range) -> tuple[int, int]:
         assert {path for path in there.rglob("*") if path.is_file()} == originals.keys(), seed
         for path, content in originals.items():
             path.write_bytes(content)
-    return imported, refused
+    return imported
+
+
+def _imported(file: Path) -> Imported | ConfigError:
+    try:
+        return import_scenario(file, within=file.parent)
+    except ConfigError as error:
+        return error
 
 
 @pytest.mark.usefixtures("quick")
 def test_mutated_files_are_imported_or_refused(tmp_path: Path) -> None:
-    imported, refused = try_mutants(tmp_path, range(300))
-    assert imported >= 30
-    assert refused >= 100
+    assert 30 <= try_mutants(tmp_path, range(300)) <= 200
 
 
 @pytest.mark.torture

@@ -83,9 +83,15 @@ MAP = file_xml(
 
 
 @cache
-def roads_and_net() -> tuple[RoadFile, Net]:
-    """The road file, and the net that it is converted to."""
+def net_file() -> Path:
+    """The net that the road file is converted to; `junction.xodr` lies beside it."""
     folder = Path(mkdtemp())
     file = folder / "junction.xodr"
     file.write_text(MAP)
-    return RoadFile.read(file), parse_net(read_tree(present_net(file, folder).file))
+    return present_net(file, folder).file
+
+
+@cache
+def roads_and_net() -> tuple[RoadFile, Net]:
+    """The road file, and the net that it is converted to."""
+    return RoadFile.read(net_file().with_name("junction.xodr")), parse_net(read_tree(net_file()))
