@@ -83,7 +83,7 @@ def test_a_sweep_plays_each_point_once_and_counts_those_refused(sweep):
 
 
 def test_both_sides_of_the_road_have_the_same_verdicts(sweep):
-    """But for the smallest gap: SUMO's driver falls back behind a slower vehicle on its left, which then never comes."""
+    """But for the smallest gap: SUMO's driver falls behind a slower vehicle on its left, and is not cut off."""
     left, right = ([r.avoided_by for r in half if r.scene["gap_m"] > 6] for half in (sweep[:6], sweep[6:]))
     assert left == right
     assert {told["r157"] for told in left if told is not None} == {True, False}
