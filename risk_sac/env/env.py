@@ -211,7 +211,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self, scene: Scene, motions: Mapping[str, NDArray[Any]] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
         self._unit_scene = self.problem.space.to_unit(scene)
-        self.trace = Trace(self._gauge.names)  # of this scene, even where it has no layout
+        self.trace, self.start_danger = Trace(self._gauge.names), None  # of this scene, even where it has no layout
         layout = self.layout = self.problem.family.layout(scene.values)
         limits = limits_from_odd(self.problem.odd, layout.friction)
         self._ground = Ground.of(layout, self.problem.speed_limit_mps)
