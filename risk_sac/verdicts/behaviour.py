@@ -15,6 +15,7 @@ from risk_sac.world.types import Bools, Floats, Kind, Role
 SMOOTH = 5  # frames, 0.5 s: a pedal that is held
 JERK_STEPS = 3  # between the accelerations that are compared
 PRESSED_MPS2 = 1.5  # from which a pedal counts as pressed; SUMO's drivers dawdle with less
+TOUCHED_MPS2 = 0.5  # from which a change between gas and brake counts
 OVER_M = 0.3  # from which a body over the line is a lane change, as R157 takes a cut-in
 CHANGE_S = 1.0  # within which the fastest lateral motion is taken
 MOVES_MPS, STANDS_MPS, DRIVES_MPS = 0.5, 0.3, 5.0
@@ -265,8 +266,8 @@ def pedal_changes(held: Floats, time_s: Floats) -> tuple[float, float]:
     Returns:
       The number, and the time of the last of them.
     """
-    pressed = np.flatnonzero(np.abs(held) > PRESSED_MPS2)
-    changed = pressed[1:][np.diff(np.sign(held[pressed])) != 0]
+    touched = np.flatnonzero(np.abs(held) > TOUCHED_MPS2)
+    changed = touched[1:][np.diff(np.sign(held[touched])) != 0]
     if not len(changed):
         return 0.0, float(time_s[0])
     at_s = time_s[changed]
