@@ -2,7 +2,8 @@
 
 Two probabilities decide, and the less likely counts. The first is the least of all features', corrected for their
 number (Holm 1979): traffic of many honest actors stays ordinary. The second is of all of them together, by the
-truncated product (Zaykin et al. 2002): an adversary that stays just inside every threshold does not stay ordinary.
+truncated product (Zaykin et al. 2002) and the product of the two least likely events: an adversary that stays just
+inside every threshold does not stay ordinary.
 
 Choice: events are independent, such as three stops of one driver; features of one event count once, by the least
 likely. A feature without a published distribution makes a failure rare at most.
