@@ -58,7 +58,7 @@ RED = 7  # s, how long that signal has been red
 CONDUCT_ROWS = 8
 MEMORY_SCALE = np.array([1.0, 3.0, 5.0, 5.0, 5.0, 8.0])  # of each row in an observation
 
-CHANGES_S = 10.0  # choice: as long as the changes of pedal are counted over by an analyst
+CHANGES_S = 10.0  # choice: over which changes of pedal are forgotten
 HELD_S = 0.5  # choice: SUMO's drivers touch a pedal for a step or two
 PEDAL_MPS2, STEPS_OUT_MPS2 = 0.5, 0.5  # choice: from there a pedal is pressed, and a pedestrian starts or stops
 FORGET = 2.0  # choice: timers run back twice as fast as they ran up, so that a short swerve does not reset them
@@ -89,7 +89,7 @@ SPEEDING_FREE, SPEEDING_FULL = _scale("speeding")  # 6.5 to 10.1 m/s above the l
 RED_FREE, RED_FULL = _scale("red_entry")  # 0 to 2.9 s after the start of red
 ENTRY_GAP_FREE, ENTRY_GAP_FULL = _scale("junction_gap")  # 1.9 to -2.8 s: 1.6 of 1,000 drivers accept 0 s
 # Choices, where nothing is published: what SUMO's drivers stay below costs nothing.
-CHANGES_FREE, CHANGES_FULL = 2.4, 3.6  # in 10 s
+CHANGES_FREE, CHANGES_FULL = 2.4, 3.6
 LATERAL_FREE, LATERAL_FULL = 1.0, 1.8  # m/s; UN R157's fastest cut-in
 LEVEL_FREE, LEVEL_FULL = 1.5, 4.0  # s
 OVER_FREE, OVER_FULL = 0.5, 2.0  # s

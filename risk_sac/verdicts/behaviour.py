@@ -15,7 +15,7 @@ from risk_sac.world.types import Bools, Floats, Kind, Role
 SMOOTH = 5  # frames, 0.5 s: a pedal that is held
 JERK_STEPS = 3  # between the accelerations that are compared
 PRESSED_MPS2 = 1.5  # from which a pedal counts as pressed; SUMO's drivers dawdle with less
-TOUCHED_MPS2 = 0.5  # from which a change between gas and brake counts
+TOUCHED_MPS2, CHANGES_S = 0.5, 5.0  # changes between gas and brake above this count, in so many seconds
 OVER_M = 0.3  # from which a body over the line is a lane change, as R157 takes a cut-in
 CHANGE_S = 1.0  # within which the fastest lateral motion is taken
 MOVES_MPS, STANDS_MPS, DRIVES_MPS = 0.5, 0.3, 5.0
@@ -267,7 +267,7 @@ def _steps_out(
 
 
 def pedal_changes(held: Floats, time_s: Floats) -> tuple[float, float]:
-    """Counts changes between gas and brake in the 10 s with most.
+    """Counts changes between gas and brake in the 5 s with most.
 
     Returns:
       The number, and the time of the last of them.
@@ -277,7 +277,7 @@ def pedal_changes(held: Floats, time_s: Floats) -> tuple[float, float]:
     if not len(changed):
         return 0.0, float(time_s[0])
     at_s = time_s[changed]
-    counts = np.arange(1, len(at_s) + 1) - np.searchsorted(at_s, at_s - LONGEST_S)
+    counts = np.arange(1, len(at_s) + 1) - np.searchsorted(at_s, at_s - CHANGES_S)
     most = int(counts.argmax())
     return float(counts[most]), float(at_s[most])
 
