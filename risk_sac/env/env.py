@@ -28,7 +28,7 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.host.process_state import c_numbers
 from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.records import Collision, RequirementResult, StoryDeviation, Violation
-from risk_sac.risk.conduct import CONDUCT_ROWS, RoadFacts, conduct_terms, see_signals
+from risk_sac.risk.conduct import CONDUCT_ROWS, Road, conduct_terms, see_signals, soft_cost
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.realism import HardRule, danger_of, refuse_danger, refuse_overlap
 from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
@@ -107,7 +107,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     _adversaries: Adversaries
     _frame: Frame
     _measures: Measures
-    _road: RoadFacts
+    _road: Road
     _conduct: Floats  # what C_soft remembers, CONDUCT_ROWS x adversaries
     _steps: int
     _contact_s: float | None  # from the release
@@ -215,10 +215,12 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         layout = self.layout = self.problem.family.layout(scene.values)
         limits = limits_from_odd(self.problem.odd, layout.friction)
         self._ground = Ground.of(layout, self.problem.speed_limit_mps)
-        self._road = RoadFacts.of(layout, self.problem.speed_limit_mps)
+        carriageway = carriageway_of(layout.net)
+        self._road = Road(layout, self.problem.speed_limit_mps, carriageway)
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._reflex = reflex_of(self.problem.ego.profile, self._ground)
-        self._gauge.reset(carriageway_of(layout.net))
+        self._gauge.reset(carriageway)
+        self.trace = Trace(self._gauge.names)
         sensor = self.problem.ego.sensor
         visible = conditions(self.problem.odd, scene.values, sensor=sensor is not None)
         self._perception.sight = sight(sensor, visible.visibility_m, visible.unlit_m)
@@ -277,8 +279,9 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         frame, adversaries = self._frame, self._adversaries
         rows = adversaries.rows(frame)
         seen = frame.kind, frame.link, frame.state
-        terms = conduct_terms(rows, adversaries.slots, *seen, self._conduct, self._road)
-        return float(terms.max(initial=0.0))
+        road = self._road.facts(rows, frame.state)
+        terms = conduct_terms(rows, adversaries.slots, *seen, self._conduct, road)
+        return float(soft_cost(terms, rows, frame.state))
 
     def _judge(self, contact: Contact) -> Collision:
         frame = self._frame

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from risk_sac.world.net import Link, Net, NetLane
 from risk_sac.world.read_net import parse_net, read_tree
@@ -58,6 +59,7 @@ class Carriageway:
         self._segments = np.array(segments, dtype=np.float64).reshape(-1, 7)
         self._tree = shapely.STRtree(self._pieces)
         self._known: dict[tuple[int, int, int], Surroundings] = {}
+        self._lanes: dict[tuple[int, int], Floats] = {}
 
     def around(self, x_m: float, y_m: float, sector: int) -> Surroundings:
         """Returns the surroundings of a point for a sector of headings, see `sector_of`, or `ANY_WAY`."""
@@ -66,10 +68,20 @@ class Carriageway:
             known = self._known[key] = self._surroundings(*key)
         return known
 
+    def lanes(self, x_m: float, y_m: float) -> Floats:
+        """Returns the lanes around a point, as in `Surroundings`, without the outline."""
+        key = int(x_m // SQUARE_M), int(y_m // SQUARE_M)
+        if (known := self._lanes.get(key)) is None:
+            near = self._near(_square(*key))
+            known = self._lanes[key] = self._segments[near[near < len(self._segments)]]
+        return known
+
+    def _near(self, square: shapely.Geometry) -> NDArray[np.intp]:
+        return np.sort(self._tree.query(square))
+
     def _surroundings(self, column: int, row: int, sector: int) -> Surroundings:
-        x, y = column * SQUARE_M, row * SQUARE_M
-        square = shapely.box(x - MARGIN_M, y - MARGIN_M, x + SQUARE_M + MARGIN_M, y + SQUARE_M + MARGIN_M)
-        near = np.sort(self._tree.query(square))
+        square = _square(column, row)
+        near = self._near(square)
         turned = np.cos(self._ways[near] - sector * SECTOR_RAD)
         admitted = near if sector == ANY_WAY else near[~(turned < LEAST_COS)]
         ground = shapely.union_all(self._pieces[admitted], grid_size=1e-6)
@@ -77,6 +89,12 @@ class Carriageway:
             ground = ground.buffer(by_m, join_style="mitre")
         outline = _outline(ground.simplify(EXACT_M).intersection(square), square.bounds)
         return Surroundings(outline, self._segments[near[near < len(self._segments)]])
+
+
+def _square(column: int, row: int) -> shapely.Polygon:
+    """Returns a square of the net with its margin."""
+    x, y = column * SQUARE_M, row * SQUARE_M
+    return shapely.box(x - MARGIN_M, y - MARGIN_M, x + SQUARE_M + MARGIN_M, y + SQUARE_M + MARGIN_M)
 
 
 @lru_cache(maxsize=8)

@@ -18,7 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from risk_sac.maps.carriageway import Carriageway
 from risk_sac.risk.driving import FEATURES
+from risk_sac.risk.publish import nearest_lane
 from risk_sac.scenario.layout import Layout
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import (
@@ -56,9 +58,9 @@ RED = 7  # s, how long that signal has been red
 CONDUCT_ROWS = 8
 MEMORY_SCALE = np.array([1.0, 3.0, 5.0, 5.0, 5.0, 8.0])  # of each row in an observation
 
-CHANGES_S = 10.0  # choice: as long as the changes of pedal are counted over by an analyst
+CHANGES_S = 10.0  # choice: over which changes of pedal are forgotten
 HELD_S = 0.5  # choice: SUMO's drivers touch a pedal for a step or two
-PEDAL_MPS2, STEPS_OUT_MPS2 = 1.0, 0.5  # choice: from there a pedal is pressed, and a pedestrian starts or stops
+PEDAL_MPS2, STEPS_OUT_MPS2 = 0.5, 0.5  # choice: from there a pedal is pressed, and a pedestrian starts or stops
 FORGET = 2.0  # choice: timers run back twice as fast as they ran up, so that a short swerve does not reset them
 
 
@@ -84,10 +86,10 @@ GAP_FREE, GAP_FULL = _scale("lane_change_gap")  # 1.9 to 0.8 m
 HEADWAY_FREE, HEADWAY_FULL = _scale("lane_change_headway")  # 0.25 to 0.11 s
 WALKING_FREE, WALKING_FULL = _scale("walking_speed")  # 1.9 to 2.3 m/s
 SPEEDING_FREE, SPEEDING_FULL = _scale("speeding")  # 6.5 to 10.1 m/s above the limit
-RED_FREE, RED_FULL = _scale("red_entry")  # 0 to 3.6 s after the start of red
+RED_FREE, RED_FULL = _scale("red_entry")  # 0 to 2.9 s after the start of red
 ENTRY_GAP_FREE, ENTRY_GAP_FULL = _scale("junction_gap")  # 1.9 to -2.8 s: 1.6 of 1,000 drivers accept 0 s
 # Choices, where nothing is published: what SUMO's drivers stay below costs nothing.
-CHANGES_FREE, CHANGES_FULL = 1.8, 3.5  # in 10 s
+CHANGES_FREE, CHANGES_FULL = 2.4, 3.6
 LATERAL_FREE, LATERAL_FULL = 1.0, 1.8  # m/s; UN R157's fastest cut-in
 LEVEL_FREE, LEVEL_FULL = 1.5, 4.0  # s
 OVER_FREE, OVER_FULL = 0.5, 2.0  # s
@@ -109,6 +111,7 @@ AHEAD_M = 30.0  # how far ahead of the car a pedestrian is in its way
 BESIDE_M = 1.0  # closer than that, a pedestrian beside the car walks into it
 WALKING_MPS = 0.3
 STOP, WAIT, YIELD, GO = ord("r"), ord("u"), ord("g"), ord("G")  # letters of signals
+NEAR_M = 20.0  # choice: from the ego, over which an adversary counts for 1 / e
 MIDDLE_M, ACROSS_M = 10.0, 8.0  # choice: from where a vehicle enters to where ways meet, and how far these lie apart
 
 # Terms of the cost.
@@ -120,15 +123,29 @@ TERMS = 12
 class RoadFacts(NamedTuple):
     """Facts of the road that the cost depends on."""
 
-    lane_width_m: float  # of all lanes
-    limit_mps: float
+    lane_width_m: Floats  # of the lane of each adversary
+    limit_mps: Floats  # of that lane
     junctions: Floats  # a row nx, ny, c and number of its junction for each side of one; nx·x + ny·y <= c within
 
-    @classmethod
-    def of(cls, layout: Layout, limit_mps: float) -> "RoadFacts":
-        """Reads them from a layout."""
+
+class Road:
+    """Road of an episode."""
+
+    def __init__(self, layout: Layout, limit_mps: float, carriageway: Carriageway) -> None:
+        """Takes a layout, the limit where no lane is near, and the carriageway of the layout's net."""
         sides = [(*side, float(k)) for k, area in enumerate(layout.junctions) for side in area.sides]
-        return cls(layout.lane_width_m, limit_mps, np.array(sides).reshape(-1, 4))
+        self._junctions = np.array(sides).reshape(-1, 4)
+        self._usual = layout.lane_width_m, limit_mps
+        self._carriageway = carriageway
+
+    def facts(self, rows: NDArray[np.intp], state: Floats) -> RoadFacts:
+        """Reads the facts at the adversaries' places; arguments as of `conduct_terms`."""
+        width_m, limit_mps = np.empty(len(rows)), np.empty(len(rows))
+        places = zip(*state[:, rows][[X, Y, HEADING]].tolist(), strict=True)
+        for k, (x, y, heading) in enumerate(places):
+            _, limit, width = nearest_lane(self._carriageway.lanes(x, y), x, y, heading)
+            width_m[k], limit_mps[k] = (width, limit) if math.isfinite(limit) else self._usual
+        return RoadFacts(width_m, limit_mps, self._junctions)
 
 
 @compiled
@@ -169,9 +186,6 @@ def conduct_terms(
 ) -> Floats:
     """Computes the terms of a step's soft realism cost, `adversaries x TERMS`, each in [0, 1].
 
-    C_soft(s, a) of (5) is their maximum. Choice: the worst adversary and its worst feature count, not a mean, or one
-    could behave as it liked beside others that do nothing.
-
     Args:
       rows: columns of the adversaries in `state`.
       slots: their columns in `memory`.
@@ -179,7 +193,7 @@ def conduct_terms(
       link: `n`, SUMO's letter of the signal ahead of each actor.
       state: `rows x n`, after the step.
       memory: `CONDUCT_ROWS x adversaries`; updated.
-      road: where they are.
+      road: where each of `rows` is.
     """
     terms = np.zeros((len(rows), TERMS))
     for k in range(len(rows)):
@@ -187,9 +201,31 @@ def conduct_terms(
         if kind[row] == PEDESTRIAN:
             _pedestrian(row, state, memory[:, slot], terms[k])
         else:
-            _vehicle(row, kind, link, state, memory[:, slot], road, terms[k])
+            lane = road.lane_width_m[k], road.limit_mps[k]
+            _vehicle(row, kind, link, state, memory[:, slot], lane, road.junctions, terms[k])
             _enter(row, kind, link, state, memory[:, slot], terms[k])
     return terms
+
+
+@compiled
+def soft_cost(terms: Floats, rows: NDArray[np.intp], state: Floats) -> float:
+    """Computes the soft realism cost of a step from its terms, in [0, 1].
+
+    C_soft(s, a) = min(1, Σ_k exp(-d_k / NEAR_M) · min(1, Σ_i c_ki))                    (5)
+
+    c_ki is term i of adversary k, and d_k its distance from the ego. Unlikely things add up, as the logarithms of
+    their probabilities do. Choice: what happens far from the ego counts less, since it does not make the failure.
+
+    Args:
+      terms: `adversaries x TERMS`.
+      rows: columns of the adversaries in `state`; the ego's is 0.
+      state: `rows x n`.
+    """
+    cost = 0.0
+    for k in range(len(rows)):
+        away_m = math.hypot(state[X, rows[k]] - state[X, 0], state[Y, rows[k]] - state[Y, 0])
+        cost += math.exp(-away_m / NEAR_M) * min(terms[k].sum(), 1.0)
+    return min(cost, 1.0)
 
 
 @compiled
@@ -259,14 +295,15 @@ def _vehicle(
     link: NDArray[np.uint8],
     state: Floats,
     memory: Floats,
-    road: RoadFacts,
+    lane: tuple[float, float],
+    junctions: Floats,
     terms: Floats,
 ) -> None:
     accel, speed, lateral = state[ACCEL, row], state[SPEED, row], state[LATERAL, row]
     terms[JERK] = ramp(abs(accel - memory[HELD]) / HELD_S, JERK_FREE, JERK_FULL)
-    terms[SPEEDING] = ramp(speed - road.limit_mps, SPEEDING_FREE, SPEEDING_FULL)
+    terms[SPEEDING] = ramp(speed - lane[1], SPEEDING_FREE, SPEEDING_FULL)
     _count_changes(accel, PEDAL_MPS2, memory)
-    to_line = road.lane_width_m / 2 - abs(state[OFFSET, row]) - state[WIDTH, row] / 2
+    to_line = lane[0] / 2 - abs(state[OFFSET, row]) - state[WIDTH, row] / 2
     moves, changes_lane = speed > MOVING_MPS, abs(lateral) > CALM_MPS
     cos, sin = math.cos(state[HEADING, row]), math.sin(state[HEADING, row])
     level, paces, clear = False, False, True
@@ -294,7 +331,7 @@ def _vehicle(
     memory[OVER] = _run(memory[OVER], moves and to_line < NEAR_LINE_M and not changes_lane)
     if paces or not level:  # two that cruise side by side do not pace each other
         memory[LEVEL] = _run(memory[LEVEL], paces)
-    within = _in_junction(row, state, road.junctions)
+    within = _in_junction(row, state, junctions)
     idles = (speed < STANDING_MPS and (link[row] == 0 or link[row] == GO)) or (within and speed < CRAWLS_MPS)
     if memory[IDLE] >= 0.0:
         memory[IDLE] = _run(memory[IDLE], idles and clear)

@@ -34,6 +34,7 @@ FASTER_MPS = 5.0  # than the ego, at most, to take up a place
 CATCHING_UP = 0.5  # 1/s, of the way to that place
 ANSWER = 0.5  # of full drive, for 1 m/s of difference
 LEAST_EFFORT = 0.4  # of an actor that is on time
+EARLIER_S, SOONEST_S = 2.0, 0.5  # than the ego, at most; and from now
 TURNING = 0.5  # of what is possible, at most
 
 
@@ -100,7 +101,7 @@ def act(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:
       pedestrian: whether it is one.
     """
     same_way = seen.cos > SAME_WAY_COS and not pedestrian
-    return (alongside if same_way else crossing)(genes, seen, since_cue_s)
+    return alongside(genes, seen, since_cue_s) if same_way else crossing(genes, seen, since_cue_s, pedestrian)
 
 
 def cue(genes: Genes, seen: Seen, pedestrian: bool) -> bool:
@@ -141,16 +142,17 @@ def _taking_place(genes: Genes, seen: Seen) -> Act:
     return Act(_clip(ANSWER * (wanted_mps - seen.speed_mps)), steer)
 
 
-def crossing(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
+def crossing(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:
     """A vehicle from across or opposite, or a pedestrian: keeps its time to where the ways cross, then goes for it.
 
-    `place` is how much later than the ego it means to be there, 2 s at most, or how it moves where the ways do not
+    `place` is how much earlier than the ego it means to be there, 2 s at most, or how it moves where the ways do not
     cross; `aside` is how hard it works at that, against what a driver would do at a red light. So it waits for the ego,
     slows down as the ego does, and sets off when the ego does. `drive` and `steer`, to the left or the right, are those
     of the strike, `after` is the drive that follows.
     """
     if since_cue_s < 0.0:
-        return Act((LEAST_EFFORT + (1.0 - LEAST_EFFORT) * genes.aside) * _keeping_time(genes, seen), 0.0)
+        keeping_time = _walking_on_time if pedestrian else _driving_on_time
+        return Act((LEAST_EFFORT + (1.0 - LEAST_EFFORT) * genes.aside) * keeping_time(genes, seen), 0.0)
     return _strike(genes, since_cue_s, TURNING * _signed(genes.steer))
 
 
@@ -160,13 +162,32 @@ def _strike(genes: Genes, since_cue_s: float, steer: float) -> Act:
     return Act(_signed(genes.after), 0.0)
 
 
-def _keeping_time(genes: Genes, seen: Seen) -> float:
+def _walking_on_time(genes: Genes, seen: Seen) -> float:
+    """A pedestrian stands or walks."""
     if abs(seen.sin) < CROSSING_SIN:
         return _signed(genes.place)
-    own_m = -seen.y_m / seen.sin  # to the ego's axis
+    own_m, ego_s = _to_crossing(seen)
+    return _clip(own_m / max(seen.speed_mps, 1.0) - ego_s + EARLIER_S * _signed(genes.place))
+
+
+def _driving_on_time(genes: Genes, seen: Seen) -> float:
+    """A vehicle takes up the speed that brings it there on time.
+
+    An action by the difference of the times overshoots again and again, as acceleration builds up with limited jerk,
+    and no driver changes pedals every second.
+    """
+    if abs(seen.sin) < CROSSING_SIN:
+        return _signed(genes.place)
+    own_m, ego_s = _to_crossing(seen)
+    wanted_s = max(ego_s - EARLIER_S * _signed(genes.place), SOONEST_S)
+    return _clip(ANSWER * (own_m / wanted_s - seen.speed_mps))
+
+
+def _to_crossing(seen: Seen) -> tuple[float, float]:
+    """Computes how far an adversary has to go to the ego's axis, and in what time the ego is there."""
+    own_m = -seen.y_m / seen.sin
     ego_m = seen.x_m + own_m * seen.cos
-    own_s, ego_s = own_m / max(seen.speed_mps, 1.0), ego_m / max(seen.ego_mps, 1.0)
-    return _clip(own_s - ego_s + 2.0 * _signed(genes.place))
+    return own_m, ego_m / max(seen.ego_mps, 1.0)
 
 
 def _signed(gene: float) -> float:

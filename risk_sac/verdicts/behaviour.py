@@ -15,6 +15,7 @@ from risk_sac.world.types import Bools, Floats, Kind, Role
 SMOOTH = 5  # frames, 0.5 s: a pedal that is held
 JERK_STEPS = 3  # between the accelerations that are compared
 PRESSED_MPS2 = 1.5  # from which a pedal counts as pressed; SUMO's drivers dawdle with less
+TOUCHED_MPS2, CHANGES_S = 0.5, 5.0  # changes between gas and brake above this count, in so many seconds
 OVER_M = 0.3  # from which a body over the line is a lane change, as R157 takes a cut-in
 CHANGE_S = 1.0  # within which the fastest lateral motion is taken
 MOVES_MPS, STANDS_MPS, DRIVES_MPS = 0.5, 0.3, 5.0
@@ -68,12 +69,13 @@ def _vehicle(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Obse
         yield Observed(actor, "jerk", float(jerk.max()), float(time_s[jerk.argmax() + JERK_STEPS]))
     changes, changed_s = pedal_changes(held, time_s)
     yield Observed(actor, "pedal_changes", changes, changed_s)
-    over_mps = speed - lanes_of(e, actor).limit_mps[frames]
+    lanes = lanes_of(e, actor)
+    over_mps = speed - lanes.limit_mps[frames]
     fastest = int(over_mps.argmax())
     yield Observed(actor, "speeding", float(over_mps[fastest]), float(time_s[fastest]))
     ahead_m, left_m, cos = _around(e, actor, frames)
     within = _in_areas(e, e.ground.junctions, actor, frames)
-    yield from _lines(e, actor, frames, within, (ahead_m, left_m, cos))
+    yield from _lines(e, actor, frames, lanes.width_m[frames], within, (ahead_m, left_m, cos))
     level_s, from_s = _pacing(e, actor, frames, ahead_m, left_m, cos)
     if level_s > 0.0:
         yield Observed(actor, "pacing", level_s, from_s)
@@ -93,14 +95,19 @@ def _around(e: Evidence, actor: int, frames: NDArray[np.intp]) -> tuple[Floats, 
 
 
 def _lines(
-    e: Evidence, actor: int, frames: NDArray[np.intp], within: Bools, others: tuple[Floats, Floats, Floats]
+    e: Evidence,
+    actor: int,
+    frames: NDArray[np.intp],
+    lane_m: Floats,
+    within: Bools,
+    others: tuple[Floats, Floats, Floats],
 ) -> Iterator[Observed]:
     """Measures lane changes, and how long it keeps to a line or over it; outside junctions."""
     ahead_m, left_m, cos = others
-    offset, lane_m = e.lane_offset_m[frames, actor], e.ground.lane_width_m
+    offset = e.lane_offset_m[frames, actor]
     over = np.abs(offset) + e.width_m[actor] / 2 - lane_m / 2
     over[within | np.isnan(over)] = -np.inf
-    jumps = np.concatenate(([False], np.abs(offset[1:] - offset[:-1]) > lane_m / 2))  # into the next lane
+    jumps = np.concatenate(([False], np.abs(offset[1:] - offset[:-1]) > lane_m[1:] / 2))  # into the next lane
     lateral = np.abs(e.lateral_mps[frames, actor])
     keeps = (over > -NEAR_LINE_M) & (lateral < CALM_MPS) & (e.speed_mps[frames, actor] > MOVING_MPS)
     yield Observed(actor, "over_line", float(keeps.sum()) * e.step_s, float(e.time_s[frames[keeps.argmax()]]))
@@ -115,7 +122,7 @@ def _lines(
         moving = smoothed(lateral[during], window)
         fastest = float(moving.max()) if len(moving) else float(lateral[during].mean())
         yield Observed(actor, "lateral_speed", float(lateral[during].max()), time_s)
-        yield Observed(actor, "lane_change_duration", lane_m / max(fastest, 0.1), time_s)
+        yield Observed(actor, "lane_change_duration", float(lane_m[at]) / max(fastest, 0.1), time_s)
         side = float(np.sign(offset[at]))
         yield from _new_follower(e, actor, frames, at, side * left_m[at], ahead_m[at], cos[at])
 
@@ -260,17 +267,17 @@ def _steps_out(
 
 
 def pedal_changes(held: Floats, time_s: Floats) -> tuple[float, float]:
-    """Counts changes between gas and brake in the 10 s with most.
+    """Counts changes between gas and brake in the 5 s with most.
 
     Returns:
       The number, and the time of the last of them.
     """
-    pressed = np.flatnonzero(np.abs(held) > PRESSED_MPS2)
-    changed = pressed[1:][np.diff(np.sign(held[pressed])) != 0]
+    touched = np.flatnonzero(np.abs(held) > TOUCHED_MPS2)
+    changed = touched[1:][np.diff(np.sign(held[touched])) != 0]
     if not len(changed):
         return 0.0, float(time_s[0])
     at_s = time_s[changed]
-    counts = np.arange(1, len(at_s) + 1) - np.searchsorted(at_s, at_s - LONGEST_S)
+    counts = np.arange(1, len(at_s) + 1) - np.searchsorted(at_s, at_s - CHANGES_S)
     most = int(counts.argmax())
     return float(counts[most]), float(at_s[most])
 

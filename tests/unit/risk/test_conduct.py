@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.env.observation_layout import MOTION_PER_ADVERSARY, PER_ADVERSARY
+from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.risk import conduct
 from risk_sac.risk.conduct import (
     ACCELERATION,
@@ -23,18 +24,26 @@ from risk_sac.risk.conduct import (
     STANDING,
     TOWARDS_CAR,
     WALKING,
+    Road,
     RoadFacts,
     conduct_terms,
+    soft_cost,
 )
 from risk_sac.risk.driving import FEATURES
+from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.world import types
-from risk_sac.world.types import Kind
+from risk_sac.world.types import Kind, Role
 
 LANE_M = 3.3
 SQUARE = [(nx, ny, 10.0, 0.0) for nx, ny in ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))]
-STREET = RoadFacts(LANE_M, 13.9, np.array(SQUARE[:0]).reshape(-1, 4))
-JUNCTION = RoadFacts(LANE_M, 13.9, np.array(SQUARE))  # within 10 m of the middle
+STREET = RoadFacts(np.array([LANE_M]), np.array([13.9]), np.array(SQUARE[:0]).reshape(-1, 4))
+JUNCTION = RoadFacts(np.array([LANE_M]), np.array([13.9]), np.array(SQUARE))  # within 10 m of the middle
 EGO = {"speed": 12.0}
+MERGE = Layout(
+    net="motorway_ramp/motorway_ramp.net.xml",
+    ego=VehicleStart(id="ego", role=Role.EGO, route=("main",), lane=0, position_m=100.0, speed_mps=25.0),
+    vehicles=(),
+)
 
 
 def state_of(*bodies: dict[str, float]) -> np.ndarray:
@@ -152,9 +161,27 @@ def test_jerking_costs_and_pressing_a_pedal_as_ordinary_drivers_do_does_not():
 
 
 def test_speeding_costs_where_1_of_100_drive_so_fast():
-    limit = STREET.limit_mps
+    limit = float(STREET.limit_mps[0])
     assert Played().step(FAR | {"speed": limit + 6.0})[SPEEDING] == 0.0
     assert Played().step(FAR | {"speed": limit + 12.0})[SPEEDING] == 1.0
+
+
+def test_the_limit_and_the_line_are_those_of_the_lane_where_an_adversary_is():
+    road = Road(MERGE, 30.0, carriageway_of(MERGE.net))
+    ramp, main, outside = {"x": 400.0, "y": -32.9, "heading": 0.124}, {"x": 400.0, "y": -1.75}, {"x": -500.0}
+    facts = road.facts(np.array([1, 2, 3]), state_of(EGO, ramp, main, outside))
+    assert facts.limit_mps.tolist() == pytest.approx([22.22, 36.0, 30.0])
+    assert facts.lane_width_m.tolist() == pytest.approx([3.5, 3.5, MERGE.lane_width_m])
+
+
+def test_terms_add_up_and_count_less_far_from_the_ego():
+    terms = np.zeros((2, conduct.TERMS))
+    terms[0, [PEDALS, ENTRY]], terms[1, OVER_LINE] = (0.2, 0.3), 0.5
+    state = state_of(EGO, {"x": 20.0}, {"y": -40.0})
+    cost = soft_cost(terms, np.array([1, 2]), state)
+    assert cost == pytest.approx(0.5 * math.exp(-1.0) + 0.5 * math.exp(-2.0))
+    assert soft_cost(terms * 9.0, np.array([1, 2]), state_of(EGO, {}, {})) == 1.0
+    assert soft_cost(terms[:0], np.array([], dtype=np.intp), state) == 0.0
 
 
 def turned(body: dict[str, float], angle: float) -> dict[str, float]:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from risk_sac.env.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
 from risk_sac.search.scripts import SIZE, Act, Genes, Seen, act, adversaries_seen, cue
+from risk_sac.verdicts.behaviour import pedal_changes
 
 MIDDLE = Genes(*[0.5] * SIZE)
 unit = st.floats(0, 1)
@@ -86,3 +87,18 @@ def test_the_observation_is_read_back_in_metres():
     first, gone = adversaries_seen(observation, 2, step=20)
     assert gone is None
     assert first == pytest.approx(Seen(2.0, 12.0, -3.0, 0.6, -0.8, 9.0, 11.0))
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_vehicle_that_keeps_its_time_changes_pedals_no_more_than_a_driver(side):
+    speed, accel, own_m, ego_m, ego_mps, held, acts = 3.0, 0.0, 25.0, 84.0, 12.0, [], [0.0, 0.0]
+    for step in range(60):
+        seen = Seen(step * 0.1, ego_m, own_m * side, 0.0, -1.0 * side, speed, ego_mps)
+        acts.append(act(MIDDLE._replace(aside=1.0), seen, -0.1, pedestrian=False).drive)
+        drive = acts[step]  # two steps later
+        accel += np.clip(drive * (2.0 if drive > 0.0 else 4.0) - accel, -1.0, 1.0)  # 10 m/s³
+        speed, ego_mps = speed + accel * 0.1, ego_mps - 0.12
+        own_m, ego_m = own_m - speed * 0.1, ego_m - ego_mps * 0.1
+        held.append(accel)
+    assert own_m / speed == pytest.approx(ego_m / ego_mps, abs=1.0)
+    assert pedal_changes(np.array(held), np.arange(60) * 0.1)[0] <= 1.0

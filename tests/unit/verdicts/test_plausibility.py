@@ -13,6 +13,7 @@ from risk_sac.verdicts.plausibility import (
     judge_observed,
     plausibility_of,
     truncated_product,
+    two_least,
     undisturbed,
 )
 from tests.unit.verdicts.staged import (
@@ -45,6 +46,12 @@ class TestObserved:
         pulses = [(1.0, -4.0), (2.0, 3.0), (3.0, -4.0), (4.0, 3.0), (5.0, -9.0)]
         leader = stage(straight(0.0, 0.0, 0.0, 14.0), straight(30.0, 0.0, 0.0, 14.0, *pulses))
         assert values(leader, "pedal_changes") == [4.0]
+
+    def test_a_pedal_that_is_touched_counts_and_a_breath_of_one_does_not(self):
+        for touch, changes in ((0.7, 3.0), (0.4, 0.0)):
+            pulses = [(1.0, -touch), (2.0, touch), (3.0, -touch), (4.0, touch), (5.0, 0.0)]
+            driven = stage(straight(0.0, 0.0, 0.0, 14.0), straight(60.0, 0.0, 0.0, 14.0, *pulses), contact=False)
+            assert values(driven, "pedal_changes") == [changes]
 
     def test_a_lane_change_leaves_a_gap(self):
         (gap,) = values(cut_in(gap=12.0, ego=14.0, other=9.0), "lane_change_gap")
@@ -141,6 +148,18 @@ class TestClass:
         (fact,) = judged.facts
         assert (fact.value, fact.time_s, fact.times) == (6.0, 6.0, 3)
 
+    def test_two_late_entries_on_red_are_implausible_and_one_is_rare(self):
+        late = [Observed(k, "red_entry", 5.0, float(k)) for k in (1, 2)]
+        calm = [Observed(1, "speeding", 0.0, float(k)) for k in range(8)]
+        assert verdict(late[0], *calm) is PlausibilityClass.RARE
+        assert verdict(*late, *calm) is PlausibilityClass.IMPLAUSIBLE
+
+    def test_a_late_entry_on_red_by_one_that_plays_with_the_pedals_is_implausible(self):
+        calm = [Observed(2, "speeding", 0.0, float(k)) for k in range(8)]
+        late = Observed(1, "red_entry", 5.0, 3.0)
+        assert verdict(late, Observed(1, "pedal_changes", 3.0, 5.0), *calm) is PlausibilityClass.RARE
+        assert verdict(late, Observed(1, "pedal_changes", 6.0, 5.0), *calm) is PlausibilityClass.IMPLAUSIBLE
+
 
 class TestTruncatedProduct:
     def test_without_truncation_it_is_fisher_s_method(self):
@@ -153,6 +172,16 @@ class TestTruncatedProduct:
         found = np.array([truncated_product(random.random(12).tolist(), 0.05) for _ in range(4000)])
         for share in (0.01, 0.05, 0.2):
             assert (found <= share).mean() == pytest.approx(share, abs=4 * math.sqrt(share / 4000))
+
+    def test_the_two_least_by_hand(self):
+        assert two_least([0.9, 1e-3, 0.5, 1e-2], 1.0) == pytest.approx(6 * 1e-5 * (1.0 + math.log(1e5)))
+        assert two_least([1e-9]) == 1.0
+
+    def test_the_two_least_bound_the_share_of_random_numbers(self):
+        random = np.random.default_rng(4)
+        found = np.array([two_least(random.random(8).tolist()) for _ in range(20000)])
+        for share in (0.001, 0.01, 0.1):
+            assert share / 4 < (found <= share).mean() <= share + 3 * math.sqrt(share / 20000)
 
     def test_nothing_unlikely_is_certain(self):
         assert truncated_product([0.5, 0.8], 0.05) == 1.0
