@@ -30,7 +30,6 @@ from risk_sac.records import EpisodeRecord, PlausibilityClass
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
 from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
-from risk_sac.verdicts.distinct import variant_name
 
 METHODS: Sequence[MethodName] = ("archive", "random", "risk-sac-diverse", "risk-sac")
 NEWEST_FIRST = (*(name for name in shipped_names() if name not in PAPER_FAMILIES), *PAPER_FAMILIES)
@@ -120,7 +119,7 @@ def plausibility(records: Sequence[EpisodeRecord]) -> Iterator[tuple[str, int]]:
     best: dict[str, PlausibilityClass] = {}
     for violation in (each for record in records for each in record.valid_violations):
         if violation.behaviour is not None:
-            kind, verdict = variant_name(violation), violation.behaviour.verdict
+            kind, verdict = violation.kind, violation.behaviour.verdict
             best[kind] = min(best.get(kind, verdict), verdict, key=order.index)
     counts = Counter(best.values())
     yield from ((str(name), counts[name]) for name in order)
