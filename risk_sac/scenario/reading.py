@@ -21,7 +21,7 @@ EXPECTED = "a scenario document: fields such as `name`, `network`, `ego` and `ac
 def read_document(file: Path, field: str = "scenario") -> Scenario:
     """Reads a document from a file; raises `ConfigError`, with `others` if more than one thing is wrong."""
     if file.is_file() and file.stat().st_size > MOST_BYTES:
-        raise _too_long(file.stat().st_size)
+        raise too_long(file.stat().st_size)
     return document_from(read_text(file, field))
 
 
@@ -35,7 +35,7 @@ def document_from(text: str) -> Scenario:
       ConfigError: it is too long, no YAML, names a field twice, or is no document; `field` is the path.
     """
     if (size := len(text.encode())) > MOST_BYTES:
-        raise _too_long(size)
+        raise too_long(size)
     return document_from_fields(_fields(text))
 
 
@@ -51,8 +51,9 @@ def document_from_fields(fields: Any) -> Scenario:
         raise faults[0] from error
 
 
-def _too_long(size: int) -> ConfigError:
-    return ConfigError("", f"a document of {size} bytes", f"at most {MOST_BYTES}", "put roads into a net beside it")
+def too_long(size: int) -> ConfigError:
+    """Returns the error of a document that is too long."""
+    return ConfigError("document", f"{size} bytes", f"at most {MOST_BYTES}", "put roads into a net beside it")
 
 
 def _fields(text: str) -> Any:
