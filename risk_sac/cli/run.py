@@ -45,6 +45,8 @@ from risk_sac.host.terminal import complain, console, notes
 from risk_sac.metrics import METRICS, Metric, with_published
 from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import TIMES, RunResults
+from risk_sac.scenario.families import family_named
+from risk_sac.scenario.odd import wider_behaviour
 from risk_sac.scenario.shipped import PAPER_FAMILIES
 
 if TYPE_CHECKING:
@@ -156,7 +158,8 @@ def _found(metrics: RunMetrics | None) -> str:
 def _summary(spec: RunSpec, results: RunResults, phases: Mapping[str, RunMetrics]) -> Table:
     """One column per phase."""
     columns = {name: _figures(metrics) for name, metrics in phases.items()}
-    setting = f"{spec.family} · {spec.odd.dynamic.behaviour} behaviour"
+    behaviour = wider_behaviour(family_named(spec.family).odd, spec.odd)
+    setting = f"{spec.family} · {behaviour} behaviour"
     title = f"{setting} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s on {results.device}"
     table = Table("", *columns, title=title)
     for figure in next(iter(columns.values()), {}):

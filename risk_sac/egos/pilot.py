@@ -117,7 +117,7 @@ BRAKE_MPS2 = 9.0  # hardest braking, that of SUMO's driver on dry asphalt
 def perceive(frame: Frame, belief: Belief, along: Along, signals: tuple[Signal, ...]) -> Perceived:
     """Returns the actors of a frame that the ego knows of by its sensor and its memory."""
     known = belief.known
-    path, station_m, offset_m = along
+    path, station_m, offset_m, _ = along
     return Perceived(
         time_s=frame.time_s,
         ids=tuple(compress(frame.ids, known.tolist())),

@@ -220,7 +220,6 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._reflex = reflex_of(self.problem.ego.profile, self._ground)
         self._gauge.reset(carriageway)
-        self.trace = Trace(self._gauge.names)
         sensor = self.problem.ego.sensor
         visible = conditions(self.problem.odd, scene.values, sensor=sensor is not None)
         self._perception.sight = sight(sensor, visible.visibility_m, visible.unlit_m)

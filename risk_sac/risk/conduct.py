@@ -85,6 +85,7 @@ ACCELERATION_FREE, ACCELERATION_FULL = _scale("acceleration")  # 3.6 to 4.1 m/sÂ
 GAP_FREE, GAP_FULL = _scale("lane_change_gap")  # 1.9 to 0.8 m
 HEADWAY_FREE, HEADWAY_FULL = _scale("lane_change_headway")  # 0.25 to 0.11 s
 WALKING_FREE, WALKING_FULL = _scale("walking_speed")  # 1.9 to 2.3 m/s
+RIDING_FREE, RIDING_FULL = _scale("riding_speed")  # 8.2 to 11.6 m/s
 SPEEDING_FREE, SPEEDING_FULL = _scale("speeding")  # 6.5 to 10.1 m/s above the limit
 RED_FREE, RED_FULL = _scale("red_entry")  # 0 to 2.9 s after the start of red
 ENTRY_GAP_FREE, ENTRY_GAP_FULL = _scale("junction_gap")  # 1.9 to -2.8 s: 1.6 of 1,000 drivers accept 0 s
@@ -110,6 +111,7 @@ CLEAR_M = 12.0  # free way ahead that gives no reason to stand
 AHEAD_M = 30.0  # how far ahead of the car a pedestrian is in its way
 BESIDE_M = 1.0  # closer than that, a pedestrian beside the car walks into it
 WALKING_MPS = 0.3
+RIDDEN_M = 1.0  # longer than this, a body that moves freely is ridden
 STOP, WAIT, YIELD, GO = ord("r"), ord("u"), ord("g"), ord("G")  # letters of signals
 NEAR_M = 20.0  # choice: from the ego, over which an adversary counts for 1 / e
 MIDDLE_M, ACROSS_M = 10.0, 8.0  # choice: from where a vehicle enters to where ways meet, and how far these lie apart
@@ -359,7 +361,10 @@ def _pedestrian(row: int, state: Floats, memory: Floats, terms: Floats) -> None:
     in_way = 0.0 < to_front < AHEAD_M and to_side < half_width / 2 and state[SPEED, 0] > STANDING_MPS
     memory[IDLE] = _run(memory[IDLE], in_way and speed < WALKING_MPS)
     terms[PEDALS] = ramp(memory[CHANGES], CHANGES_FREE, CHANGES_FULL)
-    terms[WALKING] = ramp(speed, WALKING_FREE, WALKING_FULL)
+    if state[LENGTH, row] > RIDDEN_M:
+        terms[WALKING] = ramp(speed, RIDING_FREE, RIDING_FULL)
+    else:
+        terms[WALKING] = ramp(speed, WALKING_FREE, WALKING_FULL)
     terms[STANDING] = ramp(memory[IDLE], IDLE_FREE, IDLE_FULL)
     if speed < WALKING_MPS:
         return

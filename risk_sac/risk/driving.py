@@ -322,6 +322,26 @@ _ROWS = (
         spread=NormalSpread(1.37, 0.88),
     ),
     RoadUserFeature(
+        name="riding_speed",
+        unit="m/s",
+        per="rides",
+        unlikely="above",
+        words="rides at {value:.1f} m/s",
+        # 16.4 km/h, the mean of conventional bicycles on carriageways. Choice: it is the median of a lognormal
+        # distribution, of which 1 in 100 rides faster than 29 km/h.
+        source="Schleinitz, Petzoldt, Franke-Bartholdt, Krems and Gehlert 2017, doi 10.1016/j.ssci.2015.07.027",
+        spread=LognormalSpread(4.56, 0.25),
+    ),
+    RoadUserFeature(
+        name="riding_acceleration",
+        unit="m/s²",
+        per="starts",
+        unlikely="above",
+        words="starts riding by {value:.1f} m/s²",
+        source=CHOICE,  # 1 in 10 exceeds what SUMO's class bicycle has at most
+        spread=UpperTail((0.5, 1.2, 2.0), (1.0, 0.1, 1e-3)),
+    ),
+    RoadUserFeature(
         name="turn_rate",
         unit="rad/s",
         per="crossings",

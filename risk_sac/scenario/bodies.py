@@ -86,6 +86,11 @@ class Body:
         """Whether it has wheels and a rider, who is not inside it."""
         return self.shape == "two_wheels"
 
+    @property
+    def gait(self) -> Literal["walking", "riding"]:
+        """How it moves where it moves freely; begins the names of the features that its motion is judged by."""
+        return "riding" if self.rides else "walking"
+
 
 _SUMO = "default of SUMO's class {}; emergency: its emergencyDecel"
 _BUS = {

@@ -81,10 +81,10 @@ def sampled(of: Interpreter, count: int = SAMPLED) -> Iterator[Layout | Infeasib
 
 def _odd(of: Interpreter) -> Odd:
     """The default ODD: the roads of the ego's way, what goes on anywhere, and what the document says of it."""
-    layouts = [layout for layout in sampled(of) if isinstance(layout, Layout)]
+    drawn = list(sampled(of))
+    layouts = [layout for layout in drawn if isinstance(layout, Layout)]
     if not layouts:
-        refused = next(str(refused) for refused in sampled(of) if isinstance(refused, InfeasibleScene))
-        raise ConfigError("constraints", f"none of {SAMPLED} scenes is possible; in the first, {refused}")
+        raise ConfigError("constraints", f"none of {SAMPLED} scenes is possible; in the first, {drawn[0]}")
     lanes = [(net_of(layout.net), f"{layout.ego.route[0]}_{layout.ego.lane}") for layout in layouts]
     limits_mps = [net.lanes[lane].limit_mps for net, lane in lanes]
     driven = {(layout.net, edge) for layout in layouts for edge in layout.ego.route}

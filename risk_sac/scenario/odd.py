@@ -5,9 +5,9 @@ Source: RISK-SAC, Sec. II-A; ISO 34503 for the ODD's branches.
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, get_args
 
-from risk_sac.config import Environment, Interval, Odd, Precipitation, Scenery, SignalType
+from risk_sac.config import Behaviour, Environment, Interval, Odd, Precipitation, Scenery, SignalType
 from risk_sac.errors import OddError
 from risk_sac.scenario.behaviour import behaving, preset
 from risk_sac.scenario.limits import WET_FRICTION
@@ -60,7 +60,7 @@ def intersect(default: Odd, user: Odd, space: SceneSpace | None = None) -> Odd:
     """The ODD that a family's default and a user's both allow, field by field.
 
     The user's narrows the default, or widens a field of `EXTREME` up to that; a field left out keeps the default's.
-    The default's limits of adversaries are those of the user's behaviour.
+    The default's limits of adversaries are those of the user's behaviour where that is the wider one.
 
     Args:
       default: of the family.
@@ -71,13 +71,20 @@ def intersect(default: Odd, user: Odd, space: SceneSpace | None = None) -> Odd:
       OddError: a field of the user's is physically senseless, or leaves nothing of what the family supports.
     """
     check(user)
-    dynamic = behaving(default.dynamic, user.dynamic.behaviour)
+    behaviour, dynamic = wider_behaviour(default, user), default.dynamic
+    if behaviour != dynamic.behaviour:
+        dynamic = behaving(dynamic, behaviour)
     default, limits = default.model_copy(update={"dynamic": dynamic}), widest(default)
     return Odd(
         scenery=_with_their_signals(_intersect_branch("scenery", default, user, limits)),
         environment=_rained_on(_intersect_branch("environment", default, user, limits), user.environment),
         dynamic=_intersect_branch("dynamic", default, user, limits, space),
     )
+
+
+def wider_behaviour(default: Odd, user: Odd) -> Behaviour:
+    """Returns the behaviour that allows more: a scenario's own, or that of a campaign."""
+    return max((default.dynamic.behaviour, user.dynamic.behaviour), key=get_args(Behaviour).index)
 
 
 def widest(default: Odd) -> Odd:
@@ -158,7 +165,7 @@ def _intersect_branch(branch: str, default: Odd, user: Odd, limits: Odd, space: 
     for name in type(usual).model_fields:
         theirs, supported = getattr(asked, name), getattr(ours, name)
         if theirs is None or supported is None or name == "behaviour":
-            values[name] = getattr(usual, name) if theirs is None else theirs
+            values[name] = getattr(usual, name) if theirs is None or name == "behaviour" else theirs
             continue
         values[name] = common = _common(supported, theirs)
         bounded = [each for each in space.parameters if each.odd == f"{branch}.{name}"] if space else []

@@ -22,7 +22,7 @@ EXPECTED = "a scenario document: fields such as `name`, `network`, `ego` and `ac
 def read_document(file: Path, field: str = "scenario") -> Scenario:
     """Reads a document from a file; raises `ConfigError`, with `others` if more than one thing is wrong."""
     if file.is_file() and file.stat().st_size > MOST_JSON_BYTES:
-        raise _too_long(file.stat().st_size, MOST_JSON_BYTES)
+        raise too_long(file.stat().st_size, MOST_JSON_BYTES)
     return document_from(read_text(file, field))
 
 
@@ -37,7 +37,7 @@ def document_from(text: str) -> Scenario:
     """
     most = MOST_JSON_BYTES if text.lstrip().startswith("{") else MOST_BYTES
     if (size := len(text.encode())) > most:
-        raise _too_long(size, most)
+        raise too_long(size, most)
     return document_from_fields(_fields(text))
 
 
@@ -53,8 +53,9 @@ def document_from_fields(fields: Any) -> Scenario:
         raise faults[0] from error
 
 
-def _too_long(size: int, most: int) -> ConfigError:
-    return ConfigError("", f"a document of {size} bytes", f"at most {most}", "put roads into a net beside it")
+def too_long(size: int, most: int = MOST_BYTES) -> ConfigError:
+    """Returns the error of a document that is too long."""
+    return ConfigError("document", f"{size} bytes", f"at most {most}", "put roads into a net beside it")
 
 
 def _fields(text: str) -> Any:

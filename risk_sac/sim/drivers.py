@@ -88,7 +88,7 @@ class SumoDriver:
         self, own: int, speed: float, along: Along, state: Floats, vehicle: Bools, candidate: Bools
     ) -> float | None:
         """The acceleration that its model wants for the nearest of its `targets`; None where none binds."""
-        path, station_m, offset_m = along
+        path, station_m, offset_m, _ = along
         obstacles = targets(path, station_m, offset_m, own, self._accel, state, vehicle, candidate)
         if not len(obstacles):
             return None

@@ -40,6 +40,7 @@ class Along(NamedTuple):
     path: Path
     station_m: float  # of its front bumper
     offset_m: float  # of its front bumper's middle from the line, positive to the left
+    ends_m: float = math.inf  # station at which its lane ends, if that does not lead on along its route
 
 
 class PathStopLine(NamedTuple):
@@ -58,6 +59,7 @@ class Way(NamedTuple):
     complete: bool  # whether it ends where its route ends
     lane_m: float  # length of its first lane
     following: str | None  # the lane that follows this one
+    ends_m: float  # station at which its first lane ends; inf if that leads on along the route
 
 
 def way_of(route: Sequence[str], lane: str) -> Way:
@@ -80,6 +82,7 @@ def way_of(route: Sequence[str], lane: str) -> Way:
         complete=edge_of(lanes[-1]) == route[-1],
         lane_m=_length(lines[0]),
         following=lanes[1] if len(lanes) > 1 else None,
+        ends_m=math.inf if leads_on(route, lane) else _length(lines[0]),
     )
 
 

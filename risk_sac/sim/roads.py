@@ -185,7 +185,7 @@ class Roads:
 
     def way_ahead(self, vehicle: str, x_m: float, y_m: float) -> tuple[Floats, Floats]:
         """Points x and y of the way ahead of a vehicle, its centre first."""
-        path, station_m, offset_m = self.along(vehicle)
+        path, station_m, offset_m, _ = self.along(vehicle)
         ahead = path[:, path[STATION] > station_m]
         sin, cos = np.sin(ahead[HEADING]), np.cos(ahead[HEADING])
         x = np.concatenate(([x_m], ahead[X] - offset_m * sin))
@@ -222,7 +222,8 @@ class Roads:
 
     def _along(self, vehicle: str, lane: str, offset_m: float) -> Along:
         """Locates a vehicle on its path, given its lane."""
-        return Along(self.way(vehicle, lane).path, self.station_m(vehicle, lane), offset_m)
+        way = self.way(vehicle, lane)
+        return Along(way.path, self.station_m(vehicle, lane), offset_m, way.ends_m)
 
     def station_m(self, vehicle: str, lane: str) -> float:
         """Returns how far a vehicle is along its lane, m.

@@ -27,6 +27,7 @@ GRID_M = 0.5
 BODY_M = CAR_LENGTH_M  # SUMO turns a body while it passes a corner of the lane, over the body's own length
 AHEAD_M = 5.0  # distance at which braking for a bend begins; more than BODY_M, or a bend is not seen whole as it begins
 NO_BEND_PER_M = 1e-6
+END_M = 2.0  # kept to the end of a lane, at which SUMO halts a vehicle at once
 
 # Rows of the bends of a path.
 HERE = 0  # absolute curvature, 1/m
@@ -104,7 +105,7 @@ class VehicleControl:
         if along.path is not self._path:
             if self._path is not None:
                 self._behind_per_m = float(self._bends[SOON, index(self._bends, self._at_m)])
-            self._path, self._bends = along.path, bends(along.path, self.limits)
+            self._path, self._bends = along.path, bends(along.path, self.limits, along.ends_m)
         self._at_m = along.station_m
         bend = self._at_m < BODY_M or bool(self._bends[SOON, index(self._bends, self._at_m)] > NO_BEND_PER_M)
         stopping = self._stopping[bend]
@@ -200,14 +201,16 @@ def _steer(
     return clip(wanted, lateral - change, lateral + change)
 
 
-def bends(path: Path, limits: Limits) -> Floats:
+def bends(path: Path, limits: Limits, ends_m: float = math.inf) -> Floats:
     """Computes a path's bends, and the speeds to approach them; `3 x stations`.
 
     The stations are 0, GRID_M, 2·GRID_M …
 
     v(s)² = min over s' ≥ s of  a / κ(s') + 2 b (s' - s),   a the planned cornering, b the braking left beside it
+
+    From `END_M` before `ends_m` on, where the lane ends, the speed is 0.
     """
-    return _profile(path[STATION], path[HEADING], limits.cornering_mps2, limits.approach_mps2)
+    return _profile(path[STATION], path[HEADING], limits.cornering_mps2, limits.approach_mps2, ends_m - END_M)
 
 
 @compiled
@@ -218,7 +221,7 @@ def index(bends: Floats, station_m: float) -> int:
 
 
 @compiled
-def _profile(station: Floats, heading: Floats, cornering: float, braking: float) -> Floats:
+def _profile(station: Floats, heading: Floats, cornering: float, braking: float, stop_m: float) -> Floats:
     n = int(station[-1] / GRID_M) + 1
     profile = np.zeros((3, n))
     curvature, ahead, cap = profile[HERE], profile[SOON], profile[CAP]
@@ -230,7 +233,7 @@ def _profile(station: Floats, heading: Floats, cornering: float, braking: float)
     reachable = np.inf  # square of the speed from which the next station's cap can be braked to
     for k in range(n - 1, -1, -1):
         ahead[k] = curvature[k : k + int(AHEAD_M / GRID_M) + 1].max()
-        square = min(cornering / max(ahead[k], NO_BEND_PER_M), reachable)
+        square = min(cornering / max(ahead[k], NO_BEND_PER_M), reachable) if k * GRID_M < stop_m else 0.0
         cap[k] = math.sqrt(square)
         reachable = square + 2 * braking * GRID_M
     return profile

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.risk.conduct import CALM_MPS, CRAWLS_MPS, MOVING_MPS, NEAR_LINE_M
+from risk_sac.scenario.bodies import body_of
 from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.course import BodyOnPath
 from risk_sac.verdicts.evidence import Evidence, ego_path, inside, lanes_of, seen_along
@@ -217,13 +218,13 @@ def _arrives_after(e: Evidence, actor: int, frame: int) -> float | None:
 
 def _walker(e: Evidence, actor: int, frames: NDArray[np.intp], seen: BodyOnPath[Floats]) -> Iterator[Observed]:
     speed, time_s = e.speed_mps[frames, actor], e.time_s[frames]
-    held = smoothed(speed)
+    held, gait = smoothed(speed), body_of(int(e.body[actor])).gait
     fastest = int(held.argmax())
-    yield Observed(actor, "walking_speed", float(held[fastest]), float(time_s[fastest]))
+    yield Observed(actor, f"{gait}_speed", float(held[fastest]), float(time_s[fastest]))
     gains = smoothed(e.accel_mps2[frames, actor])
     for first, last in runs(gains > MOVES_MPS):
         at = first + int(gains[first:last].argmax())
-        yield Observed(actor, "walking_acceleration", float(gains[at]), float(time_s[at]))
+        yield Observed(actor, f"{gait}_acceleration", float(gains[at]), float(time_s[at]))
     turning = smoothed(np.abs(np.diff(np.unwrap(e.heading_rad[frames, actor]))) / e.step_s)
     turning[smoothed(speed[1:]) < MOVES_MPS] = 0.0
     sharpest = int(turning.argmax())

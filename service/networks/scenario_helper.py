@@ -22,7 +22,7 @@ from risk_sac.openscenario.archive import holds_scenario, unpack
 from risk_sac.openscenario.scenario_file import import_scenario
 from risk_sac.scenario import library
 from risk_sac.scenario.check import check_document
-from risk_sac.scenario.reading import MOST_BYTES, document_from
+from risk_sac.scenario.reading import MOST_BYTES, document_from, too_long
 from risk_sac.scenario.shipped import nets_of, networks, shipped_document, shipped_names
 from service.networks.schemas import SCENARIO_MEMORY_BYTES
 
@@ -78,7 +78,7 @@ def _unpacked(upload: bytes, folder: Path) -> tuple[Scenario, Path]:
         if len(documents) != 1:
             raise ConfigError("", f"an archive with {len(documents)} documents", WANTED)
         if documents[0].file_size > MOST_BYTES:
-            raise ConfigError("", f"a document of {documents[0].file_size} bytes", f"at most {MOST_BYTES}")
+            raise too_long(documents[0].file_size)
         document = document_from(_text(archive.read(documents[0])))
         for entry in entries:
             if entry is not documents[0]:

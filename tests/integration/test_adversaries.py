@@ -158,6 +158,15 @@ def others_overlap(frame: Frame) -> bool:
     return any(first > 0 for first, _ in overlapping_pairs(frame.state))
 
 
+def test_a_vehicle_whose_lane_ends_stops_before_the_end_within_its_limits() -> None:
+    end_m, beside_m = 796.0, -7.0  # of lane main_0
+    fronts = []
+    for _, _, frames in at_random("lane_drop"):
+        x, y, length = (track(frames, "merging", name) for name in ("x_m", "y_m", "length_m"))
+        fronts += (x + length / 2)[y < beside_m].tolist()
+    assert end_m - 10.0 < max(fronts) < end_m
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_vehicle_that_does_not_obey_or_leaps_is_reported(name: FamilyName) -> None:
     family = FAMILIES[name]

@@ -154,7 +154,7 @@ def test_an_ego_s_path_stays_that_of_its_first_lane(sim, pilot, beside_m):
     away_m = beside_m + 3.3
     pilot.motion = lambda time_s: Motion(300.0 + 10.0 * time_s, -min(2.0 * time_s, away_m), 0.0, 10.0)
     play(sim, replace(LOW, ego=car("ego", ("road",), 1, 300.0, 10.0)), 50)
-    path, station_m, offset_m = pilot.paths[-1]
+    path, station_m, offset_m, _ = pilot.paths[-1]
     assert path[Y, 0] == 0.0
     assert offset_m == pytest.approx(-away_m)
     assert station_m == pytest.approx(300.0 + 49.0 + 2.3)

@@ -87,6 +87,20 @@ def test_fault_is_named_and_nothing_is_stored(shared, path):
     assert shared.client.get("/v1/scenarios").json() == before
 
 
+@pytest.mark.parametrize("packed", [False, True])
+def test_document_of_ten_megabytes_is_refused_in_one_line(shared, packed):
+    text = yaml.safe_dump(DOCUMENT | {"summary": "x" * 10_000_000})
+    body = zipped(text, names=("scenario.yaml",)) if packed else text.encode()
+    kind = {"content-type": "application/zip" if packed else "application/yaml"}
+    for path in ("/v1/scenarios", "/v1/scenarios/check"):
+        answer = shared.client.post(path, content=body, headers=kind, timeout=120)
+        assert answer.status_code == 422
+        fault = answer.json()["errors"][0]
+        assert (fault["field"], fault["got"]) == ("document", f"{len(text)} bytes")
+        assert len(fault["message"]) < 120
+        assert "\n" not in fault["message"]
+
+
 def test_check_plays_scenes(shared):
     answer = post(shared, DOCUMENT | {"name": "checked_only"}, "/v1/scenarios/check")
     assert answer.status_code == 200, answer.text

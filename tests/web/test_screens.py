@@ -54,6 +54,22 @@ def places(page: Page) -> None:
     page.get_by_text("Where no pattern fits").click()
 
 
+def cards(page: Page) -> None:
+    page.locator(".scenario-cards img").first.wait_for()
+
+
+def drawing(page: Page) -> None:
+    page.get_by_alt_text("The scenario from above with the ranges of all starts").wait_for()
+
+
+def document(page: Page) -> None:
+    text = page.get_by_label("Document, as YAML or JSON")
+    expect(text).not_to_have_value("")
+    text.press("ControlOrMeta+End")
+    text.press_sequentially("\nnonsense: 1\n")
+    page.get_by_role("alert").locator("code").first.wait_for()
+
+
 # What reaches beyond its parent to the right; not what scrolls, floats above the page, or hangs out by its margin.
 WIDER_THAN_PARENT = """() => [...document.querySelectorAll("#page *")].flatMap((each) => {
     let parent = each.parentElement;
@@ -102,6 +118,9 @@ SCREENS: dict[str, tuple[str, Callable[[Page], None]]] = {
     "compare": ("compare?ids={campaign}", heading),
     "maps": ("maps", heading),
     "map": ("maps/{network}", places),
+    "scenarios": ("scenarios", cards),
+    "scenario": ("scenarios/motorway_traffic", drawing),
+    "editor": ("scenarios/new?from=low", document),
 }
 
 

@@ -5,7 +5,8 @@
 
 plays each driver before each ego, and rewrites OUT/scenes.csv after each. All meet the same scenes, and nothing is
 learnt. `any` plays up to N scripts in a scene until one fails, half of them random and half mutated from the library.
-So its failures are the ceiling of what scripts can reach there.
+So its failures are the ceiling of what scripts can reach there. A scenario without a prior has random scripts alone,
+and no `model`.
 """
 
 import argparse
@@ -24,7 +25,8 @@ from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.lab.figures.pretrained_policy import ego_of
 from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.lab.pretraining.episodes import ScriptEpisode, outcome_of, play
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.prior.start import Start, start_of
 from risk_sac.search.scene_optimizer.archive import mutated
@@ -43,8 +45,10 @@ class Matchup(NamedTuple):
     driver: str
 
 
-def script(random: np.random.Generator, start: Start, genes: int) -> Floats:
+def script(random: np.random.Generator, start: Start | None, genes: int) -> Floats:
     """Draws a script: random, or a row of the library mutated by another one."""
+    if start is None:
+        return random.random(genes)
     own, other = (start.library[random.integers(len(start.library))][-genes:] for _ in range(2))
     return random.random(genes) if random.random() < 0.5 else mutated(own, other, random)
 
@@ -66,11 +70,11 @@ def found(cell: Matchup, scenes: int, scripts: int) -> Iterator[ScriptEpisode]:
     with closing(RiskSacEnv.of(spec)) as env:
         space, horizon = env.problem.space, env.problem.family.horizon_steps
         follower, start = ScriptFollower(env.problem.family), start_of(env.problem, "shipped")
-        assert start is not None  # shipped families have priors
         while scenes:
             scene, seed, episode = drawn.random(space.dimension), int(drawn.integers(1 << 30)), None
             for _ in range(scripts if cell.driver == "any" else 1):
                 if cell.driver == "model":
+                    assert start is not None  # `main` has checked it
                     genes = chosen(random, start, scene, follower.genes)
                 elif cell.driver == "random":
                     genes = random.random(follower.genes)
@@ -107,12 +111,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--egos", nargs="+", required=True, metavar="EGO", help="as pretrained_policy takes them")
-    parser.add_argument("--scenario", dest="families", nargs="+", choices=PAPER_FAMILIES, default=list(PAPER_FAMILIES))
+    parser.add_argument("--scenario", dest="families", nargs="+", choices=shipped_names(), default=list(PAPER_FAMILIES))
     parser.add_argument("--drivers", nargs="+", choices=DRIVERS, default=list(DRIVERS))
     parser.add_argument("--scenes", type=int, default=60)
     parser.add_argument("--scripts", type=int, default=500)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
+    cold = [name for name in options.families if FAMILIES[name].like is None]
+    if cold and "model" in options.drivers:
+        parser.error(f"--drivers: {', '.join(cold)} has no prior; choose from random and any")
     cells = [Matchup(*cell) for cell in product(options.families, options.egos, options.drivers)]
     rows_of(partial(row, options.scenes, options.scripts), cells, options.jobs, options.out / "scenes.csv")
     print((options.out / "scenes.csv").read_text())

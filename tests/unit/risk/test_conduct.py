@@ -261,6 +261,12 @@ def test_a_pedestrian_costs_that_walks_faster_than_most_or_stands_in_the_cars_wa
     assert Played(Kind.PEDESTRIAN).step(walker, ego={"speed": 0.0}, times=60)[STANDING] == 0.0
 
 
+def test_a_cyclist_may_be_faster_than_a_pedestrian():
+    quick = {"x": 60.0, "y": 4.0, "heading": -math.pi / 2, "speed": 6.0, "vy": -6.0}
+    assert Played(Kind.PEDESTRIAN).step(quick | {"length": 0.5})[WALKING] == 1.0
+    assert Played(Kind.PEDESTRIAN).step(quick | {"length": 1.6})[WALKING] == 0.0
+
+
 def test_the_cost_is_that_of_the_worst_adversary_and_0_without_one():
     state = state_of(EGO, FAR | {"accel": -9.0}, FAR | {"x": 150.0})
     memory, link = np.zeros((CONDUCT_ROWS, 2)), np.zeros(3, dtype=np.uint8)

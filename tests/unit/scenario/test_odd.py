@@ -9,7 +9,7 @@ from risk_sac.config import Behaviour, DynamicElements, Environment, Interval, O
 from risk_sac.errors import OddError
 from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.stl import Monitor
-from risk_sac.scenario.behaviour import BOUNDS, preset
+from risk_sac.scenario.behaviour import BOUNDS, behaving, preset
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.scenario.odd import intersect
 
@@ -186,3 +186,13 @@ def test_passing_a_pedestrian_on_the_sidewalk_or_standing_beside_one_violates_no
     monitor = Monitor([requirement], 0.1, 150)
     assert monitor.update({"pedestrian_gap_m": gap_m, "ego_speed_mps": speed_mps})[0] > 0
     assert monitor.update({"pedestrian_gap_m": 0.4, "ego_speed_mps": max(speed_mps, 1.0)})[0] < 0
+
+
+@pytest.mark.parametrize(
+    ("own", "asked", "wider"), [("emergency", "ordinary", "emergency"), ("ordinary", "extreme", "extreme")]
+)
+def test_of_a_scenarios_behaviour_and_a_campaigns_the_wider_counts(own, asked, wider):
+    default = DEFAULT.model_copy(update={"dynamic": behaving(DEFAULT.dynamic, own)})
+    both = intersect(default, Odd(dynamic=DynamicElements(behaviour=asked)))
+    assert both.dynamic.behaviour == wider
+    assert both.dynamic.vehicle_accel_mps2 == preset(wider)["vehicle_accel_mps2"]

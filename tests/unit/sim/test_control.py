@@ -69,14 +69,20 @@ def limits_on(friction: float, **dynamic: Any) -> Limits:
 
 
 def drive(
-    actions: Actions, limits: Limits, start_mps: float, path: Path, half_m: float, start_m: float = 0.0
+    actions: Actions,
+    limits: Limits,
+    start_mps: float,
+    path: Path,
+    half_m: float,
+    start_m: float = 0.0,
+    ends_m: float = math.inf,
 ) -> tuple[VehicleControl, list[VehicleCommand], list[float], list[float]]:
     """The commands, with the start in front, and station and offset when each was given; a road of 2·half_m."""
     control = VehicleControl(limits, start_mps)
     commands, stations, offsets = [VehicleCommand(start_mps, 0.0)], [start_m], [0.0]
     for action in actions:
         room = LateralRoom(left_m=half_m - offsets[-1], right_m=half_m + offsets[-1])
-        commands.append(control.step(*action, room, Along(path, stations[-1], offsets[-1])))
+        commands.append(control.step(*action, room, Along(path, stations[-1], offsets[-1], ends_m)))
         stations.append(stations[-1] + (commands[-2].speed_mps + commands[-1].speed_mps) / 2 * STEP_S)
         offsets.append(offsets[-1] + commands[-1].lateral_mps * STEP_S)
     return control, commands, stations, offsets
@@ -151,6 +157,14 @@ def test_who_starts_too_fast_inside_a_bend_slows_down_until_it_may_drive_as_it_w
     for before, after in pairwise(inside[6:]):  # its jerk takes it some steps to begin
         if before**2 / radius > 1.02 * limits.grip_mps2:
             assert after < before
+
+
+def test_a_vehicle_at_full_speed_stops_just_before_its_lane_ends():
+    _, commands, stations, _ = drive([(1.0, 0.0)] * 150, LIMITS, 15.0, road(), 1.75, ends_m=90.0)
+    assert 85.0 < stations[-1] < 90.0
+    assert commands[-1].speed_mps == pytest.approx(0.0, abs=0.1)
+    accels = [(after.speed_mps - before.speed_mps) / STEP_S for before, after in pairwise(commands)]
+    assert min(accels) > -LIMITS.brake_mps2 - EPS
 
 
 def test_braking_to_a_halt_by_hand():

@@ -7,6 +7,7 @@ from scipy.stats import combine_pvalues
 
 from risk_sac.records import PlausibilityClass
 from risk_sac.risk.driving import FEATURES
+from risk_sac.scenario.bodies import CODES
 from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.behaviour import Observed, observed_of, pedal_changes, runs, smoothed
 from risk_sac.verdicts.plausibility import (
@@ -90,6 +91,14 @@ class TestObserved:
 
     def test_a_pedestrian_s_speed_is_measured(self):
         assert values(pedestrian_crosses(walk=1.9), "walking_speed") == pytest.approx([1.9])
+
+    def test_a_cyclist_that_crosses_is_judged_as_one_that_rides(self):
+        walks = pedestrian_crosses(walk=5.0)
+        rides = replace(walks, body=np.array([CODES["car"], CODES["bicycle"]], dtype=np.int8))
+        assert values(rides, "riding_speed") == pytest.approx([5.0])
+        assert values(rides, "walking_speed") == []
+        assert plausibility_of(walks).verdict is PlausibilityClass.IMPLAUSIBLE
+        assert plausibility_of(rides).verdict is not PlausibilityClass.IMPLAUSIBLE
 
     def test_an_entry_on_red_is_timed_from_the_start_of_red(self):
         evidence = stage(straight(0.0, 50.0, 0.0, 10.0), straight(0.0, 0.0, 0.0, 10.0), contact=False, until_s=6.0)
