@@ -59,7 +59,7 @@ def alone(family: str, route: tuple[str, ...], lane: int, position_m: float) -> 
 )
 def test_a_vehicle_drives_along_its_path(sim, family, route, lane, position_m):
     frame = sim.reset(alone(family, route, lane, position_m), 0)
-    path, station_m, offset_m = sim.along("ego")
+    path, station_m, offset_m, _ = sim.along("ego")
     np.testing.assert_allclose(np.hypot(*np.diff(path[:2])), np.diff(path[STATION]))
     assert path[STATION, 0] == 0.0
     assert path[STATION, -1] >= min(AHEAD_M, 1.0)
