@@ -327,9 +327,7 @@ _ROWS = (
         per="rides",
         unlikely="above",
         words="rides at {value:.1f} m/s",
-        # 16.4 km/h, the mean of conventional bicycles on carriageways. Choice: it is the median of a lognormal
-        # distribution, of which 1 in 100 rides faster than 29 km/h.
-        source="Schleinitz, Petzoldt, Franke-Bartholdt, Krems and Gehlert 2017, doi 10.1016/j.ssci.2015.07.027",
+        source=CHOICE,  # median 16.4 km/h; 1 in 100 rides faster than 29 km/h
         spread=LognormalSpread(4.56, 0.25),
     ),
     RoadUserFeature(
