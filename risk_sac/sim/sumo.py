@@ -24,7 +24,7 @@ from risk_sac.sim.oncoming import OncomingVehicle, leaves
 from risk_sac.sim.paths import STATION, Along
 from risk_sac.sim.pilot import MovedVehicle, Pilot
 from risk_sac.sim.reading import Reader, Reading
-from risk_sac.sim.roads import LateralRoom, Roads, hand_over, place
+from risk_sac.sim.roads import LateralRoom, Roads, hand_over, hurry, place
 from risk_sac.sim.solid import VehicleCommand, Walker
 from risk_sac.sim.standing import stand_in_lanes
 from risk_sac.sim.story.deviation import NO_LEADS, Lead
