@@ -175,9 +175,9 @@ class SumoSimulation:
         self._layout = layout
         self._walkers = {p.id: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps) for p in layout.pedestrians}
         if self._story is not None:
-            hurry(layout)
             if layout.ego.speed_mps > CRAWLS_MPS:
                 libsumo.vehicle.setMaxSpeed(layout.ego.id, layout.ego.speed_mps)
+            hurry(layout)  # after it, since a new maximum resets the speed factor
             self._story.take_over()
             self._walkers |= self._story.walkers
         self._roads.enter(layout)
