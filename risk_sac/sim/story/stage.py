@@ -132,7 +132,10 @@ class Stage:
 
     def way_between(self, here: Pose, there: Pose) -> tuple[TravelLine, tuple[str, ...]] | None:
         """Line along lanes from one place to another, and its edges; None if no lanes lead there."""
-        return None
+        try:
+            return self.places.way(here, there)
+        except ConfigError:
+            return None
 
     def lane_of(self, target: "float | str | LaneTarget", own: Pose) -> Spot | None:
         """Spot beside a pose, on the lane that a lane change leads to; None if there is none."""
