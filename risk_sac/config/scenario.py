@@ -324,9 +324,9 @@ class Scenario(Settings):
     """Of tyres on the road, 0.4 to 1."""
     wary: bool = True
     """Whether drivers stop for an ego that stands askew."""
-    set_speed: Expression = 0.0
+    set_speed: Expression | None = None
     """Speed that the ego is told to drive, m/s: no lane's limit is above it, and an ego of SUMO changes lanes for its
-    route alone. 0: it drives as the limits allow."""
+    route alone. Without it the ego of a story keeps to its first speed, and any other drives as the limits allow."""
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()
     judge: JudgeConfig | None = None

@@ -288,6 +288,19 @@ class Places:
         line = self._leg_lines(self._legs(name, of))
         return RouteLine(line, self.edges(line))
 
+    def way(self, here: Pose, there: Pose) -> RouteLine:
+        """Returns the shortest way along lanes between two poses; raises `ConfigError` if no lanes lead there."""
+        if self._road is not None:
+            line = self._leg_lines(self._between([self.opendrive(here), self.opendrive(there)]))
+            return RouteLine(line, self.edges(line))
+        first, last = self.spot(here), self.spot(there)
+        if first is None or last is None:
+            raise ConfigError("position", "a place without a lane near it", "a place near a lane")
+        edges = tuple(joined(self._net, [first.lane.edge, last.lane.edge]))
+        return RouteLine(
+            self.ahead(first, sum(self._net.edges[edge].lanes[0].length_m for edge in edges), edges), edges
+        )
+
     def edges(self, line: TravelLine) -> tuple[str, ...]:
         """Returns the edges of the net along a line, with those between them."""
         stations = np.linspace(0.0, line.length_m, max(2, math.ceil(line.length_m / EDGE_M) + 1))
@@ -305,11 +318,15 @@ class Places:
 
     def _legs(self, name: str, of: Of) -> list[Leg]:
         """Returns the legs of a route, from its first waypoint to its last."""
-        roads, legs = self._roads(), list[Leg]()
         places = [
             self.on_road(waypoint) if isinstance(waypoint, LanePosition) else self.opendrive(self.pose(waypoint, of))
             for waypoint in self._waypoints(name)
         ]
+        return self._between(places)
+
+    def _between(self, places: Sequence[OnRoad]) -> list[Leg]:
+        """Returns the legs of the shortest ways from each place to the next."""
+        roads, legs = self._roads(), list[Leg]()
         for here, there in itertools.pairwise(places):
             begin, goal = (LaneEnd(p.road, p.lane, not roads.road(p.road).backwards(p.lane)) for p in (here, there))
             from_m, to_m = (_within(roads.road(place.road), place.s_m) for place in (here, there))

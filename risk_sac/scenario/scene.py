@@ -33,6 +33,7 @@ from risk_sac.world.read_net import DRIVER
 from risk_sac.world.types import STEP_S, Point, Role
 
 ROLES = {"adversary": Role.ADVERSARY, "story": Role.STORY, "background": Role.BACKGROUND, "static": Role.STATIC}
+CRAWLS_MPS = 1.0  # an ego that starts faster in a story keeps to its first speed, as its file has it; choice
 GRID_M = 20.0  # of the places that ground is computed for
 UNIT_DIGITS = 12  # of a direction's cosine and sine, so that those of 90 degrees are 0 and 1
 
@@ -133,7 +134,7 @@ class SceneLayout:
             friction=self._friction(),
             horizon_steps=steps_of(value.of(document.horizon_s, "horizon_s")),
             wary=document.wary,
-            set_speed_mps=math.inf if (told := value.of(document.set_speed, "set_speed")) <= 0.0 else told,
+            set_speed_mps=self._set_speed_mps(ego),
             story=None if document.story is None else self._plan((ego, *vehicles), pedestrians, statics),
         )
 
@@ -153,6 +154,13 @@ class SceneLayout:
         walking = {start.id: start.speed_mps for start in pedestrians}
         moves = {name: name in walking for name in (*own, *walking)}
         return self._story.plan(self._bodies, self._speeds | walking, moves, own[EGO])
+
+    def _set_speed_mps(self, ego: VehicleStart) -> float:
+        """Speed that the ego is told to drive; infinite where it drives as the limits allow."""
+        document = self._document
+        if document.set_speed is not None:
+            return self._value.of(document.set_speed, "set_speed")
+        return ego.speed_mps if document.story is not None and ego.speed_mps > CRAWLS_MPS else math.inf
 
     def _friction(self) -> float:
         friction = self._value.of(self._document.friction, "friction")

@@ -3,15 +3,13 @@
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from risk_sac.config.base import Settings
 from risk_sac.config.scenario import Chosen, is_expression
 from risk_sac.config.story import Story
 from risk_sac.scenario.places import Places
 from risk_sac.scenario.travel_line import Pose
-
-T = TypeVar("T")
 
 
 class Reach(NamedTuple):
@@ -57,7 +55,7 @@ class StoryPlan:
     deviation: Deviation = AS_WRITTEN
 
 
-def settled(part: T, of: Callable[[Any, str], float], choose: Callable[[Any], Any], path: str = "") -> T:
+def settled(part: Any, of: Callable[[Any, str], float], choose: Callable[[Any], Any], path: str = "") -> Any:
     """Replaces expressions by their values, and choices by what is chosen.
 
     Args:
@@ -85,7 +83,7 @@ def settled(part: T, of: Callable[[Any, str], float], choose: Callable[[Any], An
         return part.model_copy(update=changed) if changed else part
     if isinstance(part, tuple):
         members = tuple(settled(member, of, choose, f"{path}[{i}]") for i, member in enumerate(part))
-        return part if all(map(operator.is_, members, part)) else members  # type: ignore[return-value]
+        return part if all(map(operator.is_, members, part)) else members
     if isinstance(part, Mapping):
-        return {key: settled(member, of, choose, f"{path}.{key}") for key, member in part.items()}  # type: ignore[return-value]
+        return {key: settled(member, of, choose, f"{path}.{key}") for key, member in part.items()}
     return part

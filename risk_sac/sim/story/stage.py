@@ -107,8 +107,7 @@ class Stage:
 
     def onto_way(self, mover: Mover) -> None:
         """Puts an actor that left its line at an end on the way from there."""
-        if mover.station_m >= mover.line.length_m or (mover.station_m < 0.0 and not mover.guided):
-            mover.guided = False
+        if not mover.guided and not 0.0 <= mover.station_m < mover.line.length_m:
             self.onto_road(mover, mover.line.pose(mover.station_m, mover.left_m))
 
     def lane_line(self, spot: Spot, of: str = "") -> TravelLine:
@@ -133,7 +132,10 @@ class Stage:
 
     def way_between(self, here: Pose, there: Pose) -> tuple[TravelLine, tuple[str, ...]] | None:
         """Line along lanes from one place to another, and its edges; None if no lanes lead there."""
-        return None
+        try:
+            return self.places.way(here, there)
+        except ConfigError:
+            return None
 
     def lane_of(self, target: "float | str | LaneTarget", own: Pose) -> Spot | None:
         """Spot beside a pose, on the lane that a lane change leads to; None if there is none."""

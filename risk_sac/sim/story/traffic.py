@@ -37,7 +37,8 @@ class StoryTraffic:
         """Begins the story; none of its vehicles is in SUMO yet."""
         self._plan = plan
         self._engine = StoryEngine(plan, {name: present_of(start) for name, start in plan.others.items()})
-        self._lengths_m = {start.id: start.shape.length_m for start in layout.vehicles if start.id in plan.actors}
+        driving = (layout.ego, *layout.vehicles)
+        self._lengths_m = {start.id: start.shape.length_m for start in driving if start.id in plan.actors}
         self._free = frozenset(plan.actors) - self._lengths_m.keys()
         self.beside: list[str] = []
         self._take(self._engine.played)

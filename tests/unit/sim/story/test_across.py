@@ -7,6 +7,7 @@ import pytest
 
 from risk_sac.scenario.story_plan import StoryActor
 from risk_sac.scenario.travel_line import Pose
+from risk_sac.sim.story.cast import Drift
 from tests.unit.sim.story.straight import CAR, POINT, Drive, after, car, one_event, story_of
 
 
@@ -178,3 +179,18 @@ def test_free_actor_acquires_a_position_straight_on() -> None:
     )
     at = drive.to(5.0)["walker"]
     assert (at.x_m, at.y_m) == pytest.approx((3.0, 4.0))
+
+
+def test_vehicle_acquires_a_position_along_its_lane() -> None:
+    goal = {"kind": "acquire_position", "position": {"kind": "world", "x_m": 300.0, "y_m": 3.5, "heading_rad": 0.0}}
+    drive = Drive(story_of([one_event("car", goal)]), {"car": car(0.0, 1, reach=POINT)})
+    at = drive.to(5.0)["car"]
+    assert (at.x_m, at.y_m, at.speed_mps) == pytest.approx((50.0, 3.5, 10.0))
+
+
+def test_deviation_ahead_does_not_end_a_timed_trajectory() -> None:
+    events = [one_event("walker", walk({"domain": "relative"}))]
+    story = story_of(events, trajectories=trajectory(0.0, 8.0))
+    drive = Drive(story, {"walker": StoryActor(Pose(100.0, -4.0, math.pi / 2), 0.0, POINT, free=True)})
+    at = drive.to(8.0, {"walker": lambda mover, room: Drift(0.0, 0.0, 3.0, 0.0)})["walker"]
+    assert at.y_m == pytest.approx(7.0)
