@@ -240,6 +240,12 @@ class Places:
             raise ConfigError("", f"the point {x_m:.1f}, {y_m:.1f} without a road near it", "a point on a road")
         return best[1]
 
+    def across(self, place: OnRoad) -> tuple[float, float]:
+        """Returns the direction of the reference line at a place, rad, and how far left of the line the place is, m."""
+        road = self._roads().road(place.road)
+        t_m = road.middle(place.lane, place.s_m).t_m + place.offset_m
+        return self._beside(road, place.s_m, t_m).heading_rad, t_m
+
     # Lines
 
     def trajectory(self, name: str, of: Of, start: Pose | None = None) -> TravelLine:

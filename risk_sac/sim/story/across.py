@@ -69,7 +69,7 @@ class ChangeOffset:
     def begin(self, mover: Mover, stage: Stage) -> bool:
         """See `Doing.begin`."""
         do = self._do
-        self._fixed_m = self._wanted_m(stage)
+        self._fixed_m = self._wanted_m(mover, stage)
         bound = None if do.lateral_mps2 is None else float(do.lateral_mps2)
         time_s = lateral_time_s(do.shape, self._fixed_m - mover.story_left_m, bound)
         self._course = Course(do.shape, mover.story_left_m, time_s)
@@ -79,29 +79,32 @@ class ChangeOffset:
             return not do.continuous
         return False
 
-    def _wanted_m(self, stage: Stage) -> float:
+    def _wanted_m(self, mover: Mover, stage: Stage) -> float:
+        """Where it is to be across; relative to another actor, that is beside the other's place on the road."""
         target = self._do.target
         if not isinstance(target, RelativeTarget):
             return float(target)
-        its_m = stage.offset_m(target.to) if target.to in stage.present else 0.0
+        if target.to not in stage.present:
+            return mover.story_left_m
+        _, its_m = mover.line.project(*stage.of(target.to)[:2])
         return its_m + float(target.value) if target.how == "delta" else its_m * float(target.value)
 
     def step(self, mover: Mover, stage: Stage) -> bool:
         """See `Doing.step`."""
         self._gone += STEP_S
-        target_m = self._wanted_m(stage) if self._do.continuous else self._fixed_m
+        target_m = self._wanted_m(mover, stage) if self._do.continuous else self._fixed_m
         mover.wanted_left_m = self._course.value(self._gone, target_m)
         return self._course.is_over(self._gone) and not self._do.continuous
 
 
 class KeepBeside:
-    """Brings an actor to a distance across from another one; ahead of it means to its left."""
+    """Brings an actor to a distance across from another one."""
 
     controls = ACROSS
 
     def __init__(self, do: DistanceAction) -> None:
         """Takes the action."""
-        self._do, self._side = do, {"ahead": 1.0, "behind": -1.0, "any": 0.0}[do.displacement]
+        self._do, self._side = do, {"left": 1.0, "right": -1.0}.get(do.displacement, 0.0)
 
     def begin(self, mover: Mover, stage: Stage) -> bool:
         """See `Doing.begin`."""

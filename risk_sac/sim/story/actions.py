@@ -35,7 +35,7 @@ class Once:
             stage.look_again(mover.name)
         elif self._do.kind == "visibility":
             mover.visible = self._do.traffic, self._do.sensors
-        else:
+        elif self._do.kind == "delete":
             mover.gone = True
             stage.present.pop(mover.name, None)
         return True
@@ -59,6 +59,7 @@ CLASSES: Mapping[str, Callable[[Any], Doing]] = {
     "teleport": Once,
     "visibility": Once,
     "delete": Once,
+    "none": Once,
 }
 """Kind of an action of actors → class that does it."""
 

@@ -116,7 +116,7 @@ class KeepAhead:
 
     def __init__(self, do: DistanceAction) -> None:
         """Takes the action."""
-        self._do, self._side = do, {"ahead": 1.0, "behind": -1.0, "any": 0.0}[do.displacement]
+        self._do, self._side = do, {"ahead": 1.0, "behind": -1.0}.get(do.displacement, 0.0)
 
     @property
     def _bounded(self) -> bool:

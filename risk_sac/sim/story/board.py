@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from risk_sac.config.story import (
     Act,
+    DeleteAction,
     ElementKind,
     Event,
     Maneuver,
@@ -262,7 +263,8 @@ class ActionElement(Element):
             set_variable(do, self._board.stage)
             self._doings = []
         else:
-            started = [(actor, doing_of(do)) for actor in actors]
+            others = (do.actor,) if isinstance(do, DeleteAction) and do.actor else actors
+            started = [(actor, doing_of(do)) for actor in others]
             self._doings = [pair for pair in started if not self._board.running.begin(*pair)]
         self.step()
 

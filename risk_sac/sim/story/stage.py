@@ -171,11 +171,6 @@ class Stage:
         except ConfigError:
             return None
 
-    def offset_m(self, name: str) -> float:
-        """Offset of an actor from its lane's middle; 0 where it is on none."""
-        spot = self.places.spot(self.of(name))
-        return 0.0 if spot is None else spot.left_m
-
     def room(self, mover: Mover) -> Room:
         """Room beside an actor's body up to the edges of its road's lanes for cars."""
         spot = None if mover.free else self.places.spot(mover.pose)
@@ -216,11 +211,32 @@ class Stage:
 
     def apart(self, one: Present, other: Present, coordinates: Coordinates) -> Apart:
         """Finds where one actor's reference point is, seen from another's, along its axes or along the lanes."""
+        if coordinates == "road" and (found := self._along_road(one, other)) is not None:
+            return found
         if coordinates != "entity" and (found := self._along_lanes(one, other)) is not None:
             return found
         ahead, left = _turned(other.x_m - one.x_m, other.y_m - one.y_m, one.heading_rad)
         own, its = one.along(one.heading_rad), other.along(one.heading_rad)
         return Apart(ahead, left, its[0] - own[0], its[1] - own[1])
+
+    def _along_road(self, one: Present, other: Present) -> Apart | None:
+        """The same along the reference line of the road that both are on; None without one."""
+        here, there = self.on_road(one.pose), self.on_road(other.pose)
+        if here is None or there is None or here.road != there.road:
+            return None
+        apart, rates = list[tuple[float, float]](), list[tuple[float, float]]()
+        for place, actor in ((here, one), (there, other)):
+            road_rad, t_m = self.places.across(place)
+            apart.append((place.s_m, t_m))
+            rates.append(actor.along(road_rad))
+        sign = 1.0 if math.cos(one.heading_rad - self.places.across(here)[0]) >= 0.0 else -1.0
+        both = (
+            apart[1][0] - apart[0][0],
+            apart[1][1] - apart[0][1],
+            rates[1][0] - rates[0][0],
+            rates[1][1] - rates[0][1],
+        )
+        return Apart(*(sign * value for value in both))
 
     def _along_lanes(self, one: Present, other: Present) -> Apart | None:
         """The same along the lane that leads from the one behind to the other; None if neither lane does."""
