@@ -39,8 +39,16 @@ class Imported:
     document: Scenario
     files: dict[str, bytes]
     """Nets and road files, by the document's names."""
+    places: dict[str, str]
+    """Path in the document → file, line and element that it comes from."""
     points: int
     """Of the grid that a variation file spans, with those that are left out; a range without a step counts once."""
+
+    def located(self, error: ConfigError) -> ConfigError:
+        """Returns an error of the document with the place in the file that its path comes from."""
+        path = next((path for path in self.places if error.field.startswith(path)), "")
+        field = ": ".join(filter(None, (self.places.get(path, ""), error.field)))
+        return ConfigError(field, error.got, error.expected, error.remedy)
 
 
 def import_scenario(file: Path, within: Path | None = None, ego: str | None = None) -> Imported:
@@ -101,8 +109,8 @@ class _Import:
         varied = self._with_roads(varied, network, Parameters(declarations, varied).scope, file)
         parameters = Parameters(declarations, varied)
         top = At(top.element, parameters.scope)
-        document, roads = self._document(top, file, name, parameters)
-        return Imported(document, roads.files, points)
+        document, roads, places = self._document(top, file, name, parameters)
+        return Imported(document, roads.files, places, points)
 
     def _allowed(self, varied: Sequence[Varied], parameters: Parameters) -> list[Varied]:
         """Leaves out texts that constraints do not allow."""
@@ -140,7 +148,9 @@ class _Import:
             raise part.place.refusal(f"no value is left of {', '.join(part.names)[:200]}: {why}", "one at least")
         return replace(part, rows=rows, weights=part.weights and part.weights.kept(kept))
 
-    def _document(self, top: At, file: Path, name: str, parameters: Parameters) -> tuple[Scenario, Roads]:
+    def _document(
+        self, top: At, file: Path, name: str, parameters: Parameters
+    ) -> tuple[Scenario, Roads, dict[str, str]]:
         catalogs = Catalogs(self._sources, file, top.maybe("CatalogLocations"))
         entities = Entities(top.one("Entities"), catalogs, self._remarks, self._ego)
         block = top.maybe("VariableDeclarations")
@@ -202,11 +212,17 @@ class _Import:
             ),
         }
         try:
-            return Scenario(**fields), roads
+            return Scenario(**fields), roads, _places(init, storyboard)
         except ValidationError as error:
             fault = field_errors(error, Scenario)
             fault.field = f"{file.name}: {fault.field}"
             raise fault from error
+
+
+def _places(init: Init, storyboard: At) -> dict[str, str]:
+    """Returns the places of starts, then of all the rest."""
+    starts = {name if name == EGO else f"actors.{name}": start.place for name, start in init.starts.items()}
+    return {f"{path}.start": place for path, place in starts.items()} | {"": storyboard.element.place}
 
 
 def _start(entity: Entity, init: Init) -> Start:

@@ -50,6 +50,8 @@ class Begun:
     """Speed relative to that of another entity, in place of `speed`."""
     at: At | None = None
     """Where its speed is stated."""
+    place: str = ""
+    """File, line and element of its position."""
 
 
 @dataclass
@@ -112,7 +114,7 @@ class Storyboard:
             self._remarks.append(f"{error.field}: not read; {error.effect}")
             return
         if isinstance(action, TeleportAction):
-            start.position = action.position
+            start.position, start.place = action.position, at.element.place
             return
         if isinstance(action, SpeedAction) and _at_once(action):
             start.at = at
@@ -123,7 +125,7 @@ class Storyboard:
             return
         if isinstance(action, FollowTrajectoryAction) and start.position is None:
             place = {"trajectory": action.trajectory, "s_m": action.from_m}
-            start.position = at.build(TrajectoryPosition, kind="on_trajectory", **place)
+            start.position, start.place = at.build(TrajectoryPosition, kind="on_trajectory", **place), at.element.place
         way = isinstance(action, FollowTrajectoryAction | AssignRouteAction | AcquirePositionAction)
         if name == EGO and not way and not isinstance(action, NoAction):
             self._remarks.append(f"{at.element.place}: not read; {EGO_EFFECT}")

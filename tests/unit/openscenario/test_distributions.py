@@ -38,7 +38,7 @@ def varied(inner: str, remarks: list[str] | None = None) -> list[Varied]:
         ),
         (
             f'<Histogram><Bin weight="2">{RANGE}</Bin></Histogram>',
-            HistogramLaw(kind="histogram", bins=({"low": 1, "high": 9, "weight": 2},)),  # type: ignore[arg-type]
+            HistogramLaw(kind="histogram", bins=({"low": 1, "high": 9, "weight": 2},)),
         ),
     ],
 )
