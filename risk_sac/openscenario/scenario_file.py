@@ -9,21 +9,21 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from risk_sac.config.base import Chosen, field_errors
-from risk_sac.config.scenario import EGO, Actor, Moving, Origin, Scenario, Start
+from risk_sac.config.scenario import EGO, Actor, ImportOrigin, Moving, Scenario, Start
 from risk_sac.config.story import FollowTrajectoryAction, Story
 from risk_sac.errors import ConfigError
-from risk_sac.openscenario.actions import Actions
+from risk_sac.openscenario.actions import ActionReader
 from risk_sac.openscenario.catalogs import Catalogs
-from risk_sac.openscenario.conditions import Conditions
+from risk_sac.openscenario.conditions import ConditionReader
 from risk_sac.openscenario.constraints import allowed, constraints_of
 from risk_sac.openscenario.distributions import NO_SCOPE, Variation, points_of
 from risk_sac.openscenario.elements import plain
 from risk_sac.openscenario.entities import Entities, Entity
 from risk_sac.openscenario.parameters import Parameters, Varied
 from risk_sac.openscenario.positions import Positions
-from risk_sac.openscenario.road import Roads, converted, missing
-from risk_sac.openscenario.scope import At, Scope
-from risk_sac.openscenario.sources import Sources
+from risk_sac.openscenario.road import RoadFiles, converted, missing
+from risk_sac.openscenario.scope import At, NameScope
+from risk_sac.openscenario.sources import SourceFiles
 from risk_sac.openscenario.storyboard import Init, Storyboard, horizon_of, moving_actors
 from risk_sac.openscenario.unread import unread
 from risk_sac.openscenario.variables import Variables
@@ -63,7 +63,7 @@ def import_scenario(file: Path, within: Path | None = None, ego: str | None = No
       ConfigError: with file, line and element of what is wrong, or cannot be read and matters.
     """
     try:
-        return _Import(Sources(within), ego).read(file.absolute())
+        return _Import(SourceFiles(within), ego).read(file.absolute())
     except ConfigError as error:
         error.field = error.field or file.name
         raise
@@ -74,7 +74,7 @@ def import_scenario(file: Path, within: Path | None = None, ego: str | None = No
 class _Import:
     """One import."""
 
-    def __init__(self, sources: Sources, ego: str | None) -> None:
+    def __init__(self, sources: SourceFiles, ego: str | None) -> None:
         self._sources, self._ego = sources, ego
         self._remarks: list[str] = []
 
@@ -122,7 +122,7 @@ class _Import:
 
         return [self._filtered(part, list(map(fits, part.rows)), "its constraints do not allow it") for part in varied]
 
-    def _with_roads(self, varied: Sequence[Varied], at: At, scope: Scope, file: Path) -> list[Varied]:
+    def _with_roads(self, varied: Sequence[Varied], at: At, scope: NameScope, file: Path) -> list[Varied]:
         """Leaves out texts of a parameter that name roads which are not there; raises `ConfigError` if none is."""
         at = At(at.element, scope)
         text = at.text("filepath")
@@ -150,7 +150,7 @@ class _Import:
 
     def _document(
         self, top: At, file: Path, name: str, parameters: Parameters
-    ) -> tuple[Scenario, Roads, dict[str, str]]:
+    ) -> tuple[Scenario, RoadFiles, dict[str, str]]:
         catalogs = Catalogs(self._sources, file, top.maybe("CatalogLocations"))
         entities = Entities(top.one("Entities"), catalogs, self._remarks, self._ego)
         block = top.maybe("VariableDeclarations")
@@ -159,8 +159,8 @@ class _Import:
             if element.tag == "ParameterAction":
                 variables.add(element.attributes.get("parameterRef", ""))
         positions = Positions(catalogs, entities)
-        actions = Actions(positions, entities, variables, self._remarks)
-        conditions = Conditions(positions, entities, variables, self._remarks)
+        actions = ActionReader(positions, entities, variables, self._remarks)
+        conditions = ConditionReader(positions, entities, variables, self._remarks)
         board = Storyboard(actions, conditions, entities, catalogs, self._remarks)
         storyboard = top.one("Storyboard")
         init = board.init(storyboard.one("Init"))
@@ -205,7 +205,7 @@ class _Import:
             "actors": actors,
             "constraints": constraints,
             "story": story,
-            "origin": Origin(
+            "origin": ImportOrigin(
                 file=f"{name}{file.suffix}"[:200],
                 actors={entity.name: given[:200] for given, entity in entities.all.items()},
                 entries={entity.name: entity.entry for entity in entities.all.values() if entity.entry},

@@ -26,9 +26,9 @@ from risk_sac.config.story import (
     VariableAction,
 )
 from risk_sac.config.values import Expression
-from risk_sac.openscenario.actions import EGO_EFFECT, Actions
+from risk_sac.openscenario.actions import EGO_EFFECT, ActionReader
 from risk_sac.openscenario.catalogs import Catalogs, parametrised
-from risk_sac.openscenario.conditions import Conditions
+from risk_sac.openscenario.conditions import ConditionReader
 from risk_sac.openscenario.elements import Unread
 from risk_sac.openscenario.entities import Entities
 from risk_sac.openscenario.expressions import coded, combined, simplest
@@ -67,7 +67,12 @@ class Storyboard:
     """Reads the element `Storyboard`."""
 
     def __init__(
-        self, actions: Actions, conditions: Conditions, entities: Entities, catalogs: Catalogs, remarks: list[str]
+        self,
+        actions: ActionReader,
+        conditions: ConditionReader,
+        entities: Entities,
+        catalogs: Catalogs,
+        remarks: list[str],
     ) -> None:
         """Prepares to read; `remarks` gets what is not read."""
         self._actions, self._conditions, self._entities = actions, conditions, entities
