@@ -18,6 +18,7 @@ from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.layout import LEAD_IN_S, Layout, VehicleStart
 from risk_sac.scenario.odd import paths
 from risk_sac.scenario.scene import body_named, motion_of, steps_of
+from risk_sac.scenario.story_scene import ahead_of
 from risk_sac.world.net import Net
 from risk_sac.world.types import Floats, Scene
 
@@ -84,7 +85,12 @@ def bodies_of(layout: Layout, net: Net, after_s: float = 0.0) -> dict[str, Float
     for name, speed_mps in speeds_mps.items():
         along = boxes[name][1] - boxes[name][2]
         boxes[name] = boxes[name] + along / np.linalg.norm(along) * speed_mps * after_s
-    return boxes | {start.id: _box(start.x_m, start.y_m, start.heading_rad, start.body) for start in layout.statics}
+    boxes |= {start.id: _box(start.x_m, start.y_m, start.heading_rad, start.body) for start in layout.statics}
+    if layout.story is not None:
+        for name, start in {**layout.story.others, **layout.story.actors}.items():
+            x_m, y_m, heading_rad = ahead_of(start.pose, start.reach.ahead_m + start.speed_mps * after_s)
+            boxes[name] = _corners(x_m, y_m, heading_rad, start.reach.length_m, start.reach.width_m)
+    return boxes
 
 
 def _in_lane(start: VehicleStart, net: Net) -> Floats:
@@ -99,8 +105,12 @@ def _in_lane(start: VehicleStart, net: Net) -> Floats:
 
 def _box(x_m: float, y_m: float, heading_rad: float, body: str) -> Floats:
     row = BODIES[body]  # type: ignore[index] # a row of the table
-    along = np.array((math.cos(heading_rad), math.sin(heading_rad))) * row.length_m / 2
-    left = np.array((-math.sin(heading_rad), math.cos(heading_rad))) * row.width_m / 2
+    return _corners(x_m, y_m, heading_rad, row.length_m, row.width_m)
+
+
+def _corners(x_m: float, y_m: float, heading_rad: float, length_m: float, width_m: float) -> Floats:
+    along = np.array((math.cos(heading_rad), math.sin(heading_rad))) * length_m / 2
+    left = np.array((-math.sin(heading_rad), math.cos(heading_rad))) * width_m / 2
     return np.array((x_m, y_m)) + np.array((along + left, along - left, -along - left, -along + left))
 
 
@@ -212,7 +222,10 @@ def _check_apart(of: Interpreter, layouts: Sequence[Layout]) -> None:
     for layout in layouts:
         shapes = [
             {name: shapely.Polygon(box).buffer(-TOUCHING_M, join_style="mitre") for name, box in boxes.items()}
-            for boxes in (bodies_of(layout, net_of(layout.net), after_s) for after_s in (0.0, LEAD_IN_S))
+            for boxes in (
+                bodies_of(layout, net_of(layout.net), after_s)
+                for after_s in ((0.0, LEAD_IN_S) if layout.story is None else (0.0,))
+            )
         ]
         for one, other in combinations(shapes[0], 2):
             inside = any(at_once[one].intersects(at_once[other]) for at_once in shapes)

@@ -56,6 +56,12 @@ class StoryPlan:
     places: Places = field(compare=False)
     deviation: Deviation = AS_WRITTEN
 
+    @property
+    def sizes_m(self) -> Mapping[str, tuple[float, float]]:
+        """Length and width of each actor's body."""
+        starts = {**self.others, **self.actors}
+        return {name: (start.reach.length_m, start.reach.width_m) for name, start in starts.items()}
+
 
 def settled(part: T, of: Callable[[Any, str], float], choose: Callable[[Any], Any], path: str = "") -> T:
     """Replaces expressions by their values, and choices by what is chosen.

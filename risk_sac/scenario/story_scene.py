@@ -94,7 +94,7 @@ class StoryScene:
 
     def front_spot(self, name: str, body: BodyName) -> Spot:
         """Place on a lane where the front of a vehicle starts; raises `ConfigError` if no lane is near."""
-        front = ahead_of(self.middle(name, body), BODIES[body].length_m / 2)
+        front = ahead_of(self.middle(name, body), self.reach(name, body).length_m / 2)
         spot = self.places.spot(front) or nearest_lane(self._net, front.x_m, front.y_m, None)
         if spot is None:
             path = name if name == EGO else f"actors.{name}"
@@ -140,7 +140,7 @@ class StoryScene:
         """Notes where a vehicle starts that is placed by its lane."""
         lane = self._net.lanes[f"{start.route[0]}_{start.lane}"]
         line = line_of(lane.centre)
-        at_m = start.position_m * line.length_m / lane.length_m - BODIES[start.body].length_m / 2
+        at_m = start.position_m * line.length_m / lane.length_m - self.reach(start.id, start.body).length_m / 2
         self.put(start.id, line.pose(at_m, start.left_m), start.body)
 
     def plan(

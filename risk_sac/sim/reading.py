@@ -83,6 +83,7 @@ class Reader:
         self._body = {start.id: BODIES[start.body] for start in starts}
         self._body |= {start.id: BODIES[start.body] for start in layout.pedestrians}
         self._body |= {start.id: BODIES[start.body] for start in layout.statics}
+        self._sizes_m = {} if layout.story is None else layout.story.sizes_m
         self._signals = libsumo.trafficlight.getIDList()
         self._walk_signals = [place for signal in self._signals for place in _walk_signals(signal, layout.crossings)]
         self._vehicles = tuple(start.id for start in starts)
@@ -102,7 +103,8 @@ class Reader:
         self._role = np.array([self._roles[id_] for id_ in self._ids], dtype=np.int8)
         self._row = {id_: row for row, id_ in enumerate(self._vehicles)}
         self._attackers = [(row, v) for row, v in enumerate(self._vehicles) if self._roles[v] is Role.ADVERSARY]
-        self._sizes = np.array([(body.length_m, body.width_m) for body in bodies]).T
+        usual = [(body.length_m, body.width_m) for body in bodies]
+        self._sizes = np.array([self._sizes_m.get(id_, size) for id_, size in zip(self._ids, usual, strict=True)]).T
 
     def forget(self, gone: Collection[str]) -> None:
         """Leaves out actors that have left."""

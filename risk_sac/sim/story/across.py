@@ -184,11 +184,13 @@ class FollowTrajectory:
         """See `Doing.step`."""
         line = mover.line
         if not self._scale:
-            return mover.station_m + mover.speed_mps * STEP_S >= line.length_m
+            mover.guided = mover.station_m + mover.speed_mps * STEP_S < line.length_m
+            return not mover.guided
         after_s = min(stage.time_s + STEP_S, self._ends_s)
         mover.wanted_station_m = self._station_m(line, after_s)
         mover.wanted_mps = (mover.wanted_station_m - self._station_m(line, after_s - SLOPE_S)) / SLOPE_S
-        return stage.time_s + STEP_S >= self._ends_s - SLOPE_S
+        mover.guided = stage.time_s + STEP_S < self._ends_s - SLOPE_S
+        return not mover.guided
 
 
 class AssignRoute:

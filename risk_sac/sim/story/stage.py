@@ -107,8 +107,7 @@ class Stage:
 
     def onto_way(self, mover: Mover) -> None:
         """Puts an actor that left its line at an end on the way from there."""
-        if mover.station_m >= mover.line.length_m or (mover.station_m < 0.0 and not mover.guided):
-            mover.guided = False
+        if not mover.guided and not 0.0 <= mover.station_m < mover.line.length_m:
             self.onto_road(mover, mover.line.pose(mover.station_m, mover.left_m))
 
     def lane_line(self, spot: Spot, of: str = "") -> TravelLine:

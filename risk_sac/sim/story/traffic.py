@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import libsumo
 
-from risk_sac.scenario.bodies import BODIES, body_of
+from risk_sac.scenario.bodies import body_of
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.story_plan import Reach, StoryActor, StoryPlan
 from risk_sac.scenario.travel_line import Pose
@@ -37,9 +37,9 @@ class StoryTraffic:
         """Begins the story; none of its vehicles is in SUMO yet."""
         self._plan = plan
         self._engine = StoryEngine(plan, {name: present_of(start) for name, start in plan.others.items()})
-        self._lengths_m = {
-            start.id: BODIES[start.body].length_m for start in layout.vehicles if start.id in plan.actors
-        }
+        driving = [start.id for start in (layout.ego, *layout.vehicles)]
+        self._sizes_m = {name: size for name, size in plan.sizes_m.items() if name in driving}
+        self._lengths_m = {name: self._sizes_m[name][0] for name in plan.actors if name in driving}
         self._free = frozenset(plan.actors) - self._lengths_m.keys()
         self.beside: list[str] = []
         self._take(self._engine.played)
@@ -60,7 +60,10 @@ class StoryTraffic:
         return Told(x_m, y_m, angle, p.speed_mps, p.lateral_mps, p.accel_mps2, p.left_m, None)
 
     def insert(self) -> None:
-        """Has SUMO insert the vehicles, which it was given, where the story has them."""
+        """Has SUMO insert the vehicles, which it was given, with their sizes and where the story has them."""
+        for name, (length_m, width_m) in self._sizes_m.items():
+            libsumo.vehicle.setLength(name, length_m)
+            libsumo.vehicle.setWidth(name, width_m)
         for name in self.told:
             self._put(name)
 
