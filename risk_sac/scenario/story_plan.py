@@ -65,8 +65,7 @@ def settled(part: Any, of: Callable[[Any, str], float], choose: Callable[[Any], 
       path: of the part in its document.
     """
     if isinstance(part, Chosen):
-        chosen: T = settled(choose(part), of, choose, path)
-        return chosen
+        return settled(choose(part), of, choose, path)
     if isinstance(part, Settings):
         changed = {}
         for name, info in type(part).model_fields.items():

@@ -256,7 +256,7 @@ class SumoSimulation:
             return self._moved.arrived
         if self._story is None:
             return False
-        path, station_m, _ = self._roads.along(self._layout.ego.id)
+        path, station_m, *_ = self._roads.along(self._layout.ego.id)
         way = self._roads.way(self._layout.ego.id, libsumo.vehicle.getLaneID(self._layout.ego.id))
         return way.complete and bool(path[STATION, -1] - station_m < END_S * self._reading.frame.ego_speed_mps)
 
