@@ -335,6 +335,15 @@ def _limit(speed_mps: float) -> None:
                 libsumo.lane.setMaxSpeed(lane, speed_mps)
 
 
+def hurry(layout: Layout) -> None:
+    """Has vehicles that start faster than the limit, as a story's may, drive so after their insertion."""
+    for start in (layout.ego, *layout.vehicles):
+        limit_mps = libsumo.lane.getMaxSpeed(f"{start.route[0]}_{start.lane}")
+        if start.speed_mps > limit_mps:
+            libsumo.vehicle.setSpeedFactor(start.id, start.speed_mps / limit_mps)
+            libsumo.vehicle.setPreviousSpeed(start.id, start.speed_mps)
+
+
 def hand_over(start: VehicleStart) -> None:
     """Makes a vehicle drive as commanded, whatever is in its way."""
     libsumo.vehicle.setType(start.id, _type("adversary", start.body))
@@ -363,16 +372,15 @@ def _insert(start: VehicleStart, type_id: str) -> None:
     route = "_".join(("route", *start.route))
     if route not in libsumo.route.getIDList():
         libsumo.route.add(route, start.route)
+    limit_mps: float = libsumo.lane.getMaxSpeed(f"{start.route[0]}_{start.lane}")
     libsumo.vehicle.add(
         start.id,
         route,
         typeID=type_id,
         departLane=str(start.lane),
         departPos=repr(start.position_m),
-        departSpeed=repr(start.speed_mps),
+        departSpeed=repr(min(start.speed_mps, limit_mps)),  # SUMO refuses a faster start; see `hurry`
     )
-    if start.speed_mps > (limit_mps := libsumo.lane.getMaxSpeed(f"{start.route[0]}_{start.lane}")):
-        libsumo.vehicle.setSpeedFactor(start.id, start.speed_mps / limit_mps)  # SUMO refuses a faster start
     if needs_lane_change(start.route, f"{start.route[0]}_{start.lane}"):
         libsumo.vehicle.setParameter(start.id, ASSERTIVE, MERGING)
     if start.left_m != 0.0:  # SUMO's driver keeps to it

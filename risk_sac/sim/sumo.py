@@ -21,10 +21,10 @@ from risk_sac.scenario.layout import Layout
 from risk_sac.sim.drivers import Drivers
 from risk_sac.sim.ego import EVERYTHING, Belief, Perception, Senses
 from risk_sac.sim.oncoming import OncomingVehicle, leaves
-from risk_sac.sim.paths import Along
+from risk_sac.sim.paths import STATION, Along
 from risk_sac.sim.pilot import MovedVehicle, Pilot
 from risk_sac.sim.reading import Reader, Reading
-from risk_sac.sim.roads import LateralRoom, Roads, hand_over, place
+from risk_sac.sim.roads import LateralRoom, Roads, hand_over, hurry, place
 from risk_sac.sim.solid import VehicleCommand, Walker
 from risk_sac.sim.standing import stand_in_lanes
 from risk_sac.sim.story.cast import Drift
@@ -106,6 +106,8 @@ def _links() -> "tempfile.TemporaryDirectory[str]":
 
 NETS = files("sumo_nets")
 LISTED_WITHIN_S = 0.3
+CRAWLS_MPS = 1.0  # an ego that starts faster in a story keeps to its first speed, as its file has it; choice
+END_S = 0.3  # before the end of its route, at which a story is over for the ego
 OPTIONS = (
     f"--step-length {STEP_S} --lateral-resolution 0.8 --default.speeddev 0 --insertion-checks none "
     "--collision.action warn --collision.mingap-factor 0 --collision.check-junctions "
@@ -174,6 +176,9 @@ class SumoSimulation:
         self._layout = layout
         self._walkers = {p.id: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps) for p in layout.pedestrians}
         if self._story is not None:
+            if layout.ego.speed_mps > CRAWLS_MPS:
+                libsumo.vehicle.setMaxSpeed(layout.ego.id, layout.ego.speed_mps)
+            hurry(layout)  # after it, since a new maximum resets the speed factor
             self._story.take_over()
             self._walkers |= self._story.walkers
         self._roads.enter(layout)
@@ -249,8 +254,14 @@ class SumoSimulation:
 
     @property
     def ego_arrived(self) -> bool:
-        """Whether the ego's pilot drove it to its route's end, where the episode ends."""
-        return self._moved is not None and self._moved.arrived
+        """Whether the ego drove to its route's end, where the episode ends; without a pilot only in a story."""
+        if self._moved is not None:
+            return self._moved.arrived
+        if self._story is None:
+            return False
+        path, station_m, _ = self._roads.along(self._layout.ego.id)
+        way = self._roads.way(self._layout.ego.id, libsumo.vehicle.getLaneID(self._layout.ego.id))
+        return way.complete and bool(path[STATION, -1] - station_m < END_S * self._reading.frame.ego_speed_mps)
 
     @property
     def story_over(self) -> bool:
