@@ -26,42 +26,42 @@ VALUES = (
 )  # fmt: skip
 
 
-def _value(tree: ET.Element, draw: random.Random) -> None:
+def _value(tree: ET.XmlElement, draw: random.Random) -> None:
     element = draw.choice([element for element in tree.iter() if element.attrib] or [tree])
     if element.attrib:
         element.set(draw.choice(list(element.attrib)), draw.choice(VALUES))
 
 
-def _drop_attribute(tree: ET.Element, draw: random.Random) -> None:
+def _drop_attribute(tree: ET.XmlElement, draw: random.Random) -> None:
     element = draw.choice([element for element in tree.iter() if element.attrib] or [tree])
     if element.attrib:
         del element.attrib[draw.choice(list(element.attrib))]
 
 
-def _drop(tree: ET.Element, draw: random.Random) -> None:
+def _drop(tree: ET.XmlElement, draw: random.Random) -> None:
     parent = draw.choice([element for element in tree.iter() if len(element)] or [tree])
     if len(parent):
         parent.remove(draw.choice(list(parent)))
 
 
-def _double(tree: ET.Element, draw: random.Random) -> None:
+def _double(tree: ET.XmlElement, draw: random.Random) -> None:
     parent = draw.choice([element for element in tree.iter() if len(element)] or [tree])
     if len(parent):
         parent.append(draw.choice(list(parent)))
 
 
-def _transplant(tree: ET.Element, draw: random.Random) -> None:
+def _transplant(tree: ET.XmlElement, draw: random.Random) -> None:
     """Puts an element of any sample below another; never below itself."""
     donor = ET.parse(FILES / draw.choice((SCENARIO, VARIATION, BODIES, WAYS))).getroot()
     draw.choice(list(tree.iter())).append(draw.choice(list(donor.iter())))
 
 
-def _rename(tree: ET.Element, draw: random.Random) -> None:
+def _rename(tree: ET.XmlElement, draw: random.Random) -> None:
     elements = list(tree.iter())
     draw.choice(elements).tag = draw.choice(elements).tag
 
 
-MUTATIONS: tuple[Callable[[ET.Element, random.Random], None], ...] = (
+MUTATIONS: tuple[Callable[[ET.XmlElement, random.Random], None], ...] = (
     _value, _value, _value, _drop_attribute, _drop, _double, _transplant, _rename,
 )  # fmt: skip
 
@@ -71,7 +71,7 @@ def mutate(file: Path, draw: random.Random) -> None:
     if draw.random() < 0.15:
         content = bytearray(file.read_bytes())
         for _ in range(draw.randint(1, 4)):
-            at = draw.randrange(len(content))
+            at = draw.randrange(len(content) + 1)
             content[at : at + draw.choice((0, 1, 40, 4_000))] = draw.choice(
                 (b"", b"<", b"\x00", b"&x;", b"\xff\xfe", b'"')
             )
