@@ -6,6 +6,7 @@ from pathlib import Path
 
 from junitparser import Failure, Skipped
 from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.console import OK, print_answer, write_out
@@ -83,12 +84,13 @@ def _fixed(text: str) -> tuple[str, str]:
 
 
 def _table(grids: Sequence[PlayedGrid]) -> Table:
-    table = Table(
-        "scenario", "method", "ego", "scenes", *(verdict.value.replace("_", " ") for verdict in StandardVerdict)
-    )
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    table.add_column("run", overflow="fold")
+    for name in ("ego", "scenes", *(verdict.value.replace("_", "\n") for verdict in StandardVerdict)):
+        table.add_column(name, no_wrap=True)
     for grid in grids:
         counts = (str(count) for count in grid.counts.values())
-        table.add_row(grid.spec.family, grid.spec.method, grid.ego, str(len(grid.points)), *counts)
+        table.add_row(grid.spec.id, grid.ego, str(len(grid.points)), *counts)
     return table
 
 

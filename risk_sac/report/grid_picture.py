@@ -122,9 +122,10 @@ def _panel(axes: Axes, points: Sequence[PlayedPoint], over: tuple[str, str], wor
     for axis, known in ((axes.xaxis, words[0]), (axes.yaxis, words[1])):
         if known:
             axis.set_ticks(range(len(known)), known)
-    for axis, values in ((axes.xaxis, [x for x, _ in places]), (axes.yaxis, [y for _, y in places])):
-        room = 0.06 * (max(values) - min(values)) or 0.5
-        axis.set_view_interval(min(values) - room, max(values) + room, ignore=True)
+    x, y = np.array(list(places)).T
+    for limit, values in ((axes.set_xlim, x), (axes.set_ylim, y)):
+        room = 0.06 * float(np.ptp(values)) or 0.5
+        limit(float(values.min()) - room, float(values.max()) + room)
 
 
 def _coordinate(value: float | str, words: Sequence[str]) -> float:

@@ -9,6 +9,7 @@ off its lane's centre, its risk is evaluated for 0.4 s, it is a danger if the ti
 braking begins 0.75 s later. Compared with the JRC's implementation (github.com/ec-jrc/JRC-FSM) and esmini's.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -170,15 +171,25 @@ def _with_ego(values: Floats, own: Floats, first: int) -> Floats:
 
 
 def _prolonged(evidence: Evidence, steps: int) -> Evidence:
-    """The evidence and some more frames, in which all go on with their last velocity."""
+    """The evidence and some more frames, in which all go on with their last velocity.
+
+    Choice: a vehicle that comes over to the ego's line stays on it, as one does that changes lanes.
+    """
     e, after_s = evidence, np.arange(1, steps + 1) * evidence.step_s
+    heading = float(e.heading_rad[-1, 0])
+    left = np.array([-math.sin(heading), math.cos(heading)])
+    across_m = left @ np.array([e.x_m[-1] - e.x_m[-1, 0], e.y_m[-1] - e.y_m[-1, 0]])
+    across_mps = left @ np.array([e.vx_mps[-1], e.vy_mps[-1]])
+    comes = (across_m * across_mps < 0.0) & (e.kind != Kind.PEDESTRIAN)
+    arrives_s = np.where(comes, np.abs(across_m) / np.maximum(np.abs(across_mps), MOVES_MPS), np.inf)
+    too_far_m = across_mps * np.maximum(after_s[:, None] - arrives_s, 0.0)
     names = ("heading_rad", "vx_mps", "vy_mps", "speed_mps", "lane_offset_m", "link", "known")
     changed: dict[str, Any] = {}
     for name in names:
         last = getattr(e, name)[-1:]
         changed[name] = np.concatenate((getattr(e, name), np.repeat(last, steps, axis=0)))
-    for name, speed in (("x_m", e.vx_mps), ("y_m", e.vy_mps)):
-        further = getattr(e, name)[-1] + after_s[:, None] * speed[-1]
+    for name, speed, part in (("x_m", e.vx_mps, left[0]), ("y_m", e.vy_mps, left[1])):
+        further = getattr(e, name)[-1] + after_s[:, None] * speed[-1] - part * too_far_m
         changed[name] = np.concatenate((getattr(e, name), further))
     for name in ("lateral_mps", "accel_mps2"):
         changed[name] = np.concatenate((getattr(e, name), np.zeros((steps, len(e.ids)))))

@@ -97,3 +97,11 @@ def test_a_leader_that_brakes_hard_is_avoided_from_a_proper_distance_alone():
 
     assert avoided_by(braking(33.0), WAY)["r157"]
     assert not avoided_by(braking(6.0), WAY)["r157"]
+
+
+@pytest.mark.parametrize("gap_m", [5.0, 10.0, 15.0, 20.0])
+def test_a_record_that_ends_with_a_contact_has_the_same_verdict(gap_m):
+    """The vehicle is not yet in the ego's lane then."""
+    whole = cut_in(gap_m, 1.2, 5.6, steady(16.7), 16.7)
+    until = next((t for t in range(len(whole.time_s)) if whole.y_m[t, 1] < 1.8), 0)
+    assert avoided_by(whole.until(until), WAY) == avoided_by(whole, WAY)
