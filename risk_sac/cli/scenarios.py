@@ -133,7 +133,10 @@ def _kept(imported: "Imported") -> str:
     with tempfile.TemporaryDirectory() as folder:
         for name, content in imported.files.items():
             Path(folder, name).write_bytes(content)
-        check_document(imported.document, nets_of(imported.document, Path(folder)))
+        try:
+            check_document(imported.document, nets_of(imported.document, Path(folder)))
+        except ConfigError as error:
+            raise imported.located(error) from error
     return library.keep(imported.document, imported.files)
 
 

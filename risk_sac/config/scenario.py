@@ -285,7 +285,7 @@ class SignalTiming(Settings):
     offset_s: Expression = 0.0
 
 
-class Origin(Settings):
+class ImportOrigin(Settings):
     """File of another format that a scenario was imported from."""
 
     file: Annotated[str, Field(max_length=200)]
@@ -319,7 +319,7 @@ class Scenario(Settings):
     road: Net | None = None
     """OpenDRIVE file beside the net, which positions of a story are stated in."""
     story: Story | None = None
-    origin: Origin | None = None
+    origin: ImportOrigin | None = None
     signal: SignalTiming = SignalTiming()
     friction: Expression = 1.0
     """Of tyres on the road."""

@@ -62,7 +62,7 @@ WAYS = AssignRouteAction | FollowTrajectoryAction | AcquirePositionAction
 EGO_EFFECT = "the ego drives by itself"
 
 
-class Actions:
+class ActionReader:
     """Reads actions."""
 
     def __init__(self, positions: Positions, entities: Entities, variables: Variables, remarks: list[str]) -> None:

@@ -7,7 +7,7 @@ import zipfile
 from pathlib import Path
 
 from risk_sac.errors import ConfigError
-from risk_sac.openscenario.sources import MAX_FILES, Sources
+from risk_sac.openscenario.sources import MAX_FILES, SourceFiles
 
 MAX_BYTES = 100 << 20  # of all files, once unpacked
 ENDING = ".xosc"
@@ -64,7 +64,7 @@ def _write(archive: zipfile.ZipFile, folder: Path) -> None:
 
 
 def _to_import(folder: Path) -> Path:
-    sources, variations, scenarios = Sources(folder), list[Path](), list[Path]()
+    sources, variations, scenarios = SourceFiles(folder), list[Path](), list[Path]()
     for file in sorted(path for path in folder.rglob("*") if path.suffix.lower() == ENDING):
         tags = {child.tag for child in sources.root(file, "archive").children}
         if "ParameterValueDistribution" in tags:

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from risk_sac.config.base import Chosen
-from risk_sac.openscenario.elements import Element
+from risk_sac.openscenario.elements import XmlElement
 from risk_sac.openscenario.parameters import TEXTS, read_declaration
 from risk_sac.openscenario.scope import At, Meaning, Text
-from risk_sac.openscenario.sources import Sources
+from risk_sac.openscenario.sources import SourceFiles
 
 ENDING = "*.xosc"
 MOST_REFERENCES = 5_000  # that an import follows
@@ -25,7 +25,7 @@ class Alternatives:
 class Catalogs:
     """Catalogs that a scenario file gives the folders of."""
 
-    def __init__(self, sources: Sources, file: Path, locations: At | None) -> None:
+    def __init__(self, sources: SourceFiles, file: Path, locations: At | None) -> None:
         """Notes the folders; files are read when an entry is wanted.
 
         Args:
@@ -37,7 +37,7 @@ class Catalogs:
         self._folders = (
             [folder for kind in locations.element.children for folder in _folders(kind)] if locations else []
         )
-        self._catalogs: dict[str, Element] | None = None
+        self._catalogs: dict[str, XmlElement] | None = None
         self._references = 0
 
     def entry(self, reference: At, catalog: str, name: str, *tags: str) -> At:
@@ -94,7 +94,7 @@ class Catalogs:
             raise reference.refusal(got, "an entry of one of them", "give the entries different names")
         return having[0], name
 
-    def _read(self) -> dict[str, Element]:
+    def _read(self) -> dict[str, XmlElement]:
         if self._catalogs is None:
             self._catalogs = {}
             for folder in self._folders:
@@ -107,7 +107,7 @@ class Catalogs:
         return self._catalogs
 
 
-def _folders(kind: Element) -> list[Element]:
+def _folders(kind: XmlElement) -> list[XmlElement]:
     kind.used = True
     folders = kind.all("Directory")
     for folder in folders:
@@ -115,7 +115,7 @@ def _folders(kind: Element) -> list[Element]:
     return folders
 
 
-def _names(catalog: Element | None) -> set[str]:
+def _names(catalog: XmlElement | None) -> set[str]:
     return {entry.attributes.get("name", "") for entry in catalog.children} if catalog else set()
 
 

@@ -60,7 +60,7 @@ _READ = "a condition on time, distance, speed, place, collision, state, a variab
 _NEVER = "the condition never holds"
 
 
-class Conditions:
+class ConditionReader:
     """Reads conditions and triggers."""
 
     def __init__(self, positions: Positions, entities: Entities, variables: Variables, remarks: list[str]) -> None:

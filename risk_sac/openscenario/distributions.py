@@ -19,7 +19,7 @@ from risk_sac.config.distribution import (
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.errors import ConfigError
 from risk_sac.openscenario.parameters import WHOLE, Varied
-from risk_sac.openscenario.scope import At, Scope, text_of
+from risk_sac.openscenario.scope import At, NameScope, text_of
 
 MOST_ROWS = 10_000
 MOST_POINTS = 100_000_000  # of the grid; choice
@@ -33,7 +33,7 @@ STOCHASTIC = (
 )
 _USER = "UserDefinedDistribution"
 _USER_EFFECT = "the parameter keeps its default value"
-NO_SCOPE = Scope(lambda name: None, list)
+NO_SCOPE = NameScope(lambda name: None, list)
 
 
 class Variation:

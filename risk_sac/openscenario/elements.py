@@ -33,25 +33,25 @@ class Unread(ConfigError):
 
 
 @dataclass(slots=True, eq=False)
-class Element:
+class XmlElement:
     """Element of a file."""
 
     tag: str
     attributes: dict[str, str]
     file: str
     line: int
-    children: list["Element"] = field(default_factory=list)
+    children: list["XmlElement"] = field(default_factory=list)
     used: bool = False
     used_attributes: set[str] = field(default_factory=set)
 
     @property
     def place(self) -> str:
         """File, line and name, as messages give them."""
-        return f"{self.file}, line {self.line}, <{self.tag[:_SHOWN]}>"
+        return plain(f"{self.file}, line {self.line}, <{self.tag[:_SHOWN]}>")
 
     def refusal(self, got: str, expected: str = "", remedy: str = "") -> ConfigError:
         """Returns the error of something that is wrong here."""
-        return ConfigError(self.place, got[: _SHOWN * 4], expected, remedy)
+        return ConfigError(self.place, plain(got[: _SHOWN * 4]), plain(expected), plain(remedy))
 
     def unread(self, expected: str, effect: str) -> Unread:
         """Returns the error of something here that is valid but not read."""
@@ -62,7 +62,7 @@ class Element:
         self.used_attributes.add(name)
         return self.attributes.get(name)
 
-    def all(self, *tags: str) -> list["Element"]:
+    def all(self, *tags: str) -> list["XmlElement"]:
         """Returns the children of some names, and notes their use."""
         children = [child for child in self.children if child.tag in tags]
         for child in children:
@@ -85,14 +85,19 @@ class Element:
             got = f"{fault.field}: {fault.got}".removeprefix(": ")
             raise self.refusal(got, fault.expected, fault.remedy) from error
 
-    def below(self) -> Iterator["Element"]:
+    def below(self) -> Iterator["XmlElement"]:
         """Yields this element and all below."""
         yield self
         for child in self.children:
             yield from child.below()
 
 
-def parse(content: bytes, file: str) -> Element:
+def plain(text: str) -> str:
+    """Returns a text without characters that do not print, such as those that turn its direction."""
+    return text if text.isprintable() else "".join(char if char.isprintable() else "?" for char in text)
+
+
+def parse(content: bytes, file: str) -> XmlElement:
     """Reads the elements of a file.
 
     Args:
@@ -120,14 +125,14 @@ class _Tree:
     """Handlers of a parser that build elements."""
 
     def __init__(self, file: str) -> None:
-        self.root: Element | None = None
-        self._file, self._open, self._count = file, list[Element](), 0
+        self.root: XmlElement | None = None
+        self._file, self._open, self._count = file, list[XmlElement](), 0
         self.parser = ParserCreate()
         self.parser.StartElementHandler, self.parser.EndElementHandler = self._start, self._end
         self.parser.StartDoctypeDeclHandler = self._doctype
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        element = Element(tag, attributes, self._file, self.parser.CurrentLineNumber)
+        element = XmlElement(tag, attributes, self._file, self.parser.CurrentLineNumber)
         self._count += 1
         if self._count > MAX_ELEMENTS:
             raise element.refusal(f"more than {MAX_ELEMENTS} elements", "at most that")

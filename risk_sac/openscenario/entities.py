@@ -142,8 +142,8 @@ class Entities:
             near = "obstacle"
         body = BODIES[near]
         if max(abs(body.length_m - box.length_m), abs(body.width_m - box.width_m)) > _SAME_M:
-            sizes = f"{box.length_m:g} x {box.width_m:g} m in the file, {body.length_m:g} x {body.width_m:g} m here"
-            remark = f"{entry.element.place}: {given} is a {near}: {sizes}"
+            sizes = f"{body.length_m:g} x {body.width_m:g} m; its box is {box.length_m:g} x {box.width_m:g} m"
+            remark = f"{entry.element.place}: {given} is a {near}, which is usually {sizes}"
             if remark not in self._remarks:
                 self._remarks.append(remark)
         return near

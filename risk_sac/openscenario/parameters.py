@@ -14,8 +14,8 @@ from risk_sac.config.distribution import WeightsLaw
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.config.values import CONSTANTS, FUNCTIONS, term
 from risk_sac.errors import ConfigError, did_you_mean
-from risk_sac.openscenario.elements import Element
-from risk_sac.openscenario.scope import At, Meaning, Scope, literal
+from risk_sac.openscenario.elements import XmlElement
+from risk_sac.openscenario.scope import At, Meaning, NameScope, literal
 
 TEXTS = ("string", "dateTime")
 WHOLE = ("int", "integer", "unsignedInt", "unsignedShort")
@@ -31,7 +31,7 @@ class Varied:
 
     name: str
     """Of the axis in the document."""
-    place: Element
+    place: XmlElement
     parameter: ScenarioParameter | None = None
     """A range; else there are rows."""
     rows: tuple[Mapping[str, str], ...] = ()
@@ -69,7 +69,7 @@ class Parameters:
           ConfigError: one has no value, is there twice, or does not exist.
         """
         self.declared: dict[str, Declared] = {}
-        self.scope = Scope(self.meaning, lambda: list(self.declared))
+        self.scope = NameScope(self.meaning, lambda: list(self.declared))
         self._parts = tuple(part for part in varied if len(part.rows) != 1)
         self.varied = {name: part for part in self._parts for name in part.names}
         fixed = {name: text for part in varied if len(part.rows) == 1 for name, text in part.rows[0].items()}

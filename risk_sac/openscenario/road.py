@@ -11,14 +11,14 @@ from risk_sac.errors import ConfigError
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.documents import MAX_BYTES
 from risk_sac.openscenario.scope import At, Text
-from risk_sac.openscenario.sources import Sources
+from risk_sac.openscenario.sources import SourceFiles
 
 MOST_ROADS = 20
 _NET, _ROAD = ".net.xml", ".xodr"
 
 
 @dataclass
-class Roads:
+class RoadFiles:
     """Nets and road files of a document, by name."""
 
     network: Text
@@ -26,7 +26,7 @@ class Roads:
     files: dict[str, bytes] = field(default_factory=dict)
 
 
-def missing(at: At, text: Text, sources: Sources, file: Path) -> list[str]:
+def missing(at: At, text: Text, sources: SourceFiles, file: Path) -> list[str]:
     """Returns the road files of a parameter's words that are not there; raises `ConfigError` if none is."""
     if not isinstance(text, Chosen):
         sources.find(text, file, at.element)
@@ -43,7 +43,7 @@ def missing(at: At, text: Text, sources: Sources, file: Path) -> list[str]:
     return absent
 
 
-def converted(at: At, text: Text, sources: Sources, file: Path, remarks: list[str]) -> Roads:
+def converted(at: At, text: Text, sources: SourceFiles, file: Path, remarks: list[str]) -> RoadFiles:
     """Converts all roads that a scenario may be on.
 
     Args:
@@ -69,8 +69,8 @@ def converted(at: At, text: Text, sources: Sources, file: Path, remarks: list[st
         files[stems[name] + _ROAD] = content
         files[stems[name] + _NET] = _net(at, path, remarks)
     if isinstance(text, str):
-        return Roads(stems[text] + _NET, stems[text] + _ROAD, files)
-    return Roads(_chosen(text, stems, _NET), _chosen(text, stems, _ROAD), files)
+        return RoadFiles(stems[text] + _NET, stems[text] + _ROAD, files)
+    return RoadFiles(_chosen(text, stems, _NET), _chosen(text, stems, _ROAD), files)
 
 
 def _chosen(text: Chosen[str], stems: Mapping[str, str], ending: str) -> Chosen[str]:

@@ -9,20 +9,21 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from risk_sac.config.base import Chosen, field_errors
-from risk_sac.config.scenario import EGO, Actor, Moving, Origin, Scenario, Start
+from risk_sac.config.scenario import EGO, Actor, ImportOrigin, Moving, Scenario, Start
 from risk_sac.config.story import FollowTrajectoryAction, Story
 from risk_sac.errors import ConfigError
-from risk_sac.openscenario.actions import Actions
+from risk_sac.openscenario.actions import ActionReader
 from risk_sac.openscenario.catalogs import Catalogs
-from risk_sac.openscenario.conditions import Conditions
+from risk_sac.openscenario.conditions import ConditionReader
 from risk_sac.openscenario.constraints import allowed, constraints_of
 from risk_sac.openscenario.distributions import NO_SCOPE, Variation, points_of
+from risk_sac.openscenario.elements import plain
 from risk_sac.openscenario.entities import Entities, Entity
 from risk_sac.openscenario.parameters import Parameters, Varied
 from risk_sac.openscenario.positions import Positions
-from risk_sac.openscenario.road import Roads, converted, missing
-from risk_sac.openscenario.scope import At, Scope
-from risk_sac.openscenario.sources import Sources
+from risk_sac.openscenario.road import RoadFiles, converted, missing
+from risk_sac.openscenario.scope import At, NameScope
+from risk_sac.openscenario.sources import SourceFiles
 from risk_sac.openscenario.storyboard import Init, Storyboard, horizon_of, moving_actors
 from risk_sac.openscenario.unread import unread
 from risk_sac.openscenario.variables import Variables
@@ -38,8 +39,16 @@ class Imported:
     document: Scenario
     files: dict[str, bytes]
     """Nets and road files, by the document's names."""
+    places: dict[str, str]
+    """Path in the document → file, line and element that it comes from."""
     points: int
     """Of the grid that a variation file spans, with those that are left out; a range without a step counts once."""
+
+    def located(self, error: ConfigError) -> ConfigError:
+        """Returns an error of the document with the place in the file that its path comes from."""
+        path = next((path for path in self.places if error.field.startswith(path)), "")
+        field = ": ".join(filter(None, (self.places.get(path, ""), error.field)))
+        return ConfigError(field, error.got, error.expected, error.remedy)
 
 
 def import_scenario(file: Path, within: Path | None = None, ego: str | None = None) -> Imported:
@@ -54,7 +63,7 @@ def import_scenario(file: Path, within: Path | None = None, ego: str | None = No
       ConfigError: with file, line and element of what is wrong, or cannot be read and matters.
     """
     try:
-        return _Import(Sources(within), ego).read(file.absolute())
+        return _Import(SourceFiles(within), ego).read(file.absolute())
     except ConfigError as error:
         error.field = error.field or file.name
         raise
@@ -65,7 +74,7 @@ def import_scenario(file: Path, within: Path | None = None, ego: str | None = No
 class _Import:
     """One import."""
 
-    def __init__(self, sources: Sources, ego: str | None) -> None:
+    def __init__(self, sources: SourceFiles, ego: str | None) -> None:
         self._sources, self._ego = sources, ego
         self._remarks: list[str] = []
 
@@ -82,7 +91,7 @@ class _Import:
             raise root.refusal(f"a file of {tags}", "a scenario, or a variation of one", remedy)
         imported = self._scenario(At(root, NO_SCOPE), file, name, variation)
         self._remarks += [line for read in self._sources.roots for line in unread(read)]
-        remarks = tuple(line[:1000] for line in dict.fromkeys(self._remarks))[:1000]
+        remarks = tuple(plain(line[:1000]) for line in dict.fromkeys(self._remarks))[:1000]
         origin = imported.document.origin
         assert origin is not None
         document = imported.document.model_copy(update={"origin": origin.model_copy(update={"remarks": remarks})})
@@ -100,8 +109,8 @@ class _Import:
         varied = self._with_roads(varied, network, Parameters(declarations, varied).scope, file)
         parameters = Parameters(declarations, varied)
         top = At(top.element, parameters.scope)
-        document, roads = self._document(top, file, name, parameters)
-        return Imported(document, roads.files, points)
+        document, roads, places = self._document(top, file, name, parameters)
+        return Imported(document, roads.files, places, points)
 
     def _allowed(self, varied: Sequence[Varied], parameters: Parameters) -> list[Varied]:
         """Leaves out texts that constraints do not allow."""
@@ -113,7 +122,7 @@ class _Import:
 
         return [self._filtered(part, list(map(fits, part.rows)), "its constraints do not allow it") for part in varied]
 
-    def _with_roads(self, varied: Sequence[Varied], at: At, scope: Scope, file: Path) -> list[Varied]:
+    def _with_roads(self, varied: Sequence[Varied], at: At, scope: NameScope, file: Path) -> list[Varied]:
         """Leaves out texts of a parameter that name roads which are not there; raises `ConfigError` if none is."""
         at = At(at.element, scope)
         text = at.text("filepath")
@@ -139,7 +148,9 @@ class _Import:
             raise part.place.refusal(f"no value is left of {', '.join(part.names)[:200]}: {why}", "one at least")
         return replace(part, rows=rows, weights=part.weights and part.weights.kept(kept))
 
-    def _document(self, top: At, file: Path, name: str, parameters: Parameters) -> tuple[Scenario, Roads]:
+    def _document(
+        self, top: At, file: Path, name: str, parameters: Parameters
+    ) -> tuple[Scenario, RoadFiles, dict[str, str]]:
         catalogs = Catalogs(self._sources, file, top.maybe("CatalogLocations"))
         entities = Entities(top.one("Entities"), catalogs, self._remarks, self._ego)
         block = top.maybe("VariableDeclarations")
@@ -148,8 +159,8 @@ class _Import:
             if element.tag == "ParameterAction":
                 variables.add(element.attributes.get("parameterRef", ""))
         positions = Positions(catalogs, entities)
-        actions = Actions(positions, entities, variables, self._remarks)
-        conditions = Conditions(positions, entities, variables, self._remarks)
+        actions = ActionReader(positions, entities, variables, self._remarks)
+        conditions = ConditionReader(positions, entities, variables, self._remarks)
         board = Storyboard(actions, conditions, entities, catalogs, self._remarks)
         storyboard = top.one("Storyboard")
         init = board.init(storyboard.one("Init"))
@@ -194,18 +205,24 @@ class _Import:
             "actors": actors,
             "constraints": constraints,
             "story": story,
-            "origin": Origin(
+            "origin": ImportOrigin(
                 file=f"{name}{file.suffix}"[:200],
                 actors={entity.name: given[:200] for given, entity in entities.all.items()},
                 entries={entity.name: entity.entry for entity in entities.all.values() if entity.entry},
             ),
         }
         try:
-            return Scenario(**fields), roads
+            return Scenario(**fields), roads, _places(init, storyboard)
         except ValidationError as error:
             fault = field_errors(error, Scenario)
             fault.field = f"{file.name}: {fault.field}"
             raise fault from error
+
+
+def _places(init: Init, storyboard: At) -> dict[str, str]:
+    """Returns the places of starts, then of all the rest."""
+    starts = {name if name == EGO else f"actors.{name}": start.place for name, start in init.starts.items()}
+    return {f"{path}.start": place for path, place in starts.items()} | {"": storyboard.element.place}
 
 
 def _start(entity: Entity, init: Init) -> Start:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from risk_sac.config.base import Chosen
 from risk_sac.config.values import MOST_MAGNITUDE, Expression
 from risk_sac.errors import ConfigError, did_you_mean
-from risk_sac.openscenario.elements import Built, Element, Unread
+from risk_sac.openscenario.elements import Built, Unread, XmlElement
 from risk_sac.openscenario.expressions import combined, translated
 
 Text = str | Chosen[str]
@@ -42,7 +42,7 @@ def literal(text: str) -> Meaning:
     return Meaning(text)
 
 
-class Scope:
+class NameScope:
     """Names that `$name` may stand for."""
 
     def __init__(self, find: Callable[[str], Meaning | None], names: Callable[[], list[str]]) -> None:
@@ -54,9 +54,9 @@ class Scope:
         """
         self._find, self._names = find, names
 
-    def inner(self, own: Mapping[str, Meaning]) -> "Scope":
+    def inner(self, own: Mapping[str, Meaning]) -> "NameScope":
         """Returns a scope with further names, which hide those of this one."""
-        return Scope(lambda name: own.get(name) or self._find(name), lambda: [*own, *self._names()])
+        return NameScope(lambda name: own.get(name) or self._find(name), lambda: [*own, *self._names()])
 
     def name(self, name: str) -> Meaning:
         """Returns what a name stands for; raises `ConfigError` if there is no such parameter."""
@@ -98,8 +98,8 @@ def text_of(value: Expression) -> str:
 class At:
     """An element, and the parameters that its values may name."""
 
-    element: Element
-    scope: Scope
+    element: XmlElement
+    scope: NameScope
 
     def _meaning(self, name: str) -> Meaning | None:
         raw = self.element.attribute(name)

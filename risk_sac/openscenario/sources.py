@@ -3,14 +3,14 @@
 from pathlib import Path
 
 from risk_sac.errors import ConfigError
-from risk_sac.openscenario.elements import MAX_BYTES, Element, parse
+from risk_sac.openscenario.elements import MAX_BYTES, XmlElement, parse, plain
 
 MAX_FILES = 200
 ROOT = "OpenSCENARIO"
 VERSIONS = ("1.0", "1.1", "1.2", "1.3")
 
 
-class Sources:
+class SourceFiles:
     """Files of one import."""
 
     def __init__(self, within: Path | None = None) -> None:
@@ -20,10 +20,10 @@ class Sources:
           within: the folder that no file may lie outside of; None: any that the user may read.
         """
         self._within = within.resolve() if within is not None else None
-        self._roots: dict[Path, Element] = {}  # of files that were read
+        self._roots: dict[Path, XmlElement] = {}  # of files that were read
         self._count = 0
 
-    def find(self, name: str, beside: Path, place: Element) -> Path:
+    def find(self, name: str, beside: Path, place: XmlElement) -> Path:
         """Returns the path of a file or folder that an element names.
 
         Args:
@@ -62,14 +62,14 @@ class Sources:
             raise ConfigError(place, f"{path.name!r}, which cannot be read ({error.strerror})", "a file") from error
 
     @property
-    def roots(self) -> list[Element]:
+    def roots(self) -> list[XmlElement]:
         """Root elements of all OpenSCENARIO files that were read."""
         return list(self._roots.values())
 
-    def root(self, path: Path, place: str) -> Element:
+    def root(self, path: Path, place: str) -> XmlElement:
         """Reads an OpenSCENARIO file, once; raises `ConfigError` for another root or an unknown version."""
         if path not in self._roots:
-            root = parse(self.content(path, place), path.name)
+            root = parse(self.content(path, place), plain(path.name))
             if root.tag != ROOT:
                 remedy = "OpenSCENARIO 2 (.osc) and 0.9 are other languages" if root.tag != "OpenDRIVE" else ""
                 raise root.refusal(f"the root <{root.tag[:80]}>", f"<{ROOT}>", remedy)
@@ -79,13 +79,13 @@ class Sources:
         return self._roots[path]
 
 
-def version(root: Element) -> str:
+def version(root: XmlElement) -> str:
     """The version that a file states, such as `1.3`."""
     header = next(iter(root.all("FileHeader")), None)
     return f"{header.attribute('revMajor')}.{header.attribute('revMinor')}" if header else "none"
 
 
-def _check_version(root: Element) -> None:
+def _check_version(root: XmlElement) -> None:
     if (stated := version(root)) not in VERSIONS:
         header = next(iter(root.all("FileHeader")), root)
         raise header.refusal(f"version {stated[:20]}", f"one of {', '.join(VERSIONS)}", "convert the file")

@@ -26,9 +26,9 @@ from risk_sac.config.story import (
     VariableAction,
 )
 from risk_sac.config.values import Expression
-from risk_sac.openscenario.actions import EGO_EFFECT, Actions
+from risk_sac.openscenario.actions import EGO_EFFECT, ActionReader
 from risk_sac.openscenario.catalogs import Catalogs, parametrised
-from risk_sac.openscenario.conditions import Conditions
+from risk_sac.openscenario.conditions import ConditionReader
 from risk_sac.openscenario.elements import Unread
 from risk_sac.openscenario.entities import Entities
 from risk_sac.openscenario.expressions import coded, combined, simplest
@@ -50,6 +50,8 @@ class Begun:
     """Speed relative to that of another entity, in place of `speed`."""
     at: At | None = None
     """Where its speed is stated."""
+    place: str = ""
+    """File, line and element of its position."""
 
 
 @dataclass
@@ -65,7 +67,12 @@ class Storyboard:
     """Reads the element `Storyboard`."""
 
     def __init__(
-        self, actions: Actions, conditions: Conditions, entities: Entities, catalogs: Catalogs, remarks: list[str]
+        self,
+        actions: ActionReader,
+        conditions: ConditionReader,
+        entities: Entities,
+        catalogs: Catalogs,
+        remarks: list[str],
     ) -> None:
         """Prepares to read; `remarks` gets what is not read."""
         self._actions, self._conditions, self._entities = actions, conditions, entities
@@ -112,7 +119,7 @@ class Storyboard:
             self._remarks.append(f"{error.field}: not read; {error.effect}")
             return
         if isinstance(action, TeleportAction):
-            start.position = action.position
+            start.position, start.place = action.position, at.element.place
             return
         if isinstance(action, SpeedAction) and _at_once(action):
             start.at = at
@@ -123,7 +130,7 @@ class Storyboard:
             return
         if isinstance(action, FollowTrajectoryAction) and start.position is None:
             place = {"trajectory": action.trajectory, "s_m": action.from_m}
-            start.position = at.build(TrajectoryPosition, kind="on_trajectory", **place)
+            start.position, start.place = at.build(TrajectoryPosition, kind="on_trajectory", **place), at.element.place
         way = isinstance(action, FollowTrajectoryAction | AssignRouteAction | AcquirePositionAction)
         if name == EGO and not way and not isinstance(action, NoAction):
             self._remarks.append(f"{at.element.place}: not read; {EGO_EFFECT}")

@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterator
 
-from risk_sac.openscenario.elements import Element
+from risk_sac.openscenario.elements import XmlElement
 
 _SILENT = frozenset({"FileHeader", "License", "Properties", "Property", "CatalogLocations", "ParameterDeclarations"})
 _EFFECTS = {
@@ -17,7 +17,7 @@ _UNKNOWN = "it has no effect"
 _MOST_LINES = 10
 
 
-def unread(root: Element) -> list[str]:
+def unread(root: XmlElement) -> list[str]:
     """Returns a line for each kind of element of a file that nothing read."""
     lines = defaultdict[str, list[int]](list)
     for element in _unused(root):
@@ -29,7 +29,7 @@ def unread(root: Element) -> list[str]:
     ]
 
 
-def _unused(element: Element) -> Iterator[Element]:
+def _unused(element: XmlElement) -> Iterator[XmlElement]:
     """Yields elements that nothing read, within elements that were; other entries of a catalog do not count."""
     for child in element.children:
         if child.used:

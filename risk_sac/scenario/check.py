@@ -61,6 +61,8 @@ def scenes(of: Interpreter, count: int = SCENES) -> Iterator[Scene]:
     dimension = of.space.dimension
     middle = np.full(dimension, 0.5)
     yield of.space.from_unit(middle)
+    if not dimension:
+        return
     for axis in range(dimension):
         for end in (0.0, 1.0):
             yield of.space.from_unit(np.where(np.arange(dimension) == axis, end, middle))

@@ -67,6 +67,8 @@ def nearest_lane(
       among: original names of lanes that are preferred, such as `0_-4`.
     """
     lanes, rows, tree = _pieces(net)
+    if not (math.isfinite(x_m) and math.isfinite(y_m)):
+        return None
     near = tree.query(shapely.Point(x_m, y_m), predicate="dwithin", distance=FARTHEST_M)
     if among:
         named = [i for i in near.tolist() if not set(among).isdisjoint(lanes[i].original)]

@@ -18,6 +18,7 @@ from risk_sac.world.types import Floats
 SAGITTA_M = 0.001  # between a bent line and the straight pieces that stand for it
 SHORTEST_M, LONGEST_M = 0.02, 1.0  # of these pieces
 LONGEST_SEGMENT_M = 100_000.0
+MOST_POINTS = 100_000  # of a segment
 Resolve = Callable[[Position], Pose]
 Number = Callable[[str | float, str], float]
 

@@ -19,6 +19,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 TURN_RAD = 1.5  # of one interval of the quadrature, whose error is then below 1e-12 of its length
 TABLE_M = 0.05  # of arc length between the entries of a polynomial's table
 MOST_ENTRIES = 20_000
+MOST_NODES = 1_000_000  # of the quadrature at once
 
 
 class Begin(NamedTuple):
@@ -46,17 +47,30 @@ class Clothoid:
         x_m, y_m, heading_rad = self.begin
         k0, rate = self.curvature_start, (self.curvature_end - self.curvature_start) / max(self.length_m, 1e-9)
         heading = heading_rad + k0 * s_m + rate * s_m**2 / 2
-        if k0 == 0.0 and rate == 0.0:
+        if rate == 0.0 and k0 == 0.0:
             dx, dy = s_m * math.cos(heading_rad), s_m * math.sin(heading_rad)
+        elif rate == 0.0:
+            dx, dy = (np.sin(heading) - math.sin(heading_rad)) / k0, (math.cos(heading_rad) - np.cos(heading)) / k0
         else:
-            turned = float(np.max(np.abs(s_m) * (abs(k0) + np.abs(rate * s_m)), initial=0.0))
-            parts = max(1, math.ceil(turned / TURN_RAD))
-            share = (np.arange(parts)[:, None] + (_NODES + 1.0) / 2).ravel() / parts
-            u = s_m[:, None] * share
-            theta = heading_rad + k0 * u + rate * u**2 / 2
-            weights = np.tile(_WEIGHTS, parts) / (2 * parts)
-            dx, dy = s_m * (np.cos(theta) @ weights), s_m * (np.sin(theta) @ weights)
+            dx, dy = self._integrals(s_m, rate)
         return np.column_stack((x_m + dx, y_m + dy, heading, k0 + rate * s_m))
+
+    def _integrals(self, s_m: Floats, rate: float) -> tuple[Floats, Floats]:
+        """Integrals of cos θ and sin θ from 0 to each arc length, by Gauss's quadrature."""
+        k0 = self.curvature_start
+        turned = float(np.max(np.abs(s_m) * (abs(k0) + np.abs(rate * s_m)), initial=0.0))
+        parts = max(1, math.ceil(turned / TURN_RAD))
+        share = (np.arange(parts)[:, None] + (_NODES + 1.0) / 2).ravel() / parts
+        weights = np.tile(_WEIGHTS, parts) / (2 * parts)
+        dx, dy = np.empty_like(s_m), np.empty_like(s_m)
+        block = max(1, MOST_NODES // len(share))
+        for begin in range(0, len(s_m), block):
+            own = s_m[begin : begin + block]
+            u = own[:, None] * share
+            theta = self.begin.heading_rad + k0 * u + rate * u**2 / 2
+            dx[begin : begin + block] = own * (np.cos(theta) @ weights)
+            dy[begin : begin + block] = own * (np.sin(theta) @ weights)
+        return dx, dy
 
     def place(self, s_m: float) -> tuple[float, float, float, float]:
         """Returns what `at` does, at one arc length."""

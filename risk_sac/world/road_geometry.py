@@ -22,6 +22,9 @@ from risk_sac.world.plane_curves import Across, Begin, Clothoid, Cubic, CubicCur
 from risk_sac.world.types import Floats
 
 End = Literal["start", "end"]
+FARTHEST = 1e8  # of any number; the Earth's circumference is 4e7 m
+LONGEST_M = 1e6  # of a road
+MOST_TURNED_RAD = 200.0  # by one piece of a reference line; choice: 30 rounds
 TOLERANCE_M = 0.01  # by which a place may lie beyond a road's end
 NEAR_M = 60.0  # of a reference line; choice: half of the widest road
 SAMPLE_M = 1.0  # between the places of a reference line that a point is compared with first
@@ -229,7 +232,15 @@ class RoadFile:
                 got = f"road {element.get('id', '?')[:80]!r} of {file.name} with a missing or broken value: {error}"
                 raise MapError("road", got, "what OpenDRIVE requires") from error
             roads[road.id] = road
-        return cls(roads, {junction.get("id", ""): _connections(junction) for junction in root.findall("junction")})
+        connections = {}
+        for junction in root.findall("junction"):
+            id_ = junction.get("id", "")
+            try:
+                connections[id_] = _connections(junction)
+            except (KeyError, ValueError) as error:
+                got = f"junction {id_[:80]!r} of {file.name} with a missing or broken value: {error}"
+                raise MapError("road", got, "what OpenDRIVE requires") from error
+        return cls(roads, connections)
 
     def near(self, x_m: float, y_m: float) -> list[tuple[Roadway, float]]:
         """Returns the roads near a point, each with the sample of its reference line that is nearest.
@@ -267,7 +278,7 @@ class RoadFile:
 def _number(element: Element, name: str, default: float | None = None) -> float:
     text = element.get(name)
     number = default if text is None and default is not None else float(element.attrib[name])
-    if not math.isfinite(number):
+    if not abs(number) <= FARTHEST:
         raise ValueError(f"{name}={text!r}")
     return number
 
@@ -296,9 +307,12 @@ def _road(element: Element) -> Roadway:
                 kind, link.get("elementId", ""), "end" if link.get("contactPoint") == "end" else "start"
             )
     junction = element.get("junction", "-1")
+    length_m = _number(element, "length")
+    if not 0.0 < length_m <= LONGEST_M:
+        raise ValueError(f"length={length_m:g}")
     return Roadway(
         id=element.attrib["id"],
-        length_m=_number(element, "length"),
+        length_m=length_m,
         junction=None if junction == "-1" else junction,
         keeps_left=element.get("rule") == "LHT",
         starts_m=tuple(_number(geometry, "s") for geometry in geometries),
@@ -310,6 +324,17 @@ def _road(element: Element) -> Roadway:
 
 
 def _curve(geometry: Element) -> Curve:
+    curve = _shaped(geometry)
+    if not 0.0 <= curve.length_m <= LONGEST_M:
+        raise ValueError(f"a geometry of {curve.length_m:g} m")
+    if isinstance(curve, Clothoid):
+        turned = max(abs(curve.curvature_start), abs(curve.curvature_end)) * curve.length_m
+        if turned > MOST_TURNED_RAD:
+            raise ValueError(f"a geometry that turns by {turned:g} rad")
+    return curve
+
+
+def _shaped(geometry: Element) -> Curve:
     begin = Begin(_number(geometry, "x"), _number(geometry, "y"), _number(geometry, "hdg"))
     length_m, shape = _number(geometry, "length"), next(iter(geometry), None)
     match shape.tag if shape is not None else "":

@@ -233,16 +233,22 @@ def _legs(
 
 def lane_length(road: Roadway, lane: int, from_m: float, to_m: float) -> float:
     """Returns the length of a lane's middle between two places."""
-    points = leg_line(road, Leg(road.id, to_m >= from_m, from_m, to_m, lane, lane))
-    return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
+    return float(_lengths(road, lane, from_m, to_m)[1][-1])
 
 
 def _station(road: Roadway, lane: int, from_m: float, to_m: float, length_m: float) -> float:
     """Returns the s at which a lane's middle has a length."""
-    stations = _stations(road, from_m, to_m)
-    points = leg_line(road, Leg(road.id, to_m >= from_m, from_m, to_m, lane, lane))
-    lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))))
+    stations, lengths = _lengths(road, lane, from_m, to_m)
     return float(np.interp(length_m, lengths, stations))
+
+
+def _lengths(road: Roadway, lane: int, from_m: float, to_m: float) -> tuple[list[float], Floats]:
+    """Returns places along a lane, and the length of its middle up to each."""
+    out = lane_through(road, lane, from_m, to_m)
+    points = leg_line(road, Leg(road.id, to_m >= from_m, from_m, to_m, lane, lane if out is None else out))
+    changes = out is None
+    lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))))
+    return _stations(road, from_m, to_m, changes=changes), lengths
 
 
 def leg_line(road: Roadway, leg: Leg) -> Floats:

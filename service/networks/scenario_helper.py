@@ -19,7 +19,7 @@ from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
 from risk_sac.openscenario.archive import holds_scenario, unpack
-from risk_sac.openscenario.scenario_file import import_scenario
+from risk_sac.openscenario.scenario_file import Imported, import_scenario
 from risk_sac.scenario import library
 from risk_sac.scenario.check import check_document
 from risk_sac.scenario.reading import MOST_BYTES, document_from
@@ -48,26 +48,34 @@ def main() -> None:
 
 def _posted(upload: bytes, action: str) -> bytes:
     with tempfile.TemporaryDirectory() as scratch:
-        document, folder = _unpacked(upload, Path(scratch))
+        folder, imported = Path(scratch), None
+        if holds_scenario(upload):
+            imported = _imported(upload, folder)
+            document = imported.document
+        else:
+            document = _unpacked(upload, folder)
         nets = nets_of(document, folder)
         if action == "check":
             from risk_sac.failures.scenario_trial import try_document  # here, because loading libsumo takes a second
 
             return json.dumps(try_document(document, nets).model_dump(mode="json")).encode()
-        check_document(document, nets)
+        try:
+            check_document(document, nets)
+        except ConfigError as error:
+            if imported is None:
+                raise
+            raise imported.located(error) from error
         return json.dumps({"name": library.keep(document, library.own_files(document, nets))}).encode()
 
 
-def _unpacked(upload: bytes, folder: Path) -> tuple[Scenario, Path]:
+def _unpacked(upload: bytes, folder: Path) -> Scenario:
     """Reads a document and puts its nets into a folder, as SUMO nets of the present format.
 
     Raises:
       ConfigError: the upload is neither a document nor an archive of one, or a net cannot be read.
     """
     if not upload.startswith(b"PK"):
-        return document_from(_text(upload)), folder
-    if holds_scenario(upload):
-        return _imported(upload, folder)
+        return document_from(_text(upload))
     try:
         archive = zipfile.ZipFile(io.BytesIO(upload))
         entries = [entry for entry in archive.infolist() if not entry.is_dir()]
@@ -85,17 +93,17 @@ def _unpacked(upload: bytes, folder: Path) -> tuple[Scenario, Path]:
                 _put_net(archive.read(entry), Path(entry.filename).name, document, folder)
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
         raise ConfigError("", f"an archive that cannot be read ({error})", WANTED) from error
-    return document, folder
+    return document
 
 
-def _imported(upload: bytes, folder: Path) -> tuple[Scenario, Path]:
+def _imported(upload: bytes, folder: Path) -> Imported:
     """Imports an archive of OpenSCENARIO, and puts its nets and roads into a folder."""
     with tempfile.TemporaryDirectory() as scratch:
         inside = Path(scratch).resolve()
         imported = import_scenario(unpack(upload, inside), within=inside)
     for name, content in imported.files.items():
         (folder / name).write_bytes(content)
-    return imported.document, folder
+    return imported
 
 
 def _put_net(content: bytes, name: str, document: Scenario, folder: Path) -> None:

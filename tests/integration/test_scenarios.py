@@ -1,5 +1,7 @@
 """Scenarios of a user's own on a real server."""
 
+import io
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ import yaml
 from risk_sac.client import Client, Refused
 from risk_sac.scenario.reading import document_from
 from tests.hostile_networks import zipped
+from tests.openscenario_samples import FILES, SCENARIO, VARIATION, copied
 
 NET = (Path(__file__).parents[2] / "sumo_nets/low/low.net.xml").read_text()
 DOCUMENT: dict[str, Any] = {
@@ -64,6 +67,36 @@ def test_net_comes_in_an_archive(shared):
     assert answer.status_code == 201, answer.text
     answer = post(shared, DOCUMENT | {"name": "own_road", "network": "road.net.xml"})
     assert answer.json()["errors"][0]["field"] == "network"
+
+
+def archive_of(folder: Path) -> bytes:
+    """Zips the files of a folder."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for file in sorted(path for path in folder.rglob("*") if path.is_file()):
+            archive.write(file, file.relative_to(folder))
+    return buffer.getvalue()
+
+
+def test_openscenario_comes_in_an_archive(shared):
+    headers = {"content-type": "application/zip"}
+    answer = shared.client.post("/v1/scenarios", content=archive_of(FILES), headers=headers, timeout=120)
+    assert answer.status_code == 201, answer.text
+    document = document_from(answer.json()["document"])
+    assert document.road == "road.xodr"
+    assert document.origin is not None
+    assert document.origin.file == VARIATION
+    assert answer.json()["actors"] == ["Cutting_in", "Walker", "Box"]
+
+
+def test_fault_of_openscenario_is_named_by_line(shared, tmp_path):
+    files = copied(tmp_path, (SCENARIO, "${$gap + 5}", "${$gab + 5}"))
+    headers = {"content-type": "application/zip"}
+    answer = shared.client.post("/v1/scenarios", content=archive_of(files), headers=headers, timeout=120)
+    assert answer.status_code == 422
+    (error,) = answer.json()["errors"]
+    assert error["field"] == "cut_in.xosc, line 69, <RelativeLanePosition>"
+    assert error["got"] == "ds: $gab, which is no parameter"
 
 
 @pytest.mark.parametrize("path", ["/v1/scenarios", "/v1/scenarios/check"])

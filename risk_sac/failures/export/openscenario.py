@@ -5,6 +5,8 @@ clock; the ego is free, and is asked to drive where it was going. In the other f
 """
 
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 
@@ -15,8 +17,11 @@ from risk_sac.failures.export.formats import BESIDE, Files, beside, document
 from risk_sac.failures.export.opendrive import opendrive
 from risk_sac.failures.export.recorded import ExportedActor, Recorded, cycle, goal
 from risk_sac.failures.net import colour
+from risk_sac.scenario import library
 from risk_sac.scenario.bodies import Body
-from risk_sac.world.types import STEP_S
+from risk_sac.scenario.interpret import Interpreter
+from risk_sac.scenario.shipped import nets_of
+from risk_sac.world.types import STEP_S, Point
 
 VERSION = 2  # of OpenSCENARIO 1
 FREE, AS_RECORDED, ROADS = "failure.xosc", "failure-as-recorded.xosc", "roads.xodr"
@@ -35,30 +40,66 @@ FASTEST_MPS, ACCEL_MPS2, DECEL_MPS2 = 60.0, 10.0, 12.0  # a body's; players chec
 LAST_S = 20.0  # that a free ego may take
 
 
+@dataclass(frozen=True)
+class World:
+    """Road file of a failure, and names of its actors and bodies in it."""
+
+    road: str
+    content: bytes
+    shift_m: Point = (0.0, 0.0)
+    """The net's coordinates less those of the road file."""
+    names: Mapping[str, str] = field(default_factory=dict)
+    """Actor → its name; another keeps its id."""
+    entries: Mapping[str, str] = field(default_factory=dict)
+    """Actor → name of its body; another has that of the table."""
+
+    def moved(self, actor: ExportedActor) -> ExportedActor:
+        """Returns an actor with its name and place in the file."""
+        x, y = self.shift_m
+        return replace(actor, id=self.names.get(actor.id, actor.id), x_m=actor.x_m - x, y_m=actor.y_m - y)
+
+
 def files(failure: Recorded) -> Files:
     """Two scenarios, the roads, and what neither can say."""
-    roads = opendrive(failure.net, failure.name)
+    world = own_world(failure) or World(ROADS, opendrive(failure.net, failure.name))
     return {
-        FREE: _scenario(failure, roads, free=True),
-        AS_RECORDED: _scenario(failure, roads, free=False),
-        ROADS: roads,
+        FREE: _scenario(failure, world, free=True),
+        AS_RECORDED: _scenario(failure, world, free=False),
+        world.road: world.content,
         BESIDE: beside(failure, LACKS),
     }
 
 
-def _scenario(failure: Recorded, roads: bytes, *, free: bool) -> bytes:
+def own_world(failure: Recorded) -> World | None:
+    """Returns the road and names of the file that a failure's scenario was imported from, if it was."""
+    family = failure.manifest.spec.family
+    if not library.KEPT.fullmatch(family):
+        return None
+    document, folder = library.kept(family)
+    if document.origin is None or document.road is None:
+        return None
+    value = Interpreter(document, nets_of(document, folder)).value(failure.manifest.episode.scene.values)
+    road = str(value.word(document.road))
+    entries = {name: entry.rpartition("/")[2] for name, entry in document.origin.entries.items()}
+    content = (folder / road).read_bytes()
+    return World(road, content, failure.net.shift_m, document.origin.actors, entries)
+
+
+def _scenario(failure: Recorded, world: World, *, free: bool) -> bytes:
     end_s = failure.time_s[-1] + (LAST_S if free else 0.0)
     entities, init = xosc.Entities(), xosc.Init()
-    for actor in failure.actors:
-        entities.add_scenario_object(actor.id, _body(actor))
+    actors = [world.moved(actor) for actor in failure.actors]
+    for actor, own in zip(actors, failure.actors, strict=True):
+        entities.add_scenario_object(actor.id, _body(actor, world.entries.get(own.id, actor.body.name)))
         init.add_init_action(actor.id, xosc.TeleportAction(_place(actor, 0)))
         init.add_init_action(actor.id, _speed(actor))
     if free:
         x, y, heading = goal(failure)[1]
         (z,) = failure.net.heights_m(np.array([(x, y)]))
-        init.add_init_action(failure.ego.id, xosc.AcquirePositionAction(xosc.WorldPosition(x, y, z, heading, 0, 0)))
+        there = xosc.WorldPosition(x - world.shift_m[0], y - world.shift_m[1], z, heading, 0, 0)
+        init.add_init_action(actors[0].id, xosc.AcquirePositionAction(there))
     act = xosc.Act("recorded", _at("begins", 0.0))
-    for actor in failure.actors[1:] if free else failure.actors:
+    for actor in actors[1:] if free else actors:
         act.add_maneuver_group(_group(actor, leaves=len(actor.time_s) < failure.frames))
     board = xosc.StoryBoard(init, _at("ends", end_s, "stop"))
     board.add_act(act)
@@ -68,7 +109,7 @@ def _scenario(failure: Recorded, roads: bytes, *, free: bool) -> bytes:
         xosc.ParameterDeclarations(),
         entities,
         board,
-        _roads(failure, roads),
+        _roads(failure, world),
         xosc.Catalog(),
         osc_minor_version=VERSION,
         creation_date=MADE,
@@ -76,11 +117,13 @@ def _scenario(failure: Recorded, roads: bytes, *, free: bool) -> bytes:
     return document(scenario.get_element())
 
 
-def _roads(failure: Recorded, roads: bytes) -> xosc.RoadNetwork:
+def _roads(failure: Recorded, world: World) -> xosc.RoadNetwork:
     """The road file, and what its signals show from the first frame on."""
-    network = xosc.RoadNetwork(ROADS)
-    drawn = {signal.get("id") for signal in ET.fromstring(roads).iter("signal")}
-    for id_ in failure.heads:
+    network = xosc.RoadNetwork(world.road)
+    drawn = set[str | None]()
+    if world.road == ROADS:  # signals of another file have other names
+        drawn = {signal.get("id") for signal in ET.fromstring(world.content).iter("signal")}
+    for id_ in failure.heads if drawn else ():
         controller = xosc.TrafficSignalController(id_)
         for number, (steps, letters) in enumerate(cycle(failure, id_)):
             phase = xosc.Phase(f"{id_}-{number}", steps * STEP_S)
@@ -92,18 +135,18 @@ def _roads(failure: Recorded, roads: bytes) -> xosc.RoadNetwork:
     return network
 
 
-def _body(actor: ExportedActor) -> xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject:
+def _body(actor: ExportedActor, name: str) -> xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject:
     body, height = actor.body, actor.body.height_m
     if body.shape in ("person", "block"):
         box = xosc.BoundingBox(actor.width_m, actor.length_m, height, 0, 0, height / 2)
         if body.shape == "block":
-            return xosc.MiscObject(body.name, body.mass_kg, _category(xosc.MiscObjectCategory, body), box)
-        return xosc.Pedestrian(body.name, body.mass_kg, _category(xosc.PedestrianCategory, body), box)
+            return xosc.MiscObject(name, body.mass_kg, _category(xosc.MiscObjectCategory, body), box)
+        return xosc.Pedestrian(name, body.mass_kg, _category(xosc.PedestrianCategory, body), box)
     box = xosc.BoundingBox(actor.width_m, actor.length_m, height, REAR_AXLE * actor.length_m, 0, height / 2)
     wheel_m, track_m = WHEELS_M["two_wheels" if body.rides else "car" if body.name == "car" else "other"]
     base_m = (REAR_AXLE + FRONT_AXLE) * actor.length_m
     return xosc.Vehicle(
-        body.name,
+        name,
         _category(xosc.VehicleCategory, body),
         box,
         xosc.Axle(0.5, wheel_m, track_m, base_m, wheel_m / 2),

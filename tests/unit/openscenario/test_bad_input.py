@@ -32,9 +32,9 @@ FAULTS = {  # change, element or file that is named, and a piece of what was got
     "an unknown catalog": ((SCENARIO, 'catalogName="ways"', 'catalogName="way"'), "<CatalogReference>", "'way'"),
     "an unknown entry": ((SCENARIO, 'entryName="adult"', 'entryName="child"'), "<CatalogReference>", "'child'"),
     "a body for a route": ((SCENARIO, 'entryName="along"', 'entryName="across"'), "<CatalogReference>", "a Trajectory"),
-    "no value": ((SCENARIO, '"int" value="1"', '"int"'), "<ParameterDeclaration>", "without a value"),
+    "no value": ((SCENARIO, '"int" value="-1"', '"int"'), "<ParameterDeclaration>", "without a value"),
     "no type": ((SCENARIO, 'parameterType="int"', ""), "<ParameterDeclaration>", "parameterType ''"),
-    "a word for a number": ((SCENARIO, '"int" value="1"', '"int" value="left"'), "<ParameterDeclaration>", "'left'"),
+    "a word for a number": ((SCENARIO, '"int" value="-1"', '"int" value="left"'), "<ParameterDeclaration>", "'left'"),
     "a broken constraint": (
         (SCENARIO, 'name="gap" parameterType="double" value="20"', 'name="gap" parameterType="double" value="7"'),
         "<ParameterDeclaration>",

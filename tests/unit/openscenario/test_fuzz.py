@@ -71,7 +71,7 @@ def mutate(file: Path, draw: random.Random) -> None:
     if draw.random() < 0.15:
         content = bytearray(file.read_bytes())
         for _ in range(draw.randint(1, 4)):
-            at = draw.randrange(len(content))
+            at = draw.randrange(len(content) + 1)
             content[at : at + draw.choice((0, 1, 40, 4_000))] = draw.choice(
                 (b"", b"<", b"\x00", b"&x;", b"\xff\xfe", b'"')
             )

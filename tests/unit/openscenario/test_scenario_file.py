@@ -44,7 +44,7 @@ class TestParameters:
             "Ego_kph": 72.0,
             "_ego": "Ego_kph / 3.6",
             "gap": 20.0,
-            "side": 1.0,
+            "side": -1.0,
             "brakes": 0.0,
         }
         assert document.constraints == ()
@@ -151,7 +151,7 @@ class TestActors:
         place = line.vertices[0].position
         assert place.kind == "road"
         value = Interpreter(document, {}).value({})
-        assert (value.of(place.s_m), value.of(place.t_m)) == (220.0, pytest.approx(-8.4))
+        assert [value.of(place.s_m), value.of(place.t_m)] == pytest.approx([220.0, -8.4])
 
     def test_an_entry_with_other_values_is_another_trajectory(self, tmp_path: Path) -> None:
         private = '<Private entityRef="Box">'

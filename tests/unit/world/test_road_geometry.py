@@ -110,6 +110,8 @@ def test_a_lane_that_is_not_there_is_refused_with_those_that_are(tmp_path: Path)
         '<OpenDRIVE><road id="1" length="1"/></OpenDRIVE>',
         file_xml(road_xml("1", [(LINE, 10.0, ())], [Lanes(0.0, {-2: [3.0]})])),
         file_xml(road_xml("1", [(LINE, math.nan, ())], [Lanes(0.0, {-1: [3.0]})])),
+        file_xml(road_xml("1", [(LINE, 1e9, ())], [Lanes(0.0, {-1: [3.0]})])),
+        file_xml(road_xml("1", [(SPIRAL, 100.0, (0.0, 1e6))], [Lanes(0.0, {-1: [3.0]})])),
     ],
 )
 def test_a_broken_file_is_refused(tmp_path: Path, text: str) -> None:
