@@ -649,8 +649,6 @@ class DeviationBounds(Settings):
     """Added to the acceleration."""
     lateral_mps: Annotated[float, Field(ge=0, le=3)] = 0.5
     """Added to the speed across."""
-    trigger_s: Annotated[float, Field(ge=0, le=10)] = 0.0
-    """By which the events of an actor may come later."""
 
 
 class Story(Settings):

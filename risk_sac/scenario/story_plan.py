@@ -35,7 +35,6 @@ class Deviation(NamedTuple):
 
     accel_mps2: float = 0.0
     lateral_mps: float = 0.0
-    trigger_s: float = 0.0
 
 
 AS_WRITTEN = Deviation()

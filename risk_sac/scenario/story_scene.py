@@ -174,7 +174,7 @@ class StoryScene:
             words={name: word for name, word in self._value.words.items() if name in named},
             edges={EGO: ego.route},
             places=self.places,
-            deviation=Deviation(float(bound.accel_mps2), float(bound.lateral_mps), float(bound.trigger_s)),
+            deviation=Deviation(bound.accel_mps2, bound.lateral_mps),
         )
 
 

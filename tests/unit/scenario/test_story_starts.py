@@ -58,7 +58,7 @@ def names(layout: Layout) -> list[str]:
 def test_a_vehicle_starts_with_its_front_where_its_reference_point_puts_it() -> None:
     layout = layout_of({"other": {"start": on_lane("A", 1, 50, offset_m=-0.3), "speed": 3.0}})
     (other,) = layout.vehicles
-    assert front_of(layout.ego) == pytest.approx((20.0 + 1.5 + HALF_CAR_M, -1.35), abs=0.02)
+    assert front_of(layout.ego) == pytest.approx((20.0 + 1.5 + BOX["length_m"] / 2, -1.35), abs=0.02)
     assert front_of(other) == pytest.approx((50.0 - HALF_CAR_M, 1.45), abs=0.02)
     assert other.left_m == pytest.approx(0.3, abs=0.02)  # it drives the other way
     assert other.role is Role.STORY
