@@ -78,7 +78,7 @@ def own_world(failure: Recorded) -> World | None:
     document, folder = library.kept(family)
     if document.origin is None or document.road is None:
         return None
-    value = Interpreter(document, nets_of(document, folder)).value(failure.manifest.episode.scene.values)
+    value = Interpreter(document, nets_of(document, folder)).value(failure.manifest.episode.scene)
     road = str(value.word(document.road))
     entries = {name: entry.rpartition("/")[2] for name, entry in document.origin.entries.items()}
     content = (folder / road).read_bytes()
