@@ -71,7 +71,7 @@ def test_the_road_and_names_are_those_of_the_imported_file(tmp_path, monkeypatch
     monkeypatch.setenv(library.VARIABLE, str(tmp_path))
     imported = import_scenario(FILES / VARIATION)
     name = library.keep(imported.document, imported.files)
-    episode = SimpleNamespace(scene=SimpleNamespace(values={"Ego_kph": 50.0, "model": 0.1, "value_sets_1": 0.1}))
+    episode = SimpleNamespace(scene={"Ego_kph": 50.0, "model": 0.1, "value_sets_1": 0.1})
     manifest = SimpleNamespace(spec=SimpleNamespace(family=name), episode=episode)
     world = openscenario.own_world(SimpleNamespace(manifest=manifest, net=SimpleNamespace(shift_m=(1.0, 2.0))))
     assert (world.road, world.content) == ("road.xodr", (FILES / "road.xodr").read_bytes())
