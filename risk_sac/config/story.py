@@ -595,7 +595,7 @@ class NamedAction(Settings):
     do: Action
 
 
-class Event(Settings):
+class StoryEvent(Settings):
     """Actions that begin together."""
 
     name: ElementName
@@ -611,7 +611,7 @@ class Maneuver(Settings):
     """Events in a named group."""
 
     name: ElementName = "maneuver"
-    events: Annotated[tuple[Event, ...], Field(max_length=1000)]
+    events: Annotated[tuple[StoryEvent, ...], Field(max_length=1000)]
 
 
 class ManeuverGroup(Settings):
@@ -625,7 +625,7 @@ class ManeuverGroup(Settings):
     most: Annotated[int, Field(ge=1, le=1000)] = 1
 
 
-class Act(Settings):
+class StoryAct(Settings):
     """Part of a story with a start and an end."""
 
     name: ElementName = "act"
@@ -662,7 +662,7 @@ class Story(Settings):
     """Name → word at time 0, of variables that hold words."""
     init: Annotated[tuple[InitAction, ...], Field(max_length=1000)] = ()
     """Beside starts and speeds of the actors themselves."""
-    stories: Annotated[Mapping[ElementName, tuple[Act, ...]], Field(max_length=100)] = {}
+    stories: Annotated[Mapping[ElementName, tuple[StoryAct, ...]], Field(max_length=100)] = {}
     stop: Trigger | None = None
     """Ends the episode."""
     deviation: DeviationBounds = DeviationBounds()

@@ -28,7 +28,7 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.host.process_state import c_numbers
 from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.records import Collision, RequirementResult, StoryDeviation, Violation
-from risk_sac.risk.conduct import CONDUCT_ROWS, Road, conduct_terms, see_signals, soft_cost
+from risk_sac.risk.conduct import CONDUCT_ROWS, ConductRoad, conduct_terms, see_signals, soft_cost
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.realism import HardRule, danger_of, refuse_danger, refuse_overlap
 from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
@@ -107,7 +107,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     _adversaries: Adversaries
     _frame: Frame
     _measures: Measures
-    _road: Road
+    _road: ConductRoad
     _conduct: Floats  # what C_soft remembers, CONDUCT_ROWS x adversaries
     _steps: int
     _contact_s: float | None  # from the release
@@ -216,7 +216,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         limits = limits_from_odd(self.problem.odd, layout.friction)
         self._ground = Ground.of(layout, self.problem.speed_limit_mps)
         carriageway = carriageway_of(layout.net)
-        self._road = Road(layout, self.problem.speed_limit_mps, carriageway)
+        self._road = ConductRoad(layout, self.problem.speed_limit_mps, carriageway)
         sumo_seed = int(self.np_random.integers(2**31 - 1))
         self._reflex = reflex_of(self.problem.ego.profile, self._ground)
         self._gauge.reset(carriageway)

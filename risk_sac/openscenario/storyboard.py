@@ -6,10 +6,8 @@ from dataclasses import dataclass, field
 from risk_sac.config.scenario import EGO, LONGEST_HORIZON_S
 from risk_sac.config.story import (
     AcquirePositionAction,
-    Act,
     AssignRouteAction,
     DeleteAction,
-    Event,
     FollowTrajectoryAction,
     InitAction,
     Maneuver,
@@ -19,6 +17,8 @@ from risk_sac.config.story import (
     Position,
     RelativeTarget,
     SpeedAction,
+    StoryAct,
+    StoryEvent,
     TeleportAction,
     TimeCondition,
     TrajectoryPosition,
@@ -139,9 +139,9 @@ class Storyboard:
 
     # Story
 
-    def stories(self, block: At) -> Mapping[str, tuple[Act, ...]]:
+    def stories(self, block: At) -> Mapping[str, tuple[StoryAct, ...]]:
         """Reads all elements `Story`."""
-        stories: dict[str, tuple[Act, ...]] = {}
+        stories: dict[str, tuple[StoryAct, ...]] = {}
         for number, at in enumerate(block.all("Story"), 1):
             inner = parametrised(at, {})
             name = at.constant("name", f"story {number}")[:200] or f"story {number}"
@@ -150,9 +150,9 @@ class Storyboard:
             stories[name] = tuple(self._act(act) for act in inner.all("Act"))
         return stories
 
-    def _act(self, at: At) -> Act:
+    def _act(self, at: At) -> StoryAct:
         return at.build(
-            Act,
+            StoryAct,
             name=at.constant("name")[:200],
             groups=tuple(self._group(group) for group in at.all("ManeuverGroup")),
             start=self._conditions.trigger(at.maybe("StartTrigger")),
@@ -182,13 +182,13 @@ class Storyboard:
         events = tuple(self._event(event, actors) for event in at.all("Event"))
         return at.build(Maneuver, name=at.constant("name")[:200], events=events)
 
-    def _event(self, at: At, actors: tuple[str, ...]) -> Event:
+    def _event(self, at: At, actors: tuple[str, ...]) -> StoryEvent:
         actions = [
             one.build(NamedAction, name=one.constant("name", "action")[:200], do=self._actions.of_event(one, actors))
             for one in at.all("Action")
         ]
         return at.build(
-            Event,
+            StoryEvent,
             name=at.constant("name")[:200],
             start=self._conditions.trigger(at.maybe("StartTrigger")),
             actions=tuple(actions),
@@ -244,7 +244,7 @@ def _refuse_cycles(starts: Mapping[str, Begun], block: At) -> None:
             here = other
 
 
-def moving_actors(init: Init, stories: Mapping[str, tuple[Act, ...]]) -> set[str]:
+def moving_actors(init: Init, stories: Mapping[str, tuple[StoryAct, ...]]) -> set[str]:
     """Returns the names of actors that start with a speed, or that an action moves or takes away."""
     names = {name for name, start in init.starts.items() if start.speed != 0.0}
     names |= {action.actor for action in init.actions}

@@ -130,7 +130,7 @@ class RoadFacts(NamedTuple):
     junctions: Floats  # a row nx, ny, c and number of its junction for each side of one; nx·x + ny·y <= c within
 
 
-class Road:
+class ConductRoad:
     """Road of an episode."""
 
     def __init__(self, layout: Layout, limit_mps: float, carriageway: Carriageway) -> None:

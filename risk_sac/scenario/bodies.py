@@ -23,7 +23,7 @@ Injury = Literal["occupant", "pedestrian", "cyclist", "motorcyclist"]
 Shape = Literal["vehicle", "two_wheels", "person", "block"]
 
 
-class BodyLimit(NamedTuple):
+class BodyBound(NamedTuple):
     """Bound of one field of `Limits` under each behaviour, and its source."""
 
     ordinary: float
@@ -74,7 +74,7 @@ class Body:
     """Its class in permissions of lanes without cars."""
     driver: LaneDriver = CAR_DRIVER
     """As SUMO's class has it, where SUMO drives it."""
-    limits: Mapping[str, BodyLimit] = field(default_factory=dict)
+    limits: Mapping[str, BodyBound] = field(default_factory=dict)
     """Field of `Limits` → its bound; those of the ODD hold for the rest."""
 
     def sized(self, size_m: tuple[float, float] | None) -> "Body":
@@ -94,30 +94,30 @@ class Body:
 
 _SUMO = "default of SUMO's class {}; emergency: its emergencyDecel"
 _BUS = {
-    "accel_mps2": BodyLimit(1.2, 1.2, 1.2, _SUMO.format("bus")),
-    "brake_mps2": BodyLimit(4.0, 7.0, 7.0, _SUMO.format("bus")),
+    "accel_mps2": BodyBound(1.2, 1.2, 1.2, _SUMO.format("bus")),
+    "brake_mps2": BodyBound(4.0, 7.0, 7.0, _SUMO.format("bus")),
 }
 _MOTORCYCLE = {
-    "accel_mps2": BodyLimit(3.0, 6.0, 6.0, "emergency: default of SUMO's class motorcycle; ordinary: choice")
+    "accel_mps2": BodyBound(3.0, 6.0, 6.0, "emergency: default of SUMO's class motorcycle; ordinary: choice")
 }
-_BICYCLE_MPS = BodyLimit(
+_BICYCLE_MPS = BodyBound(
     25 / 3.6, 25 / 3.6, 45 / 3.6, "25 km/h: assistance of an EPAC ends (EN 15194); 45 km/h: class L1e-B (EU 168/2013)"
 )
 _BICYCLE = {
     "speed_mps": _BICYCLE_MPS,
-    "accel_mps2": BodyLimit(1.2, 1.2, 1.5, "default of SUMO's class bicycle; extreme: choice"),
-    "brake_mps2": BodyLimit(3.0, 5.0, 7.0, "default of SUMO's class bicycle, its emergencyDecel; emergency: choice"),
+    "accel_mps2": BodyBound(1.2, 1.2, 1.5, "default of SUMO's class bicycle; extreme: choice"),
+    "brake_mps2": BodyBound(3.0, 5.0, 7.0, "default of SUMO's class bicycle, its emergencyDecel; emergency: choice"),
     "walk_speed_mps": _BICYCLE_MPS,
-    "walk_accel_mps2": BodyLimit(1.2, 1.2, 1.5, "default of SUMO's class bicycle; extreme: choice"),
-    "walk_brake_mps2": BodyLimit(3.0, 4.0, 5.0, "default of SUMO's class bicycle; emergency and extreme: choice"),
-    "heading_rate_radps": BodyLimit(1.0, 1.5, 1.5, "choice"),
-    "walk_curvature_per_m": BodyLimit(0.4, 0.5, 0.5, "choice: a turn of 2.5 m and 2 m radius"),
+    "walk_accel_mps2": BodyBound(1.2, 1.2, 1.5, "default of SUMO's class bicycle; extreme: choice"),
+    "walk_brake_mps2": BodyBound(3.0, 4.0, 5.0, "default of SUMO's class bicycle; emergency and extreme: choice"),
+    "heading_rate_radps": BodyBound(1.0, 1.5, 1.5, "choice"),
+    "walk_curvature_per_m": BodyBound(0.4, 0.5, 0.5, "choice: a turn of 2.5 m and 2 m radius"),
 }
 _CHILD = {
-    "walk_speed_mps": BodyLimit(2.0, 3.0, 4.0, "choice: a child runs where an adult walks"),
-    "walk_accel_mps2": BodyLimit(1.5, 2.0, 2.5, "choice"),
-    "walk_brake_mps2": BodyLimit(1.5, 2.0, 2.5, "choice"),
-    "heading_rate_radps": BodyLimit(1.5, 2.5, 2.5, "choice"),
+    "walk_speed_mps": BodyBound(2.0, 3.0, 4.0, "choice: a child runs where an adult walks"),
+    "walk_accel_mps2": BodyBound(1.5, 2.0, 2.5, "choice"),
+    "walk_brake_mps2": BodyBound(1.5, 2.0, 2.5, "choice"),
+    "heading_rate_radps": BodyBound(1.5, 2.5, 2.5, "choice"),
 }
 
 _ROWS = (

@@ -18,7 +18,7 @@ FARTHEST_M = 30.0  # of a pose from the line of its lane
 TURNED_M = 3.0  # choice: what a lane at right angles to a pose is farther away by than one along it
 
 
-class Spot(NamedTuple):
+class LanePlace(NamedTuple):
     """Place on a lane of the SUMO net."""
 
     lane: NetLane
@@ -56,7 +56,7 @@ def lane_line(lane: NetLane) -> TravelLine:
 
 def nearest_lane(
     net: Net, x_m: float, y_m: float, heading_rad: float | None, among: Collection[str] = ()
-) -> Spot | None:
+) -> LanePlace | None:
     """Returns the place on the nearest lane for cars within 30 m.
 
     Args:
@@ -83,21 +83,21 @@ def nearest_lane(
     if not len(near) or not np.isfinite(apart.min()):
         return None
     i = int(np.argmin(apart))
-    return Spot(lanes[near[i]], float(stations[i] + on[i]), float(dy[i] * cos[i] - dx[i] * sin[i]))
+    return LanePlace(lanes[near[i]], float(stations[i] + on[i]), float(dy[i] * cos[i] - dx[i] * sin[i]))
 
 
-def spot_pose(spot: Spot) -> Pose:
+def spot_pose(spot: LanePlace) -> Pose:
     """Returns the pose of a place, in the lane's direction."""
     return lane_line(spot.lane).pose(spot.at_m, spot.left_m)
 
 
-def beside(net: Net, spot: Spot, lanes: int) -> Spot | None:
+def beside(net: Net, spot: LanePlace, lanes: int) -> LanePlace | None:
     """Returns the place as many lanes to the left, at the same height; None if no car drives there."""
     other = net.lanes.get(f"{spot.lane.edge}_{spot.lane.index + lanes}")
     if other is None or not other.drivable:
         return None
     x_m, y_m, _ = spot_pose(spot)
-    return Spot(other, *lane_line(other).project(x_m, y_m))
+    return LanePlace(other, *lane_line(other).project(x_m, y_m))
 
 
 def lanes_ahead(net: Net, lane: NetLane, length_m: float, edges: Sequence[str] = ()) -> list[NetLane]:

@@ -14,7 +14,7 @@ from risk_sac.config.story import LanePosition, Position, RelativeLanePosition, 
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.lane_places import (
     FARTHEST_M,
-    Spot,
+    LanePlace,
     beside,
     joined,
     lane_line,
@@ -28,7 +28,7 @@ from risk_sac.scenario.value import Value
 from risk_sac.world.net import Net
 from risk_sac.world.plane_curves import Across
 from risk_sac.world.road_geometry import TOLERANCE_M, RoadFile, Roadway
-from risk_sac.world.road_links import LaneEnd, Leg, leg_line, onward, road_path
+from risk_sac.world.road_links import LaneEnd, RoadLeg, leg_line, onward, road_path
 from risk_sac.world.types import Floats
 
 EDGE_M = 2.0  # between the places of a line whose edges are looked up
@@ -51,7 +51,7 @@ class RouteLine(NamedTuple):
     edges: tuple[str, ...]  # of the SUMO net
 
 
-class Places:
+class StoryPlaces:
     """Places of one net and of the road file that it was converted from."""
 
     def __init__(self, net: Net, road: RoadFile | None, story: Story, value: Value) -> None:
@@ -189,12 +189,12 @@ class Places:
             raise ConfigError("ds_m", f"{ds_m:g} m along lane {there.lane.id!r}", "a place on the road")
         return line.pose(ds_m, offset_m)
 
-    def _along_road(self, here: OnRoad, ds_m: float) -> tuple[Leg, bool]:
+    def _along_road(self, here: OnRoad, ds_m: float) -> tuple[RoadLeg, bool]:
         """Goes on along the reference lines; returns the last leg, and whether s still grows the same way."""
         leg = self._walk(here, abs(ds_m), forward=ds_m >= 0.0, by_lane=False)
         return leg, leg.forward == (ds_m >= 0.0)
 
-    def _walk(self, here: OnRoad, distance_m: float, *, forward: bool, by_lane: bool) -> Leg:
+    def _walk(self, here: OnRoad, distance_m: float, *, forward: bool, by_lane: bool) -> RoadLeg:
         begin = LaneEnd(here.road, here.lane, forward)
         legs, missing_m = onward(self._roads(), begin, here.s_m, distance_m, by_lane=by_lane)
         if missing_m > 0.0:
@@ -204,7 +204,7 @@ class Places:
 
     # Places of poses
 
-    def spot(self, pose: Pose, on: OnRoad | None = None) -> Spot | None:
+    def spot(self, pose: Pose, on: OnRoad | None = None) -> LanePlace | None:
         """Returns the place on the nearest lane of the pose's direction; None if there is none within 30 m.
 
         Args:
@@ -214,7 +214,7 @@ class Places:
         among = (f"{on.road}_{on.lane}",) if on is not None else ()
         return nearest_lane(self._net, pose.x_m, pose.y_m, pose.heading_rad, among)
 
-    def beside(self, spot: Spot, lanes: int) -> Spot | None:
+    def beside(self, spot: LanePlace, lanes: int) -> LanePlace | None:
         """Returns the place as many lanes to the left, at the same height; None if no car drives there."""
         return beside(self._net, spot, lanes)
 
@@ -316,7 +316,7 @@ class Places:
         path = routes[name]
         return (*path.waypoints, path.waypoints[0]) if path.closed else path.waypoints
 
-    def _legs(self, name: str, of: Of) -> list[Leg]:
+    def _legs(self, name: str, of: Of) -> list[RoadLeg]:
         """Returns the legs of a route, from its first waypoint to its last."""
         places = [
             self.on_road(waypoint) if isinstance(waypoint, LanePosition) else self.opendrive(self.pose(waypoint, of))
@@ -324,9 +324,9 @@ class Places:
         ]
         return self._between(places)
 
-    def _between(self, places: Sequence[OnRoad]) -> list[Leg]:
+    def _between(self, places: Sequence[OnRoad]) -> list[RoadLeg]:
         """Returns the legs of the shortest ways from each place to the next."""
-        roads, legs = self._roads(), list[Leg]()
+        roads, legs = self._roads(), list[RoadLeg]()
         for here, there in itertools.pairwise(places):
             begin, goal = (LaneEnd(p.road, p.lane, not roads.road(p.road).backwards(p.lane)) for p in (here, there))
             from_m, to_m = (_within(roads.road(place.road), place.s_m) for place in (here, there))
@@ -335,7 +335,7 @@ class Places:
             legs += road_path(roads, begin, from_m, goal, to_m)
         return legs
 
-    def _leg_lines(self, legs: Sequence[Leg]) -> TravelLine:
+    def _leg_lines(self, legs: Sequence[RoadLeg]) -> TravelLine:
         rows: Floats = np.concatenate([leg_line(self._roads().road(leg.road), leg) for leg in legs])
         return line_of(rows[:, :2] + np.array(self._net.shift_m), np.unwrap(rows[:, 2]))
 
@@ -363,7 +363,7 @@ class Places:
         there = self._shifted(*road.point(at_m, across))
         return there if leg.forward else there._replace(heading_rad=there.heading_rad + math.pi)
 
-    def ahead(self, spot: Spot, length_m: float, edges: Sequence[str] = ()) -> TravelLine:
+    def ahead(self, spot: LanePlace, length_m: float, edges: Sequence[str] = ()) -> TravelLine:
         """Returns the way on from a place, along the middles of lanes.
 
         Args:
@@ -383,7 +383,7 @@ class Places:
         legs, _ = onward(roads, begin, place.s_m, length_m, keep)
         return self._leg_lines(legs)
 
-    def _named(self, spot: Spot) -> OnRoad | None:
+    def _named(self, spot: LanePlace) -> OnRoad | None:
         """Returns the place on the road file's lane that a lane of the net was made of; None if it has no name."""
         if self._road is None:
             return None

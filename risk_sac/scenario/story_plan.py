@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from risk_sac.config.base import Settings
 from risk_sac.config.scenario import Chosen, is_expression
 from risk_sac.config.story import Story
-from risk_sac.scenario.places import Places
+from risk_sac.scenario.places import StoryPlaces
 from risk_sac.scenario.travel_line import Pose
 
 
@@ -50,7 +50,7 @@ class StoryPlan:
     numbers: Mapping[str, float] = field(default_factory=dict)  # parameters
     words: Mapping[str, str] = field(default_factory=dict)
     edges: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # the ways of actors that have one
-    places: Places = field(compare=False)
+    places: StoryPlaces = field(compare=False)
     deviation: Deviation = AS_WRITTEN
 
 

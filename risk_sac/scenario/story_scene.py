@@ -18,9 +18,9 @@ from risk_sac.config.story import (
 )
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.bodies import BODIES, BodyName
-from risk_sac.scenario.lane_places import Spot, extended, joined, nearest_lane
+from risk_sac.scenario.lane_places import LanePlace, extended, joined, nearest_lane
 from risk_sac.scenario.layout import VehicleStart
-from risk_sac.scenario.places import Places
+from risk_sac.scenario.places import StoryPlaces
 from risk_sac.scenario.story_plan import Deviation, Reach, StoryActor, StoryPlan, settled
 from risk_sac.scenario.travel_line import Pose, line_of
 from risk_sac.scenario.value import Value
@@ -44,7 +44,7 @@ class StoryScene:
         if document.road is not None:
             road = road_of(str(Path(file).parent / value.word(document.road)))
         self.story = settled(document.story or Story(), value.of, value.choose, "story")
-        self.places = Places(net, road, self.story, value)
+        self.places = StoryPlaces(net, road, self.story, value)
         self._poses: dict[str, Pose] = {}
         self._placing: list[str] = []
 
@@ -92,7 +92,7 @@ class StoryScene:
         """Where the middle of an actor's body starts."""
         return ahead_of(self.pose(name), self.reach(name, body).ahead_m)
 
-    def front_spot(self, name: str, body: BodyName) -> Spot:
+    def front_spot(self, name: str, body: BodyName) -> LanePlace:
         """Place on a lane where the front of a vehicle starts; raises `ConfigError` if no lane is near."""
         front = ahead_of(self.middle(name, body), self.reach(name, body).length_m / 2)
         spot = self.places.spot(front) or nearest_lane(self._net, front.x_m, front.y_m, None)

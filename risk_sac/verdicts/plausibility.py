@@ -39,7 +39,7 @@ class Undisturbed(NamedTuple):
     scale: float  # at least 1: by how much the joint surprise exceeds that of independent features
 
 
-class Judged(NamedTuple):
+class JudgedFeature(NamedTuple):
     """A feature with its probability."""
 
     observed: Observed
@@ -100,35 +100,35 @@ def undisturbed() -> Undisturbed:
     return Undisturbed(spreads, shipped["scale"])
 
 
-def _probability(observed: Observed, traffic: Undisturbed) -> Judged:
+def _probability(observed: Observed, traffic: Undisturbed) -> JudgedFeature:
     feature = FEATURES[observed.feature]
     spread = feature.spread or traffic.spreads[observed.feature]
     least = OVERLOOKED if observed.feature in ROOM else LEAST
-    return Judged(observed, max(tail_probability(feature, spread, observed.value), least), feature.published)
+    return JudgedFeature(observed, max(tail_probability(feature, spread, observed.value), least), feature.published)
 
 
-def _least(judged: Sequence[Judged]) -> float:
+def _least(judged: Sequence[JudgedFeature]) -> float:
     """Least probability, corrected for the number of features; the first step of Holm's procedure."""
     if not judged:
         return 1.0
     return min(1.0, len(judged) * min(each.probability for each in judged))
 
 
-def _joint(judged: Sequence[Judged], scale: float) -> float:
+def _joint(judged: Sequence[JudgedFeature], scale: float) -> float:
     """Probability that the features of independent events are together at least as unlikely."""
     events = by_event(judged)
     tests = [*(truncated_product(events, at, scale) for at in TRUNCATIONS), two_least(events, scale)]
     return min(1.0, len(tests) * min(tests))  # Bonferroni's correction for the number of tests
 
 
-def by_event(judged: Iterable[Judged]) -> list[float]:
+def by_event(judged: Iterable[JudgedFeature]) -> list[float]:
     """Lists the probabilities of events: of each the least of its features', corrected for their number."""
     grouped = groupby(judged, key=_event)
     features = [[each.probability for each in group] for _, group in grouped]
     return [min(1.0, len(probabilities) * min(probabilities)) for probabilities in features]
 
 
-def _event(judged: Judged) -> tuple[int, str, float]:
+def _event(judged: JudgedFeature) -> tuple[int, str, float]:
     observed = judged.observed
     name = FEATURES[observed.feature].event
     return observed.actor, name or observed.feature, observed.time_s
@@ -198,10 +198,10 @@ def _class(probability: float) -> PlausibilityClass:
     return PlausibilityClass.RARE if probability >= RARE else PlausibilityClass.IMPLAUSIBLE
 
 
-def _facts(judged: Sequence[Judged], ids: Sequence[str]) -> tuple[BehaviourFact, ...]:
+def _facts(judged: Sequence[JudgedFeature], ids: Sequence[str]) -> tuple[BehaviourFact, ...]:
     """Lists the least likely value of each feature of each actor, the least likely first."""
 
-    def same(each: Judged) -> tuple[int, str]:
+    def same(each: JudgedFeature) -> tuple[int, str]:
         return each.observed.actor, each.observed.feature
 
     facts = []

@@ -30,7 +30,7 @@ class LaneEnd(NamedTuple):
     forward: bool  # whether s grows along the way
 
 
-class Leg(NamedTuple):
+class RoadLeg(NamedTuple):
     """Part of a way on one road."""
 
     road: str
@@ -131,7 +131,7 @@ def onward(
     roads: Collection[str] = (),
     *,
     by_lane: bool = True,
-) -> tuple[list[Leg], float]:
+) -> tuple[list[RoadLeg], float]:
     """Returns the legs of a way along a lane, straight on where it forks, and what is left of its length.
 
     Args:
@@ -142,7 +142,7 @@ def onward(
       roads: that it keeps to where it can.
       by_lane: whether the distance is that along the lane's middle; else along the reference lines.
     """
-    legs, here, left_m = list[Leg](), begin, distance_m
+    legs, here, left_m = list[RoadLeg](), begin, distance_m
     for _ in range(MOST_LEGS):
         road = file.road(here.road)
         to_m, out = lane_end(road, here.lane, from_m, forward=here.forward)
@@ -157,8 +157,8 @@ def onward(
             else:
                 to_m = min(max(from_m + (left_m if here.forward else -left_m), 0.0), road.length_m)
             out = lane_through(road, here.lane, from_m, to_m) or out
-            return [*legs, Leg(here.road, here.forward, from_m, to_m, here.lane, out)], 0.0
-        legs.append(Leg(here.road, here.forward, from_m, to_m, here.lane, out))
+            return [*legs, RoadLeg(here.road, here.forward, from_m, to_m, here.lane, out)], 0.0
+        legs.append(RoadLeg(here.road, here.forward, from_m, to_m, here.lane, out))
         left_m -= room_m
         ways = following(file, road, out, forward=here.forward) if to_m in (0.0, road.length_m) else []
         if not ways:
@@ -169,7 +169,7 @@ def onward(
     return legs, left_m
 
 
-def road_path(file: RoadFile, begin: LaneEnd, from_m: float, goal: LaneEnd, to_m: float) -> list[Leg]:
+def road_path(file: RoadFile, begin: LaneEnd, from_m: float, goal: LaneEnd, to_m: float) -> list[RoadLeg]:
     """Returns the shortest way from a place to another, along the reference lines; lanes are changed where need be.
 
     Raises:
@@ -177,7 +177,7 @@ def road_path(file: RoadFile, begin: LaneEnd, from_m: float, goal: LaneEnd, to_m
     """
     first = (begin.road, begin.forward)
     if first == (goal.road, goal.forward) and (to_m >= from_m) == goal.forward:
-        return [Leg(goal.road, goal.forward, from_m, to_m, begin.lane, goal.lane)]
+        return [RoadLeg(goal.road, goal.forward, from_m, to_m, begin.lane, goal.lane)]
     seen, queue = dict[tuple[str, bool], float](), [(0.0, 0, [first])]
     order = itertools.count(1)
     while queue:
@@ -207,9 +207,9 @@ def _exits(file: RoadFile, road: Roadway, *, forward: bool) -> Iterator[LaneEnd]
 
 def _legs(
     file: RoadFile, path: list[tuple[str, bool]], begin: LaneEnd, from_m: float, goal: LaneEnd, to_m: float
-) -> list[Leg]:
+) -> list[RoadLeg]:
     """Chooses the lanes of a way, with the least changes on each road."""
-    legs, lane = list[Leg](), begin.lane
+    legs, lane = list[RoadLeg](), begin.lane
     for (id_, forward), (after, after_forward) in itertools.pairwise(path):
         road = file.road(id_)
         end_m = road.length_m if forward else 0.0
@@ -225,10 +225,10 @@ def _legs(
         if not exits:
             raise ConfigError("waypoints", f"no lane of road {id_!r} that leads to {after!r}", "another way")
         _, out, entered = min(exits)
-        legs.append(Leg(id_, forward, begin_m, end_m, lane, out))
+        legs.append(RoadLeg(id_, forward, begin_m, end_m, lane, out))
         lane = entered
     begin_m = 0.0 if goal.forward else file.road(goal.road).length_m
-    return [*legs, Leg(goal.road, goal.forward, begin_m, to_m, lane, goal.lane)]
+    return [*legs, RoadLeg(goal.road, goal.forward, begin_m, to_m, lane, goal.lane)]
 
 
 def lane_length(road: Roadway, lane: int, from_m: float, to_m: float) -> float:
@@ -245,13 +245,13 @@ def _station(road: Roadway, lane: int, from_m: float, to_m: float, length_m: flo
 def _lengths(road: Roadway, lane: int, from_m: float, to_m: float) -> tuple[list[float], Floats]:
     """Returns places along a lane, and the length of its middle up to each."""
     out = lane_through(road, lane, from_m, to_m)
-    points = leg_line(road, Leg(road.id, to_m >= from_m, from_m, to_m, lane, lane if out is None else out))
+    points = leg_line(road, RoadLeg(road.id, to_m >= from_m, from_m, to_m, lane, lane if out is None else out))
     changes = out is None
     lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))))
     return _stations(road, from_m, to_m, changes=changes), lengths
 
 
-def leg_line(road: Roadway, leg: Leg) -> Floats:
+def leg_line(road: Roadway, leg: RoadLeg) -> Floats:
     """Returns x, y and direction along the middle of a leg's lane, `n x 3`.
 
     Where the lane is changed, the line passes over evenly from one middle to the other.
@@ -270,7 +270,7 @@ def leg_line(road: Roadway, leg: Leg) -> Floats:
     return np.column_stack((x_m, y_m, heading + turned + (0.0 if leg.forward else math.pi)))
 
 
-def _across(road: Roadway, leg: Leg, s_m: float) -> Across:
+def _across(road: Roadway, leg: RoadLeg, s_m: float) -> Across:
     """Returns the lateral place of a leg, and its change per metre of the reference line."""
     here = lane_through(road, leg.lane, leg.from_m, s_m) or _nearest(road, leg.lane, s_m)
     there = lane_through(road, leg.out, leg.to_m, s_m) or _nearest(road, leg.out, s_m)

@@ -28,7 +28,7 @@ from risk_sac.lab.pretraining.episodes import ScriptEpisode, outcome_of, play
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
 from risk_sac.search.agents.controls import ScriptFollower
-from risk_sac.search.prior.start import Start, start_of
+from risk_sac.search.prior.start import PriorStart, start_of
 from risk_sac.search.scene_optimizer.archive import mutated
 from risk_sac.world.types import Floats
 
@@ -45,7 +45,7 @@ class Matchup(NamedTuple):
     driver: str
 
 
-def script(random: np.random.Generator, start: Start | None, genes: int) -> Floats:
+def script(random: np.random.Generator, start: PriorStart | None, genes: int) -> Floats:
     """Draws a script: random, or a row of the library mutated by another one."""
     if start is None:
         return random.random(genes)
@@ -53,7 +53,7 @@ def script(random: np.random.Generator, start: Start | None, genes: int) -> Floa
     return random.random(genes) if random.random() < 0.5 else mutated(own, other, random)
 
 
-def chosen(random: np.random.Generator, start: Start, scene: Floats, genes: int) -> Floats:
+def chosen(random: np.random.Generator, start: PriorStart, scene: Floats, genes: int) -> Floats:
     """Returns the script that the model holds to be worth most in a scene."""
     points = np.array([np.concatenate([scene, script(random, start, genes)]) for _ in range(CHOICE)])
     assert start.model is not None

@@ -9,7 +9,7 @@ import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import DrivenBy
-from risk_sac.search.prior.start import Start
+from risk_sac.search.prior.start import PriorStart
 from risk_sac.search.scene_optimizer import ArchiveOptimizer, Encounter
 from risk_sac.search.scene_optimizer.archive import DEVIATIONS, SHARES
 from risk_sac.search.scene_optimizer.base import State
@@ -75,7 +75,7 @@ class PriorOptimizer(ArchiveOptimizer):
     initial = 0
     arms: tuple[Arm, ...] = (Arm.ARCHIVE, Arm.LIBRARY, Arm.MODEL)
 
-    def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int, start: Start) -> None:
+    def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int, start: PriorStart) -> None:
         super().__init__(dimension, config, seed)
         self._model, self._translation = start.model, start.translation
         self._library, self._library_kinds, self._earlier = start.library, start.library_kinds, start.earlier

@@ -17,7 +17,7 @@ DOUBT = 0.5  # share of the uniform belief beside an earlier run's, whose ego ma
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Start:
+class PriorStart:
     """What a search starts from; points are the problem's own.
 
     Attributes:
@@ -33,7 +33,7 @@ class Start:
     earlier: int = 0
 
 
-def start_of(problem: Problem, prior: str) -> Start | None:
+def start_of(problem: Problem, prior: str) -> PriorStart | None:
     """Returns what a search at a problem starts from; None if there is nothing.
 
     Args:
@@ -48,7 +48,7 @@ def start_of(problem: Problem, prior: str) -> Start | None:
     return start if prior in SHIPPED_OR_NONE else _after(start, own, kept(prior).alike(problem.family.name))
 
 
-def _shipped(own: Coordinates, family: str) -> Start:
+def _shipped(own: Coordinates, family: str) -> PriorStart:
     """What was trained on a shipped family."""
     shipped, there = shipped_prior(family), Coordinates.of(FAMILIES[family])
     translation, model, known, kinds = Translation(own, there), shipped.model, shipped.library, shipped.library_kinds
@@ -58,7 +58,7 @@ def _shipped(own: Coordinates, family: str) -> Start:
         known, kinds = np.concatenate([known, there.reflected(known)]), kinds * 2
     library, unknown = translation.own(known), model.unknown()
     fails_there, fails_here = (model.predict(rows, unknown).fails for rows in (known, translation.known(library)))
-    return Start(
+    return PriorStart(
         model=model,
         translation=translation,
         library=library,
@@ -68,13 +68,13 @@ def _shipped(own: Coordinates, family: str) -> Start:
     )
 
 
-def _after(start: Start | None, own: Coordinates, earlier: tuple[FamilyScripts, ...]) -> Start | None:
+def _after(start: PriorStart | None, own: Coordinates, earlier: tuple[FamilyScripts, ...]) -> PriorStart | None:
     """Puts what earlier runs found before the shipped library, and believes in what their egos did."""
     failures = np.concatenate([np.empty((0, own.dimension)), *(_points(own, each, each.failures) for each in earlier)])
     kinds = tuple(script.kind for each in earlier for script in each.failures)
     if start is None or start.model is None or start.translation is None:
         worth, none = np.ones(len(kinds)), np.empty(0)
-        alone = Start(
+        alone = PriorStart(
             model=None,
             translation=None,
             library=failures,
@@ -89,7 +89,7 @@ def _after(start: Start | None, own: Coordinates, earlier: tuple[FamilyScripts, 
         known = start.translation.known(_points(own, each, each.latest))
         for point, script in zip(known, each.latest, strict=True):
             belief = model.believe(belief, point, failed=bool(script.kind))
-    return Start(
+    return PriorStart(
         model=model,
         translation=start.translation,
         library=np.concatenate([failures, start.library]),

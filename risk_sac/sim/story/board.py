@@ -6,15 +6,15 @@ Source: ASAM OpenSCENARIO XML 1.3, "Storyboard and entities": states and transit
 from collections.abc import Iterator, Mapping, Sequence
 
 from risk_sac.config.story import (
-    Act,
     DeleteAction,
     ElementKind,
-    Event,
     Maneuver,
     ManeuverGroup,
     NamedAction,
     StateCondition,
     Story,
+    StoryAct,
+    StoryEvent,
     VariableAction,
 )
 from risk_sac.sim.story.actions import doing_of, set_variable
@@ -74,7 +74,7 @@ class Element:
       state: standby, running or complete.
     """
 
-    def __init__(self, board: "Board", kind: ElementKind, path: str, parts: Sequence["Element"] = ()) -> None:
+    def __init__(self, board: "Storyboard", kind: ElementKind, path: str, parts: Sequence["Element"] = ()) -> None:
         """Stands by."""
         self.kind, self.path, self.state = kind, path, "standby"
         self._board, self.parts = board, parts
@@ -132,7 +132,7 @@ class Element:
 class ActElement(Element):
     """An act, which starts and stops by its triggers."""
 
-    def __init__(self, board: "Board", act: Act, path: str) -> None:
+    def __init__(self, board: "Storyboard", act: StoryAct, path: str) -> None:
         """Stands by."""
         super().__init__(
             board, "act", path, [GroupElement(board, group, f"{path}{PATH}{group.name}") for group in act.groups]
@@ -155,7 +155,7 @@ class ActElement(Element):
 class GroupElement(Element):
     """Maneuvers of some actors, which may be done several times."""
 
-    def __init__(self, board: "Board", group: ManeuverGroup, path: str) -> None:
+    def __init__(self, board: "Storyboard", group: ManeuverGroup, path: str) -> None:
         """Stands by."""
         maneuvers = [ManeuverElement(board, one, f"{path}{PATH}{one.name}") for one in group.maneuvers]
         super().__init__(board, "maneuver_group", path, maneuvers)
@@ -182,7 +182,7 @@ class GroupElement(Element):
 class ManeuverElement(Element):
     """Events in a named group."""
 
-    def __init__(self, board: "Board", maneuver: Maneuver, path: str) -> None:
+    def __init__(self, board: "Storyboard", maneuver: Maneuver, path: str) -> None:
         """Stands by."""
         events = [EventElement(board, event, f"{path}{PATH}{event.name}", self) for event in maneuver.events]
         super().__init__(board, "maneuver", path, events)
@@ -201,7 +201,7 @@ class EventElement(Element):
 
     names: tuple[str, ...] = ()
 
-    def __init__(self, board: "Board", event: Event, path: str, maneuver: "ManeuverElement") -> None:
+    def __init__(self, board: "Storyboard", event: StoryEvent, path: str, maneuver: "ManeuverElement") -> None:
         """Stands by."""
         super().__init__(
             board, "event", path, [ActionElement(board, one, f"{path}{PATH}{one.name}") for one in event.actions]
@@ -249,7 +249,7 @@ class EventElement(Element):
 class ActionElement(Element):
     """An action, of each of its event's actors."""
 
-    def __init__(self, board: "Board", action: NamedAction, path: str) -> None:
+    def __init__(self, board: "Storyboard", action: NamedAction, path: str) -> None:
         """Stands by."""
         super().__init__(board, "action", path)
         self._action = action
@@ -281,7 +281,7 @@ class ActionElement(Element):
         super().stop()
 
 
-class Board:
+class Storyboard:
     """The elements of a story.
 
     Attributes:

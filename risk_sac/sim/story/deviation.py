@@ -18,15 +18,15 @@ RETURN_S = 1.0  # in which a place across is returned to at most; choice
 NONE_MPS, NONE_M = 1e-4, 1e-3  # of a speed and a place, which count as none
 
 
-class Room(NamedTuple):
+class DeviationRoom(NamedTuple):
     """How far an actor's body may move to its left and its right."""
 
     left_m: float
     right_m: float
 
 
-ANYWHERE = Room(math.inf, math.inf)
-Lead = Callable[[Mover, Room], Drift]
+ANYWHERE = DeviationRoom(math.inf, math.inf)
+Lead = Callable[[Mover, DeviationRoom], Drift]
 """Says how far an actor is from its story after the next step."""
 NO_LEADS: Mapping[str, Lead] = {}
 
@@ -56,7 +56,7 @@ class DeviationControl:
         self._brake_mps2 = min(limits.walk_brake_mps2 if free else limits.brake_mps2, along_mps2)
         self._added_mps2 = 0.0
 
-    def step(self, drive: float, steer: float, mover: Mover, room: Room) -> Drift:
+    def step(self, drive: float, steer: float, mover: Mover, room: DeviationRoom) -> Drift:
         """The drift after the next step.
 
         Args:
@@ -87,7 +87,7 @@ class DeviationControl:
         self._added_mps2 = (mps - now) / STEP_S
         return mps
 
-    def _across(self, steer: float, mover: Mover, room: Room, mps: float) -> float:
+    def _across(self, steer: float, mover: Mover, room: DeviationRoom, mps: float) -> float:
         """The difference in speed across in the step."""
         bound, now = self._bounds.lateral_mps, mover.drift
         story_left_m = mover.story_left_m if mover.wanted_left_m is None else mover.wanted_left_m

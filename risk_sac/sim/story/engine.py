@@ -9,7 +9,7 @@ from typing import NamedTuple
 from risk_sac.scenario.story_plan import StoryPlan
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.sim.story.actions import doing_of, set_variable
-from risk_sac.sim.story.board import Board, Running
+from risk_sac.sim.story.board import Running, Storyboard
 from risk_sac.sim.story.cast import ON_STORY, Drift, Mover, Present
 from risk_sac.sim.story.deviation import NO_LEADS, Lead
 from risk_sac.sim.story.stage import Stage
@@ -18,7 +18,7 @@ from risk_sac.world.types import STEP_S
 TIME_DIGITS = 6  # of a time, which is a multiple of the step
 
 
-class Played(NamedTuple):
+class StoryMotion(NamedTuple):
     """An actor of the story at one moment; its place is its body's middle."""
 
     x_m: float
@@ -53,7 +53,7 @@ class StoryEngine:
                 set_variable(init.do, stage)
             else:
                 self._running.begin(init.actor, doing_of(init.do))
-        self._board = Board(plan.story, stage, self._running)
+        self._board = Storyboard(plan.story, stage, self._running)
         self._steps = 0
 
     @property
@@ -77,7 +77,7 @@ class StoryEngine:
         return frozenset(self._stage.unmet)
 
     @property
-    def played(self) -> Mapping[str, Played]:
+    def played(self) -> Mapping[str, StoryMotion]:
         """Actors of the story that are there now."""
         return {name: _played(mover) for name, mover in self._stage.movers.items() if not mover.gone}
 
@@ -86,7 +86,7 @@ class StoryEngine:
         self._stage.look(others)
         self._board.evaluate()
 
-    def advance(self, leads: Mapping[str, Lead] = NO_LEADS) -> Mapping[str, Played]:
+    def advance(self, leads: Mapping[str, Lead] = NO_LEADS) -> Mapping[str, StoryMotion]:
         """Moves all actors of the story by a step, and returns where they are.
 
         Args:
@@ -115,8 +115,8 @@ class StoryEngine:
         return {name: mover.furthest for name, mover in self._stage.movers.items() if mover.furthest != ON_STORY}
 
 
-def _played(mover: Mover) -> Played:
+def _played(mover: Mover) -> StoryMotion:
     present = mover.present
     middle = Pose(*present.middle, present.heading_rad)
     speeds = mover.speed_mps, mover.lateral_mps, mover.accel_mps2
-    return Played(*middle, *speeds, mover.left_m, all(mover.visible))
+    return StoryMotion(*middle, *speeds, mover.left_m, all(mover.visible))

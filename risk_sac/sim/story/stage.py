@@ -9,11 +9,11 @@ import shapely
 
 from risk_sac.config.story import Along, Coordinates, LanePosition, LaneTarget, Position
 from risk_sac.errors import ConfigError
-from risk_sac.scenario.places import OnRoad, Places, Spot
+from risk_sac.scenario.places import LanePlace, OnRoad, StoryPlaces
 from risk_sac.scenario.story_plan import Reach, StoryPlan
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of
 from risk_sac.sim.story.cast import STANDS_MPS, Mover, Present
-from risk_sac.sim.story.deviation import ANYWHERE, Room
+from risk_sac.sim.story.deviation import ANYWHERE, DeviationRoom
 from risk_sac.world.types import STEP_S
 
 LINE_M = 3000.0  # of the way ahead of a lane's beginning; an actor that comes to its end gets the next piece
@@ -58,7 +58,7 @@ class Stage:
         self._off_s: dict[str, float | None] = {}
         self._end_s: dict[str, float | None] = {}
         self._lines: dict[tuple[str, tuple[str, ...]], TravelLine] = {}
-        self.places: Places = plan.places
+        self.places: StoryPlaces = plan.places
         for name, start in plan.actors.items():
             self.onto_road(self.movers[name], start.pose)
 
@@ -110,12 +110,12 @@ class Stage:
         if not mover.guided and not 0.0 <= mover.station_m < mover.line.length_m:
             self.onto_road(mover, mover.line.pose(mover.station_m, mover.left_m))
 
-    def lane_line(self, spot: Spot, of: str = "") -> TravelLine:
+    def lane_line(self, spot: LanePlace, of: str = "") -> TravelLine:
         """The way ahead from the beginning of a spot's lane, along an actor's route if it has one."""
         edges = self.movers[of].edges if of in self.movers else self.plan.edges.get(of, ())
         key = spot.lane.id, edges
         if key not in self._lines:
-            self._lines[key] = self.places.ahead(Spot(spot.lane, 0.0, 0.0), LINE_M, edges)
+            self._lines[key] = self.places.ahead(LanePlace(spot.lane, 0.0, 0.0), LINE_M, edges)
         return self._lines[key]
 
     def way_to(self, name: str, target: Pose) -> tuple[float, float]:
@@ -137,7 +137,7 @@ class Stage:
         except ConfigError:
             return None
 
-    def lane_of(self, target: "float | str | LaneTarget", own: Pose) -> Spot | None:
+    def lane_of(self, target: "float | str | LaneTarget", own: Pose) -> LanePlace | None:
         """Spot beside a pose, on the lane that a lane change leads to; None if there is none."""
         here = self.places.spot(own)
         if here is None:
@@ -156,7 +156,7 @@ class Stage:
             return self._numbered(_lane_beside(place.lane, lanes), own, here)
         return self._numbered(round(float(target)), own, here)
 
-    def _numbered(self, lane: int, own: Pose, here: Spot) -> Spot | None:
+    def _numbered(self, lane: int, own: Pose, here: LanePlace) -> LanePlace | None:
         """Spot on the lane of this OpenDRIVE id beside a pose."""
         place = self.on_road(own)
         if place is None:
@@ -173,7 +173,7 @@ class Stage:
         except ConfigError:
             return None
 
-    def room(self, mover: Mover) -> Room:
+    def room(self, mover: Mover) -> DeviationRoom:
         """Room beside an actor's body up to the edges of its road's lanes for cars."""
         spot = None if mover.free else self.places.spot(mover.pose)
         if spot is None:
@@ -186,7 +186,7 @@ class Stage:
         lanes = -1
         while (other := self.places.beside(spot, lanes)) is not None:
             right_m, lanes = right_m + other.lane.width_m, lanes - 1
-        return Room(left_m - spot.left_m, right_m + spot.left_m)
+        return DeviationRoom(left_m - spot.left_m, right_m + spot.left_m)
 
     def lane_heading(self, name: str) -> float:
         """Direction of an actor's lane; its own where it is on none."""

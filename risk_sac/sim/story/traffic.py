@@ -17,7 +17,7 @@ from risk_sac.sim.reading import Told
 from risk_sac.sim.solid import Walker
 from risk_sac.sim.story.cast import Drift, Present
 from risk_sac.sim.story.deviation import NO_LEADS, Lead
-from risk_sac.sim.story.engine import Played, StoryEngine
+from risk_sac.sim.story.engine import StoryEngine, StoryMotion
 from risk_sac.world.types import ACCEL, HEADING, SPEED, Frame, X, Y
 
 ANYWHERE = 2  # SUMO's word for a place that need not be on the vehicle's route
@@ -43,7 +43,7 @@ class StoryTraffic:
         self.beside: list[str] = []
         self._take(self._engine.played)
 
-    def _take(self, played: Mapping[str, Played]) -> None:
+    def _take(self, played: Mapping[str, StoryMotion]) -> None:
         self._played = played
         self.walkers = {
             name: Walker(p.x_m, p.y_m, p.heading_rad, p.speed_mps, p.accel_mps2)
@@ -52,7 +52,7 @@ class StoryTraffic:
         }
         self.told = {name: self._tell(name, p) for name, p in played.items() if name not in self._free}
 
-    def _tell(self, name: str, p: Played) -> Told:
+    def _tell(self, name: str, p: StoryMotion) -> Told:
         half_m = self._lengths_m[name] / 2
         x_m, y_m = p.x_m + half_m * math.cos(p.heading_rad), p.y_m + half_m * math.sin(p.heading_rad)
         angle = 90.0 - math.degrees(p.heading_rad)

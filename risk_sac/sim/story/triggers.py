@@ -37,7 +37,7 @@ EPS = 1e-6  # numbers that differ by less are equal
 NOBODY: frozenset[str] = frozenset()
 
 
-class Board(Protocol):
+class StoryState(Protocol):
     """The story's elements, as a condition sees them."""
 
     def is_in(self, condition: StateCondition) -> bool:
@@ -66,7 +66,7 @@ class Watch:
         self._before: bool | None = None
         self._past: deque[tuple[float, bool]] = deque()
 
-    def check(self, stage: Stage, board: Board) -> tuple[bool, frozenset[str]]:
+    def check(self, stage: Stage, board: StoryState) -> tuple[bool, frozenset[str]]:
         """Evaluates it now: whether it holds, and for which of its actors."""
         condition = self._condition
         now, actors = evaluate(condition, stage, board)
@@ -104,7 +104,7 @@ class TriggerWatch:
         """Prepares; nothing was evaluated yet."""
         self._groups = [[Watch(condition) for condition in group] for group in trigger]
 
-    def check(self, stage: Stage, board: Board) -> tuple[bool, frozenset[str]]:
+    def check(self, stage: Stage, board: StoryState) -> tuple[bool, frozenset[str]]:
         """Evaluates all conditions now: whether all of one group hold, and the actors of these."""
         fires, actors = False, set[str]()
         for group in self._groups:
@@ -115,7 +115,7 @@ class TriggerWatch:
         return fires, frozenset(actors)
 
 
-def evaluate(condition: Condition, stage: Stage, board: Board) -> tuple[bool, frozenset[str]]:
+def evaluate(condition: Condition, stage: Stage, board: StoryState) -> tuple[bool, frozenset[str]]:
     """Evaluates a condition without its edge and its delay."""
     if isinstance(condition, StateCondition):
         return board.is_in(condition), NOBODY

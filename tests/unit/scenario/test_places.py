@@ -9,7 +9,7 @@ from pydantic import TypeAdapter
 
 from risk_sac.config.story import Position, Story
 from risk_sac.errors import ConfigError
-from risk_sac.scenario.places import OnRoad, Places, lanes_beside
+from risk_sac.scenario.places import OnRoad, StoryPlaces, lanes_beside
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.scenario.value import Value
 from tests.unit.scenario.junction_roads import roads_and_net
@@ -73,13 +73,13 @@ STORY = Story.model_validate(
 
 
 @pytest.fixture(scope="module")
-def places() -> Places:
+def places() -> StoryPlaces:
     roads, net = roads_and_net()
-    return Places(net, roads, STORY, Value({"d": 20.0}, {}))
+    return StoryPlaces(net, roads, STORY, Value({"d": 20.0}, {}))
 
 
 @pytest.fixture
-def at(places: Places) -> Callable[..., tuple[float, float, float]]:
+def at(places: StoryPlaces) -> Callable[..., tuple[float, float, float]]:
     """Poses in the road file's coordinates, of positions relative to an actor there."""
     assert roads_and_net()[1].shift_m == (300.0, 200.0)
     shift_x, shift_y = roads_and_net()[1].shift_m
@@ -177,7 +177,7 @@ def test_a_place_that_is_not_there_is_refused_by_its_field(
     assert error.value.field == field
 
 
-def test_lanes_of_the_net_keep_their_names_and_places(places: Places) -> None:
+def test_lanes_of_the_net_keep_their_names_and_places(places: StoryPlaces) -> None:
     for id_, lanes, stations in (
         ("A", (1, -1), (10, 90)),
         ("A", (-2,), (80,)),
@@ -194,12 +194,12 @@ def test_lanes_of_the_net_keep_their_names_and_places(places: Places) -> None:
                 assert places.opendrive(pose) == (id_, own, pytest.approx(s_m), pytest.approx(0.0, abs=1e-6))
 
 
-def test_a_pose_in_a_junction_is_on_the_road_that_leads_its_way(places: Places) -> None:
+def test_a_pose_in_a_junction_is_on_the_road_that_leads_its_way(places: StoryPlaces) -> None:
     for road, own in (("10", -1), ("10", 1), ("11", -1), ("11", 1)):
         assert places.opendrive(places.lane_pose(OnRoad(road, own, 12.0, 0.2))).road == road
 
 
-def test_a_spot_is_on_the_lane_of_its_direction(places: Places) -> None:
+def test_a_spot_is_on_the_lane_of_its_direction(places: StoryPlaces) -> None:
     right = places.spot(places.pose(position(**lane("A", -1, 70)), _nobody))
     left = places.spot(places.pose(position(**lane("A", 1, 70)), _nobody))
     assert right is not None
@@ -213,7 +213,7 @@ def test_a_spot_is_on_the_lane_of_its_direction(places: Places) -> None:
     assert places.spot(Pose(0.0, 5000.0, 0.0)) is None
 
 
-def test_the_way_ahead_goes_straight_on_or_along_edges(places: Places) -> None:
+def test_the_way_ahead_goes_straight_on_or_along_edges(places: StoryPlaces) -> None:
     shift_x, shift_y = roads_and_net()[1].shift_m
     spot = places.spot(places.pose(position(**lane("A", -1, 70)), _nobody))
     assert spot is not None
@@ -228,7 +228,7 @@ def test_the_way_ahead_goes_straight_on_or_along_edges(places: Places) -> None:
     assert places.ahead(spot, 1000.0).length_m == pytest.approx(150.0)
 
 
-def test_a_route_is_the_line_along_lanes_and_the_edges_of_the_net(places: Places) -> None:
+def test_a_route_is_the_line_along_lanes_and_the_edges_of_the_net(places: StoryPlaces) -> None:
     net = roads_and_net()[1]
     line, edges = places.route("back", _nobody)
     assert line.pose(0.0) == pytest.approx((118.25 + net.shift_m[0], 50.0 + net.shift_m[1], SOUTH + math.tau), abs=1e-6)
@@ -237,7 +237,7 @@ def test_a_route_is_the_line_along_lanes_and_the_edges_of_the_net(places: Places
     assert [net.edges[edge].lanes[-1].original[0] for edge in edges] == ["C_1", "A_1"]
 
 
-def test_a_polyline_is_passed_at_its_times_and_faces_its_way(places: Places) -> None:
+def test_a_polyline_is_passed_at_its_times_and_faces_its_way(places: StoryPlaces) -> None:
     line = places.trajectory("across", _nobody)
     assert line.length_m == pytest.approx(8.0)
     assert (line.station_at(2.0), line.time_s(6.0)) == (pytest.approx(2.0), pytest.approx(3.5))
@@ -246,7 +246,7 @@ def test_a_polyline_is_passed_at_its_times_and_faces_its_way(places: Places) -> 
     assert line.pose(6.0).heading_rad == pytest.approx((NORTH + 1.0) / 2)
 
 
-def test_clothoids_go_on_from_each_other_or_from_an_actor(places: Places) -> None:
+def test_clothoids_go_on_from_each_other_or_from_an_actor(places: StoryPlaces) -> None:
     shift_x, shift_y = roads_and_net()[1].shift_m
     line = places.trajectory("turn", _nobody)
     assert line.pose(line.length_m) == pytest.approx((100.0 + shift_x, 8.25 + shift_y, NORTH), abs=1e-6)
@@ -262,7 +262,7 @@ def test_lane_0_is_not_counted() -> None:
 
 def test_without_a_road_file_places_are_found_by_the_lanes_of_the_net() -> None:
     net = roads_and_net()[1]
-    places = Places(net, None, Story(), Value({}, {}))
+    places = StoryPlaces(net, None, Story(), Value({}, {}))
     shift_x, shift_y = net.shift_m
     here = Pose(70.0 + shift_x, -1.75 + shift_y, EAST)
     beside = position("relative_lane", to="actor", lanes=-1, ds_m=10.0)

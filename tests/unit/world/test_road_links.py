@@ -8,7 +8,7 @@ import pytest
 
 from risk_sac.errors import ConfigError
 from risk_sac.world.road_geometry import RoadFile
-from risk_sac.world.road_links import LaneEnd, Leg, following, lane_through, leg_line, onward, road_path
+from risk_sac.world.road_links import LaneEnd, RoadLeg, following, lane_through, leg_line, onward, road_path
 from tests.opendrive import ARC, LINE, Lanes, file_xml, road_xml
 
 W = [3.5]
@@ -64,7 +64,7 @@ def test_a_way_is_as_long_as_asked_along_the_lane_or_the_reference_lines(roads: 
     begin = LaneEnd("2", -1, True)
     by_lane, missing_m = onward(roads, begin, 0.0, 130.0)
     # The lane is 1.75 m outside an arc of 100 m radius.
-    assert by_lane[-1] == Leg("3", False, 50.0, pytest.approx(50.0 - (130.0 - 101.75), abs=0.01), 1, 1)
+    assert by_lane[-1] == RoadLeg("3", False, 50.0, pytest.approx(50.0 - (130.0 - 101.75), abs=0.01), 1, 1)
     assert missing_m == 0.0
     by_road, _ = onward(roads, begin, 0.0, 130.0, by_lane=False)
     assert by_road[-1].to_m == pytest.approx(20.0)
@@ -85,7 +85,7 @@ def test_a_change_of_lanes_begins_and_ends_in_the_middles(
 ) -> None:
     road = roads.road("3")
     from_m, to_m = (0.0, 50.0) if forward else (50.0, 0.0)
-    line = leg_line(road, Leg("3", forward, from_m, to_m, lane, out))
+    line = leg_line(road, RoadLeg("3", forward, from_m, to_m, lane, out))
     assert line[0, 1] == pytest.approx(1.75 * lane)
     assert line[-1, 1] == pytest.approx(1.75 * out)
     steps = np.diff(line[:, :2], axis=0)

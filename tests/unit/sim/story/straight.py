@@ -5,14 +5,14 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from risk_sac.config.story import Act, Condition, Story
-from risk_sac.scenario.places import Places
+from risk_sac.config.story import Condition, Story, StoryAct
+from risk_sac.scenario.places import StoryPlaces
 from risk_sac.scenario.story_plan import Reach, StoryActor, StoryPlan
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.scenario.value import Value
 from risk_sac.sim.story.cast import Present
 from risk_sac.sim.story.deviation import NO_LEADS, Lead
-from risk_sac.sim.story.engine import Played, StoryEngine
+from risk_sac.sim.story.engine import StoryEngine, StoryMotion
 from risk_sac.world.net import Edge, Net, NetLane
 from risk_sac.world.types import STEP_S
 
@@ -65,9 +65,9 @@ def condition(**fields: Any) -> Condition:
     return TypeAdapter(Condition).validate_python(fields)
 
 
-def act(**fields: Any) -> Act:
+def act(**fields: Any) -> StoryAct:
     """An act as a document writes it."""
-    return Act.model_validate(fields)
+    return StoryAct.model_validate(fields)
 
 
 class Drive:
@@ -89,20 +89,20 @@ class Drive:
         plan = StoryPlan(
             story=story,
             actors=actors,
-            places=Places(straight_net(), None, story, Value({}, {})),
+            places=StoryPlaces(straight_net(), None, story, Value({}, {})),
             numbers=numbers or {},
             words=words or {},
         )
         self.engine = StoryEngine(plan, self.present())
         self.engine.observe(self.present())
-        self.history: list[Mapping[str, Played]] = [self.engine.played]
+        self.history: list[Mapping[str, StoryMotion]] = [self.engine.played]
 
     def present(self) -> dict[str, Present]:
         time_s = self.engine.time_s if hasattr(self, "engine") else 0.0
         pose = self._ego._replace(x_m=self._ego.x_m + self.ego_mps * time_s)
         return {"ego": Present.moving(pose, self.ego_mps, 0.0, self._reach), **self._others}
 
-    def to(self, time_s: float, leads: Mapping[str, Lead] = NO_LEADS) -> Mapping[str, Played]:
+    def to(self, time_s: float, leads: Mapping[str, Lead] = NO_LEADS) -> Mapping[str, StoryMotion]:
         """Plays on to a time; returns where the actors of the story are then."""
         while self.engine.time_s < time_s - STEP_S / 2:
             self.engine.advance(leads)

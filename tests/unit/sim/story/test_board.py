@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from risk_sac.sim.story.deviation import Room
+from risk_sac.sim.story.deviation import DeviationRoom
 from tests.unit.sim.story.straight import Drive, after, car, one_event, story_of
 
 
@@ -130,7 +130,7 @@ def test_same_story_plays_the_same_again() -> None:
 def test_room_reaches_to_the_edges_of_the_road() -> None:
     drive = drive_of()
     stage = drive.engine._stage
-    assert stage.room(stage.movers["lead"]) == pytest.approx(Room(3 * 3.5 - 1.75 - 1.0, 1.75 - 1.0))
+    assert stage.room(stage.movers["lead"]) == pytest.approx(DeviationRoom(3 * 3.5 - 1.75 - 1.0, 1.75 - 1.0))
 
 
 def test_init_actions_come_before_the_first_frame() -> None:

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from risk_sac.scenario.places import Places
+from risk_sac.scenario.places import StoryPlaces
 from risk_sac.scenario.story_plan import Reach, StoryPlan
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.scenario.value import Value
@@ -25,7 +25,7 @@ class NoBoard:
 
 def stage_of(**present: Present) -> Stage:
     story = story_of(variables={"count": 2.0}, words={"mode": "fast"})
-    places = Places(straight_net(), None, story, Value({}, {}))
+    places = StoryPlaces(straight_net(), None, story, Value({}, {}))
     plan = StoryPlan(story=story, actors={}, places=places, numbers={"braking": 1.0}, words={"body": "van"})
     stage = Stage(plan)
     stage.look(present)
