@@ -179,7 +179,7 @@ def _ego(block: At, objects: list[At], wanted: str | None) -> str:
         got = (
             f"{len(egos)} egos: {', '.join(egos)[:200]}" if egos else "no entity that is named Ego or has a controller"
         )
-        raise block.refusal(got, "one ego", "name it: --ego-entity NAME")
+        raise block.refusal(got, "one ego", "name it: --ego-entity NAME, over REST ego_entity=NAME")
     return egos[0]
 
 

@@ -2,9 +2,11 @@
 
 `service.networks.scenarios` starts `service.networks.scenario_helper QUESTION ANSWER ACTION`:
 
-    add            checks the document, or the archive, that the question holds, keeps it, and answers with its name
-    check          checks it, plays 20 scenes of it, and answers with a `ScenarioCheck`
+    add EGO        checks the document, or the archive, that the question holds, keeps it, and answers with its name
+    check EGO      checks it, plays 20 scenes of it, and answers with a `ScenarioCheck`
     picture NAME   answers with a PNG
+
+EGO is the ego among the entities of OpenSCENARIO, or empty.
 """
 
 import io
@@ -34,7 +36,9 @@ def main() -> None:
     """Does what the arguments say, and writes the answer."""
     question, answer, action, *arguments = sys.argv[1:]
     try:
-        content = _picture(*arguments) if action == "picture" else _posted(Path(question).read_bytes(), action)
+        content = (
+            _picture(*arguments) if action == "picture" else _posted(Path(question).read_bytes(), action, *arguments)
+        )
     except ConfigError as error:
         faults = [(fault.field, fault.got, fault.expected, fault.remedy) for fault in (error, *error.others)]
         content = json.dumps({"faults": faults}).encode()
@@ -46,11 +50,11 @@ def main() -> None:
     Path(answer).write_bytes(content)
 
 
-def _posted(upload: bytes, action: str) -> bytes:
+def _posted(upload: bytes, action: str, ego_entity: str) -> bytes:
     with tempfile.TemporaryDirectory() as scratch:
         folder, imported = Path(scratch), None
         if holds_scenario(upload):
-            imported = _imported(upload, folder)
+            imported = _imported(upload, folder, ego_entity or None)
             document = imported.document
         else:
             document = _unpacked(upload, folder)
@@ -96,11 +100,11 @@ def _unpacked(upload: bytes, folder: Path) -> Scenario:
     return document
 
 
-def _imported(upload: bytes, folder: Path) -> Imported:
+def _imported(upload: bytes, folder: Path, ego: str | None) -> Imported:
     """Imports an archive of OpenSCENARIO, and puts its nets and roads into a folder."""
     with tempfile.TemporaryDirectory() as scratch:
         inside = Path(scratch).resolve()
-        imported = import_scenario(unpack(upload, inside), within=inside)
+        imported = import_scenario(unpack(upload, inside), within=inside, ego=ego)
     for name, content in imported.files.items():
         (folder / name).write_bytes(content)
     return imported

@@ -71,8 +71,13 @@ class Scenarios:
             row, text = summary_of(name, document, _time(record)), library.written(document)
         return ScenarioDetails(**row.model_dump(), document=text)
 
-    def add(self, upload: bytes, project: str) -> tuple[ScenarioDetails, bool]:
-        """Keeps a document, or an archive of it and its nets.
+    def add(self, upload: bytes, project: str, ego_entity: str = "") -> tuple[ScenarioDetails, bool]:
+        """Keeps a document, or an archive.
+
+        Args:
+          upload: a document, an archive of it and its nets, or one of OpenSCENARIO.
+          project: of the caller.
+          ego_entity: entity of OpenSCENARIO that is the ego; empty: the one that is named so, or has a controller.
 
         Returns:
           The scenario, and whether it is new to the project.
@@ -84,7 +89,7 @@ class Scenarios:
         if sum(1 for _ in self._records(project)) >= MOST:
             said = f"project {project!r} has {MOST} scenarios; wanted fewer: delete one first"
             raise ConflictError(said, reason="too_many_scenarios")
-        name = str(self._helped("add", upload)["name"])
+        name = str(self._helped("add", upload, ego_entity)["name"])
         record = self._folder / project / name
         new = not record.exists()
         if new:
@@ -93,9 +98,9 @@ class Scenarios:
                 replace_file(record, datetime.now(UTC).isoformat().encode())
         return self.get(name, project), new
 
-    def check(self, upload: bytes) -> ScenarioCheck:
+    def check(self, upload: bytes, ego_entity: str = "") -> ScenarioCheck:
         """Checks a document and plays 20 scenes of it; raises `ConfigError` as `add` does, and stores nothing."""
-        return ScenarioCheck.model_validate(self._helped("check", upload))
+        return ScenarioCheck.model_validate(self._helped("check", upload, ego_entity))
 
     def picture(self, name: str) -> bytes:
         """Draws a scenario that `get` has returned."""
@@ -148,8 +153,8 @@ class Scenarios:
                 return record
         raise NotFoundError(f"there is no scenario {name!r}", field="scenario", got=name)
 
-    def _helped(self, action: str, upload: bytes) -> dict[str, Any]:
-        content = self._run(action, upload)
+    def _helped(self, action: str, upload: bytes, ego_entity: str) -> dict[str, Any]:
+        content = self._run(action, upload, ego_entity)
         report: dict[str, Any] = json.loads(content)
         return _refused(content) if report.keys() & {"faults", "damaged"} else report
 

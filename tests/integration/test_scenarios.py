@@ -98,6 +98,20 @@ def test_openscenario_comes_in_an_archive(shared):
     assert answer.json()["actors"] == ["Cutting_in", "Walker", "Box"]
 
 
+def test_ego_of_openscenario_is_chosen_by_name(shared):
+    answer = shared.client.post(
+        "/v1/scenarios/check",
+        content=archive_of(FILES),
+        params={"ego_entity": "Nobody"},
+        headers={"content-type": "application/zip"},
+        timeout=120,
+    )
+    assert answer.status_code == 422
+    (error,) = answer.json()["errors"]
+    assert error["field"].startswith("cut_in.xosc")
+    assert "Nobody" in error["got"]
+
+
 def test_fault_of_openscenario_is_named_by_line(shared, tmp_path):
     files = copied(tmp_path, (SCENARIO, "${$gap + 5}", "${$gab + 5}"))
     headers = {"content-type": "application/zip"}

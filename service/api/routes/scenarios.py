@@ -2,9 +2,9 @@
 
 import asyncio
 from http import HTTPStatus
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
@@ -46,6 +46,10 @@ DOCUMENTED_BODY: dict[str, Any] = {
     }
 }
 
+EgoEntity = Annotated[
+    str, Query(max_length=200, pattern=r"^[^\x00]*$", description="Entity of OpenSCENARIO that is the ego.")
+]
+
 router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"], responses=STORAGE | INVALID)
 
 
@@ -71,11 +75,11 @@ async def _received(request: Request) -> bytes:
     dependencies=[Depends(_refuse_other_types)],
 )
 async def post_scenario(
-    request: Request, response: Response, service: Service, caller: CurrentCaller
+    request: Request, response: Response, service: Service, caller: CurrentCaller, ego_entity: EgoEntity = ""
 ) -> ScenarioDetails:
     """Keeps a document and its nets."""
     upload = await _received(request)
-    kept, new = await run_in_threadpool(service.scenarios.add, upload, caller.project)
+    kept, new = await run_in_threadpool(service.scenarios.add, upload, caller.project, ego_entity)
     response.status_code = HTTPStatus.CREATED if new else HTTPStatus.OK
     response.headers["Location"] = link(request, f"/v1/scenarios/{kept.name}")
     return kept
@@ -88,9 +92,11 @@ async def post_scenario(
     openapi_extra=DOCUMENTED_BODY,
     dependencies=[Depends(_refuse_other_types)],
 )
-async def check_scenario(request: Request, service: Service, caller: CurrentCaller) -> ScenarioCheck:
+async def check_scenario(
+    request: Request, service: Service, caller: CurrentCaller, ego_entity: EgoEntity = ""
+) -> ScenarioCheck:
     """Checks a document, and plays scenes of it."""
-    return await run_in_threadpool(service.scenarios.check, await _received(request))
+    return await run_in_threadpool(service.scenarios.check, await _received(request), ego_entity)
 
 
 @router.get("")

@@ -99,7 +99,8 @@ function Editor({ document }: { document: string }) {
           onInput={(event) => change(event.currentTarget.value)}
         />
         <label class="scenario-file small">
-          Or a file: a document to edit, or a zip archive of one with its networks, which is saved at once{" "}
+          Or a file: a document to edit, or a zip archive of one with its networks, or of OpenSCENARIO files with their roads; an
+          archive is saved at once{" "}
           <input type="file" accept=".yaml,.yml,.json,.zip" onChange={(event) => open(event.currentTarget.files?.[0])} />
         </label>
       </section>
