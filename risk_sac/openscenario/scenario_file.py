@@ -204,7 +204,6 @@ class _Import:
             "ego": Moving(body=ego.body, box=ego.box, speed=init.starts[EGO].speed, start=_start(ego, init)),
             "actors": actors,
             "constraints": constraints,
-            "set_speed": init.starts[EGO].speed,  # choice: an ego under test drives the speed that it starts with
             "story": story,
             "origin": ImportOrigin(
                 file=f"{name}{file.suffix}"[:200],

@@ -159,7 +159,10 @@ class SceneLayout:
         """Speed that the ego is told to drive; infinite where it drives as the limits allow."""
         document = self._document
         if document.set_speed is not None:
-            return self._value.of(document.set_speed, "set_speed")
+            speed_mps = self._value.of(document.set_speed, "set_speed")
+            if speed_mps <= 0.0:
+                raise ConfigError("set_speed", f"{speed_mps:g}", "more than 0 m/s", "leave it out")
+            return speed_mps
         return ego.speed_mps if document.story is not None and ego.speed_mps > CRAWLS_MPS else math.inf
 
     def _friction(self) -> float:

@@ -89,6 +89,7 @@ FAULTS: dict[str, tuple[str, Any, str]] = {  # what it is -> where it is written
     "start without its gap": ("actors.truck.start", {"ahead_of": "ego"}, "actors.truck.start.gap_m"),
     "friction of no road": ("friction", "speed / 4", "friction"),
     "negative friction": ("friction", -1, "friction"),
+    "a set speed of 0": ("set_speed", 0, "set_speed"),
     "horizon too long": ("horizon_s", "speed * 100", "horizon_s"),
     "number that is none": ("horizon_s", [1], "horizon_s"),
     "unknown family": ("like", {"family": "lo", "actors": {"truck": "lead"}}, "like.family"),
