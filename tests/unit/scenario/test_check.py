@@ -144,7 +144,7 @@ def test_ego_without_a_way_on() -> None:
         ("x: " + "[" * 100 + "]" * 100, "x[0][0][0][0]"),
         ("{" * 100_000, ""),
         ("name: !!python/object/apply:os.system [ls]", ""),
-        ("summary: " + "x" * 10_000_000, ""),
+        ("summary: " + "x" * 10_000_000, "document"),
     ],
     ids=[
         "name-twice",
