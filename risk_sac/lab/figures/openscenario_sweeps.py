@@ -13,7 +13,6 @@ import csv
 import json
 from collections import Counter
 from collections.abc import Sequence
-from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
@@ -23,7 +22,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.evaluate import run
 from risk_sac.lab.figures.pretrained_policy import ego_of
 from risk_sac.lab.figures.shipped_scenarios import kept
-from risk_sac.lab.figures.side_by_side import Row, rows_of
+from risk_sac.lab.figures.side_by_side import Row, write_rows
 from risk_sac.openscenario.scenario_file import import_scenario
 from risk_sac.records import EpisodeRecord, Outcome
 from risk_sac.report.grid import StandardVerdict, played_grids
@@ -142,14 +141,18 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", metavar="PATTERN", default=["*"], help="of file names, without suffix")
     parser.add_argument("--egos", nargs="+", metavar="EGO", default=EGOS)
     parser.add_argument("--episodes", type=int, default=500, help="of each scenario and ego (default: %(default)s)")
-    parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--markdown", action="store_true", help="play nothing, print the rows that are there")
     options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / "sweeps.csv"
     if not options.markdown:
         sweeps = [imported(each, options.folder) for each in variations(options.folder, options.only)]
         cells = [Cell(sweep, ego) for ego, sweep in product(options.egos, sorted(sweeps, key=horizon))]
-        rows_of(partial(play, options.out, options.episodes), cells, options.jobs, file)
+        rows: list[Row] = []
+        for cell in cells:  # in this process, because loading the simulator takes longer than many cells
+            rows.append(play(options.out, options.episodes, cell))
+            write_rows(file, rows)
+            print(*rows[-1].values(), sep=",", flush=True)
     with file.open(newline="") as lines:
         print(markdown(list(csv.DictReader(lines))))
 
