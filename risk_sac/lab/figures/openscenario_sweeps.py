@@ -33,7 +33,7 @@ from risk_sac.scenario.families import family_named
 VARIATION = b"<ParameterValueDistribution"
 EGOS = ("default", "idm-aeb", "fiss-plus")
 SEED = 59
-COLUMNS = ("scenario", "ego", "entities", "varied", "grid", "points", "refused", "pass", "contact", "other", "kinds")
+COLUMNS = ("scenario", "entities", "varied", "grid", "unread", "points", "refused")
 
 
 class Sweep(NamedTuple):
@@ -127,10 +127,29 @@ def outcomes(records: Sequence[EpisodeRecord], verdicts: Sequence[StandardVerdic
 
 
 def markdown(rows: Sequence[Row]) -> str:
-    """Writes rows as the documents' table."""
-    lines = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
-    lines += ["| " + " | ".join(str(row[column]) for column in COLUMNS) + " |" for row in rows]
+    """Writes rows as the documents' table, a line per scenario, with a column for each ego.
+
+    An ego's cell has passes, contacts and other failures; in brackets, contacts that R157's driver avoids.
+    """
+    egos = list(dict.fromkeys(row["ego"] for row in rows))
+    by_scenario: dict[str, dict[str, Row]] = {}
+    for row in rows:
+        by_scenario.setdefault(row["scenario"], {})[row["ego"]] = row
+    lines = ["| " + " | ".join((*COLUMNS, *egos)) + " |", "|---" * (len(COLUMNS) + len(egos)) + "|"]
+    for scenario, of in sorted(by_scenario.items()):
+        first = next(iter(of.values()))
+        name = "/".join(Path(scenario).parts[-2:]).removesuffix("_variation")
+        cells = [name, *(str(first[column]) or "–" for column in COLUMNS[1:])]
+        cells += [_cell(of[ego]) if ego in of else "not played" for ego in egos]
+        lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines)
+
+
+def _cell(row: Row) -> str:
+    if row["fault"]:
+        return str(row["fault"])
+    avoidable = f" ({row['r157_fail']})" if int(row["contact"]) else ""
+    return f"{row['pass']}, {row['contact']}{avoidable}, {row['other']}"
 
 
 def main() -> None:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from risk_sac.lab.figures.openscenario_sweeps import Cell, Sweep, imported, outcomes, play, variations
+from risk_sac.lab.figures.openscenario_sweeps import Cell, Sweep, imported, markdown, outcomes, play, variations
 from risk_sac.records import Outcome
 from risk_sac.report.grid import StandardVerdict
 from tests.builders import collision, episode_record
@@ -49,3 +49,11 @@ def test_a_row_that_is_there_is_not_played_again(tmp_path: Path) -> None:
     folder.mkdir(parents=True)
     (folder / "row.json").write_text('{"points": 3}')
     assert play(tmp_path, 3, cell) == {"points": 3}
+
+
+def test_the_table_has_a_line_per_scenario_and_a_column_per_ego() -> None:
+    row = Sweep("a/b/cut_in_variation", "x", 2, 3, 40)._asdict() | outcomes([episode_record(0)], [StandardVerdict.PASS])
+    lines = markdown([row | {"ego": ego} for ego in ("default", "idm-aeb")]).splitlines()
+    assert [cell.strip() for cell in lines[0].split("|")[-3:-1]] == ["default", "idm-aeb"]
+    cells = [cell.strip() for cell in lines[2].split("|")[1:-1]]
+    assert cells == ["b/cut_in", "2", "3", "40", "0", "1", "–", "1, 0, 0", "1, 0, 0"]
