@@ -29,8 +29,13 @@ def rows_of(play: Callable[[Run], Row], runs: Sequence[Run], jobs: int, file: Pa
         tasks = {pool.submit(play, run): place for place, run in enumerate(runs)}
         for task in as_completed(tasks):
             rows[tasks[task]] = task.result()
-            with file.open("w", newline="") as stream:
-                table = csv.DictWriter(stream, next(iter(rows.values())).keys(), lineterminator="\n")
-                table.writeheader()
-                table.writerows(rows[place] for place in sorted(rows))
+            write_rows(file, [rows[place] for place in sorted(rows)])
     return [rows[place] for place in sorted(rows)]
+
+
+def write_rows(file: Path, rows: Sequence[Row]) -> None:
+    """Writes rows with the same columns as a CSV file."""
+    with file.open("w", newline="") as stream:
+        table = csv.DictWriter(stream, rows[0].keys(), lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
