@@ -160,7 +160,8 @@ def test_the_simulator_shows_a_mirrored_scene_as_the_mirror_does():
     spec = RunSpec(family="low", method="sac", seed=3, ego=EgoConfig(driver="idm-aeb"))  # SUMO's driver keeps right
     mirror = Mirror.of(PolicyLayout.of(Problem.from_spec(spec)))
     assert mirror is not None
-    actions = [np.array([0.0, 0.0, 0.4, -0.5, -0.3, 0.2], np.float32)] * 8
+    # Both brake: before the release their accelerations differ by side, and the count of pedals has a threshold.
+    actions = [np.array([0.0, 0.0, -0.5, -0.5, -0.3, 0.2], np.float32)] * 8
     with closing(RiskSacEnv.of(spec)) as env:
         seen = observations(env, SCENE, actions)
         mirrored = observations(env, MIRRORED, [mirror.action(action) for action in actions])
