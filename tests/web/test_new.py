@@ -197,7 +197,7 @@ def test_an_ego_is_chosen_by_name_with_known_faults(page_at: Callable[..., Page]
     assert curl_body(page)["ego"] == {"driver": "idm-aeb", "defects": ["weak-brakes"]}
     page.get_by_role("button", name="Start the campaign").click()
     expect(page).to_have_url(re.compile("#/campaigns/c[0-9a-f]+$"))
-    expect(page.locator(".posted")).to_contain_text("idm-aeb, with weak-brakes")
+    expect(page.locator(".posted")).to_contain_text("idm-aeb + weak-brakes")
     page.get_by_role("link", name="Clone").click()
     expect(page.get_by_label("Driver", exact=True)).to_have_value("driver idm-aeb")
     page.get_by_label("Driver", exact=True).select_option("careful")
