@@ -227,7 +227,7 @@ class WeightsLaw(Settings):
         return WeightsLaw(kind="weights", weights=tuple(w for w, keep in zip(self.weights, which, strict=True) if keep))
 
     def index(self, share: float) -> int:
-        """Which word or row lies at a share in [0, 1] of all probability."""
+        """Finds the word or row at a share in [0, 1] of all probability."""
         left = share * math.fsum(self.weights)
         last = max(i for i, weight in enumerate(self.weights) if weight > 0.0)
         return next((i for i, sum_ in enumerate(accumulate(self.weights)) if sum_ > left), last)

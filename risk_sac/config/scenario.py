@@ -14,7 +14,8 @@ from risk_sac.config.base import Chosen, Settings, Word
 from risk_sac.config.campaign import JudgeConfig, Requirement
 from risk_sac.config.distribution import Distribution, WeightsLaw, check_distribution
 from risk_sac.config.odd import Odd
-from risk_sac.config.story import Position, Story
+from risk_sac.config.story import Story
+from risk_sac.config.story_places import Position
 from risk_sac.config.values import ARITHMETIC, Comparison, Expression
 from risk_sac.errors import ConfigError, did_you_mean
 
@@ -325,7 +326,7 @@ class Scenario(Settings):
     wary: bool = True
     """Whether drivers stop for an ego that stands askew."""
     set_speed: Expression | None = None
-    """Speed that the ego is told to drive, m/s: no lane's limit is above it, and an ego of SUMO changes lanes for its
+    """Speed that the ego keeps to, m/s: no lane's limit is above it, and an ego of SUMO changes lanes for its
     route alone. Without it the ego of a story keeps to its first speed, and any other drives as the limits allow."""
     odd: Odd = Odd()
     requirements: Annotated[tuple[Requirement, ...], Field(max_length=20)] = ()

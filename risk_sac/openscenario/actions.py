@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from risk_sac.config.scenario import EGO
-from risk_sac.config.story import (
+from risk_sac.config.story_actions import (
     AcquirePositionAction,
     Action,
     AssignRouteAction,

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from risk_sac.config.story import (
+from risk_sac.config.story_conditions import (
     AccelerationCondition,
     AngleCondition,
     CollisionCondition,

@@ -10,7 +10,8 @@ from pydantic import ValidationError
 
 from risk_sac.config.base import Chosen, field_errors
 from risk_sac.config.scenario import EGO, Actor, ImportOrigin, Moving, Scenario, Start
-from risk_sac.config.story import FollowTrajectoryAction, Story
+from risk_sac.config.story import Story
+from risk_sac.config.story_actions import FollowTrajectoryAction
 from risk_sac.errors import ConfigError
 from risk_sac.openscenario.actions import ActionReader
 from risk_sac.openscenario.catalogs import Catalogs

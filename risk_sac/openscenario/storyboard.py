@@ -4,27 +4,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from risk_sac.config.scenario import EGO, LONGEST_HORIZON_S
-from risk_sac.config.story import (
+from risk_sac.config.story import InitAction, Maneuver, ManeuverGroup, NamedAction, StoryAct, StoryEvent
+from risk_sac.config.story_actions import (
     AcquirePositionAction,
     AssignRouteAction,
     DeleteAction,
     FollowTrajectoryAction,
-    InitAction,
-    Maneuver,
-    ManeuverGroup,
-    NamedAction,
     NoAction,
-    Position,
     RelativeTarget,
     SpeedAction,
-    StoryAct,
-    StoryEvent,
     TeleportAction,
-    TimeCondition,
-    TrajectoryPosition,
-    Trigger,
     VariableAction,
 )
+from risk_sac.config.story_conditions import TimeCondition, Trigger
+from risk_sac.config.story_places import Position, TrajectoryPosition
 from risk_sac.config.values import Expression
 from risk_sac.openscenario.actions import EGO_EFFECT, ActionReader
 from risk_sac.openscenario.catalogs import Catalogs, parametrised

@@ -178,5 +178,5 @@ class Layout:
     friction: float = 1.0
     horizon_steps: int = 150  # of 0.1 s
     wary: bool = False  # whether drivers stop for an ego that stands askew; SUMO tells them of a box along its lane
-    set_speed_mps: float = math.inf  # that the ego is told to drive; no lane's limit is above it
+    set_speed_mps: float = math.inf  # that the ego keeps to; no lane's limit is above it
     story: StoryPlan | None = None  # what actors of the role `STORY` do; without a lead-in

@@ -156,7 +156,7 @@ class SceneLayout:
         return self._story.plan(self._bodies, self._speeds | walking, moves, own[EGO])
 
     def _set_speed_mps(self, ego: VehicleStart) -> float:
-        """Speed that the ego is told to drive; infinite where it drives as the limits allow."""
+        """Speed that the ego keeps to; infinite where it drives as the limits allow."""
         document = self._document
         if document.set_speed is not None:
             speed_mps = self._value.of(document.set_speed, "set_speed")

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from risk_sac.config.story import ClothoidSpline, Polyline, Position, Trajectory, WorldPosition
+from risk_sac.config.story_places import ClothoidSpline, Polyline, Position, Trajectory, WorldPosition
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of, polyline
 from risk_sac.world.plane_curves import Begin, Clothoid

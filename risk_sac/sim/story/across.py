@@ -2,7 +2,7 @@
 
 import math
 
-from risk_sac.config.story import (
+from risk_sac.config.story_actions import (
     AcquirePositionAction,
     AssignRouteAction,
     DistanceAction,

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from risk_sac.config.story import Action, VariableAction
+from risk_sac.config.story_actions import Action, VariableAction
 from risk_sac.sim.story.across import (
     AcquirePosition,
     AssignRoute,

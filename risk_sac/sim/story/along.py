@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from risk_sac.config.story import (
+from risk_sac.config.story_actions import (
     DistanceAction,
     Dynamics,
     RelativeTarget,

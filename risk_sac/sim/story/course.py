@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from risk_sac.config.story import Dynamics, Shape
+from risk_sac.config.story_actions import Dynamics, Shape
 
 SAME = 1e-9
 # Largest slope of a shape from 0 to 1 over [0, 1].

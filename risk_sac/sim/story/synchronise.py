@@ -2,7 +2,7 @@
 
 import math
 
-from risk_sac.config.story import SynchroniseAction
+from risk_sac.config.story_actions import SynchroniseAction
 from risk_sac.sim.story.along import target_mps
 from risk_sac.sim.story.cast import Mover
 from risk_sac.sim.story.doing import ALONG
