@@ -311,6 +311,8 @@ def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None
     ego_type = f"ego_{ego.car_following}"
     libsumo.vehicletype.setActionStepLength(ego_type, ego.reaction_time_s)
     libsumo.vehicletype.setEmergencyDecel(ego_type, emergency_decel_mps2(layout.friction))
+    libsumo.vehicletype.setLength(ego_type, layout.ego.shape.length_m)
+    libsumo.vehicletype.setWidth(ego_type, layout.ego.shape.width_m)
     libsumo.vehicletype.setDecel(ego_type, min(EGO_DECEL_MPS2, layout.friction * GRAVITY_MPS2))
     for name, value in settings.items():
         if name == "tau":
@@ -318,8 +320,6 @@ def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None
         elif not name.startswith(LANE_CHANGE):
             libsumo.vehicletype.setParameter(ego_type, name, f"{value:g}")
     _insert(layout.ego, ego_type)
-    libsumo.vehicle.setLength(layout.ego.id, layout.ego.shape.length_m)
-    libsumo.vehicle.setWidth(layout.ego.id, layout.ego.shape.width_m)
     if layout.set_speed_mps < math.inf:
         libsumo.vehicle.setLaneChangeMode(layout.ego.id, FOR_ITS_ROUTE)
     for name, value in settings.items():
