@@ -101,8 +101,8 @@ class _Import:
     def _scenario(self, top: At, file: Path, name: str, variation: At | None) -> Imported:
         blocks = top.all("ParameterDeclarations")
         declarations = [at for block in blocks for at in block.all("ParameterDeclaration")]
-        kinds = {at.element.attributes.get(key, ""): at for at in declarations for key in ("name",)}
-        types = {name: at.element.attributes.get("parameterType", "") for name, at in kinds.items()}
+        attributes = [at.element.attributes for at in declarations]
+        types = {own.get("name", ""): own.get("parameterType", "") for own in attributes}
         varied = Variation(types, self._remarks).read(variation) if variation is not None else []
         points = math.prod(points_of(part) for part in varied)
         varied = self._allowed(varied, Parameters(declarations, varied))
