@@ -72,7 +72,7 @@ class InitAction(Settings):
 
 
 class DeviationBounds(Settings):
-    """How far a search may lead the actors of a story away from it; with zeros they follow it exactly."""
+    """Bounds of what a search adds to a story; with zeros it is followed exactly."""
 
     accel_mps2: Annotated[float, Field(ge=0, le=10)] = 1.5
     """Added to the acceleration."""
@@ -81,7 +81,7 @@ class DeviationBounds(Settings):
 
 
 class Story(Settings):
-    """What story actors do from time 0 on, and when the episode ends."""
+    """Actions of story actors from time 0 on, and the episode's end."""
 
     routes: Annotated[Mapping[ElementName, RoutePath], Field(max_length=200)] = {}
     trajectories: Annotated[Mapping[ElementName, Trajectory], Field(max_length=200)] = {}

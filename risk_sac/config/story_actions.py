@@ -141,7 +141,7 @@ class SynchroniseAction(Settings):
 
 
 class TrajectoryTiming(Settings):
-    """How the times of a trajectory's points count."""
+    """Meaning of the times of a trajectory's points."""
 
     domain: Literal["absolute", "relative"] = "absolute"
     scale: Expression = 1.0

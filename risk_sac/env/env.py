@@ -317,7 +317,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     @property
     def deviations(self) -> Mapping[str, StoryDeviation]:
-        """How far each actor was from the scenario's story at most; without those that never left it."""
+        """Largest deviation of each actor from the scenario's story, if it left it."""
         return {
             name: StoryDeviation(
                 speed_mps=drift.mps, lateral_mps=drift.lateral_mps, along_m=drift.ahead_m, across_m=drift.left_m
@@ -326,7 +326,9 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         }
 
     def avoided_by(self) -> Mapping[str, bool] | None:
-        """Which competent drivers avoid a contact, whatever the ego did; None where others deviate from the scenario.
+        """Asks competent drivers whether they avoid a contact, whatever the ego did.
+
+        None where others deviate from the scenario.
 
         See `risk_sac.verdicts.competent`.
         """

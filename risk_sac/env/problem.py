@@ -75,7 +75,7 @@ def _of_family(family: Family, spec: RunSpec | CampaignSpec) -> Iterator[Adjustm
 
 
 def _of_grid(grid: Grid, episodes: int) -> Iterator[Adjustment]:
-    """What a sweep makes of a grid: values that the scenario does not state, and a sample."""
+    """Adjustments of a sweep: values that the scenario leaves open, and sampling."""
     for name in grid.unstated:
         why = "the scenario states no step"
         yield Adjustment(

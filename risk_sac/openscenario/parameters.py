@@ -27,7 +27,7 @@ _LONGEST_WORD = 64
 
 @dataclass(frozen=True)
 class Varied:
-    """What a variation file says of one parameter, or of several that vary together."""
+    """Values that a variation file gives parameters that vary together."""
 
     name: str
     """Of the axis in the document."""

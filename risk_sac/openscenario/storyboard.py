@@ -35,7 +35,7 @@ _PLACES = ("TeleportAction", "FollowTrajectoryAction")
 
 @dataclass
 class Begun:
-    """How an entity begins."""
+    """Start of an entity."""
 
     position: Position | None = None
     speed: Expression = 0.0

@@ -167,7 +167,7 @@ class Comparison:
 
     @property
     def origins(self) -> tuple[FailureOrigin, ...]:
-        """Where failures of scenarios begin that some method plays as they are written."""
+        """Origins of failures in scenarios that some method plays as written."""
         return failure_origins(self.runs)
 
     @property

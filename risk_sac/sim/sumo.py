@@ -267,7 +267,7 @@ class SumoSimulation:
 
     @property
     def deviations(self) -> Mapping[str, Drift]:
-        """How far each actor was from its story at most; without those that never left it."""
+        """Largest deviation of each actor from its story, if it left it."""
         return {} if self._story is None else self._story.furthest
 
     @property

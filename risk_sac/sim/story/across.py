@@ -130,7 +130,7 @@ class KeepBeside:
         return left_m + own_low - high if self._side > 0.0 else low - left_m - own_high
 
     def _missing_m(self, mover: Mover, stage: Stage) -> float:
-        """How far the actor has to move to its left."""
+        """Distance that the actor has to move to its left."""
         return self._side * (self._gap_m - self._gap(mover, stage))
 
     def step(self, mover: Mover, stage: Stage) -> bool:

@@ -149,7 +149,7 @@ class KeepAhead:
         return ahead_m + own_low - high if self._side > 0.0 else low - ahead_m - own_high
 
     def _too_far_m(self, mover: Mover, other: Present, stage: Stage) -> float:
-        """How far the actor is ahead of where it should be."""
+        """Distance of the actor ahead of its target."""
         own = stage.present[mover.name]
         gap_m = self._gap_m(other, own, stage.apart(other, own, self._do.coordinates).ahead_m)
         if self._do.time_gap_s is not None:

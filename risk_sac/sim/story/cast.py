@@ -50,7 +50,7 @@ class Present(NamedTuple):
 
 
 class Drift(NamedTuple):
-    """How far an actor is from its story."""
+    """Deviation of an actor from its story."""
 
     mps: float = 0.0
     lateral_mps: float = 0.0
@@ -120,7 +120,7 @@ class Mover:
 
     @property
     def present(self) -> Present:
-        """What others see of it."""
+        """Its motion as others see it."""
         way = self.line.pose(self.station_m).heading_rad
         cos, sin, speed, lateral = math.cos(way), math.sin(way), self.speed_mps, self.lateral_mps
         velocity = speed * cos - lateral * sin, speed * sin + lateral * cos

@@ -19,7 +19,7 @@ NONE_MPS, NONE_M = 1e-4, 1e-3  # of a speed and a place, which count as none
 
 
 class DeviationRoom(NamedTuple):
-    """How far an actor's body may move to its left and its right."""
+    """Room to the left and the right of an actor's body."""
 
     left_m: float
     right_m: float

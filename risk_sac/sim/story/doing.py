@@ -1,4 +1,4 @@
-"""What an action that runs is to the engine."""
+"""Interface between the engine and a running action."""
 
 from typing import Protocol
 

@@ -1,4 +1,4 @@
-"""Plays the story of one episode: once per step it says where the actors of the story are next.
+"""Plays the story of one episode, one step at a time.
 
 It knows nothing of SUMO: it takes where all other actors are, and returns how its own move.
 """
@@ -111,7 +111,7 @@ class StoryEngine:
 
     @property
     def furthest(self) -> Mapping[str, Drift]:
-        """How far each actor was from its story at most; without those that never left it."""
+        """Largest deviation of each actor from its story, if it left it."""
         return {name: mover.furthest for name, mover in self._stage.movers.items() if mover.furthest != ON_STORY}
 
 

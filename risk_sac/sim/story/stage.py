@@ -1,4 +1,4 @@
-"""What conditions and actions of a story refer to: its actors at present, the roads, the variables and the time."""
+"""State that a story's conditions and actions read: actors, roads, variables and time."""
 
 import math
 from collections.abc import Mapping

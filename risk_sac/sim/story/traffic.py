@@ -129,7 +129,7 @@ class StoryTraffic:
 
     @property
     def furthest(self) -> Mapping[str, Drift]:
-        """How far each actor was from its story at most; without those that never left it."""
+        """Largest deviation of each actor from its story, if it left it."""
         return self._engine.furthest
 
     @property
