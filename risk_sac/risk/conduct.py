@@ -143,9 +143,10 @@ class ConductRoad:
     def facts(self, rows: NDArray[np.intp], state: Floats) -> RoadFacts:
         """Reads the facts at the adversaries' places; arguments as of `conduct_terms`."""
         width_m, limit_mps = np.empty(len(rows)), np.empty(len(rows))
-        places = zip(*state[:, rows][[X, Y, HEADING]].tolist(), strict=True)
-        for k, (x, y, heading) in enumerate(places):
-            _, limit, width = nearest_lane(self._carriageway.lanes(x, y), x, y, heading)
+        xs, ys, headings = state[X].tolist(), state[Y].tolist(), state[HEADING].tolist()
+        for k, row in enumerate(rows.tolist()):
+            lanes = self._carriageway.lanes(xs[row], ys[row])
+            _, limit, width = nearest_lane(lanes, xs[row], ys[row], headings[row])
             width_m[k], limit_mps[k] = (width, limit) if math.isfinite(limit) else self._usual
         return RoadFacts(width_m, limit_mps, self._junctions)
 
