@@ -14,7 +14,7 @@ from risk_sac.execution.executor import FOLDER, Executor, WorkerProgram
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import QueuedRun, Scheduler
 from risk_sac.records import State as RunState
-from risk_sac.run_folder.checkpoint import PATIENCE
+from risk_sac.run_folder.crash_guard import PATIENCE
 from risk_sac.run_folder.results import RESULTS, read_results
 
 LOG = "run.log"  # in a run's folder: what its worker printed

@@ -18,8 +18,8 @@ from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.records import DrivenBy, Ending, EpisodeRecord, Outcome, RequirementResult, RunMetrics, SeriesFile
 from risk_sac.risk.rss import TTC_CAP_S
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
-from risk_sac.run_folder.checkpoint import CrashGuard
-from risk_sac.search.agents.replay import Transition
+from risk_sac.run_folder.crash_guard import CrashGuard
+from risk_sac.search.agents.transition import Transition
 from risk_sac.search.run import RunOutcome, RunState
 from risk_sac.search.scene_optimizer import NO_ENCOUNTER, Encounter
 from risk_sac.search.searchers import Actor

@@ -9,7 +9,7 @@ import torch
 
 from risk_sac.config import METHODS, AgentConfig, LearnerConfig, MethodName, ReplayConfig, SacConfig
 from risk_sac.search.agents.learner import Learner
-from risk_sac.search.agents.replay import Transition
+from risk_sac.search.agents.transition import Transition
 
 STEPS = 10_000
 CONFIG = LearnerConfig(

@@ -5,7 +5,8 @@ import pytest
 
 from risk_sac.config import ReplayConfig
 from risk_sac.search.agents.priority import SumTree, priority
-from risk_sac.search.agents.replay import RiskPrioritizedReplay, Transition, UniformReplay
+from risk_sac.search.agents.replay import RiskPrioritizedReplay, UniformReplay
+from risk_sac.search.agents.transition import Transition
 from risk_sac.world.types import Floats
 from tests.benchmarks.timing import interleaved
 

@@ -14,7 +14,7 @@ from stable_baselines3.common.logger import Logger
 
 from risk_sac.config import METHODS, LearnerConfig
 from risk_sac.search.agents.learner import Learner
-from risk_sac.search.agents.replay import Transition
+from risk_sac.search.agents.transition import Transition
 from tests.benchmarks.timing import interleaved
 
 OBSERVATIONS, ACTIONS, STORED = 48, 6, 5000

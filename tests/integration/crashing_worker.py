@@ -4,7 +4,7 @@ import ctypes
 import sys
 
 from risk_sac.execution import worker
-from risk_sac.run_folder.checkpoint import CrashGuard
+from risk_sac.run_folder.crash_guard import CrashGuard
 
 note = CrashGuard.step
 

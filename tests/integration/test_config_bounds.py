@@ -16,7 +16,7 @@ from risk_sac.env.problem import Problem
 from risk_sac.errors import OddError
 from risk_sac.records import EpisodeRecord, RunMetrics
 from risk_sac.run_folder.arrays import read_series
-from risk_sac.run_folder.checkpoint import CrashGuard
+from risk_sac.run_folder.crash_guard import CrashGuard
 from risk_sac.scenario.odd import SENSIBLE
 from risk_sac.search.loop import GuardedEnv, episode
 from risk_sac.search.run import RunState

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from risk_sac.search.agents.learner import Learner
-from risk_sac.search.agents.replay import Transition
+from risk_sac.search.agents.transition import Transition
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.run_folder import checkpoint
 

@@ -20,7 +20,7 @@ from risk_sac.lab.pretraining import episodes, policy
 from risk_sac.lab.pretraining.episodes import EpisodeStream
 from risk_sac.lab.pretraining.policy import PolicyTraining
 from risk_sac.lab.pretraining.rollouts import PolicyEpisode
-from risk_sac.search.agents.replay import Transition
+from risk_sac.search.agents.transition import Transition
 from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import PolicyLayout
 from risk_sac.world.types import Scene, Vector

@@ -25,8 +25,9 @@ from risk_sac.lab.pretraining.episodes import HELD_OUT, drawn_ego, training_egos
 from risk_sac.lab.pretraining.rollouts import DECISION_STEPS, DISCOUNT, PolicyEpisode, Turn, play_turn
 from risk_sac.run_folder import checkpoint
 from risk_sac.search.agents.agent import check_device
-from risk_sac.search.agents.replay import Batch, Transition, UniformReplay
+from risk_sac.search.agents.replay import Batch, UniformReplay
 from risk_sac.search.agents.sac import GraphedUpdate, SacAgent
+from risk_sac.search.agents.transition import Transition
 from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import GOALS, PolicyLayout, PretrainedPolicy, with_goal
 

@@ -14,7 +14,7 @@ from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.records import Collision
 from risk_sac.search.agents.controls import Decision, Held
 from risk_sac.search.agents.networks import LOG_STD_HALF, LOG_STD_MIDDLE
-from risk_sac.search.agents.replay import Transition
+from risk_sac.search.agents.transition import Transition
 from risk_sac.search.frozen_policy import Layers, respond
 from risk_sac.search.prior.policy import goal_of, with_goal
 from risk_sac.search.scene_optimizer import Encounter

@@ -19,8 +19,9 @@ from risk_sac.risk.reward import TrainingReward
 from risk_sac.search.agents.agent import Agent, UpdateResult, check_device
 from risk_sac.search.agents.controls import Decision, Held
 from risk_sac.search.agents.ddpg import DdpgAgent
-from risk_sac.search.agents.replay import Batch, RiskPrioritizedReplay, Transition, UniformReplay
+from risk_sac.search.agents.replay import Batch, RiskPrioritizedReplay, UniformReplay
 from risk_sac.search.agents.sac import SacAgent
+from risk_sac.search.agents.transition import Transition
 from risk_sac.search.frozen_policy import FrozenPolicy
 from risk_sac.world.types import Floats, Vector
 

@@ -5,8 +5,8 @@ from typing import Any
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
 from risk_sac.search.agents.learner import Learner
-from risk_sac.search.agents.replay import Transition
 from risk_sac.search.agents.sac import SacAgent
+from risk_sac.search.agents.transition import Transition
 from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import Folded, PolicyLayout, PretrainedPolicy
 from risk_sac.world.types import Floats, Vector

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from risk_sac.env.observation_layout import LATERAL_ADVERSARY, LATERAL_EGO, PER_ADVERSARY, PER_EGO
-from risk_sac.search.agents.replay import Transition
+from risk_sac.search.agents.transition import Transition
 from risk_sac.search.prior.coordinates import other_side, two_sided
 from risk_sac.search.prior.policy import PolicyLayout
 from risk_sac.world.types import Vector

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from risk_sac.run_folder.checkpoint import COUNTS, CURRENT, FATAL, LOG, PATIENCE, CrashGuard
+from risk_sac.run_folder.crash_guard import COUNTS, CURRENT, FATAL, LOG, PATIENCE, CrashGuard
 
 # Episode 3 ends the process in its fifth step, by what the second argument says.
 CRASH = """
 import ctypes, os, sys
 from pathlib import Path
-from risk_sac.run_folder.checkpoint import CrashGuard
+from risk_sac.run_folder.crash_guard import CrashGuard
 with CrashGuard(Path(sys.argv[1])) as guard:
     for episode in range(10):
         for step in range(20) if guard.begin(episode) else ():

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from risk_sac.search.agents.replay import Transition
+from risk_sac.search.agents.transition import Transition
 
 
 @pytest.fixture(autouse=True)

@@ -3,8 +3,9 @@ import pytest
 import torch
 
 from risk_sac.config.learner import AgentConfig, ReplayConfig, SacConfig
-from risk_sac.search.agents.replay import Batch, Transition, UniformReplay
+from risk_sac.search.agents.replay import Batch, UniformReplay
 from risk_sac.search.agents.sac import WARM_UP, GraphedUpdate, SacAgent
+from risk_sac.search.agents.transition import Transition
 
 SIZES = 7, 3  # of an observation and an action
 

@@ -9,7 +9,7 @@ import torch
 from risk_sac.config import METHODS, AgentConfig, LagrangianConfig, LearnerConfig, MethodName, ReplayConfig
 from risk_sac.errors import NotFinite
 from risk_sac.search.agents.learner import Learner
-from risk_sac.search.agents.replay import Transition
+from risk_sac.search.agents.transition import Transition
 
 Make = Callable[..., Transition]
 CONFIG = LearnerConfig(

@@ -9,7 +9,8 @@ from hypothesis.extra import numpy as hnp
 
 from risk_sac.config import ReplayConfig
 from risk_sac.search.agents.priority import TERM_CAP, SumTree, TermScales, importance_weights, priority
-from risk_sac.search.agents.replay import RiskPrioritizedReplay, Transition, UniformReplay
+from risk_sac.search.agents.replay import RiskPrioritizedReplay, UniformReplay
+from risk_sac.search.agents.transition import Transition
 
 Make = Callable[..., Transition]
 Replay = UniformReplay | RiskPrioritizedReplay
