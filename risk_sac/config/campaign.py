@@ -57,6 +57,10 @@ class Budget(Settings):
     """Whether `story-sweep` has to play every point of the grid; it is refused if these are more than `episodes`.
     False: where they are more, it plays a stratified sample of `episodes` points."""
 
+    batch: Annotated[int, Field(ge=1, le=1024)] = 1
+    """Episodes that are asked for at a time, and played in parallel. The results depend on it, and on nothing else of
+    how they are played. Methods that learn play one at a time."""
+
     @model_validator(mode="after")
     def _least_is_affordable(self) -> Self:
         if self.least_episodes > self.episodes:

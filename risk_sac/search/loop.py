@@ -1,91 +1,24 @@
-"""Runs episodes by Algorithm 1, and rejects those that cannot be played."""
+"""Runs episodes by Algorithm 1, one after the other or in rounds."""
 
-import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 import torch
 
 from risk_sac.config import RunSpec
-from risk_sac.egos.guard import CRASH
-from risk_sac.env.env import Observation, RiskSacEnv
-from risk_sac.errors import EgoFailed, InfeasibleScene
-from risk_sac.records import DrivenBy, Ending, EpisodeRecord, Outcome, RequirementResult, RunMetrics, SeriesFile
-from risk_sac.risk.rss import TTC_CAP_S
-from risk_sac.risk.stl import ROBUSTNESS_CLIP
+from risk_sac.records import Ending, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.crash_guard import CrashGuard
-from risk_sac.search.agents.transition import Transition
+from risk_sac.search.playing import GuardedEnv, Played, Proposal, play
+from risk_sac.search.rollouts import Rollouts, rollout_processes
 from risk_sac.search.run import RunOutcome, RunState
-from risk_sac.search.scene_optimizer import NO_ENCOUNTER, Encounter
-from risk_sac.search.searchers import Actor
-from risk_sac.world.types import Floats, Scene
 
-logger = logging.getLogger(__name__)
-
-SIM_CRASH = "sim_crash"  # reason of a rejection
-
-
-class Unplayable(Exception):
-    """An episode could not be played to its end, or at all; its record gets this outcome and reason."""
-
-    def __init__(self, outcome: Outcome, reason: str, *, begun: bool = True) -> None:
-        super().__init__(f"{outcome}: {reason}")
-        self.outcome, self.reason, self.begun = outcome, reason, begun
-
-
-class GuardedEnv:
-    """Environment of a run that leaves out crashing episodes and truncates those of no further use."""
-
-    def __init__(self, env: RiskSacEnv, guard: CrashGuard) -> None:
-        self._env, self._guard = env, guard
-
-    def begin(self, index: int) -> None:
-        """Notes for the crash guard that an episode begins, before its scene is chosen."""
-        self._index, self._playable = index, self._guard.begin(index)
-
-    def reset(self, seed: int, scene: Scene, actor: Actor) -> tuple[Observation, dict[str, Any]]:
-        """Starts the episode; see `RiskSacEnv.reset`.
-
-        Raises:
-          Unplayable: simulator or ego crashed in the episode before, C_hard rejects the scene, or the ego failed.
-        """
-        self._actor, self._steps = actor, 0
-        if not self._playable:
-            by_ego = self._guard.by_ego(self._index)
-            why = (Outcome.INVALID, CRASH) if by_ego else (Outcome.REJECTED, SIM_CRASH)
-            raise Unplayable(*why, begun=False)
-        try:
-            return self._env.reset(seed=seed, options={"scene": scene})
-        except InfeasibleScene as infeasible:
-            raise Unplayable(Outcome.REJECTED, infeasible.reason) from infeasible
-        except EgoFailed as failed:
-            raise self._invalid(failed) from failed
-
-    def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Plays one control step; see `RiskSacEnv.step`.
-
-        Also truncates once the actor can stop early, if the ego can violate nothing but by a contact.
-
-        Raises:
-          Unplayable: the ego failed.
-        """
-        self._guard.step(self._steps)
-        self._steps += 1
-        try:
-            observation, reward, terminated, truncated, info = self._env.step(action)
-        except EgoFailed as failed:
-            raise self._invalid(failed) from failed
-        stops = self._actor.can_stop_early and self._env.problem.contact_alone_counts
-        return observation, reward, terminated, truncated or stops, info
-
-    def _invalid(self, failed: EgoFailed) -> Unplayable:
-        logger.warning("episode %d is invalid: %s", self._index, failed)
-        return Unplayable(Outcome.INVALID, failed.reason)
+ROLLOUTS = "rollouts"  # folder of what rollout processes note
+ROUNDS_OUT = 2  # rounds that are asked for and not told
+POLL_S = 0.2
 
 
 class Observer(Protocol):
@@ -120,135 +53,113 @@ def execute_run(spec: RunSpec, folder: Path, observer: Observer) -> RunOutcome:
     with closing(RunState(spec, folder)) as run:
         for record, metrics in run.resume():
             observer.episode(record, metrics, run.series.get(record.index))
-        with CrashGuard(folder) as guard:
-            env = GuardedEnv(run.env, guard)
-            while not run.finished and not observer.should_stop():
-                record = episode(run, env)  # Alg. 1, l. 3
-                metrics = run.add(record)
-                observer.episode(record, metrics, run.series.get(record.index))
-                run.refuse_dead_ego()
-                if len(run.records) % spec.learner.checkpoint_every == 0:
-                    run.save()
-            run.save()
-    return run.summary(wall_s=time.monotonic() - started, cpu_s=time.process_time() - started_cpu)
+        for metrics in rounds(run, folder, observer) if spec.budget.batch > 1 else episodes(run, folder, observer):
+            record = run.records[-1]
+            observer.episode(record, metrics, run.series.get(record.index))
+            run.refuse_dead_ego()
+            if len(run.records) % spec.learner.checkpoint_every == 0:
+                run.save()
+        run.save()
+    return run.summary(wall_s=time.monotonic() - started, cpu_s=time.process_time() - started_cpu + run.rollouts_cpu_s)
 
 
-def episode(run: RunState, env: GuardedEnv) -> EpisodeRecord:
+def episodes(run: RunState, folder: Path, observer: Observer) -> Iterator[RunMetrics]:
+    """Plays the rest of a run in this process; yields the metrics after each episode."""
+    with CrashGuard(folder) as guard:
+        env = GuardedEnv(run.env, guard)
+        while not run.finished and not observer.should_stop():
+            yield episode(run, env)  # Alg. 1, l. 3
+
+
+def episode(run: RunState, env: GuardedEnv) -> RunMetrics:
     """Plays the next episode: Algorithm 1, lines 4 to 22.
 
     In the evaluation phase the policy is frozen. Choice: scenes keep coming from the method's own sampler then, since
     it is the pair of sampler and policy that generates scenarios.
     """
-    agent, learning, tally = run.searchers.agent, run.learning, EpisodeSums()
-    seed = episode_seed(run.spec.stream, len(run.records))
     env.begin(len(run.records))
-    actor = run.searchers.next(learning=learning).actor
-    point = run.searchers.ask()  # Alg. 1, l. 4
-    driven_by = run.searchers.driven_by(learning=learning)
-    scene, genes = run.searchers.split(point)
-    run.searchers.begin(genes)
-    try:
-        observation, info = env.reset(seed, scene, actor)  # Alg. 1, l. 5
-        for _ in range(run.problem.family.horizon_steps):  # Alg. 1, l. 6
-            action = actor.act(observation, explore=learning)  # Alg. 1, l. 7
-            robustness = info["robustness"]
-            next_observation, risk_reward, terminated, truncated, info = env.step(action)  # Alg. 1, l. 8
-            cost, next_robustness = info["cost"], info["robustness"]
-            reward = run.reward(risk_reward, cost, robustness, next_robustness, float(terminated), agent.dual_variable)
-            tally.add(risk_reward, cost, reward)  # Alg. 1, l. 9-10
-            if learning:
-                agent.observe(  # Alg. 1, l. 11-12
-                    Transition(
-                        observation=observation,
-                        action=action,
-                        risk_reward=risk_reward,
-                        cost=cost,
-                        robustness=robustness,
-                        next_robustness=next_robustness,
-                        next_observation=next_observation,
-                        terminated=terminated,
-                        accumulated_reward=tally.shaped_return,
-                    ),
-                    own=actor is agent,
-                )
-                actor.update()  # Alg. 1, l. 13-16
-            observation = next_observation
-            if terminated or truncated:  # Alg. 1, l. 17-19
-                break
-    except Unplayable as unplayable:
-        run.searchers.tell(point, None)
-        return _record(run, seed, scene, tally, driven_by, unplayable=unplayable)
-    kept = run.env.requirement_results()
-    encounter = Encounter(
-        collision=info.get("collision"),
-        violations=run.env.violations(kept),
-        margins={name: each.robustness for name, each in kept.items() if each.counts == "failure"},
-        encounters_s=run.env.trace.encounters_s(run.problem.family.adversaries),
-    )
-    objective = run.searchers.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
-    return _record(run, seed, scene, tally, driven_by, genes=genes, objective=objective, kept=kept, encounter=encounter)
+    proposal = propose(run)
+    actor = run.searchers.begin(proposal.genes)
+    return tell(run, proposal, play(env, proposal, actor, run.searchers.agent, run.reward))
 
 
-@dataclass(slots=True)
-class EpisodeSums:
-    """Sums over one episode."""
+def rounds(run: RunState, folder: Path, observer: Observer) -> Iterator[RunMetrics]:
+    """Plays the rest of a run in rounds of `batch` episodes, in parallel; yields the metrics after each episode.
 
-    steps: int = 0
-    risk_return: float = 0.0
-    shaped_return: float = 0.0
-    cost: float = 0.0
+    Round r + 1 is asked for once round r - 1 is told, and is played while round r is. So no process waits for the
+    slowest episode of a round, and the result depends neither on their number nor on their speed.
+    """
+    batch = run.spec.budget.batch
+    with closing(Rollouts(run.spec, folder / ROLLOUTS, min(batch, rollout_processes()))) as rollouts:
+        for proposal in run.proposed:  # an earlier process has asked for them
+            rollouts.submit(proposal)
+        while not observer.should_stop():
+            while not run.spent and run.next_index < (len(run.records) // batch + ROUNDS_OUT) * batch:
+                run.proposed.append(propose(run))
+                rollouts.submit(run.proposed[-1])
+            if not run.proposed:
+                return
+            played = rollouts.wait_for(run.proposed[0].index, POLL_S)
+            if played is not None:
+                yield tell(run, run.proposed.popleft(), played)
 
-    def add(self, risk_reward: float, cost: float, shaped: float) -> None:
-        """Counts one step; `shaped` is R' under the λ of the moment."""
-        self.steps += 1
-        self.risk_return += risk_reward
-        self.cost += cost
-        self.shaped_return += shaped
 
-
-def _record(
-    run: RunState,
-    seed: int,
-    scene: Scene,
-    tally: EpisodeSums,
-    driven_by: DrivenBy | None,
-    *,
-    unplayable: Unplayable | None = None,
-    genes: Floats | None = None,
-    objective: float | None = None,
-    kept: Mapping[str, RequirementResult] | None = None,
-    encounter: Encounter = NO_ENCOUNTER,
-) -> EpisodeRecord:
-    ending = Ending.of(encounter.collision, encounter.violations)
-    if unplayable is not None:
-        ending = Ending(unplayable.outcome, unplayable.reason, ())
-    begun = unplayable is None or unplayable.begun  # else the environment's trace is of the episode before
-    return EpisodeRecord(
-        index=len(run.records),
+def propose(run: RunState) -> Proposal:
+    """Chooses what to play next: Algorithm 1, line 4."""
+    searchers, learning, index = run.searchers, run.learning, run.next_index
+    searchers.next(learning=learning)
+    point = searchers.ask(out=[proposal.point for proposal in run.proposed])
+    scene, genes = searchers.split(point)
+    return Proposal(
+        index=index,
         phase=run.phase,
-        seed=seed,
-        scene=scene.values,
+        learning=learning,
+        seed=episode_seed(run.spec.stream, index),
+        point=point,
+        scene=scene,
+        genes=genes,
+        driven_by=searchers.driven_by(learning=learning),
+        origin=searchers.origin if run.spec.budget.batch > 1 else None,
+    )
+
+
+def tell(run: RunState, proposal: Proposal, played: Played) -> RunMetrics:
+    """Tells the searchers of an episode and adds its record: Algorithm 1, lines 21 and 22."""
+    sums, encounter, unplayable = played.sums, played.encounter, played.unplayable
+    mean_return = sums.shaped_return / sums.steps if unplayable is None else None
+    if proposal.origin is not None:
+        run.searchers.origin = proposal.origin
+    objective = run.searchers.tell(proposal.point, mean_return, encounter)
+    ending = Ending.of(encounter.collision, encounter.violations) if unplayable is None else Ending(*unplayable, ())
+    agent = run.searchers.agent
+    genes = proposal.genes.tolist() if unplayable is None else []
+    record = EpisodeRecord(
+        index=proposal.index,
+        phase=proposal.phase,
+        seed=proposal.seed,
+        scene=proposal.scene.values,
         **ending._asdict(),
-        steps=tally.steps,
-        risk_return=tally.risk_return,
-        shaped_return=tally.shaped_return,
-        mean_cost=tally.cost / tally.steps if tally.steps else 0.0,
-        min_ttc_s=run.env.trace.min_ttc_s if begun else TTC_CAP_S,
-        min_robustness=run.env.trace.min_robustness if begun else ROBUSTNESS_CLIP,
-        dual_variable=run.searchers.agent.dual_variable,
-        temperature=run.searchers.agent.temperature,
-        environment_steps=run.environment_steps + tally.steps,
+        steps=sums.steps,
+        risk_return=sums.risk_return,
+        shaped_return=sums.shaped_return,
+        mean_cost=sums.cost / sums.steps if sums.steps else 0.0,
+        min_ttc_s=played.min_ttc_s,
+        min_robustness=played.min_robustness,
+        dual_variable=agent.dual_variable,
+        temperature=agent.temperature,
+        environment_steps=run.environment_steps + sums.steps,
         objective=objective,
-        driven_by=driven_by,
-        script=None if genes is None else tuple(genes.tolist()) or None,
-        requirements=kept or {},
+        driven_by=proposal.driven_by,
+        script=tuple(genes) or None,
+        requirements=played.requirements,
         violations=encounter.violations,
         collision=encounter.collision,
-        start_danger=run.env.start_danger if begun else None,
-        defect_reached_s=run.env.defect_reached_s if tally.steps else None,
-        deviations=run.env.deviations if unplayable is None else {},
-        avoided_by=run.env.avoided_by() if unplayable is None else None,
+        start_danger=played.start_danger,
+        defect_reached_s=played.defect_reached_s,
+        deviations=played.deviations,
+        avoided_by=played.avoided_by,
     )
+    return run.add(record, played)
 
 
 def episode_seed(run_seed: int, index: int) -> int:

@@ -3,22 +3,25 @@
 import hashlib
 import logging
 import os
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from risk_sac.config import RunSpec, method_of
 from risk_sac.egos.guard import DEAD_AFTER
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import MetricsAccumulator, results_digest
-from risk_sac.records import EpisodeRecord, Outcome, Phase, RunMetrics, SeriesFile, stored
+from risk_sac.records import DrivenBy, EpisodeRecord, Outcome, Phase, RunMetrics, SeriesFile, stored
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import sha256
 from risk_sac.run_folder.results import EPISODES, FAILURES, records_from_lines, series_name
 from risk_sac.run_folder.series import write_series
+from risk_sac.search.playing import Played, Proposal
 from risk_sac.search.searchers import Searchers
 from risk_sac.world.jit import cpu_s
 
@@ -56,6 +59,7 @@ class RunState:
       searchers: propose the scenes and drive the adversaries.
       reward: what the agent is trained on, and the scenes are scored by.
       records: one per episode.
+      proposed: episodes that other processes play, in their order.
       series: time series by episode, where a requirement that counts was violated.
     """
 
@@ -67,6 +71,7 @@ class RunState:
         self.searchers = Searchers(spec, self.problem, self.env.observation_size, self.env.action_size)
         self.reward = TrainingReward(method_of(spec.method), spec.learner)
         self.records: list[EpisodeRecord] = []
+        self.proposed: deque[Proposal] = deque()
         self.series: dict[int, SeriesFile] = {}
         self._episode_cpu_s: list[float] = []
         self._folder = folder
@@ -76,21 +81,35 @@ class RunState:
         self._search = MetricsAccumulator(self.problem.family.horizon_steps)
         self._evaluation = MetricsAccumulator(self.problem.family.horizon_steps)
         self._cpu_began_s = cpu_s()
+        self.rollouts_cpu_s = 0.0
 
     @property
     def finished(self) -> bool:
         """Whether the budget is spent."""
-        budget = self.spec.budget
-        return not self.learning and len(self.records) - self._search.episodes >= budget.evaluation_episodes
+        return self.spent and not self.proposed
+
+    @property
+    def spent(self) -> bool:
+        """Whether all episodes of the budget are played or proposed."""
+        return not self.learning and self.next_index - self._search_episodes >= self.spec.budget.evaluation_episodes
+
+    @property
+    def next_index(self) -> int:
+        """Index of the next episode to propose."""
+        return len(self.records) + len(self.proposed)
+
+    @property
+    def _search_episodes(self) -> int:
+        return self._search.episodes + sum(proposal.phase != "evaluation" for proposal in self.proposed)
 
     @property
     def learning(self) -> bool:
         """Whether the next episode belongs to the search; in the evaluation the policy is frozen."""
-        budget, played, points = self.spec.budget, self._search.episodes, self.searchers.points
+        budget, played, points = self.spec.budget, self._search_episodes, self.searchers.points
         most = budget.episodes if points is None else min(budget.episodes, points)
         if played < budget.least_episodes or budget.cpu_s is None:
             return played < most
-        return played < most and self._episode_cpu_s[played - 1] < budget.cpu_s
+        return played < most and self._episode_cpu_s[min(played, len(self.records)) - 1] < budget.cpu_s
 
     @property
     def phase(self) -> Phase:
@@ -104,19 +123,21 @@ class RunState:
         """Steps of all episodes so far."""
         return self.records[-1].environment_steps if self.records else 0
 
-    def add(self, record: EpisodeRecord) -> RunMetrics:
-        """Adds the episode that `env` has just played, and writes its record and the time series of a violation.
+    def add(self, record: EpisodeRecord, played: Played) -> RunMetrics:
+        """Adds an episode that was played, and writes its record and the time series of a violation.
 
         Returns:
           The metrics of its phase.
         """
-        if record.worst_violation is not None:
+        if played.series is not None:
             file = self._folder / FAILURES / series_name(record.index)
-            self.series[record.index] = write_series(file, self.env.trace.series())
+            self.series[record.index] = write_series(file, played.series)
+        if self.spec.budget.batch > 1:
+            self.rollouts_cpu_s += played.cpu_s
         self.records.append(record)
         self._append(record)
         self.searchers.add(record)
-        self._episode_cpu_s.append(cpu_s() - self._cpu_began_s)
+        self._episode_cpu_s.append(cpu_s() - self._cpu_began_s + self.rollouts_cpu_s)
         return self._count(record)
 
     def refuse_dead_ego(self) -> None:
@@ -148,6 +169,7 @@ class RunState:
             "episodes_sha256": self._digest.hexdigest(),
             "series": {index: file.sha256 for index, file in self.series.items()},
             "episode_cpu_s": self._episode_cpu_s,
+            "proposed": [proposal.state() for proposal in self.proposed],
             **self.searchers.state(),
         }
         checkpoint.save(self._folder / CHECKPOINT, state, self.spec.digest)
@@ -173,6 +195,7 @@ class RunState:
         self.records = records_from_lines(content)
         self.series = _series(self._folder, self.records, state["series"])
         self.searchers.load(state, self.records)
+        self.proposed = deque(map(self._proposal, state["proposed"]))
         self._episode_cpu_s = list(state["episode_cpu_s"])
         self._cpu_began_s = cpu_s() - self._episode_cpu_s[-1]
         self._saved = len(self.records)
@@ -196,6 +219,13 @@ class RunState:
     def close(self) -> None:
         """Ends the simulation."""
         self.env.close()
+
+    def _proposal(self, state: dict[str, Any]) -> Proposal:
+        """Returns a proposal as an earlier process has made it."""
+        self.searchers.next(learning=state["learning"])
+        scene, genes = self.searchers.split(state["point"])
+        driven_by = state["driven_by"] and DrivenBy(state["driven_by"])
+        return Proposal(**{**state, "scene": scene, "genes": genes, "driven_by": driven_by})
 
     def _append(self, record: EpisodeRecord) -> None:
         """Writes a record behind those of this run; what an interrupted run wrote there is cut off."""

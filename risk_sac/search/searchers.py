@@ -11,19 +11,18 @@ import numpy as np
 from risk_sac.config import RunSpec, method_of
 from risk_sac.env.problem import Problem
 from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Outcome, Violation
-from risk_sac.search.agents.controls import IdleAgent, RandomAgent, ScriptedAgent, ScriptFollower
+from risk_sac.search.agents.controls import Control, ScriptFollower, control
 from risk_sac.search.agents.learner import Learner
+from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.search.prior.coordinates import Coordinates
 from risk_sac.search.prior.learner import PretrainedLearner
 from risk_sac.search.prior.policy import PolicyLayout, check_prior, pretrained_for
 from risk_sac.search.prior.sampler import PriorOptimizer, ReplayOptimizer
 from risk_sac.search.prior.start import start_of
 from risk_sac.search.scene_optimizer import (
-    NO_ENCOUNTER,
     ArchiveOptimizer,
     BotorchOptimizer,
     DiscountedBandit,
-    Encounter,
     GridSampler,
     IidSampler,
     SceneOptimizer,
@@ -32,15 +31,10 @@ from risk_sac.search.scene_optimizer import (
 from risk_sac.verdicts.distinct import Finds
 from risk_sac.world.types import Floats, Scene
 
-CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
-    "scripted": ScriptedAgent,
-    "random": RandomAgent,
-    "none": IdleAgent,
-}
 OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
     each.kind: each for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler, GridSampler)
 }
-Actor = Learner | IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
+Actor = Learner | Control
 """A joint policy that drives all adversaries."""
 GUIDE, OWN = 0, 1  # arms of the bandit that chooses between archive and policy
 # Scripts that find a failure in one episode of thirty may find none in fifty and still be worth their time.
@@ -87,10 +81,8 @@ class Searchers:
         self._start = None if "none" in (method.prior, spec.prior) else start_of(problem, spec.prior)
         pretrained = None if self._start is None or not method.learns else pretrained_for(problem.family)
         self.agent: Actor  # Alg. 1, l. 2
-        if method.agent in CONTROLS:
-            self.agent = CONTROLS[method.agent](action_size, spec.stream)
-        elif method.agent == "scripts":
-            self.agent = ScriptFollower(problem.family)
+        if not method.learns:
+            self.agent = control(spec.method, problem.family, spec.stream)
         elif pretrained is not None:
             self.agent = PretrainedLearner(pretrained, PolicyLayout.of(problem), method, spec.learner, spec.stream)
         else:
@@ -134,13 +126,15 @@ class Searchers:
         frozen = isinstance(actor, Learner) and not learning
         return DrivenBy.POLICY if frozen else actor.driven_by
 
-    def ask(self) -> Floats:
+    def ask(self, out: Sequence[Floats] = ()) -> Floats:
         """Returns the next point of the searcher chosen last; its scene keeps the scenario's constraints.
 
         A sampler is asked again for a point whose scene does not, so that random scenes stay uniform among those that
-        do; after `tries` the nearest scene of a pool takes its place. One without tries has its points refused.
+        do; after `tries` the nearest scene of a pool takes its place. One without tries has its points refused. `out`
+        are the points that are being played.
         """
         sampler, size = self._next.sampler, self._space.dimension
+        sampler.out = out
         point = sampler.ask()
         if not sampler.tries:
             return point
@@ -162,11 +156,21 @@ class Searchers:
         """Number of scenes of a method that plays each once; None: it has no end."""
         return self._own.sampler.points
 
-    def begin(self, genes: Floats) -> None:
-        """Begins an episode for its actor and for the learner that observes it."""
+    @property
+    def origin(self) -> Mapping[str, Any]:
+        """Where the point that was asked for last comes from, see `SceneOptimizer.origin`."""
+        return self._next.sampler.origin
+
+    @origin.setter
+    def origin(self, origin: Mapping[str, Any]) -> None:
+        self._next.sampler.origin = origin
+
+    def begin(self, genes: Floats) -> Actor:
+        """Begins an episode for its actor, which it returns, and for the learner that observes it."""
         self._next.actor.begin(genes)
         if self._next is not self._own:
             self.agent.begin(genes)
+        return self._next.actor
 
     def tell(self, point: Floats, mean_return: float | None, encounter: Encounter = NO_ENCOUNTER) -> float | None:
         """Scores the scene of the episode; see `SceneOptimizer.tell`. The method's sampler also gets its guide's."""

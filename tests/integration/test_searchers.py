@@ -10,8 +10,9 @@ from risk_sac.errors import ConfigError
 from risk_sac.records import DrivenBy, EpisodeRecord, Grade, Outcome
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.agents.learner import Learner
+from risk_sac.search.encounter import Encounter
 from risk_sac.search.loop import execute_run
-from risk_sac.search.scene_optimizer import ArchiveOptimizer, Encounter
+from risk_sac.search.scene_optimizer import ArchiveOptimizer
 from risk_sac.search.searchers import COLD, GUIDE, OWN, Searchers, Turns
 from tests.builders import collision, episode_record, judgement
 from tests.listener import Listener

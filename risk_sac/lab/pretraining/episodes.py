@@ -19,9 +19,9 @@ from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.search.agents.controls import ScriptFollower
+from risk_sac.search.encounter import Encounter
 from risk_sac.search.prior.coordinates import Coordinates
 from risk_sac.search.prior.shipped import GRID
-from risk_sac.search.scene_optimizer import Encounter
 from risk_sac.search.scene_optimizer.archive import REFLECTED, mutated
 from risk_sac.verdicts.distinct import variant_name
 from risk_sac.world.types import Floats, Scene

@@ -15,9 +15,9 @@ from risk_sac.records import Collision
 from risk_sac.search.agents.controls import Decision, Held
 from risk_sac.search.agents.networks import LOG_STD_HALF, LOG_STD_MIDDLE
 from risk_sac.search.agents.transition import Transition
+from risk_sac.search.encounter import Encounter
 from risk_sac.search.frozen_policy import Layers, respond
 from risk_sac.search.prior.policy import goal_of, with_goal
-from risk_sac.search.scene_optimizer import Encounter
 from risk_sac.verdicts.distinct import variant_name
 from risk_sac.world.types import Vector
 

@@ -1,11 +1,12 @@
 """Agents that learn nothing: idle, random and scripted ones."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from risk_sac.config import RunMethod, method_of
 from risk_sac.env.observation_layout import PER_ADVERSARY, X_M, Y_M
 from risk_sac.records import DrivenBy
 from risk_sac.scenario.family import Family
@@ -177,6 +178,20 @@ class ScriptFollower(NonLearner):
         self._standing = self._standing + 1 if standing else 0
         over = all(is_over(script, since_s) for script, _, since_s in acting)
         self.can_stop_early = over or self._behind >= BEHIND_STEPS or self._standing >= STANDING_STEPS
+
+
+Control = IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
+CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
+    "scripted": ScriptedAgent,
+    "random": RandomAgent,
+    "none": IdleAgent,
+}
+
+
+def control(method: RunMethod, family: Family, seed: int) -> Control:
+    """Makes the agent of a method that does not learn."""
+    agent = method_of(method).agent
+    return ScriptFollower(family) if agent == "scripts" else CONTROLS[agent](2 * len(family.adversaries), seed)
 
 
 class Held:

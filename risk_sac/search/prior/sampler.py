@@ -3,14 +3,17 @@
 Three arms share the episodes by what they have found lately: the script model, the library, and the archive search.
 """
 
+from collections.abc import Mapping
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import DrivenBy
+from risk_sac.search.encounter import Encounter
 from risk_sac.search.prior.start import PriorStart
-from risk_sac.search.scene_optimizer import ArchiveOptimizer, Encounter
+from risk_sac.search.scene_optimizer import ArchiveOptimizer
 from risk_sac.search.scene_optimizer.archive import DEVIATIONS, SHARES
 from risk_sac.search.scene_optimizer.base import State
 from risk_sac.verdicts.distinct import CANDIDATE, NEW_VARIANT, Finds
@@ -96,6 +99,15 @@ class PriorOptimizer(ArchiveOptimizer):
             return self._from_library()
         self.driven_by = DrivenBy.MODEL
         return self._from_model()
+
+    @property
+    def origin(self) -> Mapping[str, Any]:
+        """See `SceneOptimizer.origin`: the place of the parent, and the arm."""
+        return {"parent": self._elites.key(self._parent), "arm": int(self._arm)}
+
+    @origin.setter
+    def origin(self, origin: Mapping[str, Any]) -> None:
+        self._parent, self._arm = self._elites.at(origin["parent"]), Arm(origin["arm"])
 
     def _from_library(self) -> Floats:
         """Draws a row that was not played yet, the more likely the rarer its variant is so far; then all over again.

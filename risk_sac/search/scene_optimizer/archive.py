@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -10,7 +10,8 @@ import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import NO_CONTACT, Collision, DrivenBy, Severity, Violation
-from risk_sac.search.scene_optimizer.base import Encounter, SceneOptimizer, State
+from risk_sac.search.encounter import Encounter
+from risk_sac.search.scene_optimizer.base import SceneOptimizer, State
 from risk_sac.verdicts.distinct import Finds, variant_name
 from risk_sac.world.types import Floats
 
@@ -122,6 +123,18 @@ class Elites:
         """Returns all failures, and the near misses of the targets that have none."""
         hit = {elite.target for elite in self._failures.values()}
         return [*self._failures.values(), *(miss for name, miss in self._misses.items() if name not in hit)]
+
+    def key(self, elite: Elite | None) -> tuple[str, str] | None:
+        """Names an elite's place: its set and its niche or target; None once it has lost it."""
+        places = (("failures", self._failures), ("misses", self._misses))
+        return next(((place, name) for place, held in places for name, one in held.items() if one is elite), None)
+
+    def at(self, key: Sequence[str] | None) -> Elite | None:
+        """Returns the elite at a place that `key` named."""
+        if key is None:
+            return None
+        place, name = key
+        return (self._failures if place == "failures" else self._misses).get(name)
 
     def draw(self, pool: list[Elite], random: np.random.Generator) -> Elite:
         """Draws one of the pool.
@@ -236,6 +249,15 @@ class ArchiveOptimizer(SceneOptimizer):
         if self.reflect is not None and self._random.random() < REFLECTED:
             child = self.reflect(child[None])[0]
         return child
+
+    @property
+    def origin(self) -> Mapping[str, Any]:
+        """See `SceneOptimizer.origin`: the place of the parent."""
+        return {"parent": self._elites.key(self._parent)}
+
+    @origin.setter
+    def origin(self, origin: Mapping[str, Any]) -> None:
+        self._parent = self._elites.at(origin["parent"])
 
     def _learn(self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter) -> None:
         parent, self._parent = self._parent, None

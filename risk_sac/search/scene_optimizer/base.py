@@ -5,8 +5,7 @@ Source: RISK-SAC, Sec. III-E.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,7 +14,8 @@ from torch.quasirandom import SobolEngine
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
-from risk_sac.records import Collision, DrivenBy, Violation, valid_violations, worst_of
+from risk_sac.records import DrivenBy
+from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.world.types import Floats
 
 State = dict[str, Any]
@@ -23,36 +23,6 @@ State = dict[str, Any]
 # Choice: the paper leaves ε open. Mean returns per step are of order 0.1, so 1e-3 is negligible there and keeps f
 # readable while M̄ passes through zero.
 EPSILON = 1e-3
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Encounter:
-    """Outcome of an episode for the ego.
-
-    Attributes:
-      collision: its contact, if there was one.
-      violations: of requirements that count, without contact.
-      margins: least robustness of each requirement that counts, in scales.
-      encounters_s: smallest time to encounter by adversary, s, while that is ahead and in sight and the ego moves.
-    """
-
-    collision: Collision | None = None
-    violations: tuple[Violation, ...] = ()
-    margins: Mapping[str, float] = field(default_factory=dict)
-    encounters_s: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def valid_violations(self) -> tuple[Collision | Violation, ...]:
-        """Lists the violations that make the episode a failure."""
-        return valid_violations(self.collision, self.violations)
-
-    @property
-    def worst(self) -> Collision | Violation | None:
-        """Returns the valid violation that counts most, see `worst_of`."""
-        return worst_of(self.valid_violations)
-
-
-NO_ENCOUNTER = Encounter()
 
 
 def objective(mean_return: float | Floats, running_maximum: float) -> Floats:
@@ -111,16 +81,30 @@ class SceneOptimizer(ABC):
 
     Attributes:
       driven_by: where the genes of the point that was proposed last come from; None before the first one.
+      out: points that were asked for and are not told yet, where several are played at a time.
     """
 
     kind: ClassVar[str]
     tries: ClassVar[int] = 1000  # further points that it may be asked for where one breaks the scenario's constraints
     points: int | None = None  # number of different ones; None: there is no end
     driven_by: DrivenBy | None = None
+    out: Sequence[Floats] = ()
 
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int) -> None:
         self._dimension, self._config, self._seed = dimension, config, seed
         self._maximum = RunningMaximum(config.running_maximum_rate)
+
+    @property
+    def origin(self) -> Mapping[str, Any]:
+        """What the sampler remembers of the point that was asked for last, as plain values.
+
+        Where others were asked for since, it is set again before the point is told.
+        """
+        return {}
+
+    @origin.setter
+    def origin(self, origin: Mapping[str, Any]) -> None:
+        del origin  # most samplers remember nothing
 
     @abstractmethod
     def ask(self) -> Floats:

@@ -8,14 +8,17 @@ References:
 """
 
 import warnings
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from risk_sac.config import SceneOptimizerConfig
+from risk_sac.search.encounter import Encounter
 from risk_sac.search.scene_optimizer.archive import DiscountedBandit
-from risk_sac.search.scene_optimizer.base import Encounter, SceneOptimizer, State, objective, sobol_points
+from risk_sac.search.scene_optimizer.base import SceneOptimizer, State, objective, sobol_points
 from risk_sac.world.types import Floats
 
 with warnings.catch_warnings():
@@ -64,6 +67,19 @@ def fit(points: Tensor, values: Tensor, start: Hyperparameters | None, seed: int
             warning_handler=lambda warning: True,  # a search that ends early leaves the best parameters so far
         )
     return {name: parameter.detach().clone() for name, parameter in model.named_parameters()}
+
+
+def believe(
+    model: SingleTaskGP, points: Tensor, values: Tensor, out: Tensor, hyperparameters: Hyperparameters
+) -> SingleTaskGP:
+    """Returns the model as if points that are out, `m x d`, had their posterior mean; others as for `condition`.
+
+    So the next point is elsewhere. Source: the kriging believer of Ginsbourger et al. 2010, Kriging is well-suited to
+    parallelize optimization.
+    """
+    with skip_posterior_variances(), torch.no_grad():
+        mean = model.posterior(out).mean[:, 0] * values.std() + values.mean()
+    return condition(torch.cat((points, out)), torch.cat((values, mean)), hyperparameters)
 
 
 def maximise_expected_improvement(model: SingleTaskGP, choices: Tensor) -> Tensor:
@@ -144,6 +160,15 @@ class BotorchOptimizer(SceneOptimizer):
             return self._fill()
         return self._propose(values, random)
 
+    @property
+    def origin(self) -> Mapping[str, Any]:
+        """See `SceneOptimizer.origin`: the arm."""
+        return {"arm": self._arm}
+
+    @origin.setter
+    def origin(self, origin: Mapping[str, Any]) -> None:
+        self._arm = origin["arm"]
+
     def _learn(  # Alg. 1, l. 21-22
         self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter
     ) -> None:
@@ -172,8 +197,6 @@ class BotorchOptimizer(SceneOptimizer):
         return sobol_points(self._dimension, self._seed, self._filled - 1)[0].numpy()
 
     def _propose(self, values: Floats, random: np.random.Generator) -> Floats:
-        pass  # here, because BoTorch is slow to load, and many runs need none
-
         points, targets, seed = torch.from_numpy(self._points), torch.from_numpy(values), int(random.integers(2**31))
         # Each observation changes the fit less as they accumulate, while a fit's price grows with them.
         due = max(self._config.refit_every, len(values) // REFIT_SHARE)
@@ -181,6 +204,8 @@ class BotorchOptimizer(SceneOptimizer):
             self._hyperparameters = fit(points, targets, self._hyperparameters, seed)
             self._fitted_at = self._told
         model = condition(points, targets, self._hyperparameters)
+        if len(self.out):
+            model = believe(model, points, targets, torch.from_numpy(np.array(self.out)), self._hyperparameters)
         self._arm = NEAR if random.random() < self._bandit.probability else ANYWHERE
         near = torch.from_numpy(self._steps_from_one_of_the_best(values, random))
         if self._arm == NEAR:

@@ -10,12 +10,13 @@ from risk_sac.config import LearnerConfig, RunSpec, SceneOptimizerConfig, method
 from risk_sac.env.problem import Problem
 from risk_sac.records import Grade
 from risk_sac.scenario.families import FAMILIES
+from risk_sac.search.encounter import Encounter
 from risk_sac.search.prior.coordinates import Coordinates
 from risk_sac.search.prior.learner import PretrainedLearner
 from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import PolicyLayout
 from risk_sac.search.prior.start import start_of
-from risk_sac.search.scene_optimizer import ArchiveOptimizer, Encounter
+from risk_sac.search.scene_optimizer import ArchiveOptimizer
 from risk_sac.search.scripts import SIZE
 from risk_sac.search.searchers import Searchers
 from tests.builders import collision, judgement, pretrained_policy

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.records import Collision, Grade, ReferenceOutcome, Severity
-from risk_sac.search.scene_optimizer import ArchiveOptimizer, DiscountedBandit, Encounter
+from risk_sac.search.encounter import Encounter
+from risk_sac.search.scene_optimizer import ArchiveOptimizer, DiscountedBandit
 from risk_sac.search.scene_optimizer.archive import CREDIT, INITIAL, Elites, mutated
 from risk_sac.verdicts.distinct import CANDIDATE, NEW_KIND, NEW_VARIANT
 from tests.builders import collision, judgement, violation

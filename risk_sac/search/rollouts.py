@@ -1,0 +1,167 @@
+"""Processes that play the episodes of one run in parallel, one simulation each.
+
+    python -m risk_sac.search.rollouts CONNECTION FOLDER
+
+is such a process: it reads the run's spec and then proposals from the connection, and writes what was played.
+"""
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+from collections import deque
+from contextlib import closing
+from dataclasses import dataclass
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+
+from risk_sac.config import RunSpec, method_of
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.errors import RiskSacError, SimulationError
+from risk_sac.host.machine import cores
+from risk_sac.risk.reward import TrainingReward
+from risk_sac.run_folder.crash_guard import PATIENCE, CrashGuard
+from risk_sac.search.agents.controls import control
+from risk_sac.search.playing import GuardedEnv, Played, Proposal, play
+
+logger = logging.getLogger(__name__)
+
+PROCESSES = "RISK_SAC_ROLLOUTS"  # variable: how many processes play the episodes of one run
+LOST = (EOFError, ConnectionResetError, BrokenPipeError)  # errors of a connection whose other end has died
+
+
+def rollout_processes() -> int:
+    """Returns how many processes may play a run's episodes: RISK_SAC_ROLLOUTS, or one per core."""
+    return max(1, int(os.environ.get(PROCESSES) or cores()))
+
+
+@dataclass(slots=True)
+class RolloutProcess:
+    """A process, and the proposal that it plays."""
+
+    folder: Path
+    process: subprocess.Popen[bytes]
+    connection: Connection
+    playing: Proposal | None = None
+    deaths: int = 0  # since its last episode
+
+
+class Rollouts:
+    """Plays proposals in processes; one that dies is started again, and its episode is played again."""
+
+    def __init__(self, spec: RunSpec, folder: Path, most: int) -> None:
+        """Starts no process yet; each gets a folder below `folder` for what its crash guard notes."""
+        self._spec, self._folder, self._most = spec.model_dump_json(), folder, most
+        self._processes: list[RolloutProcess] = []
+        self._waiting: deque[Proposal] = deque()
+        self._played: dict[int, Played] = {}
+
+    def submit(self, proposal: Proposal) -> None:
+        """Lets a process play a proposal, once one is free."""
+        self._waiting.append(proposal)
+        self._send()
+
+    def wait_for(self, index: int, at_most_s: float) -> Played | None:
+        """Waits for an episode; returns None if it is not played after `at_most_s`.
+
+        Raises:
+          SimulationError: a process failed, or died again and again.
+        """
+        if index not in self._played:
+            busy = {one.connection: one for one in self._processes if one.playing is not None}
+            for connection in wait(list(busy), at_most_s):
+                self._receive(busy[connection])  # type: ignore[index]
+            self._send()
+        return self._played.pop(index, None)
+
+    def close(self) -> None:
+        """Ends the processes; what they play is lost."""
+        for one in self._processes:
+            one.process.kill()
+            one.connection.close()
+            one.process.wait()
+        self._processes.clear()
+
+    def _send(self) -> None:
+        """Gives what waits to processes without an episode."""
+        while self._waiting:
+            free = next((one for one in self._processes if one.playing is None), None)
+            if free is None and len(self._processes) < self._most:
+                folder = self._folder / str(len(self._processes))
+                free = RolloutProcess(folder, *self._started(folder))
+                self._processes.append(free)
+            if free is None:
+                return
+            free.playing = self._waiting.popleft()
+            self._play(free)
+
+    def _play(self, one: RolloutProcess) -> None:
+        try:
+            one.connection.send(one.playing)
+        except LOST:
+            self._restart(one)
+
+    def _receive(self, one: RolloutProcess) -> None:
+        assert one.playing is not None
+        try:
+            answer = one.connection.recv()
+        except LOST:
+            self._restart(one)
+            return
+        if isinstance(answer, str):
+            raise SimulationError(f"a rollout process failed: {answer}")
+        self._played[one.playing.index] = answer
+        one.playing, one.deaths = None, 0
+
+    def _restart(self, one: RolloutProcess) -> None:
+        """Starts a process again in which the same episode is played; its crash guard leaves out what crashes."""
+        assert one.playing is not None
+        one.connection.close()
+        status, one.deaths = one.process.wait(), one.deaths + 1
+        if one.deaths > PATIENCE:
+            raise SimulationError(f"rollout processes died {one.deaths} times in a row, the last with status {status}")
+        logger.warning("a rollout process ended with status %d in episode %d", status, one.playing.index)
+        one.process, one.connection = self._started(one.folder)
+        self._play(one)
+
+    def _started(self, folder: Path) -> tuple[subprocess.Popen[bytes], Connection]:
+        folder.mkdir(parents=True, exist_ok=True)
+        own, other = Pipe()
+        number = other.fileno()
+        command = [sys.executable, "-m", "risk_sac.search.rollouts", str(number), str(folder)]
+        process = subprocess.Popen(command, pass_fds=[number], stdin=subprocess.DEVNULL)
+        other.close()
+        own.send(self._spec)
+        return process, own
+
+
+def serve(connection: Connection, folder: Path) -> None:
+    """Plays what the connection proposes until it is closed."""
+    spec = RunSpec.model_validate_json(connection.recv())
+    reward = TrainingReward(method_of(spec.method), spec.learner)
+    with closing(RiskSacEnv.of(spec)) as env, CrashGuard(folder) as guard:
+        guarded = GuardedEnv(env, guard)
+        while True:
+            proposal: Proposal = connection.recv()
+            actor = control(spec.method, env.problem.family, proposal.seed)
+            actor.begin(proposal.genes)
+            guarded.begin(proposal.index)
+            connection.send(play(guarded, proposal, actor, actor, reward))
+
+
+def main() -> None:
+    """Serves the process that has started this one."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run decides what is left undone
+    connection, folder = Connection(int(sys.argv[1])), Path(sys.argv[2])
+    try:
+        serve(connection, folder)
+    except LOST:
+        return
+    except RiskSacError as error:
+        connection.send(str(error))
+
+
+if __name__ == "__main__":
+    main()
