@@ -29,6 +29,7 @@ BUDGET: Mapping[str, tuple[type, str, str]] = {
     "evaluation_episodes": (int, "N", "episodes of the frozen policy (default: 0)"),
     "cpu_s": (float, "S", "processor time after which a search ends (default: none)"),
     "least_episodes": (int, "N", "search episodes that --cpu-s does not cut off (default: 1)"),
+    "batch": (int, "Q", "episodes that are asked for at a time and played in parallel (default: 1)"),
 }
 
 

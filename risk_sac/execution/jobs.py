@@ -13,6 +13,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import FOLDER, Executor, WorkerProgram
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import QueuedRun, Scheduler
+from risk_sac.host.machine import rollouts_each
 from risk_sac.records import State as RunState
 from risk_sac.run_folder.crash_guard import PATIENCE
 from risk_sac.run_folder.results import RESULTS, read_results
@@ -62,11 +63,10 @@ JobProgress = Callable[[Sequence[Job]], None]
 """Told about all jobs a few times a second."""
 
 
-def worker_program() -> WorkerProgram:
-    """The worker without a limit on its memory, that replays no failures."""
-    return WorkerProgram(
-        arguments=("-m", "risk_sac.execution.worker", FOLDER, "0", "0", "0"), log=LOG, linger_s=LINGER_S
-    )
+def worker_program(jobs: int) -> WorkerProgram:
+    """The worker without a limit on its memory, that replays no failures; `jobs` are at work at a time."""
+    arguments = "-m", "risk_sac.execution.worker", FOLDER, "0", "0", "0"
+    return WorkerProgram(arguments=arguments, log=LOG, environment=rollouts_each(jobs), linger_s=LINGER_S)
 
 
 class JobStore:

@@ -5,7 +5,7 @@ import ipaddress
 import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
 UNWRITABLE = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR, errno.EEXIST)
@@ -22,6 +22,20 @@ def cores(process: Path = Path("/proc/self")) -> int:
     """
     able = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return max(1, min(able, math.ceil(min(_quotas(process), default=able))))
+
+
+ROLLOUTS = "RISK_SAC_ROLLOUTS"
+"""Variable that says how many processes play the episodes of one run."""
+
+
+def rollout_processes() -> int:
+    """Returns how many processes may play the episodes of one run: RISK_SAC_ROLLOUTS, or one per processor."""
+    return max(1, int(os.environ.get(ROLLOUTS) or cores()))
+
+
+def rollouts_each(workers: int) -> Mapping[str, str]:
+    """Returns the variable that shares this machine's processors between so many workers, unless it is set."""
+    return {ROLLOUTS: os.environ.get(ROLLOUTS) or str(max(1, cores() // workers))}
 
 
 def _quotas(process: Path) -> Iterator[float]:

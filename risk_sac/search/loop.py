@@ -10,10 +10,11 @@ import numpy as np
 import torch
 
 from risk_sac.config import RunSpec
+from risk_sac.host.machine import rollout_processes
 from risk_sac.records import Ending, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.crash_guard import CrashGuard
 from risk_sac.search.playing import GuardedEnv, Played, Proposal, play
-from risk_sac.search.rollouts import Rollouts, rollout_processes
+from risk_sac.search.rollouts import Rollouts
 from risk_sac.search.run import RunOutcome, RunState
 
 ROLLOUTS = "rollouts"  # folder of what rollout processes note

@@ -6,7 +6,6 @@ is such a process: it reads the run's spec and then proposals from the connectio
 """
 
 import logging
-import os
 import signal
 import subprocess
 import sys
@@ -20,7 +19,6 @@ from pathlib import Path
 from risk_sac.config import RunSpec, method_of
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import RiskSacError, SimulationError
-from risk_sac.host.machine import cores
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder.crash_guard import PATIENCE, CrashGuard
 from risk_sac.search.agents.controls import control
@@ -28,13 +26,7 @@ from risk_sac.search.playing import GuardedEnv, Played, Proposal, play
 
 logger = logging.getLogger(__name__)
 
-PROCESSES = "RISK_SAC_ROLLOUTS"  # variable: how many processes play the episodes of one run
 LOST = (EOFError, ConnectionResetError, BrokenPipeError)  # errors of a connection whose other end has died
-
-
-def rollout_processes() -> int:
-    """Returns how many processes may play a run's episodes: RISK_SAC_ROLLOUTS, or one per core."""
-    return max(1, int(os.environ.get(PROCESSES) or cores()))
 
 
 @dataclass(slots=True)

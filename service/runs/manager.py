@@ -16,6 +16,7 @@ from risk_sac.env.problem import checked_campaign
 from risk_sac.execution.executor import FOLDER, ClusterState, Executor, WorkerProgram
 from risk_sac.execution.messages import EpisodeDone, Finished
 from risk_sac.execution.scheduler import MOST_AT_ONCE, QueuedRun, Scheduler
+from risk_sac.host.machine import rollouts_each
 from risk_sac.records import State, Triage, TriageState
 from risk_sac.run_folder.durable import remove_abandoned, remove_temporaries
 from risk_sac.search.prior.earlier import PriorContent, keep
@@ -281,6 +282,7 @@ def worker_program(settings: ServiceSettings) -> WorkerProgram:
     return WorkerProgram(
         arguments=("-m", settings.worker_module, FOLDER, *map(str, numbers)),
         log=LOG,
+        environment=rollouts_each(settings.max_workers),
         lease_s=settings.lease_s,
         stall_s=settings.stall_s,
         linger_s=settings.grace_s,

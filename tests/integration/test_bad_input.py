@@ -31,7 +31,7 @@ def requirement(formula):
             low(budget={"episods": 3}),
             "budget.episods",
             "3",
-            "one of all_points, cpu_s, episodes, evaluation_episodes, least_episodes",
+            "one of all_points, batch, cpu_s, episodes, evaluation_episodes, least_episodes",
         ),
         (low(budget={"episodes": -1}), "budget.episodes", "-1", ">= 1"),
         (low(budget={"episodes": 3, "least_episodes": 4}), "budget", "4", "at most episodes, 3"),

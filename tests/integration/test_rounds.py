@@ -1,0 +1,112 @@
+"""Episodes that are asked for in rounds and played by processes of their own."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+
+from risk_sac.config import Budget, RunMethod, RunSpec
+from risk_sac.host.machine import ROLLOUTS
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.run_folder.results import FAILURES
+from risk_sac.search.loop import execute_run
+from tests.listener import Listener
+
+BATCH = 4
+METHODS: tuple[RunMethod, ...] = ("archive", "bo-only", "random")
+
+
+def spec(method: RunMethod, episodes: int, batch: int = BATCH, **budget: int) -> RunSpec:
+    return RunSpec(family="low", method=method, seed=5, budget=Budget(episodes=episodes, batch=batch, **budget))
+
+
+class Killer(Listener):
+    """Kills a rollout process after each of some episodes."""
+
+    def __init__(self, after: tuple[int, ...]) -> None:
+        super().__init__()
+        self.after, self.killed = after, 0
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
+        super().episode(record, metrics, series)
+        if record.index in self.after:
+            processes = psutil.Process().children()
+            processes[record.index % len(processes)].send_signal(signal.SIGKILL)
+            self.killed += 1
+
+
+@pytest.fixture
+def processes(monkeypatch: pytest.MonkeyPatch):
+    return lambda number: monkeypatch.setenv(ROLLOUTS, str(number))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_number_of_processes_changes_nothing(tmp_path: Path, processes, method: RunMethod) -> None:
+    digests = set()
+    for number in (1, 3):
+        processes(number)
+        digests.add(execute_run(spec(method, 14), tmp_path / str(number), Listener()).digest)
+    assert len(digests) == 1
+
+
+def test_killed_processes_change_nothing(tmp_path: Path, processes) -> None:
+    processes(2)
+    undisturbed = execute_run(spec("archive", 16), tmp_path / "whole", Listener())
+    killer = Killer(after=(1, 6, 9))
+    killed = execute_run(spec("archive", 16), tmp_path / "killed", killer)
+    assert killer.killed == 3
+    assert killed.digest == undisturbed.digest
+    assert [record.index for record in killer.records] == list(range(16))
+    series = [sorted(file.name for file in (tmp_path / name / FAILURES).glob("*")) for name in ("whole", "killed")]
+    assert series[0] == series[1]
+
+
+@pytest.mark.parametrize(("method", "played"), [("archive-replay", 1), ("bo-only", 6)])
+def test_a_stopped_run_goes_on_as_if_it_had_not(tmp_path: Path, processes, method: RunMethod, played: int) -> None:
+    processes(2)
+    whole = execute_run(spec(method, 14), tmp_path / "whole", Listener())
+    stopped = execute_run(spec(method, 14), tmp_path / "stopped", Listener(limit=played))
+    assert not stopped.finished
+    assert execute_run(spec(method, 14), tmp_path / "stopped", Listener()).digest == whole.digest
+
+
+def test_a_batch_of_one_is_played_in_this_process(tmp_path: Path) -> None:
+    execute_run(spec("archive", 2, batch=1), tmp_path, Listener())
+    assert not (tmp_path / "rollouts").exists()
+
+
+def test_a_round_is_not_many_times_the_same(tmp_path: Path, processes) -> None:
+    processes(2)
+    listener = Listener()
+    execute_run(spec("bo-only", 24, batch=8), tmp_path, listener)
+    scenes = [tuple(np.round(list(record.scene.values()), 3)) for record in listener.records]
+    assert len(set(scenes)) == len(scenes)
+
+
+def test_both_phases_of_a_budget_are_played(tmp_path: Path, processes) -> None:
+    processes(2)
+    listener = Listener()
+    outcome = execute_run(spec("random", 5, evaluation_episodes=3), tmp_path, listener)
+    assert outcome.finished
+    assert [record.phase for record in listener.records] == ["search"] * 5 + ["evaluation"] * 3
+
+
+def test_a_crashing_episode_is_left_out(tmp_path: Path, processes, monkeypatch: pytest.MonkeyPatch) -> None:
+    processes(2)
+    monkeypatch.setenv(
+        "PYTHONPATH", f"{Path(__file__).parent / 'crashing_rollouts'}:{os.environ.get('PYTHONPATH', '')}"
+    )
+    listener = Listener()
+    outcome = execute_run(spec("archive", 6), tmp_path, listener)
+    assert outcome.finished
+    assert [record.reason == "sim_crash" for record in listener.records] == [index == 2 for index in range(6)]
+
+
+def test_a_script_is_driven_without_torch() -> None:
+    code = "import sys, risk_sac.search.rollouts; sys.exit('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
