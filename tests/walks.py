@@ -30,7 +30,7 @@ HEARD = "RISK_SAC_WALKS"  # names the file that the worker writes
 WALKS = {
     "action": {"env/env.py": {"RiskSacEnv.step"}},
     "record": {
-        "search/loop.py": {"_record"},
+        "search/loop.py": {"tell"},
         "execution/recorder.py": {"Recorder.episode"},
         "execution/messages.py": {"hear"},
         "execution/scheduler.py": {"Scheduler._add_episodes"},

@@ -1,0 +1,86 @@
+"""How much faster rounds are with more processes, beside what this machine can do."""
+
+import os
+import subprocess
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from risk_sac.config import Budget, RunSpec
+from risk_sac.host.machine import ROLLOUTS, cores
+from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.search.loop import execute_run
+from tests.listener import Listener
+
+BATCH, EPISODES, WARM = 8, 160, 32  # the first episodes start the processes and compile
+BARE_STEPS = 30_000
+BARE = f"""
+import sys, time
+from contextlib import closing
+import libsumo
+from risk_sac.env.env import make_default
+with closing(make_default("low")) as env:
+    env.reset(seed=0)
+    print("ready", flush=True)
+    sys.stdin.readline()
+    for _ in range({BARE_STEPS}):
+        libsumo.simulationStep()
+"""
+
+
+class Watch(Listener):
+    """Times the episodes after the first ones."""
+
+    began_s = 0.0
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
+        super().episode(record, metrics, series)
+        if record.index == WARM - 1:
+            self.began_s = time.perf_counter()
+
+
+def steps_per_s(folder: Path, processes: int) -> float:
+    """Environment steps of an archive search per second."""
+    os.environ[ROLLOUTS] = str(processes)
+    watch = Watch()
+    execute_run(
+        RunSpec(family="low", method="archive", seed=3, budget=Budget(episodes=EPISODES, batch=BATCH)), folder, watch
+    )
+    return sum(record.steps for record in watch.records[WARM:]) / (time.perf_counter() - watch.began_s)
+
+
+def bare_steps_per_s(processes: int) -> float:
+    """Steps per second of so many simulations that nothing else is done with."""
+    with ExitStack() as stack:
+        started = [
+            stack.enter_context(
+                subprocess.Popen([sys.executable, "-c", BARE], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            )
+            for _ in range(processes)
+        ]
+        for one in started:
+            assert one.stdout is not None
+            one.stdout.readline()
+        began_s = time.perf_counter()
+        for one in started:
+            assert one.stdin is not None
+            one.stdin.close()
+        assert [one.wait() for one in started] == [0] * processes
+        return processes * BARE_STEPS / (time.perf_counter() - began_s)
+
+
+@pytest.mark.bench
+def test_processes_of_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(ROLLOUTS, "1")
+    counts = [number for number in (1, 2, 4, 8, 16, 32, 64) if number <= cores()]
+    ours = {number: steps_per_s(tmp_path / str(number), number) for number in counts}
+    bare = {number: bare_steps_per_s(number) for number in counts}
+    for number in counts:
+        print(
+            f"\n{number} processes: {ours[number]:.0f} steps/s, {ours[number] / ours[1]:.2f} times one process; "
+            f"bare libsumo {bare[number] / bare[1]:.2f} times"
+        )
+    assert all(ours[number] > 0.0 for number in counts)
