@@ -75,9 +75,9 @@ class LagrangianConfig(Settings):
     initial: Weight = 0.0
     learning_rate: Annotated[float, Field(ge=1e-9, le=1)] = 5e-4
     """η_λ."""
-    cost_limit: Fraction = 0.15
+    cost_limit: Fraction = 0.1
     """d, on the policy's mean realism cost per step, which is in [0, 1]. Undisturbed traffic costs about 0; failures
-    that people accept cost 0.06 on average, and those that they reject 0.26."""
+    that people accept cost 0.06 on average, and those that they reject 0.19. This limit parts them best."""
     maximum: Annotated[float, Field(ge=1e-6, le=1000)] = 10.0
     """Cap on λ, far above where it settles; it only keeps λ finite where no policy can keep the limit."""
 

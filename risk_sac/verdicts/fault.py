@@ -18,7 +18,7 @@ from risk_sac.verdicts.conflict import BODY_M, BRAKES_MPS2, Conflict, lasting_si
 from risk_sac.verdicts.course import CORRIDOR_M, HORIZON_S, RESPONDS_S, YIELDING_MPS2, BodyOnPath, MovingBox
 from risk_sac.verdicts.drivers import JERK_MPS3, R157_DELAY_S
 from risk_sac.verdicts.evidence import Evidence, column, ego_path, inside, recorded_motion, seen_along
-from risk_sac.verdicts.offences import STANDING_MPS
+from risk_sac.verdicts.offences import EGO, STANDING_MPS, STOPS, entry, front_of
 from risk_sac.world.geometry import frame_view
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import HEADING, LENGTH, VX, VY, WIDTH, Bools, Floats, Kind, X, Y
@@ -242,6 +242,7 @@ YIELDS = frozenset({"red_light", "priority", "pedestrian_on_red", "wrong_directi
 LATE_S = 0.5  # after which an answer comes later than R157's driver gives it
 HARD = 0.8  # of the braking that car and road allow
 CROSSINGS = ("crossing", "beside_crossing")
+GREEN = b"Gg"
 
 
 class Parts(NamedTuple):
@@ -264,17 +265,37 @@ def fault(parts: Parts) -> Fault:
     return Fault.EGO if parts.ego_erred or parts.ego_yields or parts.left_rss else Fault.OTHER
 
 
+def came_first(evidence: Evidence, striker: int) -> bool:
+    """Tells whether a vehicle was in the junction before the ego's signal turned green.
+
+    The ego, which enters on that green, has to yield to one that entered lawfully.
+
+    Source: North Dakota pattern jury instructions, traffic control signals: traffic on green "must yield the
+    right-of-way to other vehicles [...] lawfully within the intersection [...] at the time the signal is exhibited".
+    """
+    e = evidence
+    here = [area for area in e.ground.junctions if inside((area,), e.x_m[-1:, striker], e.y_m[-1:, striker])[0]]
+    entered = entry(e, EGO, GREEN)
+    if entered is None or not here:
+        return False
+    stopped = np.flatnonzero(np.isin(e.link[:entered, EGO], list(STOPS)))
+    return bool(len(stopped) and inside(here, *front_of(e, int(stopped[-1]) + 1, striker))[0])
+
+
 def has_to_yield(
-    conflict_type: ConflictType, ground: str, broke: Collection[str], ego_broke: Collection[str]
+    conflict_type: ConflictType, ground: str, broke: Collection[str], ego_broke: Collection[str], *, first: bool = False
 ) -> str | None:
     """Names which had to yield to the other: ego or striker; None where the record does not tell.
 
     A follower has to, and one that comes over; at a crossing the ego, unless the pedestrian came on red, and beside it
-    the pedestrian. Between vehicles whose ways cross their offences tell.
+    the pedestrian. Between vehicles whose ways cross their offences tell, and `first`: whether the striker was in the
+    junction before the ego's signal turned green.
     """
     if not YIELDS.isdisjoint(broke):
         return "striker"
     if not YIELDS.isdisjoint(ego_broke) or conflict_type in (ConflictType.LEADER, ConflictType.MERGE):
+        return "ego"
+    if first and conflict_type is ConflictType.CROSSING:
         return "ego"
     if conflict_type is ConflictType.PEDESTRIAN:
         return "ego" if ground in CROSSINGS else "striker"

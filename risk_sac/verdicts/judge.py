@@ -15,7 +15,7 @@ from risk_sac.scenario.bodies import body_of
 from risk_sac.sim.collision import Contact
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.evidence import Evidence, recorded_contact
-from risk_sac.verdicts.fault import ego_part, fault, has_to_yield, parts_of_contact, parts_of_violation
+from risk_sac.verdicts.fault import came_first, ego_part, fault, has_to_yield, parts_of_contact, parts_of_violation
 from risk_sac.verdicts.kinds import name_contact, name_violation
 from risk_sac.verdicts.labels import ground, impact, manoeuvre, response, severity
 from risk_sac.verdicts.offences import ego_offences, endangered_ego, inherits_stop, striker_offences
@@ -125,7 +125,7 @@ def judge(
     drivers = reference_outcomes(evidence, striker, conflict) if valid else {}
     avoids = {name: each.avoids for name, each in drivers.items()}
     graded = grade(avoids, preventing) if valid else None
-    yields = has_to_yield(conflict.type, where, broke, ego_broke)
+    yields = has_to_yield(conflict.type, where, broke, ego_broke, first=came_first(evidence, striker))
     part = ego_part(evidence, striker, conflict, yields)
     contact = contact or recorded_contact(evidence, striker)
     struck = impact(evidence, striker, contact)
@@ -354,7 +354,8 @@ def _fault(evidence: Evidence, met: MetActor | None, broke: Sequence[str], grade
     conflict, other = met.conflict, met.column
     other_broke = striker_offences(evidence, other, crossing=conflict.type is ConflictType.CROSSING)
     other_broke += endangered_ego(evidence, other, conflict)
-    yields = has_to_yield(conflict.type, ground(evidence, other), other_broke, broke)
+    first = came_first(evidence, other)
+    yields = has_to_yield(conflict.type, ground(evidence, other), other_broke, broke, first=first)
     return fault(parts_of_violation(own=False, yields=yields, other_broke=other_broke, broke=broke, grade=graded))
 
 

@@ -127,15 +127,17 @@ def left_carriageway(evidence: Evidence, actor: int = EGO) -> frozenset[str]:
 def took_priority(evidence: Evidence, taker: int, other: int) -> bool:
     """Whether a vehicle entered although it had to yield and the other did not.
 
-    Their signals at entry decide. None is recorded for background traffic, whose drivers enter on green.
+    Their signals at its entry decide: one that turns green later gives no priority over what is in the junction. None
+    is recorded for background traffic, whose drivers enter on green.
     """
-    if not entered_on(evidence, taker, MUST_YIELD):
+    entered = entry(evidence, taker, MUST_YIELD)
+    if entered is None or not entered_on(evidence, taker, MUST_YIELD):
         return False
     if evidence.role[other] == Role.BACKGROUND:
         return True
-    link = evidence.link[:, other]
-    shown = link[link > 0]
-    return bool(len(shown) and int(shown[-1]) in MAJOR)
+    before, later = (part[part > 0] for part in np.split(evidence.link[:, other], [entered]))
+    shown = before[-1:] if len(before) else later[:1]
+    return bool(len(shown) and int(shown[0]) in MAJOR)
 
 
 def reverses(evidence: Evidence, striker: int) -> bool:
@@ -175,7 +177,7 @@ def took_crossing(evidence: Evidence, striker: int) -> bool:
         return False
     x_m, y_m = evidence.x_m[-1:, striker], evidence.y_m[-1:, striker]
     here = [area for area in evidence.ground.crossings if inside((area,), x_m, y_m, KERB_M)[0]]
-    return not bool(inside(here, *_front(evidence, 0, EGO))[: stepped + 1].any())
+    return not bool(inside(here, *front_of(evidence, 0, EGO))[: stepped + 1].any())
 
 
 def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
@@ -184,7 +186,7 @@ def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
     It is until its whole body has left the junction, however long that takes; where the record does not say where the
     junction ends, for 6 s.
     """
-    entered = _entry(evidence, actor, letters)
+    entered = entry(evidence, actor, letters)
     if entered is None:
         return False
     x, y, areas = evidence.x_m[entered:, actor], evidence.y_m[entered:, actor], evidence.ground.junctions
@@ -203,7 +205,7 @@ def on_inherited_red(evidence: Evidence) -> bool:
 
     It could not stop at leisure any more: with 3.4 m/s² after 0.75 s, from where it was at the release.
     """
-    e, entered = evidence, _entry(evidence, EGO, RED)
+    e, entered = evidence, entry(evidence, EGO, RED)
     if entered is None or entered <= e.released:
         return False
     to_line_m = float(
@@ -229,7 +231,7 @@ def inherits_stop(speed_mps: float, to_line_m: float, after_s: float) -> bool:
     return speed_mps * R157_DELAY_S + stops_m > to_line_m and after_s <= stops_s + 1e-6
 
 
-def _entry(evidence: Evidence, actor: int, letters: bytes) -> int | None:
+def entry(evidence: Evidence, actor: int, letters: bytes) -> int | None:
     """Finds the frame in which a vehicle last came into a junction on one of these letters; None if in none.
 
     On entry the signal goes from one of these letters to none. A change to another letter is a change of the signal,
@@ -241,7 +243,7 @@ def _entry(evidence: Evidence, actor: int, letters: bytes) -> int | None:
     if not shown.any():
         return None
     passed = shown & (link[1:] == 0)
-    in_junction = inside(e.ground.junctions, *_front(e, 0, actor))
+    in_junction = inside(e.ground.junctions, *front_of(e, 0, actor))
     passed |= shown & ~_is_any(link[1:], letters) & in_junction[1:] & ~in_junction[:-1]
     frames = np.flatnonzero(passed & (e.speed_mps[1:, actor] > STANDING_MPS))
     return int(frames[-1]) + 1 if len(frames) else None
@@ -262,7 +264,8 @@ def _is_any(link: Letters, letters: bytes) -> Bools:
     return any_of
 
 
-def _front(evidence: Evidence, first: int, actor: int) -> tuple[Floats, Floats]:
+def front_of(evidence: Evidence, first: int, actor: int) -> tuple[Floats, Floats]:
+    """Locates the middle of an actor's front, from frame `first` on; m."""
     e = evidence
     heading, reach = e.heading_rad[first:, actor], e.length_m[actor] / 2
     return e.x_m[first:, actor] + reach * np.cos(heading), e.y_m[first:, actor] + reach * np.sin(heading)

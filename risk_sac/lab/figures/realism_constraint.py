@@ -1,12 +1,14 @@
 """Compares the realism cost of `risk-sac`, which λ bounds, with that of `sac`, which nothing bounds.
 
-    python -m risk_sac.lab.figures.realism_constraint OUT [--scenario mixed] [--episodes 1000] [--seed 7] [--jobs 2]
+    python -m risk_sac.lab.figures.realism_constraint OUT [--scenario mixed] [--limit D] [--episodes 1000] [--jobs 2]
 
 plays what OUT lacks and writes OUT/table.md: per family the mean cost d over the last 200 episodes of both methods. An
-interrupted run goes on where it was; `--table` only reads what there is.
+interrupted run goes on where it was; `--table` only reads what there is. λ can bind only where the limit is below what
+`sac` costs.
 """
 
 import argparse
+import json
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -16,28 +18,34 @@ from statistics import fmean
 
 from risk_sac.config import FamilyName
 from risk_sac.records import EpisodeRecord
-from risk_sac.run_folder.results import EPISODES, records_from_lines
+from risk_sac.run_folder.results import EPISODES, RESULTS, records_from_lines
 
 FAMILIES: tuple[FamilyName, ...] = ("low", "mixed", "dense")
 METHODS = ("risk-sac", "sac")
 LAST = 200  # episodes that are compared
-HEAD = "| family | episodes | d of risk-sac | d of sac | ratio | λ |\n|---|---|---|---|---|---|"
+HEAD = "| family | episodes | limit | d of risk-sac | d of sac | ratio | λ |\n|---|---|---|---|---|---|---|"
 
 
 def play(options: argparse.Namespace, family: FamilyName, method: str) -> None:
     """Plays a run in a process of its own, which learns with one thread."""
     arguments = ["run", "--scenario", family, "--method", method, "--ego", options.ego, "--seed", str(options.seed)]
     arguments += ["--episodes", str(options.episodes), "--prior", "none", "--out", str(options.out / family / method)]
+    if options.limit is not None:
+        options.out.mkdir(parents=True, exist_ok=True)
+        settings = options.out / "limit.yaml"
+        settings.write_text(f"learner: {{lagrangian: {{cost_limit: {options.limit}}}}}\n")
+        arguments += ["--spec", str(settings)]
     subprocess.run([sys.executable, "-m", "risk_sac", *arguments], check=True, stdout=subprocess.DEVNULL)
 
 
-def row(family: FamilyName, constrained: Sequence[EpisodeRecord], free: Sequence[EpisodeRecord]) -> str:
-    """Compares two runs over the last episodes that both have played."""
+def row(family: str, limit: float, constrained: Sequence[EpisodeRecord], free: Sequence[EpisodeRecord]) -> str:
+    """Compares two runs over the last episodes that both have played; `limit` is that of the constrained one."""
     count = min(len(constrained), len(free))
     last = slice(max(count - LAST, 0), count)
     kept, spent = (fmean(episode.mean_cost for episode in run[last]) for run in (constrained, free))
     ratio = f"{spent / kept:.2f}" if kept else "–"
-    return f"| {family} | {count} | {kept:.3f} | {spent:.3f} | {ratio} | {constrained[count - 1].dual_variable:.2f} |"
+    dual_variable = constrained[count - 1].dual_variable
+    return f"| {family} | {count} | {limit} | {kept:.3f} | {spent:.3f} | {ratio} | {dual_variable:.2f} |"
 
 
 def rows(out: Path) -> Iterator[str]:
@@ -46,7 +54,8 @@ def rows(out: Path) -> Iterator[str]:
         files = [out / family / method / EPISODES for method in METHODS]
         if all(file.exists() and file.stat().st_size for file in files):
             constrained, free = (records_from_lines(file.read_bytes()) for file in files)
-            yield row(family, constrained, free)
+            spec = json.loads((out / family / METHODS[0] / RESULTS).read_bytes())["spec"]
+            yield row(family, spec["learner"]["lagrangian"]["cost_limit"], constrained, free)
 
 
 def main() -> None:
@@ -54,6 +63,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("--scenario", dest="family", choices=FAMILIES, action="append")
+    parser.add_argument("--limit", type=float, help="cost limit of risk-sac, in [0, 1]; default: that of the learner")
     parser.add_argument("--ego", default="idm-aeb")
     parser.add_argument("--episodes", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=7)

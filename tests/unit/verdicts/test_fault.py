@@ -147,6 +147,24 @@ def test_a_crossing_car_that_runs_into_the_egos_rear_half(letter, expected):
     assert judged(evidence).fault is expected
 
 
+@pytest.mark.parametrize(
+    ("green_s", "enters_s", "red", "expected"),
+    [(2.5, 1.5, False, Fault.EGO), (1.0, 2.0, False, Fault.OTHER), (2.5, 1.5, True, Fault.OTHER)],
+    ids=["it was there before the green", "it came later", "it came on red"],
+)
+def test_a_car_that_clears_the_junction_when_the_egos_signal_turns_green(green_s, enters_s, red, expected):
+    """It runs into the ego's rear half, so that the ego's late reaction does not count by itself."""
+    evidence = crossing_car(other=9.0, ahead=-6.0)
+    link, time_s = np.zeros_like(evidence.link), evidence.time_s
+    link[time_s < 3.5, 0] = ord("G")
+    link[time_s < green_s, 0] = ord("r")
+    link[time_s < enters_s, 1] = ord("r" if red else "G")
+    y_m = float(evidence.y_m[np.searchsorted(time_s, enters_s), 1])
+    junction = (Area.box(45.0, 75.0, *sorted((y_m + CAR_M[0] / 2, -y_m))),)
+    evidence = replace(evidence, link=link, ground=replace(STREET, junctions=junction))
+    assert judged(evidence).fault is expected
+
+
 def test_a_car_that_runs_a_red_light_into_an_ego_that_has_just_started():
     ego = straight(45.0, 0.0, 0.0, 0.0, (3.0, 2.3))
     car = straight(60.0, -12.0 * 6.4, math.pi / 2, 12.0, start_s=0.0)

@@ -106,7 +106,7 @@ def test_a_speed_that_the_ego_inherited_is_no_offence_while_it_slows_down(brakin
     assert of_ego(stage(ego, straight(44.0, 0.0, 0.0, 0.0, start_s=0.0), from_s=0.0)) == expected
 
 
-@pytest.mark.parametrize("ego", [[(0.0, "g"), (3.5, "")], [(0.0, "r"), (3.5, "")], []])
+@pytest.mark.parametrize("ego", [[(0.0, "g"), (3.5, "")], [(0.0, "r"), (3.5, "")], [], [(0.0, "r"), (3.8, "G")]])
 def test_priority_takes_an_ego_that_had_it(ego):
     assert labels(crossing(ego, [(0.0, "g"), (3.5, "")])) == ()
 
