@@ -1,8 +1,9 @@
 """What the joint policy sees, in the ego's frame and scaled to about [-1, 1].
 
 Per adversary its motion relative to the ego and what C_soft remembers of it, then the ego itself, its signal, the
-scene ξ, the robustness of every requirement, where static bodies are and the time left. Robustness and that memory are part of the state because
-STL and C_soft keep history: without them neither the shaped reward nor the cost would be Markov.
+scene ξ, the robustness of every requirement, where static bodies are and the time left. Robustness and that memory are
+part of the state because STL and C_soft keep history: without them neither the shaped reward nor the cost would be
+Markov.
 """
 
 import numpy as np

@@ -31,10 +31,12 @@ IN_LANE_M = 1.2  # an actor nearer to the ego's axis is its leader
 NEAREST_M, FARTHEST_M = 1.9, 3.1  # from the ego's axis: touching it, and hardly off the middle of the next lane
 FOREMOST_M = 12.0  # along it, from the ego's middle: an actor farther back strikes its flank
 BEFORE_M = 5.0  # a leader's middle before the ego's, at least
+SAME_LINE_RAD = 0.02  # of the ego's heading from its lane's: far ahead, a body aside by so much is on the ego's way
 HIDING_M = 40.0  # the same of one that hides a standing body, at most: it needs room to leave late
 FASTER_MPS = 5.0  # than the ego, at most, to take up a place
 CATCHING_UP = 0.5  # 1/s, of the way to that place
 ANSWER = 0.5  # of full drive, for 1 m/s of difference
+GENTLE_ANSWER = 0.15  # of a leader that hides a standing body, as drivers follow each other
 LEAST_EFFORT = 0.4  # of an actor that is on time
 EARLIER_S, SOONEST_S = 2.0, 0.5  # than the ego, at most; and from now
 TURNING = 0.5  # of what is possible, at most
@@ -90,7 +92,7 @@ def adversaries_seen(
     rows: list[list[float]] = observation[: adversaries * PER_ADVERSARY].reshape(-1, PER_ADVERSARY).tolist()
     ego_mps = float(observation[adversaries * PER_ADVERSARY]) * SPEED_MPS
     places: list[list[float]] = observation[-1 - PER_STATIC * statics : -1].reshape(-1, PER_STATIC).tolist()
-    standing_m = [x * X_M for x, y in places if x > 0.0 and abs(y * Y_M) < IN_LANE_M]
+    standing_m = [x * X_M for x, y in places if x > 0.0 and abs(y * Y_M) < IN_LANE_M + SAME_LINE_RAD * x * X_M]
     return [_seen(row, step * STEP_S, ego_mps, standing_m) if any(row) else None for row in rows]
 
 
@@ -138,20 +140,22 @@ def alongside(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
     `place` is where along the ego it waits and `aside` how far from the ego's axis; a leader keeps its lane. `drive`
     and `steer`, towards the ego, are those of the strike, `after` is the drive that follows.
 
-    Before a static body on the ego's way it leaves that way instead: `steer` is how hard, to the right below 0.5, and
-    `aside` how far. A neighbour stays beside.
+    Before a static body on the ego's way it leaves that way instead, so that the ego meets the body: `steer` is how
+    hard, to the right below 0.5, `aside` how far, and `drive` how fast, up to 5 m/s from the ego's speed, whatever its
+    driver would do about the body. A neighbour stays beside.
     """
     if since_cue_s < 0.0:
         return _taking_place(genes, seen)
-    steer = genes.steer * _clip(-seen.y_m) if math.isinf(seen.standing_m) else _leaving(genes, seen)
-    return _strike(genes, since_cue_s, steer)
-
-
-def _leaving(genes: Genes, seen: Seen) -> float:
-    """Returns the steering of a leader that makes room, so that the ego meets what stands ahead."""
+    if math.isinf(seen.standing_m) or since_cue_s >= LONGEST_S * genes.lasts:
+        return _strike(genes, since_cue_s, genes.steer * _clip(-seen.y_m))
     wanted = _signed(genes.steer)
     side = wanted if abs(seen.y_m) < IN_LANE_M else seen.y_m
-    return abs(wanted) * _clip(math.copysign(_aside_m(genes), side) - seen.y_m)
+    steer = abs(wanted) * _clip(math.copysign(_aside_m(genes), side) - seen.y_m)
+    return Act(_keeping_speed(seen, FASTER_MPS * _signed(genes.drive)), steer)
+
+
+def _keeping_speed(seen: Seen, faster_mps: float, answer: float = ANSWER) -> float:
+    return _clip(answer * (seen.ego_mps + faster_mps - seen.speed_mps))
 
 
 def _aside_m(genes: Genes) -> float:
@@ -160,13 +164,14 @@ def _aside_m(genes: Genes) -> float:
 
 def _taking_place(genes: Genes, seen: Seen) -> Act:
     leads = abs(seen.y_m) < IN_LANE_M
-    foremost_m = HIDING_M - BEFORE_M if leads and math.isfinite(seen.standing_m) else FOREMOST_M
+    hides = leads and math.isfinite(seen.standing_m)
+    foremost_m = HIDING_M - BEFORE_M if hides else FOREMOST_M
     place_m = foremost_m * genes.place + (BEFORE_M if leads else 0.0)
     aside_m = 0.0 if leads else _aside_m(genes)
-    wanted_mps = seen.ego_mps + _clip(CATCHING_UP * (place_m - seen.x_m), FASTER_MPS)
+    faster_mps = _clip(CATCHING_UP * (place_m - seen.x_m), FASTER_MPS)
     waits_s = EARLIEST_S + LATEST_CUE_S * genes.cue / 4  # for most of the time to its cue it is beside the ego
     steer = _clip(math.copysign(aside_m, seen.y_m) - seen.y_m) if seen.time_s >= waits_s else 0.0
-    return Act(_clip(ANSWER * (wanted_mps - seen.speed_mps)), steer)
+    return Act(_keeping_speed(seen, faster_mps, GENTLE_ANSWER if hides else ANSWER), steer)
 
 
 def crossing(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:

@@ -196,7 +196,7 @@ def _pose_at(path: Floats, first: int, station_m: float, offset_m: float, half_l
 
 @compiled
 def _passes_s(state: Floats, own: int, statics: int, speed: float) -> float:
-    """Computes the time in which a vehicle has passed all static bodies that are ahead of it, s; choice: straight on."""
+    """Computes the time until a vehicle has passed all static bodies ahead, s; choice: straight on."""
     cos, sin, passes_m = math.cos(state[HEADING, own]), math.sin(state[HEADING, own]), 0.0
     for other in range(state.shape[1] - statics, state.shape[1]):
         ahead_m = (state[X, other] - state[X, own]) * cos + (state[Y, other] - state[Y, own]) * sin
