@@ -32,11 +32,11 @@ NEAREST_M, FARTHEST_M = 1.9, 3.1  # from the ego's axis: touching it, and hardly
 FOREMOST_M = 12.0  # along it, from the ego's middle: an actor farther back strikes its flank
 BEFORE_M = 5.0  # a leader's middle before the ego's, at least
 SAME_LINE_RAD = 0.02  # of the ego's heading from its lane's: far ahead, a body aside by so much is on the ego's way
-HIDING_M = 40.0  # the same of one that hides a standing body, at most: it needs room to leave late
+HIDING_M = 60.0  # the same of one that hides a standing body, at most: an ego at 26 m/s follows at 40 m
 FASTER_MPS = 5.0  # than the ego, at most, to take up a place
 CATCHING_UP = 0.5  # 1/s, of the way to that place
 ANSWER = 0.5  # of full drive, for 1 m/s of difference
-GENTLE_ANSWER = 0.15  # of a leader that hides a standing body, as drivers follow each other
+GENTLE_ANSWER = 0.15  # the same of a leader that hides a standing body and is too fast: it lets the ego come nearer
 LEAST_EFFORT = 0.4  # of an actor that is on time
 EARLIER_S, SOONEST_S = 2.0, 0.5  # than the ego, at most; and from now
 TURNING = 0.5  # of what is possible, at most
@@ -171,7 +171,8 @@ def _taking_place(genes: Genes, seen: Seen) -> Act:
     faster_mps = _clip(CATCHING_UP * (place_m - seen.x_m), FASTER_MPS)
     waits_s = EARLIEST_S + LATEST_CUE_S * genes.cue / 4  # for most of the time to its cue it is beside the ego
     steer = _clip(math.copysign(aside_m, seen.y_m) - seen.y_m) if seen.time_s >= waits_s else 0.0
-    return Act(_keeping_speed(seen, faster_mps, GENTLE_ANSWER if hides else ANSWER), steer)
+    too_fast = seen.speed_mps > seen.ego_mps + faster_mps
+    return Act(_keeping_speed(seen, faster_mps, GENTLE_ANSWER if hides and too_fast else ANSWER), steer)
 
 
 def crossing(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:
