@@ -1,8 +1,9 @@
 """What the joint policy sees, in the ego's frame and scaled to about [-1, 1].
 
 Per adversary its motion relative to the ego and what C_soft remembers of it, then the ego itself, its signal, the
-scene ξ, the robustness of every requirement and the time left. Robustness and that memory are part of the state because
-STL and C_soft keep history: without them neither the shaped reward nor the cost would be Markov.
+scene ξ, the robustness of every requirement, where static bodies are and the time left. Robustness and that memory are
+part of the state because STL and C_soft keep history: without them neither the shaped reward nor the cost would be
+Markov.
 """
 
 import numpy as np
@@ -16,6 +17,7 @@ from risk_sac.env.observation_layout import (
     MOTION_PER_ADVERSARY,
     PER_ADVERSARY,
     PER_EGO,
+    PER_STATIC,
     SPEED_MPS,
     X_M,
     Y_M,
@@ -33,8 +35,8 @@ class Encoder:
     """Builds observations of a fixed size for one family."""
 
     def __init__(self, family: Family, scene_size: int, requirements: int) -> None:
-        self._adversaries = family.adversaries
-        self.size = observation_size(len(family.adversaries), scene_size, requirements)
+        self._adversaries, self._statics = family.adversaries, family.statics
+        self.size = observation_size(len(family.adversaries), scene_size, requirements, len(family.statics))
         self._ids: tuple[str, ...] = ()
 
     def encode(
@@ -57,15 +59,16 @@ class Encoder:
           time_left: share of the horizon.
 
         Returns:
-          `size`, each entry in [-LIMIT, LIMIT]; an adversary that left the net is all zeros.
+          `size`, each entry in [-LIMIT, LIMIT]; an adversary that left the net, or an absent body, is all zeros.
         """
         if frame.ids is not self._ids:
             self._ids = frame.ids
-            rows = [frame.ids.index(a) if a in frame.ids else 0 for a in self._adversaries]
+            rows = [frame.ids.index(a) if a in frame.ids else 0 for a in (*self._adversaries, *self._statics)]
             self._rows = np.array(rows, dtype=np.intp)  # a scenario may have no adversary
         return _encoded(
             self.size,
             self._rows,
+            len(self._adversaries),
             assessment.others,
             frame.state,
             memory,
@@ -81,6 +84,7 @@ class Encoder:
 def _encoded(
     size: int,
     rows: NDArray[np.int64],
+    adversaries: int,
     others: Floats,
     state: Floats,
     memory: Floats,
@@ -91,7 +95,7 @@ def _encoded(
     time_left: float,
 ) -> NDArray[np.float32]:
     result = np.zeros(size)
-    for slot in range(len(rows)):
+    for slot in range(adversaries):
         row = rows[slot]
         if row == 0:  # left the net; 0 is the ego itself
             continue
@@ -108,7 +112,7 @@ def _encoded(
         result[at + 9] = others[SEEN, i]
         for k in range(len(MEMORY_SCALE)):
             result[at + MOTION_PER_ADVERSARY + k] = memory[k, slot] / MEMORY_SCALE[k]
-    at = len(rows) * PER_ADVERSARY
+    at = adversaries * PER_ADVERSARY
     result[at] = state[SPEED, 0] / SPEED_MPS
     result[at + 1] = state[ACCEL, 0] / ACCEL_MPS2
     result[at + 2] = state[LATERAL, 0] / LATERAL_MPS
@@ -121,5 +125,9 @@ def _encoded(
     for value in robustness:
         result[at] = value / ROBUSTNESS_CLIP
         at += 1
+    for row in rows[adversaries:]:
+        if row > 0:
+            result[at], result[at + 1] = others[AHEAD, row - 1] / X_M, others[ASIDE, row - 1] / Y_M
+        at += PER_STATIC
     result[at] = time_left
     return np.minimum(np.maximum(result, -LIMIT), LIMIT).astype(np.float32)

@@ -205,7 +205,9 @@ class Problem:
     @property
     def observation_size(self) -> int:
         """Entries of an observation."""
-        return observation_size(len(self.family.adversaries), self.space.dimension, len(self.requirements))
+        return observation_size(
+            len(self.family.adversaries), self.space.dimension, len(self.requirements), len(self.family.statics)
+        )
 
     @property
     def action_size(self) -> int:

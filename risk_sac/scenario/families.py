@@ -44,6 +44,7 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
         odd=_odd(of),
         vehicles=vehicles,
         pedestrians=pedestrians,
+        statics=tuple(name for name, actor in document.actors.items() if actor.role == "static"),
         layout=of.layout,
         horizon_steps=steps_of(of.horizon_s),
         like=document.like,

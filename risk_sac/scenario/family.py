@@ -34,6 +34,7 @@ class Family:
     odd: Odd  # complete: every field is set
     vehicles: tuple[str, ...]  # adversary vehicles, in the order of the action vector
     pedestrians: tuple[str, ...]  # adversary pedestrians, after the vehicles
+    statics: tuple[str, ...] = ()  # bodies that never move
     layout: Callable[[Mapping[str, float]], Layout]
     horizon_steps: int = 150  # of 0.1 s
     like: Like | None = None  # shipped family whose prior fits

@@ -10,12 +10,13 @@ while before it brakes, a pedestrian may hesitate.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.env.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
+from risk_sac.env.observation_layout import PER_ADVERSARY, PER_STATIC, SPEED_MPS, X_M, Y_M
 from risk_sac.world.types import STEP_S
 
 EARLIEST_S = 0.5  # after the release: a contact within the first second counts against neither side
@@ -30,9 +31,12 @@ IN_LANE_M = 1.2  # an actor nearer to the ego's axis is its leader
 NEAREST_M, FARTHEST_M = 1.9, 3.1  # from the ego's axis: touching it, and hardly off the middle of the next lane
 FOREMOST_M = 12.0  # along it, from the ego's middle: an actor farther back strikes its flank
 BEFORE_M = 5.0  # a leader's middle before the ego's, at least
+SAME_LINE_RAD = 0.02  # of the ego's heading from its lane's: far ahead, a body aside by so much is on the ego's way
+HIDING_M = 60.0  # the same of one that hides a standing body, at most: an ego at 26 m/s follows at 40 m
 FASTER_MPS = 5.0  # than the ego, at most, to take up a place
 CATCHING_UP = 0.5  # 1/s, of the way to that place
 ANSWER = 0.5  # of full drive, for 1 m/s of difference
+GENTLE_ANSWER = 0.15  # the same of a leader that hides a standing body and is too fast: it lets the ego come nearer
 LEAST_EFFORT = 0.4  # of an actor that is on time
 EARLIER_S, SOONEST_S = 2.0, 0.5  # than the ego, at most; and from now
 TURNING = 0.5  # of what is possible, at most
@@ -64,6 +68,7 @@ class Seen(NamedTuple):
     sin: float
     speed_mps: float
     ego_mps: float
+    standing_m: float = math.inf  # to the next static body on the ego's way, between the centres
 
 
 class Act(NamedTuple):
@@ -73,22 +78,28 @@ class Act(NamedTuple):
     steer: float
 
 
-def adversaries_seen(observation: NDArray[np.float32], adversaries: int, step: int) -> list[Seen | None]:
+def adversaries_seen(
+    observation: NDArray[np.float32], adversaries: int, step: int, statics: int = 0
+) -> list[Seen | None]:
     """Each adversary, in the family's order; None for one that has left the net.
 
     Args:
       observation: see `risk_sac.env.observation`.
       adversaries: how many.
       step: of the episode, from 0.
+      statics: how many bodies never move.
     """
     rows: list[list[float]] = observation[: adversaries * PER_ADVERSARY].reshape(-1, PER_ADVERSARY).tolist()
     ego_mps = float(observation[adversaries * PER_ADVERSARY]) * SPEED_MPS
-    return [_seen(row, step * STEP_S, ego_mps) if any(row) else None for row in rows]
+    places: list[list[float]] = observation[-1 - PER_STATIC * statics : -1].reshape(-1, PER_STATIC).tolist()
+    standing_m = [x * X_M for x, y in places if x > 0.0 and abs(y * Y_M) < IN_LANE_M + SAME_LINE_RAD * x * X_M]
+    return [_seen(row, step * STEP_S, ego_mps, standing_m) if any(row) else None for row in rows]
 
 
-def _seen(row: list[float], time_s: float, ego_mps: float) -> Seen:
+def _seen(row: list[float], time_s: float, ego_mps: float, standing_m: Sequence[float]) -> Seen:
     x, y, _, _, cos, sin, speed, *_ = row
-    return Seen(time_s, x * X_M, y * Y_M, cos, sin, speed * SPEED_MPS, ego_mps)
+    to_m = min((other_m - x * X_M for other_m in standing_m if other_m > x * X_M), default=math.inf)
+    return Seen(time_s, x * X_M, y * Y_M, cos, sin, speed * SPEED_MPS, ego_mps, to_m)
 
 
 def act(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:
@@ -108,9 +119,11 @@ def cue(genes: Genes, seen: Seen, pedestrian: bool) -> bool:
     """Whether it is time to strike.
 
     A vehicle in the ego's direction strikes at a time of its genes, all others as the ego nears: 0.3 to 4.3 s from
-    meeting, as both approach along the ego's axis.
+    meeting, as both approach along the ego's axis. One that hides a static body does so as it nears that body.
     """
     if not pedestrian and seen.cos > SAME_WAY_COS:
+        if math.isfinite(seen.standing_m):
+            return seen.standing_m < (NEAREST_CUE_S + CUES_S * genes.cue) * seen.speed_mps
         return seen.time_s >= EARLIEST_S + LATEST_CUE_S * genes.cue
     closing_mps = seen.ego_mps - seen.cos * seen.speed_mps
     return 0.0 < seen.x_m < (NEAREST_CUE_S + CUES_S * genes.cue) * closing_mps
@@ -126,20 +139,40 @@ def alongside(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
 
     `place` is where along the ego it waits and `aside` how far from the ego's axis; a leader keeps its lane. `drive`
     and `steer`, towards the ego, are those of the strike, `after` is the drive that follows.
+
+    Before a static body on the ego's way it leaves that way instead, so that the ego meets the body: `steer` is how
+    hard, to the right below 0.5, `aside` how far, and `drive` how fast, up to 5 m/s from the ego's speed, whatever its
+    driver would do about the body. A neighbour stays beside.
     """
     if since_cue_s < 0.0:
         return _taking_place(genes, seen)
-    return _strike(genes, since_cue_s, genes.steer * _clip(-seen.y_m))
+    if math.isinf(seen.standing_m) or since_cue_s >= LONGEST_S * genes.lasts:
+        return _strike(genes, since_cue_s, genes.steer * _clip(-seen.y_m))
+    wanted = _signed(genes.steer)
+    side = wanted if abs(seen.y_m) < IN_LANE_M else seen.y_m
+    steer = abs(wanted) * _clip(math.copysign(_aside_m(genes), side) - seen.y_m)
+    return Act(_keeping_speed(seen, FASTER_MPS * _signed(genes.drive)), steer)
+
+
+def _keeping_speed(seen: Seen, faster_mps: float, answer: float = ANSWER) -> float:
+    return _clip(answer * (seen.ego_mps + faster_mps - seen.speed_mps))
+
+
+def _aside_m(genes: Genes) -> float:
+    return NEAREST_M + (FARTHEST_M - NEAREST_M) * genes.aside
 
 
 def _taking_place(genes: Genes, seen: Seen) -> Act:
     leads = abs(seen.y_m) < IN_LANE_M
-    place_m = FOREMOST_M * genes.place + (BEFORE_M if leads else 0.0)
-    aside_m = 0.0 if leads else NEAREST_M + (FARTHEST_M - NEAREST_M) * genes.aside
-    wanted_mps = seen.ego_mps + _clip(CATCHING_UP * (place_m - seen.x_m), FASTER_MPS)
+    hides = leads and math.isfinite(seen.standing_m)
+    foremost_m = HIDING_M - BEFORE_M if hides else FOREMOST_M
+    place_m = foremost_m * genes.place + (BEFORE_M if leads else 0.0)
+    aside_m = 0.0 if leads else _aside_m(genes)
+    faster_mps = _clip(CATCHING_UP * (place_m - seen.x_m), FASTER_MPS)
     waits_s = EARLIEST_S + LATEST_CUE_S * genes.cue / 4  # for most of the time to its cue it is beside the ego
     steer = _clip(math.copysign(aside_m, seen.y_m) - seen.y_m) if seen.time_s >= waits_s else 0.0
-    return Act(_clip(ANSWER * (wanted_mps - seen.speed_mps)), steer)
+    too_fast = seen.speed_mps > seen.ego_mps + faster_mps
+    return Act(_keeping_speed(seen, faster_mps, GENTLE_ANSWER if hides and too_fast else ANSWER), steer)
 
 
 def crossing(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:

@@ -22,7 +22,7 @@ from risk_sac.sim.solid import Others, VehicleCommand, Walker, clip, taper, walk
 from risk_sac.sim.story.deviation import DeviationControl, Lead
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.sim.vehicle_control import VehicleControl
-from risk_sac.world.types import LATERAL, SPEED, STEP_S, VX, VY, Frame
+from risk_sac.world.types import LATERAL, SPEED, STEP_S, VX, VY, Frame, Role
 
 TOLERANCE_MPS = 0.02  # SUMO's rounding, divided by the step
 LEAP_MPS = 4.0  # at a corner of a coarsely drawn lane, a body off its middle moves up to 0.3 m more or less in a step
@@ -152,12 +152,12 @@ class Adversaries:
         rows = dict(zip(frame.ids, range(len(frame.ids)), strict=True))
         intended = sim.intended_accel()
         vehicles = {}
-        slot = self._slot
+        slot, statics = self._slot, np.count_nonzero(frame.role == int(Role.STATIC))
         for id_, control in self._vehicles.items():
             place, k = sim.place(id_), slot[id_]
             if place is not None:
                 others = frame.state, rows[id_]
-                vehicles[id_] = control.step(first[k], second[k], *place, intended[id_], others)
+                vehicles[id_] = control.step(first[k], second[k], *place, intended[id_], others, statics)
         walkers = {
             id_: control.step(first[slot[id_]], second[slot[id_]], (frame.state, rows[id_]))
             for id_, control in self._pedestrians.items()

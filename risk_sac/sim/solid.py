@@ -80,8 +80,13 @@ def drives_into(
     motion: tuple[float, float, float],
     braking: tuple[float, float, float],
     hardest_mps2: float,
+    statics: int = 0,
+    room_m: float = 0.0,
 ) -> int:
     """Finds where a vehicle that takes a step and then brakes meets another body than the ego's.
+
+    A static body that it passes by moving on across at this speed is not in its way: it may leave the lane too late to
+    stop. Others may move or brake, so it stays able to stop for them.
 
     Args:
       state: of a frame, `rows x n`.
@@ -92,6 +97,8 @@ def drives_into(
       motion: speed, acceleration and lateral speed of the step.
       braking: how it stops: its braking, its jerk, and how fast its lateral speed falls.
       hardest_mps2: how hard others on its course may brake.
+      statics: how many of the bodies, the last of the frame, never move.
+      room_m: of the road on the side that it moves to.
 
     Returns:
       `CLEAR`; `AHEAD`; `LEFT` or `RIGHT` if what is beside or behind there runs into it because it moves across.
@@ -106,16 +113,25 @@ def drives_into(
     segment = _segment(path, 0, station_m)
     tilt = state[HEADING, own] - path[PATH_HEADING, segment]
     side = RIGHT if lateral < -ACROSS_MPS else LEFT if lateral > ACROSS_MPS else CLEAR  # that it moves to
+    near = foreseen[SPEED_MPS, state.shape[1] - statics :]
+    if statics and side != CLEAR and not np.isnan(near).all():
+        far_m, moving_m, swerving = offset_m + math.copysign(room_m, lateral), offset_m, foreseen.copy()
+        passes_s = _passes_s(state, own, statics, speed)
+        for step in range(1, min(math.ceil(passes_s / STEP_S), LONGEST_STEPS) + 1):
+            moving_m += lateral * STEP_S
+            moving_m = min(moving_m, far_m) if lateral > 0.0 else max(moving_m, far_m)
+            pose = _pose_at(path, segment, station_m + step * speed * STEP_S, moving_m, half_length, tilt)
+            if _meets(state, swerving, pose, size, step * STEP_S, hardest_mps2, side) != CLEAR:
+                break
+        else:
+            near[:] = np.nan
     worst = CLEAR
     for step in range(1, LONGEST_STEPS):
         station_m += (before + speed) / 2 * STEP_S
         offset_m += lateral * STEP_S
         segment = _segment(path, segment, station_m)
-        ahead_m, cos, sin = station_m - path[STATION, segment], path[COS, segment], path[SIN, segment]
-        heading = path[PATH_HEADING, segment] + tilt
-        x = path[0, segment] + ahead_m * cos - offset_m * sin - half_length * math.cos(heading)
-        y = path[1, segment] + ahead_m * sin + offset_m * cos - half_length * math.sin(heading)
-        where = _meets(state, foreseen, (x, y, heading), size, step * STEP_S, hardest_mps2, side)
+        pose = _pose_at(path, segment, station_m, offset_m, half_length, tilt)
+        where = _meets(state, foreseen, pose, size, step * STEP_S, hardest_mps2, side)
         if where == AHEAD:
             return AHEAD
         worst = max(worst, where)
@@ -165,6 +181,28 @@ def _segment(path: Floats, first: int, station_m: float) -> int:
     while first + 2 < path.shape[1] and path[STATION, first + 1] <= station_m:
         first += 1
     return first
+
+
+@compiled
+def _pose_at(path: Floats, first: int, station_m: float, offset_m: float, half_length: float, tilt: float) -> Pose:
+    """Computes the pose of a vehicle whose front bumper is at a station of a path, from its segment `first` on."""
+    segment = _segment(path, first, station_m)
+    ahead_m, cos, sin = station_m - path[STATION, segment], path[COS, segment], path[SIN, segment]
+    heading = path[PATH_HEADING, segment] + tilt
+    x = path[0, segment] + ahead_m * cos - offset_m * sin - half_length * math.cos(heading)
+    y = path[1, segment] + ahead_m * sin + offset_m * cos - half_length * math.sin(heading)
+    return x, y, heading
+
+
+@compiled
+def _passes_s(state: Floats, own: int, statics: int, speed: float) -> float:
+    """Computes the time until a vehicle has passed all static bodies ahead, s; choice: straight on."""
+    cos, sin, passes_m = math.cos(state[HEADING, own]), math.sin(state[HEADING, own]), 0.0
+    for other in range(state.shape[1] - statics, state.shape[1]):
+        ahead_m = (state[X, other] - state[X, own]) * cos + (state[Y, other] - state[Y, own]) * sin
+        reach_m = (state[LENGTH, own] + state[LENGTH, other]) / 2 + 2 * MARGIN_M
+        passes_m = max(passes_m, ahead_m + reach_m)
+    return passes_m / max(speed, ACROSS_MPS)
 
 
 @compiled

@@ -91,6 +91,7 @@ class VehicleControl:
         along: Along,
         intended_mps2: float = 0.0,
         others: Others | None = None,
+        statics: int = 0,
     ) -> VehicleCommand:
         """One step of 0.1 s.
 
@@ -101,6 +102,7 @@ class VehicleControl:
           along: where it is on the path it takes if it does not steer.
           intended_mps2: acceleration that its driver would choose without a command.
           others: actors that it keeps clear of.
+          statics: how many of them, the last, never move: it stops before these or goes round them.
         """
         if along.path is not self._path:
             if self._path is not None:
@@ -110,13 +112,17 @@ class VehicleControl:
         bend = self._at_m < BODY_M or bool(self._bends[SOON, index(self._bends, self._at_m)] > NO_BEND_PER_M)
         stopping = self._stopping[bend]
         before, sides = (self.speed_mps, self.accel_mps2, self.lateral_mps), tuple(room)
-        for wanted in ((drive, steer, intended_mps2), (drive, 0.0, intended_mps2), (-1.0, 0.0, 0.0)):
+        choices: tuple[tuple[float, float, float], ...]
+        choices = ((drive, steer, intended_mps2), (drive, 0.0, intended_mps2), (-1.0, 0.0, 0.0))
+        if statics and self.lateral_mps:  # it may be too late to stop
+            choices = (*choices[:2], (0.0, math.copysign(1.0, self.lateral_mps), 0.0), choices[2])
+        for wanted in choices:
             motion = _drive(self._bounds, self._bends, along.station_m, self._behind_per_m, before, wanted, sides)
             if others is None:
                 break
-            met = drives_into(
-                *others, along.path, along.station_m, along.offset_m, motion, stopping, self.limits.others_brake_mps2
-            )
+            place, hardest_mps2 = (along.path, along.station_m, along.offset_m), self.limits.others_brake_mps2
+            beside_m = room.left_m if motion[2] > 0.0 else room.right_m
+            met = drives_into(*others, *place, motion, stopping, hardest_mps2, statics, beside_m)
             if met == CLEAR or (met != AHEAD and wanted[1] == 0.0):
                 break
         self.speed_mps, self.accel_mps2, self.lateral_mps = motion

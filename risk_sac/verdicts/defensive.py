@@ -47,6 +47,7 @@ class SceneAhead(NamedTuple):
 
     state: Floats  # rows x n, of a frame; the ego's column is not used
     vehicle: Bools
+    conceals: Bools  # bodies that hide what is behind them
     link: NDArray[np.uint8]
     seen: Bools
     priority: bool  # whether the ego's signal lets it go before all others
@@ -73,7 +74,7 @@ class View(NamedTuple):
 
 @compiled
 def view_of(ego: OnPath, scene: SceneAhead, street: Street, crossings: Crossings, step_s: float) -> View:
-    """Places the actors along the path; vehicles hide what is behind them, but those that lead the ego."""
+    """Places the actors along the path; bodies that conceal do so, but those that lead the ego."""
     n, state = len(scene.vehicle), scene.state
     placed, hides = np.empty((3, n)), np.zeros(n, dtype=np.bool_)
     for i in range(1, n):
@@ -81,7 +82,7 @@ def view_of(ego: OnPath, scene: SceneAhead, street: Street, crossings: Crossings
             continue
         placed[0, i], placed[1, i], placed[2, i] = project(ego.path, ego.first, state[X, i], state[Y, i])
         leads = abs(placed[1, i]) < OWN_LANE_M and placed[0, i] > ego.s and state[SPEED, i] > CREEP_MPS
-        hides[i] = scene.vehicle[i] and not leads
+        hides[i] = scene.conceals[i] and not leads
     x, y, heading = pose_at(ego.path, ego.s)
     reach = ego.size.half_length
     eye_x, eye_y = x + reach * math.cos(heading), y + reach * math.sin(heading)
@@ -178,7 +179,7 @@ def allowed_accel(
         memory[SEEN_S, i] += step_s
         memory[STOOD_S, i] = memory[STOOD_S, i] + step_s if stands else 0.0
         memory[HAD_SIGNAL, i] = 1.0 if link != 0 else memory[HAD_SIGNAL, i]
-        if scene.places and vehicle and stands:
+        if scene.places and scene.conceals[i] and stands:
             accel = min(accel, _past_standing(view, i))
         if not scene.minds[i]:
             continue

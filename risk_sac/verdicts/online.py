@@ -14,7 +14,7 @@ from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, SceneAhead, allowe
 from risk_sac.verdicts.drivers import R157_PERCEIVES_S, r157
 from risk_sac.verdicts.evidence import Ground
 from risk_sac.verdicts.present import OnPath, conflict_in, street_of
-from risk_sac.verdicts.unseen import crossings_on
+from risk_sac.verdicts.unseen import concealing, crossings_on
 from risk_sac.world.geometry import size_of
 from risk_sac.world.types import STEP_S, Bools, Frame, Kind
 
@@ -95,6 +95,7 @@ class DefensiveReflex:
     def __init__(self, ground: Ground) -> None:
         self._street = street_of(ground)
         self._ids: tuple[str, ...] = ()
+        self._conceals = concealing(())
         self._memory = nothing_remembered(0)
         self._priority_s = -math.inf  # when its signal last gave it priority
 
@@ -108,7 +109,7 @@ class DefensiveReflex:
             for column, id_ in enumerate(frame.ids):
                 if id_ in self._ids:
                     self._memory[:, column] = before[:, self._ids.index(id_)]
-            self._ids = frame.ids
+            self._ids, self._conceals = frame.ids, concealing(frame.body)
         if frame.link[0] == PRIORITY:
             self._priority_s = frame.time_s
         priority = frame.link[0] in (0, PRIORITY) and frame.time_s - self._priority_s <= PRIORITY_S
@@ -116,9 +117,8 @@ class DefensiveReflex:
         ego = OnPath(path, 0, float(path.s[0]), frame.ego_speed_mps, size)
         crossings = crossings_on(path, ego.s, float(path.s[-1]), self._street.boxes, size.half_width)
         everything = np.ones(len(frame.ids), dtype=np.bool_)
-        scene = SceneAhead(
-            frame.state, frame.kind == Kind.VEHICLE, frame.link, seen, priority, everything, True, 0, math.inf
-        )
+        actors = frame.kind == Kind.VEHICLE, self._conceals, frame.link, seen
+        scene = SceneAhead(frame.state, *actors, priority, everything, True, 0, math.inf)
         accel = allowed_accel(ego, scene, self._street, crossings, self._memory, STEP_S)
         # SUMO's driver speeds up by itself: the least braking keeps it from that.
         return max(-accel, LEAST_MPS2) if accel < LEAST_ACCEL_MPS2 else 0.0

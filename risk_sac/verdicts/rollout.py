@@ -30,7 +30,7 @@ from risk_sac.verdicts.drivers import (
 )
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence, recorded_size
 from risk_sac.verdicts.present import OnPath, Street, body_of, street_of
-from risk_sac.verdicts.unseen import Crossings, crossings_on, is_in_view, walls_of
+from risk_sac.verdicts.unseen import Crossings, concealing, crossings_on, is_in_view, walls_of
 from risk_sac.world.geometry import Pose, Size, touches
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import VX, VY, Bools, Floats, Kind, X, Y
@@ -185,6 +185,7 @@ class Task(NamedTuple):
     speed_mps: Floats  # T, of the recorded ego
     states: Floats  # T x rows x n
     vehicle: Bools
+    conceals: Bools
     link: NDArray[np.uint8]  # T x n
     known: Bools  # T x n
     priority: Bools  # T
@@ -234,6 +235,7 @@ def _task(e: Evidence, path: Path, striker: int | None, conflict_frame: int) -> 
         speed_mps=np.ascontiguousarray(e.speed_mps[:, 0]),
         states=np.stack([*(getattr(e, name) for name in PER_ACTOR), *sizes], axis=1),
         vehicle=vehicle,
+        conceals=concealing(e.body),
         link=link,
         known=np.ascontiguousarray(e.known),
         priority=((ahead == 0) | (ahead == PRIORITY)) & (e.time_s - latest <= PRIORITY_S),
@@ -281,6 +283,7 @@ def _asked(task: Task, t: int, ego: OnPath, state: Floats, seen: Bools, memory: 
     scene = SceneAhead(
         state,
         task.vehicle,
+        task.conceals,
         task.link[frame],
         seen,
         task.priority[frame],
@@ -314,7 +317,7 @@ def _drive(task: Task, first: int, after: int, memory: Floats) -> Floats:
     known = np.zeros(len(task.vehicle), dtype=np.bool_)
     for t in range(first):
         known |= task.known[t]
-    bodies = task.vehicle.copy()
+    bodies = task.conceals.copy()
     bodies[0] = False
     for t in range(first, last + after):
         frame = min(t, last)

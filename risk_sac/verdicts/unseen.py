@@ -1,11 +1,12 @@
 """Finds places that hide pedestrians: crossings on the path, behind other bodies."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from risk_sac.scenario.bodies import body_of
 from risk_sac.scenario.layout import Area
 from risk_sac.verdicts.course import CORRIDOR_M, MovingBox, Path, pose_at
 from risk_sac.world.jit import compiled
@@ -89,6 +90,11 @@ def crossings_on(path: Path, from_m: float, to_m: float, boxes: Floats, half_wid
             filled += 1
         count += 1
     return Crossings(entries[:count], spots[:filled])
+
+
+def concealing(codes: Iterable[int]) -> Bools:
+    """Tells which bodies hide what is behind them, by their codes in frames and recordings."""
+    return np.array([body_of(int(code)).conceals for code in codes], dtype=np.bool_)
 
 
 @compiled

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from risk_sac.scenario.bodies import body_of
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.sim.collision import Contact
 from risk_sac.verdicts.conflict import Conflict
@@ -105,7 +106,7 @@ def validity_verdicts(evidence: Evidence, striker: int, contact: Contact, facts:
         and contact.closing_lateral_other_mps > contact.closing_lateral_ego_mps
     )
     crossing_conflict = (
-        evidence.kind[striker] == Kind.VEHICLE
+        (evidence.kind[striker] == Kind.VEHICLE or body_of(int(evidence.body[striker])).rides)
         and abs(contact.heading_sin) >= CROSSING_HEADING_SIN
         and facts.visible_for_s >= CROSSING_VISIBLE_S
     )

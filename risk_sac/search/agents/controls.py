@@ -133,6 +133,7 @@ class ScriptFollower(NonLearner):
     def __init__(self, family: Family) -> None:
         """Follows nothing yet; see `begin`."""
         self._pedestrian = [False] * len(family.vehicles) + [True] * len(family.pedestrians)
+        self._statics = len(family.statics)
         self.genes = SIZE * len(self._pedestrian)  # number of genes that an episode takes
         self.begin(np.zeros(self.genes))
 
@@ -147,7 +148,7 @@ class ScriptFollower(NonLearner):
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
         """Acts on what `risk_sac.env.observation` says of each adversary; nothing is random."""
-        seen = adversaries_seen(observation, len(self._pedestrian), self._step)
+        seen = adversaries_seen(observation, len(self._pedestrian), self._step, self._statics)
         actions = np.zeros((len(seen), 2), dtype=np.float32)
         since_cue_s = [self._since_cue_s(i, one) for i, one in enumerate(seen)]
         for i, one in enumerate(seen):

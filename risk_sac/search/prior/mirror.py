@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from risk_sac.env.observation_layout import LATERAL_ADVERSARY, LATERAL_EGO, PER_ADVERSARY, PER_EGO
+from risk_sac.env.observation_layout import LATERAL_ADVERSARY, LATERAL_EGO, PER_ADVERSARY, PER_EGO, PER_STATIC
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.prior.coordinates import other_side, two_sided
 from risk_sac.search.prior.policy import PolicyLayout
@@ -26,6 +26,7 @@ class Mirror:
         self._seen_sign = np.ones(layout.observation_size, np.float32)
         self._seen_sign[(PER_ADVERSARY * np.arange(count)[:, None] + LATERAL_ADVERSARY).ravel()] = -1.0
         self._seen_sign[ego + LATERAL_EGO] = -1.0
+        self._seen_sign[-2 : -2 - PER_STATIC * layout.statics : -PER_STATIC] = -1.0
         self._acted = (2 * np.array(adversaries)[:, None] + np.arange(2)).ravel()
         self._acted_sign = np.tile(np.array([1.0, -1.0], np.float32), count)  # acceleration, lateral velocity
 

@@ -39,18 +39,20 @@ class PolicyLayout:
     scene: tuple[tuple[str, float, float], ...]  # name, least and greatest value of each parameter
     requirements: tuple[str, ...]
     per_adversary: int = PER_ADVERSARY  # entries of each adversary; its motion comes first
+    statics: int = 0
 
     @classmethod
     def of(cls, problem: Problem) -> "PolicyLayout":
         """Returns the layout of a problem's observations and actions."""
         space = problem.space
         scene = zip(space.names, space.low.tolist(), space.high.tolist(), strict=True)
-        return cls(problem.family.stand_ins, tuple(scene), tuple(each.name for each in problem.requirements))
+        requirements = tuple(requirement.name for requirement in problem.requirements)
+        return cls(problem.family.stand_ins, tuple(scene), requirements, statics=len(problem.family.statics))
 
     @property
     def observation_size(self) -> int:
         """Entries of an observation."""
-        size = observation_size(len(self.adversaries), len(self.scene), len(self.requirements))
+        size = observation_size(len(self.adversaries), len(self.scene), len(self.requirements), self.statics)
         return size - (PER_ADVERSARY - self.per_adversary) * len(self.adversaries)
 
     @property

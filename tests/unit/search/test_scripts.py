@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.env.observation_layout import PER_ADVERSARY, SPEED_MPS, X_M, Y_M
+from risk_sac.env.observation_layout import PER_ADVERSARY, PER_STATIC, SPEED_MPS, X_M, Y_M
 from risk_sac.search.scripts import SIZE, Act, Genes, Seen, act, adversaries_seen, cue
 from risk_sac.verdicts.behaviour import pedal_changes
 
@@ -58,6 +58,27 @@ def test_a_neighbour_takes_up_its_place_and_then_comes_over():
 
 
 @pytest.mark.parametrize("side", [1, -1])
+def test_a_leader_leaves_late_before_a_standing_body_to_the_side_that_its_genes_say(side):
+    hides = beside(25.0, 0.1 * side, speed_mps=20.0)._replace(ego_mps=20.0, standing_m=45.0)
+    script = MIDDLE._replace(steer=0.5 + 0.4 * side, aside=1.0, cue=0.5, drive=0.6)
+    assert cue(script, hides, pedestrian=False)  # 2.3 s from it
+    assert not cue(script, hides._replace(standing_m=47.0), pedestrian=False)
+    assert act(script, hides, 0.0, pedestrian=False) == Act(pytest.approx(0.5), pytest.approx(0.8 * side))
+    aside = hides._replace(y_m=3.1 * side)  # where it stays
+    assert act(script, aside, 1.0, pedestrian=False).steer == pytest.approx(0.0)
+    assert act(script, hides, 2.1, pedestrian=False).steer == 0.0  # the strike is over
+    ordinary = hides._replace(standing_m=math.inf)
+    assert act(script, ordinary, 0.0, pedestrian=False).steer * side < 0.0  # a leader keeps its lane
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_neighbour_does_not_cut_in_before_a_standing_body(side):
+    neighbour = beside(8.0, 2.8 * side)._replace(standing_m=30.0)
+    strike = MIDDLE._replace(steer=0.5 - 0.5 * side, aside=1.0, lasts=1.0)  # towards the ego
+    assert act(strike, neighbour, 0.5, pedestrian=False).steer * side > 0.0
+
+
+@pytest.mark.parametrize("side", [1, -1])
 def test_crossing_traffic_hurries_when_it_would_be_late_and_waits_when_early(side):
     late = Seen(0.0, 20.0, 40.0 * side, 0.0, -1.0 * side, 10.0, 10.0)  # 4 s from the ego's axis, the ego 2 s
     early = late._replace(y_m=10.0 * side)
@@ -87,6 +108,18 @@ def test_the_observation_is_read_back_in_metres():
     first, gone = adversaries_seen(observation, 2, step=20)
     assert gone is None
     assert first == pytest.approx(Seen(2.0, 12.0, -3.0, 0.6, -0.8, 9.0, 11.0))
+
+
+@pytest.mark.parametrize(
+    ("ahead_m", "aside_m", "to_m"), [(70.0, 0.5, 58.0), (70.0, 5.0, math.inf), (9.0, 0.0, math.inf)]
+)
+def test_the_next_static_body_on_the_egos_way_is_read_from_the_observation(ahead_m, aside_m, to_m):
+    observation = np.zeros(PER_ADVERSARY + 2 * PER_STATIC + 2, np.float32)
+    observation[:7] = 12 / X_M, 0.0, 0.0, 0.0, 1.0, 0.0, 9 / SPEED_MPS
+    observation[-5:-1] = ahead_m / X_M, aside_m / Y_M, 150.0 / X_M, 4.6 / Y_M  # the other stands in the next lane
+    (leader,) = adversaries_seen(observation, 1, step=0, statics=2)
+    assert leader is not None
+    assert leader.standing_m == pytest.approx(to_m)
 
 
 @pytest.mark.parametrize("side", [1, -1])

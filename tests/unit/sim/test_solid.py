@@ -98,6 +98,47 @@ def test_a_vehicle_lets_another_cross(side):
         assert abs(y) > (CAR_M[0] + CAR_M[1]) / 2 or abs(x - 40.0) > (CAR_M[0] + CAR_M[1]) / 2
 
 
+def leaves_late(side: int, at_m: float, *, statics: int = 1, beside: Pose | None = None) -> list[Pose]:
+    """Steers to a side from `at_m` before a body that stands; at 15 m/s, beside another vehicle if one is given."""
+    control, path, wide = VehicleControl(LIMITS, 15.0), road(), LateralRoom(50.0, 50.0)
+    station, offset, poses = 0.0, 0.0, [(-HALF_M, 0.0, 0.0, 15.0)]
+    standing = (100.0, 0.0, 0.0, 0.0)
+    for step in range(80):
+        others = [poses[-1], *([moved(beside, step * STEP_S)] if beside else []), standing]
+        before, near = control.speed_mps, 100.0 - HALF_M - station < at_m
+        action = (0.0, float(side) if near else 0.0)
+        state = frame_of(EGO, *others)
+        control.step(*action, wide, Along(path, station, offset), others=(state, 1), statics=statics)
+        station += (before + control.speed_mps) / 2 * STEP_S
+        offset += control.lateral_mps * STEP_S
+        poses.append((station - HALF_M, offset, 0.0, control.speed_mps))
+    return poses
+
+
+def touched(poses: list[Pose], standing_m: float = 100.0) -> bool:
+    return any(abs(standing_m - x) < CAR_M[0] and abs(y) < CAR_M[1] for x, y, _, _ in poses)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_vehicle_goes_round_a_static_body_before_which_it_could_not_stop_any_more(side):
+    poses = leaves_late(side, 36.0)
+    x, y, _, _ = poses[-1]
+    assert not touched(poses)
+    assert x > 105.0
+    assert y * side > CAR_M[1]
+    assert min(pose[3] for pose in poses) > 14.9
+    stays_able = leaves_late(side, 36.0, statics=0)  # before one that may move it stays able to stop
+    assert not touched(stays_able)
+    assert min(pose[3] for pose in stays_able if pose[0] < 95.0) < 14.0
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_vehicle_stops_before_a_static_body_that_it_cannot_go_round(side):
+    for poses in (leaves_late(side, 15.0), leaves_late(side, 36.0, beside=(-HALF_M, side * 3.3, 0.0, 15.0))):
+        assert not touched(poses)
+        assert poses[-1][3] < 0.1
+
+
 def walked(turn: float, parked: Pose) -> list[Walker]:
     """6 s of a pedestrian that starts at the origin along x and is told to run all the time."""
     control = PedestrianControl(LIMITS, Walker(0.0, 0.0, 0.0, 1.5))

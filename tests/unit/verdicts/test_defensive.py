@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from risk_sac.scenario.bodies import CODES
 from risk_sac.verdicts.conflict import find_conflict
 from risk_sac.verdicts.course import Path, polyline
 from risk_sac.verdicts.evidence import Evidence
@@ -56,6 +57,15 @@ def test_it_can_stop_before_what_it_does_not_see_of_a_crossing(side):
     assert braking(beside, ego=14.0, side=side) == pytest.approx(3.4)  # 35.7 m: 14 m/s take 39.3 m
     assert braking(beside, ego=8.0, side=side) == 0.0  # 15.4 m
     assert braking((120.0, -LANE_M, 0.0, 0.0, CAR), ego=14.0, side=side) == 0.0  # beyond it
+
+
+@SIDES
+@pytest.mark.parametrize(("name", "restrains"), [("car", True), ("motorcycle", False), ("obstacle", False)])
+def test_what_a_body_hides_restrains_it_only_if_the_body_s_row_says_that_it_conceals(name, restrains, side):
+    frame = frame_of(x_m=[60.0, 92.0], y_m=[0.0, -side * LANE_M], speed_mps=[14.0, 0.0])
+    frame = frame._replace(body=np.array([CODES["car"], CODES[name]], dtype=np.int8))
+    path = polyline(np.array([60.0, 200.0]), np.zeros(2))
+    assert (_after(DefensiveReflex(STREET), frame, path, 0.0) > 0.0) is restrains
 
 
 def test_it_creeps_past_what_stays_hidden():
@@ -152,6 +162,13 @@ def test_it_alone_prevents_who_comes_from_behind_a_standing_car():
     for evidence in (from_behind_a_standing_car(), mirrored(from_behind_a_standing_car())):
         assert prevents(evidence)
         assert not any(prevents(evidence, name) for name in ("r157", "fsm", "rss"))
+
+
+def test_it_does_not_prevent_who_comes_from_behind_a_body_that_hides_nothing():
+    behind = from_behind_a_standing_car()
+    for evidence in (behind, mirrored(behind)):
+        bodies = np.array([CODES[name] for name in ("car", "pedestrian", "motorcycle")], dtype=np.int8)
+        assert not prevents(replace(evidence, body=bodies))
 
 
 @SIDES

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from risk_sac.records import ARTEFACT_RULES
+from risk_sac.scenario.bodies import CODES
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence, Ground, recorded_contact
 from risk_sac.verdicts.validity import validity_verdicts
-from risk_sac.world.types import Frame
+from risk_sac.world.types import Frame, Kind
 from tests.unit.sim.contacts import (
     CAR,
     CROSSING,
@@ -133,3 +134,12 @@ def test_a_crossing_conflict_takes_headings_30_degrees_apart(angle_deg, rules):
 @pytest.mark.parametrize(("speed_mps", "rules"), [(0.0, {"ego_moving"}), (0.49, {"ego_moving"}), (0.51, set())])
 def test_a_standing_ego_has_no_part_in_its_collision(speed_mps, rules):
     assert broken(frames(ego(speed_mps), (LENGTH_M, 0.0, math.pi, -10.0, 0.0, CAR))) == rules
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_cyclist_that_crosses_into_the_flank_counts_as_crossing_traffic_does(side):
+    pair = frames(ego(10.0), (-1.0, -side * (WIDTH_M / 2 + 0.25), side * math.pi / 2, 0.0, side * 5.0, Kind.PEDESTRIAN))
+    rider = tuple(frame._replace(body=np.array([CODES["car"], CODES["bicycle"]], dtype=np.int8)) for frame in pair)
+    assert broken(pair) == {"no_sideswipe"}
+    assert broken(rider) == set()
+    assert broken(rider, visible_for_s=0.5) == {"no_sideswipe"}
