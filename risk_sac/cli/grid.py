@@ -4,22 +4,15 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from junitparser import Failure, Skipped
-from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.console import OK, print_answer, write_out
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.errors import ConfigError
-from risk_sac.host.terminal import notes, printable
-from risk_sac.report.grid import STANDARDS, PlayedGrid, PlayedPoint, StandardVerdict, grid_csv, played_grids
-
-SAID = {
-    StandardVerdict.OUT_OF_SCOPE: "out of scope: the competent driver does not avoid the contact either",
-    StandardVerdict.REFUSED: "refused",
-    StandardVerdict.UNJUDGED: "unjudged",
-}
+from risk_sac.host.terminal import notes
+from risk_sac.report.grid import STANDARDS, PlayedGrid, StandardVerdict, grid_csv, played_grids, varied_axes
+from risk_sac.report.grid_junit import grid_junit
 
 
 def add(commands: Commands) -> None:
@@ -54,32 +47,17 @@ def _grid(options: argparse.Namespace) -> int:
     if options.picture is not None:
         from risk_sac.report.grid_picture import grid_png  # here, because loading matplotlib takes a second
 
-        content = grid_png(grids, _over(options.over, grids), dict(map(_fixed, options.at)))
+        over = (options.over[0], options.over[1]) if options.over else varied_axes(grids)
+        content = grid_png(grids, over, dict(map(_fixed, options.at)))
         write_out(options.picture, content, "Picture", notes)
     print_answer(options, list(grids), _table(grids))
     return OK
 
 
-def _over(named: Sequence[str] | None, grids: Sequence[PlayedGrid]) -> tuple[str, str]:
-    """The parameters of the picture's axes: those named, or the first two of which scenes have several values."""
-    if named is not None:
-        return named[0], named[1]
-    varied = _varied([point for grid in grids for point in grid.points])
-    if len(varied) < 2:
-        raise ConfigError("--over", f"{len(varied)} parameters that vary", "two, for a picture")
-    return varied[0], varied[1]
-
-
-def _varied(points: Sequence[PlayedPoint]) -> list[str]:
-    """Parameters of which the scenes have several values."""
-    names = points[0].values if points else ()
-    return [name for name in names if len({point.values.get(name) for point in points}) > 1]
-
-
 def _fixed(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals:
-        raise ConfigError("--at", repr(text), "NAME=VALUE")
+        raise ConfigError("at", repr(text), "NAME=VALUE")
     return name, value
 
 
@@ -92,44 +70,3 @@ def _table(grids: Sequence[PlayedGrid]) -> Table:
         counts = (str(count) for count in grid.counts.values())
         table.add_row(grid.spec.id, grid.ego, str(len(grid.points)), *counts)
     return table
-
-
-def grid_junit(grids: Sequence[PlayedGrid]) -> bytes:
-    """Writes a suite for each run and a case for each scene.
-
-    Cases are grouped by the value of the first parameter that varies.
-    """
-    report = JUnitXml("risk-sac grid")
-    for grid in grids:
-        suite = TestSuite(printable(f"{grid.spec.family}.{grid.ego}"))
-        for name, value in (("run", grid.spec.id), ("ego", grid.ego), ("standard", grid.standard)):
-            suite.add_property(name, printable(value))
-        varied = [
-            n for n in (grid.points[0].values if grid.points else ()) if len({p.values[n] for p in grid.points}) > 1
-        ]
-        suite.add_testcases([_case(grid, point, varied) for point in grid.points])
-        report.add_testsuite(suite)
-    report.update_statistics()
-    content: bytes = report.tostring()
-    return content
-
-
-def _case(grid: PlayedGrid, point: PlayedPoint, varied: Sequence[str]) -> TestCase:
-    told = [f"{name}={_text(point.values[name])}" for name in varied]
-    group = ".".join([grid.spec.family, grid.ego, *told[:1]])
-    case = TestCase(printable(", ".join(told[1:]) or point.id), printable(group))
-    case.add_property("episode", point.id)
-    for name in ("r157", "fsm"):
-        avoids = getattr(point, name)
-        if avoids is not None:
-            case.add_property(f"avoided by {name}", "yes" if avoids else "no")
-    if point.verdict is StandardVerdict.FAIL:
-        case.append(Failure(printable(point.kind), point.grade))
-    elif point.verdict is not StandardVerdict.PASS:
-        said = SAID[point.verdict] + (f": {point.reason}" if point.reason else "")
-        case.append(Skipped(printable(said)))
-    return case
-
-
-def _text(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.6g}"

@@ -34,6 +34,7 @@ from risk_sac.config.odd import (
     SignalType,
 )
 from risk_sac.config.scenario import Like, Scenario
+from risk_sac.config.story import DeviationBounds
 
 __all__ = [
     "IID_METHODS",
@@ -45,6 +46,7 @@ __all__ = [
     "CarFollowing",
     "CrossingType",
     "DdpgConfig",
+    "DeviationBounds",
     "DynamicElements",
     "EgoConfig",
     "Environment",

@@ -16,6 +16,7 @@ from risk_sac.config.ego import EgoConfig
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import IID_METHODS, MethodName, RunMethod, method_of
 from risk_sac.config.odd import Odd
+from risk_sac.config.story import DeviationBounds
 from risk_sac.errors import ConfigError
 
 FamilyName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,59}$")]
@@ -113,6 +114,8 @@ class RunSpec(Settings):
     learner: LearnerConfig = LearnerConfig()
     judge: JudgeConfig = JudgeConfig()
     prior: PriorName = "shipped"
+    deviation: DeviationBounds | None = None
+    """Of actors from the story of their scenario; null: the scenario's own bounds."""
 
     @property
     def id(self) -> str:
@@ -157,6 +160,8 @@ class CampaignSpec(Settings):
     prior: PriorName = "shipped"
     """What methods with a prior start from: `shipped`, `none`, or the scripts of an earlier campaign, by its id; on the
     command line the folder of a run or campaign. They are copied, and the copy's name takes the place of this one."""
+    deviation: DeviationBounds | None = None
+    """Of actors from the stories of the scenarios; null: each scenario's own bounds."""
     iid: Iid | None = None
     """Null: none, and nothing is said of how often the ego fails."""
 
@@ -211,9 +216,10 @@ class CampaignSpec(Settings):
         )
 
     def _shared(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in ("ego", "odd", "requirements", "learner", "judge", "prior")}
+        return {name: getattr(self, name) for name in SHARED}
 
 
+SHARED = ("ego", "odd", "requirements", "learner", "judge", "prior", "deviation")  # by all runs of a campaign
 MOST_BYTES = 2 * 2**30  # of a run, beside the 0.6 GB or so that any run takes for code
 FLOAT, DOUBLE = 4, 8
 EPISODE_BYTES = 12_000  # of a record, as an object and as text in a checkpoint

@@ -78,6 +78,8 @@ class DeviationBounds(Settings):
     """Added to the acceleration."""
     lateral_mps: Annotated[float, Field(ge=0, le=3)] = 0.5
     """Added to the speed across."""
+    trigger_s: Annotated[float, Field(ge=0, le=10)] = 0.5
+    """How much later or earlier a search lets the triggers of an actor's events fire."""
 
 
 class Story(Settings):

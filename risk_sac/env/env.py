@@ -320,7 +320,11 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """Largest deviation of each actor from the scenario's story, if it left it."""
         return {
             name: StoryDeviation(
-                speed_mps=drift.mps, lateral_mps=drift.lateral_mps, along_m=drift.ahead_m, across_m=drift.left_m
+                speed_mps=drift.mps,
+                lateral_mps=drift.lateral_mps,
+                along_m=drift.ahead_m,
+                across_m=drift.left_m,
+                trigger_s=drift.trigger_s,
             )
             for name, drift in self._sim.deviations.items()
         }

@@ -40,7 +40,7 @@ def adjustments(spec: RunSpec | CampaignSpec) -> tuple[Adjustment, ...]:
     families_by_adjustment: dict[Adjustment, list[str]] = {}
     for name in (spec.family,) if isinstance(spec, RunSpec) else spec.families:
         try:
-            for each in _of_family(family_named(name), spec):
+            for each in _of_family(family_named(name, spec.deviation), spec):
                 families_by_adjustment.setdefault(each, []).append(name)
         except ConfigError:
             continue
@@ -66,7 +66,9 @@ def _of_family(family: Family, spec: RunSpec | CampaignSpec) -> Iterator[Adjustm
     yield from _of_sensor(whole, ego, stated=VISIBILITY in space.names)
     methods = (spec.method,) if isinstance(spec, RunSpec) else spec.methods
     if any(method_of(method).scenes == "grid" for method in methods):
-        yield from _of_grid(grid_of(space, family.parameters), spec.budget.episodes)
+        undisturbed = narrow(with_environment(family.undisturbed.space, odd, whole), whole)
+        grid = grid_of(undisturbed, family.parameters)
+        yield from _of_grid(grid, spec.budget.episodes)
     shipped = {each.name for each in requirements_from_odd(whole, ego.response_s)}
     for i, requirement in enumerate(spec.requirements):
         if not requirement.formula and requirement.name not in shipped:
@@ -145,7 +147,9 @@ class Problem:
             registered or in another version; or the run takes too much memory.
         """
         ego = pinned(spec.ego)
-        family = family or family_named(spec.family)
+        family = family or family_named(spec.family, spec.deviation)
+        if method_of(spec.method).agent == "none":
+            family = family.undisturbed
         odd = intersect(family.odd, spec.odd, family.space)
         if missing := set(family.odd.dynamic.actor_kinds or ()) - set(odd.dynamic.actor_kinds or ()):
             raise OddError(
@@ -280,7 +284,7 @@ def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
     alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()  # the i.i.d. phase's among them
     for number, family in enumerate(spec.families):
         try:
-            family_named(family)
+            family_named(family, spec.deviation)
         except ConfigError as error:
             field = f"families[{number}]" if error.field == "family" else error.field
             raise ConfigError(field, error.got, error.expected, error.remedy) from error

@@ -55,6 +55,8 @@ class StoryDeviation(Record):
     """Of its speed across."""
     along_m: Real
     across_m: Real
+    trigger_s: Real = 0.0
+    """How much later or earlier a trigger of its story fired."""
 
 
 class EpisodeRecord(Record):

@@ -151,6 +151,20 @@ def verdict_on(record: EpisodeRecord, standard: Standard) -> StandardVerdict:
     return StandardVerdict.OUT_OF_SCOPE
 
 
+def varied_of(points: Sequence[PlayedPoint]) -> list[str]:
+    """Parameters of which the scenes have several values."""
+    names = points[0].values if points else ()
+    return [name for name in names if len({point.values.get(name) for point in points}) > 1]
+
+
+def varied_axes(grids: Sequence[PlayedGrid]) -> tuple[str, str]:
+    """The first two parameters of which scenes have several values; raises `ConfigError` if there are fewer."""
+    varied = varied_of([point for grid in grids for point in grid.points])
+    if len(varied) < 2:
+        raise ConfigError("over", f"{len(varied)} parameters that vary", "two, for a picture")
+    return varied[0], varied[1]
+
+
 def named_values(scene: Mapping[str, float], parameters: Mapping[str, ScenarioParameter]) -> dict[str, float | str]:
     """Parameter → number, or word, of a scene; rows by the names of their columns."""
     values: dict[str, float | str] = {}

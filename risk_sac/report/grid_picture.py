@@ -51,14 +51,14 @@ def grid_png(grids: Sequence[PlayedGrid], over: tuple[str, str], at: Mapping[str
 
 def _at(grid: PlayedGrid, over: tuple[str, str], at: Mapping[str, str]) -> list[PlayedPoint]:
     names = list(grid.points[0].values) if grid.points else []
-    for flag, name in (*(("--over", name) for name in over), *(("--at", name) for name in at)):
+    for field, name in (*(("over", name) for name in over), *(("at", name) for name in at)):
         if name not in names:
-            raise ConfigError(flag, repr(name), f"one of {', '.join(names)}", did_you_mean(name, names))
+            raise ConfigError(field, repr(name), f"one of {', '.join(names)}", did_you_mean(name, names))
     points = [point for point in grid.points if all(_is(point.values[name], text) for name, text in at.items())]
     if not points:
         name, text = next(iter(at.items()))
         known = dict.fromkeys(_text(point.values[name]) for point in grid.points)
-        raise ConfigError("--at", f"{name}={text}, which no scene has", f"one of {', '.join(list(known)[:20])}")
+        raise ConfigError("at", f"{name}={text}, which no scene has", f"one of {', '.join(list(known)[:20])}")
     return points
 
 

@@ -35,6 +35,8 @@ class FailureOrigin(Record):
     deviations."""
     least_across_m: float | None = None
     """The same of their places across the road."""
+    least_trigger_s: float | None = None
+    """The same of shifts of their triggers."""
 
 
 def played_as(method: RunMethod) -> PlayedAs | None:
@@ -63,6 +65,7 @@ def _of_family(runs: Sequence[FinishedRun]) -> Iterable[FailureOrigin]:
         deviating = [record for record in records if id(record) in failing and record.deviations]
         speeds = [max(each.speed_mps for each in record.deviations.values()) for record in deviating]
         across = [max(each.across_m for each in record.deviations.values()) for record in deviating]
+        triggers = [max(each.trigger_s for each in record.deviations.values()) for record in deviating]
         yield FailureOrigin(
             family=own[0].spec.family,
             played=played,
@@ -74,6 +77,7 @@ def _of_family(runs: Sequence[FinishedRun]) -> Iterable[FailureOrigin]:
             new_kinds=len(kinds - known),
             least_speed_mps=min(speeds, default=None),
             least_across_m=min(across, default=None),
+            least_trigger_s=min(triggers, default=None),
         )
         known |= kinds
 

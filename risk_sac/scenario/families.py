@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from risk_sac.config import CrossingType, Interval, Like, Odd, Scenario, SignalType
+from risk_sac.config import CrossingType, DeviationBounds, Interval, Like, Odd, Scenario, SignalType
 from risk_sac.errors import ConfigError, InfeasibleScene, did_you_mean
 from risk_sac.scenario.behaviour import behaving
 from risk_sac.scenario.family import Family, usual_odd
@@ -51,6 +51,7 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
         requirements=document.requirements,
         judge=document.judge,
         parameters=document.parameters,
+        shifts=tuple(of.shifts),
     )
 
 
@@ -135,12 +136,23 @@ def _shipped(name: str) -> Family:
     return family_of(document, nets_of(document))
 
 
-def family_named(name: str) -> Family:
-    """Returns a family, shipped or of the library; raises `ConfigError` if none has this name."""
-    return FAMILIES[name] if name in FAMILIES else _kept(name)
+def family_named(name: str, deviation: DeviationBounds | None = None) -> Family:
+    """Returns a family, shipped or of the library.
+
+    Args:
+      name: of the family.
+      deviation: bounds that take the place of those of its story; None keeps these.
+
+    Raises:
+      ConfigError: no family has this name.
+    """
+    return FAMILIES[name] if name in FAMILIES else _kept(name, deviation)
 
 
 @cache  # a name holds a digest of what it stands for
-def _kept(name: str) -> Family:
+def _kept(name: str, deviation: DeviationBounds | None) -> Family:
     document, folder = kept(name)
+    if document.story is not None and deviation is not None:
+        story = document.story.model_copy(update={"deviation": deviation})
+        document = document.model_copy(update={"story": story})
     return family_of(document, nets_of(document, folder), name)

@@ -1,7 +1,7 @@
 """Scenario families, and their usual ODD."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from risk_sac.config import (
     CrossingType,
@@ -41,6 +41,13 @@ class Family:
     requirements: tuple[Requirement, ...] = ()  # of the scenario, beside the ODD's
     judge: JudgeConfig | None = None  # None: the campaign's
     parameters: Mapping[str, ScenarioParameter] = field(default_factory=dict)  # of the document
+    shifts: tuple[str, ...] = ()  # scene parameters that shift triggers of the story
+
+    @property
+    def undisturbed(self) -> "Family":
+        """The family without the scene parameters that disturb its story; its layouts have them at 0."""
+        kept = tuple(parameter for parameter in self.space.parameters if parameter.name not in self.shifts)
+        return replace(self, space=replace(self.space, parameters=kept), shifts=()) if self.shifts else self
 
     @property
     def adversaries(self) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """A scenario document as the search sees it: a scene space, and the layout of each scene."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,9 +14,11 @@ from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.scene import SceneLayout, body_named, motion_of
 from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.scenario.story_plan import shifted_groups
 from risk_sac.scenario.value import Value
 from risk_sac.world.net import Net
 
+SHIFT = "trigger_shift_"  # begins the name of a scene parameter that shifts an actor's triggers
 LEAST_WAY_M = 20.0  # of road ahead of the ego; choice
 
 
@@ -39,7 +41,23 @@ class Interpreter:
             categories = parameter.words if binary and parameter.words else ()
             meaning = parameter.meaning or name.replace("_", " ")
             parameters.append(Parameter(name, parameter.unit, low, high, meaning, parameter.odd, categories))
+        bound_s = self.document.story.deviation.trigger_s if self.document.story else 0.0
+        for name, actor in self.shifts.items():
+            if name in self.document.parameters:
+                raise ConfigError(f"parameters.{name}", "the name of a trigger's shift", "another name")
+            parameters.append(Parameter(name, "s", -bound_s, bound_s, f"how much later {actor}'s triggers fire"))
         return SceneSpace(self.document.name, tuple(parameters), self.holds if self.document.constraints else None)
+
+    @cached_property
+    def shifts(self) -> Mapping[str, str]:
+        """Scene parameter → the actor whose triggers it shifts, the first of their group that may deviate."""
+        story = self.document.story
+        if story is None or not story.deviation.trigger_s:
+            return {}
+        actors = self.document.actors
+        following = {name for name, actor in actors.items() if actor.role == "story" and self._deviates(name)}
+        first = (next((name for name in names if name in following), None) for names in shifted_groups(story))
+        return {f"{SHIFT}{name}": name for name in first if name is not None}
 
     def holds(self, xi: Mapping[str, float]) -> bool:
         """Whether a scene keeps all constraints."""
@@ -85,7 +103,10 @@ class Interpreter:
             _check_way(layout)
         except ConfigError as error:
             raise InfeasibleScene(str(error), reason="scenario") from error
-        return layout
+        if layout.story is None or not self.shifts:
+            return layout
+        shifts_s = {actor: xi.get(name, 0.0) for name, actor in self.shifts.items()}
+        return replace(layout, story=replace(layout.story, shifts_s=shifts_s))
 
     def net(self, value: Value) -> tuple[str, Net]:
         """The net of a scene: its file and its contents."""
@@ -109,7 +130,7 @@ class Interpreter:
     def _deviates(self, name: str) -> bool:
         """Whether methods may lead an actor away from the document's story."""
         story, bodies = self.document.story, self.alternatives(self.document.actors[name].body)
-        if story is None or not (story.deviation.accel_mps2 or story.deviation.lateral_mps):
+        if story is None or not any(story.deviation.model_dump().values()):
             return False
         return all(motion_of(self.document, name, body_named(body, f"actors.{name}.body")) != "not" for body in bodies)
 

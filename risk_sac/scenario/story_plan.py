@@ -1,13 +1,13 @@
 """A document's story in one scene: numbers in place of expressions, and the actors that follow it."""
 
 import operator
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from risk_sac.config.base import Settings
 from risk_sac.config.scenario import Chosen, is_expression
-from risk_sac.config.story import Story
+from risk_sac.config.story import Story, StoryEvent
 from risk_sac.scenario.places import StoryPlaces
 from risk_sac.scenario.travel_line import Pose
 
@@ -38,6 +38,18 @@ class Deviation(NamedTuple):
 
 
 AS_WRITTEN = Deviation()
+TIMELESS_CONDITIONS = frozenset({"state", "variable", "parameter", "collision"})
+TIMELESS_ACTIONS = frozenset({"none", "variable", "visibility", "delete"})
+
+
+def is_shifted(event: StoryEvent) -> bool:
+    """Whether a deviation may shift an event's start trigger: it moves an actor, at a time or in a traffic situation.
+
+    An event that begins with its act, or as another element changes, follows what went before.
+    """
+    return any(condition.kind not in TIMELESS_CONDITIONS for group in event.start or () for condition in group) and any(
+        action.do.kind not in TIMELESS_ACTIONS for action in event.actions
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +64,15 @@ class StoryPlan:
     edges: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # the ways of actors that have one
     places: StoryPlaces = field(compare=False)
     deviation: Deviation = AS_WRITTEN
+    shifts_s: Mapping[str, float] = field(default_factory=dict)  # actor -> how much later its triggers fire
+
+
+def shifted_groups(story: Story) -> Iterator[tuple[str, ...]]:
+    """Yields the actors of each group that has events whose start triggers a deviation may shift."""
+    for acts in story.stories.values():
+        for group in (group for act in acts for group in act.groups):
+            if any(is_shifted(event) for maneuver in group.maneuvers for event in maneuver.events):
+                yield group.actors
 
 
 def settled(part: Any, of: Callable[[Any, str], float], choose: Callable[[Any], Any], path: str = "") -> Any:

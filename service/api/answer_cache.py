@@ -26,13 +26,14 @@ Asked = tuple[str | None, str, bytes]  # the only project that the caller sees (
 
 @dataclass(frozen=True, slots=True)
 class KeptAnswer:
-    """A JSON answer with the revision that makes it valid."""
+    """An answer with the revision that makes it valid."""
 
     body: bytes
     headers: Mapping[str, str]  # with a tag
     revision: str  # read before the body was made, so that it is never newer
     campaign_id: str | None  # whose revision it is; None: the one of all campaigns together
     routed: Mapping[str, Any]  # what the router leaves in the scope for the log and the metrics
+    media_type: str
 
     def valid(self, store: Store) -> bool:
         """Whether nothing has changed since."""
@@ -43,18 +44,24 @@ class KeptAnswer:
         """The body, or 304 where the client has it."""
         if has(request, self.headers["ETag"]):
             return Response(status_code=304, headers=self.headers)
-        return Response(self.body, headers=self.headers, media_type="application/json")
+        return Response(self.body, headers=self.headers, media_type=self.media_type)
 
 
 def kept(
-    request: Request, body: bytes, headers: Mapping[str, str], revision: str, campaign_id: str | None = None
+    request: Request,
+    body: bytes,
+    headers: Mapping[str, str],
+    revision: str,
+    campaign_id: str | None = None,
+    *,
+    media_type: str = "application/json",
 ) -> Response:
     """An answer that the cache gives again; see `KeptAnswer`.
 
     It may depend on the project that the caller sees, the path and the query alone.
     """
     routed = {name: request.scope[name] for name in ("route", "path_params")}
-    answer = KeptAnswer(body, headers, revision, campaign_id, routed)
+    answer = KeptAnswer(body, headers, revision, campaign_id, routed, media_type)
     request.scope[ANSWER] = answer
     return answer.response(request)
 

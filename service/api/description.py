@@ -28,6 +28,7 @@ SERVER = "http://127.0.0.1:8000"
 TITLES = {
     "put_triage": "Set triage",
     "get_log": "Get run log",
+    "get_grid": "Get verdicts on scenes",
     "get_scenes": "Get scene effects",
     "get_bundle": "Get replay bundle",
     "get_core": "Get minimal failure",
@@ -57,6 +58,7 @@ QUERIES: Mapping[str, Mapping[str, str]] = {
     "list_failures": {"grade": "preventable", "severity": "severe"},
     "get_curves": {"points": "50"},
     "get_log": {"lines": "20"},
+    "get_grid": {"format": "csv"},
     "get_failure_table": {"tier": "valid"},
     "get_events": {"newest": "100"},
     "get_table": {"format": "md"},

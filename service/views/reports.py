@@ -133,6 +133,7 @@ MEDIA_TYPES = {
     "md": "text/markdown",
     "csv": "text/csv",
     "yaml": "application/yaml",
+    "xml": "application/xml",
     "png": "image/png",
     "svg": "image/svg+xml",
 }

@@ -24,6 +24,7 @@ from risk_sac.execution.messages import without_folders
 from risk_sac.failures.cases import Regression
 from risk_sac.records import Outcome, wire
 from risk_sac.report.figures import Format
+from risk_sac.report.grid import Standard
 from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, PriorContent, is_kept
 from service.errors import NotFoundError, StorageError
 from service.settings import ServiceSettings
@@ -33,6 +34,7 @@ from service.views import reports
 from service.views.curves import curves
 from service.views.failure_table import failure_table
 from service.views.on_demand import Helper, OnDemandCache
+from service.views.played_grid import GridFormat, played_grid, written_grid
 from service.views.reports import CampaignReport, Reports, unknown_figure
 from service.views.scenes import scene_effects
 
@@ -42,7 +44,9 @@ LARGE = 4000  # episodes; reading more in the server would hold up other request
 MEMORY_BYTES, WALL_S = 4 << 30, 1800.0  # of a helper; 100,000 episodes take 2.4 GiB and, where many fail, minutes
 VIEWS_KEPT = 4  # of some megabytes each
 REFUSED, LOST, PASSING, TOO_LARGE = 3, 4, 5, 6  # exit statuses
-ViewName = Literal["curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "prior"]
+ViewName = Literal[
+    "curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "prior", "grid"
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +64,10 @@ class CampaignView:
     points: int = 0
     outcomes: tuple[Outcome, ...] = ()
     prior: str = ""
+    run: str = ""
+    standard: Standard = "r157"
+    over: tuple[str, ...] = ()
+    """Parameters of a grid's picture."""
     regression: Regression | None = None
 
 
@@ -95,6 +103,9 @@ def content_of(view: CampaignView, sources: Sources) -> Content:
         return Content(wire(curves(campaign, store.records(campaign.number), view.points)))
     if view.name == "scenes":
         return Content(wire(scene_effects(campaign, store.records(campaign.number))))
+    if view.name == "grid":
+        grid = played_grid(campaign, view.run, store.records(campaign.number), view.standard)
+        return Content(written_grid(grid, cast(GridFormat, view.format), view.over))
     made = sources.reports.report(campaign)
     return Content(_OF_REPORT[view.name](made, view), made.lasting)
 

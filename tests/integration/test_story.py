@@ -158,6 +158,24 @@ def test_story_begins_with_the_release_and_free_actors_walk() -> None:
     assert all(frame.role[frame.ids.index("lead")] == Role.STORY for frame in frames)
 
 
+def test_shifted_trigger_is_a_parameter_of_methods_that_deviate() -> None:
+    text = BRAKING.replace("horizon_s: 20", "horizon_s: 4")
+    controlled, written = braking_env("default", "random", text), braking_env("default", text=text)
+    assert written.problem.space.names == ("gap_m",)
+    assert controlled.problem.space.names == ("gap_m", "trigger_shift_lead")
+    bounds = controlled.problem.space.parameters[1]
+    assert (bounds.low, bounds.high) == (-0.5, 0.5)
+    braking = {}
+    for shift_s in (-0.5, 0.0, 0.5):
+        frames = played(controlled, {"gap_m": 50.0, "trigger_shift_lead": shift_s})
+        braking[shift_s] = next(i for i, frame in enumerate(frames) if of(frame, "lead")["speed_mps"] < 24.99)
+        assert frames[-1].role.tolist()[1] == (Role.ADVERSARY if shift_s else Role.STORY)
+        assert controlled.deviations.keys() == ({"lead", "left", "right"} if shift_s else set())
+    controlled.close()
+    written.close()
+    assert {shift_s: step - braking[0.0] for shift_s, step in braking.items()} == {-0.5: -5, 0.0: 0, 0.5: 5}
+
+
 def test_dangerous_start_is_reported_and_played_and_an_overlap_is_refused() -> None:
     env = braking_env("default")
     env.reset(seed=1, options={"scene": Scene(env.problem.family.name, {"gap_m": 0.3})})
@@ -170,7 +188,9 @@ def test_dangerous_start_is_reported_and_played_and_an_overlap_is_refused() -> N
 
 
 def test_zero_action_plays_the_story_and_an_action_leads_away_from_it() -> None:
-    text = BRAKING.replace("horizon_s: 20", "horizon_s: 4")
+    text = BRAKING.replace("horizon_s: 20", "horizon_s: 4").replace(
+        "story:\n", "story:\n  deviation: {trigger_s: 0}\n", 1
+    )
     controlled, written = braking_env("default", "random", text), braking_env("default", text=text)
     size = controlled.action_size
     assert size == 8

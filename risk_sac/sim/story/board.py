@@ -10,6 +10,7 @@ from risk_sac.config.story_actions import DeleteAction, VariableAction
 from risk_sac.config.story_conditions import ElementKind, StateCondition
 from risk_sac.sim.story.actions import doing_of, set_variable
 from risk_sac.sim.story.doing import ALONG, Doing
+from risk_sac.sim.story.shift import EventStart
 from risk_sac.sim.story.stage import Stage
 from risk_sac.sim.story.triggers import TriggerWatch
 
@@ -198,23 +199,19 @@ class EventElement(Element):
             board, "event", path, [ActionElement(board, one, f"{path}{PATH}{one.name}") for one in event.actions]
         )
         self._event, self._maneuver, self._done = event, maneuver, 0
-        self._start = self._watch()
-
-    def _watch(self) -> TriggerWatch | None:
-        return TriggerWatch(self._event.start) if self._event.start else None
+        self._start = EventStart(event)
 
     def stand_by(self) -> None:
         """See `Element.stand_by`."""
         super().stand_by()
-        self._done, self._start = 0, self._watch()
+        self._done, self._start = 0, EventStart(self._event)
 
     def step(self) -> None:
         """See `Element.step`."""
         if self.state == "running":
             super().step()
             return
-        fires = self._start is None or self._board.check(self._start)[0]
-        if not fires:
+        if not self._start.fires(self._board.stage, self._board, self.names):
             return
         others = [part for part in self._maneuver.parts if part is not self and part.state == "running"]
         if others and self._event.priority == "skip":
@@ -234,7 +231,7 @@ class EventElement(Element):
         self._done += 1
         super().finish()
         if self._done < self._event.most:
-            self.state, self._start = "standby", self._watch()
+            self.state, self._start = "standby", EventStart(self._event)
 
 
 class ActionElement(Element):

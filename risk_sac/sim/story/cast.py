@@ -27,6 +27,10 @@ class Present(NamedTuple):
         way = pose.heading_rad + slip_rad
         return cls(*pose, speed_mps * math.cos(way), speed_mps * math.sin(way), accel_mps2, reach)
 
+    def after(self, seconds: float) -> "Present":
+        """Where it is after some time at its velocity."""
+        return self._replace(x_m=self.x_m + self.vx_mps * seconds, y_m=self.y_m + self.vy_mps * seconds)
+
     @property
     def pose(self) -> Pose:
         """Pose of its reference point."""
@@ -56,6 +60,7 @@ class Drift(NamedTuple):
     lateral_mps: float = 0.0
     ahead_m: float = 0.0
     left_m: float = 0.0
+    trigger_s: float = 0.0  # shift of a trigger; of the largest deviation alone
 
 
 ON_STORY = Drift()
@@ -125,6 +130,15 @@ class Mover:
         cos, sin, speed, lateral = math.cos(way), math.sin(way), self.speed_mps, self.lateral_mps
         velocity = speed * cos - lateral * sin, speed * sin + lateral * cos
         return Present(*self.pose, *velocity, self.accel_mps2, self.reach)
+
+    def note_shift(self, shift_s: float) -> None:
+        """Notes that a trigger of its story is shifted."""
+        self.furthest = self.furthest._replace(trigger_s=max(self.furthest.trigger_s, abs(shift_s)))
+
+    @property
+    def deviates(self) -> bool:
+        """Whether it is not where its story has it, or may not be because a trigger was shifted."""
+        return self.drift != ON_STORY or self.furthest.trigger_s > 0.0
 
     def move(self, drift: Drift) -> None:
         """Moves it by a step, at the end of which it has this drift from its story."""

@@ -107,7 +107,7 @@ class StoryEngine:
     @property
     def deviated(self) -> frozenset[str]:
         """Actors that are not where their story has them."""
-        return frozenset(name for name, mover in self._stage.movers.items() if mover.drift != ON_STORY)
+        return frozenset(name for name, mover in self._stage.movers.items() if mover.deviates)
 
     @property
     def furthest(self) -> Mapping[str, Drift]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -77,6 +78,19 @@ class Stage:
     def look_again(self, name: str) -> None:
         """Takes in that an actor of the story is elsewhere, which is no way that it travelled."""
         self.present[name] = self.movers[name].present
+
+    def after(self, seconds: float) -> "Stage":
+        """The stage after some time in which all actors keep their velocities; to look at only."""
+        later = copy(self)
+        later.time_s = self.time_s + seconds
+        later.present = {name: actor.after(seconds) for name, actor in self.present.items()}
+        later.travelled_m = {
+            name: gone_m + self.present[name].speed_mps * seconds if name in self.present else gone_m
+            for name, gone_m in self.travelled_m.items()
+        }
+        later.stood_s = {name: stood_s + seconds if stood_s else 0.0 for name, stood_s in self.stood_s.items()}
+        later._off_s, later._end_s = dict(self._off_s), dict(self._end_s)
+        return later
 
     def stands(self, name: str) -> bool:
         """Whether an actor does not move."""

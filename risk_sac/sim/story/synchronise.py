@@ -3,6 +3,7 @@
 import math
 
 from risk_sac.config.story_actions import SynchroniseAction
+from risk_sac.sim.solid import clip
 from risk_sac.sim.story.along import target_mps
 from risk_sac.sim.story.cast import Mover
 from risk_sac.sim.story.doing import ALONG
@@ -10,13 +11,15 @@ from risk_sac.sim.story.stage import Stage
 from risk_sac.world.types import STEP_S
 
 NO_TIME_S = 1e-6
+MOST_MPS2 = 3.0  # of an actor that walks; choice
 
 
 class Synchronise:
     """Lets an actor arrive at its target when the master arrives at the master's.
 
     The standard leaves the course of the speed open. Choice: the acceleration that changes linearly over the time that
-    is left, and so the least sum of squares; it is computed again in each step from the master's present speed:
+    is left, and so the least sum of squares; it is computed again in each step from the master's present speed.
+    Where a master that brakes, and then drives on, asks for more than `MOST_MPS2` in the end, the actor comes late:
 
       with a final speed v:   a = 6 d / T² - (4 v0 + 2 v) / T
       without one:            a = 2 (d - v0 T) / T²
@@ -45,10 +48,10 @@ class Synchronise:
         master_m, master_mps = stage.way_to(do.master, master_target)
         if way_m <= max(float(do.tolerance_m), NO_TIME_S) or master_m <= max(float(do.master_tolerance_m), NO_TIME_S):
             if do.final_speed is not None and way_m <= 0.5:
-                mover.wanted_mps = target_mps(do.final_speed.speed, mover, stage)
+                mover.wanted_mps = _reachable(target_mps(do.final_speed.speed, mover, stage), mover)
             return True
         time_s = master_m / master_mps if master_mps > NO_TIME_S else math.inf
-        mover.wanted_mps = self._speed_mps(mover, way_m, time_s, stage)
+        mover.wanted_mps = _reachable(self._speed_mps(mover, way_m, time_s, stage), mover)
         return way_m - (mover.story_mps + mover.wanted_mps) / 2 * STEP_S <= NO_TIME_S
 
     def _speed_mps(self, mover: Mover, way_m: float, time_s: float, stage: Stage) -> float:
@@ -66,6 +69,12 @@ class Synchronise:
         if speed <= NO_TIME_S and last_mps > 0.0 and time_s - STEP_S / 2 > 3 * way_m / last_mps:
             return 0.0
         return max(speed + change_mps(way_m, time_s, speed, last_mps), 0.0)
+
+
+def _reachable(wanted_mps: float, mover: Mover) -> float:
+    """The speed nearest to a wanted one that an actor can have after a step."""
+    most = MOST_MPS2 * STEP_S if mover.free else math.inf
+    return clip(wanted_mps, mover.story_mps - most, mover.story_mps + most)
 
 
 def change_mps(way_m: float, time_s: float, speed_mps: float, last_mps: float) -> float:

@@ -12,6 +12,7 @@ from risk_sac import __version__
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.env.problem import adjustments
 from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Power, Record, Results, State, wire
+from risk_sac.report.grid import PlayedGrid, Standard
 from risk_sac.report.power import power_of
 from risk_sac.search.prior.earlier import PriorContent
 from service.api.answer_cache import kept
@@ -37,12 +38,13 @@ from service.api.pages import (
     link,
 )
 from service.api.posted import ON_MAP, PostedCampaign, documented
-from service.errors import NotFoundError
 from service.runs.manager import LOG
 from service.store.stored import StoredCampaign
 from service.views.curves import Curves, played, results
 from service.views.failure_table import FailureTable
+from service.views.played_grid import GridFormat, run_of
 from service.views.progress import campaign_body, log_tail, retry_after_s, summary_body
+from service.views.reports import MEDIA_TYPES
 from service.views.scenes import SceneEffects
 from service.views.whole import CampaignView, ViewName
 
@@ -62,6 +64,17 @@ IdempotencyKey = Annotated[
 Points = Annotated[int, Query(ge=1, le=1000, description="Of each curve, at most.")]
 
 LOG_TEXT = TAGGED | {200: TAGGED[200] | {"content": {"text/plain": {"schema": {"type": "string"}}}}}
+
+GRID = LIVE | {
+    200: LIVE[200]
+    | {
+        "content": {
+            MEDIA_TYPES["csv"]: {"schema": {"type": "string"}, "example": "id,scenario,ego,gap_m,…,verdict\n…"},
+            MEDIA_TYPES["xml"]: {"schema": {"type": "string"}},
+            MEDIA_TYPES["png"]: {"schema": {"type": "string", "format": "binary"}},
+        }
+    }
+}
 
 router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID)
 
@@ -181,6 +194,30 @@ async def get_scenes(campaign_id: str, request: Request, service: Service, calle
     return await _viewed(campaign_id, request, service, caller, name="scenes")
 
 
+@router.get("/{campaign_id}/runs/{run_id}/grid", response_model=PlayedGrid, responses=UNKNOWN | GRID | CROWDED)
+async def get_grid(
+    campaign_id: str,
+    run_id: str,
+    request: Request,
+    service: Service,
+    caller: CurrentCaller,
+    format_: Annotated[
+        GridFormat, Query(alias="format", description="`xml` is a JUnit report, `png` a picture over two parameters.")
+    ] = "json",
+    standard: Annotated[
+        Standard,
+        Query(description="Whose avoidance makes a contact the ego's failure: R157's driver, the FSM, or either."),
+    ] = "r157",
+    over: Annotated[
+        tuple[str, ...],
+        Query(max_length=2, description="The two parameters of the picture; without them the first two that vary."),
+    ] = (),
+) -> Response:
+    """The standard's verdict on each scene of a run of `story-sweep`, `story-random` or `story-bo`."""
+    fields = {"run": run_id, "format": format_, "standard": standard, "over": over}
+    return await _viewed(campaign_id, request, service, caller, name="grid", media_type=MEDIA_TYPES[format_], **fields)
+
+
 @router.get("/{campaign_id}/runs/{run_id}/log", response_class=Response, responses=UNKNOWN | LOG_TEXT)
 def get_log(
     campaign_id: str,
@@ -191,10 +228,7 @@ def get_log(
     lines: Annotated[int, Query(ge=1, le=1000, description="At most; fewer where they are long.")] = 200,
 ) -> Response:
     """Last lines that a run's workers printed, without the server's folders; empty before the first."""
-    campaign = service.store.campaign(campaign_id, caller.sees)
-    if run_id not in {run.id for run in campaign.runs}:
-        message = f"campaign {campaign_id} has no run {run_id!r}; GET it lists all runs"
-        raise NotFoundError(message, field="run_id", got=run_id)
+    run_of(service.store.campaign(campaign_id, caller.sees), run_id)
     text = log_tail(service.settings.run_folder(campaign_id, run_id) / LOG, lines).encode()
     return PlainTextResponse(text, headers=cacheable(request, _digest(text)))
 
@@ -220,13 +254,20 @@ def _live(
 
 
 async def _viewed(
-    campaign_id: str, request: Request, service: Context, caller: Caller, *, name: ViewName, **fields: Any
+    campaign_id: str,
+    request: Request,
+    service: Context,
+    caller: Caller,
+    *,
+    name: ViewName,
+    media_type: str = MEDIA_TYPES["json"],
+    **fields: Any,
 ) -> Response:
     """An answer that reads all episodes of a campaign, which the cache keeps."""
     campaign, headers, revision = await run_in_threadpool(_current, campaign_id, request, service, caller)
     view = CampaignView(name=name, campaign_id=campaign_id, edition=campaign.revision, **fields)
     content = await service.views.content(view, campaign, caller.key_id)
-    return kept(request, content.body, headers, revision, campaign_id)
+    return kept(request, content.body, headers, revision, campaign_id, media_type=media_type)
 
 
 def _current(

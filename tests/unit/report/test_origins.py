@@ -17,14 +17,15 @@ def run(method, *failures, **changes):
     return FinishedRun(spec=spec, digest="", records=tuple(records), versions={}, wall_s=1.0, cpu_s=1.0)
 
 
-def strayed(speed_mps, across_m):
-    return {"left": StoryDeviation(speed_mps=speed_mps, lateral_mps=0.0, along_m=0.0, across_m=across_m)}
+def strayed(speed_mps, across_m, trigger_s):
+    strayed = StoryDeviation(speed_mps=speed_mps, lateral_mps=0.0, along_m=0.0, across_m=across_m, trigger_s=trigger_s)
+    return {"left": strayed}
 
 
 def test_each_way_to_play_adds_the_kinds_that_the_ways_before_lack():
     rows = failure_origins(
         [
-            run("archive", "a", "b", "c", deviations=strayed(1.5, 0.2)),
+            run("archive", "a", "b", "c", deviations=strayed(1.5, 0.2, 0.3)),
             run("story-bo", "a", "b"),
             run("story-sweep", "a"),
             run("no-adversary", "z"),
@@ -36,7 +37,7 @@ def test_each_way_to_play_adds_the_kinds_that_the_ways_before_lack():
         (PlayedAs.DEVIATING, ("archive",), 3, 3, 1),
     ]
     assert [row.least_speed_mps for row in rows] == [None, None, 1.5]
-    assert rows[2].least_across_m == 0.2
+    assert (rows[2].least_across_m, rows[2].least_trigger_s) == (0.2, 0.3)
 
 
 def test_nothing_is_said_of_scenarios_that_no_method_plays_as_written():

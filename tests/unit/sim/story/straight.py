@@ -85,6 +85,7 @@ class Drive:
         others: Mapping[str, Present] | None = None,
         numbers: Mapping[str, float] | None = None,
         words: Mapping[str, str] | None = None,
+        shifts_s: Mapping[str, float] | None = None,
     ) -> None:
         self.ego_mps, self._ego, self._reach, self._others = ego_mps, ego, reach, dict(others or {})
         plan = StoryPlan(
@@ -93,6 +94,7 @@ class Drive:
             places=StoryPlaces(straight_net(), None, story, Value({}, {})),
             numbers=numbers or {},
             words=words or {},
+            shifts_s=shifts_s or {},
         )
         self.engine = StoryEngine(plan, self.present())
         self.engine.observe(self.present())

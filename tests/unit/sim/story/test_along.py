@@ -109,7 +109,7 @@ def test_continuous_distance_holds_it() -> None:
         assert drive.to(time_s)["lead"].x_m == pytest.approx(10.0 * time_s + 25.0, abs=1e-6)
 
 
-def synchronised(final: dict[str, Any] | None, start_mps: float, at_m: float = 0.0) -> Drive:
+def synchronised(final: dict[str, Any] | None, start_mps: float, at_m: float = 0.0, *, free: bool = False) -> Drive:
     do = {
         "kind": "synchronise",
         "master": "ego",
@@ -118,7 +118,7 @@ def synchronised(final: dict[str, Any] | None, start_mps: float, at_m: float = 0
         "final_speed": final,
     }
     story = story_of([one_event("other", do)])
-    return Drive(story, {"other": car(at_m, 1, start_mps, reach=POINT)})
+    return Drive(story, {"other": car(at_m, 1, start_mps, reach=POINT, free=free)})
 
 
 def test_synchronised_actor_arrives_with_the_master() -> None:
@@ -144,6 +144,14 @@ def test_steady_state_is_driven_at_the_final_speed() -> None:
     steady = [moment["other"] for moment in drive.history if 44.1 <= moment["other"].x_m <= 59.9]
     assert all(moment.speed_mps == pytest.approx(8.0, abs=0.1) for moment in steady)
     assert drive.engine.played["other"].x_m == pytest.approx(60.0, abs=0.2)
+
+
+def test_walker_that_cannot_be_there_in_time_comes_late() -> None:
+    drive = synchronised({"speed": 1.4}, 0.0, at_m=59.9, free=True)  # the course of 3 · 0.1 / 1.4 s is too steep
+    drive.to(12.0)
+    steepest = max(abs(moment["other"].accel_mps2) for moment in drive.history)
+    assert steepest == pytest.approx(3.0)
+    assert drive.engine.played["other"].speed_mps > 0.0
 
 
 def test_standing_actor_waits_until_it_need_not_go_back() -> None:

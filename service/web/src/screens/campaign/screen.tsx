@@ -9,6 +9,7 @@ import { count, number, waitingWords } from "../../ui/text";
 import { useTitle } from "../../ui/title";
 import { Charts } from "./charts";
 import { Funnel } from "./funnel";
+import { Grids } from "./grid";
 import { Header } from "./header";
 import { useLive } from "./live";
 import { Newest } from "./newest";
@@ -81,6 +82,7 @@ export function CampaignScreen({ id }: { id: string }) {
         </section>
       )}
       {campaign.progress.episodes_done > 0 && <Scenes campaign={campaign} />}
+      <Grids campaign={campaign} />
       <Runs campaign={campaign} hidden={hidden} hide={hide} />
       <Worth campaign={campaign} />
     </div>
