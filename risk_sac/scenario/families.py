@@ -50,6 +50,7 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
         requirements=document.requirements,
         judge=document.judge,
         parameters=document.parameters,
+        rank_correlation=document.rank_correlation,
     )
 
 
