@@ -73,19 +73,25 @@ def defensive(dimension: int, fitted: Gaussians | None = None) -> Gaussians:
     )
 
 
-def elite(margins: Floats, latest: int) -> Floats:
-    """Which draws a proposal is fitted to, `n` of bool.
+def elite(margins: Floats, failed: np.typing.NDArray[np.bool_], latest: int) -> np.typing.NDArray[np.bool_]:
+    """Which draws a proposal is fitted to, `n`: those that failed and, until these are many, those nearest to it.
 
     Args:
-      margins: `n`, of all draws; at or below 0 they failed.
+      margins: `n x r`, of all draws and each requirement; inf where nothing is known.
+      failed: `n`.
       latest: number of draws of the latest stage, at the end.
     """
-    level = np.quantile(margins[-latest:], ELITE)
-    return np.asarray(margins <= max(float(level), 0.0))
+    if failed[-latest:].sum() >= ELITE * latest:
+        return failed
+    known = margins[-latest:][np.isfinite(margins[-latest:]).all(axis=1)]
+    if not len(known):
+        return failed
+    level = np.quantile(known, ELITE / max(margins.shape[1], 1), axis=0)
+    return np.asarray(failed | (margins < level).any(axis=1))
 
 
 def fit(points: Floats, weights: Floats, random: np.random.Generator) -> Gaussians | None:
-    """Fits Gaussians to weighted points by expectation maximisation; None if there are fewer than `d + 1`.
+    """Fits Gaussians to weighted points by expectation maximisation; None if there are at most `d`.
 
     Args:
       points: `n x d`.
@@ -93,13 +99,15 @@ def fit(points: Floats, weights: Floats, random: np.random.Generator) -> Gaussia
       random: chooses the first centres.
     """
     size, dimension = points.shape
-    if size <= dimension or not weights.sum() > 0:
+    if not dimension or size <= dimension or not weights.sum() > 0:
         return None
     count = int(np.clip(size // (PER_COMPONENT * dimension), 1, MOST_COMPONENTS))
     share = weights / weights.sum()
     means = _centres(points, share, count, random)
     spread = np.cov(points.T, aweights=share, bias=True).reshape(dimension, dimension) + 0.05 * np.eye(dimension)
-    mixture = Gaussians(np.full(count, 1 / count), means, np.stack([np.linalg.cholesky(spread / count ** (2 / dimension))] * count))
+    mixture = Gaussians(
+        np.full(count, 1 / count), means, np.stack([np.linalg.cholesky(spread / count ** (2 / dimension))] * count)
+    )
     for _ in range(ROUNDS):
         parts = mixture.log_parts(points)
         taken = np.exp(parts - _log_sum_exp(parts)[:, None]) * share[:, None]  # n x k
@@ -128,7 +136,7 @@ def _centres(points: Floats, share: Floats, count: int, random: np.random.Genera
 
 
 def _log_sum_exp(parts: Floats) -> Floats:
-    """log Σ_k exp of `n x k`, `n`."""
+    """Log Σ_k exp of `n x k`, `n`."""
     most = parts.max(axis=1)
     total: Floats = most + np.log(np.exp(parts - most[:, None]).sum(axis=1))
     return total

@@ -10,6 +10,7 @@ import numpy as np
 
 from risk_sac.config import RunSpec, method_of
 from risk_sac.env.problem import Problem
+from risk_sac.rates.record import declared_of
 from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Outcome, Violation
 from risk_sac.search.agents.controls import IdleAgent, RandomAgent, ScriptedAgent, ScriptFollower
 from risk_sac.search.agents.learner import Learner
@@ -26,6 +27,7 @@ from risk_sac.search.scene_optimizer import (
     Encounter,
     GridSampler,
     IidSampler,
+    RateSampler,
     SceneOptimizer,
     SobolOptimizer,
 )
@@ -38,7 +40,8 @@ CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
     "none": IdleAgent,
 }
 OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
-    each.kind: each for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler, GridSampler)
+    each.kind: each
+    for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler, GridSampler, RateSampler)
 }
 Actor = Learner | IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
 """A joint policy that drives all adversaries."""
@@ -211,6 +214,10 @@ class Searchers:
         made: SceneOptimizer
         if sampler is GridSampler:
             made = GridSampler(*arguments, self._problem.grid, self._spec.budget.episodes)
+        elif sampler is IidSampler:
+            made = IidSampler(*arguments, declared_of(self._problem))
+        elif sampler is RateSampler:
+            made = RateSampler(*arguments, declared_of(self._problem), self._spec.budget.episodes)
         elif self._start is None or not actor.genes:
             made = sampler(*arguments)
         else:
