@@ -50,15 +50,6 @@ class Rates(Record):
     """Parameters with a rank correlation; all others are independent."""
 
 
-def declared_of(problem: Problem) -> Declared:
-    """The declared distribution over the scenes of a problem.
-
-    Raises:
-      ConfigError: a distribution has no mass in the ODD.
-    """
-    return Declared.of(problem.space, problem.family.parameters, problem.family.rank_correlation)
-
-
 def stages_of(declared: Declared, draws: int, seed: int) -> Stages:
     """The stages of a run; axes whose values do not tell their share are drawn as declared in all of them."""
     return Stages(int(declared.telling.sum()), draws, seed)
@@ -77,20 +68,17 @@ def rates_of(spec: RunSpec, records: Sequence[EpisodeRecord], scenes_per_hour: f
     """
     if spec.method != METHOD:
         raise ConfigError("method", repr(spec.method), f"{METHOD!r}, whose draws can be weighted")
-    if scenes_per_hour is not None and not 0.0 <= scenes_per_hour <= MOST_PER_HOUR:
-        raise ConfigError("exposure", f"{scenes_per_hour:g}", f"scenes in an hour, 0 to {MOST_PER_HOUR:g}")
+    check_exposure(scenes_per_hour)
     if not records:
         raise ConfigError("", f"{spec.id} without an episode", "one episode or more")
     problem = Problem.from_spec(spec)
-    declared = declared_of(problem)
+    declared = problem.declared
     stages, draws = stages_of(declared, spec.budget.episodes, spec.stream), _draws(problem, declared, records)
     ratios = stages.ratios(draws)
     weights = ratios * stages.trust(len(draws))
     played = np.array([record.outcome not in UNKNOWN for record in records])
-    counting = [requirement.name for requirement in problem.requirements if requirement.counts == "failure"]
-    events = {ANY: draws.failed} | {
-        name: np.array([name in record.failed for record in records], dtype=bool) for name in counting
-    }
+    events = {name: np.array([name in record.failed for record in records], dtype=bool) for name in rated(problem)}
+    events[ANY] = draws.failed
     rates = {name: estimated(weights, ratios, event, played) for name, event in events.items()}
     correlation = problem.family.rank_correlation
     return Rates(
@@ -103,6 +91,21 @@ def rates_of(spec: RunSpec, records: Sequence[EpisodeRecord], scenes_per_hour: f
         distributions={name: _said(problem.family.parameters.get(name)) for name in problem.space.names},
         correlated=() if correlation is None else correlation.parameters,
     )
+
+
+def rated(problem: Problem) -> tuple[str, ...]:
+    """What has a rate: any failure, and each requirement that counts."""
+    return ANY, *(requirement.name for requirement in problem.requirements if requirement.counts == "failure")
+
+
+def check_exposure(scenes_per_hour: float | None) -> None:
+    """Refuses an exposure that is negative or no number.
+
+    Raises:
+      ConfigError: naming it.
+    """
+    if scenes_per_hour is not None and not 0.0 <= scenes_per_hour <= MOST_PER_HOUR:
+        raise ConfigError("exposure", f"{scenes_per_hour:g}", f"scenes in an hour, 0 to {MOST_PER_HOUR:g}")
 
 
 def _draws(problem: Problem, declared: Declared, records: Sequence[EpisodeRecord]) -> Draws:

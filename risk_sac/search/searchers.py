@@ -10,7 +10,6 @@ import numpy as np
 
 from risk_sac.config import RunSpec, method_of
 from risk_sac.env.problem import Problem
-from risk_sac.rates.record import declared_of
 from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Outcome, Violation
 from risk_sac.search.agents.controls import IdleAgent, RandomAgent, ScriptedAgent, ScriptFollower
 from risk_sac.search.agents.learner import Learner
@@ -215,9 +214,9 @@ class Searchers:
         if sampler is GridSampler:
             made = GridSampler(*arguments, self._problem.grid, self._spec.budget.episodes)
         elif sampler is IidSampler:
-            made = IidSampler(*arguments, declared_of(self._problem))
+            made = IidSampler(*arguments, self._problem.declared)
         elif sampler is RateSampler:
-            made = RateSampler(*arguments, declared_of(self._problem), self._spec.budget.episodes)
+            made = RateSampler(*arguments, self._problem.declared, self._spec.budget.episodes)
         elif self._start is None or not actor.genes:
             made = sampler(*arguments)
         else:

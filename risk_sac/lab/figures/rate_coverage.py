@@ -8,6 +8,7 @@ holds is not made again. OUT/coverage.csv compares with Wilson's interval of pla
 
 import argparse
 import csv
+import io
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
@@ -23,7 +24,7 @@ from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.metrics import wilson_interval
 from risk_sac.rates.estimate import RateEstimate, estimated
-from risk_sac.rates.record import declared_of, stages_of
+from risk_sac.rates.record import stages_of
 from risk_sac.rates.stages import Stages, draws_of
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.search.loop import episode_seed
@@ -112,7 +113,7 @@ def play(env: RiskSacEnv, point: Floats, seed: int) -> Encounter | None:
 
 def plain(env: RiskSacEnv, start: int) -> Iterator[list[object]]:
     """Yields rows of plain draws from a number on: number, played, failed, least margin, and the point."""
-    declared, size = declared_of(env.problem), env.problem.space.dimension
+    declared, size = env.problem.declared, env.problem.space.dimension
     for number in count(start):
         point = declared.unit(np.random.default_rng((TRUTH_SEED, number)).random(size))
         encounter = play(env, point, episode_seed(TRUTH_SEED, number))
@@ -123,7 +124,7 @@ def plain(env: RiskSacEnv, start: int) -> Iterator[list[object]]:
 
 def estimated_with(env: RiskSacEnv, seed: int) -> RateEstimate:
     """Estimates an ego's rate with `DRAWS` draws."""
-    problem, declared = env.problem, declared_of(env.problem)
+    problem, declared = env.problem, env.problem.declared
     sampler = RateSampler(problem.space.dimension, SceneOptimizerConfig(), seed, declared, DRAWS)
     for number in range(DRAWS):
         point = sampler.ask()
@@ -146,9 +147,11 @@ def _add(file: Path, header: Sequence[str], rows: Iterator[Sequence[object]], mo
     done = _rows(file)
     if len(done) >= most:
         return
-    with file.open("w", newline="") as opened:
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([header, *done])
+    replace_file(file, text.getvalue().encode())  # without a row that an interruption cut off
+    with file.open("a", newline="") as opened:
         writer = csv.writer(opened, lineterminator="\n")
-        writer.writerows([header, *done])
         for _, row in zip(range(len(done), most), rows, strict=False):
             writer.writerow(row)
             opened.flush()
