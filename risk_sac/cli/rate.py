@@ -67,7 +67,8 @@ def _rate(options: argparse.Namespace) -> int:
     if options.requirement is not None:
         only = {options.requirement: answer.rates[options.requirement]}
         answer = answer.model_copy(update={"rates": only})
-    print_answer(options, answer, _table(answer), _drawn(answer), answer.meaning)
+    texts = (_objections(answer), _drawn(answer), answer.meaning)
+    print_answer(options, answer, _table(answer), *filter(None, texts))
     if not results.finished:
         notes.print(f"Stopped after {counted(answer.draws, 'draw')}. The same command again goes on from there.")
         return INTERRUPTED
@@ -98,8 +99,14 @@ def _table(answer: Rates) -> Table:
 
 def _said(estimate: RateEstimate) -> tuple[str, str]:
     if estimate.rate is None:
-        return "not estimated", f"at most {estimate.at_most:.2g}: {estimate.why}"
+        return "-", f"below {estimate.at_most:.2g}"
     return f"{estimate.rate:.3g}", f"{estimate.low:.3g} to {estimate.high:.3g}"
+
+
+def _objections(answer: Rates) -> str:
+    """Says of each rate that is not estimated why."""
+    objected = [f"{name}: not estimated: {each.why}" for name, each in answer.rates.items() if each.rate is None]
+    return "\n".join(objected)
 
 
 def _hourly(rate: HourlyRate | None) -> str:

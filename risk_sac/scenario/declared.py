@@ -4,6 +4,7 @@ Independent standard normal numbers s become correlated ones, z = L s, these sha
 the parameters' distributions, truncated to the scene space, have that share. L Lᵀ is the copula's correlation matrix.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +19,7 @@ from risk_sac.scenario.space import SceneSpace
 from risk_sac.world.types import Floats
 
 LEAST_SHARE = 1e-12  # of either end, within which a double no longer tells shares apart
+WINDOW = 0.02  # of an axis, over which its density is taken; choice
 _STANDARD = NormalDist()
 
 
@@ -43,6 +45,14 @@ class DeclaredAxis:
             return share
         value = self.law.quantile(share, self.low, self.high)
         return min(max((value - self.low) / (self.high - self.low), 0.0), 1.0)
+
+    def density(self, unit: float) -> float:
+        """Density at a coordinate in [0, 1], as a multiple of the uniform one; the mean over `WINDOW` of the axis."""
+        if not self.tells or self.law is None:
+            return 1.0
+        low = min(max(unit - WINDOW / 2.0, 0.0), 1.0 - WINDOW)
+        ends = (self.low + end * (self.high - self.low) for end in (low, low + WINDOW))
+        return self.law.mass(*ends) / self.law.mass(self.low, self.high) / WINDOW
 
     def share(self, unit: float) -> float:
         """The share in [0, 1] at a coordinate in [0, 1]; the inverse of `unit`."""
@@ -113,6 +123,22 @@ class Declared:
         known = self._order[:count]
         normal[known] = np.linalg.solve(self._factor[:count, :count], correlated[known])
         return normal
+
+    def density(self, point: Floats) -> float:
+        """Density of a point of the unit cube, `d`, as a multiple of the uniform one.
+
+        Π_i f_i(x_i) · N(z; 0, L Lᵀ) / Π_i N(z_i; 0, 1)
+
+        Axes that do not tell their share count as uniform.
+        """
+        margins = math.prod(axis.density(unit) for axis, unit in zip(self.axes, point.tolist(), strict=True))
+        if self.correlation is None:
+            return margins
+        count = int(self.telling.sum())
+        factor, normal = self._factor[:count, :count], self.normal(point)[self._order[:count]]
+        correlated = factor @ normal
+        copula = math.exp(0.5 * float(correlated @ correlated - normal @ normal)) / float(np.prod(np.diag(factor)))
+        return margins * copula
 
     @cached_property
     def telling(self) -> np.typing.NDArray[np.bool_]:
