@@ -50,7 +50,8 @@ class Gaussians:
         """One point, `d`, within `FARTHEST`."""
         number = random.choice(len(self.weights), p=self.weights)
         point = self.means[number] + self.factors[number] @ random.standard_normal(self.means.shape[1])
-        return np.clip(point, -FARTHEST, FARTHEST)
+        within: Floats = np.clip(point, -FARTHEST, FARTHEST)
+        return within
 
 
 def log_normal(points: Floats) -> Floats:
@@ -121,7 +122,8 @@ def fit(points: Floats, weights: Floats, random: np.random.Generator) -> Gaussia
             # Shrunk towards a unit covariance of few draws: `d + 1` draws count as much as those that there are.
             pull = (dimension + 1) / (dimension + 1 + effective)
             covariances[k] = (1 - pull) * scatter + pull * np.eye(dimension)
-        mixture = Gaussians(mass / mass.sum(), means, np.linalg.cholesky(covariances))
+        factors: Floats = np.linalg.cholesky(covariances).astype(np.float64)
+        mixture = Gaussians(mass / mass.sum(), means, factors)
     return Gaussians(mixture.weights, mixture.means, mixture.factors * np.sqrt(INFLATION))
 
 

@@ -10,7 +10,7 @@ from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.rates.estimate import RateEstimate, estimated, with_exposure
 from risk_sac.rates.stages import Draws, Stages, draws_of
-from risk_sac.records import EpisodeRecord, Outcome, Record
+from risk_sac.records import REPEATS, EpisodeRecord, Outcome, Record
 from risk_sac.scenario.declared import Declared
 from risk_sac.world.types import Scene
 
@@ -78,7 +78,7 @@ def rates_of(spec: RunSpec, records: Sequence[EpisodeRecord], scenes_per_hour: f
     weights = ratios * stages.trust(len(draws))
     played = np.array([record.outcome not in UNKNOWN for record in records])
     events = {name: np.array([name in record.failed for record in records], dtype=bool) for name in rated(problem)}
-    events[ANY] = draws.failed
+    events[ANY] = np.array([record.outcome is Outcome.FAILURE for record in records], dtype=bool)
     rates = {name: estimated(weights, ratios, event, played) for name, event in events.items()}
     correlation = problem.family.rank_correlation
     return Rates(
@@ -116,7 +116,13 @@ def _draws(problem: Problem, declared: Declared, records: Sequence[EpisodeRecord
         for record in records
     ]
     points = [declared.normal(unit)[declared.telling] for unit in units]
-    return draws_of(points, margins, [record.outcome is Outcome.FAILURE for record in records])
+    return draws_of(points, margins, [_failed_as_played(record) for record in records])
+
+
+def _failed_as_played(record: EpisodeRecord) -> bool:
+    """Whether the sampler saw a failure; a replay that went another way came later."""
+    violations = (record.collision, *record.violations)
+    return any(not set(violation.broken) - {REPEATS} for violation in violations if violation is not None)
 
 
 def _said(parameter: ScenarioParameter | None) -> DeclaredParameter:

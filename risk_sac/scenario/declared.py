@@ -158,7 +158,7 @@ class Declared:
             names = [axis.name for axis in self.axes]
             rows = [names.index(name) for name in self.correlation.parameters]
             matrix[np.ix_(rows, rows)] = self.correlation.normal
-        factor: Floats = np.linalg.cholesky(matrix[np.ix_(self._order, self._order)])
+        factor: Floats = np.linalg.cholesky(matrix[np.ix_(self._order, self._order)]).astype(np.float64)
         return factor
 
 

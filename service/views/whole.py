@@ -42,7 +42,9 @@ LARGE = 4000  # episodes; reading more in the server would hold up other request
 MEMORY_BYTES, WALL_S = 4 << 30, 1800.0  # of a helper; 100,000 episodes take 2.4 GiB and, where many fail, minutes
 VIEWS_KEPT = 4  # of some megabytes each
 REFUSED, LOST, PASSING, TOO_LARGE = 3, 4, 5, 6  # exit statuses
-ViewName = Literal["curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "prior"]
+ViewName = Literal[
+    "curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "rates", "prior"
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +63,7 @@ class CampaignView:
     outcomes: tuple[Outcome, ...] = ()
     prior: str = ""
     regression: Regression | None = None
+    scenes_per_hour: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +108,7 @@ _OF_REPORT: Mapping[str, Callable[[CampaignReport, CampaignView], bytes]] = {
     "clusters": lambda made, view: reports.clusters(made).encode(),
     "figures": lambda made, view: reports.figures(made, view.address).encode(),
     "drawn": lambda made, view: reports.drawn(made, cast(Format, view.format)),
+    "rates": lambda made, view: reports.rates(made, view.scenes_per_hour),
     "report": lambda made, view: reports.evidence(made, view.format, view.address, view.regression).encode(),
 }
 

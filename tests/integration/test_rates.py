@@ -46,7 +46,7 @@ def family(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def spec(family):
-    near = Requirement(name="keeps_away", formula="vehicle_gap_m >= 12", scale=10)
+    near = Requirement(name="keeps_away", formula="vehicle_gap_m >= 31", scale=10)
     budget = Budget(episodes=DRAWS)
     return RunSpec(family=family, method="rate", seed=1, budget=budget, ego=BLIND, requirements=(near,))
 
