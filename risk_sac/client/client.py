@@ -252,6 +252,11 @@ class Client:
         """The methods compared over seeds by the runs that have finished."""
         return self._transport.ask("GET", f"{_path(campaign_id)}/table", query={"format": format_}).text
 
+    def rates(self, campaign_id: str, exposure: float | None = None) -> str:
+        """Failure rates of the finished runs of the method `rate`, as JSON; per hour with so many scenes in one."""
+        query = {"exposure": None if exposure is None else str(exposure)}
+        return self._transport.ask("GET", f"{_path(campaign_id)}/rates", query=query).text
+
     def report(
         self, campaign_id: str, format_: Literal["json", "md", "html"] = "md", regression_id: str | None = None
     ) -> str:

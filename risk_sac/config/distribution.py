@@ -9,12 +9,15 @@ from itertools import accumulate, pairwise
 from statistics import NormalDist
 from typing import Annotated, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from risk_sac.config.base import Settings
+from risk_sac.config.base import Settings, Word
 from risk_sac.errors import ConfigError
+from risk_sac.world.types import Floats
 
 LEAST_MASS = 1e-9  # of a distribution within its range, below which quantiles lose their digits; choice
+LEAST_EIGENVALUE = 1e-6  # of a correlation matrix, below which one parameter follows from the others; choice
 TAIL = 1e-3  # share of a distribution on either side of its usual range; choice
 _STANDARD = NormalDist()
 
@@ -231,6 +234,40 @@ class WeightsLaw(Settings):
         left = share * math.fsum(self.weights)
         last = max(i for i, weight in enumerate(self.weights) if weight > 0.0)
         return next((i for i, sum_ in enumerate(accumulate(self.weights)) if sum_ > left), last)
+
+
+class RankCorrelation(Settings):
+    """Spearman's rank correlations between parameters, which a Gaussian copula makes.
+
+    Source: Kruskal 1958, Ordinal measures of association: r = 2 sin(π ρ / 6) of normal variables.
+    """
+
+    parameters: Annotated[tuple[Word, ...], Field(min_length=2, max_length=100)]
+    """Those that depend on each other; all others are independent."""
+    spearman: tuple[tuple[Annotated[float, Field(ge=-1, le=1)], ...], ...]
+    """A row for each of them, in their order: a symmetric matrix with ones on its diagonal."""
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        size = len(self.parameters)
+        if len(set(self.parameters)) < size:
+            raise ConfigError("parameters", ", ".join(self.parameters), "each parameter once")
+        if len(self.spearman) != size or any(len(row) != size for row in self.spearman):
+            rows = ", ".join(str(len(row)) for row in self.spearman)
+            raise ConfigError("spearman", f"rows of {rows or 'no'} numbers", f"{size} rows of {size} numbers")
+        matrix = np.array(self.spearman)
+        if (matrix != matrix.T).any() or (matrix.diagonal() != 1.0).any():
+            raise ConfigError("spearman", f"{matrix.tolist()}", "a symmetric matrix with ones on its diagonal")
+        if np.linalg.eigvalsh(self.normal).min() < LEAST_EIGENVALUE:
+            remedy = "weaken the correlations"
+            raise ConfigError("spearman", f"{matrix.tolist()}", "correlations that are possible together", remedy)
+        return self
+
+    @property
+    def normal(self) -> Floats:
+        """Correlation matrix of the copula's normal variables, in the order of `parameters`."""
+        matrix: Floats = 2.0 * np.sin(math.pi / 6.0 * np.array(self.spearman))
+        return matrix
 
 
 NumberLaw = UniformLaw | NormalLaw | LognormalLaw | PoissonLaw | HistogramLaw

@@ -12,7 +12,16 @@ from pydantic.fields import FieldInfo
 
 from risk_sac.config.base import Chosen, Settings, Word
 from risk_sac.config.campaign import JudgeConfig, Requirement
-from risk_sac.config.distribution import Distribution, WeightsLaw, check_distribution
+from risk_sac.config.distribution import (
+    Distribution,
+    HistogramBin,
+    HistogramLaw,
+    NumberLaw,
+    RankCorrelation,
+    UniformLaw,
+    WeightsLaw,
+    check_distribution,
+)
 from risk_sac.config.odd import Odd
 from risk_sac.config.story import Story
 from risk_sac.config.story_places import Position
@@ -50,6 +59,8 @@ class ScenarioParameter(Settings):
     """Of a range's grid, from the lower bound on."""
     distribution: Distribution | None = None
     """How likely its values are, truncated to the range; weights of words or rows. Without it all are alike."""
+    source: Annotated[str, Field(max_length=300)] = ""
+    """Publication that the distribution is from. Empty: it is a choice, as a range without distribution is."""
     odd: Annotated[str, Field(max_length=60)] | None = None
     """ODD field that bounds it too, such as `dynamic.vehicle_speed_mps`."""
 
@@ -82,17 +93,20 @@ class ScenarioParameter(Settings):
         """Number of its words or rows; 0: it has none."""
         return len(self.words or self.rows or ())
 
-    def drawn(self, share: float) -> float:
-        """The point of its axis at a share in [0, 1] of its distribution; uniform shares give samples.
+    def law(self, low: float, high: float) -> NumberLaw:
+        """Its distribution over its axis; of words and rows that is from 0 to 1.
 
-        Of words and rows it is the middle of one's part of the axis from 0 to 1.
+        Args:
+          low: where its axis begins, in a scene space that may be narrower than its range.
+          high: where it ends.
         """
-        law, low, high = self.distribution, *(self.range or (0.0, 1.0))
-        if isinstance(law, WeightsLaw):
-            return (law.index(share) + 0.5) / self.alternatives
-        if self.alternatives:
-            return (min(int(share * self.alternatives), self.alternatives - 1) + 0.5) / self.alternatives
-        return low + share * (high - low) if law is None else law.quantile(share, low, high)
+        if self.distribution is None:
+            return UniformLaw(kind="uniform", low=low, high=high)
+        if not isinstance(self.distribution, WeightsLaw):
+            return self.distribution
+        weights, size = self.distribution.weights, self.alternatives
+        bins = (HistogramBin(low=i / size, high=(i + 1) / size, weight=weight) for i, weight in enumerate(weights))
+        return HistogramLaw(kind="histogram", bins=tuple(bins))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -312,6 +326,8 @@ class Scenario(Settings):
     like: Like | None = None
     """Without it no prior is used."""
     parameters: Annotated[Mapping[Word, ScenarioParameter], Field(max_length=100)] = {}
+    rank_correlation: RankCorrelation | None = None
+    """Between parameters that are drawn by their distributions; without it they are independent."""
     ego: Moving
     actors: Annotated[Mapping[Word, Actor], Field(max_length=100)] = {}
     streams: Annotated[Mapping[Word, Stream], Field(max_length=50)] = {}
@@ -358,6 +374,11 @@ class Scenario(Settings):
             raise ConfigError("actors.ego", "an actor of this name", "another name", "the ego has a part of its own")
         if both := sorted(self.actors.keys() & self.streams.keys()):
             raise ConfigError(f"streams.{both[0]}", "the name of an actor", "another name")
+        varied = [name for name, parameter in self.parameters.items() if parameter.value is None]
+        for name in self.rank_correlation.parameters if self.rank_correlation else ():
+            if name not in varied:
+                wanted = f"parameters that vary: {', '.join(varied)}"
+                raise ConfigError("rank_correlation.parameters", repr(name), wanted, did_you_mean(name, varied))
         words = self.words
         for path, choice in self.choices:
             if choice.by not in words:

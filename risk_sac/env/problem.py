@@ -15,6 +15,7 @@ from risk_sac.records import NO_CONTACT, Adjustment
 from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import parsed
+from risk_sac.scenario.declared import Declared
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.grid import DEFAULT_LEVELS, Grid, grid_of
@@ -177,6 +178,7 @@ class Problem:
         )
         problem.check_demand(spec)
         problem.check_grid(spec)
+        problem.check_distributions(spec)
         return problem
 
     def check_demand(self, spec: RunSpec) -> None:
@@ -200,6 +202,20 @@ class Problem:
             got = f"true, for a grid of {size:,} points"
             wanted = f"at most {spec.budget.episodes:,}, the budget's episodes"
             raise ConfigError("budget.all_points", got, wanted, "leave it out, and a stratified sample is played")
+
+    def check_distributions(self, spec: RunSpec) -> None:
+        """Refuses a run that draws by the declared distributions if one has no mass in the ODD.
+
+        Raises:
+          ConfigError: naming its parameter.
+        """
+        if method_of(spec.method).scenes in ("iid", "rate"):
+            _ = self.declared
+
+    @property
+    def declared(self) -> Declared:
+        """The declared distribution of its scenes; see `Declared.of`."""
+        return Declared.of(self.space, self.family.parameters, self.family.rank_correlation)
 
     @property
     def grid(self) -> Grid:
@@ -293,6 +309,7 @@ def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
         for run in others:
             problem.check_demand(run)
             problem.check_grid(run)
+            problem.check_distributions(run)
     return spec
 
 

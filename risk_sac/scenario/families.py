@@ -52,6 +52,7 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
         judge=document.judge,
         parameters=document.parameters,
         shifts=tuple(of.shifts),
+        rank_correlation=document.rank_correlation,
     )
 
 

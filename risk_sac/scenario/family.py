@@ -16,6 +16,7 @@ from risk_sac.config import (
     Scenery,
     SignalType,
 )
+from risk_sac.config.distribution import RankCorrelation
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.scenario.behaviour import preset
 from risk_sac.scenario.layout import Layout
@@ -41,6 +42,7 @@ class Family:
     requirements: tuple[Requirement, ...] = ()  # of the scenario, beside the ODD's
     judge: JudgeConfig | None = None  # None: the campaign's
     parameters: Mapping[str, ScenarioParameter] = field(default_factory=dict)  # of the document
+    rank_correlation: RankCorrelation | None = None  # between them
     shifts: tuple[str, ...] = ()  # scene parameters that shift triggers of the story
 
     @property

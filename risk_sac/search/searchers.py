@@ -25,6 +25,7 @@ from risk_sac.search.scene_optimizer import (
     DiscountedBandit,
     GridSampler,
     IidSampler,
+    RateSampler,
     SceneOptimizer,
     SobolOptimizer,
 )
@@ -32,7 +33,8 @@ from risk_sac.verdicts.distinct import Finds
 from risk_sac.world.types import Floats, Scene
 
 OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
-    each.kind: each for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler, GridSampler)
+    each.kind: each
+    for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler, GridSampler, RateSampler)
 }
 Actor = Learner | Control
 """A joint policy that drives all adversaries."""
@@ -215,6 +217,10 @@ class Searchers:
         made: SceneOptimizer
         if sampler is GridSampler:
             made = GridSampler(*arguments, self._problem.grid, self._spec.budget.episodes)
+        elif sampler is IidSampler:
+            made = IidSampler(*arguments, self._problem.declared)
+        elif sampler is RateSampler:
+            made = RateSampler(*arguments, self._problem.declared, self._spec.budget.episodes)
         elif self._start is None or not actor.genes:
             made = sampler(*arguments)
         else:

@@ -18,7 +18,8 @@ from risk_sac.errors import ConfigError
 from risk_sac.failures import studied
 from risk_sac.failures.cases import Regression
 from risk_sac.failures.clusters import Overview
-from risk_sac.records import Record, State
+from risk_sac.rates.record import METHOD, Rates, rates_of
+from risk_sac.records import Record, State, wire
 from risk_sac.report import (
     Comparison,
     FinishedRun,
@@ -180,6 +181,21 @@ def clusters(made: CampaignReport) -> str:
     """Returns the kinds of failures as JSON."""
     body = Clusters(complete=not made.comparison.missing, families=made.comparison.overviews)
     return body.model_dump_json()
+
+
+class CampaignRates(Record):
+    """Failure rates of a campaign's finished runs of the method `rate`."""
+
+    complete: bool
+    """Whether all runs are in them."""
+    items: list[Rates]
+
+
+def rates(made: CampaignReport, scenes_per_hour: float | None) -> bytes:
+    """Returns the failure rates as JSON; none where no run has the method `rate`."""
+    runs = [run for run in made.comparison.runs if run.spec.method == METHOD]
+    items = [rates_of(run.spec, run.records, scenes_per_hour) for run in runs]
+    return wire(CampaignRates(complete=not made.comparison.missing, items=items))
 
 
 def table(made: CampaignReport, format_: str, base_url: str) -> str:

@@ -45,7 +45,7 @@ MEMORY_BYTES, WALL_S = 4 << 30, 1800.0  # of a helper; 100,000 episodes take 2.4
 VIEWS_KEPT = 4  # of some megabytes each
 REFUSED, LOST, PASSING, TOO_LARGE = 3, 4, 5, 6  # exit statuses
 ViewName = Literal[
-    "curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "prior", "grid"
+    "curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "prior", "grid", "rates"
 ]
 
 
@@ -69,6 +69,7 @@ class CampaignView:
     over: tuple[str, ...] = ()
     """Parameters of a grid's picture."""
     regression: Regression | None = None
+    scenes_per_hour: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +117,7 @@ _OF_REPORT: Mapping[str, Callable[[CampaignReport, CampaignView], bytes]] = {
     "clusters": lambda made, view: reports.clusters(made).encode(),
     "figures": lambda made, view: reports.figures(made, view.address).encode(),
     "drawn": lambda made, view: reports.drawn(made, cast(Format, view.format)),
+    "rates": lambda made, view: reports.rates(made, view.scenes_per_hour),
     "report": lambda made, view: reports.evidence(made, view.format, view.address, view.regression).encode(),
 }
 

@@ -7,3 +7,4 @@ from risk_sac.search.scene_optimizer.archive import ArchiveOptimizer, Discounted
 from risk_sac.search.scene_optimizer.base import IidSampler, SceneOptimizer, SobolOptimizer
 from risk_sac.search.scene_optimizer.bayesian import BotorchOptimizer
 from risk_sac.search.scene_optimizer.grid import GridSampler
+from risk_sac.search.scene_optimizer.rate import RateSampler

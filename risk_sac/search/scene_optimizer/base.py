@@ -16,6 +16,7 @@ from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
 from risk_sac.records import DrivenBy
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
+from risk_sac.scenario.declared import Declared
 from risk_sac.world.types import Floats
 
 State = dict[str, Any]
@@ -200,15 +201,23 @@ class SobolOptimizer(SceneOptimizer):
 
 
 class IidSampler(SobolOptimizer):
-    """Uniform points, each drawn independently of all others, so that bounds may be drawn from them.
+    """Points of the declared distribution, each drawn independently, so that bounds may be drawn from them.
 
     A Sobol sequence would fill the cube more evenly, but its points depend on each other. No scene has a score.
     """
 
     kind = "iid"
 
+    def __init__(
+        self, dimension: int, config: SceneOptimizerConfig, seed: int, declared: Declared | None = None
+    ) -> None:
+        """Prepares; without a declared distribution all points are as likely."""
+        super().__init__(dimension, config, seed)
+        self._declared = declared
+
     def _point(self, number: int) -> Floats:
-        return np.random.default_rng((self._seed, number)).random(self._dimension)
+        shares = np.random.default_rng((self._seed, number)).random(self._dimension)
+        return shares if self._declared is None else self._declared.unit(shares)
 
     def tell(self, u: Floats, mean_return: float | None, encounter: Encounter = NO_ENCOUNTER) -> None:
         """See `SceneOptimizer.tell`; always None."""

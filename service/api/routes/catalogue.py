@@ -49,6 +49,7 @@ EPISODE_COST: Mapping[str, float] = {
     "story-random": 0.7,
     "story-bo": 1.1,
     "iid-random": 1.0,
+    "rate": 0.7,
     "iid-undisturbed": 0.7,
 }
 """Processor time of an episode as a multiple of `random`'s 0.06 s; of a learner, after its warm start.

@@ -9,6 +9,7 @@ from starlette.concurrency import run_in_threadpool
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.failures.cases import Regression
+from risk_sac.rates.record import MOST_PER_HOUR
 from risk_sac.records import State
 from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.report.figures import FORMATS, Format
@@ -19,7 +20,7 @@ from service.api.pages import CROWDED, INVALID, STORAGE, TAGGED, UNKNOWN, Respon
 from service.errors import ConflictError, NotFoundError
 from service.runs.regressions import StoredRegression, campaign_of
 from service.store.stored import StoredCampaign
-from service.views.reports import MEDIA_TYPES, Clusters, Figures
+from service.views.reports import MEDIA_TYPES, CampaignRates, Clusters, Figures
 from service.views.whole import CampaignView, ViewName
 
 TableFormat = Literal["json", "md", "csv"]
@@ -74,6 +75,22 @@ async def get_table(
     """Comparison of methods over the seeds of finished runs; names the missing runs."""
     address = str(request.base_url)
     return await reported(request, service, campaign, "table", format_, format=format_, address=address)
+
+
+@router.get("/rates", response_model=CampaignRates, responses=FIGURES | UNCHANGED | CROWDED)
+async def get_rates(
+    request: Request,
+    service: Service,
+    campaign: AskedCampaign,
+    exposure: Annotated[
+        float | None, Query(ge=0, le=MOST_PER_HOUR, description="Scenes in an hour, for rates per hour.")
+    ] = None,
+) -> Response:
+    """How often the ego fails under the declared distributions: of finished runs of the method `rate`.
+
+    Each rate is one of its scenario, not of the road. One that fails a check is null, and says why.
+    """
+    return await reported(request, service, campaign, "rates", "rates", str(exposure), scenes_per_hour=exposure)
 
 
 @router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED | CROWDED)

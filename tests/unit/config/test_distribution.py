@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from risk_sac.config.distribution import Distribution, HistogramLaw, NormalLaw, PoissonLaw, UniformLaw
+from risk_sac.config.distribution import Distribution, HistogramLaw, NormalLaw, PoissonLaw, RankCorrelation, UniformLaw
 from risk_sac.config.scenario import ScenarioParameter
 
 LAWS = (
@@ -56,16 +56,13 @@ def test_the_usual_range_has_nearly_all_of_it(fields):
     assert law(fields).mass(*law(fields).usual_range) >= 0.997
 
 
-def test_a_parameter_without_distribution_is_uniform():
-    assert ScenarioParameter(range=(2, 4)).drawn(0.25) == 2.5
-    assert ScenarioParameter(words=("dry", "wet")).drawn(0.6) == 0.75
-
-
-def test_weights_choose_words_and_rows():
+def test_weights_are_equal_parts_of_the_axis_of_words_and_rows():
     words = ScenarioParameter(words=("a", "b", "c"), distribution={"kind": "weights", "weights": (1, 0, 3)})
-    assert [words.drawn(share) for share in (0.0, 0.24, 0.26, 1.0)] == pytest.approx([1 / 6, 1 / 6, 5 / 6, 5 / 6])
+    axis = words.law(0, 1)
+    assert [axis.mass(i / 3, (i + 1) / 3) for i in range(3)] == pytest.approx([0.25, 0, 0.75])
     rows = ScenarioParameter(rows=({"x": 1.0}, {"x": 2.0}), distribution={"kind": "weights", "weights": (9, 1)})
-    assert [rows.drawn(share) for share in (0.89, 0.91)] == [0.25, 0.75]
+    assert rows.law(0, 1).quantile(0.91, 0, 1) == pytest.approx(0.55)
+    assert ScenarioParameter(range=(2, 4)).law(2, 4).quantile(0.25, 2, 4) == 2.5
 
 
 @pytest.mark.parametrize(
@@ -111,3 +108,26 @@ def test_the_kinds_agree_with_their_densities():
     assert NormalLaw(kind="normal", mean=0, deviation=1).mass(-1.96, 1.96) == pytest.approx(0.95, abs=1e-3)
     assert PoissonLaw(kind="poisson", expected=2).mass(1, 2) == pytest.approx(4 * math.exp(-2))
     assert HistogramLaw.model_validate(LAWS[4]).mass(0.5, 3) == pytest.approx((0.5 + 3 / 4) / 4)
+
+
+@pytest.mark.parametrize(
+    ("spearman", "where"),
+    [
+        (((1, 0.5),), "spearman"),
+        (((1, 0.5), (0.4, 1)), "spearman"),
+        (((1, 0.5), (0.5, 0.9)), "spearman"),
+        (((1, 1), (1, 1)), "spearman"),  # one follows from the other
+        (((1, 1.5), (1.5, 1)), "spearman"),
+    ],
+)
+def test_a_matrix_that_is_no_rank_correlation_is_refused(spearman, where):
+    with pytest.raises(ValidationError) as caught:
+        RankCorrelation(parameters=("a", "b"), spearman=spearman)
+    error = caught.value.errors()[0]
+    assert where in (getattr(error.get("ctx", {}).get("error"), "field", ""), *map(str, error["loc"]))
+
+
+def test_correlations_that_cannot_hold_together_are_refused():
+    three = ((1, 0.9, -0.9), (0.9, 1, 0.9), (-0.9, 0.9, 1))
+    with pytest.raises(ValidationError, match="possible together"):
+        RankCorrelation(parameters=("a", "b", "c"), spearman=three)

@@ -1,0 +1,124 @@
+"""`risk-sac rate`: how often an ego fails in a scenario under its declared distributions."""
+
+import argparse
+from pathlib import Path
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from risk_sac.cli.console import INTERRUPTED, OK, counted, print_answer, progress_bar, say_adjustments
+from risk_sac.cli.flags import add_scene_flags, scene_flags
+from risk_sac.cli.parser import Commands, add_command, add_json_flag
+from risk_sac.cli.scenarios import kept_name
+from risk_sac.config import RunSpec
+from risk_sac.config.spec_file import read_spec
+from risk_sac.env.problem import Problem, adjustments
+from risk_sac.errors import ConfigError, did_you_mean
+from risk_sac.host.terminal import notes
+from risk_sac.rates.estimate import HourlyRate, RateEstimate
+from risk_sac.rates.record import METHOD, Rates, check_exposure, rated, rates_of
+from risk_sac.records import RunMetrics
+from risk_sac.report.runs import read_records
+from risk_sac.run_folder.results import EPISODES
+
+DRAWS = 2000
+
+
+def add(commands: Commands) -> None:
+    """Adds the command."""
+    rate = add_command(
+        commands,
+        "rate",
+        _rate,
+        "estimate how often an ego fails in a scenario, without an attack",
+        more="Scenes are drawn by the scenario's distributions, by importance sampling.\n"
+        "The same command again goes on with an interrupted estimate, and repeats the answer of a finished one.",
+        example="rate cyclist_ahead --ego idm-aeb+weak-brakes --exposure 12 --out runs/rate",
+    )
+    named = "scenario that ships, is kept or in a file; `risk-sac scenarios list`"
+    rate.add_argument("family", metavar="SCENARIO", help=named)
+    add_scene_flags(rate)
+    rate.group("budget").add_argument(
+        "--draws", dest="episodes", type=int, default=DRAWS, metavar="N", help=f"(default: {DRAWS})"
+    )
+    rate.group("budget").add_argument("--seed", type=int, metavar="S", help="(default: 0)")
+    rate.add_argument("--requirement", metavar="NAME", help="only this requirement (default: all that count)")
+    exposure = "scenes of this scenario in an hour of driving, for a rate per hour (default: none)"
+    rate.add_argument("--exposure", type=float, metavar="PER_HOUR", help=exposure)
+    rate.group("output").add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the run")
+    add_json_flag(rate)
+
+
+def _rate(options: argparse.Namespace) -> int:
+    named = {"family": kept_name(options.family), "method": METHOD, "seed": options.seed, "episodes": options.episodes}
+    spec = read_spec(None, named | scene_flags(options))
+    _check(spec, options)
+    say_adjustments(adjustments(spec))
+    from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
+
+    with progress_bar() as bar:
+        task = bar.add_task(f"{spec.family} {spec.method}", total=spec.budget.episodes, found="")
+
+        def advance(done: int, metrics: RunMetrics | None) -> None:
+            bar.update(task, completed=done, found=f"failures {metrics.failures}" if metrics else "")
+
+        results = run(spec, options.out, advance)
+    answer = rates_of(spec, read_records(options.out / EPISODES), options.exposure)
+    if options.requirement is not None:
+        only = {options.requirement: answer.rates[options.requirement]}
+        answer = answer.model_copy(update={"rates": only})
+    texts = (_objections(answer), _drawn(answer), answer.meaning)
+    print_answer(options, answer, _table(answer), *filter(None, texts))
+    if not results.finished:
+        notes.print(f"Stopped after {counted(answer.draws, 'draw')}. The same command again goes on from there.")
+        return INTERRUPTED
+    return OK
+
+
+def _check(spec: RunSpec, options: argparse.Namespace) -> None:
+    """Refuses, before anything is played, what the answer cannot be given for."""
+    check_exposure(options.exposure)
+    known = rated(Problem.from_spec(spec))
+    if options.requirement is not None and options.requirement not in known:
+        remedy = did_you_mean(options.requirement, known)
+        raise ConfigError("requirement", repr(options.requirement), f"one of {', '.join(known)}", remedy)
+
+
+def _table(answer: Rates) -> Table:
+    title = f"{answer.run_id}: {answer.played} of {counted(answer.draws, 'draw')} played"
+    table = Table(box=SIMPLE_HEAD, padding=0, title=title)
+    checked = ("effective\nfailures", "largest\nshare", "declared\nshare")
+    for name in ("requirement", "failures", "rate", "95 %", "per hour", *checked):
+        table.add_column(name, overflow="fold")
+    for name, estimate in answer.rates.items():
+        shares = (f"{share:.0%}" for share in (estimate.largest_share, estimate.declared_share))
+        told = (*_said(estimate), _hourly(estimate.per_hour), f"{estimate.effective_failures:.0f}", *shares)
+        table.add_row(name, str(estimate.failures), *told)
+    return table
+
+
+def _said(estimate: RateEstimate) -> tuple[str, str]:
+    if estimate.rate is None:
+        return "-", f"below {estimate.at_most:.2g}"
+    return f"{estimate.rate:.3g}", f"{estimate.low:.3g} to {estimate.high:.3g}"
+
+
+def _objections(answer: Rates) -> str:
+    """Says of each rate that is not estimated why."""
+    objected = [f"{name}: not estimated: {each.why}" for name, each in answer.rates.items() if each.rate is None]
+    return "\n".join(objected)
+
+
+def _hourly(rate: HourlyRate | None) -> str:
+    return "" if rate is None else f"{rate.rate:.3g} ({rate.low:.3g} to {rate.high:.3g})"
+
+
+def _drawn(answer: Rates) -> str:
+    """Says which parameters have a distribution, and from where."""
+    told = [
+        f"{name}: {drawn.kind}, {drawn.source or 'choice'}"
+        for name, drawn in answer.distributions.items()
+        if drawn.kind != "uniform"
+    ]
+    alike = [name for name, drawn in answer.distributions.items() if drawn.kind == "uniform"]
+    return "\n".join([*told, *([f"uniform, a choice: {', '.join(alike)}"] if alike else [])])

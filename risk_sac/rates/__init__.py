@@ -1,0 +1,1 @@
+"""Failure rates under a declared distribution, from fewer episodes than plain draws take."""

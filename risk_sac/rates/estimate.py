@@ -1,0 +1,143 @@
+"""Estimates failure rates from weighted draws, and checks whether they can be trusted.
+
+Source of the interval: the delta method on a ratio of weighted sums, on the logarithm of the rate.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from risk_sac.metrics import clopper_pearson
+from risk_sac.rates.proposal import DECLARED
+from risk_sac.records import Record
+from risk_sac.world.types import Floats
+
+Flags = np.typing.NDArray[np.bool_]
+LEAST_EFFECTIVE = 15.0  # failures of equal weight that would tell as much; choice
+MOST_OF_ONE = 0.25  # share of the estimate that one draw may have; choice
+MOST_DECLARED = 0.5  # share of the estimate that draws of the declared distribution may have; choice
+MOST_ERRORS = 4.0  # standard errors by which the mean weight may differ from 1; choice
+CONFIDENCE = 0.95
+
+
+class HourlyRate(Record):
+    """Events in an hour, of a user's exposure."""
+
+    rate: float
+    low: float
+    high: float
+
+
+class RateEstimate(Record):
+    """How often the ego violates a requirement in scenes of the declared distribution that can be played."""
+
+    failures: int
+    """Among the draws, of which the proposal has many more than the declared distribution."""
+    rate: float | None
+    """In a scene; null: not estimated."""
+    low: float | None
+    """Of the 95 % interval."""
+    high: float | None
+    why: str
+    """Why it is not estimated; empty where it is."""
+    at_most: float
+    """One-sided 95 % bound that needs no checks, by the largest weight that a draw may have."""
+    effective_failures: float
+    """Number of failures of equal weight that would tell as much."""
+    largest_share: float
+    """Share of the estimate that a single draw has."""
+    declared_share: float
+    """Share of the estimate from draws of the declared distribution, where fitted proposals did not reach."""
+    per_hour: HourlyRate | None = None
+    """With the exposure; null without one, or without an estimate."""
+
+
+def estimated(weights: Floats, ratios: Floats, failed: Flags, played: Flags) -> RateEstimate:
+    """Estimates the rate of failures among played scenes.
+
+    rate = Σ w f / Σ w m,  se² = Σ w² (f - rate · m)² / (Σ w m)²,  log rate ± t se / rate
+
+    t has the effective number of failures, (Σ w f)² / Σ (w f)², less one as its degrees of freedom.
+
+    Args:
+      weights: w, `n`, of mean 1.
+      ratios: `n`, density of the declared distribution over that of the draw's own proposal; the weight of its stage
+        apart.
+      failed: f, `n`.
+      played: m, `n`; of a scene that was not, nothing is said.
+    """
+    hits = weights * (failed & played)
+    total, count = float((weights * played).sum()), int((failed & played).sum())
+    bound = min(1.0, clopper_pearson(count, len(weights))[1] / DECLARED * len(weights) / max(total, 1e-300))
+    if not count:
+        why = "no draw failed"
+        return _unestimated(why, bound, count)
+    rate = float(hits.sum()) / total
+    error = math.sqrt(float((weights**2 * ((failed & played) - rate * played) ** 2).sum())) / total
+    effective = float(hits.sum() ** 2 / (hits**2).sum())
+    largest = float(hits.max() / hits.sum())
+    declared = float((hits * DECLARED * ratios).sum() / hits.sum())
+    checks = {"effective_failures": effective, "largest_share": largest, "declared_share": min(declared, 1.0)}
+    why = _objection(weights, effective, largest, declared)
+    if why:
+        return _unestimated(why, bound, count).model_copy(update=checks)
+    half = _student(effective - 1.0) * error / rate
+    return RateEstimate(
+        failures=count,
+        rate=min(rate, 1.0),
+        low=min(rate * math.exp(-half), 1.0),
+        high=min(rate * math.exp(half), 1.0),
+        why="",
+        at_most=bound,
+        **checks,
+    )
+
+
+def with_exposure(estimates: Mapping[str, RateEstimate], scenes_per_hour: float | None) -> dict[str, RateEstimate]:
+    """Adds the rates in an hour that has so many scenes; None adds none."""
+    if scenes_per_hour is None:
+        return dict(estimates)
+    return {name: _hourly(estimate, scenes_per_hour) for name, estimate in estimates.items()}
+
+
+def _hourly(estimate: RateEstimate, scenes: float) -> RateEstimate:
+    if estimate.rate is None or estimate.low is None or estimate.high is None:
+        return estimate
+    hourly = HourlyRate(rate=estimate.rate * scenes, low=estimate.low * scenes, high=estimate.high * scenes)
+    return estimate.model_copy(update={"per_hour": hourly})
+
+
+def _objection(weights: Floats, effective: float, largest: float, declared: float) -> str:
+    """Why an estimate is not to be trusted; empty if it is."""
+    error = float(weights.std()) / math.sqrt(len(weights))
+    if abs(float(weights.mean()) - 1.0) > MOST_ERRORS * error + 1e-9:
+        return f"the mean weight is {weights.mean():.2f}, not 1"
+    if effective < LEAST_EFFECTIVE:
+        return f"the failures tell as much as {effective:.1f} of equal weight; {LEAST_EFFECTIVE:g} are needed"
+    if largest > MOST_OF_ONE:
+        return f"one draw has {largest:.0%} of the estimate; {MOST_OF_ONE:.0%} are allowed"
+    if declared > MOST_DECLARED:
+        return f"draws of the declared distribution have {declared:.0%} of the estimate, so failures may lie elsewhere"
+    return ""
+
+
+def _unestimated(why: str, bound: float, count: int) -> RateEstimate:
+    return RateEstimate(
+        failures=count,
+        rate=None,
+        low=None,
+        high=None,
+        why=why,
+        at_most=bound,
+        effective_failures=0.0,
+        largest_share=0.0,
+        declared_share=0.0,
+    )
+
+
+def _student(freedom: float) -> float:
+    """Two-sided 95 % quantile of Student's t distribution."""
+    from scipy.special import stdtrit  # here, because few ask for it, and every process of a server loads this
+
+    return float(stdtrit(max(freedom, 1.0), 1.0 - (1.0 - CONFIDENCE) / 2.0))

@@ -1,0 +1,144 @@
+"""Mixture that importance sampling draws from, in standard normal space, and how it follows earlier draws.
+
+q(z) = 0.2 N(0, I) + 0.3 N(0, 2² I) + 0.5 Σ_k π_k N(μ_k, Σ_k)
+
+The first term is the declared distribution itself, so that no weight p/q exceeds 5.
+
+Source: Hesterberg 1995, Weighted average importance sampling and defensive mixture distributions; Kurtz and Song
+2013, Cross-entropy-based adaptive importance sampling using Gaussian mixture. Shares and levels are choices.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from risk_sac.world.types import Floats
+
+DECLARED, WIDE = 0.2, 0.3  # shares of the mixture
+WIDE_DEVIATION = 2.0
+MOST_COMPONENTS = 8
+PER_COMPONENT = 3  # elite draws for each component and dimension
+INFLATION = 1.3  # of a component's variance, since few draws understate it
+ELITE = 0.25  # share of the latest draws that a proposal is fitted to until so many fail
+ROUNDS = 30  # of EM
+FARTHEST = 6.0  # of a coordinate; beyond it lie 2e-9 of a normal distribution, and doubles lose its shares
+_LOG_2PI = float(np.log(2 * np.pi))
+
+
+@dataclass(frozen=True)
+class Gaussians:
+    """A mixture of `k` Gaussians."""
+
+    weights: Floats  # `k`, sums to 1
+    means: Floats  # `k x d`
+    factors: Floats  # `k x d x d`, lower Cholesky factors of the covariances
+
+    def log_density(self, points: Floats) -> Floats:
+        """The mixture's log density, `n`, at points, `n x d`."""
+        return _log_sum_exp(self.log_parts(points))
+
+    def log_parts(self, points: Floats) -> Floats:
+        """Each component's log density times its weight, `n x k`."""
+        offsets = points[None] - self.means[:, None]  # k x n x d
+        solved = np.linalg.solve(self.factors, offsets.transpose(0, 2, 1))  # k x d x n
+        logs = np.log(np.diagonal(self.factors, axis1=1, axis2=2)).sum(axis=1)
+        constant = np.log(self.weights) - logs - 0.5 * points.shape[1] * _LOG_2PI
+        parts: Floats = (constant[:, None] - 0.5 * (solved**2).sum(axis=1)).T
+        return parts
+
+    def draw(self, random: np.random.Generator) -> Floats:
+        """One point, `d`, within `FARTHEST`."""
+        number = random.choice(len(self.weights), p=self.weights)
+        point = self.means[number] + self.factors[number] @ random.standard_normal(self.means.shape[1])
+        within: Floats = np.clip(point, -FARTHEST, FARTHEST)
+        return within
+
+
+def log_normal(points: Floats) -> Floats:
+    """Log density of the standard normal distribution, `n`, at points, `n x d`."""
+    density: Floats = -0.5 * ((points**2).sum(axis=-1) + points.shape[-1] * _LOG_2PI)
+    return density
+
+
+def defensive(dimension: int, fitted: Gaussians | None = None) -> Gaussians:
+    """The proposal; without fitted components the declared and the wide one share it in their proportion."""
+    shares = np.array([DECLARED, WIDE])
+    means = np.zeros((2, dimension))
+    factors = np.stack([np.eye(dimension), WIDE_DEVIATION * np.eye(dimension)])
+    if fitted is None:
+        return Gaussians(shares / shares.sum(), means, factors)
+    return Gaussians(
+        np.concatenate([shares, (1 - shares.sum()) * fitted.weights]),
+        np.concatenate([means, fitted.means]),
+        np.concatenate([factors, fitted.factors]),
+    )
+
+
+def elite(margins: Floats, failed: np.typing.NDArray[np.bool_], latest: int) -> np.typing.NDArray[np.bool_]:
+    """Which draws a proposal is fitted to, `n`: those that failed and, until these are many, those nearest to it.
+
+    Args:
+      margins: `n x r`, of all draws and each requirement; inf where nothing is known.
+      failed: `n`.
+      latest: number of draws of the latest stage, at the end.
+    """
+    if failed[-latest:].sum() >= ELITE * latest:
+        return failed
+    known = margins[-latest:][np.isfinite(margins[-latest:]).all(axis=1)]
+    if not len(known):
+        return failed
+    level = np.quantile(known, ELITE / max(margins.shape[1], 1), axis=0)
+    return np.asarray(failed | (margins < level).any(axis=1))
+
+
+def fit(points: Floats, weights: Floats, random: np.random.Generator) -> Gaussians | None:
+    """Fits Gaussians to weighted points by expectation maximisation; None if there are at most `d`.
+
+    Args:
+      points: `n x d`.
+      weights: `n`, of the declared distribution over the one that they were drawn from.
+      random: chooses the first centres.
+    """
+    size, dimension = points.shape
+    if not dimension or size <= dimension or not weights.sum() > 0:
+        return None
+    count = int(np.clip(size // (PER_COMPONENT * dimension), 1, MOST_COMPONENTS))
+    share = weights / weights.sum()
+    means = _centres(points, share, count, random)
+    spread = np.cov(points.T, aweights=share, bias=True).reshape(dimension, dimension) + 0.05 * np.eye(dimension)
+    mixture = Gaussians(
+        np.full(count, 1 / count), means, np.stack([np.linalg.cholesky(spread / count ** (2 / dimension))] * count)
+    )
+    for _ in range(ROUNDS):
+        parts = mixture.log_parts(points)
+        taken = np.exp(parts - _log_sum_exp(parts)[:, None]) * share[:, None]  # n x k
+        mass = taken.sum(axis=0) + 1e-12
+        means = taken.T @ points / mass[:, None]
+        covariances = np.empty((count, dimension, dimension))
+        for k in range(count):
+            offsets = points - means[k]
+            effective = mass[k] ** 2 / max(float((taken[:, k] ** 2).sum()), 1e-300)
+            scatter = (taken[:, k, None] * offsets).T @ offsets / mass[k]
+            # Shrunk towards a unit covariance of few draws: `d + 1` draws count as much as those that there are.
+            pull = (dimension + 1) / (dimension + 1 + effective)
+            covariances[k] = (1 - pull) * scatter + pull * np.eye(dimension)
+        factors: Floats = np.linalg.cholesky(covariances).astype(np.float64)
+        mixture = Gaussians(mass / mass.sum(), means, factors)
+    return Gaussians(mixture.weights, mixture.means, mixture.factors * np.sqrt(INFLATION))
+
+
+def _centres(points: Floats, share: Floats, count: int, random: np.random.Generator) -> Floats:
+    """First centres, `count x d`: far from each other (k-means++)."""
+    chosen = [points[random.choice(len(points), p=share)]]
+    for _ in range(count - 1):
+        distances = np.min([((points - centre) ** 2).sum(axis=1) for centre in chosen], axis=0) * share
+        total = distances.sum()
+        chosen.append(points[random.choice(len(points), p=distances / total if total > 0 else share)])
+    return np.array(chosen)
+
+
+def _log_sum_exp(parts: Floats) -> Floats:
+    """Log Σ_k exp of `n x k`, `n`."""
+    most = parts.max(axis=1)
+    total: Floats = most + np.log(np.exp(parts - most[:, None]).sum(axis=1))
+    return total

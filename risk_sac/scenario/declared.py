@@ -1,0 +1,167 @@
+"""The declared distribution of a scenario's parameters, over the unit cube of its scene space.
+
+Independent standard normal numbers s become correlated ones, z = L s, these shares, Φ(z), and these the values at which
+the parameters' distributions, truncated to the scene space, have that share. L Lᵀ is the copula's correlation matrix.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from statistics import NormalDist
+
+import numpy as np
+
+from risk_sac.config.distribution import LEAST_MASS, NumberLaw, PoissonLaw, RankCorrelation
+from risk_sac.config.scenario import ScenarioParameter
+from risk_sac.errors import ConfigError
+from risk_sac.scenario.space import SceneSpace
+from risk_sac.world.types import Floats
+
+LEAST_SHARE = 1e-12  # of either end, within which a double no longer tells shares apart
+WINDOW = 0.02  # of an axis, over which its density is taken; choice
+_STANDARD = NormalDist()
+
+
+@dataclass(frozen=True)
+class DeclaredAxis:
+    """One parameter's distribution over its axis of the scene space."""
+
+    name: str
+    low: float
+    high: float
+    law: NumberLaw | None  # None: all values alike, or one value
+
+    @property
+    def tells(self) -> bool:
+        """Whether a value tells its share, so that a search may lean towards values."""
+        return self.low < self.high and not isinstance(self.law, PoissonLaw)
+
+    def unit(self, share: float) -> float:
+        """The coordinate in [0, 1] at a share in [0, 1] of the distribution."""
+        if self.low == self.high:
+            return 0.0
+        if self.law is None:
+            return share
+        value = self.law.quantile(share, self.low, self.high)
+        return min(max((value - self.low) / (self.high - self.low), 0.0), 1.0)
+
+    def density(self, unit: float) -> float:
+        """Density at a coordinate in [0, 1], as a multiple of the uniform one; the mean over `WINDOW` of the axis."""
+        if not self.tells or self.law is None:
+            return 1.0
+        low = min(max(unit - WINDOW / 2.0, 0.0), 1.0 - WINDOW)
+        ends = (self.low + end * (self.high - self.low) for end in (low, low + WINDOW))
+        return self.law.mass(*ends) / self.law.mass(self.low, self.high) / WINDOW
+
+    def share(self, unit: float) -> float:
+        """The share in [0, 1] at a coordinate in [0, 1]; the inverse of `unit`."""
+        if self.law is None:
+            return unit
+        value = self.low + unit * (self.high - self.low)
+        return self.law.mass(self.low, value) / self.law.mass(self.low, self.high)
+
+
+@dataclass(frozen=True)
+class Declared:
+    """Distribution of the scenes of a space."""
+
+    axes: tuple[DeclaredAxis, ...]
+    correlation: RankCorrelation | None = None
+
+    @classmethod
+    def of(
+        cls, space: SceneSpace, parameters: Mapping[str, ScenarioParameter], correlation: RankCorrelation | None
+    ) -> "Declared":
+        """The distribution over a scene space that an ODD may have narrowed.
+
+        Args:
+          space: the scene space; a parameter that the document lacks, such as friction, has all values alike.
+          parameters: of the document.
+          correlation: between parameters of the document.
+
+        Raises:
+          ConfigError: a distribution has no mass between its parameter's bounds.
+        """
+        axes = []
+        for bounded in space.parameters:
+            stated = parameters.get(bounded.name)
+            law = None if stated is None or stated.distribution is None else stated.law(bounded.low, bounded.high)
+            if law is not None and bounded.low < bounded.high and law.mass(bounded.low, bounded.high) < LEAST_MASS:
+                raise ConfigError(
+                    f"parameters.{bounded.name}.distribution",
+                    f"no mass between {bounded.low:g} and {bounded.high:g}, which the ODD leaves",
+                    "bounds that overlap its usual values, {:g} to {:g}".format(*law.usual_range),
+                )
+            axes.append(DeclaredAxis(bounded.name, bounded.low, bounded.high, law))
+        return cls(tuple(axes), correlation)
+
+    @property
+    def alike(self) -> bool:
+        """Whether all scenes are as likely."""
+        return self.correlation is None and all(axis.law is None for axis in self.axes)
+
+    def unit(self, shares: Floats) -> Floats:
+        """The point of the unit cube, `d`, at independent uniform numbers, `d`."""
+        return shares if self.alike else self.point(np.array([_normal(share) for share in shares]))
+
+    def point(self, normal: Floats) -> Floats:
+        """The point of the unit cube, `d`, at independent standard normal numbers, `d`."""
+        correlated = np.empty_like(normal)
+        correlated[self._order] = self._factor @ normal[self._order]
+        pairs = zip(self.axes, correlated.tolist(), strict=True)
+        return np.array([axis.unit(_STANDARD.cdf(z)) for axis, z in pairs])
+
+    def normal(self, point: Floats) -> Floats:
+        """Independent standard normal numbers, `d`, of a point of the unit cube, `d`; the inverse of `point`.
+
+        Those of axes that do not tell their share are 0.
+        """
+        pairs = zip(self.axes, point.tolist(), strict=True)
+        correlated = np.array([_normal(axis.share(unit)) if axis.tells else 0.0 for axis, unit in pairs])
+        count, normal = int(self.telling.sum()), np.zeros(len(self.axes))
+        known = self._order[:count]
+        normal[known] = np.linalg.solve(self._factor[:count, :count], correlated[known])
+        return normal
+
+    def density(self, point: Floats) -> float:
+        """Density of a point of the unit cube, `d`, as a multiple of the uniform one.
+
+        Π_i f_i(x_i) · N(z; 0, L Lᵀ) / Π_i N(z_i; 0, 1)
+
+        Axes that do not tell their share count as uniform.
+        """
+        margins = math.prod(axis.density(unit) for axis, unit in zip(self.axes, point.tolist(), strict=True))
+        if self.correlation is None:
+            return margins
+        count = int(self.telling.sum())
+        factor, normal = self._factor[:count, :count], self.normal(point)[self._order[:count]]
+        correlated = factor @ normal
+        copula = math.exp(0.5 * float(correlated @ correlated - normal @ normal)) / float(np.prod(np.diag(factor)))
+        return margins * copula
+
+    @cached_property
+    def telling(self) -> np.typing.NDArray[np.bool_]:
+        """Which axes tell their share, `d`."""
+        return np.array([axis.tells for axis in self.axes], dtype=bool)
+
+    @cached_property
+    def _order(self) -> np.typing.NDArray[np.intp]:
+        """Axes in the order of the factor: those that tell their share first, so that no other one bears on them."""
+        return np.argsort(~self.telling, kind="stable")
+
+    @cached_property
+    def _factor(self) -> Floats:
+        """L, `d x d`, in that order."""
+        matrix = np.eye(len(self.axes))
+        if self.correlation is not None:
+            names = [axis.name for axis in self.axes]
+            rows = [names.index(name) for name in self.correlation.parameters]
+            matrix[np.ix_(rows, rows)] = self.correlation.normal
+        factor: Floats = np.linalg.cholesky(matrix[np.ix_(self._order, self._order)]).astype(np.float64)
+        return factor
+
+
+def _normal(share: float) -> float:
+    """Φ⁻¹ of a share, kept away from 0 and 1."""
+    return _STANDARD.inv_cdf(min(max(share, LEAST_SHARE), 1.0 - LEAST_SHARE))
