@@ -1,0 +1,113 @@
+"""Compares the episodes of a boundary search with those of a full grid.
+
+    python -m risk_sac.lab.figures.boundary_budget FOLDER OUT [--only CASE ...] [--episodes N] [--seeds N] [--no-search]
+
+FOLDER has the OpenSCENARIO files of ALKS and Euro NCAP, anywhere below it. For each case and ego it plays a grid of
+20 x 20 scenes as a story-sweep, then a boundary search for each seed. It plays what OUT lacks and rewrites
+OUT/budget.csv after each row; OUT/grid_CASE_EGO.csv keeps the grid's outcomes.
+"""
+
+import csv
+from collections.abc import Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from risk_sac.config import RunSpec
+from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.scenario import ScenarioParameter
+from risk_sac.env.env import RiskSacEnv
+from risk_sac.errors import InfeasibleScene
+from risk_sac.lab.figures.pretrained_policy import ego_of
+from risk_sac.lab.figures.side_by_side import Row, write_rows
+from risk_sac.openscenario.scenario_file import import_scenario
+from risk_sac.records import Ending, Outcome
+from risk_sac.scenario import library
+from risk_sac.scenario.slice import Slice
+from risk_sac.search.loop import episode_seed
+from risk_sac.world.types import Scene
+
+SIDE, SEED = 20, 0  # of the grid
+EGOS = ("broken", "idm-aeb+weak-brakes")
+
+
+class Case(NamedTuple):
+    """A scenario, and the two parameters whose boundary is sought."""
+
+    file: str
+    over: Mapping[str, tuple[float, float]]
+    values: Mapping[str, float] = {}  # of other parameters; the middle of their range where nothing is said
+
+
+CASES = {
+    "cut-in": Case(
+        "alks_scenario_4_4_1_cut_in_no_collision_variation.xosc",
+        {
+            "CutInVehicle_HeadwayDistanceTrigger_dx0_m": (5.0, 35.0),
+            "CutInVehicle_RelativeInitSpeed_Ve0_Vo0_kph": (-50.0, -15.0),
+        },
+        {"Ego_InitSpeed_Ve0_kph": 60.0, "CutInVehicle_LaneChange_MaxLateralVelocity_Vy_mps": 1.5},
+    ),
+    "pedestrian": Case("CPNA.xosc", {"Ego_speed_kph": (10.0, 80.0), "VRU_finalSpeed_kph": (3.0, 12.0)}),
+    "slow car": Case("CCRs.xosc", {"Ego_speed_kph": (30.0, 130.0), "Target_init_speed_kph": (0.0, 50.0)}),
+}
+
+
+def kept_case(folder: Path, case: Case) -> tuple[str, BoundaryConfig]:
+    """Imports a case's file and keeps it with the case's ranges; returns its name and the boundary's settings."""
+    found = sorted(folder.rglob(case.file))
+    scene = import_scenario(next((file for file in found if "StandardRange" in file.parts), found[0]))
+    parameters = dict(scene.document.parameters)
+    for name, (low, high) in case.over.items():
+        own = parameters[name]
+        parameters[name] = ScenarioParameter(unit=own.unit, meaning=own.meaning, range=(low, high))
+    document = scene.document.model_copy(update={"parameters": parameters})
+    return library.keep(document, scene.files), BoundaryConfig(over=tuple(case.over), at=case.values)
+
+
+def rows_in(file: Path) -> list[Row]:
+    """Reads the rows of a CSV file; none if it is not there."""
+    if not file.exists():
+        return []
+    with file.open(newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def play_grid(file: Path, name: str, config: BoundaryConfig, ego: str) -> list[Row]:
+    """Plays the grid of a case, or goes on with it: a row of the file for each scene, with its outcome."""
+    spec = RunSpec(family=name, method="story-random", seed=SEED, ego=ego_of(ego))
+    played = rows_in(file)
+    with closing(RiskSacEnv.of(spec)) as env:
+        slice_ = Slice(env.problem.space, config, env.problem.family.parameters)
+        sides = np.linspace(0.0, 1.0, SIDE)
+        for number in range(len(played), SIDE * SIDE):
+            unit = np.array([sides[number // SIDE], sides[number % SIDE]])
+            scene = env.problem.space.from_unit(slice_.whole(unit, np.random.default_rng(number)))
+            told = {name: scene.values[name] for name in config.over}
+            played.append(told | outcome_of(env, scene, episode_seed(SEED, number)))
+            write_rows(file, played)
+    return played
+
+
+def outcome_of(env: RiskSacEnv, scene: Scene, seed: int) -> Row:
+    """Plays a scene to its end."""
+    idle = np.zeros(env.action_size, dtype=np.float32)
+    try:
+        env.reset(seed=seed, options={"scene": scene})
+    except InfeasibleScene as refused:
+        return {"fails": "", "outcome": "rejected", "reason": refused.reason, "r157": "", "steps": 0}
+    steps, ended = 0, False
+    while not ended:
+        _, _, terminated, truncated, info = env.step(idle)
+        steps, ended = steps + 1, terminated or truncated
+    ending = Ending.of(info.get("collision"), env.violations(env.requirement_results()))
+    avoided = env.avoided_by() or {}
+    return {
+        "fails": int(ending.outcome is not Outcome.SAFE),
+        "outcome": ending.outcome.value,
+        "reason": ending.reason,
+        "r157": int(not avoided["r157"]),
+        "steps": steps,
+    }
