@@ -35,7 +35,7 @@ class BoundaryPoint(Record):
     """r157 | fsm → whether this driver avoids a contact in this scene."""
 
 
-class Share(Record):
+class BoxShare(Record):
     """A share of the box that the axes span, with its 95 % interval from posterior samples."""
 
     share: float
@@ -58,10 +58,10 @@ class DriverMap(Record):
     """Of failing at each point of the grid, in which the last axis varies fastest; empty where `always` is not null."""
     deviation: tuple[float, ...]
     """Standard deviation of the latent function there; the boundary is known where |Φ⁻¹(probability)| is large."""
-    fails: Share
-    """Share of the box in which it fails."""
-    ego_fails_alone: Share | None
-    """Share of the box in which the ego fails and this driver does not; null for the ego itself."""
+    fails: BoxShare
+    """BoxShare of the box in which it fails."""
+    ego_fails_alone: BoxShare | None
+    """BoxShare of the box in which the ego fails and this driver does not; null for the ego itself."""
 
 
 class BoundaryMap(Record):

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from risk_sac.failures.from_above import canvas, picture
 from risk_sac.records import stored
-from risk_sac.records.boundary import BoundaryMap, DriverMap, Share
+from risk_sac.records.boundary import BoundaryMap, BoxShare, DriverMap
 from risk_sac.report.drawing import STYLE
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import BOUNDARY, BOUNDARY_PICTURE
@@ -44,7 +44,7 @@ def boundary_png(found: BoundaryMap) -> bytes:
     return content
 
 
-def in_words(share: Share) -> str:
+def in_words(share: BoxShare) -> str:
     """A share as "12 % (9 to 16 %)"."""
     return f"{100 * share.share:.0f} % ({100 * share.low:.0f} to {100 * share.high:.0f} %)"
 

@@ -11,7 +11,7 @@ from risk_sac.config import RunSpec
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.records import EpisodeRecord, Outcome
-from risk_sac.records.boundary import BoundaryAxis, BoundaryMap, BoundaryPoint, DriverMap, Share
+from risk_sac.records.boundary import BoundaryAxis, BoundaryMap, BoundaryPoint, BoxShare, DriverMap
 from risk_sac.run_folder.results import EPISODES, read_results, records_from_lines
 from risk_sac.scenario.slice import Slice
 from risk_sac.search.level_set import FailureClassifier
@@ -182,10 +182,10 @@ def _rounded(values: Floats) -> tuple[float, ...]:
     return tuple(np.round(values, 4).tolist())
 
 
-def _share(samples: Bools) -> Share:
+def _share(samples: Bools) -> BoxShare:
     """Median and 95 % interval of the share of the box over posterior samples."""
     low, middle, high = np.quantile(samples.mean(axis=1), (0.025, 0.5, 0.975)).tolist()
-    return Share(share=middle, low=low, high=high)
+    return BoxShare(share=middle, low=low, high=high)
 
 
 def _effects(ego: DriverMap | None, sides: tuple[int, ...]) -> tuple[bool, ...]:

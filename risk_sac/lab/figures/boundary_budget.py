@@ -33,7 +33,7 @@ SIDE, SEED = 20, 0  # of the grid
 EGOS = ("broken", "idm-aeb+weak-brakes")
 
 
-class Case(NamedTuple):
+class BudgetCase(NamedTuple):
     """A scenario, and the two parameters whose boundary is sought."""
 
     file: str
@@ -42,7 +42,7 @@ class Case(NamedTuple):
 
 
 CASES = {
-    "cut-in": Case(
+    "cut-in": BudgetCase(
         "alks_scenario_4_4_1_cut_in_no_collision_variation.xosc",
         {
             "CutInVehicle_HeadwayDistanceTrigger_dx0_m": (5.0, 35.0),
@@ -50,12 +50,12 @@ CASES = {
         },
         {"Ego_InitSpeed_Ve0_kph": 60.0, "CutInVehicle_LaneChange_MaxLateralVelocity_Vy_mps": 1.5},
     ),
-    "pedestrian": Case("CPNA.xosc", {"Ego_speed_kph": (10.0, 80.0), "VRU_finalSpeed_kph": (3.0, 12.0)}),
-    "slow car": Case("CCRs.xosc", {"Ego_speed_kph": (30.0, 130.0), "Target_init_speed_kph": (0.0, 50.0)}),
+    "pedestrian": BudgetCase("CPNA.xosc", {"Ego_speed_kph": (10.0, 80.0), "VRU_finalSpeed_kph": (3.0, 12.0)}),
+    "slow car": BudgetCase("CCRs.xosc", {"Ego_speed_kph": (30.0, 130.0), "Target_init_speed_kph": (0.0, 50.0)}),
 }
 
 
-def kept_case(folder: Path, case: Case) -> tuple[str, BoundaryConfig]:
+def kept_case(folder: Path, case: BudgetCase) -> tuple[str, BoundaryConfig]:
     """Imports a case's file and keeps it with the case's ranges; returns its name and the boundary's settings."""
     found = sorted(folder.rglob(case.file))
     scene = import_scenario(next((file for file in found if "StandardRange" in file.parts), found[0]))
