@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from risk_sac import __version__
-from risk_sac.cli import campaigns, egos, grid, lab, places, rate, regress, replay, run, scenarios, show, understand
+from risk_sac.cli import boundary, campaigns, egos, grid, lab, places, rate, regress, replay, run, scenarios, show, understand
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
 from risk_sac.cli.parser import Commands, Parser, add_command, as_typed, example_text, wrong_path
 from risk_sac.egos import registry
@@ -133,6 +133,7 @@ def _parser() -> argparse.ArgumentParser:
         regress.add,
         grid.add,
         rate.add,
+        boundary.add,
     )
     for add in (*first, regress.add_report, lab.add_benchmark, lab.add_pretrain, add_service_commands, campaigns.add):
         add(commands)

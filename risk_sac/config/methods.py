@@ -25,6 +25,7 @@ MethodName = Literal[
     "story-random",
     "story-bo",
     "rate",
+    "boundary",
 ]
 IidName = Literal["iid-undisturbed", "iid-random"]
 """How the runs of a campaign's i.i.d. phase are made, see `Iid`; a spec cannot name them."""
@@ -45,10 +46,11 @@ class Method(Settings):
     replay: Literal["uniform", "rper"] = "uniform"
     story: bool = False
     """Whether the scenario is played as it is written: others follow its story, and nothing deviates from it."""
-    scenes: Literal["botorch", "archive", "sobol", "iid", "grid", "rate"] = "sobol"
+    scenes: Literal["botorch", "archive", "sobol", "iid", "grid", "rate", "boundary"] = "sobol"
     """`grid`: each point of the grid of the parameters, or of a stratified sample of it; `archive`: bred from
     those that led to distinct failures, together with the scripts' genes; `iid`: drawn one independently of the other,
-    by the declared distributions; `rate`: by stages of importance sampling, for a rate under these."""
+    by the declared distributions; `rate`: by stages of importance sampling, for a rate under these; `boundary`: where
+    an ego goes from passing to failing over a few parameters."""
     takes_turns: bool = False
     """Whether a learner's warm start goes on beside it: scripts and policy act in turn, by what they yield."""
     prior: Literal["none", "library", "policy", "all"] = "none"
@@ -148,6 +150,12 @@ METHODS: dict[MethodName, Method] = {
         agent="none",
         scenes="rate",
         summary="How often the ego fails under the declared distributions, without an attack, by importance sampling.",
+    ),
+    "boundary": Method(
+        agent="none",
+        story=True,
+        scenes="boundary",
+        summary="Seeks where the ego goes from passing to failing over two to four parameters, without an attack.",
     ),
 }
 

@@ -4,6 +4,7 @@ results.json    the spec, the metrics and every failure, sealed; rewritten at ea
 episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is formed over them
 failures/       the time series of every failure, see `risk_sac.run_folder.series`
 verified.json   which failures repeated, see `risk_sac.run_folder.results`; sealed
+boundary.json   the map of a run of the method `boundary`, once it has ended; boundary.png draws it
 studies/        cores and regions that were asked for, see `risk_sac.failures.studied`
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """
@@ -21,6 +22,7 @@ from risk_sac.verdicts.distinct import variant_name
 RESULTS = "results.json"
 EPISODES = "episodes.jsonl"
 FAILURES = "failures"
+BOUNDARY, BOUNDARY_PICTURE = "boundary.json", "boundary.png"
 
 
 def series_name(index: int) -> str:

@@ -158,7 +158,7 @@ def tell(run: RunState, proposal: Proposal, played: Played) -> RunMetrics:
         start_danger=played.start_danger,
         defect_reached_s=played.defect_reached_s,
         deviations=played.deviations,
-        avoided_by=played.avoided_by,
+        avoided_by=encounter.avoided_by or None,
     )
     return run.add(record, played)
 

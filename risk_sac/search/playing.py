@@ -118,7 +118,6 @@ class Played:
     start_danger: str | None = None
     defect_reached_s: float | None = None
     deviations: Mapping[str, StoryDeviation] = field(default_factory=dict)
-    avoided_by: Mapping[str, bool] | None = None
     series: dict[str, NDArray[np.generic]] | None = None  # where a requirement that counts was violated
     cpu_s: float = 0.0  # of the process that played it, without compilation
 
@@ -223,6 +222,7 @@ def play(guarded: GuardedEnv, proposal: Proposal, actor: Actor, agent: Actor, re
         violations=env.violations(results),
         margins={name: result.robustness for name, result in results.items() if result.counts == "failure"},
         encounters_s=env.trace.encounters_s(env.problem.family.adversaries),
+        avoided_by=env.avoided_by() or {},
     )
     return Played(
         sums=sums,
@@ -230,7 +230,6 @@ def play(guarded: GuardedEnv, proposal: Proposal, actor: Actor, agent: Actor, re
         requirements=results,
         **_facts(env, sums),
         deviations=env.deviations,
-        avoided_by=env.avoided_by(),
         series=env.trace.series() if encounter.collision or encounter.violations else None,
         cpu_s=cpu_s() - began_s,
     )

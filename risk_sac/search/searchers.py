@@ -22,6 +22,7 @@ from risk_sac.search.prior.start import start_of
 from risk_sac.search.scene_optimizer import (
     ArchiveOptimizer,
     BotorchOptimizer,
+    BoundarySampler,
     DiscountedBandit,
     GridSampler,
     IidSampler,
@@ -34,7 +35,15 @@ from risk_sac.world.types import Floats, Scene
 
 OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
     each.kind: each
-    for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler, GridSampler, RateSampler)
+    for each in (
+        BotorchOptimizer,
+        ArchiveOptimizer,
+        SobolOptimizer,
+        IidSampler,
+        GridSampler,
+        RateSampler,
+        BoundarySampler,
+    )
 }
 Actor = Learner | Control
 """A joint policy that drives all adversaries."""
@@ -221,6 +230,8 @@ class Searchers:
             made = IidSampler(*arguments, self._problem.declared)
         elif sampler is RateSampler:
             made = RateSampler(*arguments, self._problem.declared, self._spec.budget.episodes)
+        elif sampler is BoundarySampler:
+            made = BoundarySampler(*arguments, self._problem.slice_of(self._spec))
         elif self._start is None or not actor.genes:
             made = sampler(*arguments)
         else:

@@ -48,6 +48,7 @@ EPISODE_COST: Mapping[str, float] = {
     "story-sweep": 0.7,
     "story-random": 0.7,
     "story-bo": 1.1,
+    "boundary": 3.0,
     "iid-random": 1.0,
     "rate": 0.7,
     "iid-undisturbed": 0.7,
