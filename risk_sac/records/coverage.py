@@ -11,8 +11,8 @@ class CellState(StrEnum):
 
     FAILED = "failed"  # an episode in it failed
     PLAYED = "played"  # played, no failure
-    NEVER = "never"  # expressible, and no episode was played in it
-    INEXPRESSIBLE = "inexpressible"  # no scenario of this product can have it
+    NEVER = "never"  # no episode was played in it; a requirement never came within a clear margin
+    INEXPRESSIBLE = "inexpressible"  # no scenario states it, so nothing is counted
 
 
 class CellPower(Record):
@@ -35,8 +35,10 @@ class CoverageCell(Record):
     """Episodes, those of the i.i.d. phase among them."""
     failed: int = 0
     """Of these, those with a valid violation that counts; of a requirement its own violations."""
+    reached: int | None = None
+    """Of a requirement: episodes in which it had less than one scale of robustness left; null elsewhere."""
     families: tuple[str, ...] = ()
-    """Scenarios that have it, whether or not an episode was played."""
+    """Scenarios with an episode in it."""
     campaigns: tuple[str, ...] = ()
     """Those with an episode in it."""
     failing: tuple[str, ...] = ()
