@@ -103,8 +103,8 @@ class CoveredCampaign(Record):
 class CoverageMatrix(Record):
     """Coverage by one campaign, or by several together."""
 
-    definitions: int
-    """Of a failure, under which power is asked for."""
+    definitions: tuple[int, ...]
+    """Versions of the definitions that its contacts and violations were judged by."""
     campaigns: tuple[CoveredCampaign, ...]
     groups: tuple[CoverageGroup, ...]
     pairs: tuple[CoveredPair, ...]

@@ -38,10 +38,8 @@ from risk_sac.report.standards import (
     TRAFFIC_RULES,
     UNITS,
 )
-from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS
 from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.families import family_named
-from risk_sac.verdicts.judge import DEFINITIONS
 
 LIMITS = (
     "A cell counts where episodes begin and of which scenario they are; what unfolds is in the taxonomy of contacts.",
@@ -62,6 +60,7 @@ TITLES: Mapping[str, tuple[str, str]] = {
     "parameters": ("Scene parameters", ""),
     "bodies": ("Bodies", ""),
 }
+RULED = ("no_contact", *(rule.requirement for rule in TRAFFIC_RULES if rule.requirement))
 ROLES = ("ego", "adversary", "story", "background", "static")
 
 
@@ -123,13 +122,13 @@ def coverage_matrix(
     )
     power = {family: _power(comparison, family, id_, benchmark) for family in records}
     groups = tuple(_groups(counts, axes, id_, power))
-    return _matrix((covered,), groups, tuple(pairs))
+    return _matrix((covered,), groups, tuple(pairs), definitions_of(everything))
 
 
 def merged(matrices: Sequence[CoverageMatrix]) -> CoverageMatrix:
     """Merges the matrices of different campaigns cell by cell; parameters of unlike ranges stay apart."""
-    if len(matrices) == 1:
-        return matrices[0]
+    if len(matrices) < 2:
+        return matrices[0] if matrices else _matrix((), tuple(_groups({}, {}, "", {})), (), ())
     campaigns = tuple(campaign for matrix in matrices for campaign in matrix.campaigns)
     groups = [
         CoverageGroup(name=name, title=title, source=source, rows=tuple(_merged_rows(name, matrices)))
@@ -139,7 +138,8 @@ def merged(matrices: Sequence[CoverageMatrix]) -> CoverageMatrix:
     for pair in (pair for matrix in matrices for pair in matrix.pairs):
         key = pair.family, pair.parameters, pair.bins
         pairs[key] = _both(pairs[key], pair) if key in pairs else pair
-    return _matrix(campaigns, tuple(groups), tuple(pairs.values()))
+    definitions = sorted({version for matrix in matrices for version in matrix.definitions})
+    return _matrix(campaigns, tuple(groups), tuple(pairs.values()), definitions)
 
 
 def ego_name(spec: CampaignSpec) -> str:
@@ -147,13 +147,22 @@ def ego_name(spec: CampaignSpec) -> str:
     return "+".join((spec.ego.driver or spec.ego.profile, *spec.ego.defects))
 
 
+def definitions_of(records: Sequence[EpisodeRecord]) -> tuple[int, ...]:
+    """Returns the versions of the definitions that contacts and violations were judged by."""
+    contacts = {record.collision.judgement.definitions for record in records if record.collision is not None}
+    return tuple(sorted(contacts | {violation.definitions for record in records for violation in record.violations}))
+
+
 def _matrix(
-    campaigns: tuple[CoveredCampaign, ...], groups: tuple[CoverageGroup, ...], pairs: tuple[CoveredPair, ...]
+    campaigns: tuple[CoveredCampaign, ...],
+    groups: tuple[CoverageGroup, ...],
+    pairs: tuple[CoveredPair, ...],
+    definitions: Sequence[int],
 ) -> CoverageMatrix:
     states = [cell.state for group in groups for row in group.rows for cell in row.cells]
     cells = {state: states.count(state) for state in CellState}
     return CoverageMatrix(
-        definitions=DEFINITIONS, campaigns=campaigns, groups=groups, pairs=pairs, cells=cells, limits=LIMITS
+        definitions=tuple(definitions), campaigns=campaigns, groups=groups, pairs=pairs, cells=cells, limits=LIMITS
     )
 
 
@@ -211,7 +220,7 @@ def _groups(
             )
         return tuple(made)
 
-    requirements = dict.fromkeys((*SHIPPED_REQUIREMENTS, *(key.row for key in counts if key.group == "requirements")))
+    requirements = dict.fromkeys((*RULED, *(key.row for key in counts if key.group == "requirements")))
     of_requirement = {name: cells("requirements", name, axes) for name in requirements}
     rows: dict[str, list[CoverageRow]] = {
         "odd": [
