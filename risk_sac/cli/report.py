@@ -1,4 +1,4 @@
-"""`risk-sac report`: writes the report of runs, and verifies that its inputs are as they were."""
+"""`risk-sac report` and `risk-sac coverage`: the report of runs, whether its inputs changed, and what is covered."""
 
 import argparse
 import json
@@ -7,12 +7,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from rich.table import Column, Table
+
 from risk_sac.cli.console import FAILED, OK, counted, write_out
 from risk_sac.cli.parser import Commands, add_command
 from risk_sac.cli.regress import read_baseline
 from risk_sac.config.base import read_text
 from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import complain, console
+from risk_sac.records.coverage import CellState
 
 if TYPE_CHECKING:
     from risk_sac.report.evidence import CampaignFacts
@@ -46,6 +49,17 @@ def add_report(commands: Commands) -> None:
     output.add_argument("--regression", type=Path, metavar="FILE.json", help=regression)
     schema = f"; the data's JSON schema if the name ends in {SCHEMA}"
     output.add_argument("--out", type=Path, metavar="FILE", help=OUT + schema)
+    coverage = add_command(
+        commands,
+        "coverage",
+        _coverage,
+        "count what one campaign, or several together, have covered",
+        more="A cell is a value of the ODD, a functional scenario, a requirement, a rule, a bin of a parameter or a "
+        "body; --out has the campaigns behind each.",
+        example="coverage runs/before runs/after --out coverage.json",
+    )
+    coverage.add_argument("campaigns", type=Path, nargs="+", metavar="FOLDER", help="folder of `risk-sac evaluate`")
+    coverage.group("output").add_argument("--out", type=Path, metavar="FILE.json", help="write the whole matrix there")
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -71,9 +85,8 @@ def _report(options: argparse.Namespace) -> int:
     else:
         runs = list(map(str, options.runs))
 
-        def recount(run: "FinishedRun") -> str:
-            file = shlex.quote(str(inputs.folders[run.spec.digest] / "episodes.jsonl"))
-            return f"jq -r .outcome {file} | sort | uniq -c"
+        def episodes(run: "FinishedRun") -> str:
+            return shlex.quote(str(inputs.folders[run.spec.digest] / "episodes.jsonl"))
 
         origin = Origin(
             report=options.typed,
@@ -81,13 +94,30 @@ def _report(options: argparse.Namespace) -> int:
             show=lambda run, failure: show_command(inputs.folders[run.spec.digest], failure),
             regress=_regress_command(inputs),
             verify=shlex.join(["risk-sac", "report", VERIFY, str(options.out), *runs]),
-            recount=recount,
+            recount=lambda run: f"jq -r .outcome {episodes(run)} | sort | uniq -c",
+            record=lambda run, record: f"jq 'select(.index == {record.index})' {episodes(run)}",
             folders=inputs.folders,
             regression=facts.regression,
         )
         layout: Literal["html", "markdown"] = "html" if format_ == "html" else "markdown"
         content = report_page(inputs.comparison, evidence, origin, evidence.power, layout)
     write_out(options.out, content.encode(), "Report")
+    return OK
+
+
+def _coverage(options: argparse.Namespace) -> int:
+    from risk_sac.report.files import read_folders
+    from risk_sac.report.matrix import coverage_matrix, merged
+
+    matrix = merged([coverage_matrix(read_folders([campaign]).comparison) for campaign in options.campaigns])
+    if options.out is not None:
+        write_out(options.out, matrix.model_dump_json(indent=2).encode() + b"\n", "Coverage")
+        return OK
+    table = Table("coverage", *(Column(state, justify="right") for state in CellState))
+    for group in matrix.groups:
+        states = [cell.state for row in group.rows for cell in row.cells]
+        table.add_row(group.title, *(str(states.count(state)) for state in CellState))
+    console.print(table)
     return OK
 
 

@@ -137,7 +137,7 @@ class ClauseRow(Record):
     field: str
     standard: str
     clause: str
-    """Number and title, or `by title` where the number could not be confirmed."""
+    """Number and title; `by title` where the standard's public scope alone names the field; or not confirmed."""
 
 
 class InputDigest(Record):

@@ -40,6 +40,7 @@ class Origin:
     show: Callable[[FinishedRun, str], str]  # of a run and the id of one of its failures: the command that draws it
     regress: str  # the command that plays the failures against another ego
     verify: str = ""  # the command that forms the digest of all inputs again
+    record: Callable[[FinishedRun, EpisodeRecord], str] | None = None  # the command that prints an episode's record
     recount: Callable[[FinishedRun], str] | None = None  # of a run: the command that counts the outcomes on record
     folders: Mapping[str, Path] = field(default_factory=dict)  # by digest of the run's spec
     regression: Regression | None = None  # the campaign's failures against another ego, if played
@@ -64,7 +65,7 @@ class FailureGroup:
     run: FinishedRun
     record: EpisodeRecord
     violation: Collision | Violation | None  # of this kind
-    command: str  # draws the episode
+    command: str  # lines that draw the episode, and print its record
     drawing: Drawing
 
 
@@ -127,9 +128,11 @@ def _kinds(comparison: Comparison, family: FamilyName, origin: Origin) -> list[F
     for cluster in comparison.overviews[family].clusters[:MOST_KINDS]:
         run, record = episodes[cluster.representative]
         violation = next((one for one in record.valid_violations if one.kind == cluster.name), None)
-        command = origin.show(run, cluster.representative)
+        commands = [origin.show(run, cluster.representative)]
+        if origin.record is not None:
+            commands.append(origin.record(run, record))
         drawing = _draw(run, origin.folders.get(run.spec.digest), record)
-        kinds.append(FailureGroup(cluster, run, record, violation, command, drawing))
+        kinds.append(FailureGroup(cluster, run, record, violation, "\n".join(commands), drawing))
     return kinds
 
 

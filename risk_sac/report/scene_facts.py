@@ -11,9 +11,9 @@ from risk_sac.report.standards import BANDS, JUNCTION_TAGS, ROAD_TAGS, functiona
 from risk_sac.scenario.families import document_named, family_named
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.limits import NIGHT, VISIBILITY, with_environment
-from risk_sac.scenario.odd import field, intersect, narrow
+from risk_sac.scenario.odd import SIGNAL_OF, field, intersect, narrow
 from risk_sac.scenario.scene import motion_of
-from risk_sac.scenario.space import SceneSpace
+from risk_sac.scenario.space import Parameter, SceneSpace
 
 # Field of the ODD that is a set → attribute whose cells are its members.
 SETS: Mapping[str, str] = {
@@ -89,9 +89,9 @@ class SceneFacts:
         for path, row in SETS.items():
             parameter, allowed = categories.get(path), field(self.odd, path) or ()
             if parameter is not None:
-                whole = next(own for own in self._interpreter.space.parameters if own.name == parameter.name)
-                upper = scene[parameter.name] >= (whole.low + whole.high) / 2
-                yield CellKey("odd", row, parameter.categories[int(upper)])
+                yield CellKey("odd", row, parameter.categories[self._half(parameter, scene)])
+            elif path == "scenery.signal_types" and (crossing := categories.get("scenery.crossing_types")):
+                yield CellKey("odd", row, SIGNAL_OF[crossing.categories[self._half(crossing, scene)]])
             elif allowed:
                 yield CellKey("odd", row, " or ".join(allowed))
         times = self.odd.environment.time_of_day or ()
@@ -102,6 +102,11 @@ class SceneFacts:
         if VISIBILITY in scene:
             row = "visibility in particulates"
             yield CellKey("odd", row, band_of(row, scene[VISIBILITY]))
+
+    def _half(self, parameter: Parameter, scene: Mapping[str, float]) -> int:
+        """Which half of a parameter's own range a scene lies in, which stands for one of its two categories."""
+        own = next(one for one in self._interpreter.space.parameters if one.name == parameter.name)
+        return int(scene[own.name] >= (own.low + own.high) / 2)
 
 
 def band_of(row: str, number: float) -> str:

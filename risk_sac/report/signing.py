@@ -20,7 +20,8 @@ from risk_sac.scenario.families import sources_named
 
 FILES = (RESULTS, EPISODES, VERIFIED)
 FOLDERS = (FAILURES, "studies")  # one line for all files of each
-_LINE = re.compile(r"^(?:.*>)?([0-9a-f]{64})  (\S+)", re.MULTILINE)
+_LINE = re.compile(r"^([0-9a-f]{64})  (\S+)$", re.MULTILINE)
+_TAG = re.compile(r"<[^>]*>")
 
 
 def signed(digests: Mapping[str, str]) -> SignedInputs:
@@ -87,8 +88,9 @@ def inputs_in(text: str) -> SignedInputs:
         found = json.loads(text).get("signed")
         wanted = SignedInputs.model_validate(found) if found else None
     else:
-        lines = {name: digest for digest, name in _LINE.findall(html.unescape(text))}
-        stated = re.search(r"digest of all inputs(?:<[^>]*>|\W)*([0-9a-f]{64})", text)
+        text = html.unescape(_TAG.sub("", text))
+        lines = {name: digest for digest, name in _LINE.findall(text)}
+        stated = re.search(r"digest of all inputs\W*([0-9a-f]{64})", text)
         wanted = None
         if lines and stated:
             made = signed(lines)

@@ -154,17 +154,19 @@ class Clause(NamedTuple):
     field: str
     standard: str
     clause: str
-    """Number and title, or `by title`."""
+    """Number and title, or `by title` where its public scope alone names the field."""
 
 
 _BY_TITLE = "by title"
+_UNCONFIRMED = "not confirmed: in neither its scope nor its public contents"
 CLAUSES = (
     Clause("identifier", ISO_34505, _BY_TITLE),
     Clause("scenario", ISO_34505, "5.2, Set of scenarios"),
     Clause("objective", ISO_34505, "5.5, Relation between the scenarios and test objectives"),
     Clause("functional_scenarios", ISO_34502, _BY_TITLE),
-    Clause("preconditions", ISO_34503, _BY_TITLE),
+    Clause("preconditions", ISO_34505, _UNCONFIRMED),
     Clause("odd", ISO_34505, "5.4, Relation between scenarios and ODD"),
+    Clause("odd", ISO_34503, _BY_TITLE),
     Clause("inputs", ISO_34505, _BY_TITLE),
     Clause("steps", ISO_34505, _BY_TITLE),
     Clause("platform", ISO_34505, _BY_TITLE),
@@ -172,6 +174,6 @@ CLAUSES = (
         "pass_criteria", ISO_34505, "5.3, Relations between the scenarios and functional and technical requirements"
     ),
     Clause("result", ISO_34505, _BY_TITLE),
-    Clause("recording", ISO_34505, _BY_TITLE),
-    Clause("judged_by", ISO_34505, _BY_TITLE),
+    Clause("recording", ISO_34505, _UNCONFIRMED),
+    Clause("judged_by", ISO_34505, _UNCONFIRMED),
 )
