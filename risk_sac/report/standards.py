@@ -90,7 +90,7 @@ ODD_ATTRIBUTES = (
     OddAttribute(SCENERY, "signals", ("none", "fixed_time"), "odd.scenery.signal_types"),
     OddAttribute(SCENERY, "other signs", (), "the net's priority holds; no sign is seen"),
     OddAttribute(SCENERY, "edges and shoulders", (), NOT_STATED),
-    OddAttribute(SCENERY, "surface friction", _bands(FRICTION_EDGES), "a scenario's friction, 1"),
+    OddAttribute(SCENERY, "surface friction", _bands(FRICTION_EDGES), "a scenario's friction"),
     OddAttribute(SCENERY, "surface features", (), NOT_STATED),
     OddAttribute(SCENERY, "junctions", ("none", "intersection", "roundabout"), "a scenario's tags"),
     OddAttribute(SCENERY, "basic road structures", (), NOT_STATED),
