@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from risk_sac.config import FamilyName, IidName, Requirement
+from risk_sac.config import CampaignSpec, FamilyName, IidName, Requirement
 from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Regression
 from risk_sac.failures.clusters import Overview
@@ -118,8 +118,9 @@ class CampaignEvidence(Record):
 
     complete: bool
     """Whether all runs are in it."""
+    spec: CampaignSpec
     campaign: str
-    """Digest of its spec."""
+    """Digest of the spec."""
     headline: int | None
     """Failures of all searches; what several found alike counts once. Null before one was replayed."""
     headline_published: int | None
@@ -163,6 +164,7 @@ def gathered(comparison: Comparison, facts: CampaignFacts = NO_FACTS) -> Campaig
     regression = facts.regression.model_dump_json() if facts.regression else ""
     return CampaignEvidence(
         complete=not comparison.missing and not comparison.undrawn,
+        spec=spec,
         campaign=spec.digest,
         headline=comparison.headline,
         headline_published=comparison.headline_published,
