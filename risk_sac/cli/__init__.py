@@ -8,7 +8,22 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from risk_sac import __version__
-from risk_sac.cli import boundary, campaigns, egos, grid, lab, places, rate, regress, replay, run, scenarios, show, understand
+from risk_sac.cli import (
+    boundary,
+    campaigns,
+    egos,
+    grid,
+    lab,
+    places,
+    rate,
+    regress,
+    replay,
+    report,
+    run,
+    scenarios,
+    show,
+    understand,
+)
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
 from risk_sac.cli.parser import Commands, Parser, add_command, as_typed, example_text, wrong_path
 from risk_sac.egos import registry
@@ -135,6 +150,6 @@ def _parser() -> argparse.ArgumentParser:
         rate.add,
         boundary.add,
     )
-    for add in (*first, regress.add_report, lab.add_benchmark, lab.add_pretrain, add_service_commands, campaigns.add):
+    for add in (*first, report.add_report, lab.add_benchmark, lab.add_pretrain, add_service_commands, campaigns.add):
         add(commands)
     return parser

@@ -22,7 +22,7 @@ from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.helper import ANSWER, QUESTION
 from risk_sac.execution.messages import without_folders
 from risk_sac.failures.cases import Regression
-from risk_sac.records import Outcome, wire
+from risk_sac.records import Outcome, TriageState, wire
 from risk_sac.report.figures import Format
 from risk_sac.report.grid import Standard
 from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, PriorContent, is_kept
@@ -45,7 +45,18 @@ MEMORY_BYTES, WALL_S = 4 << 30, 1800.0  # of a helper; 100,000 episodes take 2.4
 VIEWS_KEPT = 4  # of some megabytes each
 REFUSED, LOST, PASSING, TOO_LARGE = 3, 4, 5, 6  # exit statuses
 ViewName = Literal[
-    "curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "prior", "grid", "rates"
+    "curves",
+    "scenes",
+    "failure_table",
+    "table",
+    "clusters",
+    "figures",
+    "drawn",
+    "report",
+    "coverage",
+    "rates",
+    "grid",
+    "prior",
 ]
 
 
@@ -70,6 +81,8 @@ class CampaignView:
     """Parameters of a grid's picture."""
     regression: Regression | None = None
     scenes_per_hour: float | None = None
+    people: tuple[tuple[TriageState, int], ...] = ()
+    """Failures by what people made of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +120,9 @@ def content_of(view: CampaignView, sources: Sources) -> Content:
     if view.name == "grid":
         grid = played_grid(campaign, view.run, store.records(campaign.number), view.standard)
         return Content(written_grid(grid, cast(GridFormat, view.format), view.over))
+    if view.name == "coverage":
+        matrix, lasting = sources.reports.matrix(campaign)
+        return Content(wire(matrix), lasting)
     made = sources.reports.report(campaign)
     return Content(_OF_REPORT[view.name](made, view), made.lasting)
 
@@ -118,7 +134,9 @@ _OF_REPORT: Mapping[str, Callable[[CampaignReport, CampaignView], bytes]] = {
     "figures": lambda made, view: reports.figures(made, view.address).encode(),
     "drawn": lambda made, view: reports.drawn(made, cast(Format, view.format)),
     "rates": lambda made, view: reports.rates(made, view.scenes_per_hour),
-    "report": lambda made, view: reports.evidence(made, view.format, view.address, view.regression).encode(),
+    "report": lambda made, view: reports.evidence(
+        made, view.format, view.address, view.regression, dict(view.people)
+    ).encode(),
 }
 
 
