@@ -17,6 +17,7 @@ import { ReplayScreen } from "./screens/replay/screen";
 import { EditorScreen } from "./screens/scenarios/editor";
 import { ScenarioScreen } from "./screens/scenarios/one";
 import { ScenariosScreen } from "./screens/scenarios/screen";
+import { TrendScreen } from "./screens/trend/screen";
 import { useSignal } from "./signal";
 import { Login } from "./ui/login";
 import { Empty } from "./ui/states";
@@ -44,6 +45,7 @@ export function App() {
           <Tab to="#/scenarios">Scenarios</Tab>
           <Tab to="#/maps">Maps</Tab>
           <Tab to="#/compare">Compare</Tab>
+          <Tab to="#/trend">Versions</Tab>
           <a href={absolute("docs")}>API</a>
         </nav>
         <span class="bar-end">
@@ -84,6 +86,7 @@ function screen({ parts, query }: Place): ComponentChildren {
     return id === "new" ? <EditorScreen query={query} /> : <ScenarioScreen name={id} key={id} />;
   }
   if (room === "maps" && part === undefined) return id === undefined ? <MapsScreen /> : <MapScreen id={id} query={query} key={id} />;
+  if (room === "trend") return <TrendScreen query={query} />;
   if (room === "compare") return <CompareScreen query={query} />;
   if (room === "campaigns" && id !== undefined) {
     if (part === undefined) return <CampaignScreen id={id} key={id} />;
