@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rich.markup import escape
+from rich.table import Table
 
 from risk_sac.cli.console import OK, counted, narrow_table, or_dash, print_answer
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
@@ -13,7 +14,6 @@ from risk_sac.report.trend import (
     EndedRun,
     LeftOut,
     Trend,
-    TrendPoint,
     TrendRate,
     TrendRow,
     check_scenarios,
@@ -76,7 +76,7 @@ def trend_of_folders(folders: Sequence[Path]) -> Trend:
     return trend(ended, left_out)
 
 
-def _texts(found: Trend) -> Iterator[object]:
+def _texts(found: Trend) -> Iterator[str | Table]:
     for row in found.rows:
         yield _heading(row)
         yield _table(row)
@@ -95,11 +95,12 @@ def _heading(row: TrendRow) -> str:
     return "; ".join(parts) + (f"; differs in {', '.join(row.differs)}" if row.differs else "")
 
 
-def _table(row: TrendRow) -> object:
+def _table(row: TrendRow) -> Table:
     table = narrow_table("version", "headline", "new", "gone", "returned", "rate of failures, 95 %")
-    for point in row.points:
-        if point.changed:
-            table.add_row("", *[""] * 4, f"— not comparable: {_change(point)} —")
+    for before, point in zip((None, *row.points), row.points, strict=False):
+        if before is not None and point.changed:
+            changes = (f"{name} {before.software[name]} → {point.software[name]}" for name in point.changed)
+            table.add_row(*[""] * 5, f"not comparable: {', '.join(changes)}")
         counts = ("-" if kinds is None else str(len(kinds)) for kinds in (point.new, point.gone, point.returned))
         rates = "\n".join(_rate(rate) for rate in point.rates if rate.requirement is None) or "-"
         named = escape(" ".join([point.version, *(f"({setting})" for setting in point.settings)]))
@@ -107,11 +108,6 @@ def _table(row: TrendRow) -> object:
     return table
 
 
-def _change(point: TrendPoint) -> str:
-    return ", ".join(f"{name} {point.software[name]}" for name in point.changed)
-
-
 def _rate(rate: TrendRate) -> str:
-    figures = (or_dash(value, ".3f") for value in (rate.rate, rate.low, rate.high))
-    value, low, high = figures
+    value, low, high = (or_dash(figure, ".3f") for figure in (rate.rate, rate.low, rate.high))
     return f"{value} [{low}, {high}] {rate.family}, {rate.method.removeprefix('iid-')}"
