@@ -4,10 +4,11 @@ import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from risk_sac.cli.console import OK, counted, narrow_table, or_dash, print_answer
+from risk_sac.cli.console import OK, counted, or_dash, print_answer
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.report.trend import (
     EndedCampaign,
@@ -90,13 +91,18 @@ def _heading(row: TrendRow) -> str:
         ", ".join(row.methods),
         counted(row.seeds, "seed"),
         counted(row.budget.episodes, "episode"),
+        *([] if row.iid_episodes is None else [counted(row.iid_episodes, "fresh scene")]),
         row.behaviour,
     ]
     return "; ".join(parts) + (f"; differs in {', '.join(row.differs)}" if row.differs else "")
 
 
 def _table(row: TrendRow) -> Table:
-    table = narrow_table("version", "headline", "new", "gone", "returned", "rate of failures, 95 %")
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    table.add_column("version", overflow="fold")
+    for name in ("head-\nline", "new", "gone", "re-\nturned"):
+        table.add_column(name, no_wrap=True, justify="right")
+    table.add_column("rate of failures, 95 %", overflow="fold")
     for before, point in zip((None, *row.points), row.points, strict=False):
         if before is not None and point.changed:
             changes = (f"{name} {before.software[name]} → {point.software[name]}" for name in point.changed)

@@ -18,7 +18,7 @@ from risk_sac.records import Real, Record, RequirementCounts, RunMetrics
 
 SOFTWARE = ("definitions", "risk-sac", "libsumo")
 """What results rest on beside the terms; a change of one of these ends a line."""
-OF_EGO = {"profile", "driver", "label"}  # the other fields of an ego are its settings
+OF_EGO = {"profile", "driver", "label", "version"}  # the other fields of an ego are its settings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +65,8 @@ class TrendPoint(Record):
 
     version: str
     """`ego.label`, else the registered version, else that of libsumo."""
+    registered: str | None
+    """Version of the registered ego and its defects, which ends in a hash of the source."""
     settings: tuple[str, ...]
     """Settings of the ego that differ from the defaults, such as `reaction_time_s 1`."""
     campaign_id: Annotated[str, Field(examples=["c27e3e7bd8296c1d3"])]
@@ -218,6 +220,7 @@ def _point(campaigns: Sequence[EndedCampaign]) -> TrendPoint:
     ego = newest.spec.ego
     return TrendPoint(
         version=ego.label or ego.version or f"libsumo {software['libsumo']}",
+        registered=ego.version,
         settings=tuple(_settings(ego)),
         campaign_id=newest.id,
         at=newest.at,
@@ -275,10 +278,10 @@ def _rates(run: EndedRun, phase: RunMetrics) -> Iterator[TrendRate]:
 
 
 def _settings(ego: EgoConfig) -> Iterator[str]:
-    """Says in which settings an ego differs from the defaults of its profile, its registered version among them."""
+    """Says in which settings an ego differs from the defaults of its profile."""
     usual = dict(_flat(EgoConfig(profile=ego.profile).model_dump(mode="json")))
-    told = OF_EGO | ({"response_time_s"} if ego.driver else set()) | (set() if ego.label else {"version"})
-    for name, value in _flat(ego.model_dump(mode="json", exclude=told)):
+    filled_in = {"response_time_s"} if ego.driver else set()
+    for name, value in _flat(ego.model_dump(mode="json", exclude=OF_EGO | filled_in)):
         if value != usual.get(name):
             yield f"{name} {', '.join(value) if isinstance(value, list) else value}"
 

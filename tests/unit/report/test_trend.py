@@ -115,7 +115,8 @@ def test_egos_have_rows_of_their_own_and_settings_tell_versions_apart():
         ("libsumo 1.28.0", ("reaction_time_s 1.0",)),
         ("libsumo 1.28.0", ()),
     ]
-    assert rows[1].points[0].settings == ("version 1.0+abc",)
+    (registered,) = rows[1].points
+    assert (registered.version, registered.registered, registered.settings) == ("1.4", "1.0+abc", ())
 
 
 def test_rates_are_of_freshly_drawn_scenes_that_were_played():

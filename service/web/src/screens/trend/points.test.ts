@@ -2,7 +2,7 @@ import { expect, it } from "vitest";
 import { changeOf, drawnIn, kindsOf, nameOf, spots, type Point, type Row } from "./points";
 
 function point(version: string, told: Partial<Point> = {}): Point {
-  const rest = { settings: [], campaign_id: version, at: null, earlier: [], software: { definitions: "10" }, changed: [], headline: 0, headline_published: 0 };
+  const rest = { registered: null, settings: [], campaign_id: version, at: null, earlier: [], software: { definitions: "10" }, changed: [], headline: 0, headline_published: 0 };
   return { version, ...rest, kinds: [], new: null, gone: null, returned: null, requirements: {}, rates: [], ...told };
 }
 
