@@ -130,7 +130,7 @@ class Trend(Record):
     """Campaigns that did not end well, or that this version of the service refuses."""
 
 
-def ego_name(ego: EgoConfig) -> str:
+def driver_name(ego: EgoConfig) -> str:
     """Returns the name that an ego is listed by."""
     return ego.driver or ego.profile
 
@@ -145,7 +145,7 @@ def trend(campaigns: Sequence[EndedCampaign], left_out: Iterable[LeftOut] = ()) 
     rows: dict[tuple[str, str], list[EndedCampaign]] = {}
     order: dict[tuple[str, str], int] = {}
     for campaign in campaigns:
-        name = ego_name(campaign.spec.ego)
+        name = driver_name(campaign.spec.ego)
         order.setdefault((name, _version_key(campaign)), len(order))
         rows.setdefault((name, _terms(campaign.spec).model_dump_json()), []).append(campaign)
     found = [

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from risk_sac.errors import ConfigError
 from risk_sac.records import State
-from risk_sac.report.trend import EndedCampaign, EndedRun, LeftOut, Trend, check_scenarios, ego_name, trend
+from risk_sac.report.trend import EndedCampaign, EndedRun, LeftOut, Trend, check_scenarios, driver_name, trend
 from service.errors import OutdatedError
 from service.store.reading import Store
 from service.store.stored import StoredCampaign
@@ -31,8 +31,8 @@ def trend_of(store: Store, name: str, chosen: Sequence[str], project: str | None
         except OutdatedError as error:
             left_out.append(LeftOut(campaign_id=campaign.id, reason=str(error)))
             continue
-        if ego_name(read.spec.ego) != name:
-            raise ConfigError("campaign", f"{read.id}, of the ego {ego_name(read.spec.ego)!r}", f"one of {name!r}")
+        if driver_name(read.spec.ego) != name:
+            raise ConfigError("campaign", f"{read.id}, of the ego {driver_name(read.spec.ego)!r}", f"one of {name!r}")
         if campaign.state is State.SUCCEEDED:
             ended.append(read)
         else:

@@ -118,6 +118,7 @@ SCREENS: dict[str, tuple[str, Callable[[Page], None]]] = {
     "compare": ("compare?ids={campaign}", heading),
     "maps": ("maps", heading),
     "map": ("maps/{network}", places),
+    "trend": ("trend?ego=default", heading),
     "scenarios": ("scenarios", cards),
     "scenario": ("scenarios/motorway_traffic", drawing),
     "editor": ("scenarios/new?from=low", document),
