@@ -35,7 +35,7 @@ def ended_campaign(
     spec = CampaignSpec(families=("low",), methods=("archive",)).model_copy(update=changes)
     spec = CampaignSpec.model_validate(spec.model_dump() | {"ego": {**ego, "label": version}})
     told = {} if kinds is None else {"headline": len(kinds), "headline_kinds": tuple(kinds)}
-    searched = run_metrics(**told, requirements=requirements)
+    searched = run_metrics(300, **told, requirements=requirements)
     runs = [EndedRun(family="low", method="archive", iid=False, phases=(searched,), versions=versions)]
     if drawn is not None:
         runs.append(EndedRun(family="low", method="iid-random", iid=True, phases=(drawn,), versions=versions))

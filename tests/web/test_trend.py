@@ -91,7 +91,7 @@ def test_no_line_leads_over_a_change_of_the_definitions(page: Callable[..., Page
 
 
 def test_kinds_are_new_gone_and_returned(page: Callable[..., Page]) -> None:
-    rows = page().get_by_role("region", name="Headline kinds by version").locator("tbody tr")
+    rows = page().get_by_role("region", name="Kinds and versions").locator("tbody tr")
     expect(rows).to_have_count(3)
     changes = {
         row.locator("th").inner_text(): [cell.get_attribute("data-change") for cell in row.locator("td").all()]

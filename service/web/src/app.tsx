@@ -8,6 +8,7 @@ import { placeOf, usePlace, type Place } from "./router";
 import { CampaignScreen } from "./screens/campaign/screen";
 import { CampaignsScreen } from "./screens/campaigns/screen";
 import { CompareScreen } from "./screens/compare/screen";
+import { CoverageScreen } from "./screens/coverage/screen";
 import { FailuresScreen } from "./screens/failures/screen";
 import { MapScreen } from "./screens/maps/map";
 import { MapsScreen } from "./screens/maps/screen";
@@ -46,6 +47,7 @@ export function App() {
           <Tab to="#/maps">Maps</Tab>
           <Tab to="#/compare">Compare</Tab>
           <Tab to="#/trend">Versions</Tab>
+          <Tab to="#/coverage">Coverage</Tab>
           <a href={absolute("docs")}>API</a>
         </nav>
         <span class="bar-end">
@@ -87,10 +89,12 @@ function screen({ parts, query }: Place): ComponentChildren {
   }
   if (room === "maps" && part === undefined) return id === undefined ? <MapsScreen /> : <MapScreen id={id} query={query} key={id} />;
   if (room === "trend") return <TrendScreen query={query} />;
+  if (room === "coverage") return <CoverageScreen query={query} />;
   if (room === "compare") return <CompareScreen query={query} />;
   if (room === "campaigns" && id !== undefined) {
     if (part === undefined) return <CampaignScreen id={id} key={id} />;
     if (part === "compare") return <CompareScreen query={new URLSearchParams({ ids: id })} />;
+    if (part === "coverage") return <CoverageScreen campaign={id} query={query} key={id} />;
     if (part === "failures" && failure === undefined) return <FailuresScreen campaign={id} query={query} key={id} />;
     if (part === "failures" && failure !== undefined) {
       if (twin === "twin") return <PairScreen campaign={id} failure={failure} twin={kind ?? "idle"} query={query} key={failure} />;

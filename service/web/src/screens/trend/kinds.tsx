@@ -9,7 +9,7 @@ export function KindsTable({ row }: { row: Row }) {
   return (
     <section class="card" aria-labelledby="kinds">
       <h2 id="kinds">Headline kinds by version</h2>
-      <div class="scroll" tabIndex={0} role="region" aria-label="Headline kinds by version">
+      <div class="scroll" tabIndex={0} role="region" aria-label="Kinds and versions">
         <table class="kinds-by-version">
           <thead>
             <tr>
