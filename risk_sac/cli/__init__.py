@@ -8,7 +8,21 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from risk_sac import __version__
-from risk_sac.cli import campaigns, egos, grid, lab, places, regress, replay, run, scenarios, show, trend, understand
+from risk_sac.cli import (
+    campaigns,
+    egos,
+    grid,
+    lab,
+    places,
+    regress,
+    replay,
+    report,
+    run,
+    scenarios,
+    show,
+    trend,
+    understand,
+)
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
 from risk_sac.cli.parser import Commands, Parser, add_command, as_typed, example_text, wrong_path
 from risk_sac.egos import registry
@@ -132,15 +146,8 @@ def _parser() -> argparse.ArgumentParser:
         replay.add_export,
         regress.add,
         grid.add,
-    )
-    for add in (
-        *first,
         trend.add,
-        regress.add_report,
-        lab.add_benchmark,
-        lab.add_pretrain,
-        add_service_commands,
-        campaigns.add,
-    ):
+    )
+    for add in (*first, report.add_report, lab.add_benchmark, lab.add_pretrain, add_service_commands, campaigns.add):
         add(commands)
     return parser

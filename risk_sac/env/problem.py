@@ -153,21 +153,13 @@ class Problem:
                 f"{list(odd.dynamic.actor_kinds or ())}",
                 f"{sorted(missing)} too, which every scene of the {family.name!r} family has",
             )
-        shipped = {each.name: each for each in requirements_from_odd(odd, ego.response_s)}
-        own = {}
-        for source, requirements in (("scenario.", family.requirements), ("", spec.requirements)):
-            for i, requirement in enumerate(requirements):
-                wanted = _own(f"{source}requirements[{i}]", requirement, shipped)
-                if wanted is not None:
-                    parsed(i, wanted, STEP_S, family.horizon_steps)
-                    own[wanted.name] = wanted
         judge = spec.judge if family.judge is None or spec.judge != JudgeConfig() else family.judge
         problem = cls(
             family=family,
             odd=odd,
             space=narrow(with_environment(family.space, spec.odd, odd), odd),
             ego=ego,
-            requirements=tuple((shipped | own).values()),
+            requirements=_requirements(spec, family, odd, ego),
             rss=_rss_parameters(odd),
             drivers=judge.drivers,
         )
@@ -226,6 +218,39 @@ class Problem:
         """The posted limit; all roads of a family have the same."""
         limit = self.odd.scenery.speed_limit_mps
         return float("inf") if limit is None else limit.high
+
+
+def requirements_of(spec: CampaignSpec) -> Mapping[str, tuple[Requirement, ...]]:
+    """Returns the requirements that each scenario of a campaign is monitored by.
+
+    A scenario that cannot be read any more is left out. An ego that is not registered here has the response time that
+    the spec states.
+    """
+    try:
+        ego = pinned(spec.ego)
+    except ConfigError:
+        ego = spec.ego
+    requirements: dict[str, tuple[Requirement, ...]] = {}
+    for name in spec.families:
+        try:
+            family = family_named(name)
+            requirements[name] = _requirements(spec, family, intersect(family.odd, spec.odd, family.space), ego)
+        except ConfigError:
+            continue
+    return requirements
+
+
+def _requirements(spec: RunSpec | CampaignSpec, family: Family, odd: Odd, ego: EgoConfig) -> tuple[Requirement, ...]:
+    """Joins the requirements of an ODD with a scenario's and a user's; raises `ConfigError` for one that is wrong."""
+    shipped = {each.name: each for each in requirements_from_odd(odd, ego.response_s)}
+    own = {}
+    for source, requirements in (("scenario.", family.requirements), ("", spec.requirements)):
+        for i, requirement in enumerate(requirements):
+            wanted = _own(f"{source}requirements[{i}]", requirement, shipped)
+            if wanted is not None:
+                parsed(i, wanted, STEP_S, family.horizon_steps)
+                own[wanted.name] = wanted
+    return tuple((shipped | own).values())
 
 
 def _own(field: str, requirement: Requirement, shipped: Mapping[str, Requirement]) -> Requirement | None:

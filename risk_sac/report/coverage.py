@@ -128,6 +128,7 @@ class Axis:
     parameter: Parameter
     names: tuple[str, ...]  # of the bins: a category, or a range in the parameter's unit
     edges: Floats  # inner ones, one fewer than bins
+    categorical: bool = False
 
     def places(self, values: Floats) -> NDArray[np.int64]:
         """The bin of each value, `n`."""
@@ -146,7 +147,7 @@ def axis_of(parameter: Parameter, whole: Parameter, bins: int) -> Axis:
         middle = (whole.low + whole.high) / 2  # belongs to the upper half
         left = parameter.low < middle, parameter.high >= middle
         names = tuple(name for name, allowed in zip(whole.categories, left, strict=True) if allowed)
-        return Axis(parameter, names, np.array([middle] if all(left) else []))
+        return Axis(parameter, names, np.array([middle] if all(left) else []), categorical=True)
     if parameter.high <= parameter.low:
         return Axis(parameter, (f"{parameter.low:g}",), np.array([]))
     edges = np.linspace(parameter.low, parameter.high, bins + 1)
@@ -154,10 +155,25 @@ def axis_of(parameter: Parameter, whole: Parameter, bins: int) -> Axis:
 
 
 def axes_of(family: Family, odd: Odd, bins: int) -> list[Axis]:
-    """Divide the range that the ODD leaves each scene parameter into bins."""
+    """Divide the range that the ODD leaves each scene parameter into bins; words and few rows are a bin each."""
     whole = intersect(family.odd, odd)
     every = with_environment(family.space, odd, whole)
-    return [axis_of(*both, bins) for both in zip(narrow(every, whole).parameters, every.parameters, strict=True)]
+    return [
+        _alternatives(family, allowed) or axis_of(allowed, own, bins)
+        for allowed, own in zip(narrow(every, whole).parameters, every.parameters, strict=True)
+    ]
+
+
+def _alternatives(family: Family, parameter: Parameter) -> Axis | None:
+    """Makes a bin of each word, or of each of a few rows; None of other parameters, and of those the ODD bounds."""
+    document = family.parameters.get(parameter.name)
+    if document is None or parameter.categories or not 0 < document.alternatives <= BINS:
+        return None
+    count = document.alternatives
+    names = document.words or [
+        ", ".join(f"{name} {value}" for name, value in row.items()) for row in document.rows or ()
+    ]
+    return Axis(parameter, tuple(names), np.arange(1, count) / count, categorical=True)
 
 
 def coverage(family: Family, odd: Odd, records: Sequence[EpisodeRecord]) -> Coverage:
@@ -190,7 +206,7 @@ def _parameter(axis: Axis, places: NDArray[np.int64], played: Bools, failed: Boo
     parameter = axis.parameter
     return ParameterCoverage(
         **{name: getattr(parameter, name) for name in ("name", "unit", "meaning", "low", "high")},
-        categorical=bool(parameter.categories),
+        categorical=axis.categorical,
         bins=tuple(
             Bin(name=name, played=played, failed=failed, refused=refused)
             for name, played, failed, refused in zip(axis.names, *counts, strict=True)

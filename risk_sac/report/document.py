@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from risk_sac.config import IID_METHODS, CampaignSpec, FamilyName, Interval
+from risk_sac.config import IID_METHODS, CampaignSpec, FamilyName
 from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.errors import ConfigError, DamagedError, RiskSacError
 from risk_sac.failures.cases import Regression
@@ -17,7 +17,9 @@ from risk_sac.records import Collision, EpisodeRecord, Power, Violation
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.report.rendering import Layout, render
+from risk_sac.report.reported_cases import allowed
 from risk_sac.report.runs import FinishedRun
+from risk_sac.report.signing import manifest
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, RecordedFailure, series_name
 from risk_sac.scenario.families import family_named
@@ -34,9 +36,12 @@ class Origin:
     """Places of the runs and commands to type, known to the caller only."""
 
     report: str  # the command that makes this report
-    data: str  # the command that gives bounds and coverage as JSON
+    data: str  # the command that writes all numbers of the report to report.json
     show: Callable[[FinishedRun, str], str]  # of a run and the id of one of its failures: the command that draws it
     regress: str  # the command that plays the failures against another ego
+    verify: str = ""  # the command that forms the digest of all inputs again
+    record: Callable[[FinishedRun, EpisodeRecord], str] | None = None  # the command that prints an episode's record
+    recount: Callable[[FinishedRun], str] | None = None  # of a run: the command that counts the outcomes on record
     folders: Mapping[str, Path] = field(default_factory=dict)  # by digest of the run's spec
     regression: Regression | None = None  # the campaign's failures against another ego, if played
 
@@ -60,7 +65,7 @@ class FailureGroup:
     run: FinishedRun
     record: EpisodeRecord
     violation: Collision | Violation | None  # of this kind
-    command: str  # draws the episode
+    command: str  # lines that draw the episode, and print its record
     drawing: Drawing
 
 
@@ -83,6 +88,7 @@ def report_page(
         kinds={name: _kinds(comparison, name, origin) for name in comparison.overviews},
         settings=campaign_yaml(comparison.spec),
         iid_methods=IID_METHODS,
+        manifest=manifest,
         words=words,
     )
 
@@ -107,15 +113,7 @@ def _families(spec: CampaignSpec) -> tuple[Mapping[FamilyName, Family], Mapping[
 def _odd(spec: CampaignSpec, families: Mapping[FamilyName, Family]) -> Mapping[str, list[str]]:
     """Returns what each family and the campaign allow together, by field of the ODD."""
     odds = [intersect(family.odd, spec.odd) for family in families.values()]
-    return {path: [_allowed(odd_field(odd, path)) for odd in odds] for path in (paths(odds[0]) if odds else ())}
-
-
-def _allowed(value: object) -> str:
-    if isinstance(value, Interval):
-        return f"{value.low:g}" if value.low == value.high else f"{value.low:g} to {value.high:g}"
-    if isinstance(value, tuple):
-        return ", ".join(map(str, value))
-    return "anything" if value is None else str(value)
+    return {path: [allowed(odd_field(odd, path)) for odd in odds] for path in (paths(odds[0]) if odds else ())}
 
 
 def _kinds(comparison: Comparison, family: FamilyName, origin: Origin) -> list[FailureGroup]:
@@ -130,9 +128,11 @@ def _kinds(comparison: Comparison, family: FamilyName, origin: Origin) -> list[F
     for cluster in comparison.overviews[family].clusters[:MOST_KINDS]:
         run, record = episodes[cluster.representative]
         violation = next((one for one in record.valid_violations if one.kind == cluster.name), None)
-        command = origin.show(run, cluster.representative)
+        commands = [origin.show(run, cluster.representative)]
+        if origin.record is not None:
+            commands.append(origin.record(run, record))
         drawing = _draw(run, origin.folders.get(run.spec.digest), record)
-        kinds.append(FailureGroup(cluster, run, record, violation, command, drawing))
+        kinds.append(FailureGroup(cluster, run, record, violation, "\n".join(commands), drawing))
     return kinds
 
 

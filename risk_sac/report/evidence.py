@@ -1,20 +1,40 @@
-"""Gathers a report's data: bounds of the i.i.d. phase, and coverage.
+"""Gathers a report's data: funnel, bounds of the i.i.d. phase, coverage, test cases and the digests of all inputs.
 
-Coverage of the search and of that phase are kept apart.
+Coverage of the search and of that phase are kept apart, but for the matrix, which says what was played at all.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 
-from risk_sac.config import FamilyName, IidName
+from risk_sac.config import FamilyName, IidName, Requirement
 from risk_sac.errors import ConfigError
+from risk_sac.failures.cases import Regression
+from risk_sac.failures.clusters import Overview
 from risk_sac.metrics import clopper_pearson, pooled_requirements, preventable, published
-from risk_sac.records import EpisodeRecord, Outcome, Record
-from risk_sac.report.comparison import Comparison
+from risk_sac.records import EpisodeRecord, Outcome, Power, Record, TriageState
+from risk_sac.records.assessment import CaseEstimate, ClauseRow, FigureNote, ReportedCase, SignedInputs
+from risk_sac.records.coverage import CoverageMatrix
+from risk_sac.report.comparison import Cell, Comparison
 from risk_sac.report.coverage import NOT_PLAYED, Coverage, coverage
+from risk_sac.report.matrix import coverage_matrix
+from risk_sac.report.power import played_by, power_of
+from risk_sac.report.reported_cases import CLAUSE_ROWS, CRASHED, FIGURES, TRAFFIC, reported_cases
 from risk_sac.report.runs import FinishedRun
+from risk_sac.report.signing import input_digests, signed
 from risk_sac.scenario.families import family_named
 
-CRASHED = "sim_crash"  # the reason of an episode that was left out because the simulator died in it
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CampaignFacts:
+    """Facts of a campaign that its finished runs do not tell."""
+
+    id: str = ""  # the first digits of the digest of its spec if empty
+    folders: tuple[Path, ...] = ()  # of its runs, to be digested
+    requirements: Mapping[FamilyName, tuple[Requirement, ...]] = field(default_factory=dict)  # by scenario
+    code: str = ""  # SHA-256 over the sources
+    regression: Regression | None = None
+    people: Mapping[TriageState, int] | None = None  # failures by what people made of them
 
 
 class Bound(Record):
@@ -94,17 +114,40 @@ class FamilyCoverage(Record):
 
 
 class CampaignEvidence(Record):
-    """Evidence of a campaign on its ego's failure rate, and its coverage."""
+    """Evidence of a campaign: every number of its report."""
 
     complete: bool
     """Whether all runs are in it."""
+    campaign: str
+    """Digest of its spec."""
+    headline: int | None
+    """Failures of all searches; what several found alike counts once. Null before one was replayed."""
+    headline_published: int | None
+    """Of these, those that R157, FSM or RSS prevents."""
+    cells: tuple[Cell, ...]
+    """The funnel by family, phase and method."""
+    kinds: Mapping[FamilyName, Overview]
+    """Kinds of failures that all methods found together."""
+    power: Power
+    """What finding nothing is worth."""
     bounds: tuple[Drawn, ...]
     """Of the i.i.d. phase alone; none without one, however much was searched."""
     coverage: Mapping[FamilyName, FamilyCoverage]
     """Of the families with a finished run."""
+    matrix: CoverageMatrix
+    cases: tuple[ReportedCase, ...]
+    """Test cases after ISO 34505, one for each scenario."""
+    clauses: tuple[ClauseRow, ...]
+    """Where standards ask for the fields of a test case."""
+    figures: tuple[FigureNote, ...]
+    """Which figures are estimates, and what they do not show."""
+    signed: SignedInputs
 
 
-def gathered(comparison: Comparison) -> CampaignEvidence:
+NO_FACTS = CampaignFacts()
+
+
+def gathered(comparison: Comparison, facts: CampaignFacts = NO_FACTS) -> CampaignEvidence:
     """Gather the evidence of the runs that have finished."""
     spec = comparison.spec
     coverage_by_family: dict[FamilyName, FamilyCoverage] = {}
@@ -115,10 +158,37 @@ def gathered(comparison: Comparison) -> CampaignEvidence:
                 search=coverage(family_named(family), spec.odd, searched),
                 iid=coverage(family_named(family), spec.odd, fresh) if fresh else None,
             )
+    bounds = tuple(map(drawn, comparison.drawn))
+    estimates = {name: tuple(_estimate(one) for one in bounds if one.family == name) for name in spec.families}
+    regression = facts.regression.model_dump_json() if facts.regression else ""
     return CampaignEvidence(
         complete=not comparison.missing and not comparison.undrawn,
-        bounds=tuple(map(drawn, comparison.drawn)),
+        campaign=spec.digest,
+        headline=comparison.headline,
+        headline_published=comparison.headline_published,
+        cells=comparison.cells,
+        kinds=comparison.overviews,
+        power=power_of(spec, played_by(comparison.runs)),
+        bounds=bounds,
         coverage=coverage_by_family,
+        matrix=coverage_matrix(comparison, facts.id),
+        cases=tuple(reported_cases(comparison, facts.requirements, estimates, facts.people)),
+        clauses=CLAUSE_ROWS,
+        figures=FIGURES,
+        signed=signed(input_digests(spec, facts.folders, code=facts.code, regression=regression)),
+    )
+
+
+def _estimate(bounds: Drawn) -> CaseEstimate:
+    failures = bounds.failures
+    return CaseEstimate(
+        figure=f"failures per scene with {TRAFFIC[bounds.method]}, {bounds.played} scenes played",
+        value=failures.count / bounds.played if bounds.played else 0.0,
+        low=failures.low,
+        high=failures.high,
+        level="95 %, one-sided each, Clopper and Pearson",
+        shows="the failure probability of scenes drawn as stated, in this simulator",
+        does_not_show="a rate on the road, or with other adversaries",
     )
 
 

@@ -13,10 +13,17 @@ from risk_sac.scenario.family import Family, usual_odd
 from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.layout import Layout
-from risk_sac.scenario.library import kept
+from risk_sac.scenario.library import DOCUMENT, kept
 from risk_sac.scenario.odd import SIGNAL_OF
 from risk_sac.scenario.scene import steps_of
-from risk_sac.scenario.shipped import PAPER_FAMILIES, nets_of, shipped_document, shipped_names
+from risk_sac.scenario.shipped import (
+    FOLDER,
+    PAPER_FAMILIES,
+    nets_of,
+    scenario_file,
+    shipped_document,
+    shipped_names,
+)
 
 SAMPLED = 64  # scenes whose layouts say which roads a scenario has
 
@@ -143,3 +150,19 @@ def family_named(name: str) -> Family:
 def _kept(name: str) -> Family:
     document, folder = kept(name)
     return family_of(document, nets_of(document, folder), name)
+
+
+def document_named(name: str) -> Scenario:
+    """Returns the document of a family, shipped or of the library; raises `ConfigError` if none has this name."""
+    return shipped_document(name) if name in shipped_names() else kept(name)[0]
+
+
+def sources_named(name: str) -> Mapping[str, bytes]:
+    """Reads the document of a family and its nets, by file name; raises what `document_named` does."""
+    if name in shipped_names():
+        document, folder, file = shipped_document(name), None, scenario_file(name)
+    else:
+        document, folder = kept(name)
+        file = folder / DOCUMENT
+    nets = [FOLDER / net for net in nets_of(document, folder).values()]
+    return {path.name: path.read_bytes() for path in (file, *nets)}

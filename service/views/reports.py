@@ -4,6 +4,7 @@ import hashlib
 import shlex
 import threading
 import zipfile
+from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from io import BytesIO
@@ -14,11 +15,14 @@ from pydantic import Field
 
 from risk_sac import __version__
 from risk_sac.config import FamilyName
+from risk_sac.env.problem import requirements_of
 from risk_sac.errors import ConfigError
 from risk_sac.failures import studied
+from risk_sac.failures.bundle import code_digest
 from risk_sac.failures.cases import Regression
 from risk_sac.failures.clusters import Overview
-from risk_sac.records import Record, State
+from risk_sac.records import Record, State, TriageState
+from risk_sac.records.coverage import CoverageMatrix
 from risk_sac.report import (
     Comparison,
     FinishedRun,
@@ -31,9 +35,9 @@ from risk_sac.report import (
     table_markdown,
 )
 from risk_sac.report.document import Origin, report_page
-from risk_sac.report.evidence import gathered
+from risk_sac.report.evidence import CampaignFacts, gathered
 from risk_sac.report.figures import FORMATS, Format
-from risk_sac.report.power import played_by, power_of
+from risk_sac.report.matrix import coverage_matrix
 from risk_sac.scenario.families import family_named
 from service.errors import NotFoundError
 from service.settings import ServiceSettings
@@ -69,13 +73,17 @@ class CampaignReport:
             return self._drawn[name, format_]
 
 
+MATRICES_KEPT = 64  # each of some 200 kB
+
+
 class Reports:
-    """Makes reports and caches the newest."""
+    """Makes reports, and caches the newest and the newest coverage matrices."""
 
     def __init__(self, settings: ServiceSettings) -> None:
         self._settings = settings
         self._lock = threading.Lock()
         self._newest: tuple[str, CampaignReport] | None = None
+        self._matrices: OrderedDict[str, CoverageMatrix] = OrderedDict()
 
     def edition(self, campaign: StoredCampaign) -> str:
         """A name that changes whenever the report would."""
@@ -95,6 +103,20 @@ class Reports:
                 self._newest = (name, report) if report.lasting else None
                 return report
             return self._newest[1]
+
+    def matrix(self, campaign: StoredCampaign) -> tuple[CoverageMatrix, bool]:
+        """Returns the coverage of a campaign's finished runs, and whether it may be kept."""
+        edition = self.edition(campaign)
+        if (made := self._matrices.get(edition)) is not None:
+            return made, True
+        report = self.report(campaign)
+        matrix = coverage_matrix(report.comparison, campaign.id)
+        if report.lasting:
+            with self._lock:
+                self._matrices[edition] = matrix
+                if len(self._matrices) > MATRICES_KEPT:
+                    self._matrices.popitem(last=False)
+        return matrix, report.lasting
 
     def _make(self, campaign: StoredCampaign) -> CampaignReport:
         finished_runs: list[FinishedRun] = []
@@ -204,10 +226,24 @@ def drawn(made: CampaignReport, format_: Format) -> bytes:
     return packed.getvalue()
 
 
-def evidence(made: CampaignReport, format_: str, base_url: str, regression: Regression | None) -> str:
-    """Returns bounds and coverage as JSON; as a page or Markdown with failures, limits and commands."""
+def evidence(
+    made: CampaignReport,
+    format_: str,
+    base_url: str,
+    regression: Regression | None,
+    people: Mapping[TriageState, int],
+) -> str:
+    """Returns all numbers of the report as JSON; as a page or Markdown with pictures, limits and commands."""
     comparison = _with_commands(made, base_url)
-    campaign_evidence = gathered(comparison)
+    facts = CampaignFacts(
+        id=made.campaign_id,
+        folders=tuple(made.folders.values()),
+        requirements=requirements_of(comparison.spec),
+        code=code_digest(),
+        regression=regression,
+        people=people,
+    )
+    campaign_evidence = gathered(comparison, facts)
     if format_ == "json":
         return campaign_evidence.model_dump_json()
     here = f"{base_url}v1/campaigns/{made.campaign_id}"
@@ -216,15 +252,20 @@ def evidence(made: CampaignReport, format_: str, base_url: str, regression: Regr
         return shlex.join(["curl", "-s", f"{here}/failures/{failure}/picture.png", "-o", "failure.png"])
 
     posted = f'{{"campaign_id": "{made.campaign_id}", "ego": {{"profile": "careful"}}}}'
+    data = shlex.join(["curl", "-s", f"{here}/report?format=json", "-o", "report.json"])
     origin = Origin(
         report=shlex.join(["curl", "-s", f"{here}/report?format={format_}", "-o", f"report.{format_}"]),
-        data=shlex.join(["curl", "-s", f"{here}/report?format=json"]),
+        data=data,
         show=show,
         regress=shlex.join(["curl", f"{base_url}v1/regressions", "-H", "content-type: application/json", "-d", posted]),
+        record=lambda run, record: (
+            shlex.join(["curl", "-s", f"{here}/failures/{record.id_in(run.spec.id)}"]) + " | jq 'del(.series)'"
+        ),
+        verify=f"{data} && jq -r .signed.digest report.json",
         folders=made.folders,
         regression=regression,
     )
-    power = power_of(comparison.spec, played_by(comparison.runs))
+    power = campaign_evidence.power
     return report_page(comparison, campaign_evidence, origin, power, "html" if format_ == "html" else "markdown")
 
 

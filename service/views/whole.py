@@ -22,7 +22,7 @@ from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.helper import ANSWER, QUESTION
 from risk_sac.execution.messages import without_folders
 from risk_sac.failures.cases import Regression
-from risk_sac.records import Outcome, wire
+from risk_sac.records import Outcome, TriageState, wire
 from risk_sac.report.figures import Format
 from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, PriorContent, is_kept
 from service.errors import NotFoundError, StorageError
@@ -42,7 +42,9 @@ LARGE = 4000  # episodes; reading more in the server would hold up other request
 MEMORY_BYTES, WALL_S = 4 << 30, 1800.0  # of a helper; 100,000 episodes take 2.4 GiB and, where many fail, minutes
 VIEWS_KEPT = 4  # of some megabytes each
 REFUSED, LOST, PASSING, TOO_LARGE = 3, 4, 5, 6  # exit statuses
-ViewName = Literal["curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "prior"]
+ViewName = Literal[
+    "curves", "scenes", "failure_table", "table", "clusters", "figures", "drawn", "report", "coverage", "prior"
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,6 +63,8 @@ class CampaignView:
     outcomes: tuple[Outcome, ...] = ()
     prior: str = ""
     regression: Regression | None = None
+    people: tuple[tuple[TriageState, int], ...] = ()
+    """Failures by what people made of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +99,9 @@ def content_of(view: CampaignView, sources: Sources) -> Content:
         return Content(wire(curves(campaign, store.records(campaign.number), view.points)))
     if view.name == "scenes":
         return Content(wire(scene_effects(campaign, store.records(campaign.number))))
+    if view.name == "coverage":
+        matrix, lasting = sources.reports.matrix(campaign)
+        return Content(wire(matrix), lasting)
     made = sources.reports.report(campaign)
     return Content(_OF_REPORT[view.name](made, view), made.lasting)
 
@@ -105,7 +112,9 @@ _OF_REPORT: Mapping[str, Callable[[CampaignReport, CampaignView], bytes]] = {
     "clusters": lambda made, view: reports.clusters(made).encode(),
     "figures": lambda made, view: reports.figures(made, view.address).encode(),
     "drawn": lambda made, view: reports.drawn(made, cast(Format, view.format)),
-    "report": lambda made, view: reports.evidence(made, view.format, view.address, view.regression).encode(),
+    "report": lambda made, view: reports.evidence(
+        made, view.format, view.address, view.regression, dict(view.people)
+    ).encode(),
 }
 
 

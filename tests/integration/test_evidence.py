@@ -7,6 +7,7 @@ import signal
 import pytest
 
 from risk_sac import cli
+from risk_sac.records.coverage import CellState, CoverageMatrix
 from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.run_folder.results import read_results
 
@@ -92,6 +93,26 @@ def test_the_page_may_run_and_load_nothing_and_a_client_that_has_it_is_told_so(s
     assert service.client.get(path, params={"format": "pdf"}).status_code == 422
 
 
+def test_coverage_names_the_campaigns_behind_each_cell(service, campaign):
+    own = CoverageMatrix.model_validate(service.get(campaign["id"], "/coverage"))
+    assert [(one.id, one.label, one.complete) for one in own.campaigns] == [(campaign["id"], LABEL, True)]
+    played = {cell.campaigns for group in own.groups for row in group.rows for cell in row.cells if cell.played}
+    assert played == {(campaign["id"],)}
+    of_label = service.client.get("/v1/coverage", params={"label": LABEL, "ego": "default"})
+    assert of_label.status_code == 200
+    assert CoverageMatrix.model_validate(of_label.json()) == own
+    nothing = CoverageMatrix.model_validate(service.client.get("/v1/coverage", params={"ego": "x"}).json())
+    assert (nothing.campaigns, nothing.cells[CellState.PLAYED]) == ((), 0)
+    assert service.client.get("/v1/coverage", params={"limit": 0}).status_code == 422
+
+
+def test_the_report_has_a_test_case_and_who_judged_it(service, campaign):
+    case = CampaignEvidence.model_validate(service.get(campaign["id"], "/report")).cases[0]
+    assert (case.scenario, case.result.episodes, case.judged_by.people) == ("mixed", 40, {})
+    assert {run.id for run in case.recording} == set(RUNS)
+    assert [requirement.name for requirement in case.pass_criteria][:2] == ["no_contact", "on_carriageway"]
+
+
 def test_a_regression_of_the_campaign_is_told_in_it_and_no_other(service, campaign):
     path = f"/v1/campaigns/{campaign['id']}/report"
     for unknown in ("x", f"{campaign['id']}-{'0' * 16}", f"c0123-{'0' * 16}"):
@@ -112,9 +133,12 @@ def test_the_command_line_says_the_same_of_the_same_folders(service, campaign, f
     for suffix in (".json", ".html", ".md"):
         assert cli.main(["report", *folders, "--out", str(out.with_suffix(suffix))]) == 0
     told = json.loads(out.with_suffix(".json").read_text())
-    assert CampaignEvidence.model_validate(told) == CampaignEvidence.model_validate(
-        service.get(campaign["id"], "/report")
-    )
+    here, there = (CampaignEvidence.model_validate(found) for found in (told, service.get(campaign["id"], "/report")))
+    for name in ("complete", "headline", "bounds", "coverage", "cells", "kinds", "power", "clauses", "figures"):
+        assert getattr(here, name) == getattr(there, name)
+    digests = [{one.name: one.sha256 for one in evidence.signed.inputs} for evidence in (here, there)]
+    assert {name for name in digests[0] if digests[0][name] != digests[1].get(name)} == {"campaign"}  # has no label
+    assert cli.main(["report", "verify", str(out.with_suffix(".html")), *folders]) == 0
     page = out.with_suffix(".html").read_text()
     assert "data:image/svg+xml;base64," in page
     assert f"risk-sac show {folders[0]} " in page

@@ -1,5 +1,6 @@
-"""/v1/campaigns/{id}/table, figures, clusters and spec: the report of `risk-sac evaluate`."""
+"""/v1/campaigns/{id}/table, figures, clusters, coverage and spec: the report of `risk-sac evaluate`."""
 
+from collections import Counter
 from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
@@ -10,6 +11,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.failures.cases import Regression
 from risk_sac.records import State
+from risk_sac.records.coverage import CoverageMatrix
 from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
@@ -82,6 +84,12 @@ async def get_clusters(request: Request, service: Service, campaign: AskedCampai
     return await reported(request, service, campaign, "clusters", "clusters")
 
 
+@router.get("/coverage", response_model=CoverageMatrix, responses=FIGURES | UNCHANGED | CROWDED)
+async def get_coverage(request: Request, service: Service, campaign: AskedCampaign) -> Response:
+    """What the finished runs have covered: ODD, functional scenarios, requirements, parameters and bodies."""
+    return await reported(request, service, campaign, "coverage", "coverage")
+
+
 @router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED | CROWDED)
 async def list_figures(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """Figures of the finished runs: search, results, λ and α."""
@@ -141,20 +149,24 @@ async def get_report(
         str | None, Query(max_length=200, description="Id of a regression of this campaign, to be told of in it.")
     ] = None,
 ) -> Response:
-    """Bounds and coverage as JSON; with funnel, failures, pictures, limits and commands as one page or as Markdown.
+    """Evidence of a campaign: test cases, funnel, bounds, coverage and the digests of all inputs, as JSON.
 
+    As one page or as Markdown it has pictures, limits and a command for each number, too.
     Search results are no crash rate: bounds come from the i.i.d. phase alone, and there are none without one.
     """
     played = None if regression is None else await run_in_threadpool(_played, service, campaign, regression)
+    triages = await run_in_threadpool(service.store.triages, campaign.number)
+    people = tuple(sorted(Counter(triages.values()).items()))
     answer = await reported(
         request,
         service,
         campaign,
         "report",
-        *("report", format_, *([played.id] if played else [])),
+        *("report", format_, *([played.id] if played else []), *(f"{state}{count}" for state, count in people)),
         format=format_,
         address=str(request.base_url),
         regression=Regression(ego=played.ego, cases=played.cases) if played else None,
+        people=people,
     )
     if format_ == "html":
         answer.headers["Content-Security-Policy"] = f"{POLICY}; frame-ancestors 'none'"

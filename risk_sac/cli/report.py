@@ -1,0 +1,176 @@
+"""`risk-sac report` and `risk-sac coverage`: the report of runs, whether its inputs changed, and what is covered."""
+
+import argparse
+import json
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from rich.table import Column, Table
+
+from risk_sac.cli.console import FAILED, OK, counted, write_out
+from risk_sac.cli.parser import Commands, add_command
+from risk_sac.cli.regress import read_baseline
+from risk_sac.config.base import read_text
+from risk_sac.errors import ConfigError
+from risk_sac.host.terminal import complain, console
+from risk_sac.records.coverage import CellState
+
+if TYPE_CHECKING:
+    from risk_sac.report.evidence import CampaignFacts
+    from risk_sac.report.files import Inputs
+    from risk_sac.report.runs import FinishedRun
+
+Format = Literal["html", "md", "json"]
+OUT = "report.html, report.md, or its data as report.json"
+REPORT_FORMATS: dict[str, Format] = {".html": "html", ".md": "md", ".json": "json"}
+SCHEMA = ".schema.json"
+VERIFY = "verify"
+NAMED_CHANGES = 3
+
+
+def add_report(commands: Commands) -> None:
+    """Adds the command."""
+    parser = add_command(
+        commands,
+        "report",
+        _report,
+        "write one file on what runs found, with test cases, bounds, coverage and limits",
+        more="`report verify FILE RUNS` forms the digest of a report's inputs again and names what changed; without "
+        "RUNS they lie beside the file.",
+        example="report runs/compared --out report.html",
+    )
+    parser.add_argument(
+        "runs", type=Path, nargs="+", metavar="RUNS", help="folder of `risk-sac evaluate`, or folders of runs"
+    )
+    regression = "failures against another ego, by `risk-sac regress --out`"
+    output = parser.group("output")
+    output.add_argument("--regression", type=Path, metavar="FILE.json", help=regression)
+    schema = f"; the data's JSON schema if the name ends in {SCHEMA}"
+    output.add_argument("--out", type=Path, metavar="FILE", help=OUT + schema)
+    coverage = add_command(
+        commands,
+        "coverage",
+        _coverage,
+        "count what one campaign, or several together, have covered",
+        more="A cell is a value of the ODD, a functional scenario, a requirement, a rule, a bin of a parameter or a "
+        "body; --out has the campaigns behind each.",
+        example="coverage runs/before runs/after --out coverage.json",
+    )
+    coverage.add_argument("campaigns", type=Path, nargs="+", metavar="FOLDER", help="folder of `risk-sac evaluate`")
+    coverage.group("output").add_argument("--out", type=Path, metavar="FILE.json", help="write the whole matrix there")
+
+
+def _report(options: argparse.Namespace) -> int:
+    # Here, because loading numpy takes a while.
+    from risk_sac.report.document import Origin, report_page, show_command
+    from risk_sac.report.evidence import CampaignEvidence, gathered
+    from risk_sac.report.files import read_folders
+
+    if options.runs[0].name == VERIFY and options.out is None:  # paths are absolute
+        return _verify(options.runs[1:], options.regression)
+    if options.out is None:
+        raise ConfigError("--out", "nothing", OUT)
+    if options.out.name.endswith(SCHEMA):
+        schema = json.dumps(CampaignEvidence.model_json_schema(mode="serialization"), indent=2)
+        write_out(options.out, f"{schema}\n".encode(), "Schema")
+        return OK
+    format_ = format_of(options.out)
+    inputs = read_folders(options.runs)
+    facts = _facts(inputs, options.runs, options.regression)
+    evidence = gathered(inputs.comparison, facts)
+    if format_ == "json":
+        content = evidence.model_dump_json(indent=2) + "\n"
+    else:
+        runs = list(map(str, options.runs))
+
+        def episodes(run: "FinishedRun") -> str:
+            return shlex.quote(str(inputs.folders[run.spec.digest] / "episodes.jsonl"))
+
+        origin = Origin(
+            report=options.typed,
+            data=shlex.join(["risk-sac", "report", *runs, "--out", "report.json"]),
+            show=lambda run, failure: show_command(inputs.folders[run.spec.digest], failure),
+            regress=_regress_command(inputs),
+            verify=shlex.join(["risk-sac", "report", VERIFY, str(options.out), *runs]),
+            recount=lambda run: f"jq -r .outcome {episodes(run)} | sort | uniq -c",
+            record=lambda run, record: f"jq 'select(.index == {record.index})' {episodes(run)}",
+            folders=inputs.folders,
+            regression=facts.regression,
+        )
+        layout: Literal["html", "markdown"] = "html" if format_ == "html" else "markdown"
+        content = report_page(inputs.comparison, evidence, origin, evidence.power, layout)
+    write_out(options.out, content.encode(), "Report")
+    return OK
+
+
+def _coverage(options: argparse.Namespace) -> int:
+    from risk_sac.report.files import read_folders
+    from risk_sac.report.matrix import coverage_matrix, merged
+
+    matrix = merged([coverage_matrix(read_folders([campaign]).comparison) for campaign in options.campaigns])
+    if options.out is not None:
+        write_out(options.out, matrix.model_dump_json(indent=2).encode() + b"\n", "Coverage")
+        return OK
+    table = Table("coverage", *(Column(state, justify="right") for state in CellState))
+    for group in matrix.groups:
+        states = [cell.state for row in group.rows for cell in row.cells]
+        table.add_row(group.title, *(str(states.count(state)) for state in CellState))
+    console.print(table)
+    return OK
+
+
+def format_of(file: Path) -> Format:
+    """Returns the format of a report by the name of its file."""
+    if file.suffix not in REPORT_FORMATS:
+        raise ConfigError("--out", f"{file.name!r}", f"a name that ends in {', '.join(REPORT_FORMATS)}")
+    return REPORT_FORMATS[file.suffix]
+
+
+def _facts(inputs: "Inputs", runs: Sequence[Path], regression: Path | None) -> "CampaignFacts":
+    from risk_sac.env.problem import requirements_of
+    from risk_sac.failures.bundle import code_digest
+    from risk_sac.report.evidence import CampaignFacts
+    from risk_sac.report.files import run_folders
+
+    return CampaignFacts(
+        folders=run_folders(runs),
+        requirements=requirements_of(inputs.comparison.spec),
+        code=code_digest(),
+        regression=read_baseline(regression, "--regression") if regression else None,
+    )
+
+
+def _verify(words: Sequence[Path], regression: Path | None) -> int:
+    """Compares the inputs of a report with those that lie there now."""
+    from risk_sac.failures.bundle import code_digest
+    from risk_sac.report.files import SPEC, campaign_in, run_folders
+    from risk_sac.report.signing import changes, input_digests, inputs_in, signed
+
+    file = next(iter(words), None)
+    if file is None:
+        raise ConfigError("REPORT", "nothing", "the file of a report, or its folder")
+    if file.is_dir():
+        file = next((path for suffix in REPORT_FORMATS if (path := file / f"report{suffix}").is_file()), file)
+    runs = list(words[1:]) or [file.parent]
+    if len(words) == 1 and not (file.parent / SPEC).is_file():
+        raise ConfigError("RUNS", f"no runs beside {file}", "the folders that the report was made from, after it")
+    report = inputs_in(read_text(file, "REPORT"))
+    campaign, _ = campaign_in(runs)
+    played = read_baseline(regression, "--regression").model_dump_json() if regression else ""
+    now = signed(input_digests(campaign, run_folders(runs), code=code_digest(), regression=played))
+    if changed := changes(report, now):
+        more = f", and {len(changed) - NAMED_CHANGES} more" if len(changed) > NAMED_CHANGES else ""
+        complain(f"{file}: not as it was made: {', '.join(changed[:NAMED_CHANGES])}{more}")
+        return FAILED
+    console.print(
+        f"{file}: digest {report.digest} of {counted(len(report.inputs), 'input')}, all as they were", soft_wrap=True
+    )
+    return OK
+
+
+def _regress_command(inputs: "Inputs") -> str:
+    """Returns the command that plays the failures of all finished searches."""
+    runs = [str(inputs.folders[run.spec.digest]) for run in inputs.comparison.runs]
+    return shlex.join(["risk-sac", "regress", "--failures", *runs, "--ego", "EGO", "--out", "cases.json"])

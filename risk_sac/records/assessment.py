@@ -1,0 +1,156 @@
+"""Test cases of a campaign as an assessor reads them, and the inputs that its report was made from."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from risk_sac.config import FamilyName, Requirement, RunMethod
+from risk_sac.records.base import Record
+from risk_sac.records.episode import Phase, TriageState
+
+
+class CaseInput(Record):
+    """A parameter of a scenario, as episodes draw it."""
+
+    name: str
+    unit: str
+    meaning: str
+    low: float
+    high: float
+    words: tuple[str, ...]
+    """Alternatives that parts of the range stand for; empty for a number."""
+    distribution: str
+    """In words: that of the document, or uniform."""
+    declared: bool
+    """Whether the document declares the distribution; if not, uniform is an assumption."""
+
+
+class CaseRun(Record):
+    """A run that played a test case, and where it is recorded."""
+
+    id: str
+    method: RunMethod
+    seed: int
+    phases: tuple[Phase, ...]
+    episodes: int
+    """Refused scenes included."""
+    cpu_s: float
+    digest: str
+    """SHA-256 of the results: the same whenever the run is repeated."""
+    spec_digest: str
+    replayed: int | None
+    """Failures that were replayed; null where none was yet."""
+    verified: int | None
+    """Of these, the same to the bit each time."""
+
+
+class CaseResult(Record):
+    """What happened in the searches of a test case; counts, no rates."""
+
+    verdict: Literal["failed", "no_failure_found", "not_played"]
+    episodes: int
+    refused: int
+    """Infeasible scenes."""
+    unended: int
+    """Episodes in which the ego failed to drive, or the simulator died."""
+    played: int
+    """All others."""
+    contacts: int
+    failures: int
+    """Episodes with a valid violation of a requirement that counts."""
+    kinds: int
+    """Of failures, over all runs."""
+    preventable: int
+    """Of these kinds, those that a reference driver prevents."""
+    published: int
+    """Of these kinds, those that R157, FSM or RSS prevents."""
+    headline: int | None
+    """Kinds that are preventable, plausible, not minor and verified; null before a replay."""
+    violated: Mapping[str, int]
+    """Requirement → episodes; of one that counts only those that are valid."""
+
+
+class CaseEstimate(Record):
+    """A number that stands for more than was played."""
+
+    figure: str
+    value: float
+    low: float
+    high: float
+    level: str
+    """Of the bounds."""
+    shows: str
+    does_not_show: str
+
+
+class CaseJudges(Record):
+    """Who judged a test case."""
+
+    definitions: tuple[int, ...]
+    """Versions of the written definitions of a failure that were applied."""
+    drivers: tuple[str, ...]
+    """Reference drivers, each of which makes a failure preventable."""
+    people: Mapping[TriageState, int] | None
+    """Failures of the whole campaign by what people made of them. Null: not known, as folders of runs do not tell."""
+
+
+class ReportedCase(Record):
+    """A scenario of a campaign as a test case."""
+
+    identifier: str
+    """Scenario and the first digits of the campaign's digest."""
+    scenario: FamilyName
+    summary: str
+    sources: Mapping[str, str]
+    """File of the document or a net → SHA-256."""
+    tags: tuple[str, ...]
+    functional_scenarios: tuple[str, ...]
+    objective: str
+    preconditions: tuple[str, ...]
+    odd: Mapping[str, str]
+    """Field → what scenario and campaign allow together."""
+    inputs: tuple[CaseInput, ...]
+    constraints: tuple[str, ...]
+    """That every scene keeps."""
+    steps: tuple[str, ...]
+    platform: Mapping[str, str]
+    """Software → version of the runs."""
+    pass_criteria: tuple[Requirement, ...]
+    """The case fails with a valid violation of one that counts as a failure; others are reported."""
+    result: CaseResult
+    estimates: tuple[CaseEstimate, ...]
+    recording: tuple[CaseRun, ...]
+    judged_by: CaseJudges
+
+
+class FigureNote(Record):
+    """What a kind of figure is, and what it does not show."""
+
+    figure: str
+    kind: Literal["count", "estimate", "model", "measurement"]
+    rests_on: str
+    does_not_show: str
+
+
+class ClauseRow(Record):
+    """Where a standard asks for a field."""
+
+    field: str
+    standard: str
+    clause: str
+    """Number and title; `by title` where the standard's public scope alone names the field; or not confirmed."""
+
+
+class InputDigest(Record):
+    """An input of a report."""
+
+    name: str
+    """Run and file, file of a scenario, or `campaign`, `code`, `benchmark`, `regression`."""
+    sha256: str
+
+
+class SignedInputs(Record):
+    """All inputs of a report."""
+
+    digest: str
+    """SHA-256 over the lines `sha256  name` in the order of the names."""
+    inputs: tuple[InputDigest, ...]
