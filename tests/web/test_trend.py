@@ -37,7 +37,7 @@ CAMPAIGNS = (
     version("1.5", [CUT_IN], 4),
     version("2.0-rc1", [CUT_IN, WALKER], 6, versions=NEWER),
     version("2.0", [], 1, versions=NEWER),
-    version("2.0", [LEADER], 2, versions=NEWER, methods=("random",)),
+    version("2.1", [LEADER], 2, versions=NEWER, methods=("random",)),
 )
 
 
