@@ -22,6 +22,7 @@ from risk_sac.cli import (
     run,
     scenarios,
     show,
+    trend,
     understand,
 )
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
@@ -149,6 +150,7 @@ def _parser() -> argparse.ArgumentParser:
         grid.add,
         rate.add,
         boundary.add,
+        trend.add,
     )
     for add in (*first, report.add_report, lab.add_benchmark, lab.add_pretrain, add_service_commands, campaigns.add):
         add(commands)

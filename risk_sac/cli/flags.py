@@ -66,6 +66,8 @@ def add_scene_flags(parser: Parser) -> None:
     """Adds the flags that name the ego and how its adversaries behave."""
     scene = parser.group("scene")
     scene.add_argument("--ego", metavar="EGO", help=f"vehicle under test: {EGO} (default: default)")
+    label = "your version of --ego, which `risk-sac trend` compares with others"
+    scene.add_argument("--ego-label", metavar="VERSION", help=label)
     behaviours = "|".join(get_args(Behaviour))
     scene.add_argument("--behaviour", metavar=behaviours, help="limits of the adversaries (default: ordinary)")
 
@@ -80,6 +82,10 @@ def named_ego(text: str) -> EgoConfig:
 def scene_flags(options: argparse.Namespace) -> dict[str, Any]:
     """Returns the ego and the behaviour that flags name; None where one is missing."""
     ego = None if options.ego is None else named_ego(options.ego).model_dump(mode="json")
+    if options.ego_label is not None:
+        if ego is None:
+            raise ConfigError("--ego-label", "it without --ego", "both")
+        ego |= {"label": options.ego_label}
     return {"ego": ego, "behaviour": options.behaviour}
 
 

@@ -45,6 +45,8 @@ class EgoConfig(Settings):
     version: Annotated[str | None, Field(min_length=1, max_length=100)] = None
     """Of the registered ego and its defects. It is filled in where a campaign is posted; a run refuses to go on with
     another one."""
+    label: Annotated[str | None, Field(min_length=1, max_length=100, pattern=r"^\S+( \S+)*$")] = None
+    """Version of the ego as its maker calls it, such as `1.4`; `GET /v1/egos/{name}/trend` compares versions."""
     response_time_s: Annotated[float | None, Field(ge=0.0, le=5.0)] = None
     """Time within which the ego responds, s; its time-to-collision requirement follows from it. By default what a
     registered ego declares, or `reaction_time_s`."""

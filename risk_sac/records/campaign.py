@@ -129,6 +129,8 @@ class EgoDriver(Record):
     car_following: str
     driver: str | None = None
     """Name of a registered ego; null: SUMO's models drive, as `profile` and `car_following` say."""
+    label: str | None = None
+    """Its version as its maker calls it."""
     defects: tuple[str, ...] = ()
     """Defects that are planted into it."""
 

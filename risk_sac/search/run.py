@@ -23,6 +23,7 @@ from risk_sac.run_folder.results import EPISODES, FAILURES, records_from_lines, 
 from risk_sac.run_folder.series import write_series
 from risk_sac.search.playing import Played, Proposal
 from risk_sac.search.searchers import Searchers
+from risk_sac.verdicts.judge import DEFINITIONS
 from risk_sac.world.jit import cpu_s
 
 logger = logging.getLogger(__name__)
@@ -209,7 +210,7 @@ class RunState:
             evaluation=self._evaluation.metrics() if self.spec.budget.evaluation_episodes else None,
             digest=results_digest(self.records),
             finished=self.finished,
-            versions={name: version(name) for name in PACKAGES},
+            versions={name: version(name) for name in PACKAGES} | {"definitions": str(DEFINITIONS)},
             device=self.searchers.agent.device,
             wall_s=wall_s,
             cpu_s=cpu_s,

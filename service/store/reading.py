@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 from pydantic_core import from_json
-from sqlalchemy import func, or_, select
+from sqlalchemy import and_, func, or_, select
 from sqlalchemy.orm import Session, selectinload
 
 from risk_sac.records import FINAL, Episode, EpisodeRecord, Outcome, State, StateChange, Triage, TriageState
@@ -29,6 +29,7 @@ from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, RunRow, Tria
 
 DAY_HOURS = 24
 BATCH = 1000  # rows in memory at once
+DRIVERS = ("driver", "profile")  # fields of an ego that name it
 
 
 class Known(NamedTuple):
@@ -131,6 +132,18 @@ class Store:
             rows = list(session.scalars(query.limit(limit + 1)))
             last = rows[limit - 1].number if len(rows) > limit else None
             return StoredPage(items=tuple(self._campaign(row) for row in rows[:limit]), last=last)
+
+    def campaigns_of_ego(self, name: str, project: str | None, limit: int) -> list[StoredCampaign]:
+        """Returns the newest campaigns of a registered ego or, without a driver, of a profile; oldest first."""
+        # JSON as it is stored has no spaces, and a quotation mark inside a text has a backslash before it.
+        driver, profile = (CampaignRow.spec.contains(f'"{key}":"{name}"', autoescape=True) for key in DRIVERS)
+        of_sumo = and_(profile, CampaignRow.spec.contains('"driver":null'))
+        query = select(CampaignRow).options(selectinload(CampaignRow.runs)).where(or_(driver, of_sumo))
+        if project is not None:
+            query = query.filter_by(project=project)
+        with self._reading() as session:
+            rows = session.scalars(query.order_by(CampaignRow.number.desc()).limit(limit))
+            return [self._campaign(row) for row in rows][::-1]
 
     def revision(self, campaign_id: str, project: str | None = None) -> str:
         """Returns the revision of a campaign, which changes with its runs and episodes."""

@@ -54,6 +54,10 @@ def places(page: Page) -> None:
     page.get_by_text("Where no pattern fits").click()
 
 
+def covered(page: Page) -> None:
+    page.locator(".chip.cell-failed").first.click()
+
+
 def cards(page: Page) -> None:
     page.locator(".scenario-cards img").first.wait_for()
 
@@ -118,6 +122,8 @@ SCREENS: dict[str, tuple[str, Callable[[Page], None]]] = {
     "compare": ("compare?ids={campaign}", heading),
     "maps": ("maps", heading),
     "map": ("maps/{network}", places),
+    "coverage": ("campaigns/{campaign}/coverage", covered),
+    "trend": ("trend?ego=default", heading),
     "scenarios": ("scenarios", cards),
     "scenario": ("scenarios/motorway_traffic", drawing),
     "editor": ("scenarios/new?from=low", document),

@@ -1,10 +1,11 @@
 """Catalogues: families, methods, formats, egos."""
 
 from collections.abc import Mapping
-from typing import Literal, TypeVar, get_args
+from hashlib import blake2b
+from typing import Annotated, Literal, TypeVar, get_args
 
-from fastapi import APIRouter
-from pydantic import BaseModel
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, Field
 
 from risk_sac.config import (
     METHODS,
@@ -17,15 +18,21 @@ from risk_sac.config import (
     Odd,
     Requirement,
 )
+from risk_sac.config.ego import EgoName
 from risk_sac.egos.defects.catalogue import DEFECTS, DefectKind
 from risk_sac.egos.registry import cards
 from risk_sac.failures.export.formats import FORMATS, FormatName
-from risk_sac.records import Record
+from risk_sac.records import Record, wire
+from risk_sac.report.trend import Trend
 from risk_sac.risk.requirements import requirements_from_odd
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.behaviour import behaving
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import widest
+from service.api.answer_cache import kept
+from service.api.context import CurrentCaller, Service
+from service.api.pages import INVALID, STORAGE, TAGGED, UNKNOWN, entity_tag
+from service.views.trends import trend_of
 
 R = TypeVar("R", bound=BaseModel)
 
@@ -235,6 +242,24 @@ def list_egos() -> Egos:
     ]
     defects = [_told(DefectEntry, defect) for defect in DEFECTS.values()]
     return Egos(items=[*models, *(_told(EgoDrivers, card) for card in cards())], defects=defects)
+
+
+@router.get("/egos/{name}/trend", response_model=Trend, responses=TAGGED | STORAGE | INVALID | UNKNOWN)
+def get_trend(
+    name: EgoName,
+    request: Request,
+    service: Service,
+    caller: CurrentCaller,
+    campaign: Annotated[
+        list[Annotated[str, Field(max_length=100)]] | None,
+        Query(max_length=50, description="Only these campaigns, all of the same scenarios; none: all of the ego."),
+    ] = None,
+) -> Response:
+    """Versions of an ego: headline kinds, rates and requirements, on equal terms in each row."""
+    revision = service.store.revision_of_all()
+    body = wire(trend_of(service.store, name, campaign or (), caller.sees))
+    headers = {"Cache-Control": "no-cache", "ETag": entity_tag(blake2b(body, digest_size=8).hexdigest())}
+    return kept(request, body, headers, revision)
 
 
 @router.get("/methods")

@@ -8,6 +8,7 @@ import { placeOf, usePlace, type Place } from "./router";
 import { CampaignScreen } from "./screens/campaign/screen";
 import { CampaignsScreen } from "./screens/campaigns/screen";
 import { CompareScreen } from "./screens/compare/screen";
+import { CoverageScreen } from "./screens/coverage/screen";
 import { FailuresScreen } from "./screens/failures/screen";
 import { MapScreen } from "./screens/maps/map";
 import { MapsScreen } from "./screens/maps/screen";
@@ -17,6 +18,7 @@ import { ReplayScreen } from "./screens/replay/screen";
 import { EditorScreen } from "./screens/scenarios/editor";
 import { ScenarioScreen } from "./screens/scenarios/one";
 import { ScenariosScreen } from "./screens/scenarios/screen";
+import { TrendScreen } from "./screens/trend/screen";
 import { useSignal } from "./signal";
 import { Login } from "./ui/login";
 import { Empty } from "./ui/states";
@@ -44,6 +46,8 @@ export function App() {
           <Tab to="#/scenarios">Scenarios</Tab>
           <Tab to="#/maps">Maps</Tab>
           <Tab to="#/compare">Compare</Tab>
+          <Tab to="#/trend">Versions</Tab>
+          <Tab to="#/coverage">Coverage</Tab>
           <a href={absolute("docs")}>API</a>
         </nav>
         <span class="bar-end">
@@ -84,10 +88,13 @@ function screen({ parts, query }: Place): ComponentChildren {
     return id === "new" ? <EditorScreen query={query} /> : <ScenarioScreen name={id} key={id} />;
   }
   if (room === "maps" && part === undefined) return id === undefined ? <MapsScreen /> : <MapScreen id={id} query={query} key={id} />;
+  if (room === "trend") return <TrendScreen query={query} />;
+  if (room === "coverage") return <CoverageScreen query={query} />;
   if (room === "compare") return <CompareScreen query={query} />;
   if (room === "campaigns" && id !== undefined) {
     if (part === undefined) return <CampaignScreen id={id} key={id} />;
     if (part === "compare") return <CompareScreen query={new URLSearchParams({ ids: id })} />;
+    if (part === "coverage") return <CoverageScreen campaign={id} query={query} key={id} />;
     if (part === "failures" && failure === undefined) return <FailuresScreen campaign={id} query={query} key={id} />;
     if (part === "failures" && failure !== undefined) {
       if (twin === "twin") return <PairScreen campaign={id} failure={failure} twin={kind ?? "idle"} query={query} key={failure} />;

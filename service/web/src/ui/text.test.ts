@@ -24,9 +24,9 @@ it.each<[number | null, number, string]>([
   expect(headlineWords({ headline, headline_waiting })).toBe(wanted);
 });
 
-it.each<[string | null, string[], string]>([
-  [null, [], "default, Krauss"],
-  ["idm-aeb", ["latency", "blind-right"], "idm-aeb + latency + blind-right"],
-])("ego of driver %j with defects %j", (driver, defects, wanted) => {
-  expect(egoWords({ profile: "default", car_following: "Krauss", driver, defects })).toBe(wanted);
+it.each<[string | null, string | null, string[], string]>([
+  [null, null, [], "default, Krauss"],
+  ["idm-aeb", "1.4", ["latency", "blind-right"], "idm-aeb 1.4 + latency + blind-right"],
+])("ego of driver %j, version %j, with defects %j", (driver, label, defects, wanted) => {
+  expect(egoWords({ profile: "default", car_following: "Krauss", driver, label, defects })).toBe(wanted);
 });

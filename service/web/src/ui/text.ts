@@ -43,9 +43,10 @@ export function seconds(value: number | null | undefined): string {
   return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
-/** What drives the ego: a registered driver, or a profile of SUMO's with its model; and its defects. */
-export function egoWords({ profile, car_following, driver, defects }: Body<"EgoDriver">): string {
-  return [driver ?? `${profile}, ${car_following}`, ...(defects ?? [])].join(" + ");
+/** What drives the ego: a registered driver, or a profile of SUMO's with its model; its version, and its defects. */
+export function egoWords({ profile, car_following, driver, label, defects }: Body<"EgoDriver">): string {
+  const name = driver ?? `${profile}, ${car_following}`;
+  return [label ? `${name} ${label}` : name, ...(defects ?? [])].join(" + ");
 }
 
 /** `red_light` -> `red light`. */

@@ -87,6 +87,9 @@ function Actions({ campaign, again }: { campaign: Campaign; again: () => void })
       <a class="button" href={address(["campaigns", campaign.id, "compare"])}>
         Compare methods
       </a>
+      <a class="button" href={address(["campaigns", campaign.id, "coverage"])}>
+        Coverage
+      </a>
       <a class="button" href={absolute(report)} target="_blank" rel="noopener" onClick={keyed}>
         Report
       </a>

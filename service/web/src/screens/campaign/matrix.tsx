@@ -14,6 +14,18 @@ interface Asked {
 export function Matrix({ family, rows, columns }: Asked) {
   const cells = cellsOf(family, rows, columns);
   if (cells === null) return <p class="faint">Choose two different parameters.</p>;
+  return <CellTable of={[rows, columns]} bins={[binsOf(family, rows), binsOf(family, columns)]} cells={cells} />;
+}
+
+interface Table {
+  /** The two parameters. */
+  of: [rows: string, columns: string];
+  bins: [rows: readonly string[], columns: readonly string[]];
+  cells: Cell[][];
+}
+
+/** How often each cell of two parameters was played, and failed. */
+export function CellTable({ of: [rows, columns], bins, cells }: Table) {
   const every = cells.flat();
   const [played, failed] = [every.filter((cell) => cell.played), every.filter((cell) => cell.failed)];
   return (
@@ -29,7 +41,7 @@ export function Matrix({ family, rows, columns }: Asked) {
               <th class="corner">
                 {axis(rows)} ↓ · {axis(columns)} →
               </th>
-              {binsOf(family, columns).map((bin) => (
+              {bins[1].map((bin) => (
                 <th key={bin} scope="col">
                   {bin}
                 </th>
@@ -37,7 +49,7 @@ export function Matrix({ family, rows, columns }: Asked) {
             </tr>
           </thead>
           <tbody>
-            {binsOf(family, rows).map((bin, i) => (
+            {bins[0].map((bin, i) => (
               <tr key={bin}>
                 <th scope="row">{bin}</th>
                 {cells[i]!.map((cell, j) => (

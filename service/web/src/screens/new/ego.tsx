@@ -13,7 +13,7 @@ type Egos = Body<"Egos">;
 type Defect = Egos["defects"][number];
 
 const OTHER = "other";
-const APART: readonly string[] = ["profile", "driver", "defects"];
+const APART: readonly string[] = ["profile", "driver", "label", "defects"];
 const OTHERS = "An ego of yours has a name here once the service registers it: an entry point module:Class, or the address of a remote one.";
 
 interface Props {
@@ -35,6 +35,7 @@ export function Ego({ field, sent }: Props) {
         {(egos) => (
           <>
             <Driver egos={egos} />
+            <Fields shape={{ kind: "object", about: "", fields: fields.filter(({ name }) => name === "label") }} path={["ego"]} />
             <Defects field={fields.find(({ name }) => name === "defects")!} egos={egos} />
           </>
         )}
