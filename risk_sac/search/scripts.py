@@ -142,7 +142,7 @@ def alongside(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
     and `steer`, towards the ego, are those of the strike, `after` is the drive that follows.
 
     Before a static body on the ego's way it leaves that way instead, so that the ego meets the body: to the right for a
-    `steer` below 0.4, to the left above 0.6. `aside` is how far, and `drive` how fast, up to 5 m/s from the ego's speed,
+    `steer` below 0.4, to the left above 0.6. `aside` is how far. `drive` is how fast, up to 5 m/s from the ego's speed,
     whatever its driver would do about the body. A neighbour stays beside.
     """
     if since_cue_s < 0.0:
