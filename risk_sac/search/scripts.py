@@ -40,6 +40,7 @@ GENTLE_ANSWER = 0.15  # the same of a leader that hides a standing body and is t
 LEAST_EFFORT = 0.4  # of an actor that is on time
 EARLIER_S, SOONEST_S = 2.0, 0.5  # than the ego, at most; and from now
 TURNING = 0.5  # of what is possible, at most
+STAYING = 0.2  # signed steering gene up to which a leader stays before a standing body
 
 
 class Genes(NamedTuple):
@@ -140,18 +141,18 @@ def alongside(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
     `place` is where along the ego it waits and `aside` how far from the ego's axis; a leader keeps its lane. `drive`
     and `steer`, towards the ego, are those of the strike, `after` is the drive that follows.
 
-    Before a static body on the ego's way it leaves that way instead, so that the ego meets the body: `steer` is how
-    hard, to the right below 0.5, `aside` how far, and `drive` how fast, up to 5 m/s from the ego's speed, whatever its
-    driver would do about the body. A neighbour stays beside.
+    Before a static body on the ego's way it leaves that way instead, so that the ego meets the body: to the right for a
+    `steer` below 0.4, to the left above 0.6. `aside` is how far. `drive` is how fast, up to 5 m/s from the ego's speed,
+    whatever its driver would do about the body. A neighbour stays beside.
     """
     if since_cue_s < 0.0:
         return _taking_place(genes, seen)
     if math.isinf(seen.standing_m) or since_cue_s >= LONGEST_S * genes.lasts:
         return _strike(genes, since_cue_s, genes.steer * _clip(-seen.y_m))
-    wanted = _signed(genes.steer)
-    side = wanted if abs(seen.y_m) < IN_LANE_M else seen.y_m
-    steer = abs(wanted) * _clip(math.copysign(_aside_m(genes), side) - seen.y_m)
-    return Act(_keeping_speed(seen, FASTER_MPS * _signed(genes.drive)), steer)
+    wanted, leads = _signed(genes.steer), abs(seen.y_m) < IN_LANE_M
+    stays = leads and abs(wanted) < STAYING
+    aside_m = 0.0 if stays else math.copysign(_aside_m(genes), wanted if leads else seen.y_m)
+    return Act(_keeping_speed(seen, FASTER_MPS * _signed(genes.drive)), _clip(aside_m - seen.y_m))
 
 
 def _keeping_speed(seen: Seen, faster_mps: float, answer: float = ANSWER) -> float:

@@ -8,6 +8,7 @@ import pytest
 
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.env.env import RiskSacEnv
+from risk_sac.env.observation_layout import X_M, Y_M
 from risk_sac.records import Collision
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.scripts import Genes
@@ -36,6 +37,16 @@ def played(env: RiskSacEnv, *, left: bool) -> tuple[list[Frame], Collision | Non
         observation, _, terminated, truncated, info = env.step(follower.act(observation))
         ended = terminated or truncated
     return env.trace.frames, info.get("collision")
+
+
+def test_the_observation_tells_where_the_standing_car_is(env: RiskSacEnv) -> None:
+    for seed in (1, 2):
+        observation, _ = env.reset(seed=seed)
+        frame = env.trace.frames[-1]
+        standing, heading = frame.ids.index("standing"), frame.heading_rad[0]
+        dx, dy = frame.x_m[standing] - frame.x_m[0], frame.y_m[standing] - frame.y_m[0]
+        ahead_m, aside_m = dx * np.cos(heading) + dy * np.sin(heading), dy * np.cos(heading) - dx * np.sin(heading)
+        assert observation[-3:-1] * (X_M, Y_M) == pytest.approx((ahead_m, aside_m), abs=1e-3)
 
 
 @pytest.mark.parametrize("left", [False, True])

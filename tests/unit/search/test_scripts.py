@@ -63,10 +63,12 @@ def test_a_leader_leaves_late_before_a_standing_body_to_the_side_that_its_genes_
     script = MIDDLE._replace(steer=0.5 + 0.4 * side, aside=1.0, cue=0.5, drive=0.6)
     assert cue(script, hides, pedestrian=False)  # 2.3 s from it
     assert not cue(script, hides._replace(standing_m=47.0), pedestrian=False)
-    assert act(script, hides, 0.0, pedestrian=False) == Act(pytest.approx(0.5), pytest.approx(0.8 * side))
+    assert act(script, hides, 0.0, pedestrian=False) == Act(pytest.approx(0.5), side)
     aside = hides._replace(y_m=3.1 * side)  # where it stays
     assert act(script, aside, 1.0, pedestrian=False).steer == pytest.approx(0.0)
     assert act(script, hides, 2.1, pedestrian=False).steer == 0.0  # the strike is over
+    stays = script._replace(steer=0.5 + 0.05 * side)
+    assert act(stays, hides, 0.0, pedestrian=False).steer == pytest.approx(-0.1 * side)
     ordinary = hides._replace(standing_m=math.inf)
     assert act(script, ordinary, 0.0, pedestrian=False).steer * side < 0.0  # a leader keeps its lane
 

@@ -87,6 +87,15 @@ def test_searches_of_low_get_the_mirror_and_others_do_not():
         assert (sampler.reflect is not None) == has_mirror
 
 
+def test_the_mirror_puts_static_bodies_on_the_other_side():
+    layout = replace(PolicyLayout.of(problem()), statics=2)
+    mirror = Mirror.of(layout)
+    assert mirror is not None
+    seen = np.zeros(layout.observation_size, np.float32)
+    seen[-5:] = 0.7, 0.2, 0.9, -0.1, 0.5  # two places ahead and aside, and the time left
+    np.testing.assert_array_equal(mirror.observation(seen)[-5:], np.float32([0.7, -0.2, 0.9, 0.1, 0.5]))
+
+
 def test_the_policy_acts_in_the_mirror_in_every_other_episode():
     layout = PolicyLayout.of(problem())
     mirror = Mirror.of(layout)
