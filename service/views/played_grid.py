@@ -39,9 +39,9 @@ def played_grid(
       ConfigError: its method plays no scenario as it is written.
     """
     run = run_of(campaign, run_id)
-    if not method_of(run.method).story:
-        raise ConfigError("run_id", f"{run_id!r}, of {run.method}", "a run of story-sweep, story-random or story-bo")
     spec = next(spec for spec in campaign.spec.runs() if spec.id == run_id)
+    if not method_of(spec.method).story:
+        raise ConfigError("run_id", f"{run_id!r}, of {spec.method}", "a run of story-sweep, story-random or story-bo")
     records = [episode.record for episode in episodes if episode.run_number == run.number]
     return PlayedGrid(spec=spec, standard=standard, points=played_points(spec, records, standard))
 
