@@ -19,6 +19,7 @@ from risk_sac.config import (
 from risk_sac.config.distribution import RankCorrelation
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.scenario.behaviour import preset
+from risk_sac.scenario.declared import Declared
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.space import SceneSpace
 
@@ -42,6 +43,11 @@ class Family:
     judge: JudgeConfig | None = None  # None: the campaign's
     parameters: Mapping[str, ScenarioParameter] = field(default_factory=dict)  # of the document
     rank_correlation: RankCorrelation | None = None  # between them
+
+    @property
+    def declared(self) -> Declared:
+        """The declared distribution of its scenes."""
+        return Declared.of(self.space, self.parameters, self.rank_correlation)
 
     @property
     def adversaries(self) -> tuple[str, ...]:
