@@ -131,7 +131,7 @@ def estimated_with(env: RiskSacEnv, seed: int) -> RateEstimate:
         encounter = play(env, point, episode_seed(seed, number))
         sampler.tell(point, None if encounter is None else 0.0, encounter or NO_ENCOUNTER)
     draws, stages = sampler.draws(), stages_of(declared, DRAWS, seed)
-    ratios, played = stages.ratios(draws), np.isfinite(draws.margins).all(axis=1)
+    ratios, played = stages.ratios(draws), np.asarray(np.isfinite(draws.margins).all(axis=1))
     return estimated(ratios * stages.trust(DRAWS), ratios, draws.failed, played)
 
 
