@@ -219,9 +219,13 @@ def _gravest(worst: Worst) -> tuple[bool, int, bool, bool]:
 
 SORTS: Mapping[str, Callable[[Worst], Any]] = {
     "severity": _gravest,
+    "weight": lambda worst: -worst.weight,
     "speed": lambda worst: -worst.ego_speed_mps,
 }
-SORTED_BY = "found (the order of the search), severity (plausible and worst first) or speed (the fastest ego first)"
+SORTED_BY = (
+    "found (the order of the search), severity (plausible and worst first), "
+    "weight (severity times plausibility) or speed (the fastest ego first)"
+)
 
 
 def add_filter_flags(parser: Parser) -> None:

@@ -210,6 +210,7 @@ class Problem:
     def declared(self) -> Declared:
         """The declared distribution of its scenes; see `Declared.of`."""
         return Declared.of(self.space, self.family.parameters, self.family.rank_correlation)
+
     def slice_of(self, spec: RunSpec) -> Slice:
         """The slice of the scene space in which a run seeks the ego's boundary."""
         if spec.boundary is None:

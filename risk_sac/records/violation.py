@@ -25,6 +25,13 @@ NO_CONTACT = "no_contact"  # the requirement that a contact violates
 # Reference drivers by a regulation or a publication, which react to the conflict. `defensive` is our own, and slows
 # before it, which the ego owes only where it could not see.
 PUBLISHED = ("r157", "fsm", "rss")
+# Choice: a class of severity weighs as much as a factor of ten in probability; no contact is as a moderate one.
+SEVERITY_WEIGHTS: Mapping[Severity | None, float] = {
+    Severity.MINOR: 0.01,
+    Severity.MODERATE: 0.1,
+    None: 0.1,
+    Severity.SEVERE: 1.0,
+}
 
 
 class Violated(Record, ABC):
@@ -85,6 +92,19 @@ class Violated(Record, ABC):
     def plausible(self) -> bool:
         """Whether it is valid and road users do what its adversaries did, though it may be rare."""
         return self.behaviour is not None and self.behaviour.plausible
+
+    @property
+    @abstractmethod
+    def severity(self) -> Severity | None:
+        """How severe the contact is; None without one, and where it is not valid."""
+
+    @property
+    def weight(self) -> float:
+        """Severity times plausibility, in [0, 1], by which failures are ranked; 0 where it is not valid.
+
+        The plausibility is the probability that road users do all that the adversaries did.
+        """
+        return 0.0 if self.behaviour is None else SEVERITY_WEIGHTS[self.severity] * self.behaviour.joint_probability
 
     @property
     def published_preventable(self) -> bool:
@@ -161,6 +181,11 @@ class Violation(Violated):
     def prevention(self) -> Mapping[str, bool]:
         """See `Violated.prevention`."""
         return self.drivers
+
+    @property
+    def severity(self) -> Severity | None:
+        """See `Violated.severity`."""
+        return None
 
     @property
     def event(self) -> str:

@@ -140,6 +140,12 @@ class Declared:
         copula = math.exp(0.5 * float(correlated @ correlated - normal @ normal)) / float(np.prod(np.diag(factor)))
         return margins * copula
 
+    def density_of(self, values: Mapping[str, float]) -> float:
+        """Density of a scene by its parameters' values, of which those beyond the bounds count as on them."""
+        widths = [max(axis.high - axis.low, 1e-12) for axis in self.axes]
+        pairs = zip(self.axes, widths, strict=True)
+        return self.density(np.clip([(values[axis.name] - axis.low) / width for axis, width in pairs], 0.0, 1.0))
+
     @cached_property
     def telling(self) -> np.typing.NDArray[np.bool_]:
         """Which axes tell their share, `d`."""

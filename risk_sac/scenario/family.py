@@ -19,6 +19,7 @@ from risk_sac.config import (
 from risk_sac.config.distribution import RankCorrelation
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.scenario.behaviour import preset
+from risk_sac.scenario.declared import Declared
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.space import SceneSpace
 
@@ -50,6 +51,11 @@ class Family:
         """The family without the scene parameters that disturb its story; its layouts have them at 0."""
         kept = tuple(parameter for parameter in self.space.parameters if parameter.name not in self.shifts)
         return replace(self, space=replace(self.space, parameters=kept), shifts=()) if self.shifts else self
+
+    @property
+    def declared(self) -> Declared:
+        """The declared distribution of its scenes."""
+        return Declared.of(self.space, self.parameters, self.rank_correlation)
 
     @property
     def adversaries(self) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from risk_sac.config.boundary import BoundaryConfig
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.errors import ConfigError, did_you_mean
+from risk_sac.scenario.declared import Declared
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.world.types import Floats
 
@@ -91,7 +92,6 @@ class Slice:
 
     def _drawn(self, name: str, share: float) -> float:
         """The value at a share of the parameter's distribution, within the space."""
-        parameter, document = self.space.parameters[self.space.names.index(name)], self.parameters.get(name)
-        if document is None:
-            return parameter.low + share * (parameter.high - parameter.low)
-        return min(max(document.drawn(share), parameter.low), parameter.high)
+        column = self.space.names.index(name)
+        axis = Declared.of(self.space, self.parameters, None).axes[column]
+        return axis.low + axis.unit(share) * (axis.high - axis.low)

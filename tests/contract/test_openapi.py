@@ -101,7 +101,19 @@ def test_wrong_method_is_a_problem_that_names_the_right_ones(base_url):
 
 @pytest.mark.parametrize(
     "part",
-    ["", "/results", "/episodes", "/failures", "/failure-table", "/curves", "/power", "/table", "/figures", "/spec"],
+    [
+        "",
+        "/results",
+        "/episodes",
+        "/failures",
+        "/failure-table",
+        "/curves",
+        "/power",
+        "/table",
+        "/rates",
+        "/figures",
+        "/spec",
+    ],
 )
 def test_answers_about_a_campaign_that_exists_are_as_documented(base_url, schema, part):
     campaign_id = httpx.post(f"{base_url}/v1/campaigns", json={"families": ["dense"]}).json()["id"]

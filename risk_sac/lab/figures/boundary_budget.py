@@ -32,7 +32,8 @@ from risk_sac.scenario import library
 from risk_sac.scenario.slice import Slice
 from risk_sac.search.level_set import FailureClassifier
 from risk_sac.search.loop import episode_seed
-from risk_sac.search.scene_optimizer import BoundarySampler, Encounter
+from risk_sac.search.encounter import Encounter
+from risk_sac.search.scene_optimizer import BoundarySampler
 from risk_sac.world.types import Bools, Scene
 
 SIDE, SEED = 20, 0  # of the grid

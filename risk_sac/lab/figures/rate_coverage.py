@@ -28,7 +28,8 @@ from risk_sac.rates.record import stages_of
 from risk_sac.rates.stages import Stages, draws_of
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.search.loop import episode_seed
-from risk_sac.search.scene_optimizer import NO_ENCOUNTER, Encounter, RateSampler
+from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
+from risk_sac.search.scene_optimizer import RateSampler
 from risk_sac.world.types import Floats
 
 DRAWS, PLAIN_DRAWS = 2000, 20_000  # of an estimate, and of the plain Monte Carlo that it is compared with
@@ -131,7 +132,7 @@ def estimated_with(env: RiskSacEnv, seed: int) -> RateEstimate:
         encounter = play(env, point, episode_seed(seed, number))
         sampler.tell(point, None if encounter is None else 0.0, encounter or NO_ENCOUNTER)
     draws, stages = sampler.draws(), stages_of(declared, DRAWS, seed)
-    ratios, played = stages.ratios(draws), np.isfinite(draws.margins).all(axis=1)
+    ratios, played = stages.ratios(draws), np.asarray(np.isfinite(draws.margins).all(axis=1))
     return estimated(ratios * stages.trust(DRAWS), ratios, draws.failed, played)
 
 

@@ -15,8 +15,8 @@ from torch.quasirandom import SobolEngine
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
 from risk_sac.records import DrivenBy
-from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.scenario.declared import Declared
+from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.world.types import Floats
 
 State = dict[str, Any]

@@ -9,7 +9,8 @@ from risk_sac.config import SceneOptimizerConfig
 from risk_sac.rates.record import stages_of
 from risk_sac.rates.stages import Draws, draws_of
 from risk_sac.scenario.declared import Declared
-from risk_sac.search.scene_optimizer.base import NO_ENCOUNTER, Encounter, SceneOptimizer, State
+from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
+from risk_sac.search.scene_optimizer.base import SceneOptimizer, State
 from risk_sac.world.types import Floats
 
 

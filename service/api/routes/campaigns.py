@@ -12,8 +12,8 @@ from risk_sac import __version__
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.env.problem import adjustments
 from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Power, Record, Results, State, wire
-from risk_sac.report.grid import PlayedGrid, Standard
 from risk_sac.records.boundary import BoundaryMap
+from risk_sac.report.grid import PlayedGrid, Standard
 from risk_sac.report.power import power_of
 from risk_sac.run_folder.results import BOUNDARY, BOUNDARY_PICTURE
 from risk_sac.search.prior.earlier import PriorContent
@@ -41,7 +41,7 @@ from service.api.pages import (
     problem,
 )
 from service.api.posted import ON_MAP, PostedCampaign, documented
-from service.errors import ConflictError
+from service.errors import ConflictError, NotFoundError
 from service.runs.manager import LOG
 from service.store.stored import StoredCampaign, StoredRun
 from service.views.curves import Curves, played, results

@@ -16,6 +16,7 @@ export function sample(size: number, changed: Partial<FailureTable> = {}): Failu
     requirement: column(() => "no_contact"),
     failed: column((i) => (i % 4 === 3 ? [] : ["no_contact"])),
     grade: column((i) => (i % 4 === 3 ? null : (["preventable", "full_braking", "unavoidable"] as const)[i % 3]!)),
+    weight: column(() => 0),
     plausibility: column((i) => (i % 4 === 3 ? null : "ordinary")),
     unlikely: column((i) => (i % 4 === 3 ? "" : "left brakes by 5.0 m/s²: 1 of 25 stops")),
     severity: column((i) => (["minor", "moderate", "severe"] as const)[i % 3]!),

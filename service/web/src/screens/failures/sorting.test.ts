@@ -41,6 +41,12 @@ test("by severity the severe come first, then the ego's fault, then the preventa
   expect(sorted(few, [0, 1, 2, 3], "severity", oftenOf(few))).toEqual([2, 3, 1, 0]);
 });
 
+test("a likely moderate failure comes before an unlikely severe one", () => {
+  const severity = (["severe", "moderate"] as const).slice();
+  const few = sample(2, { severity, plausibility: Array(2).fill("rare"), weight: [0.001, 0.05] });
+  expect(sorted(few, [0, 1], "severity", oftenOf(few))).toEqual([1, 0]);
+});
+
 test("implausible failures come last, however severe", () => {
   const plausibility = (["implausible", "rare", "ordinary"] as const).slice();
   const severity = (["severe", "severe", "moderate"] as const).slice();

@@ -7,7 +7,7 @@ export type Sort = keyof typeof SORTS;
 
 /** What people choose from; the first is meant where none is chosen. */
 export const SORTS = {
-  severity: "plausible, then severity",
+  severity: "severity × plausibility",
   grade: "preventable first",
   closing: "fastest closing",
   reaction: "least time to contact",
@@ -34,10 +34,11 @@ export function sorted(table: FailureTable, failures: readonly number[], sort: S
   const grade = (i: number) => GRADES.indexOf(table.grade[i]!);
   const severity = (i: number) => SEVERITIES.indexOf(table.severity[i]!);
   const implausible = (i: number) => Number(table.plausibility[i] === "implausible");
+  const weight = (i: number) => -table.weight[i]!;
   const fault = (i: number) => FAULTS.indexOf(table.fault[i]!);
   switch (sort) {
     case "severity":
-      return worst(implausible, severity, fault, grade);
+      return worst(implausible, weight, severity, fault, grade);
     case "grade":
       return worst(grade, implausible, severity, fault);
     case "closing":
