@@ -42,7 +42,7 @@ class _Latent(ApproximateGP):
 
     def __init__(self, points: Tensor) -> None:
         count, dimension = points.shape
-        distribution = NaturalVariationalDistribution(count)
+        distribution = NaturalVariationalDistribution(count, mean_init_std=0.0)  # else it begins with noise
         super().__init__(VariationalStrategy(self, points, distribution, learn_inducing_locations=False))
         lengths = LogNormalPrior(math.sqrt(2.0) + math.log(dimension) / 2 - 1.5, 1.0)
         self.mean_module = ConstantMean(constant_prior=NormalPrior(0.0, 1.0))
@@ -76,7 +76,7 @@ class FailureClassifier:
         bound = VariationalELBO(likelihood, self._latent, num_data=len(x))
         kernel = torch.optim.Adam(self._latent.hyperparameters(), lr=RATE)
         posterior = NGD(self._latent.variational_parameters(), num_data=len(x), lr=NATURAL_RATE)
-        with cholesky_jitter(double_value=JITTER):
+        with cholesky_jitter(double_value=JITTER), torch.random.fork_rng(devices=[]):
             for _ in range(STEPS):
                 kernel.zero_grad()
                 posterior.zero_grad()
