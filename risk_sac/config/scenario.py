@@ -318,7 +318,8 @@ class Scenario(Settings):
     name: ScenarioName
     summary: Annotated[str, Field(max_length=300)] = ""
     tags: Annotated[tuple[Annotated[str, Field(max_length=60)], ...], Field(max_length=30)] = ()
-    """Such as `iso34502:cut-in`, `ncap:CCRb`, or free words."""
+    """Such as `iso34502:cut-in`, `iso34502:merge/lane-change/deceleration` for road, ego and other, `ncap:CCRb`, or
+    free words."""
     network: Net
     """A shipped net's name, or a SUMO net beside the document."""
     horizon_s: Expression = 15.0
