@@ -152,7 +152,7 @@ function Versions({ row, chosen, choose }: { row: Row; chosen: string[]; choose:
                     </label>
                   </th>
                   <td>
-                    <a href={address(["campaigns", id])}>{moment(point.at)}</a>
+                    <a href={address(["campaigns", id])}>{point.at ? moment(point.at) : id}</a>
                     {point.earlier.length > 0 && <span class="faint small"> and {count(point.earlier.length)} before</span>}
                   </td>
                   <td class="number">{point.headline === null ? "–" : count(point.headline)}</td>
