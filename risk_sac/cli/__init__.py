@@ -9,6 +9,7 @@ from pathlib import Path
 
 from risk_sac import __version__
 from risk_sac.cli import (
+    boundary,
     campaigns,
     egos,
     grid,
@@ -147,6 +148,7 @@ def _parser() -> argparse.ArgumentParser:
         regress.add,
         grid.add,
         trend.add,
+        boundary.add,
     )
     for add in (*first, report.add_report, lab.add_benchmark, lab.add_pretrain, add_service_commands, campaigns.add):
         add(commands)

@@ -197,7 +197,7 @@ def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
 
 
 def _evaluate(options: argparse.Namespace) -> int:
-    methods = [name for name, method in METHODS.items() if not method.needs]
+    methods = [name for name, method in METHODS.items() if not method.needs and method.scenes != "boundary"]
     defaults = {"families": list(PAPER_FAMILIES), "methods": methods, "seeds": list(range(SEEDS))}
     options.families = families_on_map(options) or options.families
     spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | scene_flags(options), defaults)

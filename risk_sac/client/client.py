@@ -31,6 +31,7 @@ from risk_sac.records import (
     Results,
     Severity,
 )
+from risk_sac.records.boundary import BoundaryMap
 from risk_sac.records.scenario import ScenarioDetails, ScenarioList, ScenarioSummary
 from risk_sac.scenario.library import written
 
@@ -181,6 +182,10 @@ class Client:
     def results(self, campaign_id: str) -> Results:
         """Returns the results of a campaign so far."""
         return self._get(Results, f"{_path(campaign_id)}/results")
+
+    def boundary(self, campaign_id: str, run_id: str) -> BoundaryMap:
+        """Where the ego of a run of the method `boundary` goes from passing to failing."""
+        return self._get(BoundaryMap, f"{_path(campaign_id)}/runs/{_part(run_id)}/boundary")
 
     def power(self, campaign_id: str) -> Power:
         """Number of known defects that the budget of a campaign detects, by stored benchmark runs."""

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from risk_sac.config.base import Settings
+from risk_sac.config.boundary import BoundaryConfig
 from risk_sac.config.ego import EgoConfig
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import IID_METHODS, MethodName, RunMethod, method_of
@@ -109,6 +110,8 @@ class RunSpec(Settings):
     learner: LearnerConfig = LearnerConfig()
     judge: JudgeConfig = JudgeConfig()
     prior: PriorName = "shipped"
+    boundary: BoundaryConfig | None = None
+    """Of the method `boundary`; other methods have none."""
 
     @property
     def id(self) -> str:
@@ -155,6 +158,8 @@ class CampaignSpec(Settings):
     command line the folder of a run or campaign. They are copied, and the copy's name takes the place of this one."""
     iid: Iid | None = None
     """Null: none, and nothing is said of how often the ego fails."""
+    boundary: BoundaryConfig | None = None
+    """What the method `boundary` searches; null where it is not among the methods."""
 
     @model_validator(mode="after")
     def _within_reason(self) -> Self:
@@ -164,6 +169,14 @@ class CampaignSpec(Settings):
             more = f", and {drawn} of the i.i.d. phase" if drawn else ""
             got = f"{self.budget.total_episodes} episodes for each of {runs} runs{more}"
             raise ConfigError("budget", got, f"at most {MOST_EPISODES} in all")
+        return self
+
+    @model_validator(mode="after")
+    def _boundary_is_told(self) -> Self:
+        if "boundary" in self.methods and self.boundary is None:
+            raise ConfigError("boundary", "nothing", "`over`, the parameters that the method boundary searches")
+        if "boundary" not in self.methods and self.boundary is not None:
+            raise ConfigError("boundary", "it without the method boundary", remedy="add the method, or leave it out")
         return self
 
     @model_validator(mode="after")
@@ -189,7 +202,14 @@ class CampaignSpec(Settings):
     def searches(self) -> tuple[RunSpec, ...]:
         """Families × methods × seeds: seeds outermost, so that early results compare methods."""
         return tuple(
-            RunSpec(family=family, method=method, seed=seed, budget=self.budget, **self._shared())
+            RunSpec(
+                family=family,
+                method=method,
+                seed=seed,
+                budget=self.budget,
+                boundary=self.boundary if method == "boundary" else None,
+                **self._shared(),
+            )
             for seed in self.seeds
             for family in self.families
             for method in self.methods

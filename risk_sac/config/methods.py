@@ -24,6 +24,7 @@ MethodName = Literal[
     "story-sweep",
     "story-random",
     "story-bo",
+    "boundary",
 ]
 IidName = Literal["iid-undisturbed", "iid-random"]
 """How the runs of a campaign's i.i.d. phase are made, see `Iid`; a spec cannot name them."""
@@ -44,10 +45,10 @@ class Method(Settings):
     replay: Literal["uniform", "rper"] = "uniform"
     story: bool = False
     """Whether the scenario is played as it is written: others follow its story, and nothing deviates from it."""
-    scenes: Literal["botorch", "archive", "sobol", "iid", "grid"] = "sobol"
+    scenes: Literal["botorch", "archive", "sobol", "iid", "grid", "boundary"] = "sobol"
     """`grid`: each point of the grid of the parameters, or of a stratified sample of it; `archive`: bred from
     those that led to distinct failures, together with the scripts' genes; `iid`: drawn one independently of the other,
-    uniformly over the ODD."""
+    uniformly over the ODD; `boundary`: where an ego goes from passing to failing over a few parameters."""
     takes_turns: bool = False
     """Whether a learner's warm start goes on beside it: scripts and policy act in turn, by what they yield."""
     prior: Literal["none", "library", "policy", "all"] = "none"
@@ -142,6 +143,12 @@ METHODS: dict[MethodName, Method] = {
         story=True,
         scenes="botorch",
         summary="BoTorch searches the scenario's parameters; others follow its story, without an attack.",
+    ),
+    "boundary": Method(
+        agent="none",
+        story=True,
+        scenes="boundary",
+        summary="Seeks where the ego goes from passing to failing over two to four parameters, without an attack.",
     ),
 }
 

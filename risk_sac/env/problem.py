@@ -10,7 +10,7 @@ from risk_sac.config.campaign import check_demand
 from risk_sac.config.methods import MethodName, method_of
 from risk_sac.egos.registry import pinned
 from risk_sac.env.observation_layout import observation_size
-from risk_sac.errors import ConfigError, OddError
+from risk_sac.errors import ConfigError, OddError, did_you_mean
 from risk_sac.records import NO_CONTACT, Adjustment
 from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.rss_parameters import RssParameters
@@ -28,6 +28,7 @@ from risk_sac.scenario.odd import (
     text_of,
     widest,
 )
+from risk_sac.scenario.slice import Slice
 from risk_sac.scenario.space import SceneSpace
 from risk_sac.world.types import STEP_S
 
@@ -165,6 +166,7 @@ class Problem:
         )
         problem.check_demand(spec)
         problem.check_grid(spec)
+        problem.check_boundary(spec)
         return problem
 
     def check_demand(self, spec: RunSpec) -> None:
@@ -188,6 +190,30 @@ class Problem:
             got = f"true, for a grid of {size:,} points"
             wanted = f"at most {spec.budget.episodes:,}, the budget's episodes"
             raise ConfigError("budget.all_points", got, wanted, "leave it out, and a stratified sample is played")
+
+    def slice_of(self, spec: RunSpec) -> Slice:
+        """The slice of the scene space in which a run seeks the ego's boundary."""
+        if spec.boundary is None:
+            raise ConfigError("boundary", "nothing", "the parameters `over` which the method boundary searches")
+        return Slice(self.space, spec.boundary, self.family.parameters)
+
+    def check_boundary(self, spec: RunSpec) -> None:
+        """Refuses a boundary search over what has no boundary.
+
+        Raises:
+          ConfigError: it names a parameter or requirement that there is not, or a parameter without a range.
+        """
+        if method_of(spec.method).scenes != "boundary":
+            return
+        searched = self.slice_of(spec)
+        searched.check()
+        known, wanted = (
+            [each.name for each in self.requirements if each.counts == "failure"],
+            searched.config.requirement,
+        )
+        if wanted and wanted not in known:
+            hint = did_you_mean(wanted, known)
+            raise ConfigError("boundary.requirement", repr(wanted), f"one of {', '.join(known)}", hint)
 
     @property
     def grid(self) -> Grid:
@@ -312,6 +338,7 @@ def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
         for run in others:
             problem.check_demand(run)
             problem.check_grid(run)
+            problem.check_boundary(run)
     return spec
 
 

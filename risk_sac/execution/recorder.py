@@ -4,7 +4,7 @@ import logging
 from dataclasses import replace
 from pathlib import Path
 
-from risk_sac.config import RunSpec
+from risk_sac.config import RunSpec, method_of
 from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
@@ -76,6 +76,11 @@ class Recorder:
         )
         verified = read_verified(self._folder, summary.digest)  # by an earlier invocation
         self._write(with_headline(results, verified) if verified else results)
+        if summary.finished and method_of(results.spec.method).scenes == "boundary":
+            from risk_sac.report.boundary import write_boundary  # here, because other runs need neither
+            from risk_sac.search.boundary_map import read_boundary
+
+            write_boundary(self._folder, read_boundary(self._folder, {}))
         return self.results
 
     def _write(self, results: RunResults) -> None:

@@ -24,7 +24,7 @@ _SCRATCH = re.compile(r"risk-sac\.[0-9a-f]{16}\.scratch")
 # Files that `durable.replace_file` writes into folders of ours, before they get their names.
 _TEMPORARY = re.compile(
     r"\.(?:(?:results|verified|crashes|keys|table|places)\.(?:json|md|csv)|spec\.yaml|checkpoint|\d{6}\.npz"
-    r"|\d{6}-(?:core|region)\.json|[A-Za-z0-9]+-[0-9a-f]{16}\.json|places\.png)\.tmp|\.probe"
+    r"|\d{6}-(?:core|region)\.json|[A-Za-z0-9]+-[0-9a-f]{16}\.json|places\.png|boundary\.(?:json|png))\.tmp|\.probe"
 )
 
 

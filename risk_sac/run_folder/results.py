@@ -4,6 +4,7 @@ results.json    the spec, the metrics and every failure, sealed; rewritten at ea
 episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is formed over them
 failures/       the time series of every failure, see `risk_sac.run_folder.series`
 verified.json   which failures repeated, see `risk_sac.run_folder.results`; sealed
+boundary.json   the map of a run of the method `boundary`, once it has ended; boundary.png draws it
 studies/        cores and regions that were asked for, see `risk_sac.failures.studied`
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """
@@ -12,15 +13,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import REPEATS, Adjustment, DrivenBy, EpisodeId, EpisodeRecord, Repetition, RunMetrics
+from risk_sac.records.boundary import BoundaryMap
 from risk_sac.run_folder.durable import read_sealed, write_sealed
 from risk_sac.verdicts.distinct import variant_name
 
 RESULTS = "results.json"
 EPISODES = "episodes.jsonl"
 FAILURES = "failures"
+BOUNDARY, BOUNDARY_PICTURE = "boundary.json", "boundary.png"
 
 
 def series_name(index: int) -> str:
@@ -198,6 +203,14 @@ def first_of_variants(results: RunResults) -> list[EpisodeRecord]:
             episodes.append(episode)
         seen |= new
     return episodes
+
+
+def read_boundary_map(folder: Path) -> BoundaryMap | None:
+    """Reads the map of a run of the method `boundary`; None where there is none, or it is damaged."""
+    try:
+        return BoundaryMap.model_validate_json((folder / BOUNDARY).read_bytes())
+    except (FileNotFoundError, ValidationError):
+        return None
 
 
 def write_verified(folder: Path, verified: Verified) -> None:

@@ -184,6 +184,7 @@ def episode(run: RunState, env: GuardedEnv) -> EpisodeRecord:
         violations=run.env.violations(kept),
         margins={name: each.robustness for name, each in kept.items() if each.counts == "failure"},
         encounters_s=run.env.trace.encounters_s(run.problem.family.adversaries),
+        avoided_by=run.env.avoided_by() or {},
     )
     objective = run.searchers.tell(point, tally.shaped_return / tally.steps, encounter)  # Alg. 1, l. 21-22
     return _record(run, seed, scene, tally, driven_by, genes=genes, objective=objective, kept=kept, encounter=encounter)
@@ -247,7 +248,7 @@ def _record(
         start_danger=run.env.start_danger if begun else None,
         defect_reached_s=run.env.defect_reached_s if tally.steps else None,
         deviations=run.env.deviations if unplayable is None else {},
-        avoided_by=run.env.avoided_by() if unplayable is None else None,
+        avoided_by=encounter.avoided_by or None,
     )
 
 

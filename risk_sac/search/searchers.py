@@ -22,6 +22,7 @@ from risk_sac.search.scene_optimizer import (
     NO_ENCOUNTER,
     ArchiveOptimizer,
     BotorchOptimizer,
+    BoundarySampler,
     DiscountedBandit,
     Encounter,
     GridSampler,
@@ -38,7 +39,8 @@ CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
     "none": IdleAgent,
 }
 OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
-    each.kind: each for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler, GridSampler)
+    each.kind: each
+    for each in (BotorchOptimizer, ArchiveOptimizer, SobolOptimizer, IidSampler, GridSampler, BoundarySampler)
 }
 Actor = Learner | IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
 """A joint policy that drives all adversaries."""
@@ -211,6 +213,8 @@ class Searchers:
         made: SceneOptimizer
         if sampler is GridSampler:
             made = GridSampler(*arguments, self._problem.grid, self._spec.budget.episodes)
+        elif sampler is BoundarySampler:
+            made = BoundarySampler(*arguments, self._problem.slice_of(self._spec))
         elif self._start is None or not actor.genes:
             made = sampler(*arguments)
         else:

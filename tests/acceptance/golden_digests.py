@@ -75,7 +75,7 @@ def recorded(wanted: dict[str, str]) -> dict[str, str] | None:
 def record() -> None:
     """Replaces this machine's recording; if it changed, the others are of the code as it was and go."""
     here, digests = fingerprint(), {}
-    for name in (f"{family} {method}" for family in SEEDS for method in METHODS):
+    for name in (f"{family} {method}" for family in SEEDS for method in METHODS if method != "boundary"):
         with TemporaryDirectory() as folder:
             digests[name] = digest(*name.split(), Path(folder))
         print(name, digests[name])

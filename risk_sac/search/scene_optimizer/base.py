@@ -34,12 +34,14 @@ class Encounter:
       violations: of requirements that count, without contact.
       margins: least robustness of each requirement that counts, in scales.
       encounters_s: smallest time to encounter by adversary, s, while that is ahead and in sight and the ego moves.
+      avoided_by: reference driver → whether it avoids a contact; empty where nothing is played as it is written.
     """
 
     collision: Collision | None = None
     violations: tuple[Violation, ...] = ()
     margins: Mapping[str, float] = field(default_factory=dict)
     encounters_s: Mapping[str, float] = field(default_factory=dict)
+    avoided_by: Mapping[str, bool] = field(default_factory=dict)
 
     @property
     def valid_violations(self) -> tuple[Collision | Violation, ...]:

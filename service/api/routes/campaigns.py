@@ -12,7 +12,9 @@ from risk_sac import __version__
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.env.problem import adjustments
 from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Power, Record, Results, State, wire
+from risk_sac.records.boundary import BoundaryMap
 from risk_sac.report.power import power_of
+from risk_sac.run_folder.results import BOUNDARY, BOUNDARY_PICTURE
 from risk_sac.search.prior.earlier import PriorContent
 from service.api.answer_cache import kept
 from service.api.context import Caller, Context, CurrentCaller, Service
@@ -35,11 +37,12 @@ from service.api.pages import (
     cacheable,
     entity_tag,
     link,
+    problem,
 )
 from service.api.posted import ON_MAP, PostedCampaign, documented
-from service.errors import NotFoundError
+from service.errors import ConflictError, NotFoundError
 from service.runs.manager import LOG
-from service.store.stored import StoredCampaign
+from service.store.stored import StoredCampaign, StoredRun
 from service.views.curves import Curves, played, results
 from service.views.failure_table import FailureTable
 from service.views.progress import campaign_body, log_tail, retry_after_s, summary_body
@@ -61,6 +64,8 @@ IdempotencyKey = Annotated[
 ]
 Points = Annotated[int, Query(ge=1, le=1000, description="Of each curve, at most.")]
 
+NO_BOUNDARY = problem(409, "The run has not succeeded")
+BOUNDARY_PNG = TAGGED | {200: TAGGED[200] | {"content": {"image/png": {}}}}
 LOG_TEXT = TAGGED | {200: TAGGED[200] | {"content": {"text/plain": {"schema": {"type": "string"}}}}}
 
 router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID)
@@ -191,12 +196,57 @@ def get_log(
     lines: Annotated[int, Query(ge=1, le=1000, description="At most; fewer where they are long.")] = 200,
 ) -> Response:
     """Last lines that a run's workers printed, without the server's folders; empty before the first."""
-    campaign = service.store.campaign(campaign_id, caller.sees)
-    if run_id not in {run.id for run in campaign.runs}:
-        message = f"campaign {campaign_id} has no run {run_id!r}; GET it lists all runs"
-        raise NotFoundError(message, field="run_id", got=run_id)
-    text = log_tail(service.settings.run_folder(campaign_id, run_id) / LOG, lines).encode()
+    run = _run(campaign_id, run_id, service, caller)
+    text = log_tail(service.settings.run_folder(campaign_id, run.id) / LOG, lines).encode()
     return PlainTextResponse(text, headers=cacheable(request, _digest(text)))
+
+
+@router.get(
+    "/{campaign_id}/runs/{run_id}/boundary", response_model=BoundaryMap, responses=UNKNOWN | TAGGED | NO_BOUNDARY
+)
+def get_boundary(campaign_id: str, run_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
+    """Where the ego of a run of the method `boundary` goes from passing to failing."""
+    content = _boundary(_run(campaign_id, run_id, service, caller), BOUNDARY, service)
+    return Response(content, headers=cacheable(request, _digest(content)), media_type="application/json")
+
+
+@router.get(
+    "/{campaign_id}/runs/{run_id}/boundary.png",
+    response_class=Response,
+    responses=UNKNOWN | BOUNDARY_PNG | NO_BOUNDARY,
+)
+def get_boundary_picture(
+    campaign_id: str, run_id: str, request: Request, service: Service, caller: CurrentCaller
+) -> Response:
+    """The same as a picture over the first two parameters."""
+    content = _boundary(_run(campaign_id, run_id, service, caller), BOUNDARY_PICTURE, service)
+    return Response(content, headers=cacheable(request, _digest(content)), media_type="image/png")
+
+
+def _run(campaign_id: str, run_id: str, service: Context, caller: Caller) -> StoredRun:
+    """Returns a run of a campaign; NotFoundError if there is none of this id."""
+    campaign = service.store.campaign(campaign_id, caller.sees)
+    for run in campaign.runs:
+        if run.id == run_id:
+            return run
+    message = f"campaign {campaign_id} has no run {run_id!r}; GET it lists all runs"
+    raise NotFoundError(message, field="run_id", got=run_id)
+
+
+def _boundary(run: StoredRun, file: str, service: Context) -> bytes:
+    """Reads what the worker wrote at the run's end.
+
+    Raises:
+      NotFoundError: the run is of another method.
+      ConflictError: it has not succeeded, or its file is gone.
+    """
+    if run.method != "boundary":
+        message = f"run {run.id} is of the method {run.method}; wanted one of boundary"
+        raise NotFoundError(message, field="run_id", got=run.id)
+    try:
+        return (service.settings.run_folder(run.campaign_id, run.id) / file).read_bytes()
+    except FileNotFoundError as error:
+        raise ConflictError(f"run {run.id} is {run.state} and has no boundary", reason="not_ended") from error
 
 
 def _submit(

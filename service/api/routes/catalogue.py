@@ -55,6 +55,7 @@ EPISODE_COST: Mapping[str, float] = {
     "story-sweep": 0.7,
     "story-random": 0.7,
     "story-bo": 1.1,
+    "boundary": 3.0,
     "iid-random": 1.0,
     "iid-undisturbed": 0.7,
 }
@@ -255,7 +256,7 @@ def get_trend(
 ) -> Response:
     """Versions of an ego: headline kinds, rates and requirements, on equal terms in each row."""
     revision = service.store.revision_of_all()
-    body = wire(trend_of(service.store, name, campaign or (), caller.sees))
+    body = wire(trend_of(service.store, service.settings, name, campaign or (), caller.sees))
     headers = {"Cache-Control": "no-cache", "ETag": entity_tag(blake2b(body, digest_size=8).hexdigest())}
     return kept(request, body, headers, revision)
 

@@ -7,6 +7,7 @@ import { Empty, Failed, Loading } from "../../ui/states";
 import { RequirementTable } from "../../ui/requirements";
 import { count, number, waitingWords } from "../../ui/text";
 import { useTitle } from "../../ui/title";
+import { Boundaries } from "./boundaries";
 import { Charts } from "./charts";
 import { Funnel } from "./funnel";
 import { Header } from "./header";
@@ -81,6 +82,7 @@ export function CampaignScreen({ id }: { id: string }) {
         </section>
       )}
       {campaign.progress.episodes_done > 0 && <Scenes campaign={campaign} />}
+      <Boundaries campaign={campaign} />
       <Runs campaign={campaign} hidden={hidden} hide={hide} />
       <Worth campaign={campaign} />
     </div>

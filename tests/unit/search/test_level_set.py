@@ -1,0 +1,111 @@
+"""The classifier of passing and failing, and the search for its boundary, on boundaries that are known."""
+
+import numpy as np
+import pytest
+
+from risk_sac.config import SceneOptimizerConfig
+from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.scenario.slice import Slice
+from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.search.level_set import FailureClassifier, straddle
+from risk_sac.search.scene_optimizer import BoundarySampler, Encounter
+from risk_sac.search.scene_optimizer.base import sobol_points
+
+GRID = np.stack(np.meshgrid(*[np.linspace(0, 1, 20)] * 2, indexing="ij"), -1).reshape(-1, 2)
+
+
+def circle(points):
+    return np.hypot(points[:, 0] - 0.4, points[:, 1] - 0.55) < 0.3
+
+
+def plane(points):
+    return points @ np.array([1.0, 0.6]) < 0.7
+
+
+def slice_over(names, holds=None):
+    parameters = tuple(Parameter(name, "m", 0.0, 10.0, "") for name in ("a", "b", "c"))
+    return Slice(SceneSpace("x", parameters, holds), BoundaryConfig(over=names), {})
+
+
+def searched(fails, episodes, seed=0, slice_=None, refused=lambda point: False):
+    slice_ = slice_ or slice_over(("a", "b"))
+    sampler = BoundarySampler(3, SceneOptimizerConfig(), seed, slice_)
+    asked = []
+    for _ in range(episodes):
+        point = sampler.ask()
+        unit = point[list(slice_.columns)]
+        asked.append(unit)
+        failed = bool(fails(unit[None])[0])
+        margins = {"no_contact": -1.0 if failed else 1.0}
+        violated = Encounter(margins=margins, avoided_by={"r157": not failed}, violations=(object(),) if failed else ())
+        sampler.tell(point, None if refused(unit) else 0.0, violated)
+    return np.array(asked), sampler
+
+
+def balanced(guessed, truth):
+    return (guessed[truth].mean() + (~guessed[~truth]).mean()) / 2
+
+
+@pytest.mark.parametrize("fails", [circle, plane])
+def test_40_points_tell_a_grid_of_400(fails):
+    asked, _ = searched(fails, 40)
+    classifier = FailureClassifier(asked, fails(asked))
+    assert balanced(classifier.probability(GRID) > 0.5, fails(GRID)) >= 0.95
+
+
+def test_most_points_lie_near_the_boundary():
+    asked, _ = searched(circle, 30)
+    off = np.abs(np.hypot(asked[:, 0] - 0.4, asked[:, 1] - 0.55) - 0.3)
+    assert np.median(off[12:]) < 0.5 * np.median(off[:12])
+
+
+def test_a_mirrored_problem_has_the_mirrored_map():
+    points = sobol_points(2, 3, count=30).numpy()
+    mirrored = points * (-1, 1) + (1, 0)
+    one, other = FailureClassifier(points, circle(points)), FailureClassifier(mirrored, circle(points))
+    np.testing.assert_allclose(one.probability(GRID), other.probability(GRID * (-1, 1) + (1, 0)), atol=0.02)
+
+
+def test_the_interval_of_the_area_has_the_true_area():
+    points = sobol_points(2, 1, count=60).numpy()
+    box = sobol_points(2, 5, count=500).numpy()
+    shares = (FailureClassifier(points, plane(points)).samples(box, 200, 0) > 0).mean(axis=1)
+    low, high = np.quantile(shares, (0.025, 0.975))
+    assert low <= plane(box).mean() <= high
+    assert high - low < 0.15
+
+
+def test_what_is_known_is_less_ambiguous_than_what_is_not():
+    points = sobol_points(2, 1, count=40).numpy() * (0.5, 1.0)  # nothing is known on the right
+    classifier = FailureClassifier(points, plane(points))
+    corner, inside = straddle(classifier, np.array([[0.98, 0.5], [0.05, 0.1]]))
+    assert corner > inside
+
+
+def test_other_parameters_are_fixed_at_their_middle_and_the_order_of_names_is_kept():
+    slice_ = slice_over(("c", "a"))
+    np.testing.assert_allclose(slice_.whole(np.array([0.1, 0.9]), np.random.default_rng(0)), [0.9, 0.5, 0.1])
+    np.testing.assert_allclose(slice_.units({"a": 9.0, "b": 5.0, "c": 1.0}), [0.1, 0.9])
+
+
+def test_a_search_goes_on_where_its_state_was_taken():
+    whole, _ = searched(circle, 16)
+    _, sampler = searched(circle, 14)
+    resumed = BoundarySampler(3, SceneOptimizerConfig(), 0, slice_over(("a", "b")))
+    resumed.load(sampler.state())
+    np.testing.assert_array_equal(resumed.ask()[:2], whole[14])
+
+
+def test_scenes_that_break_a_constraint_are_not_asked_for():
+    asked, _ = searched(circle, 18, slice_=slice_over(("a", "b"), holds=lambda scene: scene["a"] < 6.0))
+    assert (asked[:, 0] < 0.6).all()
+
+
+def test_refused_scenes_are_left_alone_once_they_are_known():
+    asked, _ = searched(circle, 22, refused=lambda point: point[1] > 0.6)
+    assert (asked[12:, 1] > 0.7).sum() <= 2
+
+
+def test_without_an_outcome_of_either_class_the_space_is_filled():
+    asked, _ = searched(lambda points: np.zeros(len(points), bool), 16)
+    np.testing.assert_array_equal(asked, sobol_points(2, 0, count=16).numpy())
