@@ -19,6 +19,7 @@ def ended_campaign(
     drawn: RunMetrics | None = None,
     ego: Mapping[str, Any] = {"driver": "idm-aeb"},
     requirements: Mapping[str, RequirementCounts] = {},
+    boundary: BoundaryMap | None = None,
     **changes: Any,
 ) -> EndedCampaign:
     """Of one version of an ego, with one search and, given what it drew, one run of an i.i.d. phase.
@@ -30,13 +31,16 @@ def ended_campaign(
       drawn: metrics of the i.i.d. phase.
       ego: its settings.
       requirements: of the search.
+      boundary: of a run of that method.
       changes: of the campaign's spec.
     """
     spec = CampaignSpec(families=("low",), methods=("archive",)).model_copy(update=changes)
     spec = CampaignSpec.model_validate(spec.model_dump() | {"ego": {**ego, "label": version}})
     told = {} if kinds is None else {"headline": len(kinds), "headline_kinds": tuple(kinds)}
     searched = run_metrics(300, **told, requirements=requirements)
-    runs = [EndedRun(family="low", method="archive", iid=False, phases=(searched,), versions=versions)]
+    runs = [
+        EndedRun(family="low", method="archive", iid=False, phases=(searched,), versions=versions, boundary=boundary)
+    ]
     if drawn is not None:
         runs.append(EndedRun(family="low", method="iid-random", iid=True, phases=(drawn,), versions=versions))
     return EndedCampaign(id=f"c{version}", spec=spec, runs=runs)

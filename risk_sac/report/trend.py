@@ -15,9 +15,11 @@ from risk_sac.config import Budget, CampaignSpec, EgoConfig, Iid
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import pooled_headline, pooled_published, pooled_requirements, wilson_interval
 from risk_sac.records import Real, Record, RequirementCounts, RunMetrics
+from risk_sac.records.boundary import BoundaryMap
 
 SOFTWARE = ("definitions", "risk-sac", "libsumo")
 """What results rest on beside the terms; a change of one of these ends a line."""
+PUBLISHED = ("r157", "fsm")  # drivers that an ego's boundary is compared with
 OF_EGO = {"profile", "driver", "label", "version"}  # the other fields of an ego are its settings
 
 
@@ -30,6 +32,7 @@ class EndedRun:
     iid: bool
     phases: tuple[RunMetrics, ...]  # search and evaluation, or the i.i.d. phase
     versions: Mapping[str, str]
+    boundary: BoundaryMap | None = None  # of the method `boundary`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,6 +60,20 @@ class TrendRate(Record):
     rate: Real
     low: Real
     """95 % interval of Wilson."""
+    high: Real
+
+
+class TrendArea(Record):
+    """Share of a box of scene parameters in which the ego fails and a reference driver does not."""
+
+    family: str
+    parameters: tuple[str, ...]
+    driver: str
+    """The reference driver: `r157` or `fsm`."""
+    rate: Real
+    """The share."""
+    low: Real
+    """95 % interval from posterior samples of the boundary."""
     high: Real
 
 
@@ -95,6 +112,8 @@ class TrendPoint(Record):
     """Requirement → its funnel, summed over the searches; its rate is one of a search."""
     rates: tuple[TrendRate, ...]
     """Of the i.i.d. phase; none without one."""
+    areas: tuple[TrendArea, ...]
+    """Of runs of the method `boundary`; none without one."""
 
 
 class TrendRow(Record):
@@ -235,6 +254,7 @@ def _point(campaigns: Sequence[EndedCampaign]) -> TrendPoint:
         returned=None,
         requirements=pooled_requirements(searched),
         rates=tuple(rate for run in newest.runs if run.iid for phase in run.phases for rate in _rates(run, phase)),
+        areas=tuple(area for run in newest.runs if run.boundary is not None for area in _areas(run.boundary)),
     )
 
 
@@ -275,6 +295,20 @@ def _rates(run: EndedRun, phase: RunMetrics) -> Iterator[TrendRate]:
             low=low,
             high=high,
         )
+
+
+def _areas(boundary: BoundaryMap) -> Iterator[TrendArea]:
+    for driver in boundary.maps:
+        area = driver.ego_fails_alone
+        if area is not None and driver.name in PUBLISHED:
+            yield TrendArea(
+                family=boundary.spec.family,
+                parameters=tuple(axis.name for axis in boundary.axes),
+                driver=driver.name,
+                rate=area.share,
+                low=area.low,
+                high=area.high,
+            )
 
 
 def _settings(ego: EgoConfig) -> Iterator[str]:

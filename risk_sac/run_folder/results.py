@@ -13,9 +13,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import REPEATS, Adjustment, DrivenBy, EpisodeId, EpisodeRecord, Repetition, RunMetrics
+from risk_sac.records.boundary import BoundaryMap
 from risk_sac.run_folder.durable import read_sealed, write_sealed
 from risk_sac.verdicts.distinct import variant_name
 
@@ -200,6 +203,14 @@ def first_of_variants(results: RunResults) -> list[EpisodeRecord]:
             episodes.append(episode)
         seen |= new
     return episodes
+
+
+def read_boundary_map(folder: Path) -> BoundaryMap | None:
+    """Reads the map of a run of the method `boundary`; None where there is none, or it is damaged."""
+    try:
+        return BoundaryMap.model_validate_json((folder / BOUNDARY).read_bytes())
+    except (FileNotFoundError, ValidationError):
+        return None
 
 
 def write_verified(folder: Path, verified: Verified) -> None:

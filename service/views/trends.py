@@ -5,14 +5,16 @@ from collections.abc import Sequence
 from risk_sac.errors import ConfigError
 from risk_sac.records import State
 from risk_sac.report.trend import EndedCampaign, EndedRun, LeftOut, Trend, check_scenarios, driver_name, trend
+from risk_sac.run_folder.results import read_boundary_map
 from service.errors import OutdatedError
+from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign
 
 MOST_CAMPAIGNS = 200  # of an ego; older ones are not read
 
 
-def trend_of(store: Store, name: str, chosen: Sequence[str], project: str | None) -> Trend:
+def trend_of(store: Store, settings: ServiceSettings, name: str, chosen: Sequence[str], project: str | None) -> Trend:
     """Compares the versions of an ego, by its newest campaigns or by those that are chosen.
 
     Raises:
@@ -27,7 +29,7 @@ def trend_of(store: Store, name: str, chosen: Sequence[str], project: str | None
     left_out: list[LeftOut] = []
     for campaign in stored:
         try:
-            read = _ended(campaign)
+            read = _ended(campaign, settings)
         except OutdatedError as error:
             left_out.append(LeftOut(campaign_id=campaign.id, reason=str(error)))
             continue
@@ -42,7 +44,7 @@ def trend_of(store: Store, name: str, chosen: Sequence[str], project: str | None
     return trend(ended, left_out)
 
 
-def _ended(campaign: StoredCampaign) -> EndedCampaign:
+def _ended(campaign: StoredCampaign, settings: ServiceSettings) -> EndedCampaign:
     runs = (
         EndedRun(
             family=run.family,
@@ -50,6 +52,7 @@ def _ended(campaign: StoredCampaign) -> EndedCampaign:
             iid=run.iid,
             phases=tuple(phase for phase in (run.metrics, run.evaluation) if phase is not None),
             versions=run.versions,
+            boundary=read_boundary_map(settings.run_folder(campaign.id, run.id)) if run.method == "boundary" else None,
         )
         for run in campaign.runs
     )

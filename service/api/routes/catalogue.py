@@ -257,7 +257,7 @@ def get_trend(
 ) -> Response:
     """Versions of an ego: headline kinds, rates and requirements, on equal terms in each row."""
     revision = service.store.revision_of_all()
-    body = wire(trend_of(service.store, name, campaign or (), caller.sees))
+    body = wire(trend_of(service.store, service.settings, name, campaign or (), caller.sees))
     headers = {"Cache-Control": "no-cache", "ETag": entity_tag(blake2b(body, digest_size=8).hexdigest())}
     return kept(request, body, headers, revision)
 

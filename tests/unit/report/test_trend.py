@@ -2,10 +2,11 @@
 
 import pytest
 
-from risk_sac.config import CampaignSpec
+from risk_sac.config import CampaignSpec, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval
 from risk_sac.records import RequirementCounts
+from risk_sac.records.boundary import BoundaryAxis, BoundaryMap, BoxShare, DriverMap
 from risk_sac.report.trend import check_scenarios, trend
 from tests.builders import run_metrics
 from tests.versions import SOFTWARE, ended_campaign
@@ -119,6 +120,22 @@ def test_rates_are_of_freshly_drawn_scenes_that_were_played():
 
 def _counts(valid: int) -> RequirementCounts:
     return RequirementCounts(counts="failure", violated=valid, valid=valid)
+
+
+def test_areas_are_those_beside_published_drivers():
+    spec = RunSpec(family="low", method="random", seed=0)
+    share = BoxShare(share=0.2, low=0.1, high=0.3)
+    axis = BoundaryAxis(name="gap_m", unit="m", meaning="", low=0.0, high=1.0, levels=(0.0, 1.0), has_effect=True)
+    told = {"judged": True, "episodes": 9, "always": None, "probability": (), "deviation": (), "fails": share}
+    maps = tuple(
+        DriverMap(name=name, ego_fails_alone=None if name == "ego" else share, **told)
+        for name in ("ego", "r157", "idm-aeb")
+    )
+    found = BoundaryMap(spec=spec, axes=(axis, axis), fixed={}, points=(), refused=0, maps=maps, notes=())
+    (row,) = trend([ended_campaign("1.3", boundary=found)]).rows
+    (area,) = row.points[0].areas
+    assert (area.driver, area.family, area.parameters) == ("r157", "low", ("gap_m", "gap_m"))
+    assert (area.rate, area.low, area.high) == (0.2, 0.1, 0.3)
 
 
 def test_campaigns_of_other_scenarios_that_were_chosen_are_refused():

@@ -4,6 +4,7 @@ import { useState } from "preact/hooks";
 import type { Body } from "../../api/types";
 import { words } from "../../ui/text";
 import { CellTable } from "../campaign/matrix";
+import { titleOf } from "../new/schema";
 
 type Pair = Body<"CoveredPair">;
 
@@ -22,7 +23,7 @@ export function Pairs({ pairs }: { pairs: Pair[] }) {
             <optgroup key={family} label={words(family)}>
               {pairs.map((pair, place) => pair.family === family && (
                 <option key={place} value={place}>
-                  {pair.parameters.map(words).join(" and ")}
+                  {pair.parameters.map((name) => titleOf(name)[0]).join(" and ")}
                 </option>
               ))}
             </optgroup>

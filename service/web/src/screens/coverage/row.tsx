@@ -3,6 +3,7 @@
 import { useId, useState } from "preact/hooks";
 import { address } from "../../router";
 import { words } from "../../ui/text";
+import { titleOf } from "../new/schema";
 import { STATES, numbersOf, type Cell, type Matrix, type Row } from "./cells";
 
 type Campaigns = Matrix["campaigns"];
@@ -11,11 +12,12 @@ export function RowOfCells({ row, campaigns }: { row: Row; campaigns: Campaigns 
   const [chosen, setChosen] = useState<string>();
   const id = useId();
   const cell = row.cells.find(({ name }) => name === chosen);
+  const name = row.family ? titleOf(row.name)[0] : words(row.name); // a parameter's ends in its unit
   const unit = row.unit && `, ${row.unit}`;
   return (
     <div>
       <dt title={row.meaning}>
-        {words(row.name)}
+        {name}
         <span class="faint small">
           {unit}
           {row.family && ` in ${words(row.family)}`}
@@ -23,6 +25,7 @@ export function RowOfCells({ row, campaigns }: { row: Row; campaigns: Campaigns 
       </dt>
       <dd>
         <div class="chips">
+          {row.cells.length === 0 && <span class="faint small">no campaign has one</span>}
           {row.cells.map((each) => (
             <button
               key={each.name}

@@ -12,15 +12,17 @@ interface Props {
   say: (value: number) => string;
 }
 
-const TOP = 18;
+const TOP = 28; // below what a break says
 const BOTTOM = 150;
+const LEFT = 14; // per cent, for the values of the levels
+const LATE = 60; // per cent, from which on a break says itself to its left
 const LABELS = 8; // of versions below a chart, at most
 
 export function VersionChart({ title, about, spots, say }: Props) {
   const id = useId();
   const known = spots.flatMap(({ value, high }) => (value === null ? [] : [high ?? value]));
   const end = niceEnd(Math.max(0, ...known));
-  const x = (at: number) => `${(100 * (at + 0.5)) / spots.length}%`;
+  const x = (at: number) => LEFT + ((100 - LEFT) * (at + 0.5)) / spots.length;
   const y = (value: number) => BOTTOM - ((BOTTOM - TOP) * percentAlong(value, 0, end)) / 100;
   const every = Math.ceil(spots.length / LABELS);
   return (
@@ -44,17 +46,17 @@ export function VersionChart({ title, about, spots, say }: Props) {
                 )}
               </g>
             ))}
-            {spots.map(({ change }, at) => change && <Break key={at} at={`${(100 * at) / spots.length}%`} change={change} />)}
+            {spots.map(({ change }, at) => change && <Break key={at} at={x(at - 0.5)} change={change} />)}
             {spots.map((spot, at) => {
               const before = spots[at - 1];
               const joined = before && !spot.change && before.value !== null && spot.value !== null;
-              return joined && <line key={at} class="joined-spots" x1={x(at - 1)} x2={x(at)} y1={y(before.value!)} y2={y(spot.value!)} />;
+              return joined && <line key={at} class="joined-spots" x1={`${x(at - 1)}%`} x2={`${x(at)}%`} y1={y(before.value!)} y2={y(spot.value!)} />;
             })}
             {spots.map((spot, at) => (
-              <Drawn key={at} spot={spot} x={x(at)} y={y} said={saidOf(spot, say)} />
+              <Drawn key={at} spot={spot} x={`${x(at)}%`} y={y} said={saidOf(spot, say)} />
             ))}
           </svg>
-          <ol class="versions" aria-hidden="true" style={{ gridTemplateColumns: `repeat(${Math.ceil(spots.length / every)}, minmax(0, 1fr))` }}>
+          <ol class="versions" aria-hidden="true" style={{ marginLeft: `${LEFT}%`, gridTemplateColumns: `repeat(${Math.ceil(spots.length / every)}, minmax(0, 1fr))` }}>
             {spots.map(({ version }, at) => at % every === 0 && (
               <li key={at} title={version}>
                 {version}
@@ -70,12 +72,13 @@ export function VersionChart({ title, about, spots, say }: Props) {
   );
 }
 
-function Break({ at, change }: { at: string; change: string }) {
+function Break({ at, change }: { at: number; change: string }) {
+  const [x, late] = [`${at}%`, at > LATE];
   return (
     <g class="break" data-change={change}>
       <title>Not comparable: {change}</title>
-      <line x1={at} x2={at} y1="4" y2={BOTTOM} />
-      <text x={at} y="12" dx="4">
+      <line x1={x} x2={x} y1="4" y2={BOTTOM} />
+      <text x={x} y="12" dx={late ? -4 : 4} text-anchor={late ? "end" : "start"}>
         {change}
       </text>
     </g>

@@ -1,9 +1,9 @@
 import { expect, it } from "vitest";
-import { changeOf, drawnIn, kindsOf, nameOf, spots, type Point, type Row } from "./points";
+import { boxesIn, changeOf, drawnIn, kindsOf, nameOf, spots, type Point, type Row } from "./points";
 
 function point(version: string, told: Partial<Point> = {}): Point {
   const rest = { registered: null, settings: [], campaign_id: version, at: null, earlier: [], software: { definitions: "10" }, changed: [], headline: 0, headline_published: 0 };
-  return { version, ...rest, kinds: [], new: null, gone: null, returned: null, requirements: {}, rates: [], ...told };
+  return { version, ...rest, kinds: [], new: null, gone: null, returned: null, requirements: {}, rates: [], areas: [], ...told };
 }
 
 const CHANGED = point("1.5", { software: { definitions: "11" }, changed: ["definitions"], headline: null, kinds: null });
@@ -44,4 +44,9 @@ it("lists scenario and traffic once", () => {
   const rate = { family: "low", method: "iid-random", requirement: null, count: 1, played: 10, rate: 0.1, low: 0, high: 0.3 };
   const rates = [rate, { ...rate, requirement: "no_contact" }, { ...rate, method: "iid-undisturbed" }];
   expect(drawnIn({ points: [point("1.3", { rates }), point("1.4", { rates })] } as Row)).toEqual(["low, random adversaries", "low, undisturbed traffic"]);
+});
+
+it("lists boxes of scene parameters once", () => {
+  const area = { family: "cut_in", parameters: ["gap_m", "speed_mps"], driver: "r157", rate: 0.2, low: 0.1, high: 0.3 };
+  expect(boxesIn({ points: [point("1.3", { areas: [area] }), point("1.4", { areas: [area] })] } as Row)).toEqual(["Gap and Speed in cut in: only the ego fails, not R157's driver"]);
 });

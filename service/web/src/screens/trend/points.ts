@@ -1,6 +1,8 @@
 /** A row of a trend as what its charts draw. Pure. */
 
 import type { Body } from "../../api/types";
+import { words } from "../../ui/text";
+import { titleOf } from "../new/schema";
 
 export type Row = Body<"TrendRow">;
 export type Point = Body<"TrendPoint">;
@@ -53,6 +55,15 @@ export function drawKey({ family, method }: Pick<Rate, "family" | "method">): st
 
 export function rateOf(point: Point, draw: string, requirement: string | null): Rate | undefined {
   return point.rates.find((rate) => drawKey(rate) === draw && rate.requirement === requirement);
+}
+
+/** Boxes in which a row's versions have an area, each once. */
+export function boxesIn({ points }: Row): string[] {
+  return [...new Set(points.flatMap((point) => point.areas.map(boxKey)))];
+}
+
+export function boxKey({ family, parameters, driver }: Body<"TrendArea">): string {
+  return `${parameters.map((name) => titleOf(name)[0]).join(" and ")} in ${words(family)}: only the ego fails, not ${driver === "r157" ? "R157's driver" : driver.toUpperCase()}`;
 }
 
 export type Change = "new" | "returned" | "found" | "gone" | "absent";

@@ -10,7 +10,7 @@ import { count, moment, percent, words } from "../../ui/text";
 import { useTitle } from "../../ui/title";
 import { VersionChart } from "./chart";
 import { KindsTable } from "./kinds";
-import { changeOf, drawnIn, nameOf, rateOf, spots, type Point, type Row } from "./points";
+import { boxKey, boxesIn, changeOf, drawnIn, nameOf, rateOf, spots, type Point, type Row } from "./points";
 import "./trend.css";
 
 type Trend = Body<"Trend">;
@@ -152,7 +152,7 @@ function Versions({ row, chosen, choose }: { row: Row; chosen: string[]; choose:
                     </label>
                   </th>
                   <td>
-                    <a href={address(["campaigns", id])}>{moment(point.at)}</a>
+                    <a href={address(["campaigns", id])}>{point.at ? moment(point.at) : id}</a>
                     {point.earlier.length > 0 && <span class="faint small"> and {count(point.earlier.length)} before</span>}
                   </td>
                   <td class="number">{point.headline === null ? "–" : count(point.headline)}</td>
@@ -203,6 +203,9 @@ function Charts({ row }: { row: Row }) {
       <div class="version-charts">
         <VersionChart title="Headline kinds" about="plausible, preventable, not minor, verified" spots={of((point) => point.headline)} say={count} />
         {draws.length > 0 && <VersionChart title="Failure rate" about={`of fresh scenes, 95 % interval: ${draw}`} spots={of((point) => rate(point, null))} say={percent} />}
+        {boxesIn(row).map((box) => (
+          <VersionChart key={box} title="Boundary area" about={`share of the box, 95 % interval: ${box}`} spots={of((point) => point.areas.find((area) => boxKey(area) === box))} say={percent} />
+        ))}
       </div>
       <KindsTable row={row} />
       {names.length > 0 && (
