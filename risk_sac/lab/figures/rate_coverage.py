@@ -27,8 +27,8 @@ from risk_sac.rates.estimate import RateEstimate, estimated
 from risk_sac.rates.record import stages_of
 from risk_sac.rates.stages import Stages, draws_of
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.search.loop import episode_seed
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
+from risk_sac.search.loop import episode_seed
 from risk_sac.search.scene_optimizer import RateSampler
 from risk_sac.world.types import Floats
 

@@ -5,8 +5,8 @@ import torch
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.scenario.slice import Slice
-from risk_sac.search.level_set import FailureClassifier, straddle
 from risk_sac.search.encounter import Encounter
+from risk_sac.search.level_set import FailureClassifier, straddle
 from risk_sac.search.scene_optimizer.base import SceneOptimizer, State, sobol_points
 from risk_sac.world.types import Bools, Floats
 
