@@ -30,7 +30,7 @@ def play(options: argparse.Namespace, family: FamilyName, method: str) -> None:
     """Plays a run in a process of its own, which learns with one thread."""
     arguments = ["run", "--scenario", family, "--method", method, "--ego", options.ego, "--seed", str(options.seed)]
     arguments += ["--episodes", str(options.episodes), "--prior", "none", "--out", str(options.out / family / method)]
-    if options.limit is not None:
+    if options.limit is not None and method == METHODS[0]:
         options.out.mkdir(parents=True, exist_ok=True)
         settings = options.out / "limit.yaml"
         settings.write_text(f"learner: {{lagrangian: {{cost_limit: {options.limit}}}}}\n")
