@@ -152,7 +152,7 @@ class Adversaries:
         rows = dict(zip(frame.ids, range(len(frame.ids)), strict=True))
         intended = sim.intended_accel()
         vehicles = {}
-        slot, statics = self._slot, np.count_nonzero(frame.role == int(Role.STATIC))
+        slot, statics = self._slot, int(np.count_nonzero(frame.role == int(Role.STATIC)))
         for id_, control in self._vehicles.items():
             place, k = sim.place(id_), slot[id_]
             if place is not None:

@@ -120,9 +120,17 @@ class VehicleControl:
             motion = _drive(self._bounds, self._bends, along.station_m, self._behind_per_m, before, wanted, sides)
             if others is None:
                 break
-            place, hardest_mps2 = (along.path, along.station_m, along.offset_m), self.limits.others_brake_mps2
-            beside_m = room.left_m if motion[2] > 0.0 else room.right_m
-            met = drives_into(*others, *place, motion, stopping, hardest_mps2, statics, beside_m)
+            met = drives_into(
+                *others,
+                along.path,
+                along.station_m,
+                along.offset_m,
+                motion,
+                stopping,
+                self.limits.others_brake_mps2,
+                statics,
+                room.left_m if motion[2] > 0.0 else room.right_m,
+            )
             if met == CLEAR or (met != AHEAD and wanted[1] == 0.0):
                 break
         self.speed_mps, self.accel_mps2, self.lateral_mps = motion
