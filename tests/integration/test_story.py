@@ -2,15 +2,17 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from risk_sac.config import RewardConfig, RunSpec
+from risk_sac.config import DeviationBounds, RewardConfig, RunSpec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.env.problem import Problem
 from risk_sac.errors import InfeasibleScene
+from risk_sac.scenario import library
 from risk_sac.scenario.families import family_of
 from risk_sac.scenario.reading import document_from
 from risk_sac.scenario.shipped import nets_of
@@ -211,3 +213,20 @@ def test_zero_action_plays_the_story_and_an_action_leads_away_from_it() -> None:
         controlled.step(np.zeros(size, dtype=np.float32))
         assert of(controlled.trace.frames[-1], "lead") == of(frame, "lead")
     controlled.close()
+
+
+def test_a_campaigns_bounds_of_deviations_take_the_place_of_the_documents(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RISK_SAC_PLACES", str(tmp_path))
+    name = library.keep(document_from(BRAKING), {})
+    bounds = {"accel_mps2": 0.0, "lateral_mps": 0.0}
+    posed = {
+        shift_s: Problem.from_spec(
+            RunSpec(family=name, method="random", seed=0, deviation=DeviationBounds(**bounds, trigger_s=shift_s))
+        )
+        for shift_s in (0.0, 2.0)
+    }
+    assert posed[2.0].space.parameters[-1].high == 2.0
+    assert posed[2.0].action_size == 8
+    assert (posed[0.0].space.names, posed[0.0].action_size) == (("gap_m",), 0)
