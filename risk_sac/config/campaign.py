@@ -72,7 +72,7 @@ class Budget(Settings):
 class Iid(Settings):
     """Final phase that estimates the ego's failure rate in scenes that no search chose.
 
-    They are drawn from the ODD independently, uniformly between each parameter's bounds, and played with undisturbed
+    They are drawn from the ODD independently, by the document's distributions, else uniformly, and played with undisturbed
     traffic and with random adversaries, in runs of their own.
     """
 
