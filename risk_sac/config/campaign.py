@@ -72,8 +72,8 @@ class Budget(Settings):
 class Iid(Settings):
     """Final phase that estimates the ego's failure rate in scenes that no search chose.
 
-    They are drawn from the ODD independently, by the document's distributions, else uniformly, and played with undisturbed
-    traffic and with random adversaries, in runs of their own.
+    They are drawn from the ODD independently, by the document's distributions and else uniformly. They are played with
+    undisturbed traffic and with random adversaries, in runs of their own.
     """
 
     episodes: Annotated[int, Field(ge=1, le=100_000)] = 300
