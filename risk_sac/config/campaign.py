@@ -78,8 +78,8 @@ class Budget(Settings):
 class Iid(Settings):
     """Final phase that estimates the ego's failure rate in scenes that no search chose.
 
-    They are drawn from the ODD independently, uniformly between each parameter's bounds, and played with undisturbed
-    traffic and with random adversaries, in runs of their own.
+    They are drawn from the ODD independently, by the document's distributions and else uniformly. They are played with
+    undisturbed traffic and with random adversaries, in runs of their own.
     """
 
     episodes: Annotated[int, Field(ge=1, le=100_000)] = 300

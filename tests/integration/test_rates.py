@@ -1,8 +1,11 @@
 """Failure rates of an ego in a scenario whose document declares distributions."""
 
+import json
+
 import numpy as np
 import pytest
 
+from risk_sac import cli
 from risk_sac.config import Budget, CampaignSpec, DynamicElements, EgoConfig, Iid, Interval, Odd, Requirement, RunSpec
 from risk_sac.env.problem import Problem, checked_campaign
 from risk_sac.errors import ConfigError
@@ -129,3 +132,16 @@ def test_a_rate_in_an_odd_without_mass_is_refused_and_a_search_is_not(tmp_path_f
 def test_axes_of_a_problem_are_those_of_its_space(spec):
     problem = Problem.from_spec(spec)
     assert tuple(axis.name for axis in problem.declared.axes) == problem.space.names
+
+
+def test_the_command_answers_again_and_refuses_what_it_cannot_answer(family, tmp_path, capsys):
+    command = ["rate", family, "--draws", "6", "--out", str(tmp_path), "--json"]
+    assert cli.main([*command, "--exposure", "2"]) == 0
+    first = json.loads(capsys.readouterr().out)
+    assert (first["draws"], first["scenes_per_hour"]) == (6, 2.0)
+    assert first["rates"][ANY]["why"]  # six draws are too few
+    assert cli.main([*command, "--requirement", "no_contact"]) == 0
+    assert list(json.loads(capsys.readouterr().out)["rates"]) == ["no_contact"]
+    for wrong in (["--exposure", "-1"], ["--requirement", "no_contacts"]):
+        assert cli.main([*command, *wrong]) == 2
+        assert len(capsys.readouterr().err.strip().splitlines()) == 1

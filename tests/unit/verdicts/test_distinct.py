@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.records import Collision, Grade
+from risk_sac.records import Collision, Grade, Severity
 from risk_sac.verdicts.distinct import CANDIDATE, NEW_KIND, NEW_VARIANT, DistinctFailures, Finds, distinct_failures
-from tests.builders import collision, judgement, violation
+from tests.builders import collision, judgement, plausibility, violation
 
 
 def failure(kind: str = "leader", variant: str = "ahead", grade: Grade | None = None) -> Collision:
@@ -61,3 +61,12 @@ def test_finds_continue_from_their_state():
     second.load(first.state())
     assert second.state() == first.state()
     assert second.add([failure(grade=Grade.PREVENTABLE), violation()]) == 0.0
+
+
+def test_failures_weigh_by_severity_times_plausibility():
+    unlikely = judgement(severity=Severity.SEVERE, plausibility=plausibility(joint_probability=0.004))
+    likely = judgement(plausibility=plausibility(joint_probability=0.3))
+    assert collision(judgement=unlikely).weight == pytest.approx(0.004)
+    assert collision(judgement=likely).weight == pytest.approx(0.03)
+    assert violation(grade=Grade.PREVENTABLE).weight == pytest.approx(0.03)  # without contact as a moderate one
+    assert collision().weight == 0.0  # not valid
