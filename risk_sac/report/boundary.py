@@ -97,7 +97,9 @@ def _panel(axes: Axes, found: BoundaryMap, cut: tuple[int, ...]) -> None:
 def _values(found: BoundaryMap, told: DriverMap, cut: tuple[int, ...]) -> Floats:
     """The probabilities of a driver over the first two axes."""
     values = np.array(told.probability).reshape([len(axis.levels) for axis in found.axes])
-    return np.asarray(values[(slice(None), slice(None), *cut)])
+    for level in reversed(cut):
+        values = values[..., level]
+    return np.asarray(values)
 
 
 def _scatter(axes: Axes, found: BoundaryMap, cut: tuple[int, ...]) -> None:

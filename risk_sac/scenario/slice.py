@@ -42,7 +42,7 @@ class Slice:
 
     def whole(self, point: Floats, random: np.random.Generator) -> Floats:
         """The point of the space's unit cube, `d`, at a point of the slice's, `k`."""
-        values = {name: self._drawn(name, random.random()) for name in self.space.names} | self.fixed
+        values = {name: self._drawn(name, random.random()) for name in self.space.names} | dict(self.fixed)
         width = self.space.high - self.space.low
         offset = np.array([values[name] for name in self.space.names]) - self.space.low
         unit = np.clip(np.divide(offset, width, out=np.zeros_like(offset), where=width > 0), 0.0, 1.0)

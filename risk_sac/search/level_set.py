@@ -37,7 +37,7 @@ SCALE, SCALE_SPREAD = math.log(20.0), 0.7  # prior of the latent's variance: out
 JITTER = 1e-5
 
 
-class _Latent(ApproximateGP):
+class _Latent(ApproximateGP):  # type: ignore[misc]  # gpytorch has no types
     """Latent function of the classifier, with an inducing point at each observation."""
 
     def __init__(self, points: Tensor) -> None:
