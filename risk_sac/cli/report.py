@@ -1,4 +1,4 @@
-"""`risk-sac report` and `risk-sac coverage`: the report of runs, whether its inputs changed, and what is covered."""
+"""`risk-sac report` and `risk-sac coverage`: reports, their verification, and coverage."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""Test cases of a campaign as an assessor reads them, and the inputs that its report was made from."""
+"""Test cases of a campaign for an assessor, and the inputs of its report."""
 
 from collections.abc import Mapping
 from typing import Literal
@@ -44,7 +44,7 @@ class CaseRun(Record):
 
 
 class CaseResult(Record):
-    """What happened in the searches of a test case; counts, no rates."""
+    """Result of the searches of a test case: counts, no rates."""
 
     verdict: Literal["failed", "no_failure_found", "not_played"]
     episodes: int
@@ -83,7 +83,7 @@ class CaseEstimate(Record):
 
 
 class CaseJudges(Record):
-    """Who judged a test case."""
+    """Rules, drivers and people that judged a test case."""
 
     definitions: tuple[int, ...]
     """Versions of the written definitions of a failure that were applied."""
@@ -123,7 +123,7 @@ class ReportedCase(Record):
 
 
 class FigureNote(Record):
-    """What a kind of figure is, and what it does not show."""
+    """A kind of figure, and its limits."""
 
     figure: str
     kind: Literal["count", "estimate", "model", "measurement"]
@@ -132,7 +132,7 @@ class FigureNote(Record):
 
 
 class ClauseRow(Record):
-    """Where a standard asks for a field."""
+    """A field of a test case, and the clause of a standard for it."""
 
     field: str
     standard: str

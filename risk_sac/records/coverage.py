@@ -1,4 +1,4 @@
-"""What campaigns have covered: a matrix of cells, each with the campaigns behind it."""
+"""Coverage of campaigns: a matrix of cells, each with the campaigns behind it."""
 
 from collections.abc import Mapping
 from enum import StrEnum
@@ -7,7 +7,7 @@ from risk_sac.records.base import Real, Record
 
 
 class CellState(StrEnum):
-    """What is known of a cell."""
+    """State of a cell."""
 
     FAILED = "failed"  # an episode in it failed
     PLAYED = "played"  # played, no failure
@@ -16,7 +16,10 @@ class CellState(StrEnum):
 
 
 class CellPower(Record):
-    """Known faults that the best budget behind a cell finds; of the budget in the cell's scenarios, not of the cell."""
+    """Known faults that the best budget behind a cell finds.
+
+    It is that of the whole budget in the cell's scenarios, not of the cell.
+    """
 
     campaign: str
     method: str

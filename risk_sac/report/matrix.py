@@ -295,7 +295,7 @@ def _cell(
     power: CellPower | None,
     unplayed: str = "never played",
 ) -> CoverageCell:
-    """Returns a cell with its state, and that in words; `unplayed` is said of one without an episode."""
+    """Returns a cell with its state, and that in words; `unplayed` are those of one without an episode."""
     state = CellState.FAILED if failed else CellState.PLAYED if played else CellState.NEVER
     if reached == 0 and not failed:
         state = CellState.NEVER

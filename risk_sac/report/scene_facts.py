@@ -104,7 +104,7 @@ class SceneFacts:
             yield CellKey("odd", row, band_of(row, scene[VISIBILITY]))
 
     def _half(self, parameter: Parameter, scene: Mapping[str, float]) -> int:
-        """Which half of a parameter's own range a scene lies in, which stands for one of its two categories."""
+        """Returns the half of a parameter's own range that a scene lies in: 0 or 1."""
         own = next(one for one in self._interpreter.space.parameters if one.name == parameter.name)
         return int(scene[own.name] >= (own.low + own.high) / 2)
 
@@ -117,7 +117,7 @@ def band_of(row: str, number: float) -> str:
 
 
 def _within(row: str, allowed: Interval) -> str:
-    """Returns the band of an interval, or the interval where it has several: which one a scene has is not recorded."""
+    """Returns the band of an interval, or the interval itself where it has several."""
     bands = {band_of(row, allowed.low), band_of(row, allowed.high)}
     return bands.pop() if len(bands) == 1 else f"within {allowed.low:.4g} to {allowed.high:.4g}"
 

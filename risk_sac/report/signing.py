@@ -4,6 +4,7 @@ A manifest has a line `sha256  name` for each input, as `sha256sum` writes them;
 lines. An unkeyed digest shows that inputs are as they were. It does not show who wrote the report.
 """
 
+import contextlib
 import hashlib
 import html
 import json
@@ -49,7 +50,7 @@ def input_digests(
       spec: of the campaign.
       folders: of its runs; files that are not there have no line.
       code: SHA-256 over the sources that make the report; no line if empty.
-      regression: JSON of the regression that is told in it; no line if empty.
+      regression: JSON of the regression in it; no line if empty.
 
     Returns:
       Name → SHA-256.
@@ -84,14 +85,15 @@ def inputs_in(text: str) -> SignedInputs:
     Raises:
       ConfigError: the text has no manifest, or its lines are not those that the report's digest was formed over.
     """
+    wanted: SignedInputs | None = None
     if text.lstrip().startswith("{"):
-        found = json.loads(text).get("signed")
-        wanted = SignedInputs.model_validate(found) if found else None
+        with contextlib.suppress(ValueError):  # no JSON, or no report's: a ValidationError is one, too
+            wanted = SignedInputs.model_validate(json.loads(text).get("signed"))
     else:
-        text = html.unescape(_TAG.sub("", text))
+        if text.lstrip().startswith("<!doctype"):
+            text = html.unescape(_TAG.sub("", text))
         lines = {name: digest for digest, name in _LINE.findall(text)}
         stated = re.search(r"digest of all inputs\W*([0-9a-f]{64})", text)
-        wanted = None
         if lines and stated:
             made = signed(lines)
             wanted = made.model_copy(update={"digest": stated[1]})
@@ -103,7 +105,7 @@ def inputs_in(text: str) -> SignedInputs:
 
 
 def changes(report: SignedInputs, now: SignedInputs) -> Sequence[str]:
-    """Names the inputs that are not as a report has them, each with what became of it; empty if all are."""
+    """Names the inputs that changed since a report, are missing or are new; empty if none."""
     before, after = ({one.name: one.sha256 for one in inputs.inputs} for inputs in (report, now))
     words = []
     for name in sorted(before.keys() | after.keys()):

@@ -149,7 +149,7 @@ TRAFFIC_RULES = (
 
 
 class Clause(NamedTuple):
-    """Where a standard asks for a field of a test case."""
+    """A field of a test case, and the clause of a standard for it."""
 
     field: str
     standard: str

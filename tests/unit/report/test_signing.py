@@ -82,7 +82,7 @@ def test_a_manifest_that_was_edited_is_refused(folder):
     assert inputs_in(text) == made
     with pytest.raises(ConfigError):
         inputs_in(text.replace("low-random-0/episodes", "low-random-1/episodes"))
-    for nothing in ("", "{}", "# A report"):
+    for nothing in ("", "{}", "{", '{"signed": 1}', "# A report"):
         with pytest.raises(ConfigError):
             inputs_in(nothing)
 
