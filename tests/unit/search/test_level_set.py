@@ -7,8 +7,9 @@ from risk_sac.config import SceneOptimizerConfig
 from risk_sac.config.boundary import BoundaryConfig
 from risk_sac.scenario.slice import Slice
 from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.search.encounter import Encounter
 from risk_sac.search.level_set import FailureClassifier, straddle
-from risk_sac.search.scene_optimizer import BoundarySampler, Encounter
+from risk_sac.search.scene_optimizer import BoundarySampler
 from risk_sac.search.scene_optimizer.base import sobol_points
 
 GRID = np.stack(np.meshgrid(*[np.linspace(0, 1, 20)] * 2, indexing="ij"), -1).reshape(-1, 2)
