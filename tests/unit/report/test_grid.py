@@ -106,9 +106,9 @@ def test_the_command_writes_a_table_a_report_and_a_picture(sweep, tmp_path, caps
 @pytest.mark.parametrize(
     ("flags", "field"),
     [
-        (["--over", "ego_speed_mps", "gap"], "over"),
-        (["--at", "ego_speed_mps=99"], "at"),
-        (["--at", "ego_speed_mps"], "at"),
+        (["--over", "ego_speed_mps", "gap"], "--over"),
+        (["--at", "ego_speed_mps=99"], "--at"),
+        (["--at", "ego_speed_mps"], "--at"),
     ],
 )
 def test_a_picture_of_nothing_is_refused_in_one_line(sweep, tmp_path, capsys, flags, field):
