@@ -49,7 +49,7 @@ class DriverMap(Record):
     name: str
     """`ego`, a reference driver, or another ego as it was named."""
     judged: bool
-    """Whether the driver is asked by a model of the recorded episodes, instead of driving."""
+    """Whether the driver is asked by a model of the recorded episodes, of all egos together, instead of driving."""
     episodes: int
     """Points that the map is fitted to."""
     always: bool | None
