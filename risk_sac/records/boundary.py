@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 
-from risk_sac.config import RunSpec
+from risk_sac.config import EgoConfig
+from risk_sac.config.boundary import BoundaryConfig
 from risk_sac.records.base import Record
+from risk_sac.records.run import Family
 
 
 class BoundaryAxis(Record):
@@ -67,7 +69,9 @@ class DriverMap(Record):
 class BoundaryMap(Record):
     """The boundary that a run of the method `boundary` has found."""
 
-    spec: RunSpec
+    family: Family
+    ego: EgoConfig
+    settings: BoundaryConfig
     axes: tuple[BoundaryAxis, ...]
     fixed: Mapping[str, float]
     """Value of each other parameter that is the same in all scenes; in [0, 1] of one with words or rows."""

@@ -111,7 +111,9 @@ def boundary_map(
     effects = _effects(maps[0] if maps else None, SIDES[axes])
     points = tuple(_point(spec, record, slice_) for record in records)
     return BoundaryMap(
-        spec=spec,
+        family=spec.family,
+        ego=spec.ego,
+        settings=slice_.config,
         axes=tuple(
             BoundaryAxis(
                 name=axis.name,
