@@ -2,8 +2,10 @@
 
 from collections.abc import Mapping
 
-from risk_sac.config import RunSpec
+from risk_sac.config import EgoConfig
+from risk_sac.config.boundary import BoundaryConfig
 from risk_sac.records.base import Record
+from risk_sac.records.run import Family
 
 
 class BoundaryAxis(Record):
@@ -30,7 +32,7 @@ class BoundaryPoint(Record):
     fails: bool | None
     """Of the ego; null where nothing was played."""
     refused_failure: bool
-    """Whether a validity rule refuses the violation, which counts as failing here all the same."""
+    """Whether a validity rule refuses the violation, which counts here all the same."""
     avoided_by: Mapping[str, bool]
     """r157 | fsm → whether this driver avoids a contact in this scene."""
 
@@ -49,25 +51,27 @@ class DriverMap(Record):
     name: str
     """`ego`, a reference driver, or another ego as it was named."""
     judged: bool
-    """Whether the driver is asked by a model of the recorded episodes, instead of driving."""
+    """Whether it is asked of the recorded episodes of all egos, instead of driving."""
     episodes: int
     """Points that the map is fitted to."""
     always: bool | None
     """Its outcome where all points end alike; null where it both passes and fails."""
     probability: tuple[float, ...]
-    """Of failing at each point of the grid, in which the last axis varies fastest; empty where `always` is not null."""
+    """Of failing at each point of the grid, last axis fastest; empty where `always` is not null."""
     deviation: tuple[float, ...]
-    """Standard deviation of the latent function there; the boundary is known where |Φ⁻¹(probability)| is large."""
+    """Standard deviation of the latent function there."""
     fails: BoxShare
     """BoxShare of the box in which it fails."""
     ego_fails_alone: BoxShare | None
-    """BoxShare of the box in which the ego fails and this driver does not; null for the ego itself."""
+    """BoxShare of the box in which the ego fails and this driver does not."""
 
 
 class BoundaryMap(Record):
     """The boundary that a run of the method `boundary` has found."""
 
-    spec: RunSpec
+    family: Family
+    ego: EgoConfig
+    settings: BoundaryConfig
     axes: tuple[BoundaryAxis, ...]
     fixed: Mapping[str, float]
     """Value of each other parameter that is the same in all scenes; in [0, 1] of one with words or rows."""

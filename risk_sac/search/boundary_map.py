@@ -98,7 +98,8 @@ def boundary_map(
     slice_ = Problem.from_spec(spec).slice_of(spec)
     wanted = slice_.config.requirement
     drives = [_driven("ego", records, slice_, wanted)]
-    drives += [_judged(name, records, slice_) for name in JUDGED]
+    together = [*records, *itertools.chain.from_iterable((beside or {}).values())]  # their word is of no ego
+    drives += [_judged(name, together, slice_) for name in JUDGED]
     drives += [_driven(name, others, slice_, wanted) for name, others in (beside or {}).items()]
     axes = len(slice_.axes)
     box = sobol_points(axes, SEED, count=BOX).numpy()
@@ -110,7 +111,9 @@ def boundary_map(
     effects = _effects(maps[0] if maps else None, SIDES[axes])
     points = tuple(_point(spec, record, slice_) for record in records)
     return BoundaryMap(
-        spec=spec,
+        family=spec.family,
+        ego=spec.ego,
+        settings=slice_.config,
         axes=tuple(
             BoundaryAxis(
                 name=axis.name,
@@ -127,7 +130,7 @@ def boundary_map(
         points=points,
         refused=sum(point.fails is None for point in points),
         maps=maps,
-        notes=tuple(_notes(slice_, points, maps, effects)),
+        notes=(*_notes(slice_, points, maps, effects), *_contradicted(fitted)),
     )
 
 
@@ -204,6 +207,17 @@ def _point(spec: RunSpec, record: EpisodeRecord, slice_: Slice) -> BoundaryPoint
         refused_failure=record.outcome is Outcome.DEGENERATE,
         avoided_by=record.avoided_by or {},
     )
+
+
+def _contradicted(fitted: Sequence[Fitted]) -> list[str]:
+    """Says of which drivers the map smooths over outcomes, such as those on an island of failures."""
+    notes = []
+    for each in fitted:
+        if each.classifier is not None:
+            guessed = each.classifier.probability(each.drive.points) > 0.5
+            if wrong := int((guessed != each.drive.fails).sum()):
+                notes.append(f"{wrong} of {len(guessed)} outcomes of {each.drive.name} are not as its map says.")
+    return notes
 
 
 def _notes(
