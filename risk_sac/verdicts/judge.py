@@ -39,7 +39,7 @@ from risk_sac.verdicts.validity import (
 )
 from risk_sac.world.types import STEP_S, Frame, Kind, Role, Signal
 
-DEFINITIONS = 10  # raise it with whatever changes a verdict; what was judged before says by which it was
+DEFINITIONS = 11  # raise it with whatever changes a verdict; what was judged before says by which it was
 
 WARNING_STEPS = round(1.0 / STEP_S)  # what a failure is remembered by ends this long before the contact
 

@@ -35,13 +35,13 @@ def played_grid(
       standard: the driver that tells a failure from a scene that is out of scope.
 
     Raises:
-      NotFoundError: the campaign has no such run.
-      ConfigError: its method plays no scenario as it is written.
+      NotFoundError: the campaign has no such run, or its method plays no scenario as it is written.
     """
     run = run_of(campaign, run_id)
     spec = next(spec for spec in campaign.spec.runs() if spec.id == run_id)
     if not method_of(spec.method).story:
-        raise ConfigError("run_id", f"{run_id!r}, of {spec.method}", "a run of story-sweep, story-random or story-bo")
+        message = f"run {run_id} is of the method {spec.method}; wanted one of story-sweep, story-random or story-bo"
+        raise NotFoundError(message, field="run_id", got=run_id)
     records = [episode.record for episode in episodes if episode.run_number == run.number]
     return PlayedGrid(spec=spec, standard=standard, points=played_points(spec, records, standard))
 
