@@ -61,7 +61,7 @@ class Budget(Settings):
 
     batch: Annotated[int, Field(ge=1, le=1024)] = 1
     """Episodes that are asked for at a time, and played in parallel. The results depend on it, and on nothing else of
-    how they are played. Methods that learn play one at a time."""
+    how they are played. Methods that learn, `rate` and `boundary` play one at a time."""
 
     @model_validator(mode="after")
     def _least_is_affordable(self) -> Self:

@@ -15,7 +15,7 @@ from risk_sac.records import NO_CONTACT, Adjustment
 from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import parsed
-from risk_sac.scenario.declared import Declared
+from risk_sac.scenario.declared import SceneLaw
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.family import Family
 from risk_sac.scenario.grid import DEFAULT_LEVELS, Grid, grid_of
@@ -207,9 +207,9 @@ class Problem:
             _ = self.declared
 
     @property
-    def declared(self) -> Declared:
-        """The declared distribution of its scenes; see `Declared.of`."""
-        return Declared.of(self.space, self.family.parameters, self.family.rank_correlation)
+    def declared(self) -> SceneLaw:
+        """The declared distribution of its scenes; see `SceneLaw.of`."""
+        return SceneLaw.of(self.space, self.family.parameters, self.family.rank_correlation)
 
     def slice_of(self, spec: RunSpec) -> Slice:
         """The slice of the scene space in which a run seeks the ego's boundary."""

@@ -25,7 +25,7 @@ from risk_sac.openscenario.positions import Positions
 from risk_sac.openscenario.road import RoadFiles, converted, missing
 from risk_sac.openscenario.scope import At, NameScope
 from risk_sac.openscenario.sources import SourceFiles
-from risk_sac.openscenario.storyboard import Init, Storyboard, horizon_of, moving_actors
+from risk_sac.openscenario.storyboard import Init, StoryboardReader, horizon_of, moving_actors
 from risk_sac.openscenario.unread import unread
 from risk_sac.openscenario.variables import Variables
 
@@ -162,7 +162,7 @@ class _Import:
         positions = Positions(catalogs, entities)
         actions = ActionReader(positions, entities, variables, self._remarks)
         conditions = ConditionReader(positions, entities, variables, self._remarks)
-        board = Storyboard(actions, conditions, entities, catalogs, self._remarks)
+        board = StoryboardReader(actions, conditions, entities, catalogs, self._remarks)
         storyboard = top.one("Storyboard")
         init = board.init(storyboard.one("Init"))
         stories, stop = board.stories(storyboard), board.stop(storyboard)

@@ -56,7 +56,7 @@ class Init:
     variables: list[VariableAction] = field(default_factory=list)
 
 
-class Storyboard:
+class StoryboardReader:
     """Reads the element `Storyboard`."""
 
     def __init__(

@@ -11,7 +11,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.rates.estimate import RateEstimate, estimated, with_exposure
 from risk_sac.rates.stages import Draws, Stages, draws_of
 from risk_sac.records import REPEATS, EpisodeRecord, Outcome, Record
-from risk_sac.scenario.declared import Declared
+from risk_sac.scenario.declared import SceneLaw
 from risk_sac.world.types import Scene
 
 METHOD = "rate"
@@ -50,7 +50,7 @@ class Rates(Record):
     """Parameters with a rank correlation; all others are independent."""
 
 
-def stages_of(declared: Declared, draws: int, seed: int) -> Stages:
+def stages_of(declared: SceneLaw, draws: int, seed: int) -> Stages:
     """The stages of a run; axes whose values do not tell their share are drawn as declared in all of them."""
     return Stages(int(declared.telling.sum()), draws, seed)
 
@@ -108,7 +108,7 @@ def check_exposure(scenes_per_hour: float | None) -> None:
         raise ConfigError("exposure", f"{scenes_per_hour:g}", f"scenes in an hour, 0 to {MOST_PER_HOUR:g}")
 
 
-def _draws(problem: Problem, declared: Declared, records: Sequence[EpisodeRecord]) -> Draws:
+def _draws(problem: Problem, declared: SceneLaw, records: Sequence[EpisodeRecord]) -> Draws:
     space = problem.space
     units = [space.to_unit(Scene(space.family, record.scene)) for record in records]
     margins = [

@@ -61,9 +61,9 @@ class DriverMap(Record):
     deviation: tuple[float, ...]
     """Standard deviation of the latent function there."""
     fails: BoxShare
-    """BoxShare of the box in which it fails."""
+    """Share of the box in which it fails."""
     ego_fails_alone: BoxShare | None
-    """BoxShare of the box in which the ego fails and this driver does not."""
+    """Share of the box in which the ego fails and this driver does not."""
 
 
 class BoundaryMap(Record):

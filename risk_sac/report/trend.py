@@ -302,7 +302,7 @@ def _areas(boundary: BoundaryMap) -> Iterator[TrendArea]:
         area = driver.ego_fails_alone
         if area is not None and driver.name in PUBLISHED:
             yield TrendArea(
-                family=boundary.spec.family,
+                family=boundary.family,
                 parameters=tuple(axis.name for axis in boundary.axes),
                 driver=driver.name,
                 rate=area.share,

@@ -63,7 +63,7 @@ class DeclaredAxis:
 
 
 @dataclass(frozen=True)
-class Declared:
+class SceneLaw:
     """Distribution of the scenes of a space."""
 
     axes: tuple[DeclaredAxis, ...]
@@ -72,7 +72,7 @@ class Declared:
     @classmethod
     def of(
         cls, space: SceneSpace, parameters: Mapping[str, ScenarioParameter], correlation: RankCorrelation | None
-    ) -> "Declared":
+    ) -> "SceneLaw":
         """The distribution over a scene space that an ODD may have narrowed.
 
         Args:

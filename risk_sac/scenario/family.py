@@ -19,7 +19,7 @@ from risk_sac.config import (
 from risk_sac.config.distribution import RankCorrelation
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.scenario.behaviour import preset
-from risk_sac.scenario.declared import Declared
+from risk_sac.scenario.declared import SceneLaw
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.space import SceneSpace
 
@@ -53,9 +53,9 @@ class Family:
         return replace(self, space=replace(self.space, parameters=kept), shifts=()) if self.shifts else self
 
     @property
-    def declared(self) -> Declared:
+    def declared(self) -> SceneLaw:
         """The declared distribution of its scenes."""
-        return Declared.of(self.space, self.parameters, self.rank_correlation)
+        return SceneLaw.of(self.space, self.parameters, self.rank_correlation)
 
     @property
     def adversaries(self) -> tuple[str, ...]:

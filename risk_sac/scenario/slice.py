@@ -9,7 +9,7 @@ import numpy as np
 from risk_sac.config.boundary import BoundaryConfig
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.errors import ConfigError, did_you_mean
-from risk_sac.scenario.declared import Declared
+from risk_sac.scenario.declared import SceneLaw
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.world.types import Floats
 
@@ -93,5 +93,5 @@ class Slice:
     def _drawn(self, name: str, share: float) -> float:
         """The value at a share of the parameter's distribution, within the space."""
         column = self.space.names.index(name)
-        axis = Declared.of(self.space, self.parameters, None).axes[column]
+        axis = SceneLaw.of(self.space, self.parameters, None).axes[column]
         return axis.low + axis.unit(share) * (axis.high - axis.low)

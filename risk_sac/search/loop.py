@@ -13,7 +13,7 @@ from risk_sac.config import RunSpec
 from risk_sac.host.machine import rollout_processes
 from risk_sac.records import Ending, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.crash_guard import CrashGuard
-from risk_sac.search.playing import GuardedEnv, Played, Proposal, play
+from risk_sac.search.playing import GuardedEnv, PlayedEpisode, Proposal, play
 from risk_sac.search.rollouts import Rollouts
 from risk_sac.search.run import RunOutcome, RunState
 
@@ -54,7 +54,7 @@ def execute_run(spec: RunSpec, folder: Path, observer: Observer) -> RunOutcome:
     with closing(RunState(spec, folder)) as run:
         for record, metrics in run.resume():
             observer.episode(record, metrics, run.series.get(record.index))
-        for metrics in rounds(run, folder, observer) if spec.budget.batch > 1 else episodes(run, folder, observer):
+        for metrics in rounds(run, folder, observer) if run.in_rounds else episodes(run, folder, observer):
             record = run.records[-1]
             observer.episode(record, metrics, run.series.get(record.index))
             run.refuse_dead_ego()
@@ -120,11 +120,11 @@ def propose(run: RunState) -> Proposal:
         scene=scene,
         genes=genes,
         driven_by=searchers.driven_by(learning=learning),
-        origin=searchers.origin if run.spec.budget.batch > 1 else None,
+        origin=searchers.origin if run.in_rounds else None,
     )
 
 
-def tell(run: RunState, proposal: Proposal, played: Played) -> RunMetrics:
+def tell(run: RunState, proposal: Proposal, played: PlayedEpisode) -> RunMetrics:
     """Tells the searchers of an episode and adds its record: Algorithm 1, lines 21 and 22."""
     sums, encounter, unplayable = played.sums, played.encounter, played.unplayable
     mean_return = sums.shaped_return / sums.steps if unplayable is None else None

@@ -29,7 +29,7 @@ logger = logging.getLogger(__name__)
 SIM_CRASH = "sim_crash"  # reason of a rejection
 
 
-class Actor(Protocol):
+class EpisodeActor(Protocol):
     """Drives all adversaries of an episode, and learns from it."""
 
     @property
@@ -106,7 +106,7 @@ class Unplayable(Exception):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Played:
+class PlayedEpisode:
     """What was played of a proposal."""
 
     sums: EpisodeSums
@@ -132,7 +132,7 @@ class GuardedEnv:
         """Notes for the crash guard that an episode begins, before its scene is chosen."""
         self._index, self._playable = index, self._guard.begin(index)
 
-    def reset(self, seed: int, scene: Scene, actor: Actor) -> tuple[Observation, dict[str, Any]]:
+    def reset(self, seed: int, scene: Scene, actor: EpisodeActor) -> tuple[Observation, dict[str, Any]]:
         """Starts the episode; see `RiskSacEnv.reset`.
 
         Raises:
@@ -172,7 +172,9 @@ class GuardedEnv:
         return Unplayable(Outcome.INVALID, failed.reason)
 
 
-def play(guarded: GuardedEnv, proposal: Proposal, actor: Actor, agent: Actor, reward: TrainingReward) -> Played:
+def play(
+    guarded: GuardedEnv, proposal: Proposal, actor: EpisodeActor, agent: EpisodeActor, reward: TrainingReward
+) -> PlayedEpisode:
     """Plays a proposed episode, which the guard knows of: Algorithm 1, lines 5 to 20.
 
     Args:
@@ -214,8 +216,8 @@ def play(guarded: GuardedEnv, proposal: Proposal, actor: Actor, agent: Actor, re
     except Unplayable as unplayable:
         why = unplayable.outcome, unplayable.reason
         if not unplayable.begun:  # the environment's trace is of the episode before
-            return Played(sums=sums, unplayable=why)
-        return Played(sums=sums, unplayable=why, **_facts(env, sums), cpu_s=cpu_s() - began_s)
+            return PlayedEpisode(sums=sums, unplayable=why)
+        return PlayedEpisode(sums=sums, unplayable=why, **_facts(env, sums), cpu_s=cpu_s() - began_s)
     results = env.requirement_results()
     encounter = Encounter(
         collision=info.get("collision"),
@@ -224,7 +226,7 @@ def play(guarded: GuardedEnv, proposal: Proposal, actor: Actor, agent: Actor, re
         encounters_s=env.trace.encounters_s(env.problem.family.adversaries),
         avoided_by=env.avoided_by() or {},
     )
-    return Played(
+    return PlayedEpisode(
         sums=sums,
         encounter=encounter,
         requirements=results,

@@ -22,7 +22,7 @@ from risk_sac.errors import RiskSacError, SimulationError
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder.crash_guard import PATIENCE, CrashGuard
 from risk_sac.search.agents.controls import control
-from risk_sac.search.playing import GuardedEnv, Played, Proposal, play
+from risk_sac.search.playing import GuardedEnv, PlayedEpisode, Proposal, play
 
 logger = logging.getLogger(__name__)
 
@@ -48,14 +48,14 @@ class Rollouts:
         self._spec, self._folder, self._most = spec.model_dump_json(), folder, most
         self._processes: list[RolloutProcess] = []
         self._waiting: deque[Proposal] = deque()
-        self._played: dict[int, Played] = {}
+        self._played: dict[int, PlayedEpisode] = {}
 
     def submit(self, proposal: Proposal) -> None:
         """Lets a process play a proposal, once one is free."""
         self._waiting.append(proposal)
         self._send()
 
-    def wait_for(self, index: int, at_most_s: float) -> Played | None:
+    def wait_for(self, index: int, at_most_s: float) -> PlayedEpisode | None:
         """Waits for an episode; returns None if it is not played after `at_most_s`.
 
         Raises:

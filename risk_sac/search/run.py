@@ -21,7 +21,7 @@ from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import sha256
 from risk_sac.run_folder.results import EPISODES, FAILURES, records_from_lines, series_name
 from risk_sac.run_folder.series import write_series
-from risk_sac.search.playing import Played, Proposal
+from risk_sac.search.playing import PlayedEpisode, Proposal
 from risk_sac.search.searchers import Searchers
 from risk_sac.verdicts.judge import DEFINITIONS
 from risk_sac.world.jit import cpu_s
@@ -85,6 +85,11 @@ class RunState:
         self.rollouts_cpu_s = 0.0
 
     @property
+    def in_rounds(self) -> bool:
+        """Whether several episodes are asked for at a time."""
+        return self.spec.budget.batch > 1 and not self.searchers.one_at_a_time
+
+    @property
     def finished(self) -> bool:
         """Whether the budget is spent."""
         return self.spent and not self.proposed
@@ -124,7 +129,7 @@ class RunState:
         """Steps of all episodes so far."""
         return self.records[-1].environment_steps if self.records else 0
 
-    def add(self, record: EpisodeRecord, played: Played) -> RunMetrics:
+    def add(self, record: EpisodeRecord, played: PlayedEpisode) -> RunMetrics:
         """Adds an episode that was played, and writes its record and the time series of a violation.
 
         Returns:
@@ -133,7 +138,7 @@ class RunState:
         if played.series is not None:
             file = self._folder / FAILURES / series_name(record.index)
             self.series[record.index] = write_series(file, played.series)
-        if self.spec.budget.batch > 1:
+        if self.in_rounds:
             self.rollouts_cpu_s += played.cpu_s
         self.records.append(record)
         self._append(record)

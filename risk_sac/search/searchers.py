@@ -163,6 +163,11 @@ class Searchers:
         return self._space.from_unit(point[:size]), point[size:]
 
     @property
+    def one_at_a_time(self) -> bool:
+        """Whether each episode has to be told before the next is asked for: learners learn from it."""
+        return isinstance(self.agent, Learner) or self._own.sampler.one_at_a_time
+
+    @property
     def points(self) -> int | None:
         """Number of scenes of a method that plays each once; None: it has no end."""
         return self._own.sampler.points

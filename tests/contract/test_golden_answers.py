@@ -126,7 +126,12 @@ def test_every_choice_that_is_documented_is_accepted_and_no_other(client, monkey
     assert seen > 50
 
 
-TESTED_APART = ("spec", "matrix", "cases", "signed")  # parts of a report; the digest differs with each change of the code
+TESTED_APART = (
+    "spec",
+    "matrix",
+    "cases",
+    "signed",
+)  # parts of a report; the digest differs with each change of the code
 
 
 def shown(response: httpx.Response) -> dict[str, Any]:

@@ -80,6 +80,15 @@ def test_a_batch_of_one_is_played_in_this_process(tmp_path: Path) -> None:
     assert not (tmp_path / "rollouts").exists()
 
 
+@pytest.mark.parametrize("method", ["risk-sac", "rate"])
+def test_methods_that_need_each_outcome_play_one_at_a_time(tmp_path: Path, method: RunMethod) -> None:
+    digests = {
+        execute_run(spec(method, 3, batch=batch), tmp_path / str(batch), Listener()).digest for batch in (1, BATCH)
+    }
+    assert len(digests) == 1
+    assert not (tmp_path / str(BATCH) / "rollouts").exists()
+
+
 def test_a_round_is_not_many_times_the_same(tmp_path: Path, processes) -> None:
     processes(2)
     listener = Listener()

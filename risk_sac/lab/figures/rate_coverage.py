@@ -57,7 +57,7 @@ ANALYTIC: Mapping[str, Analytic] = {
 }
 
 
-class Case(NamedTuple):
+class RatedEgo(NamedTuple):
     """An ego in a scenario."""
 
     family: str
@@ -74,9 +74,9 @@ class Case(NamedTuple):
         return RunSpec(family=self.family, method="rate", seed=0, ego=self.ego)
 
 
-CASES = (
-    Case("cyclist_ahead", EgoConfig(driver="idm-aeb", defects=("weak-brakes",))),
-    Case("left_turn_car", EgoConfig(driver="idm-aeb")),
+RATED_EGOS = (
+    RatedEgo("cyclist_ahead", EgoConfig(driver="idm-aeb", defects=("weak-brakes",))),
+    RatedEgo("left_turn_car", EgoConfig(driver="idm-aeb")),
 )
 
 
@@ -165,7 +165,7 @@ def _row(seed: int, estimate: RateEstimate) -> list[object]:
     return [seed, *("" if (value := getattr(estimate, name)) is None else value for name in ESTIMATE[1:])]
 
 
-class Coverage(NamedTuple):
+class IntervalCoverage(NamedTuple):
     """A row of the table."""
 
     problem: str
@@ -178,13 +178,13 @@ class Coverage(NamedTuple):
     width: float  # mean width of the intervals over that of Wilson's with 20,000 plain draws
 
 
-def coverage(problem: str, rate: float, plain_draws: int, rows: Sequence[Sequence[str]]) -> Coverage:
+def coverage(problem: str, rate: float, plain_draws: int, rows: Sequence[Sequence[str]]) -> IntervalCoverage:
     """Summarises repetitions."""
     told = [tuple(map(float, row[1:4])) for row in rows if row[1]]
     low, high = wilson_interval(round(rate * PLAIN_DRAWS), PLAIN_DRAWS)
     if not told:
-        return Coverage(problem, rate, plain_draws, len(rows), 0, math.nan, math.nan, math.nan)
-    return Coverage(
+        return IntervalCoverage(problem, rate, plain_draws, len(rows), 0, math.nan, math.nan, math.nan)
+    return IntervalCoverage(
         problem,
         rate,
         plain_draws,
@@ -199,12 +199,12 @@ def coverage(problem: str, rate: float, plain_draws: int, rows: Sequence[Sequenc
 def write_table(out: Path) -> None:
     """Writes OUT/coverage.csv of what is there."""
     table = [coverage(name, problem.rate, 0, _rows(out / f"{name}.csv")) for name, problem in ANALYTIC.items()]
-    for case in CASES:
+    for case in RATED_EGOS:
         draws = _rows(out / f"plain-{case.name}.csv")
         played, failed = sum(row[1] == "1" for row in draws), sum(row[2] == "1" for row in draws)
         if failed:
             table.append(coverage(case.name, failed / played, played, _rows(out / f"rates-{case.name}.csv")))
-    lines = [",".join(Coverage._fields)]
+    lines = [",".join(IntervalCoverage._fields)]
     lines += [",".join(f"{value:.4g}" if isinstance(value, float) else str(value) for value in row) for row in table]
     replace_file(out / "coverage.csv", ("\n".join(lines) + "\n").encode())
     print("\n".join(lines), flush=True)
@@ -224,7 +224,7 @@ def main() -> None:
         rows = (_row(seed, repeated(problem, seed)) for seed in range(len(_rows(file)), options.repetitions))
         _add(file, ESTIMATE, rows, options.repetitions)
     rounds = max(-(-options.plain // ROUND), options.ego_repetitions)
-    for number, case in ((number, case) for number in range(1, rounds + 1) for case in CASES):
+    for number, case in ((number, case) for number in range(1, rounds + 1) for case in RATED_EGOS):
         with closing(RiskSacEnv.of(case.spec)) as env:
             file = options.out / f"plain-{case.name}.csv"
             header = ("number", "played", "failed", "least_margin", *env.problem.space.names)

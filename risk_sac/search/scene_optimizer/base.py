@@ -15,7 +15,7 @@ from torch.quasirandom import SobolEngine
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
 from risk_sac.records import DrivenBy
-from risk_sac.scenario.declared import Declared
+from risk_sac.scenario.declared import SceneLaw
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.world.types import Floats
 
@@ -87,6 +87,7 @@ class SceneOptimizer(ABC):
 
     kind: ClassVar[str]
     tries: ClassVar[int] = 1000  # further points that it may be asked for where one breaks the scenario's constraints
+    one_at_a_time: ClassVar[bool] = False  # whether it has to be told of each point before it is asked for the next
     points: int | None = None  # number of different ones; None: there is no end
     driven_by: DrivenBy | None = None
     out: Sequence[Floats] = ()
@@ -209,7 +210,7 @@ class IidSampler(SobolOptimizer):
     kind = "iid"
 
     def __init__(
-        self, dimension: int, config: SceneOptimizerConfig, seed: int, declared: Declared | None = None
+        self, dimension: int, config: SceneOptimizerConfig, seed: int, declared: SceneLaw | None = None
     ) -> None:
         """Prepares; without a declared distribution all points are as likely."""
         super().__init__(dimension, config, seed)

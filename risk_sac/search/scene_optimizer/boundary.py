@@ -27,6 +27,7 @@ class BoundarySampler(SceneOptimizer):
     """
 
     kind = "boundary"
+    one_at_a_time = True  # the most ambiguous point is the same until it is told
     tries = 0  # its candidates keep the constraints
 
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int, slice_: Slice) -> None:

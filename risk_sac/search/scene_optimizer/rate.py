@@ -8,7 +8,7 @@ import numpy as np
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.rates.record import stages_of
 from risk_sac.rates.stages import Draws, draws_of
-from risk_sac.scenario.declared import Declared
+from risk_sac.scenario.declared import SceneLaw
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.search.scene_optimizer.base import SceneOptimizer, State
 from risk_sac.world.types import Floats
@@ -21,9 +21,10 @@ class RateSampler(SceneOptimizer):
     """
 
     kind = "rate"
+    one_at_a_time = True  # a stage's proposal is fitted to all draws before it
     tries = 0  # a point that breaks a constraint is refused and counted, so that the weights of the others hold
 
-    def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int, declared: Declared, draws: int) -> None:
+    def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int, declared: SceneLaw, draws: int) -> None:
         """Prepares the stages.
 
         Args:

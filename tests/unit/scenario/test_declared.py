@@ -7,7 +7,7 @@ from scipy import stats
 from risk_sac.config.distribution import RankCorrelation
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.errors import ConfigError
-from risk_sac.scenario.declared import Declared
+from risk_sac.scenario.declared import SceneLaw
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 PARAMETERS = {
@@ -29,7 +29,7 @@ def space_of(**bounds):
 
 @pytest.fixture(scope="module")
 def samples():
-    declared = Declared.of(space_of(), PARAMETERS, CORRELATED)
+    declared = SceneLaw.of(space_of(), PARAMETERS, CORRELATED)
     normal = np.random.default_rng(0).standard_normal((4000, len(PARAMETERS)))
     return declared, normal, np.array([declared.point(one) for one in normal])
 
@@ -57,14 +57,14 @@ def test_a_scene_tells_the_normal_numbers_that_it_was_drawn_from(samples):
 
 
 def test_without_distributions_shares_are_points():
-    declared = Declared.of(space_of(), {"speed": PARAMETERS["speed"]}, None)
+    declared = SceneLaw.of(space_of(), {"speed": PARAMETERS["speed"]}, None)
     shares = np.array([0.1, 0.2, 0.3, 0.4, 0.5])
     assert declared.alike
     assert declared.unit(shares) is shares
 
 
 def test_the_distribution_is_truncated_to_what_the_odd_leaves():
-    declared = Declared.of(space_of(gap=(4, 5)), PARAMETERS, None)
+    declared = SceneLaw.of(space_of(gap=(4, 5)), PARAMETERS, None)
     drawn = np.array([declared.unit(shares)[0] for shares in np.random.default_rng(1).random((2000, 5))])
     assert stats.kstest(4 + drawn, stats.truncnorm(0.5, 1.0, loc=3, scale=2).cdf).pvalue > 0.01
 
@@ -72,7 +72,7 @@ def test_the_distribution_is_truncated_to_what_the_odd_leaves():
 def test_an_odd_without_mass_is_refused():
     narrow = {"gap": ScenarioParameter(range=(0, 100), distribution={"kind": "normal", "mean": 3, "deviation": 1})}
     with pytest.raises(ConfigError) as caught:
-        Declared.of(space_of(gap=(60, 100)), narrow, None)
+        SceneLaw.of(space_of(gap=(60, 100)), narrow, None)
     assert caught.value.field == "parameters.gap.distribution"
 
 
@@ -81,6 +81,6 @@ def test_density_is_that_of_the_samples(samples):
     inside = (points[:, [0, 3]] > 0.3).all(axis=1) & (points[:, [0, 3]] < 0.5).all(axis=1)
     steps = np.linspace(0.31, 0.49, 10)
     grid = np.array([[gap, 0.2, 0.9, speed, 0.0] for gap in steps for speed in steps])
-    pair = Declared(declared.axes, RankCorrelation(parameters=("speed", "gap"), spearman=((1, -0.6), (-0.6, 1))))
+    pair = SceneLaw(declared.axes, RankCorrelation(parameters=("speed", "gap"), spearman=((1, -0.6), (-0.6, 1))))
     density = np.mean([pair.density(one) for one in grid]) / pair.axes[2].density(0.9)
     assert inside.mean() == pytest.approx(density * 0.04, rel=0.15)
