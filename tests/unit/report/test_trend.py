@@ -2,7 +2,7 @@
 
 import pytest
 
-from risk_sac.config import CampaignSpec, RunSpec
+from risk_sac.config import CampaignSpec
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval
 from risk_sac.records import RequirementCounts
@@ -123,7 +123,6 @@ def _counts(valid: int) -> RequirementCounts:
 
 
 def test_areas_are_those_beside_published_drivers():
-    spec = RunSpec(family="low", method="random", seed=0)
     share = BoxShare(share=0.2, low=0.1, high=0.3)
     axis = BoundaryAxis(name="gap_m", unit="m", meaning="", low=0.0, high=1.0, levels=(0.0, 1.0), has_effect=True)
     told = {"judged": True, "episodes": 9, "always": None, "probability": (), "deviation": (), "fails": share}
@@ -131,7 +130,18 @@ def test_areas_are_those_beside_published_drivers():
         DriverMap(name=name, ego_fails_alone=None if name == "ego" else share, **told)
         for name in ("ego", "r157", "idm-aeb")
     )
-    found = BoundaryMap(spec=spec, axes=(axis, axis), fixed={}, points=(), refused=0, maps=maps, notes=())
+    settings = BoundaryConfig(over=("gap_m", "speed_mps"))
+    found = BoundaryMap(
+        family="low",
+        ego=EgoConfig(),
+        settings=settings,
+        axes=(axis, axis),
+        fixed={},
+        points=(),
+        refused=0,
+        maps=maps,
+        notes=(),
+    )
     (row,) = trend([ended_campaign("1.3", boundary=found)]).rows
     (area,) = row.points[0].areas
     assert (area.driver, area.family, area.parameters) == ("r157", "low", ("gap_m", "gap_m"))
