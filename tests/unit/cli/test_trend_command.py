@@ -52,7 +52,7 @@ def test_the_table_marks_what_cannot_be_compared_and_fits_80_columns(tmp_path, c
     assert [line for line in lines if len(line) > 80 and unfinished not in line] == []
     (marker,) = (at for at, line in enumerate(lines) if "definitions 1 → 2" in line)
     assert any(line.lstrip().startswith("2.0") for line in lines[marker:])
-    assert any(line.startswith("Left out") and unfinished in line for line in lines)
+    assert unfinished in "".join(lines).partition("Left out")[2]  # a long path is wrapped
 
 
 @pytest.mark.parametrize("folders", [("low", "dense"), ("dense", "low")])
