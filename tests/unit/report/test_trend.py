@@ -2,7 +2,8 @@
 
 import pytest
 
-from risk_sac.config import CampaignSpec
+from risk_sac.config import CampaignSpec, EgoConfig
+from risk_sac.config.boundary import BoundaryConfig
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval
 from risk_sac.records import RequirementCounts
