@@ -20,7 +20,7 @@ from risk_sac.report.trend import (
     check_scenarios,
     trend,
 )
-from risk_sac.run_folder.results import read_boundary_map, read_verified, with_headline
+from risk_sac.run_folder.results import read_boundary_map, read_rates, read_verified, with_headline
 
 
 def add(commands: Commands) -> None:
@@ -67,6 +67,7 @@ def trend_of_folders(folders: Sequence[Path]) -> Trend:
                     phases=tuple(phase for phase in (told.metrics, told.evaluation) if phase is not None),
                     versions=told.versions or {},
                     boundary=read_boundary_map(path),
+                    rates=read_rates(path),
                 )
             )
         done = {result.spec.digest for result in results.values() if result.finished}

@@ -7,6 +7,7 @@ from pathlib import Path
 from risk_sac.config import RunSpec, method_of
 from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
+from risk_sac.rates.record import METHOD, write_rates
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import set_aside
@@ -17,6 +18,7 @@ from risk_sac.run_folder.results import (
     RunResults,
     read_results,
     read_verified,
+    records_from_lines,
     with_headline,
     write_results,
 )
@@ -81,6 +83,8 @@ class Recorder:
             from risk_sac.search.boundary_map import read_boundary
 
             write_boundary(self._folder, read_boundary(self._folder, {}))
+        if summary.finished and results.spec.method == METHOD:
+            write_rates(self._folder, results.spec, records_from_lines((self._folder / EPISODES).read_bytes()))
         return self.results
 
     def _write(self, results: RunResults) -> None:

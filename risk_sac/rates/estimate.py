@@ -10,7 +10,7 @@ import numpy as np
 
 from risk_sac.metrics import clopper_pearson
 from risk_sac.rates.proposal import DECLARED
-from risk_sac.records import Record
+from risk_sac.records.rates import HourlyRate, RateEstimate
 from risk_sac.world.types import Floats
 
 Flags = np.typing.NDArray[np.bool_]
@@ -19,38 +19,6 @@ MOST_OF_ONE = 0.25  # share of the estimate that one draw may have; choice
 MOST_DECLARED = 0.5  # share of the estimate that draws of the declared distribution may have; choice
 MOST_ERRORS = 4.0  # standard errors by which the mean weight may differ from 1; choice
 CONFIDENCE = 0.95
-
-
-class HourlyRate(Record):
-    """Events in an hour, of a user's exposure."""
-
-    rate: float
-    low: float
-    high: float
-
-
-class RateEstimate(Record):
-    """How often the ego violates a requirement in scenes of the declared distribution that can be played."""
-
-    failures: int
-    """Among the draws, of which the proposal has many more than the declared distribution."""
-    rate: float | None
-    """In a scene; null: not estimated."""
-    low: float | None
-    """Of the 95 % interval."""
-    high: float | None
-    why: str
-    """Why it is not estimated; empty where it is."""
-    at_most: float
-    """One-sided 95 % bound that needs no checks, by the largest weight that a draw may have."""
-    effective_failures: float
-    """Number of failures of equal weight that would tell as much."""
-    largest_share: float
-    """Share of the estimate that a single draw has."""
-    declared_share: float
-    """Share of the estimate from draws of the declared distribution, where fitted proposals did not reach."""
-    per_hour: HourlyRate | None = None
-    """With the exposure; null without one, or without an estimate."""
 
 
 def estimated(weights: Floats, ratios: Floats, failed: Flags, played: Flags) -> RateEstimate:

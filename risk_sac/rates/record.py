@@ -1,6 +1,7 @@
 """Failure rates of a run of the method `rate`, from its records alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -8,46 +9,18 @@ from risk_sac.config import RunSpec
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
-from risk_sac.rates.estimate import RateEstimate, estimated, with_exposure
+from risk_sac.rates.estimate import estimated, with_exposure
 from risk_sac.rates.stages import Draws, Stages, draws_of
-from risk_sac.records import REPEATS, EpisodeRecord, Outcome, Record
+from risk_sac.records import REPEATS, EpisodeRecord, Outcome, wire
+from risk_sac.records.rates import ANY, DeclaredParameter, Rates
+from risk_sac.run_folder.durable import replace_file
+from risk_sac.run_folder.results import RATES
 from risk_sac.scenario.declared import SceneLaw
 from risk_sac.world.types import Scene
 
 METHOD = "rate"
-ANY = "failure"  # of any requirement that counts
-MEANING = "A rate of this scenario under these distributions, without an attack; not one of the road."
 UNKNOWN = frozenset({Outcome.REJECTED, Outcome.INVALID})
 MOST_PER_HOUR = 1e9
-
-
-class DeclaredParameter(Record):
-    """How a parameter is drawn."""
-
-    kind: str
-    """Of its distribution; `uniform` also where none is declared."""
-    source: str
-    """Publication; empty: a choice."""
-
-
-class Rates(Record):
-    """Failure rates of an ego in a scenario."""
-
-    run_id: str
-    meaning: str = MEANING
-    draws: int
-    """Episodes, of those that were asked for."""
-    asked: int
-    played: int
-    """All others were refused before the first step, or did not end: of these scenes nothing is said."""
-    scenes_per_hour: float | None
-    """The user's; null: none was stated."""
-    rates: Mapping[str, RateEstimate]
-    """`failure`, of any requirement that counts, and requirement → estimate."""
-    distributions: Mapping[str, DeclaredParameter]
-    """Parameter → how it is drawn."""
-    correlated: tuple[str, ...]
-    """Parameters with a rank correlation; all others are independent."""
 
 
 def stages_of(declared: SceneLaw, draws: int, seed: int) -> Stages:
@@ -91,6 +64,11 @@ def rates_of(spec: RunSpec, records: Sequence[EpisodeRecord], scenes_per_hour: f
         distributions={name: _said(problem.family.parameters.get(name)) for name in problem.space.names},
         correlated=() if correlation is None else correlation.parameters,
     )
+
+
+def write_rates(folder: Path, spec: RunSpec, records: Sequence[EpisodeRecord]) -> None:
+    """Writes the rates of a run that has ended to its folder; see `rates_of`."""
+    replace_file(folder / RATES, wire(rates_of(spec, records)))
 
 
 def rated(problem: Problem) -> tuple[str, ...]:

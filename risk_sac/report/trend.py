@@ -16,6 +16,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.metrics import pooled_headline, pooled_published, pooled_requirements, wilson_interval
 from risk_sac.records import Real, Record, RequirementCounts, RunMetrics
 from risk_sac.records.boundary import BoundaryMap
+from risk_sac.records.rates import ANY, Rates
 
 SOFTWARE = ("definitions", "risk-sac", "libsumo")
 """What results rest on beside the terms; a change of one of these ends a line."""
@@ -33,6 +34,7 @@ class EndedRun:
     phases: tuple[RunMetrics, ...]  # search and evaluation, or the i.i.d. phase
     versions: Mapping[str, str]
     boundary: BoundaryMap | None = None  # of the method `boundary`
+    rates: Rates | None = None  # of the method `rate`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,11 +48,11 @@ class EndedCampaign:
 
 
 class TrendRate(Record):
-    """Share of freshly drawn scenes in which the ego fails, in one scenario and kind of traffic."""
+    """How often the ego fails in freshly drawn scenes, in one scenario and kind of traffic."""
 
     family: str
     method: str
-    """What draws: `iid-undisturbed` or `iid-random`."""
+    """What draws: `iid-undisturbed` or `iid-random`; or `rate`, whose draws are weighted."""
     requirement: str | None
     """Null: any requirement that counts."""
     count: int
@@ -59,7 +61,7 @@ class TrendRate(Record):
     """Episodes; refused scenes are none."""
     rate: Real
     low: Real
-    """95 % interval of Wilson."""
+    """95 % interval: Wilson's, or that of weighted draws."""
     high: Real
 
 
@@ -111,7 +113,7 @@ class TrendPoint(Record):
     requirements: Mapping[str, RequirementCounts]
     """Requirement → its funnel, summed over the searches; its rate is one of a search."""
     rates: tuple[TrendRate, ...]
-    """Of the i.i.d. phase; none without one."""
+    """Of the i.i.d. phase and of the method `rate`; none without either."""
     areas: tuple[TrendArea, ...]
     """Of runs of the method `boundary`; none without one."""
 
@@ -253,7 +255,10 @@ def _point(campaigns: Sequence[EndedCampaign]) -> TrendPoint:
         gone=None,
         returned=None,
         requirements=pooled_requirements(searched),
-        rates=tuple(rate for run in newest.runs if run.iid for phase in run.phases for rate in _rates(run, phase)),
+        rates=(
+            *(rate for run in newest.runs if run.iid for phase in run.phases for rate in _rates(run, phase)),
+            *(rate for run in newest.runs if run.rates is not None for rate in _weighted(run, run.rates)),
+        ),
         areas=tuple(area for run in newest.runs if run.boundary is not None for area in _areas(run.boundary)),
     )
 
@@ -295,6 +300,22 @@ def _rates(run: EndedRun, phase: RunMetrics) -> Iterator[TrendRate]:
             low=low,
             high=high,
         )
+
+
+def _weighted(run: EndedRun, rates: Rates) -> Iterator[TrendRate]:
+    """Rates from weighted draws, without those that were not estimated."""
+    for name, told in rates.rates.items():
+        if told.rate is not None and told.low is not None and told.high is not None:
+            yield TrendRate(
+                family=run.family,
+                method=run.method,
+                requirement=None if name == ANY else name,
+                count=told.failures,
+                played=rates.played,
+                rate=told.rate,
+                low=told.low,
+                high=told.high,
+            )
 
 
 def _areas(boundary: BoundaryMap) -> Iterator[TrendArea]:

@@ -5,6 +5,7 @@ episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is form
 failures/       the time series of every failure, see `risk_sac.run_folder.series`
 verified.json   which failures repeated, see `risk_sac.run_folder.results`; sealed
 boundary.json   the map of a run of the method `boundary`, once it has ended; boundary.png draws it
+rates.json      the failure rates of a run of the method `rate`, once it has ended
 studies/        cores and regions that were asked for, see `risk_sac.failures.studied`
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """
@@ -19,13 +20,14 @@ from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import REPEATS, Adjustment, DrivenBy, EpisodeId, EpisodeRecord, Repetition, RunMetrics
 from risk_sac.records.boundary import BoundaryMap
+from risk_sac.records.rates import Rates
 from risk_sac.run_folder.durable import read_sealed, write_sealed
 from risk_sac.verdicts.distinct import variant_name
 
 RESULTS = "results.json"
 EPISODES = "episodes.jsonl"
 FAILURES = "failures"
-BOUNDARY, BOUNDARY_PICTURE = "boundary.json", "boundary.png"
+BOUNDARY, BOUNDARY_PICTURE, RATES = "boundary.json", "boundary.png", "rates.json"
 
 
 def series_name(index: int) -> str:
@@ -209,6 +211,14 @@ def read_boundary_map(folder: Path) -> BoundaryMap | None:
     """Reads the map of a run of the method `boundary`; None where there is none, or it is damaged."""
     try:
         return BoundaryMap.model_validate_json((folder / BOUNDARY).read_bytes())
+    except (FileNotFoundError, ValidationError):
+        return None
+
+
+def read_rates(folder: Path) -> Rates | None:
+    """Reads the rates of a run of the method `rate`; None where there are none, or they are damaged."""
+    try:
+        return Rates.model_validate_json((folder / RATES).read_bytes())
     except (FileNotFoundError, ValidationError):
         return None
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from risk_sac.errors import ConfigError
 from risk_sac.records import State
 from risk_sac.report.trend import EndedCampaign, EndedRun, LeftOut, Trend, check_scenarios, driver_name, trend
-from risk_sac.run_folder.results import read_boundary_map
+from risk_sac.run_folder.results import read_boundary_map, read_rates
 from service.errors import OutdatedError
 from service.settings import ServiceSettings
 from service.store.reading import Store
@@ -53,6 +53,7 @@ def _ended(campaign: StoredCampaign, settings: ServiceSettings) -> EndedCampaign
             phases=tuple(phase for phase in (run.metrics, run.evaluation) if phase is not None),
             versions=run.versions,
             boundary=read_boundary_map(settings.run_folder(campaign.id, run.id)) if run.method == "boundary" else None,
+            rates=read_rates(settings.run_folder(campaign.id, run.id)) if run.method == "rate" else None,
         )
         for run in campaign.runs
     )

@@ -9,13 +9,17 @@ from risk_sac import cli
 from risk_sac.config import Budget, CampaignSpec, DynamicElements, EgoConfig, Iid, Interval, Odd, Requirement, RunSpec
 from risk_sac.env.problem import Problem, checked_campaign
 from risk_sac.errors import ConfigError
-from risk_sac.rates.record import ANY, rates_of
+from risk_sac.rates.record import rates_of, write_rates
 from risk_sac.records import EpisodeRecord, Outcome, stored
+from risk_sac.records.rates import ANY
+from risk_sac.report.trend import EndedCampaign, EndedRun, trend
+from risk_sac.run_folder.results import read_rates
 from risk_sac.scenario.library import VARIABLE, keep
 from risk_sac.scenario.reading import document_from
 from risk_sac.search.loop import execute_run
 from risk_sac.search.run import RunState
 from tests.listener import Listener
+from tests.versions import SOFTWARE
 
 SOURCE = "choice of this test"
 CLOSING = f"""
@@ -105,6 +109,20 @@ def test_an_exposure_that_is_none_is_refused(spec, whole, exposure):
     with pytest.raises(ConfigError) as caught:
         rates_of(spec, whole[1], exposure)
     assert caught.value.field == "exposure"
+
+
+def test_a_trend_has_the_rates_that_a_run_has_written(spec, whole, tmp_path):
+    write_rates(tmp_path, spec, whole[1])
+    rates = read_rates(tmp_path)
+    assert rates == rates_of(spec, whole[1])
+    known = rates.rates[ANY].model_copy(update={"rate": 0.02, "low": 0.01, "high": 0.04})
+    rates = rates.model_copy(update={"rates": {ANY: known}})
+    run = EndedRun(family=spec.family, method="rate", iid=False, phases=(), versions=SOFTWARE, rates=rates)
+    campaign = CampaignSpec(families=(spec.family,), methods=("rate",), ego=BLIND)
+    (row,) = trend([EndedCampaign(id="c1", spec=campaign, runs=(run,))]).rows
+    (rate,) = row.points[0].rates
+    assert (rate.method, rate.requirement, rate.rate, rate.low, rate.high) == ("rate", None, 0.02, 0.01, 0.04)
+    assert (rate.count, rate.played) == (known.failures, rates.played)
 
 
 def test_draws_of_another_method_have_no_weights(spec, whole):
