@@ -50,7 +50,7 @@ export function drawnIn({ points }: Row): string[] {
 }
 
 export function drawKey({ family, method }: Pick<Rate, "family" | "method">): string {
-  return `${family}, ${method === "iid-undisturbed" ? "undisturbed traffic" : method === "iid-random" ? "random adversaries" : method}`;
+  return `${family}, ${method === "iid-undisturbed" ? "undisturbed traffic" : method === "iid-random" ? "random adversaries" : "weighted draws"}`;
 }
 
 export function rateOf(point: Point, draw: string, requirement: string | null): Rate | undefined {
