@@ -107,7 +107,7 @@ def coverage_matrix(
         everything += played
         for record in played:
             failed = record.outcome is Outcome.FAILURE
-            for key in (*facts.cells(record.scene), *_bins(family, axes[family], record)):
+            for key in (*sorted(facts.cells(record.scene)), *_bins(family, axes[family], record)):
                 counts[key].add(family, failed=failed)
             _count_requirements(counts, family, record)
         pairs += _pairs(family, spec, played, id_)

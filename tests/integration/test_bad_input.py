@@ -26,7 +26,7 @@ def requirement(formula):
         ('{"families": []}', "families", "[]", "at least 1 entries"),
         ('{"families": ["low", "low"]}', "families", "['low', 'low']", "each value once"),
         (low(methods=["sca"]), "methods[0]", '"sca"', "'risk-sac'"),
-        (low(episodes=3), "episodes", "3", "one of budget, ego, families"),
+        (low(episodes=3), "episodes", "3", "one of boundary, budget"),
         (
             low(budget={"episods": 3}),
             "budget.episods",
