@@ -35,7 +35,7 @@ class Killer(Listener):
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         super().episode(record, metrics, series)
         if record.index in self.after:
-            processes = psutil.Process().children()
+            processes = [one for one in psutil.Process().children() if "risk_sac.search.rollouts" in one.cmdline()]
             processes[record.index % len(processes)].send_signal(signal.SIGKILL)
             self.killed += 1
 
