@@ -229,7 +229,7 @@ def test_it_needs_no_script_and_fits_a_phone(new_page: Callable[..., Page], serv
     page = new_page(PHONE, java_script_enabled=False)
     page.goto(address(service, campaign))
     expect(page.get_by_role("note")).to_contain_text(BANNER)
-    expect(page.get_by_role("heading", name="Coverage")).to_be_visible()
+    expect(page.get_by_role("heading", name="Coverage of scene parameters")).to_be_visible()
     box = page.locator("main").bounding_box()
     assert box is not None
     assert box["x"] + box["width"] <= PHONE["width"]

@@ -67,7 +67,8 @@ def kinds_of(table: dict[str, Any]) -> list[int]:
         fault = ["ego", "shared", "other", None].index(table["fault"][i])
         grade = ["preventable", "full_braking", "unavoidable", None].index(table["grade"][i])
         implausible = table["plausibility"][i] == "implausible"
-        return not table["headline"][i], implausible, severity, fault, grade, -(table["relative_speed_mps"][i] or 0), i
+        worst = implausible, -table["weight"][i], severity, fault, grade, -(table["relative_speed_mps"][i] or 0)
+        return not table["headline"][i], *worst, i
 
     kinds = {table["kind"][i] for i in valid_of(table)}
     return [min((i for i in valid_of(table) if table["kind"][i] == kind), key=order) for kind in kinds]
