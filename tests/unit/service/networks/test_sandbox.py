@@ -63,8 +63,8 @@ def test_a_checker_that_hangs_is_killed_with_its_children(tmp_path):
         "open('pid', 'w').write(str(child.pid)); time.sleep(60)"
     )
     began = time.monotonic()
-    assert refusal(tmp_path, code, wall_s=1) == "checking the upload takes more than 1 s; wanted a smaller network"
-    assert time.monotonic() - began < 10
+    assert refusal(tmp_path, code, wall_s=5) == "checking the upload takes more than 5 s; wanted a smaller network"
+    assert time.monotonic() - began < 30
     pid = int((tmp_path / "pid").read_text())
     for _ in range(600):
         if not Path(f"/proc/{pid}").exists() or "State:\tZ" in Path(f"/proc/{pid}/status").read_text():
