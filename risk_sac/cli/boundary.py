@@ -8,12 +8,11 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.console import EGO, INTERRUPTED, OK, print_answer, progress_bar, say_adjustments
-from risk_sac.cli.flags import add_scene_flags, named_ego, scene_flags
+from risk_sac.cli.flags import add_scene_flags, assignment, named_ego, scene_flags
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.cli.scenarios import kept_name
 from risk_sac.config.spec_file import read_spec
 from risk_sac.env.problem import adjustments
-from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import notes
 from risk_sac.records.boundary import BoundaryMap
 from risk_sac.run_folder.results import BOUNDARY_PICTURE
@@ -90,9 +89,7 @@ def _boundary(options: argparse.Namespace) -> int:
 
 
 def _fixed(text: str) -> tuple[str, float | str]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise ConfigError("--at", repr(text), "NAME=VALUE")
+    name, value = assignment(text)
     try:
         return name, float(value)
     except ValueError:

@@ -62,6 +62,18 @@ def budget_flags(options: argparse.Namespace) -> dict[str, Any]:
     return {name: getattr(options, name) for name in (*BUDGET, "all_points")}
 
 
+def assignment(text: str) -> tuple[str, str]:
+    """Splits a NAME=VALUE of `--at`.
+
+    Raises:
+      ConfigError: it has no equals sign.
+    """
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise ConfigError("--at", repr(text), "NAME=VALUE")
+    return name, value
+
+
 def add_scene_flags(parser: Parser) -> None:
     """Adds the flags that name the ego and how its adversaries behave."""
     scene = parser.group("scene")

@@ -8,8 +8,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from risk_sac.cli.console import OK, print_answer, write_out
+from risk_sac.cli.flags import assignment
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
-from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import notes
 from risk_sac.report.grid import STANDARDS, PlayedGrid, StandardVerdict, grid_csv, played_grids, varied_axes
 from risk_sac.report.grid_junit import grid_junit
@@ -48,17 +48,10 @@ def _grid(options: argparse.Namespace) -> int:
         from risk_sac.report.grid_picture import grid_png  # here, because loading matplotlib takes a second
 
         over = (options.over[0], options.over[1]) if options.over else varied_axes(grids)
-        content = grid_png(grids, over, dict(map(_fixed, options.at)))
+        content = grid_png(grids, over, dict(map(assignment, options.at)))
         write_out(options.picture, content, "Picture", notes)
     print_answer(options, list(grids), _table(grids))
     return OK
-
-
-def _fixed(text: str) -> tuple[str, str]:
-    name, equals, value = text.partition("=")
-    if not equals:
-        raise ConfigError("at", repr(text), "NAME=VALUE")
-    return name, value
 
 
 def _table(grids: Sequence[PlayedGrid]) -> Table:

@@ -184,7 +184,7 @@ class Client:
         return self._get(Results, f"{_path(campaign_id)}/results")
 
     def boundary(self, campaign_id: str, run_id: str) -> BoundaryMap:
-        """Where the ego of a run of the method `boundary` goes from passing to failing."""
+        """Returns where a run of the method `boundary` goes from passing to failing."""
         return self._get(BoundaryMap, f"{_path(campaign_id)}/runs/{_part(run_id)}/boundary")
 
     def power(self, campaign_id: str) -> Power:
@@ -258,7 +258,10 @@ class Client:
         return self._transport.ask("GET", f"{_path(campaign_id)}/table", query={"format": format_}).text
 
     def rates(self, campaign_id: str, exposure: float | None = None) -> str:
-        """Failure rates of the finished runs of the method `rate`, as JSON; per hour with so many scenes in one."""
+        """Returns failure rates of finished runs of the method `rate`, as JSON.
+
+        With an exposure, scenes in an hour, they are per hour, too.
+        """
         query = {"exposure": None if exposure is None else str(exposure)}
         return self._transport.ask("GET", f"{_path(campaign_id)}/rates", query=query).text
 

@@ -227,10 +227,8 @@ class Problem:
             return
         searched = self.slice_of(spec)
         searched.check()
-        known, wanted = (
-            [each.name for each in self.requirements if each.counts == "failure"],
-            searched.config.requirement,
-        )
+        known = [each.name for each in self.requirements if each.counts == "failure"]
+        wanted = searched.config.requirement
         if wanted and wanted not in known:
             hint = did_you_mean(wanted, known)
             raise ConfigError("boundary.requirement", repr(wanted), f"one of {', '.join(known)}", hint)

@@ -8,6 +8,8 @@ import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
+from risk_sac.errors import ConfigError
+
 UNWRITABLE = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR, errno.EEXIST)
 """Errors of a folder that cannot be made or written, whatever room there is."""
 NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EBADF)
@@ -29,8 +31,17 @@ ROLLOUTS = "RISK_SAC_ROLLOUTS"
 
 
 def rollout_processes() -> int:
-    """Returns how many processes may play the episodes of one run: RISK_SAC_ROLLOUTS, or one per processor."""
-    return max(1, int(os.environ.get(ROLLOUTS) or cores()))
+    """Returns how many processes may play the episodes of one run.
+
+    Raises:
+      ConfigError: RISK_SAC_ROLLOUTS is no positive integer.
+    """
+    given = os.environ.get(ROLLOUTS)
+    if not given:
+        return cores()
+    if not given.isdecimal() or int(given) < 1:
+        raise ConfigError(ROLLOUTS, repr(given), "an integer, 1 or more", "leave it out for one per processor")
+    return int(given)
 
 
 def rollouts_each(workers: int) -> Mapping[str, str]:

@@ -90,8 +90,11 @@ class Slice:
             raise ConfigError(f"boundary.at.{name}", repr(given), f"{parameter.low:g} to {parameter.high:g}")
         return float(given)
 
+    @cached_property
+    def _law(self) -> SceneLaw:
+        return SceneLaw.of(self.space, self.parameters, None)
+
     def _drawn(self, name: str, share: float) -> float:
         """The value at a share of the parameter's distribution, within the space."""
-        column = self.space.names.index(name)
-        axis = SceneLaw.of(self.space, self.parameters, None).axes[column]
+        axis = self._law.axes[self.space.names.index(name)]
         return axis.low + axis.unit(share) * (axis.high - axis.low)

@@ -17,7 +17,7 @@ from risk_sac.search.playing import GuardedEnv, PlayedEpisode, Proposal, play
 from risk_sac.search.rollouts import Rollouts
 from risk_sac.search.run import RunOutcome, RunState
 
-ROLLOUTS = "rollouts"  # folder of what rollout processes note
+ROLLOUT_FOLDER = "rollouts"  # folder of what rollout processes note
 ROUNDS_OUT = 2  # rounds that are asked for and not told
 POLL_S = 0.2
 
@@ -91,7 +91,7 @@ def rounds(run: RunState, folder: Path, observer: Observer) -> Iterator[RunMetri
     slowest episode of a round, and the result depends neither on their number nor on their speed.
     """
     batch = run.spec.budget.batch
-    with closing(Rollouts(run.spec, folder / ROLLOUTS, min(batch, rollout_processes()))) as rollouts:
+    with closing(Rollouts(run.spec, folder / ROLLOUT_FOLDER, min(batch, rollout_processes()))) as rollouts:
         for proposal in run.proposed:  # an earlier process has asked for them
             rollouts.submit(proposal)
         while not observer.should_stop():

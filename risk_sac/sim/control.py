@@ -145,6 +145,7 @@ class Adversaries:
         self._order = family.adversaries
         self._slot = {id_: k for k, id_ in enumerate(self._order)}
         self._ids: tuple[str, ...] = ()
+        self._statics = int(np.count_nonzero(frame.role == int(Role.STATIC)))  # they never leave
 
     def command(self, action: Sequence[float], frame: Frame, sim: SumoSimulation) -> None:
         """Sends one joint action, two entries per adversary in the family's order; `frame` is the latest."""
@@ -152,12 +153,12 @@ class Adversaries:
         rows = dict(zip(frame.ids, range(len(frame.ids)), strict=True))
         intended = sim.intended_accel()
         vehicles = {}
-        slot, statics = self._slot, int(np.count_nonzero(frame.role == int(Role.STATIC)))
+        slot = self._slot
         for id_, control in self._vehicles.items():
             place, k = sim.place(id_), slot[id_]
             if place is not None:
                 others = frame.state, rows[id_]
-                vehicles[id_] = control.step(first[k], second[k], *place, intended[id_], others, statics)
+                vehicles[id_] = control.step(first[k], second[k], *place, intended[id_], others, self._statics)
         walkers = {
             id_: control.step(first[slot[id_]], second[slot[id_]], (frame.state, rows[id_]))
             for id_, control in self._pedestrians.items()

@@ -11,7 +11,8 @@ import psutil
 import pytest
 
 from risk_sac.config import Budget, RunMethod, RunSpec
-from risk_sac.host.machine import ROLLOUTS
+from risk_sac.errors import ConfigError
+from risk_sac.host.machine import ROLLOUTS, rollout_processes
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import FAILURES
 from risk_sac.search.loop import execute_run
@@ -87,6 +88,14 @@ def test_methods_that_need_each_outcome_play_one_at_a_time(tmp_path: Path, metho
     }
     assert len(digests) == 1
     assert not (tmp_path / str(BATCH) / "rollouts").exists()
+
+
+@pytest.mark.parametrize("number", ["0", "-2", "two"])
+def test_a_number_of_processes_that_is_none_is_refused(processes, number: str) -> None:
+    processes(number)
+    with pytest.raises(ConfigError) as refused:
+        rollout_processes()
+    assert refused.value.field == ROLLOUTS
 
 
 def test_a_round_is_not_many_times_the_same(tmp_path: Path, processes) -> None:
