@@ -24,6 +24,7 @@ from risk_sac.report.scene_facts import SceneFacts
 from risk_sac.report.signing import sha256
 from risk_sac.report.standards import CLAUSES, functional_of
 from risk_sac.scenario.families import document_named, family_named, sources_named
+from risk_sac.scenario.layout import LEAD_IN_S
 from risk_sac.scenario.odd import field, paths
 from risk_sac.world.types import STEP_S
 
@@ -112,7 +113,7 @@ def reported_cases(
             odd={path: allowed(field(facts.odd, path)) for path in paths(facts.odd)},
             inputs=tuple(_inputs(document, facts)),
             constraints=tuple(map(str, document.constraints)),
-            steps=tuple(_steps(spec, name)),
+            steps=tuple(_steps(spec, name, document)),
             platform=_versions(runs),
             pass_criteria=criteria,
             result=_result(searches, records, criteria),
@@ -184,10 +185,11 @@ def _inputs(document: Scenario, facts: SceneFacts) -> Iterator[CaseInput]:
         )
 
 
-def _steps(spec: CampaignSpec, name: FamilyName) -> Iterator[str]:
+def _steps(spec: CampaignSpec, name: FamilyName, document: Scenario) -> Iterator[str]:
     methods = "; ".join(f"{method}: {method_of(method).summary}" for method in spec.methods)
     yield "Choose the inputs of a scene within their ranges; refuse it if it breaks a constraint or cannot be played."
-    yield "Place all actors; SUMO drives them for 1.5 s."
+    told = "the scenario's story begins at once" if document.story else f"SUMO drives them for {LEAD_IN_S:g} s"
+    yield f"Place all actors; {told}."
     yield f"Release the ego and the adversaries. Methods: {methods}"
     yield f"Monitor the pass criteria every {STEP_S:g} s."
     yield f"End at a contact, or after {family_named(name).horizon_steps * STEP_S:g} s."

@@ -6,11 +6,13 @@ import pytest
 
 from risk_sac.config import Requirement
 from risk_sac.config.distribution import HistogramLaw, NormalLaw, WeightsLaw
+from risk_sac.config.story import Story
 from risk_sac.records import Outcome, TriageState
 from risk_sac.report import compare
 from risk_sac.report.evidence import CampaignEvidence, CampaignFacts, gathered
-from risk_sac.report.reported_cases import law_in_words
+from risk_sac.report.reported_cases import _steps, law_in_words
 from risk_sac.report.standards import CLAUSES
+from risk_sac.scenario.families import document_named
 
 CONTACT = Requirement(name="no_contact", formula="vehicle_gap_m > 0")
 TTC = Requirement(name="safe_ttc", formula="encounter_s >= 1.5", counts="report")
@@ -34,6 +36,14 @@ def test_a_case_names_its_scenario_platform_criteria_and_judges(case, spec):
     assert case.odd["scenery.lanes"] == "3"
     friction = next(one for one in case.inputs if one.name == "friction")
     assert (friction.low, friction.high, friction.distribution, friction.declared) == (0.6, 1.0, "uniform", False)
+
+
+@pytest.mark.parametrize(
+    ("story", "begins"), [(Story(), "the scenario's story begins at once"), (None, "SUMO drives them for 1.5 s")]
+)
+def test_the_lead_in_is_that_of_the_scenario(spec, story, begins):
+    document = document_named("low").model_copy(update={"story": story})
+    assert list(_steps(spec, "low", document))[1] == f"Place all actors; {begins}."
 
 
 def test_the_result_counts_the_searches_alone(case, runs):
