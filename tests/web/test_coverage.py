@@ -86,6 +86,7 @@ def page(new_page: Callable[..., Page], service: Service) -> Callable[..., Page]
         page = new_page(**options)
         page.route("**/v1/coverage*", answer)
         page.goto(f"{service.client.base_url}/page/#/coverage{query}")
+        expect(page.locator("section[data-group='bodies']")).to_be_visible()
         return page
 
     return open_at
@@ -118,7 +119,7 @@ def test_one_state_alone_can_be_shown(page: Callable[..., Page]) -> None:
 
 def test_two_parameters_are_shown_together(page: Callable[..., Page]) -> None:
     cells = page().get_by_role("region", name="Coverage of two parameters").locator("td")
-    assert [text.strip() for text in cells.all_inner_texts()] == ["2 of 4", "–", "0 of 3", "1 of 2"]
+    expect(cells).to_have_text(["2 of 4", "–", "0 of 3", "1 of 2"])
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
