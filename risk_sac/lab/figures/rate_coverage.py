@@ -1,15 +1,18 @@
 """Measures how often intervals of failure rates cover the true rate, and how wide they are.
 
     python -m risk_sac.lab.figures.rate_coverage OUT [--repetitions 500] [--plain 100000] [--ego-repetitions 50]
+        [--egos NAME ...]
 
 Three analytic problems, whose rate is exact, and two egos, whose rate plain draws tell. OUT has a CSV of each; what it
-holds is not made again. OUT/coverage.csv compares with Wilson's interval of plain Monte Carlo with 20,000 draws.
+holds is not made again. OUT/coverage.csv compares with Wilson's interval of plain Monte Carlo with 20,000 draws. Two
+processes with one of the egos each share OUT.
 """
 
 import argparse
 import csv
 import io
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from itertools import count
@@ -28,6 +31,8 @@ from risk_sac.rates.record import stages_of
 from risk_sac.rates.stages import Stages, draws_of
 from risk_sac.records.rates import RateEstimate
 from risk_sac.run_folder.durable import replace_file
+from risk_sac.scenario import library
+from risk_sac.scenario.reading import document_from
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.search.loop import episode_seed
 from risk_sac.search.scene_optimizer import RateSampler
@@ -58,27 +63,35 @@ ANALYTIC: Mapping[str, Analytic] = {
 }
 
 
-class RatedEgo(NamedTuple):
-    """An ego in a scenario."""
+# A short scenario with no adversary, since its rates need 300,000 episodes. The distributions are assumptions.
+STANDING_CAR = """\
+name: standing_car
+summary: "Country road: the ego closes up on a car that stands in its lane."
+network: rural
+parameters:
+  ego_speed_mps: {unit: m/s, range: [12, 26], meaning: initial speed of the ego,
+    distribution: {kind: normal, mean: 19, deviation: 2}}
+  time_gap_s: {unit: s, range: [2.5, 7], meaning: gap to the standing car over the ego's speed,
+    distribution: {kind: normal, mean: 4.7, deviation: 0.6}}
+  aside_m: {unit: m, range: [-0.8, 0.8], meaning: standing car's centre left of the lane's}
+  friction: {unit: "1", range: [0.4, 1.0], meaning: tyre-road friction coefficient,
+    distribution: {kind: normal, mean: 0.8, deviation: 0.1}}
+ego: {start: {lane: eastbound_0, at_m: 400}, speed: ego_speed_mps}
+actors:
+  standing: {role: static, body: car, start: {ahead_of: ego, gap_m: time_gap_s * ego_speed_mps, left_m: aside_m}}
+friction: friction
+horizon_s: 8
+"""
+RATED_EGOS = {
+    "krauss-0.8s": EgoConfig(car_following="Krauss", reaction_time_s=0.8),
+    "idm-1.0s": EgoConfig(car_following="IDM", reaction_time_s=1.0),
+}
 
-    family: str
-    ego: EgoConfig
 
-    @property
-    def name(self) -> str:
-        """Of its files."""
-        return "-".join((self.family, self.ego.driver or self.ego.profile, *self.ego.defects))
-
-    @property
-    def spec(self) -> RunSpec:
-        """A run that plays its scenes without an attack."""
-        return RunSpec(family=self.family, method="rate", seed=0, ego=self.ego)
-
-
-RATED_EGOS = (
-    RatedEgo("cyclist_ahead", EgoConfig(driver="idm-aeb", defects=("weak-brakes",))),
-    RatedEgo("left_turn_car", EgoConfig(driver="idm-aeb")),
-)
+def rated_env(ego: EgoConfig) -> RiskSacEnv:
+    """Returns the environment that plays scenes with the standing car."""
+    scenario = library.keep(document_from(STANDING_CAR), {})
+    return RiskSacEnv.of(RunSpec(family=scenario, method="rate", seed=0, ego=ego))
 
 
 def repeated(problem: Analytic, seed: int) -> RateEstimate:
@@ -200,11 +213,11 @@ def coverage(problem: str, rate: float, plain_draws: int, rows: Sequence[Sequenc
 def write_table(out: Path) -> None:
     """Writes OUT/coverage.csv of what is there."""
     table = [coverage(name, problem.rate, 0, _rows(out / f"{name}.csv")) for name, problem in ANALYTIC.items()]
-    for case in RATED_EGOS:
-        draws = _rows(out / f"plain-{case.name}.csv")
+    for name in RATED_EGOS:
+        draws = _rows(out / f"plain-{name}.csv")
         played, failed = sum(row[1] == "1" for row in draws), sum(row[2] == "1" for row in draws)
         if failed:
-            table.append(coverage(case.name, failed / played, played, _rows(out / f"rates-{case.name}.csv")))
+            table.append(coverage(name, failed / played, played, _rows(out / f"rates-{name}.csv")))
     lines = [",".join(IntervalCoverage._fields)]
     lines += [",".join(f"{value:.4g}" if isinstance(value, float) else str(value) for value in row) for row in table]
     replace_file(out / "coverage.csv", ("\n".join(lines) + "\n").encode())
@@ -218,19 +231,21 @@ def main() -> None:
     parser.add_argument("--repetitions", type=int, default=500)
     parser.add_argument("--plain", type=int, default=100_000)
     parser.add_argument("--ego-repetitions", type=int, default=50)
+    parser.add_argument("--egos", nargs="+", choices=RATED_EGOS, default=list(RATED_EGOS), metavar="NAME")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
+    os.environ.setdefault(library.VARIABLE, str(options.out / "scenarios"))
     for name, problem in ANALYTIC.items():
         file = options.out / f"{name}.csv"
         rows = (_row(seed, repeated(problem, seed)) for seed in range(len(_rows(file)), options.repetitions))
         _add(file, ESTIMATE, rows, options.repetitions)
     rounds = max(-(-options.plain // ROUND), options.ego_repetitions)
-    for number, case in ((number, case) for number in range(1, rounds + 1) for case in RATED_EGOS):
-        with closing(RiskSacEnv.of(case.spec)) as env:
-            file = options.out / f"plain-{case.name}.csv"
+    for number, name in ((number, name) for number in range(1, rounds + 1) for name in options.egos):
+        with closing(rated_env(RATED_EGOS[name])) as env:
+            file = options.out / f"plain-{name}.csv"
             header = ("number", "played", "failed", "least_margin", *env.problem.space.names)
             _add(file, header, plain(env, len(_rows(file))), min(number * ROUND, options.plain))
-            file = options.out / f"rates-{case.name}.csv"
+            file = options.out / f"rates-{name}.csv"
             rows = (_row(seed, estimated_with(env, seed)) for seed in count(len(_rows(file))))
             _add(file, ESTIMATE, rows, min(number, options.ego_repetitions))
         write_table(options.out)
