@@ -72,10 +72,10 @@ parameters:
   ego_speed_mps: {unit: m/s, range: [12, 26], meaning: initial speed of the ego,
     distribution: {kind: normal, mean: 19, deviation: 2}}
   time_gap_s: {unit: s, range: [2.5, 7], meaning: gap to the standing car over the ego's speed,
-    distribution: {kind: normal, mean: 4.7, deviation: 0.6}}
+    distribution: {kind: normal, mean: 4.5, deviation: 0.6}}
   aside_m: {unit: m, range: [-0.8, 0.8], meaning: standing car's centre left of the lane's}
-  friction: {unit: "1", range: [0.4, 1.0], meaning: tyre-road friction coefficient,
-    distribution: {kind: normal, mean: 0.8, deviation: 0.1}}
+  friction: {unit: "1", range: [0.3, 1.0], meaning: tyre-road friction coefficient,
+    distribution: {kind: normal, mean: 0.65, deviation: 0.12}}
 ego: {start: {lane: eastbound_0, at_m: 400}, speed: ego_speed_mps}
 actors:
   standing: {role: static, body: car, start: {ahead_of: ego, gap_m: time_gap_s * ego_speed_mps, left_m: aside_m}}
@@ -83,8 +83,8 @@ friction: friction
 horizon_s: 8
 """
 RATED_EGOS = {
-    "krauss-0.8s": EgoConfig(car_following="Krauss", reaction_time_s=0.8),
-    "idm-1.0s": EgoConfig(car_following="IDM", reaction_time_s=1.0),
+    "r157": EgoConfig(driver="r157"),
+    "idm-aeb+latency": EgoConfig(driver="idm-aeb", defects=("latency",)),
 }
 
 
