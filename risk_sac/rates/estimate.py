@@ -19,30 +19,34 @@ MOST_OF_ONE = 0.25  # share of the estimate that one draw may have; choice
 MOST_DECLARED = 0.5  # share of the estimate that draws of the declared distribution may have; choice
 MOST_ERRORS = 4.0  # standard errors by which the mean weight may differ from 1; choice
 CONFIDENCE = 0.95
+UNSEEN = 1.15  # choice: part of the error comes from regions that no draw reached; repeated experiments cover with it
 
 
-def estimated(weights: Floats, ratios: Floats, failed: Flags, played: Flags) -> RateEstimate:
+def estimated(ratios: Floats, trust: Floats, failed: Flags, played: Flags) -> RateEstimate:
     """Estimates the rate of failures among played scenes.
 
-    rate = Σ w f / Σ w m,  se² = Σ w² (f - rate · m)² / (Σ w m)²,  log rate ± t se / rate
+    rate = Σ w f / (n - Σ w u),  w = a p/q,  se² = Σ r² / (n - Σ w u)²,  log rate ± 1.15 t se / rate
 
-    t has the effective number of failures, (Σ w f)² / Σ (w f)², less one as its degrees of freedom.
+    r = w f + rate w u, less its mean. The expected sum of all weights is n, so the sum itself, whose chance deviation
+    would add to the error, is not used. t has the effective number of failures, (Σ w f)² / Σ (w f)², less one as its
+    degrees of freedom.
 
     Args:
-      weights: w, `n`, of mean 1.
-      ratios: `n`, density of the declared distribution over that of the draw's own proposal; the weight of its stage
-        apart.
+      ratios: p/q, `n`, density of the declared distribution over that of the draw's own proposal.
+      trust: a, `n`, of mean 1; see `Stages.trust`.
       failed: f, `n`.
-      played: m, `n`; of a scene that was not, nothing is said.
+      played: `n`; of a scene that was not (u), nothing is said.
     """
-    hits = weights * (failed & played)
-    total, count = float((weights * played).sum()), int((failed & played).sum())
+    weights, failed = ratios * trust, failed & played
+    hits, refused, count = weights * failed, weights * ~played, int(failed.sum())
+    total = len(weights) - float(refused.sum())
     bound = min(1.0, clopper_pearson(count, len(weights))[1] / DECLARED * len(weights) / max(total, 1e-300))
-    if not count:
-        why = "no draw failed"
+    if not count or total <= 0.0:
+        why = "no draw failed" if not count else "no scene could be played"
         return _unestimated(why, bound, count)
     rate = float(hits.sum()) / total
-    error = math.sqrt(float((weights**2 * ((failed & played) - rate * played) ** 2).sum())) / total
+    parts = hits + rate * refused
+    error = math.sqrt(float(((parts - trust * parts.mean()) ** 2).sum())) / total
     effective = float(hits.sum() ** 2 / (hits**2).sum())
     largest = float(hits.max() / hits.sum())
     declared = float((hits * DECLARED * ratios).sum() / hits.sum())
@@ -50,7 +54,7 @@ def estimated(weights: Floats, ratios: Floats, failed: Flags, played: Flags) -> 
     why = _objection(weights, effective, largest, declared)
     if why:
         return _unestimated(why, bound, count).model_copy(update=checks)
-    half = _student(effective - 1.0) * error / rate
+    half = UNSEEN * _student(effective - 1.0) * error / rate
     return RateEstimate(
         failures=count,
         rate=min(rate, 1.0),

@@ -1,8 +1,8 @@
 """Mixture that importance sampling draws from, in standard normal space, and how it follows earlier draws.
 
-q(z) = 0.2 N(0, I) + 0.3 N(0, 2² I) + 0.5 Σ_k π_k N(μ_k, Σ_k)
+q(z) = 0.1 N(0, I) + 0.2 N(0, 2² I) + 0.7 Σ_k π_k N(μ_k, Σ_k)
 
-The first term is the declared distribution itself, so that no weight p/q exceeds 5.
+The first term is the declared distribution itself, so that no weight p/q exceeds 10.
 
 Source: Hesterberg 1995, Weighted average importance sampling and defensive mixture distributions; Kurtz and Song
 2013, Cross-entropy-based adaptive importance sampling using Gaussian mixture. Shares and levels are choices.
@@ -14,7 +14,7 @@ import numpy as np
 
 from risk_sac.world.types import Floats
 
-DECLARED, WIDE = 0.2, 0.3  # shares of the mixture
+DECLARED, WIDE = 0.1, 0.2  # shares of the mixture
 WIDE_DEVIATION = 2.0
 MOST_COMPONENTS = 8
 PER_COMPONENT = 3  # elite draws for each component and dimension

@@ -47,12 +47,11 @@ def rates_of(spec: RunSpec, records: Sequence[EpisodeRecord], scenes_per_hour: f
     problem = Problem.from_spec(spec)
     declared = problem.declared
     stages, draws = stages_of(declared, spec.budget.episodes, spec.stream), _draws(problem, declared, records)
-    ratios = stages.ratios(draws)
-    weights = ratios * stages.trust(len(draws))
+    ratios, trust = stages.ratios(draws), stages.trust(len(draws))
     played = np.array([record.outcome not in UNKNOWN for record in records])
     events = {name: np.array([name in record.failed for record in records], dtype=bool) for name in rated(problem)}
     events[ANY] = np.array([record.outcome is Outcome.FAILURE for record in records], dtype=bool)
-    rates = {name: estimated(weights, ratios, event, played) for name, event in events.items()}
+    rates = {name: estimated(ratios, trust, event, played) for name, event in events.items()}
     correlation = problem.family.rank_correlation
     return Rates(
         run_id=spec.id,

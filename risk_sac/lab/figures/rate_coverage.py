@@ -70,12 +70,12 @@ summary: "Country road: the ego closes up on a car that stands in its lane."
 network: rural
 parameters:
   ego_speed_mps: {unit: m/s, range: [12, 26], meaning: initial speed of the ego,
-    distribution: {kind: normal, mean: 19, deviation: 2}}
+    distribution: {kind: normal, mean: 18, deviation: 2}}
   time_gap_s: {unit: s, range: [2.5, 7], meaning: gap to the standing car over the ego's speed,
-    distribution: {kind: normal, mean: 4.5, deviation: 0.6}}
+    distribution: {kind: normal, mean: 5, deviation: 0.5}}
   aside_m: {unit: m, range: [-0.8, 0.8], meaning: standing car's centre left of the lane's}
   friction: {unit: "1", range: [0.3, 1.0], meaning: tyre-road friction coefficient,
-    distribution: {kind: normal, mean: 0.65, deviation: 0.12}}
+    distribution: {kind: normal, mean: 0.8, deviation: 0.1}}
 ego: {start: {lane: eastbound_0, at_m: 400}, speed: ego_speed_mps}
 actors:
   standing: {role: static, body: car, start: {ahead_of: ego, gap_m: time_gap_s * ego_speed_mps, left_m: aside_m}}
@@ -105,8 +105,7 @@ def repeated(problem: Analytic, seed: int) -> RateEstimate:
         points.append(stages.draw(number, lambda: draws_of(*known())))
         margins.append(problem.margin(points[-1]))
     draws = draws_of(*known())
-    ratios = stages.ratios(draws)
-    return estimated(ratios * stages.trust(DRAWS), ratios, draws.failed, np.ones(DRAWS, dtype=bool))
+    return estimated(stages.ratios(draws), stages.trust(DRAWS), draws.failed, np.ones(DRAWS, dtype=bool))
 
 
 def play(env: RiskSacEnv, point: Floats, seed: int) -> Encounter | None:
@@ -146,8 +145,8 @@ def estimated_with(env: RiskSacEnv, seed: int) -> RateEstimate:
         encounter = play(env, point, episode_seed(seed, number))
         sampler.tell(point, None if encounter is None else 0.0, encounter or NO_ENCOUNTER)
     draws, stages = sampler.draws(), stages_of(declared, DRAWS, seed)
-    ratios, played = stages.ratios(draws), np.asarray(np.isfinite(draws.margins).all(axis=1))
-    return estimated(ratios * stages.trust(DRAWS), ratios, draws.failed, played)
+    played = np.asarray(np.isfinite(draws.margins).all(axis=1))
+    return estimated(stages.ratios(draws), stages.trust(DRAWS), draws.failed, played)
 
 
 def _rows(file: Path) -> list[list[str]]:

@@ -11,7 +11,7 @@ from risk_sac.rates.estimate import LEAST_EFFECTIVE, estimated, with_exposure
 from risk_sac.rates.proposal import DECLARED, Gaussians, defensive, elite, fit, log_normal
 from risk_sac.rates.stages import Draws, Stages, draws_of, stage_sizes
 
-ALL = np.ones(4000, dtype=bool)
+ALL, ONES = np.ones(4000, dtype=bool), np.ones(4000)
 
 
 def test_a_mixture_is_the_sum_of_its_densities():
@@ -81,31 +81,43 @@ def test_the_interval_covers_a_known_rate_in_most_repetitions(name):
 
 def test_draws_of_the_declared_distribution_give_the_share_of_failures():
     failed = np.arange(4000) < 80
-    ones = np.ones(4000)
-    estimate = estimated(ones, 0 * ones, failed, ALL)
+    estimate = estimated(ONES, ONES, failed, ALL)
     assert estimate.rate == pytest.approx(0.02)
     assert (estimate.low, estimate.high) == pytest.approx((0.016, 0.025), abs=1e-3)
 
 
 def test_scenes_that_were_not_played_count_neither_way():
-    weights, failed = np.ones(4000), np.arange(4000) < 80
-    estimate = estimated(weights, 0 * weights, failed, np.arange(4000) < 2000)
+    estimate = estimated(ONES, ONES, np.arange(4000) < 80, np.arange(4000) < 2000)
     assert estimate.rate == pytest.approx(0.04)
 
 
+def test_chance_in_the_weights_does_not_widen_the_interval():
+    # A quarter of the draws has weight 4 by chance and not by the failures, which all have weight 1.
+    random = np.random.default_rng(0)
+    passed = np.where(random.random(4000) < 0.25, 4.0, 0.0)
+    ratios = np.where(np.arange(4000) < 400, 1.0, passed)
+    estimate = estimated(ratios, ONES, np.arange(4000) < 400, ALL)
+    assert estimate.rate == pytest.approx(0.1, rel=0.02)
+    low, high = (
+        estimated(ONES, ONES, np.arange(4000) < 400, ALL).low,
+        estimated(ONES, ONES, np.arange(4000) < 400, ALL).high,
+    )
+    assert estimate.high - estimate.low == pytest.approx(high - low, rel=0.05)
+
+
 @pytest.mark.parametrize(
-    ("weights", "ratios", "failures"),
+    ("ratios", "failures"),
     [
-        (np.ones(4000), np.zeros(4000), 0),
-        (np.ones(4000), np.zeros(4000), int(LEAST_EFFECTIVE) - 1),
-        (np.where(np.arange(4000) == 0, 50.0, 3950 / 3999), np.zeros(4000), 100),
-        (np.ones(4000), np.full(4000, 1 / DECLARED), 100),
-        (np.full(4000, 2.0), np.zeros(4000), 100),
+        (ONES, 0),
+        (ONES, int(LEAST_EFFECTIVE) - 1),
+        (np.where(np.arange(4000) == 0, 50.0, 3950 / 3999), 100),
+        (np.where(np.arange(4000) < 100, 1 / DECLARED, (4000 - 100 / DECLARED) / 3900), 100),
+        (np.full(4000, 2.0), 100),
     ],
     ids=["none", "few", "one draw", "declared", "mean"],
 )
-def test_an_estimate_that_fails_a_check_is_none_and_says_why(weights, ratios, failures):
-    estimate = estimated(weights, ratios, np.arange(4000) < failures, ALL)
+def test_an_estimate_that_fails_a_check_is_none_and_says_why(ratios, failures):
+    estimate = estimated(ratios, ONES, np.arange(4000) < failures, ALL)
     assert (estimate.rate, estimate.low, estimate.high) == (None, None, None)
     assert estimate.why
     assert estimate.at_most > failures / 4000
@@ -113,7 +125,7 @@ def test_an_estimate_that_fails_a_check_is_none_and_says_why(weights, ratios, fa
 
 def test_exposure_makes_a_rate_per_hour():
     failed = np.arange(4000) < 80
-    told = {"failure": estimated(np.ones(4000), np.zeros(4000), failed, ALL)}
+    told = {"failure": estimated(ONES, ONES, failed, ALL)}
     hourly = with_exposure(told, 12.0)["failure"].per_hour
     assert hourly is not None
     assert hourly.rate == pytest.approx(0.24)
