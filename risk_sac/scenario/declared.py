@@ -141,10 +141,14 @@ class SceneLaw:
         return margins * copula
 
     def density_of(self, values: Mapping[str, float]) -> float:
-        """Density of a scene by its parameters' values, of which those beyond the bounds count as on them."""
-        widths = [max(axis.high - axis.low, 1e-12) for axis in self.axes]
-        pairs = zip(self.axes, widths, strict=True)
-        return self.density(np.clip([(values[axis.name] - axis.low) / width for axis, width in pairs], 0.0, 1.0))
+        """Density of a scene by its parameters' values.
+
+        Those beyond the bounds count as on them, and a missing one as the least: a story that nothing disturbs lacks
+        its shifts.
+        """
+        offsets = np.array([values.get(axis.name, axis.low) - axis.low for axis in self.axes])
+        widths = np.array([max(axis.high - axis.low, 1e-12) for axis in self.axes])
+        return self.density(np.clip(offsets / widths, 0.0, 1.0))
 
     @cached_property
     def telling(self) -> np.typing.NDArray[np.bool_]:
