@@ -24,7 +24,7 @@ function RateCard({ campaign }: { campaign: string }) {
       <h2 id="rates-title">Failure rates</h2>
       <label class="small">
         Scenes of this scenario in an hour of driving:{" "}
-        <input type="number" min="0" step="any" value={exposure} placeholder="not stated" onChange={(event) => setExposure(event.currentTarget.value)} />
+        <input type="number" min="0" step="any" value={exposure} placeholder="not stated" onInput={(event) => setExposure(event.currentTarget.value)} />
       </label>
       {error ? <Failed error={error} /> : !value && <Loading what="the rates" />}
       {value?.items.map((run) => (
