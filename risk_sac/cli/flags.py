@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar, get_args
 from risk_sac.cli.console import EGO, number
 from risk_sac.cli.parser import Parser
 from risk_sac.cli.scenarios import kept_name
-from risk_sac.config import METHODS, Behaviour, EgoConfig
+from risk_sac.config import METHODS, Behaviour, EgoConfig, FamilyName
 from risk_sac.config.spec_file import read_ego
 from risk_sac.egos.registry import refuse_class
 from risk_sac.errors import ConfigError
@@ -20,6 +20,7 @@ from risk_sac.maps.convert import present_net
 from risk_sac.maps.finder import FINDERS, Map
 from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Fault, Grade, PlausibilityClass, Severity, Violation
 from risk_sac.run_folder.durable import scratch_folder
+from risk_sac.scenario.families import density_of
 from risk_sac.verdicts.distinct import DistinctFailures
 
 CLASS = re.compile(r"[\w.]+:\w+")  # matches module:Class, which `risk_sac.egos.serve` takes and no campaign
@@ -229,14 +230,14 @@ def _gravest(worst: Worst) -> tuple[bool, int, bool, bool]:
     return not worst.plausible, -rank, not worst.preventable, worst.blamed is not Fault.EGO
 
 
+WEIGHT = "weight"
 SORTS: Mapping[str, Callable[[Worst], Any]] = {
     "severity": _gravest,
-    "weight": lambda worst: -worst.weight,
     "speed": lambda worst: -worst.ego_speed_mps,
 }
 SORTED_BY = (
-    "found (the order of the search), severity (plausible and worst first), "
-    "weight (severity times plausibility) or speed (the fastest ego first)"
+    "found (the order of the search), weight (severity times plausibility, times the scene's density where a "
+    "distribution is declared), severity (plausible and worst first) or speed (the fastest ego first)"
 )
 
 
@@ -253,8 +254,9 @@ def add_filter_flags(parser: Parser) -> None:
     )
     group.add_argument("--distinct", action="store_true", help="only the first of each kind")
     group.add_argument("--raw", action="store_true", help="also those that a validity rule refused")
+    orders = ["found", WEIGHT, *SORTS]
     group.add_argument(
-        "--sort", choices=["found", *SORTS], metavar="ORDER", default="found", help=f"by {SORTED_BY} (default: found)"
+        "--sort", choices=orders, metavar="ORDER", default="found", help=f"by {SORTED_BY} (default: found)"
     )
     add_limit(parser)
 
@@ -283,11 +285,21 @@ def matching(options: argparse.Namespace, failures: Iterable[E]) -> Iterator[E]:
             yield failure
 
 
-def listed(options: argparse.Namespace, failures: Iterable[E]) -> list[E]:
-    """Returns the failures to list, and notes on standard error if --limit leaves some out."""
+def listed(options: argparse.Namespace, failures: Iterable[E], family: FamilyName | None = None) -> list[E]:
+    """Returns the failures to list, and notes on standard error if --limit leaves some out.
+
+    Args:
+      options: of the command line.
+      failures: all of them.
+      family: whose declared density weighs them; None: they come in the order of their weight where that is asked for.
+    """
     if options.distinct:
         failures = _first_of_each_kind(failures)
-    if options.sort != "found":
+    if options.sort == WEIGHT and family is not None:
+        density = density_of(family)
+        judged = ((-worst.weight(density(each.scene)), each) for each in failures if (worst := each.worst_violation))
+        failures = [each for _, each in sorted(judged, key=itemgetter(0))]
+    elif options.sort in SORTS:
         order = SORTS[options.sort]
         judged = ((order(worst), each) for each in failures if (worst := each.worst_violation))
         failures = [each for _, each in sorted(judged, key=itemgetter(0))]

@@ -2,6 +2,7 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -15,6 +16,7 @@ from risk_sac.config.spec_file import read_spec
 from risk_sac.env.problem import Problem, adjustments
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.host.terminal import notes
+from risk_sac.rates.earlier import start_in
 from risk_sac.rates.record import METHOD, check_exposure, rated, rates_of
 from risk_sac.records import RunMetrics
 from risk_sac.records.rates import HourlyRate, RateEstimate, Rates
@@ -42,6 +44,8 @@ def add(commands: Commands) -> None:
         "--draws", dest="episodes", type=int, default=DRAWS, metavar="N", help=f"(default: {DRAWS})"
     )
     rate.group("budget").add_argument("--seed", type=int, metavar="S", help="(default: 0)")
+    earlier = "folder of a run or campaign whose failures in this scenario say where to look first (default: none)"
+    rate.add_argument("--from", dest="earlier", type=Path, metavar="FOLDER", help=earlier)
     rate.add_argument("--requirement", metavar="NAME", help="only this requirement (default: all that count)")
     exposure = "scenes of this scenario in an hour of driving, for a rate per hour (default: none)"
     rate.add_argument("--exposure", type=float, metavar="PER_HOUR", help=exposure)
@@ -51,7 +55,7 @@ def add(commands: Commands) -> None:
 
 def _rate(options: argparse.Namespace) -> int:
     named = {"family": kept_name(options.family), "method": METHOD, "seed": options.seed, "episodes": options.episodes}
-    spec = read_spec(None, named | scene_flags(options))
+    spec = read_spec(None, named | scene_flags(options) | _start(options, named["family"]))
     _check(spec, options)
     say_adjustments(adjustments(spec))
     from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
@@ -73,6 +77,11 @@ def _rate(options: argparse.Namespace) -> int:
         notes.print(f"Stopped after {counted(answer.draws, 'draw')}. The same command again goes on from there.")
         return INTERRUPTED
     return OK
+
+
+def _start(options: argparse.Namespace, family: str) -> dict[str, Any]:
+    """Returns the field of the spec that says where to look first; none without `--from`."""
+    return {} if options.earlier is None else {"rate": start_in(options.earlier, family).model_dump()}
 
 
 def _check(spec: RunSpec, options: argparse.Namespace) -> None:

@@ -132,7 +132,7 @@ def newest_run(folder: Path) -> Path:
 def _list(options: argparse.Namespace, results: RunResults) -> None:
     by_index = {failure.episode.index: failure for failure in results.failures}
     episodes = [failure.episode for failure in results.failures]
-    chosen = [by_index[each.index] for each in listed(options, matching(options, episodes))]
+    chosen = [by_index[each.index] for each in listed(options, matching(options, episodes), results.spec.family)]
     lines = [
         f"headline failures{where}: {_headline(phase)}{_driven_by(phase)}\n"
         f"episodes driven by: {driven_by_in_words(phase.episodes_driven_by)}"

@@ -22,6 +22,7 @@ from risk_sac.records import (
     Episode,
     EpisodePage,
     Failure,
+    FailureOrder,
     Fault,
     Grade,
     Page,
@@ -205,12 +206,13 @@ class Client:
         driven_by: DrivenBy | None = None,
         broke: str | None = None,
         kind: str | None = None,
+        order: FailureOrder = "arrival",
         page: int = PAGE,
     ) -> Iterator[Episode]:
-        """Failures in the order of their arrival; read page by page as far as they are asked for."""
+        """Failures in an order; read page by page as far as they are asked for."""
         query: Query = {"run": run, "tier": tier, "requirement": requirement, "grade": grade, "broke": broke}
         query |= {"plausibility": plausibility, "severity": severity, "fault": fault, "driven_by": driven_by}
-        query |= {"kind": kind, "limit": page}
+        query |= {"kind": kind, "order": order, "limit": page}
         return self._items(EpisodePage, f"{_path(campaign_id)}/failures", query)
 
     def failure(self, campaign_id: str, failure_id: str) -> Failure:

@@ -7,6 +7,7 @@ from risk_sac.config.campaign import (
     FamilyName,
     Iid,
     JudgeConfig,
+    RateStart,
     Requirement,
     RunSpec,
 )

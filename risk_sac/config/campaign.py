@@ -5,14 +5,14 @@ The same `CampaignSpec` is the REST body, the CLI's YAML and the stored record.
 
 import hashlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
 from risk_sac.config.base import Settings
-from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.boundary import BoundaryConfig, ParameterName
 from risk_sac.config.ego import EgoConfig
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import IID_METHODS, MethodName, RunMethod, method_of
@@ -75,6 +75,11 @@ class Budget(Settings):
         return self.episodes + self.evaluation_episodes
 
 
+def _is_none(value: object) -> bool:
+    """Whether a setting is left out of what is written, so that digests of older specs hold."""
+    return value is None
+
+
 class Iid(Settings):
     """Final phase that estimates the ego's failure rate in scenes that no search chose.
 
@@ -86,6 +91,13 @@ class Iid(Settings):
     """Scenes of each family and each kind of traffic, those included that are refused before the first step."""
     seed: Seed = 0
     """Of scenes, actions and SUMO; no stream of a search is the same, whatever its seed."""
+
+
+class RateStart(Settings):
+    """Scenes that failed before a run of the method `rate`, where it looks first. No estimate counts them."""
+
+    scenes: Annotated[tuple[Mapping[ParameterName, float], ...], Field(min_length=1, max_length=300)]
+    """Each with a value of every parameter. Those beyond what the ODD leaves are not used."""
 
 
 PreventingDriver = Literal["r157", "fsm", "rss", "defensive"]
@@ -119,6 +131,8 @@ class RunSpec(Settings):
     """Of actors from the story of their scenario; null: the scenario's own bounds."""
     boundary: BoundaryConfig | None = None
     """Of the method `boundary`; other methods have none."""
+    rate: RateStart | None = Field(default=None, exclude_if=_is_none)
+    """Of the method `rate`; other methods have none."""
 
     @property
     def id(self) -> str:
@@ -169,6 +183,8 @@ class CampaignSpec(Settings):
     """Null: none, and nothing is said of how often the ego fails."""
     boundary: BoundaryConfig | None = None
     """What the method `boundary` searches; null where it is not among the methods."""
+    rate: RateStart | None = Field(default=None, exclude_if=_is_none)
+    """Where the method `rate` looks first; null: nowhere before the declared distribution. For one scenario alone."""
 
     @model_validator(mode="after")
     def _within_reason(self) -> Self:
@@ -186,6 +202,14 @@ class CampaignSpec(Settings):
             raise ConfigError("boundary", "nothing", "`over`, the parameters that the method boundary searches")
         if "boundary" not in self.methods and self.boundary is not None:
             raise ConfigError("boundary", "it without the method boundary", remedy="add the method, or leave it out")
+        return self
+
+    @model_validator(mode="after")
+    def _start_has_its_scenario(self) -> Self:
+        if self.rate is not None and "rate" not in self.methods:
+            raise ConfigError("rate", "it without the method rate", remedy="add the method, or leave it out")
+        if self.rate is not None and len(self.families) > 1:
+            raise ConfigError("rate", f"it with {len(self.families)} families", "one, whose scenes they are")
         return self
 
     @model_validator(mode="after")
@@ -217,6 +241,7 @@ class CampaignSpec(Settings):
                 seed=seed,
                 budget=self.budget,
                 boundary=self.boundary if method == "boundary" else None,
+                rate=self.rate if method == "rate" else None,
                 **self._shared(),
             )
             for seed in self.seeds

@@ -201,10 +201,14 @@ class Problem:
         """Refuses a run that draws by the declared distributions if one has no mass in the ODD.
 
         Raises:
-          ConfigError: naming its parameter.
+          ConfigError: naming its parameter, or that no scene which it starts from is in the ODD.
         """
-        if method_of(spec.method).scenes in ("iid", "rate"):
-            _ = self.declared
+        if method_of(spec.method).scenes not in ("iid", "rate"):
+            return
+        declared = self.declared
+        if spec.rate is not None and not len(declared.normals(spec.rate.scenes)):
+            named = ", ".join(self.space.names)
+            raise ConfigError("rate.scenes", "no scene within the ODD", f"values of {named} within their ranges")
 
     @property
     def declared(self) -> SceneLaw:

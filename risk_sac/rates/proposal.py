@@ -21,6 +21,7 @@ PER_COMPONENT = 3  # elite draws for each component and dimension
 INFLATION = 1.3  # of a component's variance, since few draws understate it
 ELITE = 0.25  # share of the latest draws that a proposal is fitted to until so many fail
 ROUNDS = 30  # of EM
+TEMPER = 0.5  # exponent of the weights that a proposal is fitted with, so that few draws do not decide it
 FARTHEST = 6.0  # of a coordinate; beyond it lie 2e-9 of a normal distribution, and doubles lose its shares
 _LOG_2PI = float(np.log(2 * np.pi))
 
@@ -89,6 +90,19 @@ def elite(margins: Floats, failed: np.typing.NDArray[np.bool_], latest: int) -> 
         return failed
     level = np.quantile(known, ELITE / max(margins.shape[1], 1), axis=0)
     return np.asarray(failed | (margins < level).any(axis=1))
+
+
+def around(points: Floats, random: np.random.Generator) -> Gaussians | None:
+    """Fits Gaussians to points, `n x d`, of which nothing else is known; None without any.
+
+    The likelier a point, the more it weighs. Up to `d` points have a Gaussian of unit covariance each.
+    """
+    size, dimension = points.shape
+    if not size or not dimension:
+        return None
+    likely = log_normal(points)
+    fitted = fit(points, np.exp(TEMPER * (likely - likely.max())), random)
+    return fitted or Gaussians(np.full(size, 1 / size), points, np.stack([np.eye(dimension)] * size))
 
 
 def fit(points: Floats, weights: Floats, random: np.random.Generator) -> Gaussians | None:

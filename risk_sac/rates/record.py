@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from risk_sac.config import RunSpec
+from risk_sac.config import RateStart, RunSpec
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
@@ -23,9 +23,10 @@ UNKNOWN = frozenset({Outcome.REJECTED, Outcome.INVALID})
 MOST_PER_HOUR = 1e9
 
 
-def stages_of(declared: SceneLaw, draws: int, seed: int) -> Stages:
+def stages_of(declared: SceneLaw, draws: int, seed: int, start: RateStart | None = None) -> Stages:
     """The stages of a run; axes whose values do not tell their share are drawn as declared in all of them."""
-    return Stages(int(declared.telling.sum()), draws, seed)
+    earlier = None if start is None else declared.normals(start.scenes)
+    return Stages(int(declared.telling.sum()), draws, seed, earlier)
 
 
 def rates_of(spec: RunSpec, records: Sequence[EpisodeRecord], scenes_per_hour: float | None = None) -> Rates:
@@ -46,7 +47,8 @@ def rates_of(spec: RunSpec, records: Sequence[EpisodeRecord], scenes_per_hour: f
         raise ConfigError("", f"{spec.id} without an episode", "one episode or more")
     problem = Problem.from_spec(spec)
     declared = problem.declared
-    stages, draws = stages_of(declared, spec.budget.episodes, spec.stream), _draws(problem, declared, records)
+    stages = stages_of(declared, spec.budget.episodes, spec.stream, spec.rate)
+    draws = _draws(problem, declared, records)
     ratios, trust = stages.ratios(draws), stages.trust(len(draws))
     played = np.array([record.outcome not in UNKNOWN for record in records])
     events = {name: np.array([name in record.failed for record in records], dtype=bool) for name in rated(problem)}

@@ -11,12 +11,11 @@ from itertools import accumulate
 
 import numpy as np
 
-from risk_sac.rates.proposal import defensive, elite, fit, log_normal
+from risk_sac.rates.proposal import TEMPER, around, defensive, elite, fit, log_normal
 from risk_sac.world.types import Floats
 
 EARLY = 5  # stages before the last one, each of a tenth of the draws, and so the last of half of them
 EARLY_SHARE = 0.1
-TEMPER = 0.5  # exponent of the weights that a proposal is fitted with, so that few draws do not decide it
 
 
 @dataclass(frozen=True)
@@ -54,11 +53,21 @@ class Stages:
       sizes: draws of each stage.
     """
 
-    def __init__(self, dimension: int, draws: int, seed: int) -> None:
+    def __init__(self, dimension: int, draws: int, seed: int, earlier: Floats | None = None) -> None:
+        """Prepares the first proposal.
+
+        Args:
+          dimension: `d`.
+          draws: of the whole run.
+          seed: of all draws.
+          earlier: `n x d`, points that failed before this run. The first proposal is fitted to them; no estimate counts
+            them.
+        """
         self.sizes = stage_sizes(draws)
         self._ends = tuple(accumulate(self.sizes))
         self._dimension, self._seed = dimension, seed
-        self._proposals = [defensive(dimension)]
+        first = None if earlier is None else around(earlier, np.random.default_rng((seed, 0, 1)))
+        self._proposals = [defensive(dimension, first)]
 
     def draw(self, number: int, known: Callable[[], Draws]) -> Floats:
         """The point of a draw, `d`; the same seed and earlier draws give the same one.

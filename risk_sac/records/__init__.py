@@ -27,6 +27,7 @@ from risk_sac.records.episode import (
     EpisodePage,
     EpisodeRecord,
     Failure,
+    FailureOrder,
     Outcome,
     Phase,
     Repetition,

@@ -217,8 +217,12 @@ class Episode(EpisodeRecord):
     """Of the first failure of its kind, once the run has ended."""
 
 
+FailureOrder = Literal["arrival", "weight"]
+"""Of a list of failures: `weight` is that of `ranking_weight`, the largest first."""
+
+
 class EpisodePage(Page[Episode]):
-    """Episodes in the order of their arrival."""
+    """Episodes, in the order of their arrival unless another one was asked for."""
 
 
 class TriageState(StrEnum):

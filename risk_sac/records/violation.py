@@ -34,6 +34,22 @@ SEVERITY_WEIGHTS: Mapping[Severity | None, float] = {
 }
 
 
+def ranking_weight(severity: Severity | None, probability: float, density: float = 1.0) -> float:
+    """Weight by which failures are ranked, the most likely and severe first.
+
+    w = s(severity) · P(behaviour) · p(scene)
+
+    Args:
+      severity: of the contact; None: the ego touched nothing.
+      probability: that road users do all that the adversaries did, in [0, 1].
+      density: declared density of the scene, as a multiple of the uniform one; 1 where nothing is declared.
+
+    Returns:
+      At least 0; s is 1 for severe, 0.1 for moderate and for no contact, 0.01 for minor.
+    """
+    return SEVERITY_WEIGHTS[severity] * probability * density
+
+
 class Violated(Record, ABC):
     """Base of violations, with and without contact: the rules they are valid by, and their verdict."""
 
@@ -98,13 +114,15 @@ class Violated(Record, ABC):
     def severity(self) -> Severity | None:
         """How severe the contact is; None without one, and where it is not valid."""
 
-    @property
-    def weight(self) -> float:
-        """Severity times plausibility, in [0, 1], by which failures are ranked; 0 where it is not valid.
+    def weight(self, density: float = 1.0) -> float:
+        """See `ranking_weight`; 0 where it is not valid.
 
-        The plausibility is the probability that road users do all that the adversaries did.
+        Args:
+          density: declared density of the scene.
         """
-        return 0.0 if self.behaviour is None else SEVERITY_WEIGHTS[self.severity] * self.behaviour.joint_probability
+        if self.behaviour is None:
+            return 0.0
+        return ranking_weight(self.severity, self.behaviour.joint_probability, density)
 
     @property
     def published_preventable(self) -> bool:

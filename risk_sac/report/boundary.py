@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from risk_sac.failures.from_above import canvas, picture
 from risk_sac.records import stored
-from risk_sac.records.boundary import BoundaryMap, BoxShare, DriverMap
+from risk_sac.records.boundary import BoundaryAxis, BoundaryMap, BoxShare, DriverMap
 from risk_sac.report.drawing import STYLE
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import BOUNDARY, BOUNDARY_PICTURE
@@ -91,7 +91,14 @@ def _panel(axes: Axes, found: BoundaryMap, cut: tuple[int, ...]) -> None:
     axes.grid(visible=False)
     if cut:
         told_cut = zip(found.axes[2:], cut, strict=True)
-        axes.set_title(", ".join(f"{axis.name} = {axis.levels[i]:.4g}" for axis, i in told_cut), fontsize=8)
+        axes.set_title("\n".join(_slice_words(axis, i) for axis, i in told_cut), fontsize=8)
+
+
+def _slice_words(axis: BoundaryAxis, level: int) -> str:
+    """A panel's level of an axis, and the range of the points in it, as `_nearest` sorts them."""
+    between = [(left + right) / 2 for left, right in pairwise(axis.levels)]
+    low, high = (axis.low, *between)[level], (*between, axis.high)[level]
+    return f"{axis.name} = {axis.levels[level]:.4g} (points: {low:.4g} to {high:.4g})"
 
 
 def _values(found: BoundaryMap, told: DriverMap, cut: tuple[int, ...]) -> Floats:

@@ -5,7 +5,7 @@ the parameters' distributions, truncated to the scene space, have that share. L 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from statistics import NormalDist
@@ -141,10 +141,23 @@ class SceneLaw:
         return margins * copula
 
     def density_of(self, values: Mapping[str, float]) -> float:
-        """Density of a scene by its parameters' values, of which those beyond the bounds count as on them."""
-        widths = [max(axis.high - axis.low, 1e-12) for axis in self.axes]
-        pairs = zip(self.axes, widths, strict=True)
-        return self.density(np.clip([(values[axis.name] - axis.low) / width for axis, width in pairs], 0.0, 1.0))
+        """Density of a scene by its parameters' values.
+
+        Those beyond the bounds count as on them, and a missing one as the least: a story that nothing disturbs lacks
+        its shifts.
+        """
+        offsets = np.array([values.get(axis.name, axis.low) - axis.low for axis in self.axes])
+        widths = np.array([max(axis.high - axis.low, 1e-12) for axis in self.axes])
+        return self.density(np.clip(offsets / widths, 0.0, 1.0))
+
+    def normals(self, scenes: Iterable[Mapping[str, float]]) -> Floats:
+        """Standard normal numbers, `n x t`, of the scenes within the bounds, for the axes that tell their share."""
+        low, high = (np.array([getattr(axis, end) for axis in self.axes]) for end in ("low", "high"))
+        values = np.array([[scene.get(axis.name, math.nan) for axis in self.axes] for scene in scenes])
+        inside = values[((low <= values) & (values <= high)).all(axis=1)]
+        points = (inside - low) / np.maximum(high - low, 1e-12)
+        normals = [self.normal(point)[self.telling] for point in points]
+        return np.array(normals).reshape(len(points), int(self.telling.sum()))
 
     @cached_property
     def telling(self) -> np.typing.NDArray[np.bool_]:

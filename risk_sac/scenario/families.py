@@ -1,6 +1,6 @@
 """Scenario families by name: those shipped, and those at places that the library keeps."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -164,6 +164,18 @@ def _kept(name: str, deviation: DeviationBounds | None) -> Family:
         story = document.story.model_copy(update={"deviation": deviation})
         document = document.model_copy(update={"story": story})
     return family_of(document, nets_of(document, folder), name)
+
+
+def density_of(name: str) -> Callable[[Mapping[str, float]], float]:
+    """Returns the declared density of a family's scenes, as a multiple of the uniform one.
+
+    It is 1 everywhere where the family declares no distribution, or is gone.
+    """
+    try:
+        declared = family_named(name).declared
+    except ConfigError:
+        return lambda scene: 1.0
+    return (lambda scene: 1.0) if declared.alike else declared.density_of
 
 
 def document_named(name: str) -> Scenario:

@@ -234,7 +234,7 @@ class Searchers:
         elif sampler is IidSampler:
             made = IidSampler(*arguments, self._problem.declared)
         elif sampler is RateSampler:
-            made = RateSampler(*arguments, self._problem.declared, self._spec.budget.episodes)
+            made = RateSampler(*arguments, self._problem.declared, self._spec.budget.episodes, self._spec.rate)
         elif sampler is BoundarySampler:
             made = BoundarySampler(*arguments, self._problem.slice_of(self._spec))
         elif self._start is None or not actor.genes:

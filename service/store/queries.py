@@ -10,9 +10,10 @@ from statistics import fmean, median_low
 from typing import Any
 
 from pydantic_core import from_json
-from sqlalchemy import ColumnElement, Engine, Row, Select, func, select
+from sqlalchemy import ColumnElement, Engine, Row, Select, and_, func, or_, select
 from sqlalchemy.orm import Session
 
+from risk_sac.config import FamilyName
 from risk_sac.execution.messages import EpisodeDone
 from risk_sac.metrics.tally import STEPS
 from risk_sac.records import (
@@ -31,6 +32,7 @@ from risk_sac.records import (
     StateChange,
     stored,
 )
+from risk_sac.scenario.families import density_of
 from service.errors import NotFoundError, StorageError
 from service.store.database import storage_errors
 from service.store.stored import StoredPage, read_episode
@@ -99,6 +101,19 @@ def find_run(session: Session, campaign: CampaignRow, run_id: str) -> int:
     raise NotFoundError(message, field="run", got=run_id)
 
 
+def weighty_page(
+    session: Session, query: Select[EpisodeRow], outcomes: Collection[Outcome], limit: int, after: int | None
+) -> StoredPage[Episode]:
+    """Returns the page of a query's failures after number `after`, the most likely and severe first."""
+    weight = func.coalesce(EpisodeRow.weight, 0.0)  # refused ones last
+    last = None if after is None else session.get(EpisodeRow, after)
+    if last is not None:
+        at = last.weight or 0.0
+        query = query.where(or_(weight < at, and_(weight == at, EpisodeRow.number > last.number)))
+    query = query.where(EpisodeRow.outcome.in_(outcomes)).order_by(weight.desc(), EpisodeRow.number)
+    return _page(list(session.scalars(query.limit(limit + 1))), limit)
+
+
 def episode_page(
     session: Session, query: Select[EpisodeRow], outcomes: Collection[Outcome], limit: int, after: int
 ) -> StoredPage[Episode]:
@@ -107,7 +122,11 @@ def episode_page(
     query = query.where(EpisodeRow.number > after).order_by(EpisodeRow.number).limit(limit + 1)
     queries = [query.where(EpisodeRow.outcome == outcome) for outcome in outcomes] or [query]
     found = merge(*(session.scalars(each) for each in queries), key=attrgetter("number"))
-    rows = list(islice(found, limit + 1))
+    return _page(list(islice(found, limit + 1)), limit)
+
+
+def _page(rows: Sequence[EpisodeRow], limit: int) -> StoredPage[Episode]:
+    """Returns the first rows, and whether there are more."""
     last = rows[limit - 1].number if len(rows) > limit else None
     return StoredPage(items=tuple(map(read_episode, rows[:limit])), last=last)
 
@@ -190,16 +209,16 @@ def tally(run: RunRow) -> None:
             setattr(row, step, sum(each[name][step] for each in funnels if name in each))
 
 
-def fill(row: EpisodeRow, event: EpisodeDone) -> None:
+def fill(row: EpisodeRow, family: FamilyName, event: EpisodeDone) -> None:
     """Fills an episode's row from a worker's message."""
-    fill_record(row, event.record)
+    fill_record(row, family, event.record)
     row.series = event.series
     row.series_sha256 = event.series_sha256
     row.wall_s = event.wall_s
     row.funnel = stored(Funnel.of(event.metrics))
 
 
-def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
+def fill_record(row: EpisodeRow, family: FamilyName, record: EpisodeRecord) -> None:
     """Writes an episode's record and the searched columns into its row."""
     row.phase = record.phase
     row.index = record.index
@@ -213,6 +232,7 @@ def fill_record(row: EpisodeRow, record: EpisodeRecord) -> None:
     row.failed = listed(each.requirement for each in record.valid_violations) if failed else None
     row.grade = None if worst is None or not failed else worst.graded
     row.plausibility = None if worst is None or not failed or worst.behaviour is None else worst.behaviour.verdict
+    row.weight = None if worst is None or not failed else worst.weight(density_of(family)(record.scene))
     row.severity = None if contact is None or not failed else contact.severity
     row.fault = None if worst is None or not failed else worst.blamed
     row.kind = None if worst is None else worst.kind

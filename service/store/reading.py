@@ -23,6 +23,7 @@ from service.store.queries import (
     find_failure,
     find_run,
     find_triage,
+    weighty_page,
 )
 from service.store.stored import StoredCampaign, StoredFailure, StoredPage, StoredRecord, Usage, read_episode
 from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
@@ -184,9 +185,21 @@ class Store:
         run_id: str | None = None,
         outcomes: Collection[Outcome] = (),
         judged: Judged | None = None,
+        weighty: bool = False,
         project: str | None = None,
     ) -> StoredPage[Episode]:
-        """Returns episodes in order of arrival, after number `after`; no outcomes means all."""
+        """Returns episodes after number `after`.
+
+        Args:
+          campaign_id: of the campaign.
+          limit: at most so many.
+          after: number of the last one of the page before.
+          run_id: only those of this run.
+          outcomes: only these; none means all, unless they are ordered by weight.
+          judged: filter by what drove them and by their verdicts.
+          weighty: the most likely and severe first, instead of in order of arrival.
+          project: that the campaign must belong to.
+        """
         with self._reading() as session:
             campaign = find_campaign(session, campaign_id, project)
             if run_id is None:
@@ -194,6 +207,8 @@ class Store:
             else:  # without the campaign's number, which would let the database choose a slower index
                 query = select(EpisodeRow).where(EpisodeRow.run_number == find_run(session, campaign, run_id))
             query = query if judged is None else query.where(*judged.conditions())
+            if weighty:
+                return weighty_page(session, query, outcomes, limit, after)
             return episode_page(session, query, outcomes, limit, after or 0)
 
     def records(self, number: int, outcomes: Collection[Outcome] = ()) -> Iterator[StoredRecord]:

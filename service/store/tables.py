@@ -159,6 +159,7 @@ class EpisodeRow(Base):
     failed: Mapped[str | None]  # of these, those that make it a failure
     grade: Mapped[str | None]  # of a valid failure
     plausibility: Mapped[str | None]  # of a valid failure
+    weight: Mapped[float | None]  # of a valid failure: severity times plausibility times density
     severity: Mapped[str | None]  # of its contact
     fault: Mapped[str | None]  # of a valid failure
     kind: Mapped[str | None]  # of the violation that names the episode

@@ -112,7 +112,7 @@ class Ledger:
                     session.add(row)
                 else:
                     count(run, row, -1)
-                fill(row, event)
+                fill(row, run.family, event)
                 count(run, row, +1)
                 if newest_s is not None:
                     newest_s.append(event.wall_s)
@@ -255,7 +255,8 @@ def _refuse(session: Session, run: RunRow, flaky: Mapping[int, Collection[str]])
         if row.index not in flaky:  # asked here: a statement has a limit on parameters
             continue
         count(run, row, -1)
-        fill_record(row, EpisodeRecord.model_validate_json(row.record).refused(REPEATS, flaky[row.index]))
+        record = EpisodeRecord.model_validate_json(row.record)
+        fill_record(row, run.family, record.refused(REPEATS, flaky[row.index]))
         count(run, row, +1)
 
 

@@ -1,13 +1,12 @@
 """The table of a campaign's failures. Pure."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
 
 from risk_sac.config import FamilyName, MethodName
-from risk_sac.errors import ConfigError
 from risk_sac.records import (
     Collision,
     ConflictType,
@@ -23,7 +22,7 @@ from risk_sac.records import (
     TriageState,
     Violation,
 )
-from risk_sac.scenario.families import family_named
+from risk_sac.scenario.families import density_of
 from risk_sac.verdicts.distinct import DistinctFailures, variant_name
 from service.store.stored import StoredCampaign, StoredRecord, StoredRun
 
@@ -188,14 +187,14 @@ def failure_table(
     runs = {run.number: run for run in campaign.runs}
     distinct: defaultdict[tuple[int, str], DistinctFailures] = defaultdict(DistinctFailures)
     headline, variants = DistinctFailures(), dict[str, int]()
-    densities = {family: _density(family) for family in {run.family for run in runs.values()}}
+    densities = {family: density_of(family) for family in {run.family for run in runs.values()}}
     failures, naming, rows = list(failures), list[Collision | Violation](), list[dict[str, Any]]()
     for failure in failures:
         worst, valid = failure.record.worst_violation, failure.record.valid_violations
         assert worst is not None  # else it would be no failure
         run = runs[failure.run_number]
         row = _row(run, failure.record, worst)
-        row["weight"] = worst.weight * densities[run.family](failure.record.scene)
+        row["weight"] = worst.weight(densities[run.family](failure.record.scene))
         kinds = distinct[failure.run_number, failure.record.phase]
         candidates = [each for each in valid if each.headline_candidate and row["repeats"] == "verified"]
         row["headline"] = sum(map(headline.add, candidates)) > 0
@@ -216,15 +215,6 @@ def failure_table(
         values = [row[column] for row in rows]
         table[column] = _rounded(values) if FailureTable.model_fields[column].annotation == list[Real] else values
     return FailureTable.model_validate(table)
-
-
-def _density(family: FamilyName) -> Callable[[Mapping[str, float]], float]:
-    """Density of a family's scenes; 1 where it declares no distribution, or is gone."""
-    try:
-        declared = family_named(family).declared
-    except ConfigError:
-        return lambda scene: 1.0
-    return (lambda scene: 1.0) if declared.alike else declared.density_of
 
 
 def _row(run: StoredRun, record: EpisodeRecord, worst: Collision | Violation) -> dict[str, Any]:

@@ -49,6 +49,18 @@ def test_the_numbers_on_the_screen_are_the_services(
     check_axe(page)
 
 
+def test_the_funnel_names_the_most_likely_severe_failure(
+    page_at: Callable[..., Page], service: Service, campaign: str
+) -> None:
+    table = service.get(campaign, "/failure-table")
+    heaviest = max(range(len(table["ids"])), key=lambda i: (table["weight"][i], -i))
+    line = page_at(f"campaigns/{campaign}").get_by_text("Most likely and severe:")
+    expect(line.get_by_role("link")).to_have_attribute(
+        "href", f"#/campaigns/{campaign}/failures/{table['ids'][heaviest]}"
+    )
+    assert table["severity"][heaviest] is None or table["severity"][heaviest] in line.inner_text()
+
+
 def test_the_pointer_reads_the_curves_of_the_service(
     page_at: Callable[..., Page], service: Service, campaign: str
 ) -> None:

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from risk_sac.cli.campaigns.output import add_campaign_command, add_newest_command, chosen_id
 from risk_sac.cli.console import OK, OUTCOME, in_words, offences, or_dash, outcome, print_answer, write_out
-from risk_sac.cli.flags import add_filter_flags, listed, wanted
+from risk_sac.cli.flags import WEIGHT, add_filter_flags, listed, wanted
 from risk_sac.cli.parser import FAILURE_HELP, Commands, Parser
 from risk_sac.client import Client, Episode
 from risk_sac.errors import ConfigError
@@ -94,7 +94,7 @@ def look_command(service_url: str, campaign_id: str, failure_id: str) -> str:
 
 
 def _list(options: argparse.Namespace) -> int:
-    filters: dict[str, Any] = wanted(options)
+    filters: dict[str, Any] = wanted(options) | {"order": "weight" if options.sort == WEIGHT else "arrival"}
     with Client.from_environment(options.url) as client:
         found = client.failures(
             chosen_id(client, options), tier="raw" if options.raw else "valid", run=options.run, **filters

@@ -5,7 +5,7 @@ See `risk_sac.rates`.
 
 import numpy as np
 
-from risk_sac.config import SceneOptimizerConfig
+from risk_sac.config import RateStart, SceneOptimizerConfig
 from risk_sac.rates.record import stages_of
 from risk_sac.rates.stages import Draws, draws_of
 from risk_sac.scenario.declared import SceneLaw
@@ -24,7 +24,15 @@ class RateSampler(SceneOptimizer):
     one_at_a_time = True  # a stage's proposal is fitted to all draws before it
     tries = 0  # a point that breaks a constraint is refused and counted, so that the weights of the others hold
 
-    def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int, declared: SceneLaw, draws: int) -> None:
+    def __init__(
+        self,
+        dimension: int,
+        config: SceneOptimizerConfig,
+        seed: int,
+        declared: SceneLaw,
+        draws: int,
+        start: RateStart | None = None,
+    ) -> None:
         """Prepares the stages.
 
         Args:
@@ -33,10 +41,11 @@ class RateSampler(SceneOptimizer):
           seed: of all draws.
           declared: distribution of the scenes.
           draws: number of scenes of the whole run.
+          start: scenes that failed before it.
         """
         super().__init__(dimension, config, seed)
         self._declared = declared
-        self._stages = stages_of(declared, draws, seed)
+        self._stages = stages_of(declared, draws, seed, start)
         self._points: list[Floats] = []
         self._margins: list[dict[str, float]] = []
         self._failed: list[bool] = []

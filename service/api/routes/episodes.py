@@ -14,6 +14,7 @@ from risk_sac.records import (
     Episode,
     EpisodePage,
     Failure,
+    FailureOrder,
     Fault,
     Grade,
     Outcome,
@@ -126,14 +127,18 @@ def list_failures(
     kind: Annotated[
         str | None, Query(max_length=300, pattern=r"^[^\x00]*$", description="Only those of exactly this kind.")
     ] = None,
+    order: Annotated[
+        FailureOrder, Query(description="weight: the most likely and severe first, by severity × plausibility.")
+    ] = "arrival",
     limit: Limit = 50,
     cursor: Cursor = None,
 ) -> Response:
-    """Failures in order of arrival: violations of requirements that count, contacts included."""
+    """Failures: violations of requirements that count, contacts included."""
+    listed = campaign_id if order == "arrival" else f"{campaign_id} by {order}"
     page = service.store.episodes(
         campaign_id,
         limit=limit,
-        after=service.cursors.decode(cursor, campaign_id, caller.sees),
+        after=service.cursors.decode(cursor, listed, caller.sees),
         run_id=run,
         outcomes=TIERS[tier],
         judged=Judged(
@@ -148,9 +153,10 @@ def list_failures(
             kind=kind,
             iid=run is not None,
         ),
+        weighty=order == "weight",
         project=caller.sees,
     )
-    return _page(page, service.cursors.encode(page.last, campaign_id, caller.sees))
+    return _page(page, service.cursors.encode(page.last, listed, caller.sees))
 
 
 @router.get("/failures/{failure_id}", response_model=Failure)

@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from risk_sac.records import Collision, Grade, Severity
+from risk_sac.records.violation import ranking_weight
 from risk_sac.verdicts.distinct import CANDIDATE, NEW_KIND, NEW_VARIANT, DistinctFailures, Finds, distinct_failures
 from tests.builders import collision, judgement, plausibility, violation
 
@@ -66,7 +67,10 @@ def test_finds_continue_from_their_state():
 def test_failures_weigh_by_severity_times_plausibility():
     unlikely = judgement(severity=Severity.SEVERE, plausibility=plausibility(joint_probability=0.004))
     likely = judgement(plausibility=plausibility(joint_probability=0.3))
-    assert collision(judgement=unlikely).weight == pytest.approx(0.004)
-    assert collision(judgement=likely).weight == pytest.approx(0.03)
-    assert violation(grade=Grade.PREVENTABLE).weight == pytest.approx(0.03)  # without contact as a moderate one
-    assert collision().weight == 0.0  # not valid
+    assert collision(judgement=unlikely).weight() == pytest.approx(0.004)
+    assert collision(judgement=likely).weight() == pytest.approx(0.03)
+    assert violation(grade=Grade.PREVENTABLE).weight() == pytest.approx(0.03)  # without contact as a moderate one
+    assert collision().weight() == 0.0  # not valid
+    assert collision(judgement=likely).weight(density=4.0) == pytest.approx(0.12)
+    assert ranking_weight(Severity.SEVERE, 0.5, 3.0) == 1.5
+    assert ranking_weight(Severity.MINOR, 0.5) == 0.005

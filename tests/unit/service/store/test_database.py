@@ -77,6 +77,24 @@ def test_a_record_that_cannot_be_read_is_a_storage_error(store, ledger, episode)
         list(store.records(campaign.number))
 
 
+def test_failures_of_an_older_database_get_their_weight(tmp_path, episode):
+    url = f"sqlite:///{tmp_path}/test.db"
+    store = Store(url)
+    ledger = Ledger(store)
+    ledger.create(SPEC)
+    ledger.add_episodes([(start(store, ledger), episode(0, Outcome.FAILURE))])
+    asked = "SELECT weight FROM episodes"
+    with store.engine.begin() as connection:
+        before = connection.exec_driver_sql(asked).scalar()
+        connection.exec_driver_sql("ALTER TABLE episodes DROP COLUMN weight")
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0001'")
+    store.close()
+    opened = Store(url)
+    with opened.engine.connect() as connection:
+        assert connection.exec_driver_sql(asked).scalar() == before > 0.0
+    opened.close()
+
+
 @pytest.fixture
 def settings(tmp_path, database_url, monkeypatch):
     monkeypatch.setenv("RISK_SAC_DATA_DIR", str(tmp_path / "data"))

@@ -88,6 +88,21 @@ def test_contacts_are_found_by_grade_severity_fault_what_was_broken_and_kind(sto
     assert found(kind="crossing") == []
 
 
+def test_the_most_likely_and_severe_failures_come_first_page_by_page(store, ledger, episode):
+    campaign = ledger.create(SPEC)
+    number = start(store, ledger)
+    severities = (Severity.MINOR, Severity.SEVERE, Severity.MODERATE, Severity.SEVERE)
+    likely = (0.5, 0.01, 0.5, 0.2)  # weights 0.005, 0.01, 0.05, 0.2
+    for index, (severity, joint) in enumerate(zip(severities, likely, strict=True)):
+        told = judgement(severity=severity, plausibility=plausibility(joint_probability=joint))
+        ledger.add_episodes([(number, judged(episode(index, Outcome.FAILURE), told))])
+    asked = {"outcomes": (Outcome.FAILURE,), "weighty": True}
+    first = store.episodes(campaign.id, limit=3, **asked)
+    second = store.episodes(campaign.id, limit=3, after=first.last, **asked)
+    assert [[item.index for item in page.items] for page in (first, second)] == [[3, 2, 1], [0]]
+    assert second.last is None
+
+
 def test_an_id_with_a_nul_is_unknown_on_every_database(store, ledger):
     campaign = ledger.create(SPEC)
     for wrong in ("\0", f"{campaign.id}\0"):

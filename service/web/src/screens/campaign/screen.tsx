@@ -14,6 +14,8 @@ import { Grids } from "./grid";
 import { Header } from "./header";
 import { useLive } from "./live";
 import { Newest } from "./newest";
+import { FirstRanked } from "./ranked";
+import { RatesOfCampaign } from "./rates";
 import { Runs } from "./runs";
 import { Scenes } from "./scenes";
 import { Worth } from "./worth";
@@ -50,6 +52,7 @@ export function CampaignScreen({ id }: { id: string }) {
         <section class="card" aria-labelledby="funnel-title">
           <h2 id="funnel-title">From failures to what is worth your time</h2>
           <Funnel counts={progress} />
+          {progress.failures > 0 && <FirstRanked campaign={campaign} />}
           {campaign.runs.length > 1 && (
             <p class="stage-note small faint">
               Distinct, preventable, plausible and implausible are summed over the runs; headline counts what several runs found alike once.
@@ -84,6 +87,7 @@ export function CampaignScreen({ id }: { id: string }) {
       )}
       {campaign.progress.episodes_done > 0 && <Scenes campaign={campaign} />}
       <Grids campaign={campaign} />
+      <RatesOfCampaign campaign={campaign} />
       <Boundaries campaign={campaign} />
       <Runs campaign={campaign} hidden={hidden} hide={hide} />
       <Worth campaign={campaign} />
