@@ -60,8 +60,8 @@ class Budget(Settings):
     False: where they are more, it plays a stratified sample of `episodes` points."""
 
     batch: Annotated[int, Field(ge=1, le=1024)] = 1
-    """Episodes that are asked for at a time, and played in parallel. The results depend on it, and on nothing else of
-    how they are played. Methods that learn, `rate` and `boundary` play one at a time."""
+    """Episodes that are asked for at a time, and played in parallel; at most 16 for each processor. The results depend
+    on it, and on nothing else of how they are played. A policy plays a round as it was when the round was asked for."""
 
     @model_validator(mode="after")
     def _least_is_affordable(self) -> Self:

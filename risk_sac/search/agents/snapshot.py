@@ -60,9 +60,7 @@ class PolicySnapshot:
     def at(self, state: dict[str, Any]) -> "PolicySnapshot":
         """Returns the same learner's policy at another moment, as `state` describes it."""
         policy = replace(self.policy, layers=tuple(state["layers"]))
-        return replace(
-            self, policy=policy, random_steps=state["random_steps"], dual_variable=state["dual_variable"]
-        )
+        return replace(self, policy=policy, random_steps=state["random_steps"], dual_variable=state["dual_variable"])
 
 
 def drawn_course(random: np.random.Generator, goals: int, *, mirrored: bool) -> tuple[int, bool]:
