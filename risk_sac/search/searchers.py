@@ -124,7 +124,11 @@ class Searchers:
         return self._next
 
     def _warm(self, out: int) -> bool:
-        """Whether the guide has done its part with so many episodes that are being played; one that takes turns goes on until it has found enough."""
+        """Whether the guide has done its part; one that takes turns goes on until it has found enough.
+
+        Args:
+          out: number of episodes that are being played.
+        """
         if isinstance(self.agent, PretrainedLearner):
             return True  # it needs none
         warm_start = self._spec.learner.warm_start

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
-
 from pydantic import ValidationError
 
 from risk_sac.config import METHODS, Budget, CampaignSpec, LearnerConfig, RunMethod, RunSpec, method_of
