@@ -60,8 +60,8 @@ class Budget(Settings):
     False: where they are more, it plays a stratified sample of `episodes` points."""
 
     batch: Annotated[int, Field(ge=1, le=1024)] = 1
-    """Episodes that are asked for at a time, and played in parallel. The results depend on it, and on nothing else of
-    how they are played. Methods that learn, `rate` and `boundary` play one at a time."""
+    """Episodes that are asked for at a time, and played in parallel; at most 16 for each processor. The results depend
+    on it, and on nothing else of how they are played. A policy plays a round as it was when the round was asked for."""
 
     @model_validator(mode="after")
     def _least_is_affordable(self) -> Self:
@@ -268,6 +268,7 @@ SHARED = ("ego", "odd", "requirements", "learner", "judge", "prior", "deviation"
 MOST_BYTES = 2 * 2**30  # of a run, beside the 0.6 GB or so that any run takes for code
 FLOAT, DOUBLE = 4, 8
 EPISODE_BYTES = 12_000  # of a record, as an object and as text in a checkpoint
+STEP_BYTES = 1500  # of a step that another process has played, beside what is observed
 IN_CHECKPOINT = 3  # what lives, its copy, and the archive of it
 
 
@@ -292,9 +293,11 @@ def demand_bytes(spec: RunSpec, observation_size: int, action_size: int, horizon
     parameters: P floats; of a network that learns 4 live (value, gradient, two moments of Adam) and 6 in a checkpoint
     (values and moments, copied and written), of a target 2 and 2.
     replay: a row for each decision of the search, up to the capacity, `IN_CHECKPOINT` times.
-    batch: what enters and leaves each layer of four networks at once.
+    batch_size: what enters and leaves each layer of four networks at once.
+    batch: the steps of the episodes that are played and not told yet, of two rounds.
     """
-    method, agent, episodes = method_of(spec.method), spec.learner.agent, spec.budget.episodes
+    method, agent, batch = method_of(spec.method), spec.learner.agent, spec.budget.batch
+    episodes = spec.budget.episodes
     demand = {"budget.episodes": EPISODE_BYTES * spec.budget.total_episodes}
     if not method.learns:
         return demand
@@ -309,6 +312,7 @@ def demand_bytes(spec: RunSpec, observation_size: int, action_size: int, horizon
         "learner.agent.hidden_sizes": FLOAT * floats,
         "learner.replay.capacity": IN_CHECKPOINT * row * decisions,
         "learner.agent.batch_size": FLOAT * agent.batch_size * 4 * 2 * sum(critic),
+        "budget.batch": 2 * (batch if batch > 1 else 0) * horizon_steps * (FLOAT * observation_size + STEP_BYTES),
     }
 
 

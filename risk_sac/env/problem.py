@@ -11,6 +11,7 @@ from risk_sac.config.methods import MethodName, method_of
 from risk_sac.egos.registry import pinned
 from risk_sac.env.observation_layout import observation_size
 from risk_sac.errors import ConfigError, OddError, did_you_mean
+from risk_sac.host.machine import check_batch
 from risk_sac.records import NO_CONTACT, Adjustment
 from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.rss_parameters import RssParameters
@@ -348,6 +349,7 @@ def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
     Refuses one that could not run; see `Problem.from_spec` and `check_installed` for the errors.
     """
     spec = spec.model_copy(update={"ego": pinned(spec.ego)})
+    check_batch(spec.budget.batch)
     for method in spec.methods:
         check_installed(method)
     alike = spec.model_copy(update={"seeds": spec.seeds[:1]}).runs()  # the i.i.d. phase's among them

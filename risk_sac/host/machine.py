@@ -28,6 +28,7 @@ def cores(process: Path = Path("/proc/self")) -> int:
 
 ROLLOUTS = "RISK_SAC_ROLLOUTS"
 """Variable that says how many processes play the episodes of one run."""
+MOST_EACH = 16  # episodes of a round for each process; more would only be chosen with less known
 
 
 def rollout_processes() -> int:
@@ -42,6 +43,18 @@ def rollout_processes() -> int:
     if not given.isdecimal() or int(given) < 1:
         raise ConfigError(ROLLOUTS, repr(given), "an integer, 1 or more", "leave it out for one per processor")
     return int(given)
+
+
+def check_batch(batch: int) -> None:
+    """Refuses rounds of more episodes than a search on this machine gains from.
+
+    Raises:
+      ConfigError: naming the batch.
+    """
+    processes = max(cores(), rollout_processes())
+    if batch > (most := MOST_EACH * processes):
+        expected = f"at most {most}, {MOST_EACH} for each of the {processes} processes that play here"
+        raise ConfigError("budget.batch", f"{batch}", expected, f"choose a smaller batch, or set {ROLLOUTS}")
 
 
 def rollouts_each(workers: int) -> Mapping[str, str]:

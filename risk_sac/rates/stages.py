@@ -81,6 +81,11 @@ class Stages:
             self._fit(stage, known())
         return self._proposals[stage].draw(np.random.default_rng((self._seed, number)))
 
+    def start(self, number: int) -> int:
+        """Returns the number of the first draw in the stage of a draw."""
+        stage = self._stage(number)
+        return self._ends[stage - 1] if stage else 0
+
     def ratios(self, known: Draws) -> Floats:
         """p(z) / q_s(z) of the draws so far, `n`, each with the proposal of its own stage."""
         ratios, stages = np.empty(len(known)), self._stages(len(known))

@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 from risk_sac.errors import NotFinite
 from risk_sac.world.types import Vector
 
+# Choice: log σ is squashed smoothly into these bounds; a hard clamp has no gradient outside them.
+LOG_STD_MIN = -5.0
+LOG_STD_MAX = 2.0
+LOG_STD_MIDDLE, LOG_STD_HALF = 0.5 * (LOG_STD_MAX + LOG_STD_MIN), 0.5 * (LOG_STD_MAX - LOG_STD_MIN)
 EPSILON = 1e-5  # added to a variance, as `torch.nn.functional.layer_norm` does
 Layers = Sequence[NDArray[np.float32]]
 """Weights, `in x out`, and biases, `out`, in turn."""

@@ -35,6 +35,8 @@ STEPS, NATURAL_RATE, RATE = 20, 0.8, 0.2  # of a fit: natural gradient of the po
 WIDE = 1.96  # standard deviations of the straddle, Bryan et al.
 SCALE, SCALE_SPREAD = math.log(20.0), 0.7  # prior of the latent's variance: outcomes hardly vary at one point; choice
 JITTER = 1e-5
+# Noise that an outcome at a latent of 0 has as an observation of it: 1 / (-∂² log Φ) there.
+OUTCOME_VARIANCE = math.pi / 2
 
 
 class _Latent(ApproximateGP):  # type: ignore[misc]  # gpytorch has no types
@@ -86,11 +88,28 @@ class FailureClassifier:
                 posterior.step()
         self._latent.eval()
 
-    def latent(self, points: Floats) -> tuple[Floats, Floats]:
-        """Mean and standard deviation of the latent function at points, `n` each; it is above 0 where most fail."""
+    def latent(self, points: Floats, out: Floats | None = None) -> tuple[Floats, Floats]:
+        """Mean and standard deviation of the latent function at points, `n` each; it is above 0 where most fail.
+
+        Args:
+          points: `n x d`.
+          out: `m x d`, where outcomes are awaited. Each is taken for what the mean says, so that the mean stays and
+            the deviation falls around them: σ²(x) - k(x, out) (K(out, out) + s² I)⁻¹ k(out, x).
+
+        Source: Desautels et al. 2014, Parallelizing exploration-exploitation tradeoffs in Gaussian process bandit
+        optimization (hallucinated observations).
+        """
         with torch.no_grad(), cholesky_jitter(double_value=JITTER):
-            at = self._latent(torch.from_numpy(points))
-            return at.mean.numpy(), at.variance.clamp_min(0.0).sqrt().numpy()
+            if out is None or not len(out):
+                at = self._latent(torch.from_numpy(points))
+                return at.mean.numpy(), at.variance.clamp_min(0.0).sqrt().numpy()
+            count, at = len(points), self._latent(torch.from_numpy(np.concatenate((points, out))))
+            covariance = at.covariance_matrix
+            awaited = covariance[count:, count:] + OUTCOME_VARIANCE * torch.eye(len(out), dtype=covariance.dtype)
+            across = covariance[:count, count:]
+            told = (across * torch.linalg.solve(awaited, across.T).T).sum(dim=1)
+            variance = covariance.diagonal()[:count] - told
+            return at.mean[:count].numpy(), variance.clamp_min(0.0).sqrt().numpy()
 
     def probability(self, points: Floats) -> Floats:
         """Probability of failing at points, `n`: the latent's uncertainty is integrated out."""
@@ -108,12 +127,12 @@ class FailureClassifier:
             return np.asarray((at.mean + noise @ root.T).numpy())
 
 
-def straddle(classifier: FailureClassifier, points: Floats) -> Floats:
-    """Ambiguity of points, `n`: largest where the boundary may pass.
+def straddle(classifier: FailureClassifier, points: Floats, out: Floats | None = None) -> Floats:
+    """Ambiguity of points, `n`: largest where the boundary may pass, and outcomes are not awaited already.
 
-    a(x) = 1.96 σ(x) - |μ(x)|
+    a(x) = 1.96 σ(x) - |μ(x)|, with the deviation that is left at `out`; see `FailureClassifier.latent`.
 
     Source: Bryan et al. 2005.
     """
-    mean, deviation = classifier.latent(points)
+    mean, deviation = classifier.latent(points, out)
     return WIDE * deviation - np.abs(mean)

@@ -88,14 +88,16 @@ def rounds(run: RunState, folder: Path, observer: Observer) -> Iterator[RunMetri
     """Plays the rest of a run in rounds of `batch` episodes, in parallel; yields the metrics after each episode.
 
     Round r + 1 is asked for once round r - 1 is told, and is played while round r is. So no process waits for the
-    slowest episode of a round, and the result depends neither on their number nor on their speed.
+    slowest episode of a round, and the result depends neither on their number nor on their speed. A learner learns from
+    an episode when it is told; a round is played with the policy of the moment in which it is asked for.
     """
     batch = run.spec.budget.batch
     with closing(Rollouts(run.spec, folder / ROLLOUT_FOLDER, min(batch, rollout_processes()))) as rollouts:
         for proposal in run.proposed:  # an earlier process has asked for them
             rollouts.submit(proposal)
         while not observer.should_stop():
-            while not run.spent and run.next_index < (len(run.records) // batch + ROUNDS_OUT) * batch:
+            most = (len(run.records) // batch + ROUNDS_OUT) * batch
+            while not run.spent and not run.waits and run.next_index < most:
                 run.proposed.append(propose(run))
                 rollouts.submit(run.proposed[-1])
             if not run.proposed:
@@ -108,7 +110,7 @@ def rounds(run: RunState, folder: Path, observer: Observer) -> Iterator[RunMetri
 def propose(run: RunState) -> Proposal:
     """Chooses what to play next: Algorithm 1, line 4."""
     searchers, learning, index = run.searchers, run.learning, run.next_index
-    searchers.next(learning=learning)
+    searchers.next(learning=learning, out=len(run.proposed))
     point = searchers.ask(out=[proposal.point for proposal in run.proposed])
     scene, genes = searchers.split(point)
     return Proposal(
@@ -120,7 +122,9 @@ def propose(run: RunState) -> Proposal:
         scene=scene,
         genes=genes,
         driven_by=searchers.driven_by(learning=learning),
+        guided=searchers.guided,
         origin=searchers.origin if run.in_rounds else None,
+        policy=searchers.snapshot() if run.in_rounds else None,
     )
 
 
@@ -128,8 +132,9 @@ def tell(run: RunState, proposal: Proposal, played: PlayedEpisode) -> RunMetrics
     """Tells the searchers of an episode and adds its record: Algorithm 1, lines 21 and 22."""
     sums, encounter, unplayable = played.sums, played.encounter, played.unplayable
     mean_return = sums.shaped_return / sums.steps if unplayable is None else None
-    if proposal.origin is not None:
-        run.searchers.origin = proposal.origin
+    run.searchers.recall(guided=proposal.guided, origin=proposal.origin)
+    if proposal.policy is not None:
+        run.searchers.learn(played.transitions, proposal.policy, proposal.seed)
     objective = run.searchers.tell(proposal.point, mean_return, encounter)
     ending = Ending.of(encounter.collision, encounter.violations) if unplayable is None else Ending(*unplayable, ())
     agent = run.searchers.agent

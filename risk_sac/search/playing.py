@@ -4,7 +4,7 @@ A proposal and what was played of it are plain values, so that either may pass t
 """
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -19,6 +19,7 @@ from risk_sac.risk.reward import TrainingReward
 from risk_sac.risk.rss import TTC_CAP_S
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.run_folder.crash_guard import CrashGuard
+from risk_sac.search.agents.snapshot import PolicySnapshot
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.world.jit import cpu_s
@@ -65,10 +66,15 @@ class Proposal:
     scene: Scene
     genes: Floats
     driven_by: DrivenBy | None
+    guided: bool  # whether the guide's searcher has proposed it, see `Searchers`
     origin: Mapping[str, Any] | None = None  # see `SceneOptimizer.origin`; None: nothing else is asked for meanwhile
+    policy: PolicySnapshot | None = None  # that it is played with; None: this process plays it, or nothing learns
 
     def state(self) -> dict[str, Any]:
-        """Returns plain values that the proposal can be made of again; the point has the scene and the genes."""
+        """Returns plain values that the proposal can be made of again, with its policy.
+
+        The point has the scene and the genes.
+        """
         return {
             "index": self.index,
             "phase": self.phase,
@@ -76,6 +82,7 @@ class Proposal:
             "seed": self.seed,
             "point": self.point,
             "driven_by": self.driven_by and self.driven_by.value,
+            "guided": self.guided,
             "origin": None if self.origin is None else dict(self.origin),
         }
 
@@ -120,6 +127,7 @@ class PlayedEpisode:
     deviations: Mapping[str, StoryDeviation] = field(default_factory=dict)
     series: dict[str, NDArray[np.generic]] | None = None  # where a requirement that counts was violated
     cpu_s: float = 0.0  # of the process that played it, without compilation
+    transitions: Sequence[Transition] = ()  # its steps, where another process has played it for a learner
 
 
 class GuardedEnv:

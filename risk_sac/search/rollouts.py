@@ -11,17 +11,18 @@ import subprocess
 import sys
 from collections import deque
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
-from risk_sac.config import RunSpec, method_of
+from risk_sac.config import RunMethod, RunSpec, method_of
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import RiskSacError, SimulationError
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder.crash_guard import PATIENCE, CrashGuard
-from risk_sac.search.agents.controls import control
+from risk_sac.search.agents.controls import ScriptFollower, control
+from risk_sac.search.agents.snapshot import SnapshotActor
 from risk_sac.search.playing import GuardedEnv, PlayedEpisode, Proposal, play
 
 logger = logging.getLogger(__name__)
@@ -137,10 +138,23 @@ def serve(connection: Connection, folder: Path) -> None:
         guarded = GuardedEnv(env, guard)
         while True:
             proposal: Proposal = connection.recv()
-            actor = control(spec.method, env.problem.family, proposal.seed)
-            actor.begin(proposal.genes)
             guarded.begin(proposal.index)
-            connection.send(play(guarded, proposal, actor, actor, reward))
+            connection.send(played(guarded, proposal, spec.method, reward))
+
+
+def played(guarded: GuardedEnv, proposal: Proposal, method: RunMethod, reward: TrainingReward) -> PlayedEpisode:
+    """Plays a proposal; with a policy, the steps are for the learner."""
+    family, actor = guarded.env.problem.family, None
+    if proposal.policy is None:
+        driver = control(method, family, proposal.seed)
+        driver.begin(proposal.genes)
+        return play(guarded, proposal, driver, driver, reward)
+    learner = SnapshotActor(proposal.policy, proposal.seed)
+    if proposal.guided:
+        actor = ScriptFollower(family)
+        actor.begin(proposal.genes)
+    episode = play(guarded, proposal, actor or learner, learner, reward)
+    return replace(episode, transitions=learner.transitions)
 
 
 def main() -> None:

@@ -4,7 +4,7 @@ import hashlib
 import logging
 import os
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -21,6 +21,7 @@ from risk_sac.run_folder import checkpoint
 from risk_sac.run_folder.durable import sha256
 from risk_sac.run_folder.results import EPISODES, FAILURES, records_from_lines, series_name
 from risk_sac.run_folder.series import write_series
+from risk_sac.search.agents.snapshot import PolicySnapshot
 from risk_sac.search.playing import PlayedEpisode, Proposal
 from risk_sac.search.searchers import Searchers
 from risk_sac.verdicts.judge import DEFINITIONS
@@ -87,7 +88,7 @@ class RunState:
     @property
     def in_rounds(self) -> bool:
         """Whether several episodes are asked for at a time."""
-        return self.spec.budget.batch > 1 and not self.searchers.one_at_a_time
+        return self.spec.budget.batch > 1
 
     @property
     def finished(self) -> bool:
@@ -98,6 +99,12 @@ class RunState:
     def spent(self) -> bool:
         """Whether all episodes of the budget are played or proposed."""
         return not self.learning and self.next_index - self._search_episodes >= self.spec.budget.evaluation_episodes
+
+    @property
+    def waits(self) -> bool:
+        """Whether the next episode depends on one that is out: a stage of `rate`, or the evaluation of a learner."""
+        learns_yet = self.searchers.learns and any(proposal.learning for proposal in self.proposed)
+        return (learns_yet and not self.learning) or self.searchers.waits(len(self.proposed))
 
     @property
     def next_index(self) -> int:
@@ -170,12 +177,15 @@ class RunState:
             return
         with (self._folder / EPISODES).open("rb") as file:
             os.fsync(file.fileno())
+        policies = {id(one.policy): one.policy for one in self.proposed if one.policy is not None}
+        numbers = {known: number for number, known in enumerate(policies)}
         state = {
             "episodes_bytes": self._written,
             "episodes_sha256": self._digest.hexdigest(),
             "series": {index: file.sha256 for index, file in self.series.items()},
             "episode_cpu_s": self._episode_cpu_s,
-            "proposed": [proposal.state() for proposal in self.proposed],
+            "proposed": [{**one.state(), "policy": numbers.get(id(one.policy))} for one in self.proposed],
+            "policies": [policy.state() for policy in policies.values()],
             **self.searchers.state(),
         }
         checkpoint.save(self._folder / CHECKPOINT, state, self.spec.digest)
@@ -201,7 +211,8 @@ class RunState:
         self.records = records_from_lines(content)
         self.series = _series(self._folder, self.records, state["series"])
         self.searchers.load(state, self.records)
-        self.proposed = deque(map(self._proposal, state["proposed"]))
+        policies = [self.searchers.snapshot_of(policy) for policy in state["policies"]]
+        self.proposed = deque(self._proposal(proposed, policies) for proposed in state["proposed"])
         self._episode_cpu_s = list(state["episode_cpu_s"])
         self._cpu_began_s = cpu_s() - self._episode_cpu_s[-1]
         self._saved = len(self.records)
@@ -226,12 +237,13 @@ class RunState:
         """Ends the simulation."""
         self.env.close()
 
-    def _proposal(self, state: dict[str, Any]) -> Proposal:
+    def _proposal(self, state: dict[str, Any], policies: Sequence[PolicySnapshot]) -> Proposal:
         """Returns a proposal as an earlier process has made it."""
-        self.searchers.next(learning=state["learning"])
+        self.searchers.recall(guided=state["guided"])
         scene, genes = self.searchers.split(state["point"])
         driven_by = state["driven_by"] and DrivenBy(state["driven_by"])
-        return Proposal(**{**state, "scene": scene, "genes": genes, "driven_by": driven_by})
+        policy = None if state["policy"] is None else policies[state["policy"]]
+        return Proposal(**{**state, "scene": scene, "genes": genes, "driven_by": driven_by, "policy": policy})
 
     def _append(self, record: EpisodeRecord) -> None:
         """Writes a record behind those of this run; what an interrupted run wrote there is cut off."""

@@ -13,6 +13,8 @@ from risk_sac.env.problem import Problem
 from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Outcome, Violation
 from risk_sac.search.agents.controls import Control, ScriptFollower, control
 from risk_sac.search.agents.learner import Learner
+from risk_sac.search.agents.snapshot import PolicySnapshot
+from risk_sac.search.agents.transition import Transition
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.search.prior.coordinates import Coordinates
 from risk_sac.search.prior.learner import PretrainedLearner
@@ -106,27 +108,31 @@ class Searchers:
         self._next = self._own
         self._episodes, self._failures = 0, 0  # of the search
 
-    def next(self, *, learning: bool) -> Searcher:
+    def next(self, *, learning: bool, out: int = 0) -> Searcher:
         """Chooses the searcher of the next episode.
 
         Args:
           learning: whether the episode is one of the search; in the evaluation the guide takes no part.
+          out: number of episodes that are being played.
         """
         if self._guide is None or not learning:
             self._next = self._own
-        elif not self._warm:
+        elif not self._warm(out):
             self._next = self._guide
         else:
             self._next = (self._guide, self._own)[self._turns.draw()] if self._turns else self._own
         return self._next
 
-    @property
-    def _warm(self) -> bool:
-        """Whether the guide has done its part; one that takes turns goes on until it has found enough."""
+    def _warm(self, out: int) -> bool:
+        """Whether the guide has done its part; one that takes turns goes on until it has found enough.
+
+        Args:
+          out: number of episodes that are being played.
+        """
         if isinstance(self.agent, PretrainedLearner):
             return True  # it needs none
         warm_start = self._spec.learner.warm_start
-        spent = self._episodes >= warm_start.episodes and not (self._turns and warm_start.episodes)
+        spent = self._episodes + out >= warm_start.episodes and not (self._turns and warm_start.episodes)
         return spent or self._failures >= warm_start.failures
 
     def driven_by(self, *, learning: bool) -> DrivenBy | None:
@@ -144,8 +150,8 @@ class Searchers:
         do; after `tries` the nearest scene of a pool takes its place. One without tries has its points refused. `out`
         are the points that are being played.
         """
-        sampler, size = self._next.sampler, self._space.dimension
-        sampler.out = out
+        (sampler, actor), size = self._next, self._space.dimension
+        sampler.out = [played[: size + actor.genes] for played in out]
         point = sampler.ask()
         if not sampler.tries:
             return point
@@ -163,9 +169,13 @@ class Searchers:
         return self._space.from_unit(point[:size]), point[size:]
 
     @property
-    def one_at_a_time(self) -> bool:
-        """Whether each episode has to be told before the next is asked for: learners learn from it."""
-        return isinstance(self.agent, Learner) or self._own.sampler.one_at_a_time
+    def learns(self) -> bool:
+        """Whether the adversaries do."""
+        return isinstance(self.agent, Learner)
+
+    def waits(self, out: int) -> bool:
+        """Whether the next point depends on one of so many that are out; see `SceneOptimizer.waits`."""
+        return self._own.sampler.waits(out)
 
     @property
     def points(self) -> int | None:
@@ -177,9 +187,31 @@ class Searchers:
         """Where the point that was asked for last comes from, see `SceneOptimizer.origin`."""
         return self._next.sampler.origin
 
-    @origin.setter
-    def origin(self, origin: Mapping[str, Any]) -> None:
-        self._next.sampler.origin = origin
+    @property
+    def guided(self) -> bool:
+        """Whether the searcher chosen last is the guide."""
+        return self._next is not self._own
+
+    def snapshot(self) -> PolicySnapshot | None:
+        """The policy as it is now; None where nothing learns."""
+        return self.agent.snapshot() if isinstance(self.agent, Learner) else None
+
+    def snapshot_of(self, state: dict[str, Any]) -> PolicySnapshot:
+        """Returns the policy of an earlier moment; see `PolicySnapshot.state`."""
+        assert isinstance(self.agent, Learner)
+        return self.agent.snapshot().at(state)
+
+    def recall(self, *, guided: bool, origin: Mapping[str, Any] | None = None) -> None:
+        """Chooses the searcher that has proposed an episode; `origin` where others were proposed since."""
+        self._next = self._guide if guided and self._guide else self._own
+        if origin is not None:
+            self._own.sampler.origin = {}  # the guide's points are none of its own
+            self._next.sampler.origin = origin
+
+    def learn(self, transitions: Sequence[Transition], snapshot: PolicySnapshot, seed: int) -> None:
+        """Lets the learner learn from an episode that another process has played; see `Learner.learn`."""
+        assert isinstance(self.agent, Learner)
+        self.agent.learn(transitions, snapshot, seed, own=not self.guided)
 
     def begin(self, genes: Floats) -> Actor:
         """Begins an episode for its actor, which it returns, and for the learner that observes it."""
@@ -201,7 +233,7 @@ class Searchers:
         self._episodes += 1
         self._failures += record.outcome is Outcome.FAILURE
         if self._turns:
-            self._turns.tell(OWN if self._next is self._own else GUIDE, record.steps, record.valid_violations)
+            self._turns.tell(GUIDE if self.guided else OWN, record.steps, record.valid_violations)
 
     def state(self) -> dict[str, Any]:
         """Returns all that the next episode depends on, except the records so far; see `load`."""
@@ -209,6 +241,7 @@ class Searchers:
             "optimizer": self._own.sampler.state(),
             "agent": self.agent.state(),
             "guide": self._guide.sampler.state() if self._guide else None,
+            "turns": self._turns.state() if self._turns else None,
         }
 
     def load(self, state: dict[str, Any], records: list[EpisodeRecord]) -> None:
@@ -221,9 +254,10 @@ class Searchers:
         self.agent.load(state["agent"])
         if self._guide:
             self._guide.sampler.load(state["guide"])
-        for record in records:
-            self.next(learning=record.searching)
-            self.add(record)
+        if self._turns:
+            self._turns.load(state["turns"])
+        searched = [record for record in records if record.searching]
+        self._episodes, self._failures = len(searched), sum(record.outcome is Outcome.FAILURE for record in searched)
 
     def _searcher(self, actor: Actor, sampler: type[SceneOptimizer]) -> Searcher:
         dimension = self._space.dimension + actor.genes
@@ -272,3 +306,17 @@ class Turns:
     def tell(self, arm: int, steps: int, violations: Sequence[Collision | Violation]) -> None:
         """Counts an episode and its valid violations; what either arm has found is new to neither."""
         self._bandit.tell(arm, self._finds.add(violations), steps)
+
+    def state(self) -> dict[str, Any]:
+        """Returns plain values to continue from."""
+        return {
+            "random": self._random.bit_generator.state,
+            "bandit": self._bandit.state(),
+            "finds": self._finds.state(),
+        }
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Continues from `state()`."""
+        self._random.bit_generator.state = state["random"]
+        self._bandit.load(state["bandit"])
+        self._finds.load(state["finds"])

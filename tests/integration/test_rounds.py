@@ -9,21 +9,39 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from pydantic import ValidationError
 
-from risk_sac.config import Budget, RunMethod, RunSpec
+from risk_sac.config import METHODS, Budget, CampaignSpec, LearnerConfig, RunMethod, RunSpec, method_of
+from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.learner import AgentConfig, WarmStartConfig
+from risk_sac.config.methods import IID_METHODS
+from risk_sac.env.problem import checked_campaign
 from risk_sac.errors import ConfigError
+from risk_sac.host import machine
 from risk_sac.host.machine import ROLLOUTS, rollout_processes
-from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.records import DrivenBy, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import FAILURES
 from risk_sac.search.loop import execute_run
 from tests.listener import Listener
 
 BATCH = 4
-METHODS: tuple[RunMethod, ...] = ("archive", "bo-only", "random")
+OVER = ("lead_gap_m", "lead_speed_mps")  # of a boundary
+ALL: tuple[RunMethod, ...] = (*METHODS, *IID_METHODS)
+# A learner that acts by its policy, and learns, within a few episodes.
+QUICK = LearnerConfig(
+    agent=AgentConfig(warmup_steps=200, batch_size=32), warm_start=WarmStartConfig(episodes=4), checkpoint_every=3
+)
 
 
 def spec(method: RunMethod, episodes: int, batch: int = BATCH, **budget: int) -> RunSpec:
-    return RunSpec(family="low", method=method, seed=5, budget=Budget(episodes=episodes, batch=batch, **budget))
+    return RunSpec(
+        family="low",
+        method=method,
+        seed=5,
+        budget=Budget(episodes=episodes, batch=batch, **budget),
+        learner=QUICK,
+        boundary=BoundaryConfig(over=OVER) if method == "boundary" else None,
+    )
 
 
 class Killer(Listener):
@@ -46,13 +64,32 @@ def processes(monkeypatch: pytest.MonkeyPatch):
     return lambda number: monkeypatch.setenv(ROLLOUTS, str(number))
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["archive", "bo-only", "risk-sac"])
 def test_the_number_of_processes_changes_nothing(tmp_path: Path, processes, method: RunMethod) -> None:
     digests = set()
     for number in (1, 3):
         processes(number)
         digests.add(execute_run(spec(method, 14), tmp_path / str(number), Listener()).digest)
     assert len(digests) == 1
+
+
+@pytest.mark.torture
+@pytest.mark.parametrize("method", ALL)
+def test_neither_processes_nor_kills_change_a_method(tmp_path: Path, processes, method: RunMethod) -> None:
+    needed = method_of(method).needs
+    if needed:
+        pytest.importorskip(needed)
+    wanted, digests = spec(method, 26, batch=8, evaluation_episodes=3), set()
+    for number in (1, 2, 3, 5):
+        processes(number)
+        killer = Killer(after=(5, 14) if number in (2, 5) else ())
+        outcome = execute_run(wanted, tmp_path / str(number), killer)
+        assert outcome.finished
+        assert killer.killed == len(killer.after)
+        digests.add(outcome.digest)
+    for limit in (3, 9, 10**9):
+        outcome = execute_run(wanted, tmp_path / "stopped", Listener(limit=limit))
+    assert digests == {outcome.digest}
 
 
 def test_killed_processes_change_nothing(tmp_path: Path, processes) -> None:
@@ -67,7 +104,7 @@ def test_killed_processes_change_nothing(tmp_path: Path, processes) -> None:
     assert series[0] == series[1]
 
 
-@pytest.mark.parametrize(("method", "played"), [("archive-replay", 1), ("bo-only", 6)])
+@pytest.mark.parametrize(("method", "played"), [("archive-replay", 1), ("risk-sac-diverse", 7)])
 def test_a_stopped_run_goes_on_as_if_it_had_not(tmp_path: Path, processes, method: RunMethod, played: int) -> None:
     processes(2)
     whole = execute_run(spec(method, 14), tmp_path / "whole", Listener())
@@ -81,13 +118,42 @@ def test_a_batch_of_one_is_played_in_this_process(tmp_path: Path) -> None:
     assert not (tmp_path / "rollouts").exists()
 
 
-@pytest.mark.parametrize("method", ["risk-sac", "rate"])
-def test_methods_that_need_each_outcome_play_one_at_a_time(tmp_path: Path, method: RunMethod) -> None:
+def test_a_rate_has_the_same_draws_with_any_batch(tmp_path: Path) -> None:
+    """Five stages of two draws, and one of twelve."""
     digests = {
-        execute_run(spec(method, 3, batch=batch), tmp_path / str(batch), Listener()).digest for batch in (1, BATCH)
+        execute_run(spec("rate", 22, batch=batch), tmp_path / str(batch), Listener()).digest for batch in (1, BATCH)
     }
     assert len(digests) == 1
-    assert not (tmp_path / str(BATCH) / "rollouts").exists()
+    assert (tmp_path / str(BATCH) / "rollouts").exists()
+
+
+def test_a_learner_learns_from_all_episodes_before_it_is_evaluated(tmp_path: Path, processes) -> None:
+    processes(2)
+    listener = Listener()
+    execute_run(spec("sac", 14, evaluation_episodes=3), tmp_path, listener)
+    search, evaluation = listener.records[:14], listener.records[14:]
+    assert [record.driven_by for record in search[:4]] == [DrivenBy.RANDOM] * 4  # the guide's
+    assert {record.driven_by for record in search[8:]} == {DrivenBy.POLICY}
+    learnt = [record.temperature for record in search]
+    assert len(set(learnt[8:])) == len(learnt[8:])
+    assert [record.temperature for record in evaluation] == [learnt[-1]] * 3
+
+
+@pytest.mark.parametrize("batch", [33, 1024])
+def test_rounds_too_large_for_the_machine_are_refused(monkeypatch: pytest.MonkeyPatch, batch: int) -> None:
+    monkeypatch.delenv(ROLLOUTS, raising=False)
+    monkeypatch.setattr(machine, "cores", lambda: 2)
+    campaign = CampaignSpec(families=("low",), methods=("archive",), budget=Budget(batch=batch))
+    with pytest.raises(ConfigError, match=f"budget.batch: got {batch}; wanted at most 32") as refused:
+        checked_campaign(campaign)
+    assert refused.value.field == "budget.batch"
+    monkeypatch.setenv(ROLLOUTS, "64")  # of an ego that takes its time
+    assert checked_campaign(campaign).budget.batch == batch
+
+
+def test_a_round_of_no_episode_is_refused() -> None:
+    with pytest.raises(ValidationError, match="batch"):
+        Budget(batch=0)
 
 
 @pytest.mark.parametrize("number", ["0", "-2", "two"])

@@ -79,6 +79,21 @@ def test_a_guide_that_goes_on_anyway_has_time_until_it_has_found_enough() -> Non
     assert set(taken[2:]) == {ScriptFollower, Learner}
 
 
+def test_a_guide_has_done_its_part_once_its_last_episode_is_out() -> None:
+    subject = searchers("risk-sac", WarmStartConfig(episodes=3, failures=2))
+    assert [type(subject.next(learning=True, out=out).actor) for out in (2, 3)] == [ScriptFollower, Learner]
+
+
+def test_an_episode_of_the_guide_says_nothing_about_the_arm_of_the_policys_scenes() -> None:
+    subject = searchers("risk-sac", WarmStartConfig())
+    subject.recall(guided=False, origin={"arm": 1})
+    assert subject.origin == {"arm": 1}
+    subject.recall(guided=True, origin={"parent": None})
+    assert subject.guided
+    subject.recall(guided=False)
+    assert subject.origin == {"arm": None}
+
+
 def shares(*findings: tuple[int, str, Grade]) -> list[float]:
     """Share of the policy's turns among 2,000, after each finding."""
     turns, found = Turns(0, COLD), []

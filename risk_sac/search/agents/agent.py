@@ -15,6 +15,7 @@ from torch.optim import Adam
 from risk_sac.errors import CheckpointError, ConfigError, NotFinite
 from risk_sac.search.agents.networks import Mlp
 from risk_sac.search.agents.replay import Batch
+from risk_sac.search.agents.snapshot import Exploration
 from risk_sac.search.frozen_policy import FrozenPolicy
 from risk_sac.world.types import Floats, Vector
 
@@ -35,9 +36,11 @@ class Agent(ABC):
 
     Attributes:
       parts: networks and optimisers by their name in a checkpoint.
+      exploration: how actions are drawn from the policy's outputs.
     """
 
     parts: Mapping[str, nn.Module | Adam]
+    exploration: Exploration
     _policy: Mlp
     _action_size: int
     _generator: torch.Generator

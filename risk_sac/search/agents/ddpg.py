@@ -42,7 +42,7 @@ class DdpgAgent(Agent):
         device: str = "cpu",
     ) -> None:
         self._config = config
-        self._deviation = ddpg.exploration_deviation
+        self.exploration = ddpg.exploration_deviation
         self._action_size = action_size
         self._generator = torch.Generator(torch.device(device)).manual_seed(seed)
         critic_sizes = (observation_size + action_size, *config.hidden_sizes, 1)
@@ -65,7 +65,7 @@ class DdpgAgent(Agent):
         action = torch.tanh(self._policy.respond(observation))
         if explore:
             noise = torch.randn(self._action_size, generator=self._generator, device=self._generator.device)
-            action = (action + self._deviation * noise.cpu()).clamp(-1.0, 1.0)
+            action = (action + self.exploration * noise.cpu()).clamp(-1.0, 1.0)
         return action.numpy()
 
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:

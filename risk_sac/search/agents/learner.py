@@ -4,6 +4,7 @@ Source: RISK-SAC, Sec. III-B, Eq. 1-2, and Alg. 1, l. 15-16.
 """
 
 import math
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,7 @@ from risk_sac.search.agents.controls import Decision, Held
 from risk_sac.search.agents.ddpg import DdpgAgent
 from risk_sac.search.agents.replay import Batch, RiskPrioritizedReplay, UniformReplay
 from risk_sac.search.agents.sac import SacAgent
+from risk_sac.search.agents.snapshot import PolicySnapshot
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.frozen_policy import FrozenPolicy
 from risk_sac.world.types import Floats, Vector
@@ -95,6 +97,7 @@ class Learner:
         self._replay = replay(*sizes, config.replay)
         self.dual_variable = min(config.lagrangian.initial, config.lagrangian.maximum) if method.lagrangian else 0.0
         self._generator = np.random.default_rng(seed)
+        self._snapshot: PolicySnapshot | None = None  # of the policy as it is, once asked for
         self._acted = False
         self._steps, self._updates = 0, 0  # steps: its own, and those of others before the first of them
 
@@ -113,8 +116,7 @@ class Learner:
 
     def begin(self, genes: Floats) -> None:
         """Begins an episode, for any driver; there are no genes."""
-        self._held.begin()
-        self._decision.begin()
+        self._begin(self._generator)
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
         """Action in [-1, 1], `action_size`, held for `decision_steps`; uniformly random in the first `warmup_steps`."""
@@ -123,6 +125,30 @@ class Learner:
     def frozen(self) -> FrozenPolicy:
         """The policy as it is now, without exploration."""
         return self._agent.frozen()
+
+    def snapshot(self) -> PolicySnapshot:
+        """The policy as it is now, to play in another process; the same object until `learn` or `load`."""
+        if self._snapshot is None:
+            self._snapshot = self._taken()
+        return self._snapshot
+
+    def learn(self, transitions: Sequence[Transition], snapshot: PolicySnapshot, seed: int, *, own: bool) -> None:
+        """Learns from an episode that another process has played, as if it had been played here.
+
+        Deviation: the policy, and λ in R̂, are those of the snapshot, which knows nothing of the two rounds before.
+
+        Args:
+          transitions: its steps.
+          snapshot: what it was played with.
+          seed: of the episode's `SnapshotActor`.
+          own: whether the policy acted, and no other driver.
+        """
+        self._begin(np.random.default_rng(seed))
+        for step, transition in enumerate(transitions):
+            self._take(transition, own=own, priced=own and step >= snapshot.random_steps)
+            if own:
+                self.update()
+        self._snapshot = None
 
     def observe(self, transition: Transition, *, own: bool = True) -> None:
         """Stores a step, and prices its cost if it is the policy's.
@@ -133,11 +159,14 @@ class Learner:
           transition: the step.
           own: whether this learner acted, and no other driver.
         """
+        self._take(transition, own=own, priced=own and self.driven_by is DrivenBy.POLICY)
+
+    def _take(self, transition: Transition, *, own: bool, priced: bool) -> None:
         self._acted |= own
         self._steps += own or not self._acted
-        if self._method.lagrangian and own and self._steps > self._config.agent.warmup_steps:
+        if self._method.lagrangian and priced:
             self.dual_variable = dual_step(self.dual_variable, transition.cost, self._config.lagrangian)  # l. 15-16
-        decided = self._decision.add(transition)
+        decided = self._decision.add(self._seen(transition))
         if decided is not None:
             self._replay.add(decided)  # Alg. 1, l. 12
 
@@ -183,6 +212,26 @@ class Learner:
         self.dual_variable = state["dual_variable"]
         self._generator.bit_generator.state = state["generator"]
         self._acted, self._steps, self._updates = state["acted"], state["steps"], state["updates"]
+        self._snapshot = None
+
+    def _begin(self, random: np.random.Generator) -> None:
+        """Begins an episode; `random` is of what it draws at its start."""
+        self._held.begin()
+        self._decision.begin()
+
+    def _seen(self, transition: Transition) -> Transition:
+        """Returns a step as the networks see it."""
+        return transition
+
+    def _taken(self) -> PolicySnapshot:
+        """Takes a snapshot."""
+        return PolicySnapshot(
+            policy=self._agent.frozen(),
+            exploration=self._agent.exploration,
+            decision_steps=self._config.agent.decision_steps,
+            random_steps=max(0, self._config.agent.warmup_steps - self._steps),
+            dual_variable=self.dual_variable,
+        )
 
     def _decide(self, observation: Vector, explore: bool) -> Vector:
         if explore and self.driven_by is DrivenBy.RANDOM:

@@ -10,13 +10,8 @@ import torch.nn.functional as F  # noqa: N812  # the usual name
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from risk_sac.search.frozen_policy import Layers, respond
+from risk_sac.search.frozen_policy import LOG_STD_HALF, LOG_STD_MIDDLE, Layers, respond
 from risk_sac.world.types import Vector
-
-# Choice: log σ is squashed smoothly into these bounds; a hard clamp has no gradient outside them.
-LOG_STD_MIN = -5.0
-LOG_STD_MAX = 2.0
-LOG_STD_MIDDLE, LOG_STD_HALF = 0.5 * (LOG_STD_MAX + LOG_STD_MIN), 0.5 * (LOG_STD_MAX - LOG_STD_MIN)
 
 
 class Mlp(nn.Module):

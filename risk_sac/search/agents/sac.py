@@ -104,6 +104,8 @@ class SacAgent(Agent):
     learning with offline data", 2023, Sec. 4.2.
     """
 
+    exploration = "squashed"
+
     def __init__(
         self,
         observation_size: int,

@@ -24,6 +24,7 @@ from risk_sac.config.learner import AgentConfig, SacConfig
 from risk_sac.errors import NotFinite
 from risk_sac.search.agents.agent import UpdateResult, all_finite, loading
 from risk_sac.search.agents.replay import Batch
+from risk_sac.search.agents.snapshot import Exploration
 from risk_sac.search.frozen_policy import FrozenPolicy
 from risk_sac.world.types import Floats, Vector
 
@@ -47,6 +48,8 @@ class _Given(NamedTuple):
 
 class Sb3Agent:
     """`stable_baselines3.SAC`, which is handed its batches; it weights no transition, and measures no TD error."""
+
+    exploration: Exploration = "clipped"
 
     def __init__(self, observation_size: int, action_size: int, config: AgentConfig, sac: SacConfig, seed: int) -> None:
         self._generator = torch.Generator().manual_seed(seed).get_state()
@@ -88,9 +91,10 @@ class Sb3Agent:
 
     def frozen(self) -> FrozenPolicy:
         """See `Agent.frozen`."""
-        *linear, _ = (layer for layer in self._model.policy.actor.modules() if isinstance(layer, Linear))  # log σ last
-        tensors = [tensor for layer in linear for tensor in (layer.weight.t(), layer.bias)]
-        return FrozenPolicy(tuple(tensor.detach().numpy().copy() for tensor in tensors), linear[-1].out_features)
+        layers = (layer for layer in self._model.policy.actor.modules() if isinstance(layer, Linear))
+        *hidden, mean, log_std = ((layer.weight.t().detach().numpy(), layer.bias.detach().numpy()) for layer in layers)
+        last = [np.concatenate(pair, axis=-1) for pair in zip(mean, log_std, strict=True)]
+        return FrozenPolicy((*(array.copy() for pair in hidden for array in pair), *last), len(mean[1]))
 
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
         """Nothing is replayed by them."""

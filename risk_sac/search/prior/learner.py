@@ -1,15 +1,19 @@
 """RISK-SAC that starts from the pretrained policy and goes on learning by Algorithm 1."""
 
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
 from risk_sac.search.agents.learner import Learner
 from risk_sac.search.agents.sac import SacAgent
+from risk_sac.search.agents.snapshot import PolicySnapshot, drawn_course
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import Folded, PolicyLayout, PretrainedPolicy
-from risk_sac.world.types import Floats, Vector
+from risk_sac.world.types import Vector
 
 FINE_TUNING = {
     "actor_learning_rate": 3e-4,
@@ -45,19 +49,18 @@ class PretrainedLearner(Learner):
         self._mirror, self._reflected = Mirror.of(layout), False
         super().__init__(layout.observation_size, layout.action_size, method, config, seed)
 
-    def begin(self, genes: Floats) -> None:
-        """See `Learner.begin`; draws what to ask for, any failure or one kind."""
-        super().begin(genes)
+    def _begin(self, random: np.random.Generator) -> None:
+        """See `Learner._begin`; draws what to ask for, any failure or one kind."""
+        super()._begin(random)
         shifts = self._start.shifts
-        goal = int(self._generator.integers(len(shifts) + 1))
+        goal, self._reflected = drawn_course(random, len(shifts), mirrored=self._mirror is not None)
         self._shift = shifts[goal - 1] if goal else None
-        self._reflected = self._mirror is not None and bool(self._generator.integers(2))
 
-    def observe(self, transition: Transition, *, own: bool = True) -> None:
-        """See `Learner.observe`."""
-        super().observe(
-            self._mirror.transition(transition) if self._mirror and self._reflected else transition, own=own
-        )
+    def _seen(self, transition: Transition) -> Transition:
+        return self._mirror.transition(transition) if self._mirror and self._reflected else transition
+
+    def _taken(self) -> PolicySnapshot:
+        return replace(super()._taken(), shifts=self._start.shifts, mirror=self._mirror)
 
     def _make_agent(self, observation_size: int, action_size: int, seed: int) -> SacAgent:
         agent, sac = self._config.agent, self._config.sac

@@ -257,7 +257,7 @@ class ArchiveOptimizer(SceneOptimizer):
 
     @origin.setter
     def origin(self, origin: Mapping[str, Any]) -> None:
-        self._parent = self._elites.at(origin["parent"])
+        self._parent = self._elites.at(origin.get("parent"))
 
     def _learn(self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter) -> None:
         parent, self._parent = self._parent, None

@@ -87,7 +87,6 @@ class SceneOptimizer(ABC):
 
     kind: ClassVar[str]
     tries: ClassVar[int] = 1000  # further points that it may be asked for where one breaks the scenario's constraints
-    one_at_a_time: ClassVar[bool] = False  # whether it has to be told of each point before it is asked for the next
     points: int | None = None  # number of different ones; None: there is no end
     driven_by: DrivenBy | None = None
     out: Sequence[Floats] = ()
@@ -100,13 +99,18 @@ class SceneOptimizer(ABC):
     def origin(self) -> Mapping[str, Any]:
         """What the sampler remembers of the point that was asked for last, as plain values.
 
-        Where others were asked for since, it is set again before the point is told.
+        Where others were asked for since, it is set again before the point is told; to nothing before a point that
+        another sampler has proposed.
         """
         return {}
 
     @origin.setter
     def origin(self, origin: Mapping[str, Any]) -> None:
         del origin  # most samplers remember nothing
+
+    def waits(self, out: int) -> bool:
+        """Whether the next point depends on what so many points that are out will tell, and cannot be asked for yet."""
+        return False
 
     @abstractmethod
     def ask(self) -> Floats:

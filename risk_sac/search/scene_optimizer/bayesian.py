@@ -167,7 +167,7 @@ class BotorchOptimizer(SceneOptimizer):
 
     @origin.setter
     def origin(self, origin: Mapping[str, Any]) -> None:
-        self._arm = origin["arm"]
+        self._arm = origin.get("arm")
 
     def _learn(  # Alg. 1, l. 21-22
         self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter

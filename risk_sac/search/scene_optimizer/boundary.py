@@ -21,13 +21,12 @@ class BoundarySampler(SceneOptimizer):
     """Sobol points of a slice first, then the most ambiguous ones of a classifier.
 
     Every `OF_DRIVER`th point is the most ambiguous one for R157's driver instead of the ego. A candidate whose nearest
-    known neighbour was refused is left out.
+    known neighbour was refused is left out. Where points are out, the ambiguity is what they leave.
 
     Source: straddle, Bryan et al. 2005, on the latent function of a Gaussian-process classifier.
     """
 
     kind = "boundary"
-    one_at_a_time = True  # the most ambiguous point is the same until it is told
     tries = 0  # its candidates keep the constraints
 
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int, slice_: Slice) -> None:
@@ -54,7 +53,7 @@ class BoundarySampler(SceneOptimizer):
         self._asked += 1
         of_driver = self._asked % OF_DRIVER == 0 and _both(self._driver)
         outcomes = self._driver if of_driver else self._fails
-        if len(self._points) < self._initial or not _both(outcomes):
+        if len(self._points) + len(self.out) < self._initial or not _both(outcomes):
             return self._fill(random)
         return self._whole(self._most_ambiguous(outcomes, int(random.integers(2**31))), random)
 
@@ -73,7 +72,8 @@ class BoundarySampler(SceneOptimizer):
         fails = np.array([bool(outcome) for outcome in outcomes])
         candidates = sobol_points(self._points.shape[1], seed, count=CANDIDATES).numpy()
         candidates = candidates[self._likely_playable(candidates)]
-        scores = straddle(FailureClassifier(self._points[known], fails[known]), candidates)
+        out = np.array(self.out).reshape(len(self.out), -1)[:, list(self._slice.columns)] if len(self.out) else None
+        scores = straddle(FailureClassifier(self._points[known], fails[known]), candidates, out)
         return np.asarray(candidates[int(scores.argmax())])
 
     def _likely_playable(self, candidates: Floats) -> Bools:

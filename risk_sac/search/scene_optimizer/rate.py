@@ -21,7 +21,6 @@ class RateSampler(SceneOptimizer):
     """
 
     kind = "rate"
-    one_at_a_time = True  # a stage's proposal is fitted to all draws before it
     tries = 0  # a point that breaks a constraint is refused and counted, so that the weights of the others hold
 
     def __init__(
@@ -50,9 +49,17 @@ class RateSampler(SceneOptimizer):
         self._margins: list[dict[str, float]] = []
         self._failed: list[bool] = []
 
+    def waits(self, out: int) -> bool:
+        """See `SceneOptimizer.waits`: a stage's proposal is fitted to all draws before it.
+
+        So each draw's weight has the density that it was drawn from, and the same scenes are drawn in rounds of any
+        size.
+        """
+        return len(self._points) < self._stages.start(len(self._points) + out)
+
     def ask(self) -> Floats:
         """See `SceneOptimizer.ask`."""
-        number, telling = len(self._points), self._declared.telling
+        number, telling = len(self._points) + len(self.out), self._declared.telling
         normal = np.random.default_rng((self._seed, number, 1)).standard_normal(self._dimension)
         normal[telling] = self._stages.draw(number, self.draws)
         return self._declared.point(normal)

@@ -14,8 +14,9 @@ from torch.nn.functional import layer_norm
 from risk_sac.config import LagrangianConfig
 from risk_sac.search.agents.agent import critic_loss, td_target
 from risk_sac.search.agents.learner import dual_step
-from risk_sac.search.agents.networks import LOG_STD_MAX, LOG_STD_MIN, Mlp, bounded_log_std, tanh_gaussian
+from risk_sac.search.agents.networks import Mlp, bounded_log_std, tanh_gaussian
 from risk_sac.search.agents.sac import actor_loss, soft_value, temperature_loss
+from risk_sac.search.frozen_policy import LOG_STD_MAX, LOG_STD_MIN
 
 
 def test_log_prob_of_a_hand_computed_case():
