@@ -1,8 +1,9 @@
 """Processes that play the episodes of one run in parallel, one simulation each.
 
-    python -m risk_sac.search.rollouts CONNECTION FOLDER
+    python -m risk_sac.search.rollouts CONNECTION FOLDER NUMBER
 
-is such a process: it reads the run's spec and then proposals from the connection, and writes what was played.
+is such a process: it reads the run's spec and then proposals from the connection, and writes what was played. Processes
+of a run are numbered from 0; each plays against the remote ego's server of its number.
 """
 
 import logging
@@ -33,7 +34,7 @@ LOST = (EOFError, ConnectionResetError, BrokenPipeError)  # errors of a connecti
 class RolloutProcess:
     """A process, and the proposal that it plays."""
 
-    folder: Path
+    number: int
     process: subprocess.Popen[bytes]
     connection: Connection
     playing: Proposal | None = None
@@ -81,8 +82,8 @@ class Rollouts:
         while self._waiting:
             free = next((one for one in self._processes if one.playing is None), None)
             if free is None and len(self._processes) < self._most:
-                folder = self._folder / str(len(self._processes))
-                free = RolloutProcess(folder, *self._started(folder))
+                number = len(self._processes)
+                free = RolloutProcess(number, *self._started(number))
                 self._processes.append(free)
             if free is None:
                 return
@@ -115,25 +116,26 @@ class Rollouts:
         if one.deaths > PATIENCE:
             raise SimulationError(f"rollout processes died {one.deaths} times in a row, the last with status {status}")
         logger.warning("a rollout process ended with status %d in episode %d", status, one.playing.index)
-        one.process, one.connection = self._started(one.folder)
+        one.process, one.connection = self._started(one.number)
         self._play(one)
 
-    def _started(self, folder: Path) -> tuple[subprocess.Popen[bytes], Connection]:
+    def _started(self, number: int) -> tuple[subprocess.Popen[bytes], Connection]:
+        folder = self._folder / str(number)
         folder.mkdir(parents=True, exist_ok=True)
         own, other = Pipe()
-        number = other.fileno()
-        command = [sys.executable, "-m", "risk_sac.search.rollouts", str(number), str(folder)]
-        process = subprocess.Popen(command, pass_fds=[number], stdin=subprocess.DEVNULL)
+        descriptor = other.fileno()
+        command = [sys.executable, "-m", "risk_sac.search.rollouts", str(descriptor), str(folder), str(number)]
+        process = subprocess.Popen(command, pass_fds=[descriptor], stdin=subprocess.DEVNULL)
         other.close()
         own.send(self._spec)
         return process, own
 
 
-def serve(connection: Connection, folder: Path) -> None:
-    """Plays what the connection proposes until it is closed."""
+def serve(connection: Connection, folder: Path, number: int) -> None:
+    """Plays what the connection proposes until it is closed, as the run's process of that number."""
     spec = RunSpec.model_validate_json(connection.recv())
     reward = TrainingReward(method_of(spec.method), spec.learner)
-    with closing(RiskSacEnv.of(spec)) as env, CrashGuard(folder) as guard:
+    with closing(RiskSacEnv.of(spec, ego_server=number)) as env, CrashGuard(folder) as guard:
         guarded = GuardedEnv(env, guard)
         while True:
             proposal: Proposal = connection.recv()
@@ -146,9 +148,9 @@ def serve(connection: Connection, folder: Path) -> None:
 def main() -> None:
     """Serves the process that has started this one."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run decides what is left undone
-    connection, folder = Connection(int(sys.argv[1])), Path(sys.argv[2])
+    connection, folder, number = Connection(int(sys.argv[1])), Path(sys.argv[2]), int(sys.argv[3])
     try:
-        serve(connection, folder)
+        serve(connection, folder, number)
     except LOST:
         return
     except RiskSacError as error:

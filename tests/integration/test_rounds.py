@@ -4,18 +4,21 @@ import os
 import signal
 import subprocess
 import sys
+import tomllib
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
 
-from risk_sac.config import Budget, RunMethod, RunSpec
+from risk_sac.config import Budget, EgoConfig, RunMethod, RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.host.machine import ROLLOUTS, rollout_processes
 from risk_sac.records import EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import FAILURES
 from risk_sac.search.loop import execute_run
+from tests.ego_processes import served
 from tests.listener import Listener
 
 BATCH = 4
@@ -128,3 +131,28 @@ def test_a_crashing_episode_is_left_out(tmp_path: Path, processes, monkeypatch: 
 def test_a_script_is_driven_without_torch() -> None:
     code = "import sys, risk_sac.search.rollouts; sys.exit('torch' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_each_server_of_a_remote_ego_sees_the_episodes_of_one_process(
+    tmp_path: Path, processes, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    pytest.importorskip("grpc")
+    processes(3)
+    folders = [tmp_path / name for name in ("first", "second")]
+    file, listener = tmp_path / "egos.toml", Listener()
+    monkeypatch.setenv("RISK_SAC_EGOS", str(file))
+    with ExitStack() as stack:
+        tables = []
+        for folder in folders:
+            folder.mkdir()
+            tables.append(stack.enter_context(served("tests.ego_processes:Noting", folder, deadline_s=60)))
+        addresses = ",".join(tomllib.loads(table)["address"] for table in tables)
+        file.write_text(f"[far]\n{tables[0]}".replace(tomllib.loads(tables[0])["address"], addresses))
+        remote = spec("archive", 8, batch=8).model_copy(update={"ego": EgoConfig(driver="far")})
+        outcome = execute_run(remote, tmp_path / "run", listener)
+    played = [set(map(int, (folder / "ego.log").read_text().split()[1:])) for folder in folders]  # 0: the warming up
+    assert all(played)
+    assert not played[0] & played[1]
+    assert len(played[0] | played[1]) == sum(record.outcome != "rejected" for record in listener.records)
+    assert outcome.processes == 2
+    assert "rounds of 8 episodes are played by 2 process(es): the ego 'far' has no more servers" in caplog.text
