@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -85,3 +86,14 @@ class Noting:
 
     def close(self) -> None:
         pass
+
+
+class Slow(Noting):
+    """Thinks for 20 ms a step without using a processor."""
+
+    version = "1"
+    response_time_s = 1.0
+
+    def act(self, perceived: Perceived) -> Control:
+        time.sleep(0.02)
+        return super().act(perceived)
