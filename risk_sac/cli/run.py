@@ -93,7 +93,7 @@ def add(commands: Commands) -> None:
     add_prior_flag(evaluate)
     add_map_flags(evaluate, several=True)
     execution = evaluate.group("execution")
-    jobs = "runs at a time (default: one per core, or as many as a cluster has room for)"
+    jobs = "processes that play episodes (default: one per core, or as many as a cluster has room for)"
     execution.add_argument("--jobs", type=int, metavar="N", help=jobs)
     executor = os.environ.get("RISK_SAC_EXECUTOR", "local")
     where = "`local` or, on a cluster, `ray` (default: RISK_SAC_EXECUTOR or local)"

@@ -20,6 +20,7 @@ from pathlib import Path
 from risk_sac.config import RunSpec, method_of
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import RiskSacError, SimulationError
+from risk_sac.host.memory import memory_limit_bytes, out_of_memory
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder.crash_guard import PATIENCE, CrashGuard
 from risk_sac.search.agents.controls import control
@@ -155,6 +156,13 @@ def main() -> None:
         return
     except RiskSacError as error:
         connection.send(str(error))
+    except Exception as error:
+        if not out_of_memory(error):
+            raise
+        most = memory_limit_bytes()
+        may = "there is" if most is None else f"the {most / 2**30:.3g} GiB that each process of a run may take"
+        remedy = "a machine with more of it" if most is None else "a larger RISK_SAC_WORKER_MEMORY_BYTES"
+        connection.send(f"it needs more memory than {may}; wanted {remedy}")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from contextlib import ExitStack
+from multiprocessing import Pipe
 from pathlib import Path
 
 import numpy as np
@@ -128,9 +129,42 @@ def test_a_crashing_episode_is_left_out(tmp_path: Path, processes, monkeypatch: 
     assert [record.reason == "sim_crash" for record in listener.records] == [index == 2 for index in range(6)]
 
 
-def test_a_script_is_driven_without_torch() -> None:
-    code = "import sys, risk_sac.search.rollouts; sys.exit('torch' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+class Mapped(Listener):
+    """Reads after each episode which libraries the rollout processes have loaded."""
+
+    maps = ""
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
+        super().episode(record, metrics, series)
+        for process in psutil.Process().children():
+            self.maps += Path(f"/proc/{process.pid}/maps").read_text()
+
+
+def test_a_script_is_driven_without_torch(tmp_path: Path, processes) -> None:
+    processes(1)
+    listener = Mapped()
+    execute_run(spec("archive", 6), tmp_path, listener)
+    assert "libsumo" in listener.maps
+    assert "torch" not in listener.maps
+
+
+def test_a_process_that_needs_too_much_memory_says_what_it_may_take() -> None:
+    own, other = Pipe()
+    code = f"""
+import sys
+import risk_sac.search.rollouts as rollouts
+from risk_sac.host.memory import limit_memory
+limit_memory(1 << 30)
+rollouts.serve = lambda *_: bytearray(1 << 31)
+sys.argv = ["", "{other.fileno()}", "", "0"]
+rollouts.main()
+"""
+    with own, other:
+        assert subprocess.run([sys.executable, "-c", code], pass_fds=[other.fileno()], check=False).returncode == 0
+        assert own.recv() == (
+            "it needs more memory than the 1 GiB that each process of a run may take; "
+            "wanted a larger RISK_SAC_WORKER_MEMORY_BYTES"
+        )
 
 
 def test_each_server_of_a_remote_ego_sees_the_episodes_of_one_process(
