@@ -103,7 +103,7 @@ def test_processes_of_a_run_with_a_slow_ego(tmp_path: Path, monkeypatch: pytest.
         address = tomllib.loads(table)["address"]
         (tmp_path / "egos.toml").write_text("[slow]\n" + table.replace(address, ",".join([address] * SLOW_PROCESSES)))
         rates = {}
-        for number, episodes, warm in ((1, 16, 4), (SLOW_PROCESSES, 128, 48)):
+        for number, episodes, warm in ((1, 8, 2), (SLOW_PROCESSES, 96, 40)):
             budget = Budget(episodes=episodes, batch=SLOW_PROCESSES)
             rates[number] = steps_per_s(tmp_path / str(number), number, budget, EgoConfig(driver="slow"), warm)
     one, many = rates.values()
