@@ -66,14 +66,14 @@ class ServiceSettings(RaySettings, BaseSettings):
     executor: ExecutorName = "local"
     """Executor of runs; `local`: processes of this machine; `ray`: a cluster."""
     max_workers: Annotated[int, Field(ge=1, le=MOST_WORKERS)] = Field(default_factory=_most_workers)
-    """Runs executed at the same time, each in its own process; by default one per core, or as many as fit the
-    cluster."""
+    """Processes that play episodes at the same time, at least one for each run; by default one per core, or as many as
+    fit the cluster. A run in rounds takes up to `budget.batch` of those that are free, within its project's share."""
     worker_module: str = "risk_sac.execution.worker"
     """Module that executes one run, started as `python -m`."""
     worker_niceness: Annotated[int, Field(ge=0, le=19)] = 5
     """Added to the niceness of workers."""
     worker_memory_bytes: Annotated[int, Field(ge=1 << 28)] = 4 << 30
-    """Memory that a worker may take, bytes; a run that needs more fails."""
+    """Memory that a worker, and each process that plays its episodes, may take, bytes; a run that needs more fails."""
     grace_s: Annotated[float, Field(gt=0, le=600)] = 30.0
     """Time that a worker whose run is cancelled has to finish its episode before it is killed, s."""
     stop_s: Annotated[float, Field(gt=0, le=600)] = 15.0

@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -68,3 +69,31 @@ class Shadow:
 
     def close(self) -> None:
         pass
+
+
+class Noting:
+    """Keeps its lane, and notes the seed of each episode in its server's log."""
+
+    version = "1"
+    response_time_s = 1.0
+
+    def reset(self, episode: EpisodeStart) -> None:
+        self._vehicle = episode.vehicle
+        print(episode.seed, file=sys.stderr, flush=True)
+
+    def act(self, perceived: Perceived) -> Control:
+        return Control(0.0, lane_keeping(perceived, self._vehicle))
+
+    def close(self) -> None:
+        pass
+
+
+class Slow(Noting):
+    """Thinks for 20 ms a step without using a processor."""
+
+    version = "1"
+    response_time_s = 1.0
+
+    def act(self, perceived: Perceived) -> Control:
+        time.sleep(0.02)
+        return super().act(perceived)

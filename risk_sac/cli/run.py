@@ -93,7 +93,7 @@ def add(commands: Commands) -> None:
     add_prior_flag(evaluate)
     add_map_flags(evaluate, several=True)
     execution = evaluate.group("execution")
-    jobs = "runs at a time (default: one per core, or as many as a cluster has room for)"
+    jobs = "processes that play episodes (default: one per core, or as many as a cluster has room for)"
     execution.add_argument("--jobs", type=int, metavar="N", help=jobs)
     executor = os.environ.get("RISK_SAC_EXECUTOR", "local")
     where = "`local` or, on a cluster, `ray` (default: RISK_SAC_EXECUTOR or local)"
@@ -134,7 +134,8 @@ def _run(options: argparse.Namespace) -> int:
     phases = {"i.i.d." if spec.iid else "search": results.metrics, "evaluation": results.evaluation}
     played = {name: metrics for name, metrics in phases.items() if metrics is not None}
     requirements = requirements_table({name: metrics.requirements for name, metrics in played.items()})
-    answer = {"id": spec.id, "folder": str(options.out), "wall_s": results.wall_s, "device": results.device, **played}
+    answer = {"id": spec.id, "folder": str(options.out), "wall_s": results.wall_s, "device": results.device}
+    answer |= {"processes": results.processes, **played}
     print_answer(options, answer, _summary(spec, results, played), *([requirements] if requirements else []))
     if options.json:
         return OK
@@ -160,7 +161,8 @@ def _summary(spec: RunSpec, results: RunResults, phases: Mapping[str, RunMetrics
     columns = {name: _figures(metrics) for name, metrics in phases.items()}
     behaviour = wider_behaviour(family_named(spec.family).odd, spec.odd)
     setting = f"{spec.family} · {behaviour} behaviour"
-    title = f"{setting} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s on {results.device}"
+    by = "1 process" if results.processes == 1 else f"{results.processes} processes"
+    title = f"{setting} · {spec.method} · seed {spec.seed} · {results.wall_s:.0f} s by {by} on {results.device}"
     table = Table("", *columns, title=title)
     for figure in next(iter(columns.values()), {}):
         table.add_row(figure, *(column[figure] for column in columns.values()))

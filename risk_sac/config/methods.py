@@ -65,6 +65,11 @@ class Method(Settings):
         return self.agent in ("sac", "sb3")
 
     @property
+    def in_rounds(self) -> bool:
+        """Whether several of its episodes can be asked for at a time; others need each outcome before the next."""
+        return not self.learns and self.scenes not in ("rate", "boundary")
+
+    @property
     def learns(self) -> bool:
         """Whether its adversaries do; the others are controls."""
         return self.stochastic or self.agent == "ddpg"

@@ -15,13 +15,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
 
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from risk_sac.config import EgoConfig, Settings
 from risk_sac.config.base import field_error, read_text
 from risk_sac.config.ego import EgoName
 from risk_sac.egos.defects.catalogue import Planted, planted, version_of
 from risk_sac.egos.guard import Guarded
+from risk_sac.egos.remote.addresses import addresses_of
 from risk_sac.egos.seam import Ego
 from risk_sac.errors import ConfigError, EgoFailed, did_you_mean
 
@@ -59,13 +60,23 @@ class EgoCard(Settings):
     """In a sentence."""
 
 
+def _checked_addresses(text: str) -> str:
+    addresses_of(text)
+    return text
+
+
 class RemoteCard(EgoCard):
     """An ego in another process."""
 
     kind: Literal["remote"] = "remote"
     deadline_s: Annotated[float, Field(gt=0, le=600)] = 1.0
-    address: Annotated[str, Field(min_length=1, max_length=500, exclude=True)]
-    """Of its server, `host:port` or `unix:///path`; never shown."""
+    address: Annotated[str, Field(max_length=10_000, exclude=True), AfterValidator(_checked_addresses)]
+    """Of its servers, see `addresses_of`; each plays one episode at a time. Never shown."""
+
+    @property
+    def addresses(self) -> tuple[str, ...]:
+        """Addresses of its servers, one each."""
+        return addresses_of(self.address)
 
 
 def python_card(point: EntryPoint) -> EgoCard:
@@ -152,8 +163,22 @@ def pinned(ego: EgoConfig) -> EgoConfig:
     return ego.model_copy(update={"version": version, "response_time_s": response_s})
 
 
-def load(ego: EgoConfig) -> Guarded | None:
+def servers(ego: EgoConfig) -> int | None:
+    """Counts the servers of a remote ego; None for an ego that any number of processes can play.
+
+    Raises:
+      ConfigError: there is no such driver.
+    """
+    card = None if ego.driver is None else card_of(ego.driver)
+    return len(card.addresses) if isinstance(card, RemoteCard) else None
+
+
+def load(ego: EgoConfig, server: int = 0) -> Guarded | None:
     """Returns the driver that an ego names, ready to drive; None for SUMO's.
+
+    Args:
+      ego: names the driver.
+      server: number of the process that asks; it counts through the servers of a remote ego.
 
     Raises:
       ConfigError: there is no such driver or no such version, or it cannot be loaded.
@@ -164,7 +189,8 @@ def load(ego: EgoConfig) -> Guarded | None:
     if isinstance(card, RemoteCard):
         from risk_sac.egos.remote.client import RemoteEgo  # here, because not everybody has grpc
 
-        remote = RemoteEgo(card.name, card.address, card.version, card.deadline_s)
+        address = card.addresses[server % len(card.addresses)]
+        remote = RemoteEgo(card.name, address, card.version, card.deadline_s)
         return Guarded(lambda: remote, card.deadline_s)
     point = _points()[card.name]
     defects = planted(ego)
@@ -225,11 +251,16 @@ def _remotes() -> Mapping[str, RemoteCard]:
         return {}
     try:
         tables = tomllib.loads(read_text(Path(name), FILE))
-        return {key: RemoteCard.model_validate({"name": key, **table}) for key, table in tables.items()}
+        return {key: _remote_card(key, table) for key, table in tables.items()}
     except (tomllib.TOMLDecodeError, TypeError) as error:
         raise ConfigError(FILE, f"{name} is no TOML of one table for each ego: {error}") from error
+
+
+def _remote_card(name: str, table: Mapping[str, Any]) -> RemoteCard:
+    try:
+        return RemoteCard.model_validate({"name": name, **table})
     except ValidationError as error:
-        raise ConfigError(FILE, str(field_error(error.errors()[0]))) from error
+        raise ConfigError(FILE, f"{name}.{field_error(error.errors()[0])}") from error
 
 
 def _source(point: EntryPoint) -> Path:

@@ -20,6 +20,7 @@ import numpy as np
 from risk_sac.egos.guard import MALFORMED, Guarded
 from risk_sac.egos.registry import EgoCard, make
 from risk_sac.egos.remote import ego_pb2
+from risk_sac.egos.remote.local_steps import listen
 from risk_sac.egos.remote.messages import (
     METHODS,
     PROTOCOL,
@@ -38,7 +39,13 @@ SPARE_THREADS = 16  # beside one for each session: to start and to close them
 
 
 class Sessions:
-    """Sessions that are open, each with an ego of its own."""
+    """Sessions that are open, each with an ego of its own.
+
+    Attributes:
+      socket: name of the local socket that takes their steps, too; "" without one.
+    """
+
+    socket = ""
 
     def __init__(self, make_ego: Callable[[], Ego], version: str) -> None:
         self._make, self._version = make_ego, version
@@ -56,7 +63,7 @@ class Sessions:
             while len(self._egos) >= MOST_SESSIONS:
                 self._egos.pop(next(iter(self._egos))).close()
             self._egos[request.session] = ego
-        return ego_pb2.StartReply(version=self._version)
+        return ego_pb2.StartReply(version=self._version, socket=self.socket)
 
     def act(self, requests: Iterator[Any], context: Any) -> Iterator[Any]:
         """Answers an episode's steps; the session is over with them, also if the client is gone."""
@@ -135,6 +142,7 @@ def serve(sessions: Sessions, address: str) -> tuple[grpc.Server, int]:
     server = grpc.server(threads, options=[("grpc.so_reuseport", 0)])
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
     port = server.add_insecure_port(address)
+    sessions.socket = listen(sessions.act)
     server.start()
     return server, port
 

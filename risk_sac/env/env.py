@@ -60,7 +60,13 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     metadata = {"render_modes": []}  # noqa: RUF012  # Gymnasium's own declaration
 
     def __init__(
-        self, problem: Problem, reward: RewardConfig, *, controlled: bool = True, as_written: bool = False
+        self,
+        problem: Problem,
+        reward: RewardConfig,
+        *,
+        controlled: bool = True,
+        as_written: bool = False,
+        ego_server: int = 0,
     ) -> None:
         """Prepares, but starts no simulation.
 
@@ -69,6 +75,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
           reward: the terms of R_risk, and β of the soft minimum.
           controlled: False leaves the adversary vehicles to SUMO and lets pedestrians stand: a control.
           as_written: whether nothing deviates from the scenario, so that the others' behaviour is not judged.
+          ego_server: which of a remote ego's servers drives, see `load`.
 
         Raises:
           ConfigError: the problem's ego is not registered, in another version, or cannot be loaded.
@@ -78,7 +85,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self._controlled, self._as_written = controlled, as_written
         sensor, horizon_steps = problem.ego.sensor, problem.family.horizon_steps
         self._perception = Perception(sensor.memory_s if sensor else 0.0, EVERYTHING)
-        ego = load(problem.ego)
+        ego = load(problem.ego, ego_server)
         self._pilot = None if ego is None else EgoPilot(ego)
         self._sim = SumoSimulation(problem.ego, self._perception, self._pilot, settings_of(problem.ego))
         self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, reward.softmin_sharpness)
@@ -90,15 +97,24 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         self.observation_space = gym.spaces.Box(-LIMIT, LIMIT, (self.observation_size,), np.float32)
 
     @classmethod
-    def of(cls, spec: RunSpec) -> "RiskSacEnv":
+    def of(cls, spec: RunSpec, ego_server: int = 0) -> "RiskSacEnv":
         """The environment that the episodes of a run are played in.
+
+        Args:
+          spec: the run.
+          ego_server: which of a remote ego's servers drives, see `load`.
 
         Raises:
           ConfigError: the spec poses no problem that can be run.
         """
         method = method_of(spec.method)
-        controlled = method.agent != "none"
-        return cls(Problem.from_spec(spec), spec.learner.reward, controlled=controlled, as_written=method.story)
+        return cls(
+            Problem.from_spec(spec),
+            spec.learner.reward,
+            controlled=method.agent != "none",
+            as_written=method.story,
+            ego_server=ego_server,
+        )
 
     # The state of an episode, set by `_start`.
     layout: Layout  # of the episode's start

@@ -211,7 +211,7 @@ def evaluate(
     hung_up = () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)  # nohup stays nohup
     with _claimed(spec, folder), stop_signal((*STOPPING, *hung_up)) as stopping:
         queue = [Job(spec=run, folder=folder / RUNS / run.id) for run in spec.runs()]
-        with closing(make_executor(worker_program(jobs))) as chosen:
+        with closing(make_executor(worker_program())) as chosen:
             execute(queue, chosen, jobs, progress, stopping)
         if times and not stopping():
             finished = [job.folder for job in queue if job.state == "finished"]

@@ -89,8 +89,12 @@ class Executor(Protocol):
     A run is known by its number. It is submitted again only after its end was reported.
     """
 
-    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
-        """Starts a run, whose files go to `folder`; raises `OSError` if it cannot be started."""
+    def submit(self, number: int, spec: RunSpec, folder: Path, slots: int) -> None:
+        """Starts a run, whose files go to `folder`, with at most `slots` processes that play its episodes.
+
+        Raises:
+          OSError: it cannot be started.
+        """
 
     def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
         """Returns messages since the last call, by run, waiting up to `timeout_s` for one.
@@ -109,7 +113,11 @@ class Executor(Protocol):
 
     @property
     def slots(self) -> float:
-        """Attempts that it has room for at present; infinite if it does not know."""
+        """Processes that play episodes, at least one for each run; infinite if it does not know its room for them."""
+
+    @property
+    def slots_per_run(self) -> float:
+        """Slots that one run may take."""
 
     @property
     def cluster(self) -> ClusterState | None:

@@ -12,8 +12,7 @@ from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import FOLDER, Executor, WorkerProgram
 from risk_sac.execution.messages import EpisodeDone, Finished
-from risk_sac.execution.scheduler import QueuedRun, Scheduler
-from risk_sac.host.machine import rollouts_each
+from risk_sac.execution.scheduler import QueuedRun, Scheduler, SlotUse
 from risk_sac.records import State as RunState
 from risk_sac.run_folder.crash_guard import PATIENCE
 from risk_sac.run_folder.results import RESULTS, read_results
@@ -63,10 +62,10 @@ JobProgress = Callable[[Sequence[Job]], None]
 """Told about all jobs a few times a second."""
 
 
-def worker_program(jobs: int) -> WorkerProgram:
-    """The worker without a limit on its memory, that replays no failures; `jobs` are at work at a time."""
+def worker_program() -> WorkerProgram:
+    """The worker without a limit on its memory, that replays no failures."""
     arguments = "-m", "risk_sac.execution.worker", FOLDER, "0", "0", "0"
-    return WorkerProgram(arguments=arguments, log=LOG, environment=rollouts_each(jobs), linger_s=LINGER_S)
+    return WorkerProgram(arguments=arguments, log=LOG, linger_s=LINGER_S)
 
 
 class JobStore:
@@ -76,14 +75,14 @@ class JobStore:
         self._jobs = jobs
         self.waiting = deque(number for number, job in enumerate(jobs) if job.state == "waiting")
 
-    def start_next(self) -> QueuedRun | None:
+    def start_next(self, use: SlotUse) -> QueuedRun | None:
         """See `RunStore`."""
         if not self.waiting:
             return None
         number = self.waiting.popleft()
         job = self._jobs[number]
         job.state, job.attempts = "running", job.attempts + 1
-        return QueuedRun(number=number, spec=job.spec, folder=job.folder)
+        return QueuedRun(number=number, spec=job.spec, folder=job.folder, slots=use.granted(job.spec))
 
     def not_started(self, run: QueuedRun, error: OSError) -> None:
         """See `RunStore`; what is wrong with a run's folder leaves the others alone."""
@@ -130,7 +129,7 @@ def execute(
     progress: JobProgress,
     stopping: Callable[[], bool],
 ) -> None:
-    """Keeps so many jobs at work until each has finished or failed; no worker outlives it."""
+    """Keeps jobs at work on so many slots until each has finished or failed; no worker outlives it."""
     for job in jobs:
         job.look()
     store = JobStore(jobs)

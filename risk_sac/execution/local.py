@@ -19,6 +19,7 @@ import psutil
 from risk_sac.config import RunSpec
 from risk_sac.execution.executor import FOLDER, WORDS, Cause, Exited, Messages, WorkerProgram, taken
 from risk_sac.execution.messages import Event, WorkerLog, reason_of
+from risk_sac.host.machine import ROLLOUTS
 
 logger = logging.getLogger(__name__)
 
@@ -35,8 +36,8 @@ class Subprocess:
       listening: whether its words can still be read.
     """
 
-    def __init__(self, program: WorkerProgram, spec: RunSpec, folder: Path) -> None:
-        """Starts it.
+    def __init__(self, program: WorkerProgram, spec: RunSpec, folder: Path, slots: int) -> None:
+        """Starts it with at most `slots` processes that play its episodes.
 
         Raises:
           OSError: its folder or its log cannot be written, or there is no room for one more process.
@@ -53,7 +54,7 @@ class Subprocess:
                     stdin=subprocess.PIPE,
                     stdout=log,
                     stderr=log,
-                    env={**os.environ, **THREADS, **program.environment, WORDS: str(words)},
+                    env={**os.environ, **THREADS, **program.environment, ROLLOUTS: str(slots), WORDS: str(words)},
                     pass_fds=(words,),
                     bufsize=0,
                     start_new_session=True,  # Ctrl-C is for our starter; we ask the worker to stop
@@ -190,7 +191,7 @@ class LocalExecutor:
     overstays or has fallen silent.
     """
 
-    slots = math.inf  # the caller knows this machine
+    slots = slots_per_run = math.inf  # the caller knows this machine
     cluster = None
 
     def __init__(self, program: WorkerProgram) -> None:
@@ -199,9 +200,9 @@ class LocalExecutor:
         self._workers: dict[int, _Worker] = {}
         self._lock = threading.Lock()
 
-    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
+    def submit(self, number: int, spec: RunSpec, folder: Path, slots: int) -> None:
         """See `Executor.submit`."""
-        worker = _Worker(self._program, Subprocess(self._program, spec, folder))
+        worker = _Worker(self._program, Subprocess(self._program, spec, folder, slots))
         with self._lock:
             self._workers[number] = worker
         threading.Thread(target=self._follow, args=(number, worker), name=f"run-{number}", daemon=True).start()

@@ -71,6 +71,7 @@ class Recorder:
             digest=summary.digest,
             versions=summary.versions,
             device=summary.device,
+            processes=summary.processes,
             wall_s=self.results.wall_s + summary.wall_s,
             cpu_s=self.results.cpu_s + summary.cpu_s,
             episode_cpu_s=summary.episode_cpu_s,

@@ -1,20 +1,25 @@
 """Starts waiting runs, passes on workers' messages, retries lost runs.
 
-`risk-sac evaluate` and the service share it; each keeps its runs in a store of its own.
+`risk-sac evaluate` and the service share it; each keeps its runs in a store of its own. Runs share slots: a slot is one
+process that plays episodes. A run has as many from its start to its end, at least one.
 """
 
 import logging
+import math
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
 from risk_sac.config import RunSpec
+from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Cause, Executor, Exited
 from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, Started
+from risk_sac.host.machine import rollout_limit
 from risk_sac.records import State
+from risk_sac.search.processes import most_processes
 
 logger = logging.getLogger(__name__)
 
@@ -28,15 +33,43 @@ class QueuedRun:
     number: int  # unique in its store
     spec: RunSpec
     folder: Path
+    slots: int  # that it takes
     project: str = ""
     ids: Mapping[str, str] = field(default_factory=dict)  # of campaign and run, for the log
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlotUse:
+    """The slots that runs share, and who has them."""
+
+    free: int
+    taken: Mapping[str, int]  # by project
+    most: float  # that one run may take
+
+    def granted(self, spec: RunSpec, project: str = "", waiting: Collection[str] = ("",)) -> int:
+        """Returns how many of the free slots a run takes, at least one.
+
+        It takes all that it can use, but no more than its project's share: the projects with runs that wait or are at
+        work share alike.
+
+        Args:
+          spec: the run.
+          project: that it belongs to.
+          waiting: projects with runs that wait, this one among them.
+        """
+        share = (self.free + sum(self.taken.values())) // len({project, *waiting, *self.taken})
+        try:
+            wanted = most_processes(spec)
+        except ConfigError:  # its ego is gone; the worker says so
+            wanted = 1
+        return int(max(1, min(wanted, self.most, self.free, share - self.taken.get(project, 0))))
 
 
 class RunStore(Protocol):
     """Keeps runs; called by the thread that calls the scheduler. Only `start_next` may raise."""
 
-    def start_next(self) -> QueuedRun | None:
-        """Takes the next run from those that wait, and notes that its worker is about to start."""
+    def start_next(self, use: SlotUse) -> QueuedRun | None:
+        """Takes the next run from those that wait, grants it slots, and notes that its worker is about to start."""
 
     def not_started(self, run: QueuedRun, error: OSError) -> None:
         """Its worker could not be started."""
@@ -82,6 +115,9 @@ class Scheduler:
         """Starts nothing yet.
 
         A run may lose `attempts` workers in a row without a new episode.
+
+        Raises:
+          ConfigError: RISK_SAC_ROLLOUTS is no positive integer.
         """
         self.active: dict[int, Active] = {}
         self.restarts: Counter[str] = Counter()
@@ -89,17 +125,23 @@ class Scheduler:
         self._executor = executor
         self._store = store
         self._attempts = attempts
+        self._most_slots = min(executor.slots_per_run, rollout_limit() or math.inf)
         self._deaths: Counter[int] = Counter()
 
     def fill(self, most: float) -> None:
-        """Starts waiting runs until `most` are at work, or as many as the executor has room for."""
-        while len(self.active) < min(most, self._executor.slots):
-            run = self._store.start_next()
+        """Starts waiting runs until they have taken `most` slots, or as many as the executor has room for."""
+        while True:
+            taken = Counter[str]()
+            for active in self.active.values():
+                taken[active.run.project] += active.run.slots
+            free = int(min(most, self._executor.slots) - taken.total())
+            use = SlotUse(free=free, taken=taken, most=self._most_slots)
+            run = self._store.start_next(use) if free > 0 else None
             if run is None:
                 return
             self.active[run.number] = Active(run)
             try:
-                self._executor.submit(run.number, run.spec, run.folder)
+                self._executor.submit(run.number, run.spec, run.folder, run.slots)
             except OSError as error:
                 del self.active[run.number]
                 self._store.not_started(run, error)

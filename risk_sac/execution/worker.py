@@ -7,11 +7,9 @@ the next episode boundary, with a checkpoint; before the first episode it ends t
 means that the scheduler has died: the worker leaves at once, and the run resumes from its last checkpoint.
 """
 
-import errno
 import io
 import logging
 import os
-import resource
 import signal
 import sys
 import threading
@@ -37,6 +35,7 @@ from risk_sac.execution.messages import (
     encode,
     without_folders,
 )
+from risk_sac.host.memory import limit_memory, out_of_memory
 from risk_sac.host.terminal import log_to_stderr
 from risk_sac.records import REPEATS, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.durable import LOCK, lock, remove_temporaries
@@ -50,14 +49,6 @@ BEAT_S = 1.0
 PATIENCE_S = 5.0  # time for an orphaned worker to leave before it is killed; a suspended one cannot leave
 GIVE_UP_S = 60.0  # a process that holds the folder for longer is no such worker
 POLL_S = 0.05
-# Torch, C++ and the loader of libraries have no class of errors for it.
-_OUT_OF_MEMORY = (
-    "can't allocate memory",
-    "cannot allocate memory",
-    "out of memory",
-    "bad_alloc",
-    "failed to map segment",
-)
 
 
 class Reporter:
@@ -217,28 +208,6 @@ def _lose_what_a_full_disk_refuses() -> None:
         )
         for number in (1, 2)
     )
-
-
-def limit_memory(most_bytes: int) -> None:
-    """Limits the memory that this process may write to; libraries reserve far more address space than they use.
-
-    Raises:
-      MemoryError: it has taken more already.
-    """
-    if psutil.Process().memory_info().data > most_bytes:
-        raise MemoryError
-    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    most = most_bytes if hard == resource.RLIM_INFINITY else min(most_bytes, hard)
-    resource.setrlimit(resource.RLIMIT_DATA, (most, most))
-
-
-def out_of_memory(error: Exception) -> bool:
-    """Whether an error says that there is no more memory."""
-    if isinstance(error, MemoryError):
-        return True
-    if isinstance(error, OSError):
-        return error.errno == errno.ENOMEM
-    return isinstance(error, RuntimeError | ImportError) and any(sign in str(error).lower() for sign in _OUT_OF_MEMORY)
 
 
 def take_over(folder: Path) -> IO[bytes]:

@@ -5,7 +5,7 @@ import ipaddress
 import math
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
 from risk_sac.errors import ConfigError
@@ -31,18 +31,23 @@ ROLLOUTS = "RISK_SAC_ROLLOUTS"
 MOST_EACH = 16  # episodes of a round for each process; more would only be chosen with less known
 
 
-def rollout_processes() -> int:
-    """Returns how many processes may play the episodes of one run.
+def rollout_limit() -> int | None:
+    """Returns how many processes RISK_SAC_ROLLOUTS lets play one run; None where it is not set.
 
     Raises:
-      ConfigError: RISK_SAC_ROLLOUTS is no positive integer.
+      ConfigError: it is no positive integer.
     """
     given = os.environ.get(ROLLOUTS)
     if not given:
-        return cores()
+        return None
     if not given.isdecimal() or int(given) < 1:
         raise ConfigError(ROLLOUTS, repr(given), "an integer, 1 or more", "leave it out for one per processor")
     return int(given)
+
+
+def rollout_processes() -> int:
+    """Returns how many processes may play the episodes of one run; raises as `rollout_limit` does."""
+    return rollout_limit() or cores()
 
 
 def check_batch(batch: int) -> None:
@@ -55,11 +60,6 @@ def check_batch(batch: int) -> None:
     if batch > (most := MOST_EACH * processes):
         expected = f"at most {most}, {MOST_EACH} for each of the {processes} processes that play here"
         raise ConfigError("budget.batch", f"{batch}", expected, f"choose a smaller batch, or set {ROLLOUTS}")
-
-
-def rollouts_each(workers: int) -> Mapping[str, str]:
-    """Returns the variable that shares this machine's processors between so many workers, unless it is set."""
-    return {ROLLOUTS: os.environ.get(ROLLOUTS) or str(max(1, cores() // workers))}
 
 
 def _quotas(process: Path) -> Iterator[float]:

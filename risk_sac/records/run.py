@@ -225,6 +225,8 @@ class Run(RunSummary):
 
     attempts: int
     """Workers that were started for it; more than one where some were lost."""
+    processes: int | None = None
+    """Processes that play its episodes, as many as slots were free when it started; null before."""
     started_at: datetime | None
     finished_at: datetime | None
     episodes_done: int

@@ -62,6 +62,7 @@ class RunResults:
     digest: str | None = None  # of all records; None while the run goes on
     versions: Mapping[str, str] | None = None
     device: str | None = None  # where the networks lived; None while the run goes on
+    processes: int = 1  # that played its episodes when it was run last, at most so many at a time
     wall_s: float = 0.0  # over all resumes
     cpu_s: float = 0.0  # the same in processor time
     episode_cpu_s: tuple[float, ...] = ()  # to the end of each; none while it goes on

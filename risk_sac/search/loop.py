@@ -10,10 +10,10 @@ import numpy as np
 import torch
 
 from risk_sac.config import RunSpec
-from risk_sac.host.machine import rollout_processes
 from risk_sac.records import Ending, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.crash_guard import CrashGuard
 from risk_sac.search.playing import GuardedEnv, PlayedEpisode, Proposal, play
+from risk_sac.search.processes import processes_of
 from risk_sac.search.rollouts import Rollouts
 from risk_sac.search.run import RunOutcome, RunState
 
@@ -51,17 +51,20 @@ def execute_run(spec: RunSpec, folder: Path, observer: Observer) -> RunOutcome:
     started, started_cpu = time.monotonic(), time.process_time()
     folder.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)  # runs are what is parallel
+    processes = processes_of(spec)
     with closing(RunState(spec, folder)) as run:
         for record, metrics in run.resume():
             observer.episode(record, metrics, run.series.get(record.index))
-        for metrics in rounds(run, folder, observer) if run.in_rounds else episodes(run, folder, observer):
+        played = rounds(run, folder, observer, processes) if run.in_rounds else episodes(run, folder, observer)
+        for metrics in played:
             record = run.records[-1]
             observer.episode(record, metrics, run.series.get(record.index))
             run.refuse_dead_ego()
             if len(run.records) % spec.learner.checkpoint_every == 0:
                 run.save()
         run.save()
-    return run.summary(wall_s=time.monotonic() - started, cpu_s=time.process_time() - started_cpu + run.rollouts_cpu_s)
+    used_s = time.process_time() - started_cpu + run.rollouts_cpu_s
+    return run.summary(wall_s=time.monotonic() - started, cpu_s=used_s, processes=processes)
 
 
 def episodes(run: RunState, folder: Path, observer: Observer) -> Iterator[RunMetrics]:
@@ -84,7 +87,7 @@ def episode(run: RunState, env: GuardedEnv) -> RunMetrics:
     return tell(run, proposal, play(env, proposal, actor, run.searchers.agent, run.reward))
 
 
-def rounds(run: RunState, folder: Path, observer: Observer) -> Iterator[RunMetrics]:
+def rounds(run: RunState, folder: Path, observer: Observer, processes: int) -> Iterator[RunMetrics]:
     """Plays the rest of a run in rounds of `batch` episodes, in parallel; yields the metrics after each episode.
 
     Round r + 1 is asked for once round r - 1 is told, and is played while round r is. So no process waits for the
@@ -92,7 +95,7 @@ def rounds(run: RunState, folder: Path, observer: Observer) -> Iterator[RunMetri
     an episode when it is told; a round is played with the policy of the moment in which it is asked for.
     """
     batch = run.spec.budget.batch
-    with closing(Rollouts(run.spec, folder / ROLLOUT_FOLDER, min(batch, rollout_processes()))) as rollouts:
+    with closing(Rollouts(run.spec, folder / ROLLOUT_FOLDER, processes)) as rollouts:
         for proposal in run.proposed:  # an earlier process has asked for them
             rollouts.submit(proposal)
         while not observer.should_stop():

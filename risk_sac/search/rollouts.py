@@ -1,8 +1,9 @@
 """Processes that play the episodes of one run in parallel, one simulation each.
 
-    python -m risk_sac.search.rollouts CONNECTION FOLDER
+    python -m risk_sac.search.rollouts CONNECTION FOLDER NUMBER
 
-is such a process: it reads the run's spec and then proposals from the connection, and writes what was played.
+is such a process: it reads the run's spec and then proposals from the connection, and writes what was played. Processes
+of a run are numbered from 0; each plays against the remote ego's server of its number.
 """
 
 import logging
@@ -19,6 +20,7 @@ from pathlib import Path
 from risk_sac.config import RunMethod, RunSpec, method_of
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import RiskSacError, SimulationError
+from risk_sac.host.memory import memory_limit_bytes, out_of_memory
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder.crash_guard import PATIENCE, CrashGuard
 from risk_sac.search.agents.controls import ScriptFollower, control
@@ -34,7 +36,7 @@ LOST = (EOFError, ConnectionResetError, BrokenPipeError)  # errors of a connecti
 class RolloutProcess:
     """A process, and the proposal that it plays."""
 
-    folder: Path
+    number: int
     process: subprocess.Popen[bytes]
     connection: Connection
     playing: Proposal | None = None
@@ -82,8 +84,8 @@ class Rollouts:
         while self._waiting:
             free = next((one for one in self._processes if one.playing is None), None)
             if free is None and len(self._processes) < self._most:
-                folder = self._folder / str(len(self._processes))
-                free = RolloutProcess(folder, *self._started(folder))
+                number = len(self._processes)
+                free = RolloutProcess(number, *self._started(number))
                 self._processes.append(free)
             if free is None:
                 return
@@ -116,25 +118,26 @@ class Rollouts:
         if one.deaths > PATIENCE:
             raise SimulationError(f"rollout processes died {one.deaths} times in a row, the last with status {status}")
         logger.warning("a rollout process ended with status %d in episode %d", status, one.playing.index)
-        one.process, one.connection = self._started(one.folder)
+        one.process, one.connection = self._started(one.number)
         self._play(one)
 
-    def _started(self, folder: Path) -> tuple[subprocess.Popen[bytes], Connection]:
+    def _started(self, number: int) -> tuple[subprocess.Popen[bytes], Connection]:
+        folder = self._folder / str(number)
         folder.mkdir(parents=True, exist_ok=True)
         own, other = Pipe()
-        number = other.fileno()
-        command = [sys.executable, "-m", "risk_sac.search.rollouts", str(number), str(folder)]
-        process = subprocess.Popen(command, pass_fds=[number], stdin=subprocess.DEVNULL)
+        descriptor = other.fileno()
+        command = [sys.executable, "-m", "risk_sac.search.rollouts", str(descriptor), str(folder), str(number)]
+        process = subprocess.Popen(command, pass_fds=[descriptor], stdin=subprocess.DEVNULL)
         other.close()
         own.send(self._spec)
         return process, own
 
 
-def serve(connection: Connection, folder: Path) -> None:
-    """Plays what the connection proposes until it is closed."""
+def serve(connection: Connection, folder: Path, number: int) -> None:
+    """Plays what the connection proposes until it is closed, as the run's process of that number."""
     spec = RunSpec.model_validate_json(connection.recv())
     reward = TrainingReward(method_of(spec.method), spec.learner)
-    with closing(RiskSacEnv.of(spec)) as env, CrashGuard(folder) as guard:
+    with closing(RiskSacEnv.of(spec, ego_server=number)) as env, CrashGuard(folder) as guard:
         guarded = GuardedEnv(env, guard)
         while True:
             proposal: Proposal = connection.recv()
@@ -160,13 +163,20 @@ def played(guarded: GuardedEnv, proposal: Proposal, method: RunMethod, reward: T
 def main() -> None:
     """Serves the process that has started this one."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run decides what is left undone
-    connection, folder = Connection(int(sys.argv[1])), Path(sys.argv[2])
+    connection, folder, number = Connection(int(sys.argv[1])), Path(sys.argv[2]), int(sys.argv[3])
     try:
-        serve(connection, folder)
+        serve(connection, folder, number)
     except LOST:
         return
     except RiskSacError as error:
         connection.send(str(error))
+    except Exception as error:
+        if not out_of_memory(error):
+            raise
+        most = memory_limit_bytes()
+        may = "there is" if most is None else f"the {most / 2**30:.3g} GiB that each process of a run may take"
+        remedy = "a machine with more of it" if most is None else "a larger RISK_SAC_WORKER_MEMORY_BYTES"
+        connection.send(f"it needs more memory than {may}; wanted {remedy}")
 
 
 if __name__ == "__main__":

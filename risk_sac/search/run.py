@@ -44,6 +44,7 @@ class RunOutcome:
     finished: bool  # False when the observer ended it
     versions: Mapping[str, str]
     device: str
+    processes: int  # that played its episodes, at most so many at a time
     wall_s: float  # of this process; excludes what was done before a resume
     cpu_s: float  # the same in processor time, which a busy machine does not lengthen
     episode_cpu_s: tuple[float, ...]  # from the run's start to each episode's end, resumes included, compilation not
@@ -219,8 +220,8 @@ class RunState:
         logger.info("resumed after %d episodes", len(self.records))
         return [(record, self._count(record)) for record in self.records]
 
-    def summary(self, *, wall_s: float, cpu_s: float) -> RunOutcome:
-        """Summarises the run so far; the times are of this process."""
+    def summary(self, *, wall_s: float, cpu_s: float, processes: int) -> RunOutcome:
+        """Summarises the run so far; times and processes are of this invocation."""
         return RunOutcome(
             metrics=self._search.metrics(),
             evaluation=self._evaluation.metrics() if self.spec.budget.evaluation_episodes else None,
@@ -228,6 +229,7 @@ class RunState:
             finished=self.finished,
             versions={name: version(name) for name in PACKAGES} | {"definitions": str(DEFINITIONS)},
             device=self.searchers.agent.device,
+            processes=processes,
             wall_s=wall_s,
             cpu_s=cpu_s,
             episode_cpu_s=tuple(self._episode_cpu_s),

@@ -15,8 +15,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.env.problem import checked_campaign
 from risk_sac.execution.executor import FOLDER, ClusterState, Executor, WorkerProgram
 from risk_sac.execution.messages import EpisodeDone, Finished
-from risk_sac.execution.scheduler import MOST_AT_ONCE, QueuedRun, Scheduler
-from risk_sac.host.machine import rollouts_each
+from risk_sac.execution.scheduler import MOST_AT_ONCE, QueuedRun, Scheduler, SlotUse
 from risk_sac.records import State, Triage, TriageState
 from risk_sac.run_folder.durable import remove_abandoned, remove_temporaries
 from risk_sac.search.prior.earlier import PriorContent, keep
@@ -79,7 +78,7 @@ class Manager:
 
     @property
     def workers(self) -> int:
-        """Number of runs executed at once; 0 while no executor is available."""
+        """Number of slots that runs share; 0 while no executor is available."""
         return int(min(self._settings.max_workers, self._executor.slots))
 
     def start(self) -> None:
@@ -224,26 +223,26 @@ class Manager:
 
     # What follows is the `RunStore` of the scheduler.
 
-    def start_next(self) -> QueuedRun | None:
-        """Returns the oldest queued run of the project with the fewest running ones."""
-        at_work = Counter(active.run.project for active in self._scheduler.active.values())
+    def start_next(self, use: SlotUse) -> QueuedRun | None:
+        """Returns the oldest queued run of the project with the fewest slots."""
         while True:
             waiting = self._store.waiting()
             able = [project for project in waiting if not exhausted(self._store.usage(project), self._settings)]
-            number = min(((at_work[project], waiting[project]) for project in able), default=(0, None))[1]
+            number = min(((use.taken.get(project, 0), waiting[project]) for project in able), default=(0, None))[1]
             if number is None:
                 return None
             campaign = self._store.campaign_of(number)
             (run,) = campaign.runs
-            self._ledger.start_run(number)
             try:
                 spec = campaign.run_spec(run)
             except OutdatedError as error:
                 self._ledger.end_run(number, State.FAILED, str(error))
                 continue
+            slots = use.granted(spec, campaign.project, able)
+            self._ledger.start_run(number, slots)
             folder = self._settings.run_folder(campaign.id, run.id)
             ids = {"campaign": campaign.id, "run": run.id}
-            return QueuedRun(number=number, spec=spec, folder=folder, project=campaign.project, ids=ids)
+            return QueuedRun(number=number, spec=spec, folder=folder, slots=slots, project=campaign.project, ids=ids)
 
     def not_started(self, run: QueuedRun, error: OSError) -> None:
         """See `RunStore`."""
@@ -282,7 +281,6 @@ def worker_program(settings: ServiceSettings) -> WorkerProgram:
     return WorkerProgram(
         arguments=("-m", settings.worker_module, FOLDER, *map(str, numbers)),
         log=LOG,
-        environment=rollouts_each(settings.max_workers),
         lease_s=settings.lease_s,
         stall_s=settings.stall_s,
         linger_s=settings.grace_s,

@@ -104,6 +104,7 @@ class RunRow(Base):
     busy_s: Mapped[float] = mapped_column(default=0.0)
     pace_s: Mapped[float | None]  # mean of its newest episodes; null before the second one
     attempts: Mapped[int] = mapped_column(default=0)
+    processes: Mapped[int | None]  # that play its episodes; null before it starts, and in rows of older versions
     metrics: Mapped[str | None] = mapped_column(Text)
     evaluation: Mapped[str | None] = mapped_column(Text)
     digest: Mapped[str | None]

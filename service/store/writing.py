@@ -75,12 +75,13 @@ class Ledger:
             session.flush()
             return StoredCampaign.from_row(row, str(row.revision))
 
-    def start_run(self, number: int) -> None:
-        """Notes that a worker is launched for this run."""
+    def start_run(self, number: int, processes: int = 1) -> None:
+        """Notes that a worker is launched for this run, with so many processes that play its episodes."""
         with self._run(number, "starting a run") as (session, row):
             _move(session, row, State.RUNNING)
             row.started_at = row.started_at or time.time()
             row.attempts += 1
+            row.processes = processes
             self._newest_s.pop(number, None)
 
     def add_episodes(self, events: Sequence[tuple[int, EpisodeDone]]) -> set[int]:

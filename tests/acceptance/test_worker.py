@@ -47,7 +47,7 @@ class Launcher:
         self.executor = LocalExecutor(worker_program(settings or ServiceSettings(replays=0)))
 
     def submit(self) -> None:
-        self.executor.submit(1, self.spec, self.folder)
+        self.executor.submit(1, self.spec, self.folder, 1)
 
     def work(self, until: int | None = None, then: Do | None = None) -> tuple[list[Event], Exited, float]:
         """What one worker says, why it is gone, and how long that took after something was done to it.

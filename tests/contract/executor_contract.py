@@ -75,10 +75,10 @@ class Runs:
     def folder(self, number: int, attempt: int = 1) -> Path:
         return self._folder / f"{number}-{attempt}"
 
-    def submit(self, code: str, number: int = 1, attempt: int = 1) -> None:
+    def submit(self, code: str, number: int = 1, attempt: int = 1, slots: int = 1) -> None:
         folder = self.folder(number, attempt)
         folder.with_name(f"{folder.name}.py").write_text(WORKER + code)
-        self.executor.submit(number, SPEC, folder)
+        self.executor.submit(number, SPEC, folder, slots)
         self._numbers.add(number)
 
     def messages(self, ends: int = 1) -> list[tuple[int, Any]]:
@@ -146,6 +146,10 @@ class ExecutorContract:
         assert words[1:] == [*map(str, range(500)), "episode", "last"]
         assert cause is Cause.ENDED
         runs.silence()
+
+    def test_a_worker_knows_how_many_processes_it_may_start(self, runs: Runs) -> None:
+        runs.submit("say(os.environ['RISK_SAC_ROLLOUTS']); say('last')", slots=3)
+        assert outcome(runs.messages()) == (["3", "last"], Cause.ENDED)
 
     @pytest.mark.parametrize(
         ("code", "said", "cause"),

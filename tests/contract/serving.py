@@ -19,13 +19,13 @@ from service.settings import ServiceSettings
 class IdleExecutor:
     """Accepts runs and leaves them waiting until they are cancelled."""
 
-    slots, cluster = math.inf, None
+    slots, slots_per_run, cluster = math.inf, math.inf, None
 
     def __init__(self) -> None:
         self._cancelled: list[int] = []
         self._wake = threading.Event()
 
-    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
+    def submit(self, number: int, spec: RunSpec, folder: Path, slots: int) -> None:
         pass
 
     def cancel(self, number: int, grace_s: float) -> None:

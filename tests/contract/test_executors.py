@@ -40,7 +40,7 @@ class Reused(RayExecutor):
 
 @pytest.fixture(scope="module")
 def reused(cluster: Cluster) -> Iterator[Reused]:
-    executor = Reused(worker_program(1))
+    executor = Reused(worker_program())
     yield executor
     executor.really_close()
 

@@ -54,7 +54,7 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
 
 def refusal() -> ConfigError:
     with pytest.raises(ConfigError) as caught:
-        RayExecutor(worker_program(1)).close()
+        RayExecutor(worker_program()).close()
     return caught.value
 
 

@@ -4,6 +4,9 @@ import os
 import signal
 import subprocess
 import sys
+import tomllib
+from contextlib import ExitStack
+from multiprocessing import Pipe
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +14,7 @@ import psutil
 import pytest
 from pydantic import ValidationError
 
-from risk_sac.config import METHODS, Budget, CampaignSpec, LearnerConfig, RunMethod, RunSpec, method_of
+from risk_sac.config import METHODS, Budget, CampaignSpec, EgoConfig, LearnerConfig, RunMethod, RunSpec, method_of
 from risk_sac.config.boundary import BoundaryConfig
 from risk_sac.config.learner import AgentConfig, WarmStartConfig
 from risk_sac.config.methods import IID_METHODS
@@ -22,6 +25,7 @@ from risk_sac.host.machine import ROLLOUTS, rollout_processes
 from risk_sac.records import DrivenBy, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.results import FAILURES
 from risk_sac.search.loop import execute_run
+from tests.ego_processes import served
 from tests.listener import Listener
 
 BATCH = 4
@@ -191,6 +195,64 @@ def test_a_crashing_episode_is_left_out(tmp_path: Path, processes, monkeypatch: 
     assert [record.reason == "sim_crash" for record in listener.records] == [index == 2 for index in range(6)]
 
 
-def test_a_script_is_driven_without_torch() -> None:
-    code = "import sys, risk_sac.search.rollouts; sys.exit('torch' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+class Mapped(Listener):
+    """Reads after each episode which libraries the rollout processes have loaded."""
+
+    maps = ""
+
+    def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
+        super().episode(record, metrics, series)
+        for process in psutil.Process().children():
+            self.maps += Path(f"/proc/{process.pid}/maps").read_text()
+
+
+def test_a_script_is_driven_without_torch(tmp_path: Path, processes) -> None:
+    processes(1)
+    listener = Mapped()
+    execute_run(spec("archive", 6), tmp_path, listener)
+    assert "libsumo" in listener.maps
+    assert "torch" not in listener.maps
+
+
+def test_a_process_that_needs_too_much_memory_says_what_it_may_take() -> None:
+    own, other = Pipe()
+    code = f"""
+import sys
+import risk_sac.search.rollouts as rollouts
+from risk_sac.host.memory import limit_memory
+limit_memory(1 << 30)
+rollouts.serve = lambda *_: bytearray(1 << 31)
+sys.argv = ["", "{other.fileno()}", "", "0"]
+rollouts.main()
+"""
+    with own, other:
+        assert subprocess.run([sys.executable, "-c", code], pass_fds=[other.fileno()], check=False).returncode == 0
+        assert own.recv() == (
+            "it needs more memory than the 1 GiB that each process of a run may take; "
+            "wanted a larger RISK_SAC_WORKER_MEMORY_BYTES"
+        )
+
+
+def test_each_server_of_a_remote_ego_sees_the_episodes_of_one_process(
+    tmp_path: Path, processes, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    pytest.importorskip("grpc")
+    processes(3)
+    folders = [tmp_path / name for name in ("first", "second")]
+    file, listener = tmp_path / "egos.toml", Listener()
+    monkeypatch.setenv("RISK_SAC_EGOS", str(file))
+    with ExitStack() as stack:
+        tables = []
+        for folder in folders:
+            folder.mkdir()
+            tables.append(stack.enter_context(served("tests.ego_processes:Noting", folder, deadline_s=60)))
+        addresses = ",".join(tomllib.loads(table)["address"] for table in tables)
+        file.write_text(f"[far]\n{tables[0]}".replace(tomllib.loads(tables[0])["address"], addresses))
+        remote = spec("archive", 8, batch=8).model_copy(update={"ego": EgoConfig(driver="far")})
+        outcome = execute_run(remote, tmp_path / "run", listener)
+    played = [set(map(int, (folder / "ego.log").read_text().split()[1:])) for folder in folders]  # 0: the warming up
+    assert all(played)
+    assert not played[0] & played[1]
+    assert len(played[0] | played[1]) == sum(record.outcome != "rejected" for record in listener.records)
+    assert outcome.processes == 2
+    assert "rounds of 8 episodes are played by 2 process(es): the ego 'far' has no more servers" in caplog.text

@@ -1,5 +1,6 @@
 """Client of an ego in another process."""
 
+import contextlib
 import uuid
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -11,6 +12,7 @@ from google.protobuf.message import DecodeError
 
 from risk_sac.egos.guard import CRASH, DEADLINE, MALFORMED
 from risk_sac.egos.remote import ego_pb2
+from risk_sac.egos.remote.local_steps import LocalStream
 from risk_sac.egos.remote.messages import METHODS, PROTOCOL, SERVICE, command_of, observation, start_request
 from risk_sac.egos.seam import Command, EpisodeStart, Perceived
 from risk_sac.errors import EgoFailed
@@ -41,7 +43,7 @@ class RemoteEgo:
         self._channel: Any = None
         self._call: Mapping[str, Any] = {}
         self._session = ""
-        self._stream: _Stream | None = None
+        self._stream: _Stream | LocalStream | None = None
         self._path: Floats | None = None
 
     def reset(self, episode: EpisodeStart) -> None:
@@ -64,7 +66,14 @@ class RemoteEgo:
                 f"the ego {self._name!r} is of version {reply.version!r}; registered is {self._version!r}",
                 reason=VERSION,
             )
-        self._stream = _Stream(self._channel.stream_stream(f"/{SERVICE}/Act"), self._deadline_s)
+        self._stream = self._steps(reply.socket)
+
+    def _steps(self, socket: str) -> "_Stream | LocalStream":
+        """Returns the stream of the session's steps, over the ego's local socket if that can be reached."""
+        if socket:
+            with contextlib.suppress(OSError):  # the ego is on another machine
+                return LocalStream(socket, self._deadline_s, LONGEST)
+        return _Stream(self._channel.stream_stream(f"/{SERVICE}/Act"), self._deadline_s)
 
     def act(self, perceived: Perceived) -> Command:
         """Sends what is perceived and returns the command.
@@ -76,6 +85,10 @@ class RemoteEgo:
         message = observation(perceived, self._session, new_path=perceived.path is not self._path)
         self._path = perceived.path
         reply = self._asked("Act", message, self._stream.ask)
+        if reply.HasField("failure"):
+            failure = reply.failure
+            reason = MALFORMED if failure.malformed else CRASH
+            raise EgoFailed(f"the ego {self._name!r} failed: {failure.text}", reason=reason)
         command = command_of(reply)
         if command is None:
             raise EgoFailed("the ego answered neither a control nor a trajectory", reason=MALFORMED)
@@ -106,7 +119,7 @@ class RemoteEgo:
             return reply.FromString(ask(message.SerializeToString()))
         except DecodeError as error:
             raise EgoFailed(f"the ego {self._name!r} answered {error}", reason=MALFORMED) from error
-        except StopIteration as error:
+        except (StopIteration, EOFError, ConnectionError) as error:
             raise EgoFailed(f"the ego {self._name!r} ended the session unasked", reason=CRASH) from error
         except TimeoutError as error:
             raise self._late() from error

@@ -67,21 +67,23 @@ class RayExecutor:
         self._bridge = _Bridge()
         threading.Thread(target=self._work, name="ray", daemon=True).start()
 
+    slots_per_run = 1  # its rounds are played by one process: the rest of them may not fit its node
+
     @property
     def slots(self) -> float:
         """See `Executor.slots`."""
         return self.cluster.slots
 
-    def submit(self, number: int, spec: RunSpec, folder: Path) -> None:
+    def submit(self, number: int, spec: RunSpec, folder: Path, slots: int) -> None:
         """See `Executor.submit`."""
         folder.mkdir(parents=True, exist_ok=True)
-        order = self._order(number, spec, folder.resolve())
+        order = self._order(number, spec, folder.resolve(), slots)
         with self._lock:
             self._orders[number] = order
             if not self._bridge.say("submit", order):
                 self._lose(order)
 
-    def _order(self, number: int, spec: RunSpec, folder: Path) -> Order:
+    def _order(self, number: int, spec: RunSpec, folder: Path, slots: int) -> Order:
         """An attempt, with the egos that the server's operator has registered and the run's scenario."""
         scratch = self._scratch / scratch_name()
         beside: dict[str, Path] = {}
@@ -97,7 +99,9 @@ class RayExecutor:
         if any(name.startswith("places/") for name in beside):
             environment[library.VARIABLE] = str(scratch / "places")
         program = replace(self._program, environment=environment)
-        return Order(number=number, spec=spec, program=program, folder=folder, scratch=scratch, beside=beside)
+        return Order(
+            number=number, spec=spec, slots=slots, program=program, folder=folder, scratch=scratch, beside=beside
+        )
 
     def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:
         """See `Executor.events`."""

@@ -43,6 +43,7 @@ class Order:
 
     number: int
     spec: RunSpec
+    slots: int
     program: WorkerProgram
     folder: Path  # of the run, on the server's machine
     scratch: Path  # of this attempt and no other, on its node
@@ -77,7 +78,7 @@ class Attendant:
         self._seen = signatures(self._folder)
         self._grown_due = 0.0
         self._local = LocalExecutor(order.program)
-        self._local.submit(1, order.spec, self._folder)
+        self._local.submit(1, order.spec, self._folder, order.slots)
         return str(ray.get_runtime_context().get_node_id())
 
     def poll(self, wait_s: float) -> tuple[list[Event | Exited], Files]:

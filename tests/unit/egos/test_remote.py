@@ -7,7 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import pytest
 from risk_sac.egos import Control, EpisodeStart, Perceived, Trajectory
 from risk_sac.egos.remote.client import RemoteEgo
 from risk_sac.egos.remote.ego_pb2 import CloseReply, Command, Observation, StartReply
+from risk_sac.egos.remote.local_steps import listen
 from risk_sac.egos.remote.messages import METHODS, SERVICE, command_message
 from risk_sac.egos.seam import Vehicle
 from risk_sac.egos.serve import Sessions, serve
@@ -36,12 +37,12 @@ def perceived(time_s: float) -> Perceived:
 
 
 @contextmanager
-def talking(acts: Acts, deadline_s: float = PATIENT_S, service: str = SERVICE) -> Iterator[RemoteEgo]:
+def session(acts: Acts, deadline_s: float, socket: str) -> Iterator[RemoteEgo]:
     """A session with a server that answers observations so."""
     kinds = {"Start": grpc.unary_unary_rpc_method_handler, "Close": grpc.unary_unary_rpc_method_handler}
     kinds["Act"] = grpc.stream_stream_rpc_method_handler
     answers = {
-        "Start": lambda *_: StartReply(version="1"),
+        "Start": lambda *_: StartReply(version="1", socket=socket),
         "Act": lambda requests, _: acts(requests),
         "Close": lambda *_: CloseReply(),
     }
@@ -50,7 +51,7 @@ def talking(acts: Acts, deadline_s: float = PATIENT_S, service: str = SERVICE) -
         for name, (request, _) in METHODS.items()
     }
     server = grpc.server(ThreadPoolExecutor(4))
-    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(service, handlers),))
+    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
     ego = RemoteEgo("far", f"127.0.0.1:{server.add_insecure_port('127.0.0.1:0')}", "1", deadline_s)
     server.start()
     try:
@@ -61,11 +62,22 @@ def talking(acts: Acts, deadline_s: float = PATIENT_S, service: str = SERVICE) -
         server.stop(0)
 
 
+@pytest.fixture(params=["stream of gRPC", "local socket"])
+def talking(request: pytest.FixtureRequest) -> Callable[..., AbstractContextManager[RemoteEgo]]:
+    """Begins a session over either transport."""
+
+    def begin(acts: Acts, deadline_s: float = PATIENT_S) -> AbstractContextManager[RemoteEgo]:
+        socket = listen(lambda requests, _: acts(requests)) if request.param == "local socket" else ""
+        return session(acts, deadline_s, socket)
+
+    return begin
+
+
 def keeping(request: Observation) -> Command:
     return command_message(Control(1.0, 0.0), request.time_s)
 
 
-def test_each_answer_has_the_whole_deadline():
+def test_each_answer_has_the_whole_deadline(talking):
     def acts(requests):
         for request in requests:
             time.sleep(0.5)
@@ -76,7 +88,7 @@ def test_each_answer_has_the_whole_deadline():
             assert ego.act(perceived(0.1 * step)) == Control(1.0, 0.0)
 
 
-def test_loopback_is_reached_whatever_proxy_there_is(monkeypatch):
+def test_loopback_is_reached_whatever_proxy_there_is(talking, monkeypatch):
     for name in ("grpc_proxy", "https_proxy", "http_proxy"):
         monkeypatch.setenv(name, "http://127.0.0.1:9")
     with talking(lambda requests: map(keeping, requests)) as ego:
@@ -84,7 +96,7 @@ def test_loopback_is_reached_whatever_proxy_there_is(monkeypatch):
 
 
 @pytest.mark.parametrize("answered", [0, 3])
-def test_who_does_not_answer_in_time_has_failed(answered):
+def test_who_does_not_answer_in_time_has_failed(talking, answered):
     asked = threading.Event()
 
     def acts(requests):
@@ -102,6 +114,11 @@ def test_who_does_not_answer_in_time_has_failed(answered):
         asked.set()
     assert failed.value.reason == "ego_deadline"
     assert time.monotonic() - began >= 1.9
+
+
+def test_a_socket_that_cannot_be_reached_from_here_is_not_needed():
+    with session(lambda requests: map(keeping, requests), PATIENT_S, "risk-sac-ego-elsewhere") as ego:
+        assert ego.act(perceived(0.0)) == Control(1.0, 0.0)
 
 
 def twice(requests: Iterator[Observation]) -> Iterator[Command]:
@@ -154,7 +171,7 @@ def silent(requests: Iterator[Observation]) -> Iterator[Command]:
         (raising, "ego_crash", "by me"),
     ],
 )
-def test_an_answer_out_of_turn_or_none_is_not_driven(acts, reason, says):
+def test_an_answer_out_of_turn_or_none_is_not_driven(talking, acts, reason, says):
     with talking(acts) as ego:
         ego.act(perceived(0.5))
         with pytest.raises(EgoFailed, match=says) as failed:
@@ -192,11 +209,11 @@ def test_thirty_sessions_are_served_at_a_time_and_end_with_their_streams():
         for ego in egos[:20]:
             ego.close()
         for ego in egos[20:]:  # as if the process were gone: the session stays open
-            ego._channel.close()
+            ego._stream.close()
         for _ in egos:
             assert closed.acquire(timeout=PATIENT_S)
         for ego in egos[20:]:
-            ego._stream.close()
+            ego.close()
 
 
 REMOTE = Path("risk_sac/egos/remote")

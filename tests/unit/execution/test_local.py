@@ -93,7 +93,7 @@ def large_run():
 
 def execute(code, folder, **program):
     executor = LocalExecutor(WorkerProgram(arguments=("-c", code), log="log", **program))
-    executor.submit(1, large_run(), folder)
+    executor.submit(1, large_run(), folder, 1)
     return executor
 
 

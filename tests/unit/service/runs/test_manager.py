@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from risk_sac.config import CampaignSpec
+from risk_sac.config import Budget, CampaignSpec
 from risk_sac.execution.executor import Cause, Exited
 from risk_sac.execution.messages import Failed, Finished
 from service.errors import OutdatedError, QuotaError
@@ -19,14 +19,14 @@ SPEC = CampaignSpec(families=("low",), methods=("random",))
 class Scripted:
     """An executor whose attempts do what the test says, one after the other."""
 
-    slots, cluster = math.inf, None
+    slots, slots_per_run, cluster = math.inf, math.inf, None
 
     def __init__(self, *attempts):
         self._attempts = list(attempts)
         self._told = queue.SimpleQueue()
         self.submitted = []
 
-    def submit(self, number, spec, folder):
+    def submit(self, number, spec, folder, slots):
         self.submitted.append(number)
         for message in self._attempts.pop(0):
             self._told.put((number, message))
@@ -125,6 +125,15 @@ def test_worker_hours_are_used_up_when_they_are_reached():
     with pytest.raises(QuotaError, match=r"has used 2.00 worker hours within 24; wanted at most 2") as refusal:
         check_quota(usage(hours=2.0), 1, SETTINGS)
     assert refusal.value.retry_after_s > 0
+
+
+def test_projects_share_the_slots_and_a_run_states_how_many_it_has(store, ledger, tmp_path):
+    rounds = SPEC.model_copy(update={"budget": Budget(episodes=100, batch=8)})
+    campaigns = [ledger.create(rounds, project) for project in ("ours", "theirs")]
+    manager = Manager(ServiceSettings(data_dir=tmp_path, max_workers=8), store, Scripted([], []))
+    assert [store.campaign(campaign.id).runs[0].processes for campaign in campaigns] == [None, None]
+    manager._tend()
+    assert [store.campaign(campaign.id).runs[0].processes for campaign in campaigns] == [4, 4]
 
 
 @pytest.mark.parametrize(("slots", "wanted"), [(math.inf, 7), (3, 3), (0, 0)])

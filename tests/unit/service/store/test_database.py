@@ -47,6 +47,20 @@ def test_a_database_is_brought_up_to_date_in_one_step_or_not_at_all(tmp_path):
     Store(f"sqlite:///{tmp_path}/test.db").close()
 
 
+def test_runs_of_the_version_before_are_kept(tmp_path):
+    store = Store(f"sqlite:///{tmp_path}/test.db")
+    campaign = Ledger(store).create(SPEC)
+    store.close()
+    with sqlite3.connect(tmp_path / "test.db") as older:
+        older.execute("ALTER TABLE runs DROP COLUMN processes")
+        older.execute("UPDATE alembic_version SET version_num = '0001'")
+    older.close()
+    store = Store(f"sqlite:///{tmp_path}/test.db")
+    Ledger(store).start_run(campaign.runs[0].number, 3)
+    assert [run.processes for run in store.campaign(campaign.id).runs] == [3, None, None, None]
+    store.close()
+
+
 def test_a_database_of_a_newer_version_is_refused(tmp_path):
     Store(f"sqlite:///{tmp_path}/test.db").close()
     with sqlite3.connect(tmp_path / "test.db") as newer:

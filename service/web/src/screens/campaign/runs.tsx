@@ -63,6 +63,7 @@ function Card({ run, campaign, away, hide }: { run: Run; campaign: Body<"Campaig
       </dl>
       <p class="small faint">
         {count(run.raw_collisions)} contact{run.raw_collisions === 1 ? "" : "s"}, {count(run.rejected)} rejected scene{run.rejected === 1 ? "" : "s"}
+        {(run.processes ?? 1) > 1 && <span> · {run.processes} processes</span>}
         {run.attempts > 1 && <span class="warn"> · attempt {run.attempts}</span>}
       </p>
       {run.metrics && Object.keys(run.metrics.episodes_driven_by).length > 0 && <p class="small faint">{drivenSummary(run.metrics.episodes_driven_by)}</p>}

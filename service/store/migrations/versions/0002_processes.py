@@ -1,0 +1,12 @@
+"""Runs state by how many processes their episodes are played."""
+
+import sqlalchemy as sa
+from alembic import op
+
+revision = "0002"
+down_revision = "0001"
+
+
+def upgrade() -> None:
+    """Adds the column, empty in the rows that are there."""
+    op.add_column("runs", sa.Column("processes", sa.Integer(), nullable=True))
