@@ -21,7 +21,6 @@ from service.api.problems import add_problem_handlers
 from service.api.routes import (
     campaigns,
     catalogue,
-    coverage,
     episodes,
     events,
     exports,
@@ -80,8 +79,9 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
         redoc_url=None,
     )
     shown = (episodes, exports, events, reports)
-    for routes in (campaigns, *shown, coverage, regressions, networks, scenarios, catalogue, server):
+    for routes in (campaigns, *shown, regressions, networks, scenarios, catalogue, server):
         app.include_router(routes.router)
+    app.include_router(reports.coverage_router)
     app.router.routes += server.page_routes()
     add_problem_handlers(app)
     add_middleware(app, settings, latencies)

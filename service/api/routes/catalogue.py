@@ -31,7 +31,7 @@ from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.odd import widest
 from service.api.answer_cache import kept
 from service.api.context import CurrentCaller, Service
-from service.api.pages import INVALID, STORAGE, TAGGED, UNKNOWN, entity_tag
+from service.api.pages import INVALID, TAGGED, UNKNOWN, entity_tag
 from service.views.trends import trend_of
 
 R = TypeVar("R", bound=BaseModel)
@@ -244,7 +244,7 @@ def list_egos() -> Egos:
     return Egos(items=[*models, *(_told(EgoDrivers, card) for card in cards())], defects=defects)
 
 
-@router.get("/egos/{name}/trend", response_model=Trend, responses=TAGGED | STORAGE | INVALID | UNKNOWN)
+@router.get("/egos/{name}/trend", response_model=Trend, responses=TAGGED | INVALID | UNKNOWN)
 def get_trend(
     name: EgoName,
     request: Request,

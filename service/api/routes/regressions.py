@@ -10,7 +10,7 @@ from risk_sac.config import EgoConfig
 from risk_sac.config.base import Settings
 from risk_sac.failures.cases import CampaignRegression
 from service.api.context import CurrentCaller, Service
-from service.api.pages import INVALID, MALFORMED, NOT_JSON, STORAGE, UNKNOWN, Responses, header, link, problem
+from service.api.pages import INVALID, MALFORMED, NOT_JSON, UNKNOWN, Responses, header, link, problem
 from service.api.posted import documented, read_posted
 from service.runs.regressions import campaign_of
 
@@ -32,7 +32,7 @@ POSTING: Responses = (
     | problem(409, "The campaign has not ended, or none of its runs has succeeded")
 )
 
-router = APIRouter(prefix="/v1/regressions", tags=["regressions"], responses=STORAGE | INVALID)
+router = APIRouter(prefix="/v1/regressions", tags=["regressions"], responses=INVALID)
 
 
 async def _posted(request: Request) -> PostedRegression:

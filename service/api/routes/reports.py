@@ -16,9 +16,10 @@ from risk_sac.records.coverage import CoverageMatrix
 from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
+from risk_sac.report.matrix import ego_name, merged
 from risk_sac.report.rendering import POLICY
-from service.api.context import AskedCampaign, Context, Service, caller_of
-from service.api.pages import CROWDED, INVALID, STORAGE, TAGGED, UNKNOWN, Responses, cacheable, link, problem
+from service.api.context import AskedCampaign, Context, CurrentCaller, Service, caller_of
+from service.api.pages import INVALID, TAGGED, UNKNOWN, Responses, as_json, cacheable, link, problem
 from service.errors import ConflictError, NotFoundError
 from service.runs.regressions import StoredRegression, campaign_of
 from service.store.stored import StoredCampaign
@@ -64,10 +65,12 @@ SPEC: Responses = {
 FIGURES: Responses = {200: {"headers": CACHED}}
 FIGURE: Responses = {200: {"headers": CACHED, "content": {MEDIA_TYPES[each]: {} for each in FORMATS}}}
 
-router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
+MOST_MERGED = 100  # campaigns: each takes up to seconds the first time
+coverage_router = APIRouter(prefix="/v1/coverage", tags=["reports"], responses=INVALID)
+router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=INVALID | UNKNOWN)
 
 
-@router.get("/table", response_model=Table, responses=TABLE | UNCHANGED | CROWDED)
+@router.get("/table", response_model=Table, responses=TABLE | UNCHANGED)
 async def get_table(
     request: Request,
     service: Service,
@@ -79,7 +82,7 @@ async def get_table(
     return await reported(request, service, campaign, "table", format_, format=format_, address=address)
 
 
-@router.get("/rates", response_model=CampaignRates, responses=FIGURES | UNCHANGED | CROWDED)
+@router.get("/rates", response_model=CampaignRates, responses=FIGURES | UNCHANGED)
 async def get_rates(
     request: Request,
     service: Service,
@@ -95,25 +98,25 @@ async def get_rates(
     return await reported(request, service, campaign, "rates", "rates", str(exposure), scenes_per_hour=exposure)
 
 
-@router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED | CROWDED)
+@router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED)
 async def get_clusters(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """Kinds of failures that the finished runs found, in words, with an example of each."""
     return await reported(request, service, campaign, "clusters", "clusters")
 
 
-@router.get("/coverage", response_model=CoverageMatrix, responses=FIGURES | UNCHANGED | CROWDED)
+@router.get("/coverage", response_model=CoverageMatrix, responses=FIGURES | UNCHANGED)
 async def get_coverage(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """What the finished runs have covered: ODD, functional scenarios, requirements, parameters and bodies."""
     return await reported(request, service, campaign, "coverage", "coverage")
 
 
-@router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED | CROWDED)
+@router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED)
 async def list_figures(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """Figures of the finished runs: search, results, λ and α."""
     return await reported(request, service, campaign, "figures", "figures", address=link(request, ""))
 
 
-@router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED | CROWDED)
+@router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED)
 async def get_figure(
     name: str, format: Format, request: Request, service: Service, campaign: AskedCampaign
 ) -> Response:
@@ -156,7 +159,7 @@ REPORT: Responses = {200: text(html="<!doctype html>…", md="# Failures of an e
 NOT_PLAYED = problem(409, "The regression has not ended, or has failed")
 
 
-@router.get("/report", response_model=CampaignEvidence, responses=REPORT | UNCHANGED | NOT_PLAYED | CROWDED)
+@router.get("/report", response_model=CampaignEvidence, responses=REPORT | UNCHANGED | NOT_PLAYED)
 async def get_report(
     request: Request,
     service: Service,
@@ -199,3 +202,32 @@ def _played(service: Context, campaign: StoredCampaign, regression_id: str) -> S
     if found.state is not State.SUCCEEDED:
         raise ConflictError(f"regression {found.id} is {found.state}; wanted one that succeeded", reason="not_ended")
     return found
+
+
+@coverage_router.get("", response_model=CoverageMatrix)
+async def get_project_coverage(
+    service: Service,
+    caller: CurrentCaller,
+    ego: Annotated[
+        str | None,
+        Query(max_length=500, description="Only campaigns of this ego, with its defects: `idm-aeb+latency`."),
+    ] = None,
+    label: Annotated[
+        str | None, Query(max_length=200, pattern=r"^[^\x00]*$", description="Only campaigns with exactly this label.")
+    ] = None,
+    limit: Annotated[int, Query(ge=1, le=MOST_MERGED, description="Newest campaigns to be merged.")] = MOST_MERGED,
+) -> Response:
+    """Coverage of the newest campaigns of a project, cell by cell; each cell names the campaigns behind it.
+
+    Campaigns of different egos are merged too, unless `ego` picks one: what one ego kept, another need not.
+    """
+    page = await run_in_threadpool(service.store.campaigns, limit, project=caller.sees, label=label)
+    matrices = []
+    for campaign in page.items:
+        if ego is not None and ego_name(campaign.spec) != ego:
+            continue
+        edition = await run_in_threadpool(service.reports.edition, campaign)
+        view = CampaignView(name="coverage", campaign_id=campaign.id, edition=edition)
+        content = await service.views.content(view, campaign, caller.key_id)
+        matrices.append(CoverageMatrix.model_validate_json(content.body))
+    return as_json(merged(matrices))
