@@ -25,7 +25,6 @@ from service.api.routes import (
     events,
     exports,
     networks,
-    regressions,
     reports,
     scenarios,
     server,
@@ -78,10 +77,10 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
         docs_url=None,
         redoc_url=None,
     )
-    shown = (episodes, exports, events, reports)
-    for routes in (campaigns, *shown, regressions, networks, scenarios, catalogue, server):
-        app.include_router(routes.router)
-    app.include_router(reports.coverage_router)
+    of_campaigns = [routes.router for routes in (campaigns, episodes, exports, events, reports)]
+    others = [routes.router for routes in (networks, scenarios, catalogue, server)]
+    for router in (*of_campaigns, reports.coverage_router, reports.regressions_router, *others):
+        app.include_router(router)
     app.router.routes += server.page_routes()
     add_problem_handlers(app)
     add_middleware(app, settings, latencies)

@@ -22,7 +22,7 @@ from service.api.pages import header
 from service.api.posted import campaign_schemas, input_schemas
 from service.api.problems import ProblemDetails
 from service.api.routes.episodes import PostedTriage
-from service.api.routes.regressions import PostedRegression
+from service.api.routes.reports import PostedRegression
 
 SERVER = "http://127.0.0.1:8000"
 TITLES = {

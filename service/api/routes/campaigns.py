@@ -44,11 +44,10 @@ from service.runs.manager import LOG
 from service.store.stored import StoredCampaign, StoredRun
 from service.views.curves import Curves, played, results
 from service.views.failure_table import FailureTable
-from service.views.played_grid import GridFormat, run_of
 from service.views.progress import campaign_body, log_tail, retry_after_s, summary_body
 from service.views.reports import MEDIA_TYPES
 from service.views.scenes import SceneEffects
-from service.views.whole import CampaignView, ViewName
+from service.views.whole import CampaignView, GridFormat, ViewName, run_of
 
 LISTED = "campaigns"
 EITHER_KIND = documented(CampaignSpec.__name__, ON_MAP)

@@ -26,13 +26,13 @@ from risk_sac.records import Record, wire
 from risk_sac.report.trend import Trend
 from risk_sac.risk.requirements import requirements_from_odd
 from risk_sac.risk.signals import SIGNALS
-from risk_sac.scenario.behaviour import behaving
 from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.limits import behaving
 from risk_sac.scenario.odd import widest
 from service.api.answer_cache import kept
 from service.api.context import CurrentCaller, Service
 from service.api.pages import INVALID, TAGGED, UNKNOWN, entity_tag
-from service.views.trends import trend_of
+from service.views.reports import trend_of
 
 R = TypeVar("R", bound=BaseModel)
 

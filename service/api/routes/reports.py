@@ -1,15 +1,17 @@
-"""/v1/campaigns/{id}/table, figures, clusters, coverage and spec: the report of `risk-sac evaluate`."""
+"""/v1/campaigns/{id}/table, figures, clusters, coverage and spec; /v1/coverage; /v1/regressions."""
 
 from collections import Counter
 from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
+from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.config import CampaignSpec
+from risk_sac.config import CampaignSpec, EgoConfig
+from risk_sac.config.base import Settings
 from risk_sac.config.spec_file import campaign_yaml
-from risk_sac.failures.cases import Regression
+from risk_sac.failures.cases import CampaignRegression, Regression
 from risk_sac.rates.record import MOST_PER_HOUR
 from risk_sac.records import State
 from risk_sac.records.coverage import CoverageMatrix
@@ -19,7 +21,20 @@ from risk_sac.report.files import Table
 from risk_sac.report.matrix import ego_name, merged
 from risk_sac.report.rendering import POLICY
 from service.api.context import AskedCampaign, Context, CurrentCaller, Service, caller_of
-from service.api.pages import INVALID, TAGGED, UNKNOWN, Responses, as_json, cacheable, link, problem
+from service.api.pages import (
+    INVALID,
+    MALFORMED,
+    NOT_JSON,
+    TAGGED,
+    UNKNOWN,
+    Responses,
+    as_json,
+    cacheable,
+    header,
+    link,
+    problem,
+)
+from service.api.posted import documented, read_posted
 from service.errors import ConflictError, NotFoundError
 from service.runs.regressions import StoredRegression, campaign_of
 from service.store.stored import StoredCampaign
@@ -231,3 +246,49 @@ async def get_project_coverage(
         content = await service.views.content(view, campaign, caller.key_id)
         matrices.append(CoverageMatrix.model_validate_json(content.body))
     return as_json(merged(matrices))
+
+
+class PostedRegression(Settings):
+    """Campaign and ego of a regression."""
+
+    campaign_id: Annotated[str, Field(max_length=100, pattern=r"^[A-Za-z0-9]+$")]
+    """Ended campaign whose distinct failures are played."""
+    ego: EgoConfig
+    """The other ego, such as `{"profile": "careful"}`."""
+
+
+POSTING: Responses = (
+    {202: {"headers": {"Location": header("Where to follow it.")}}}
+    | MALFORMED
+    | NOT_JSON
+    | UNKNOWN
+    | problem(409, "The campaign has not ended, or none of its runs has succeeded")
+)
+
+regressions_router = APIRouter(prefix="/v1/regressions", tags=["regressions"], responses=INVALID)
+
+
+async def _posted(request: Request) -> PostedRegression:
+    return await read_posted(request, PostedRegression)
+
+
+@regressions_router.post("", status_code=202, responses=POSTING, openapi_extra=documented("PostedRegression"))
+async def post_regression(
+    posted: Annotated[PostedRegression, Depends(_posted)],
+    request: Request,
+    response: Response,
+    service: Service,
+    caller: CurrentCaller,
+) -> CampaignRegression:
+    """Play the distinct failures of a campaign against another ego; the same request returns the existing one."""
+    campaign = await run_in_threadpool(service.store.campaign, posted.campaign_id, caller.sees)
+    regression = await run_in_threadpool(service.regressions.post, campaign, posted.ego, caller.key_id)
+    response.headers["Location"] = link(request, f"/v1/regressions/{regression.id}")
+    return regression
+
+
+@regressions_router.get("/{regression_id}", responses=UNKNOWN)
+def get_regression(regression_id: str, service: Service, caller: CurrentCaller) -> CampaignRegression:
+    """Verdict of each failure: fixed, still failing, a new kind, flaky, or not comparable, with the reason."""
+    service.store.campaign(campaign_of(regression_id), caller.sees)  # which another project's caller does not see
+    return service.regressions.get(regression_id)
