@@ -21,12 +21,10 @@ from service.api.problems import add_problem_handlers
 from service.api.routes import (
     campaigns,
     catalogue,
-    coverage,
     episodes,
     events,
     exports,
     networks,
-    regressions,
     reports,
     scenarios,
     server,
@@ -79,9 +77,10 @@ def create_app(settings: ServiceSettings, executor: Executor | None = None) -> F
         docs_url=None,
         redoc_url=None,
     )
-    shown = (episodes, exports, events, reports)
-    for routes in (campaigns, *shown, coverage, regressions, networks, scenarios, catalogue, server):
-        app.include_router(routes.router)
+    of_campaigns = [routes.router for routes in (campaigns, episodes, exports, events, reports)]
+    others = [routes.router for routes in (networks, scenarios, catalogue, server)]
+    for router in (*of_campaigns, reports.coverage_router, reports.regressions_router, *others):
+        app.include_router(router)
     app.router.routes += server.page_routes()
     add_problem_handlers(app)
     add_middleware(app, settings, latencies)

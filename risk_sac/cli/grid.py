@@ -11,8 +11,7 @@ from risk_sac.cli.console import OK, print_answer, write_out
 from risk_sac.cli.flags import assignment
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.host.terminal import notes
-from risk_sac.report.grid import STANDARDS, PlayedGrid, StandardVerdict, grid_csv, played_grids, varied_axes
-from risk_sac.report.grid_junit import grid_junit
+from risk_sac.report.grid import STANDARDS, PlayedGrid, StandardVerdict, grid_csv, grid_junit, played_grids, varied_axes
 
 
 def add(commands: Commands) -> None:

@@ -1,6 +1,6 @@
 """Bundles of failures: packed, checked and unpacked with their scenarios.
 
-A bundled net reaches the simulator only if it has the elements that `risk_sac.maps.cut` writes and no others: SUMO
+A bundled net reaches the simulator only if it has the elements that `risk_sac.maps.finder` writes and no others: SUMO
 writes files that a parameter of a signal names, and reads those that XML includes.
 """
 

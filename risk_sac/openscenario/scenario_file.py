@@ -2,8 +2,10 @@
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -13,24 +15,32 @@ from risk_sac.config.scenario import EGO, Actor, ImportOrigin, Moving, Scenario,
 from risk_sac.config.story import Story
 from risk_sac.config.story_actions import FollowTrajectoryAction
 from risk_sac.errors import ConfigError
+from risk_sac.maps.convert import present_net
+from risk_sac.maps.documents import MAX_BYTES
 from risk_sac.openscenario.actions import ActionReader
 from risk_sac.openscenario.catalogs import Catalogs
 from risk_sac.openscenario.conditions import ConditionReader
-from risk_sac.openscenario.constraints import allowed, constraints_of
 from risk_sac.openscenario.distributions import NO_SCOPE, Variation, points_of
-from risk_sac.openscenario.elements import plain
+from risk_sac.openscenario.elements import XmlElement, plain
 from risk_sac.openscenario.entities import Entities, Entity
-from risk_sac.openscenario.parameters import Parameters, Varied
+from risk_sac.openscenario.parameters import Parameters, Varied, allowed, constraints_of
 from risk_sac.openscenario.positions import Positions
-from risk_sac.openscenario.road import RoadFiles, converted, missing
-from risk_sac.openscenario.scope import At, NameScope
+from risk_sac.openscenario.scope import At, NameScope, Text
 from risk_sac.openscenario.sources import SourceFiles
 from risk_sac.openscenario.storyboard import Init, StoryboardReader, horizon_of, moving_actors
-from risk_sac.openscenario.unread import unread
 from risk_sac.openscenario.variables import Variables
 
 _VARIATION = "ParameterValueDistribution"
 _LONGEST_NAME, _LONGEST_SUMMARY = 40, 300
+
+
+@dataclass
+class RoadFiles:
+    """Nets and road files of a document, by name."""
+
+    network: Text
+    road: Text
+    files: dict[str, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -249,3 +259,108 @@ def _name(stem: str) -> str:
     """Returns a document's name for a file's."""
     plain = re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_")
     return (plain if plain[:1].isalpha() else f"scenario_{plain}")[:_LONGEST_NAME].strip("_")
+
+
+_SILENT = frozenset({"FileHeader", "License", "Properties", "Property", "CatalogLocations", "ParameterDeclarations"})
+_EFFECTS = {
+    "Performance": "limits are those of the body",
+    "Axles": "turning follows the road",
+    "TrafficSignals": "signals keep the program of the road",
+    "MonitorDeclarations": "nothing is monitored",
+    "Trailer": "there is no trailer",
+}
+_UNKNOWN = "it has no effect"
+_MOST_LINES = 10
+
+
+def unread(root: XmlElement) -> list[str]:
+    """Returns a line for each kind of element of a file that nothing read."""
+    lines = defaultdict[str, list[int]](list)
+    for element in _unused(root):
+        lines[element.tag].append(element.line)
+    return [
+        f"{root.file}, line{'s' if len(at) > 1 else ''} {', '.join(map(str, at[:_MOST_LINES]))}"
+        f"{', …' if len(at) > _MOST_LINES else ''}, <{tag[:80]}>: not read; {_EFFECTS.get(tag, _UNKNOWN)}"
+        for tag, at in lines.items()
+    ]
+
+
+def _unused(element: XmlElement) -> Iterator[XmlElement]:
+    """Yields elements that nothing read, within elements that were; other entries of a catalog do not count."""
+    for child in element.children:
+        if child.used:
+            yield from _unused(child)
+        elif child.tag not in _SILENT and "Catalog" not in (child.tag, element.tag):
+            yield child
+
+
+MOST_ROADS = 20
+_NET, _ROAD = ".net.xml", ".xodr"
+
+
+def missing(at: At, text: Text, sources: SourceFiles, file: Path) -> list[str]:
+    """Returns the road files of a parameter's words that are not there; raises `ConfigError` if none is."""
+    if not isinstance(text, Chosen):
+        sources.find(text, file, at.element)
+        return []
+    absent, last = list[str](), None
+    for name in dict.fromkeys(text.of.values()):
+        try:
+            sources.find(name, file, at.element)
+        except ConfigError as error:
+            absent.append(name)
+            last = error
+    if last is not None and len(absent) == len(set(text.of.values())):
+        raise last
+    return absent
+
+
+def converted(at: At, text: Text, sources: SourceFiles, file: Path, remarks: list[str]) -> RoadFiles:
+    """Converts all roads that a scenario may be on.
+
+    Args:
+      at: the element that names them.
+      text: their names.
+      sources: reads files.
+      file: the scenario file.
+      remarks: to which what a road loses is added.
+
+    Raises:
+      ConfigError: a road is not there, is no OpenDRIVE, or cannot be converted.
+    """
+    names = dict.fromkeys([text] if isinstance(text, str) else text.of.values())
+    if len(names) > MOST_ROADS:
+        raise at.refusal(f"{len(names)} roads", f"at most {MOST_ROADS}")
+    stems, files = dict[str, str](), dict[str, bytes]()
+    for name in names:
+        path = sources.find(name, file, at.element)
+        content = sources.content(path, at.element.place)
+        if len(content) > MAX_BYTES or b"<OpenDRIVE" not in content:
+            raise at.refusal(f"{name!r}, which is no OpenDRIVE", "an OpenDRIVE file (.xodr)")
+        stems[name] = _free_stem(path.stem, files)
+        files[stems[name] + _ROAD] = content
+        files[stems[name] + _NET] = _net(at, path, remarks)
+    if isinstance(text, str):
+        return RoadFiles(stems[text] + _NET, stems[text] + _ROAD, files)
+    return RoadFiles(_chosen(text, stems, _NET), _chosen(text, stems, _ROAD), files)
+
+
+def _chosen(text: Chosen[str], stems: Mapping[str, str], ending: str) -> Chosen[str]:
+    return Chosen[str](by=text.by, of={word: stems[name] + ending for word, name in text.of.items()})
+
+
+def _free_stem(stem: str, files: Mapping[str, bytes]) -> str:
+    plain = re.sub(r"[^A-Za-z0-9_-]", "_", stem)[:60] or "road"
+    while plain + _ROAD in files:
+        plain += "_"
+    return plain
+
+
+def _net(at: At, path: Path, remarks: list[str]) -> bytes:
+    with tempfile.TemporaryDirectory(prefix="risk-sac-") as folder:
+        try:
+            net = present_net(path, Path(folder), path.name)
+        except ConfigError as error:
+            raise at.refusal(f"{path.name}: {error.got}", error.expected, error.remedy) from error
+        remarks += [f"{path.name}: {warning}" for warning in net.warnings]
+        return re.sub(rb"<!--.*?-->\s*", b"", net.file.read_bytes(), count=1, flags=re.DOTALL)  # it has the time

@@ -8,12 +8,12 @@ import numpy as np
 
 from risk_sac.config import CrossingType, DeviationBounds, Interval, Like, Odd, Scenario, SignalType
 from risk_sac.errors import ConfigError, InfeasibleScene, did_you_mean
-from risk_sac.scenario.behaviour import behaving
 from risk_sac.scenario.family import Family, usual_odd
 from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.library import DOCUMENT, kept
+from risk_sac.scenario.limits import behaving
 from risk_sac.scenario.odd import SIGNAL_OF
 from risk_sac.scenario.scene import steps_of
 from risk_sac.scenario.shipped import (

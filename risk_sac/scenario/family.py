@@ -18,9 +18,9 @@ from risk_sac.config import (
 )
 from risk_sac.config.distribution import RankCorrelation
 from risk_sac.config.scenario import ScenarioParameter
-from risk_sac.scenario.behaviour import preset
 from risk_sac.scenario.declared import SceneLaw
 from risk_sac.scenario.layout import Layout
+from risk_sac.scenario.limits import preset
 from risk_sac.scenario.space import SceneSpace
 
 MOST_OVER_LIMIT = 1.2  # fastest vehicles, as a share of the limit; choice

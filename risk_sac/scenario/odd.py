@@ -9,8 +9,7 @@ from typing import Any, get_args
 
 from risk_sac.config import Behaviour, Environment, Interval, Odd, Precipitation, Scenery, SignalType
 from risk_sac.errors import OddError
-from risk_sac.scenario.behaviour import behaving, preset
-from risk_sac.scenario.limits import WET_FRICTION
+from risk_sac.scenario.limits import WET_FRICTION, behaving, preset
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 TINY = 1e-6  # in any unit; SUMO refuses a speed of 1e-320

@@ -17,12 +17,12 @@ from pydantic import TypeAdapter
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.config.methods import RunMethod
 from risk_sac.records import StateChange
-from service.api.gate import HEALTH, PUBLIC
-from service.api.pages import WAIT, header
+from service.api.gate import PUBLIC
+from service.api.pages import header
 from service.api.posted import campaign_schemas, input_schemas
 from service.api.problems import ProblemDetails
 from service.api.routes.episodes import PostedTriage
-from service.api.routes.regressions import PostedRegression
+from service.api.routes.reports import PostedRegression
 
 SERVER = "http://127.0.0.1:8000"
 TITLES = {
@@ -153,19 +153,23 @@ _SECURITY = {
         "description": "Made by `risk-sac keys create`. On a loopback address none is needed until one was made.",
     }
 }
-_SCHEME = {"WWW-Authenticate": header("`Bearer`", required=False)}
-_Answers = dict[str, tuple[str, dict[str, Any]]]
-_FULL = "too many connections are open"
-_BODY: _Answers = {"408": ("The body comes too slowly", {}), "413": ("The body is too large", {})}
-_ALL: _Answers = {
-    "421": ("The Host header names no address of this service", {}),
-    "503": (_FULL.capitalize(), WAIT),
+GUARDS: Mapping[int, str] = {
+    401: "the API key is missing, wrong or revoked",
+    403: "the API key does not reach so far, or the request comes from a foreign page",
+    408: "the body comes too slowly",
+    413: "the body is too large",
+    421: "the Host header names no address of this service",
+    429: "too many requests, or too much for the project's quota",
+    503: "too many are connected or wait for such an answer, or disk, database or API keys refuse",
 }
-_COUNTED: _Answers = {"429": ("Too many requests, or too much for the project's quota", WAIT)}
-_GUARDED: _Answers = {
-    "401": ("The API key is missing, wrong or revoked", _SCHEME),
-    "403": ("The API key does not reach so far, or the request comes from a foreign page", {}),
-    "503": (f"The API keys are lost or damaged, as `detail` says, or {_FULL}", WAIT),
+"""Statuses with which the service may refuse any call, and why."""
+_REFUSED = {
+    "description": "Refused: " + "; ".join(f"{status}: {reason}" for status, reason in GUARDS.items()),
+    "headers": {
+        "Retry-After": header("Seconds to wait before asking again, of 429 and 503.", "integer", required=False),
+        "WWW-Authenticate": header("`Bearer`, of 401.", required=False),
+    },
+    "content": {"application/problem+json": {"schema": {"$ref": f"#/components/schemas/{ProblemDetails.__name__}"}}},
 }
 _CHOICES: dict[str, dict[str, Any]] = {
     "FamilyName": TypeAdapter(FamilyName).json_schema(),
@@ -208,24 +212,15 @@ def _event_schemas() -> dict[str, Any]:
 
 
 def _describe_guards(document: dict[str, Any]) -> None:
-    """Adds the key scheme, and the guards' answers to each operation that declares none."""
+    """Adds the key scheme, and the guards' answer to each operation."""
     document["components"]["securitySchemes"] = _SECURITY
     # Either of them: whether a key is needed depends on the address and the keys of the server.
     document["security"] = [{"ApiKey": []}, {}]
     for path, operations in document["paths"].items():
-        answers = _ALL | ({} if path in HEALTH else _COUNTED) | ({} if path in PUBLIC else _GUARDED)
         for operation in operations.values():
             if path in PUBLIC:
                 operation["security"] = []
-            body = _BODY if "requestBody" in operation else {}
-            for status, (description, headers) in (body | answers).items():
-                operation["responses"].setdefault(status, _problem(description, headers))
-            operation["responses"] = dict(sorted(operation["responses"].items()))
-
-
-def _problem(description: str, headers: dict[str, Any]) -> dict[str, Any]:
-    content = {"application/problem+json": {"schema": {"$ref": f"#/components/schemas/{ProblemDetails.__name__}"}}}
-    return {"description": description, **({"headers": headers} if headers else {}), "content": content}
+            operation["responses"] = dict(sorted(operation["responses"].items())) | {"default": _REFUSED}
 
 
 def _simplified(node: Any) -> Any:

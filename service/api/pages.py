@@ -118,11 +118,9 @@ REUSED = problem(409, "The idempotency key has queued another campaign")
 NOT_ENDED = problem(409, "The campaign has not ended")
 NOT_JSON = problem(415, "The body is declared as something else than application/json, or carries a Content-Encoding")
 INVALID = problem(422, "A field is wrong; `errors` names it")
-STORAGE = problem(503, "The database cannot be read or written")
 STOPPED = problem(503, "Campaigns make no progress")
 UNREADY = problem(503, "The disk or the database refuses")
 
-CROWDED = problem(503, "The database cannot be read, or too many wait for theirs")
 _RETRY = {
     "Retry-After": header(
         "Seconds to wait: a twentieth of the time left; absent once the campaign has ended.", "integer", required=False

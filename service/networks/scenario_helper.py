@@ -20,8 +20,8 @@ from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
-from risk_sac.openscenario.archive import holds_scenario, unpack
 from risk_sac.openscenario.scenario_file import Imported, import_scenario
+from risk_sac.openscenario.sources import holds_scenario, unpack
 from risk_sac.scenario import library
 from risk_sac.scenario.check import check_document
 from risk_sac.scenario.reading import MOST_BYTES, document_from, too_long

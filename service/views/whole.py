@@ -6,7 +6,7 @@
 import logging
 import sys
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from io import BytesIO
@@ -17,26 +17,75 @@ from pydantic import TypeAdapter
 from pydantic_core import from_json, to_json
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.config import CampaignSpec
+from risk_sac.config import CampaignSpec, method_of
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.helper import ANSWER, QUESTION
 from risk_sac.execution.messages import without_folders
 from risk_sac.failures.cases import Regression
 from risk_sac.records import Outcome, TriageState, wire
 from risk_sac.report.figures import Format
-from risk_sac.report.grid import Standard
+from risk_sac.report.grid import PlayedGrid, Standard, grid_csv, grid_junit, played_points, varied_axes
 from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, PriorContent, is_kept
 from service.errors import NotFoundError, StorageError
 from service.settings import ServiceSettings
 from service.store.reading import Store
-from service.store.stored import StoredCampaign
+from service.store.stored import StoredCampaign, StoredRecord, StoredRun
 from service.views import reports
 from service.views.curves import curves
 from service.views.failure_table import failure_table
 from service.views.on_demand import Helper, OnDemandCache
-from service.views.played_grid import GridFormat, played_grid, written_grid
 from service.views.reports import CampaignReport, Reports, unknown_figure
 from service.views.scenes import scene_effects
+
+GridFormat = Literal["json", "csv", "xml", "png"]
+
+
+def run_of(campaign: StoredCampaign, run_id: str) -> StoredRun:
+    """The run of a campaign with this id; raises `NotFoundError` without one."""
+    run = next((run for run in campaign.runs if run.id == run_id), None)
+    if run is None:
+        message = f"campaign {campaign.id} has no run {run_id!r}; GET it lists all runs"
+        raise NotFoundError(message, field="run_id", got=run_id)
+    return run
+
+
+def played_grid(
+    campaign: StoredCampaign, run_id: str, episodes: Iterable[StoredRecord], standard: Standard
+) -> PlayedGrid:
+    """The scenes of a run so far.
+
+    Args:
+      campaign: of the run.
+      run_id: of the run.
+      episodes: of all runs, in order.
+      standard: the driver that tells a failure from a scene that is out of scope.
+
+    Raises:
+      NotFoundError: the campaign has no such run, or its method plays no scenario as it is written.
+    """
+    run = run_of(campaign, run_id)
+    spec = next(spec for spec in campaign.spec.runs() if spec.id == run_id)
+    if not method_of(spec.method).story:
+        message = f"run {run_id} is of the method {spec.method}; wanted one of story-sweep, story-random or story-bo"
+        raise NotFoundError(message, field="run_id", got=run_id)
+    records = [episode.record for episode in episodes if episode.run_number == run.number]
+    return PlayedGrid(spec=spec, standard=standard, points=played_points(spec, records, standard))
+
+
+def written_grid(grid: PlayedGrid, format_: GridFormat, over: Sequence[str]) -> bytes:
+    """A played grid as a file; `over` names the two parameters of a picture, the first two that vary without it."""
+    if format_ == "csv":
+        return grid_csv([grid]).encode()
+    if format_ == "xml":
+        return grid_junit([grid])
+    if format_ == "png":
+        from risk_sac.report.grid_picture import grid_png  # here, because loading matplotlib takes a second
+
+        if len(over) not in (0, 2):
+            raise ConfigError("over", ", ".join(over), "two parameters, or none")
+        return grid_png([grid], (over[0], over[1]) if over else varied_axes([grid]), {})
+    return wire(grid)
+
 
 logger = logging.getLogger(__name__)
 

@@ -21,14 +21,12 @@ from service.api.answer_cache import kept
 from service.api.context import Caller, Context, CurrentCaller, Service
 from service.api.pages import (
     ACCEPTED,
-    CROWDED,
     INVALID,
     LIVE,
     MALFORMED,
     NOT_ENDED,
     NOT_JSON,
     REUSED,
-    STORAGE,
     TAGGED,
     TIERS,
     UNKNOWN,
@@ -46,15 +44,14 @@ from service.runs.manager import LOG
 from service.store.stored import StoredCampaign, StoredRun
 from service.views.curves import Curves, played, results
 from service.views.failure_table import FailureTable
-from service.views.played_grid import GridFormat, run_of
 from service.views.progress import campaign_body, log_tail, retry_after_s, summary_body
 from service.views.reports import MEDIA_TYPES
 from service.views.scenes import SceneEffects
-from service.views.whole import CampaignView, ViewName
+from service.views.whole import CampaignView, GridFormat, ViewName, run_of
 
 LISTED = "campaigns"
 EITHER_KIND = documented(CampaignSpec.__name__, ON_MAP)
-POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON | CROWDED
+POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON
 IdempotencyKey = Annotated[
     str | None,
     Header(
@@ -82,7 +79,7 @@ GRID = LIVE | {
     }
 }
 
-router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID)
+router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=INVALID)
 
 
 @router.post("", status_code=202, response_model=Campaign, responses=POSTING, openapi_extra=EITHER_KIND)
@@ -98,7 +95,7 @@ async def post_campaign(
     return await run_in_threadpool(_submit, request, spec, prior, service, caller, idempotency_key)
 
 
-@router.post("/check", responses=MALFORMED | NOT_JSON | CROWDED, openapi_extra=EITHER_KIND)
+@router.post("/check", responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
 async def check_campaign(spec: PostedCampaign, service: Service, caller: CurrentCaller) -> CampaignCheck:
     """Validate a campaign and change nothing; `adjustments` has the values that its episodes would use instead."""
     checked = await run_in_threadpool(service.manager.checked, spec)
@@ -178,7 +175,7 @@ def get_power(campaign_id: str, request: Request, service: Service, caller: Curr
     return _live(campaign_id, request, service, caller, lambda found: power_of(found.spec, played(found)))
 
 
-@router.get("/{campaign_id}/failure-table", response_model=FailureTable, responses=UNKNOWN | LIVE | CROWDED)
+@router.get("/{campaign_id}/failure-table", response_model=FailureTable, responses=UNKNOWN | LIVE)
 async def get_failure_table(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, tier: Tier = "valid"
 ) -> Response:
@@ -186,7 +183,7 @@ async def get_failure_table(
     return await _viewed(campaign_id, request, service, caller, name="failure_table", outcomes=TIERS[tier])
 
 
-@router.get("/{campaign_id}/curves", response_model=Curves, responses=UNKNOWN | LIVE | CROWDED)
+@router.get("/{campaign_id}/curves", response_model=Curves, responses=UNKNOWN | LIVE)
 async def get_curves(
     campaign_id: str, request: Request, service: Service, caller: CurrentCaller, points: Points = 200
 ) -> Response:
@@ -194,13 +191,13 @@ async def get_curves(
     return await _viewed(campaign_id, request, service, caller, name="curves", points=points)
 
 
-@router.get("/{campaign_id}/scenes", response_model=SceneEffects, responses=UNKNOWN | LIVE | CROWDED)
+@router.get("/{campaign_id}/scenes", response_model=SceneEffects, responses=UNKNOWN | LIVE)
 async def get_scenes(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """Which scene parameters set failing episodes apart, and which parts of the ODD were played."""
     return await _viewed(campaign_id, request, service, caller, name="scenes")
 
 
-@router.get("/{campaign_id}/runs/{run_id}/grid", response_model=PlayedGrid, responses=UNKNOWN | GRID | CROWDED)
+@router.get("/{campaign_id}/runs/{run_id}/grid", response_model=PlayedGrid, responses=UNKNOWN | GRID)
 async def get_grid(
     campaign_id: str,
     run_id: str,

@@ -26,13 +26,13 @@ from risk_sac.records import Record, wire
 from risk_sac.report.trend import Trend
 from risk_sac.risk.requirements import requirements_from_odd
 from risk_sac.risk.signals import SIGNALS
-from risk_sac.scenario.behaviour import behaving
 from risk_sac.scenario.families import FAMILIES
+from risk_sac.scenario.limits import behaving
 from risk_sac.scenario.odd import widest
 from service.api.answer_cache import kept
 from service.api.context import CurrentCaller, Service
-from service.api.pages import INVALID, STORAGE, TAGGED, UNKNOWN, entity_tag
-from service.views.trends import trend_of
+from service.api.pages import INVALID, TAGGED, UNKNOWN, entity_tag
+from service.views.reports import trend_of
 
 R = TypeVar("R", bound=BaseModel)
 
@@ -244,7 +244,7 @@ def list_egos() -> Egos:
     return Egos(items=[*models, *(_told(EgoDrivers, card) for card in cards())], defects=defects)
 
 
-@router.get("/egos/{name}/trend", response_model=Trend, responses=TAGGED | STORAGE | INVALID | UNKNOWN)
+@router.get("/egos/{name}/trend", response_model=Trend, responses=TAGGED | INVALID | UNKNOWN)
 def get_trend(
     name: EgoName,
     request: Request,

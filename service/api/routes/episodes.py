@@ -26,11 +26,9 @@ from risk_sac.records import (
 )
 from service.api.context import CurrentCaller, Service
 from service.api.pages import (
-    CROWDED,
     INVALID,
     MALFORMED,
     NOT_JSON,
-    STORAGE,
     TAGGED,
     TIERS,
     UNKNOWN,
@@ -72,7 +70,7 @@ class PostedTriage(Settings):
     """Reason, as plain text."""
 
 
-router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
+router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["campaigns"], responses=INVALID | UNKNOWN)
 
 
 async def _posted_triage(request: Request) -> PostedTriage:
@@ -190,7 +188,7 @@ PLAYED = problem(409, "The failure does not repeat here, or cannot be played")
 
 def made(*media_types: str) -> Responses:
     """Responses of content that is made on demand."""
-    return TAGGED | LOST | CROWDED | {200: TAGGED[200] | {"content": {each: {} for each in media_types}}}
+    return TAGGED | LOST | {200: TAGGED[200] | {"content": {each: {} for each in media_types}}}
 
 
 async def _failure(campaign_id: str, failure_id: str, service: Service, caller: CurrentCaller) -> FailureOfARun:

@@ -8,7 +8,7 @@ from sse_starlette import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from service.api.context import CurrentCaller, Service
-from service.api.pages import INVALID, STORAGE, UNKNOWN, Responses
+from service.api.pages import INVALID, UNKNOWN, Responses
 from service.api.problems import invalid_field
 from service.api.stream import decode_position
 from service.store.reading import Store
@@ -60,7 +60,7 @@ Newest = Annotated[
     ),
 ]
 
-router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=STORAGE | INVALID | UNKNOWN)
+router = APIRouter(prefix="/v1/campaigns", tags=["campaigns"], responses=INVALID | UNKNOWN)
 
 
 @router.get("/{campaign_id}/events", response_class=Response, responses=EVENTS)

@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 from risk_sac.errors import ConfigError
 from risk_sac.failures.export.formats import FORMATS, REMEDY, ZIP, FormatName, names
 from service.api.context import AskedCampaign, CurrentCaller, Service
-from service.api.pages import CROWDED, INVALID, STORAGE, UNKNOWN, problem
+from service.api.pages import INVALID, UNKNOWN, problem
 from service.api.problems import ProblemError, Reason
 from service.api.routes.episodes import PLAYED, Asked, Headers, made
 from service.errors import ConflictError
@@ -20,7 +20,7 @@ from service.views.studies import EpisodeTable, Study
 LACKING = problem(501, "The service lacks a package that makes this format")
 NOTHING_YET = problem(409, "No run has played an episode yet")
 
-router = APIRouter(prefix="/v1/campaigns/{campaign_id}", responses=STORAGE | INVALID | UNKNOWN)
+router = APIRouter(prefix="/v1/campaigns/{campaign_id}", responses=INVALID | UNKNOWN)
 
 
 def _checked(given: str, of: Literal["failure", "episodes"]) -> FormatName:
@@ -65,10 +65,7 @@ async def get_export(
     "/export",
     tags=["reports"],
     response_class=Response,
-    responses={200: {"content": {FORMATS[name].media_type: {} for name in names("episodes")}}}
-    | NOTHING_YET
-    | LACKING
-    | CROWDED,
+    responses={200: {"content": {FORMATS[name].media_type: {} for name in names("episodes")}}} | NOTHING_YET | LACKING,
 )
 async def get_episodes_export(
     campaign: AskedCampaign, format: EpisodesFormat, service: Service, caller: CurrentCaller

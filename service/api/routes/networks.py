@@ -9,7 +9,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES, MAX_ROADS
 from service.api.context import CurrentCaller, Service
-from service.api.pages import INVALID, STORAGE, UNKNOWN, WAIT, Cursor, Limit, Responses, header, link, problem
+from service.api.pages import INVALID, UNKNOWN, WAIT, Cursor, Limit, Responses, header, link, problem
 from service.api.posted import media_type
 from service.api.problems import ProblemError, Reason
 from service.networks.schemas import MEDIA_TYPES, WALL_S, Network, NetworkPage, Places
@@ -23,15 +23,11 @@ CREATED: Responses = {
     201: {"headers": LOCATED},
 }
 REFUSALS: Responses = (
-    problem(408, f"The body comes too slowly, or took longer than {RECEIVE_S} s")
-    | problem(409, "The project has as many networks as it may")
+    problem(409, "The project has as many networks as it may")
     | problem(415, "The body is declared as something else, or carries a Content-Encoding")
     | problem(422, "The upload is refused, and `detail` says why; or a query parameter is wrong")
-    | problem(503, "The disk refuses, or there are too many uploads at once")
 )
-FINDING = problem(422, "Nothing can be found on the network, and `detail` says why") | problem(
-    503, "The disk refuses, or there are too many searches at once"
-)
+FINDING = problem(422, "Nothing can be found on the network, and `detail` says why")
 SEARCHING: Responses = {
     202: {"model": Places, "description": "They are still searched for; `progress` says how far", "headers": WAIT}
 }
@@ -51,7 +47,7 @@ DOCUMENTED_BODY: dict[str, Any] = {
     }
 }
 
-router = APIRouter(prefix="/v1/networks", tags=["networks"], responses=STORAGE | INVALID)
+router = APIRouter(prefix="/v1/networks", tags=["networks"], responses=INVALID)
 
 
 def _refuse_other_types(request: Request) -> None:

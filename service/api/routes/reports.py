@@ -1,24 +1,40 @@
-"""/v1/campaigns/{id}/table, figures, clusters, coverage and spec: the report of `risk-sac evaluate`."""
+"""/v1/campaigns/{id}/table, figures, clusters, coverage and spec; /v1/coverage; /v1/regressions."""
 
 from collections import Counter
 from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
+from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
-from risk_sac.config import CampaignSpec
+from risk_sac.config import CampaignSpec, EgoConfig
+from risk_sac.config.base import Settings
 from risk_sac.config.spec_file import campaign_yaml
-from risk_sac.failures.cases import Regression
+from risk_sac.failures.cases import CampaignRegression, Regression
 from risk_sac.rates.record import MOST_PER_HOUR
 from risk_sac.records import State
 from risk_sac.records.coverage import CoverageMatrix
 from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
+from risk_sac.report.matrix import ego_name, merged
 from risk_sac.report.rendering import POLICY
-from service.api.context import AskedCampaign, Context, Service, caller_of
-from service.api.pages import CROWDED, INVALID, STORAGE, TAGGED, UNKNOWN, Responses, cacheable, link, problem
+from service.api.context import AskedCampaign, Context, CurrentCaller, Service, caller_of
+from service.api.pages import (
+    INVALID,
+    MALFORMED,
+    NOT_JSON,
+    TAGGED,
+    UNKNOWN,
+    Responses,
+    as_json,
+    cacheable,
+    header,
+    link,
+    problem,
+)
+from service.api.posted import documented, read_posted
 from service.errors import ConflictError, NotFoundError
 from service.runs.regressions import StoredRegression, campaign_of
 from service.store.stored import StoredCampaign
@@ -64,10 +80,12 @@ SPEC: Responses = {
 FIGURES: Responses = {200: {"headers": CACHED}}
 FIGURE: Responses = {200: {"headers": CACHED, "content": {MEDIA_TYPES[each]: {} for each in FORMATS}}}
 
-router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=STORAGE | INVALID | UNKNOWN)
+MOST_MERGED = 100  # campaigns: each takes up to seconds the first time
+coverage_router = APIRouter(prefix="/v1/coverage", tags=["reports"], responses=INVALID)
+router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=INVALID | UNKNOWN)
 
 
-@router.get("/table", response_model=Table, responses=TABLE | UNCHANGED | CROWDED)
+@router.get("/table", response_model=Table, responses=TABLE | UNCHANGED)
 async def get_table(
     request: Request,
     service: Service,
@@ -79,7 +97,7 @@ async def get_table(
     return await reported(request, service, campaign, "table", format_, format=format_, address=address)
 
 
-@router.get("/rates", response_model=CampaignRates, responses=FIGURES | UNCHANGED | CROWDED)
+@router.get("/rates", response_model=CampaignRates, responses=FIGURES | UNCHANGED)
 async def get_rates(
     request: Request,
     service: Service,
@@ -95,25 +113,25 @@ async def get_rates(
     return await reported(request, service, campaign, "rates", "rates", str(exposure), scenes_per_hour=exposure)
 
 
-@router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED | CROWDED)
+@router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED)
 async def get_clusters(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """Kinds of failures that the finished runs found, in words, with an example of each."""
     return await reported(request, service, campaign, "clusters", "clusters")
 
 
-@router.get("/coverage", response_model=CoverageMatrix, responses=FIGURES | UNCHANGED | CROWDED)
+@router.get("/coverage", response_model=CoverageMatrix, responses=FIGURES | UNCHANGED)
 async def get_coverage(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """What the finished runs have covered: ODD, functional scenarios, requirements, parameters and bodies."""
     return await reported(request, service, campaign, "coverage", "coverage")
 
 
-@router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED | CROWDED)
+@router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED)
 async def list_figures(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """Figures of the finished runs: search, results, λ and α."""
     return await reported(request, service, campaign, "figures", "figures", address=link(request, ""))
 
 
-@router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED | CROWDED)
+@router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED)
 async def get_figure(
     name: str, format: Format, request: Request, service: Service, campaign: AskedCampaign
 ) -> Response:
@@ -156,7 +174,7 @@ REPORT: Responses = {200: text(html="<!doctype html>…", md="# Failures of an e
 NOT_PLAYED = problem(409, "The regression has not ended, or has failed")
 
 
-@router.get("/report", response_model=CampaignEvidence, responses=REPORT | UNCHANGED | NOT_PLAYED | CROWDED)
+@router.get("/report", response_model=CampaignEvidence, responses=REPORT | UNCHANGED | NOT_PLAYED)
 async def get_report(
     request: Request,
     service: Service,
@@ -199,3 +217,78 @@ def _played(service: Context, campaign: StoredCampaign, regression_id: str) -> S
     if found.state is not State.SUCCEEDED:
         raise ConflictError(f"regression {found.id} is {found.state}; wanted one that succeeded", reason="not_ended")
     return found
+
+
+@coverage_router.get("", response_model=CoverageMatrix)
+async def get_project_coverage(
+    service: Service,
+    caller: CurrentCaller,
+    ego: Annotated[
+        str | None,
+        Query(max_length=500, description="Only campaigns of this ego, with its defects: `idm-aeb+latency`."),
+    ] = None,
+    label: Annotated[
+        str | None, Query(max_length=200, pattern=r"^[^\x00]*$", description="Only campaigns with exactly this label.")
+    ] = None,
+    limit: Annotated[int, Query(ge=1, le=MOST_MERGED, description="Newest campaigns to be merged.")] = MOST_MERGED,
+) -> Response:
+    """Coverage of the newest campaigns of a project, cell by cell; each cell names the campaigns behind it.
+
+    Campaigns of different egos are merged too, unless `ego` picks one: what one ego kept, another need not.
+    """
+    page = await run_in_threadpool(service.store.campaigns, limit, project=caller.sees, label=label)
+    matrices = []
+    for campaign in page.items:
+        if ego is not None and ego_name(campaign.spec) != ego:
+            continue
+        edition = await run_in_threadpool(service.reports.edition, campaign)
+        view = CampaignView(name="coverage", campaign_id=campaign.id, edition=edition)
+        content = await service.views.content(view, campaign, caller.key_id)
+        matrices.append(CoverageMatrix.model_validate_json(content.body))
+    return as_json(merged(matrices))
+
+
+class PostedRegression(Settings):
+    """Campaign and ego of a regression."""
+
+    campaign_id: Annotated[str, Field(max_length=100, pattern=r"^[A-Za-z0-9]+$")]
+    """Ended campaign whose distinct failures are played."""
+    ego: EgoConfig
+    """The other ego, such as `{"profile": "careful"}`."""
+
+
+POSTING: Responses = (
+    {202: {"headers": {"Location": header("Where to follow it.")}}}
+    | MALFORMED
+    | NOT_JSON
+    | UNKNOWN
+    | problem(409, "The campaign has not ended, or none of its runs has succeeded")
+)
+
+regressions_router = APIRouter(prefix="/v1/regressions", tags=["regressions"], responses=INVALID)
+
+
+async def _posted(request: Request) -> PostedRegression:
+    return await read_posted(request, PostedRegression)
+
+
+@regressions_router.post("", status_code=202, responses=POSTING, openapi_extra=documented("PostedRegression"))
+async def post_regression(
+    posted: Annotated[PostedRegression, Depends(_posted)],
+    request: Request,
+    response: Response,
+    service: Service,
+    caller: CurrentCaller,
+) -> CampaignRegression:
+    """Play the distinct failures of a campaign against another ego; the same request returns the existing one."""
+    campaign = await run_in_threadpool(service.store.campaign, posted.campaign_id, caller.sees)
+    regression = await run_in_threadpool(service.regressions.post, campaign, posted.ego, caller.key_id)
+    response.headers["Location"] = link(request, f"/v1/regressions/{regression.id}")
+    return regression
+
+
+@regressions_router.get("/{regression_id}", responses=UNKNOWN)
+def get_regression(regression_id: str, service: Service, caller: CurrentCaller) -> CampaignRegression:
+    """Verdict of each failure: fixed, still failing, a new kind, flaky, or not comparable, with the reason."""
+    service.store.campaign(campaign_of(regression_id), caller.sees)  # which another project's caller does not see
+    return service.regressions.get(regression_id)

@@ -11,7 +11,7 @@ from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
 from risk_sac.records.scenario import ScenarioCheck, ScenarioDetails, ScenarioList
 from risk_sac.scenario.reading import MOST_BYTES
 from service.api.context import CurrentCaller, Service
-from service.api.pages import INVALID, STORAGE, UNKNOWN, Responses, header, link, problem
+from service.api.pages import INVALID, UNKNOWN, Responses, header, link, problem
 from service.api.posted import media_type
 from service.api.problems import ProblemError, Reason
 
@@ -22,11 +22,8 @@ CREATED: Responses = {
     200: {"model": ScenarioDetails, "description": "The same was posted before", "headers": LOCATED},
     201: {"headers": LOCATED},
 }
-REFUSALS: Responses = (
-    problem(408, f"The body takes longer than {RECEIVE_S} s")
-    | problem(415, "The body is declared as something else, or carries a Content-Encoding")
-    | problem(422, "The document has faults; each is one of `errors`, whose `field` is its path in the document")
-    | problem(503, "The disk refuses, or too many scenarios are checked at once")
+REFUSALS: Responses = problem(415, "The body is declared as something else, or carries a Content-Encoding") | problem(
+    422, "The document has faults; each is one of `errors`, whose `field` is its path in the document"
 )
 FULL = problem(409, "The project has as many scenarios as it may")
 IN_USE = problem(409, "It ships with the service, or a campaign names it")
@@ -50,7 +47,7 @@ EgoEntity = Annotated[
     str, Query(max_length=200, pattern=r"^[^\x00]*$", description="Entity of OpenSCENARIO that is the ego.")
 ]
 
-router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"], responses=STORAGE | INVALID)
+router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"], responses=INVALID)
 
 
 def _refuse_other_types(request: Request) -> None:
@@ -111,7 +108,7 @@ def get_scenario(scenario: str, service: Service, caller: CurrentCaller) -> Scen
     return service.scenarios.get(scenario, caller.sees)
 
 
-@router.get("/{scenario}/picture.png", response_class=Response, responses=UNKNOWN | DRAWN | problem(503, "Too busy"))
+@router.get("/{scenario}/picture.png", response_class=Response, responses=UNKNOWN | DRAWN)
 async def get_scenario_picture(scenario: str, service: Service, caller: CurrentCaller) -> Response:
     """Picture of a scenario from above, with the ranges of all starts."""
     await run_in_threadpool(service.scenarios.get, scenario, caller.sees)

@@ -2,10 +2,10 @@
 
 import pytest
 
-from risk_sac.openscenario import road
+from risk_sac.openscenario import scenario_file
 
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Makes an empty net of each road."""
-    monkeypatch.setattr(road, "_net", lambda *_: b"<net/>")
+    monkeypatch.setattr(scenario_file, "_net", lambda *_: b"<net/>")

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from risk_sac.errors import ConfigError
-from risk_sac.openscenario.archive import holds_scenario, unpack
 from risk_sac.openscenario.scenario_file import import_scenario
+from risk_sac.openscenario.sources import holds_scenario, unpack
 from tests.openscenario_samples import BODIES, FILES, SCENARIO, VARIATION, WAYS, copied
 
 pytestmark = pytest.mark.usefixtures("quick")

@@ -9,8 +9,7 @@ from risk_sac.config import Behaviour, DynamicElements, Environment, Interval, O
 from risk_sac.errors import OddError
 from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.stl import Monitor
-from risk_sac.scenario.behaviour import BOUNDS, behaving, preset
-from risk_sac.scenario.limits import limits_from_odd
+from risk_sac.scenario.limits import BOUNDS, behaving, limits_from_odd, preset
 from risk_sac.scenario.odd import intersect
 
 

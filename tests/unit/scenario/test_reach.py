@@ -2,11 +2,11 @@
 
 import pytest
 
+from risk_sac.failures.scenario_trial import out_of_reach
 from risk_sac.scenario.check import scenes
 from risk_sac.scenario.families import family_of
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.limits import limits_from_odd
-from risk_sac.scenario.reach import out_of_reach
 from risk_sac.scenario.reading import document_from_fields
 from risk_sac.scenario.shipped import nets_of
 
