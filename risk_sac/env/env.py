@@ -28,7 +28,7 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.host.process_state import c_numbers
 from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.records import Collision, RequirementResult, StoryDeviation, Violation
-from risk_sac.risk.conduct import CONDUCT_ROWS, ConductRoad, conduct_terms, see_signals, soft_cost
+from risk_sac.risk.conduct import CONDUCT_ROWS, ConductRoad, conduct_cost, see_signals
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.realism import HardRule, danger_of, refuse_danger, refuse_overlap
 from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
@@ -277,10 +277,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """C_soft of Eq. 5 over the adversaries; updates what it remembers of them."""
         frame, adversaries = self._frame, self._adversaries
         rows = adversaries.rows(frame)
-        seen = frame.kind, frame.link, frame.state
-        road = self._road.facts(rows, frame.state)
-        terms = conduct_terms(rows, adversaries.slots, *seen, self._conduct, road)
-        return float(soft_cost(terms, rows, frame.state))
+        near = self._road.near(rows, frame.state)
+        return conduct_cost(rows, adversaries.slots, frame.kind, frame.link, frame.state, self._conduct, *near)
 
     def _judge(self, contact: Contact) -> Collision:
         frame = self._frame
