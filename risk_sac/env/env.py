@@ -114,7 +114,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     _artefacts: dict[str, float]  # rule that the episode broke -> when it first did
     _way: Path  # the ego's way ahead at the release
 
-    @c_numbers()
+    @c_numbers
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -141,7 +141,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
                 continue
         raise SimulationError(f"none of {FEASIBLE_TRIES} random scenes of {self.problem.family.name!r} is feasible")
 
-    @c_numbers()
+    @c_numbers
     def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One control step of 0.1 s.
 
@@ -172,7 +172,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             self._artefacts.setdefault("inside_limits", self._frame.time_s)
         if self._frame.teleported:
             self._artefacts.setdefault("no_teleport", self._frame.time_s)
-        self.trace.append(self._frame, self._measures, np.array(shares, dtype=np.float32))
+        self.trace.append(self._frame, self._measures, shares)
         collision = None if contact is None else self._judge(contact)
         self._contact_s = None if collision is None else collision.time_s
         cost = self._cost()
@@ -200,7 +200,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """SUMO's letter of each link of each signal now, the signals in the order of their names."""
         return self._sim.signal_heads()
 
-    @c_numbers()
+    @c_numbers
     def close(self) -> None:
         """Ends the simulation, and lets the ego go."""
         self._sim.close()
