@@ -1,5 +1,7 @@
 """Runs episodes by Algorithm 1, one after the other or in rounds."""
 
+import os
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -7,7 +9,6 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-import torch
 
 from risk_sac.config import RunSpec
 from risk_sac.host.machine import rollout_processes
@@ -50,7 +51,9 @@ def execute_run(spec: RunSpec, folder: Path, observer: Observer) -> RunOutcome:
     """
     started, started_cpu = time.monotonic(), time.process_time()
     folder.mkdir(parents=True, exist_ok=True)
-    torch.set_num_threads(1)  # runs are what is parallel
+    os.environ["OMP_NUM_THREADS"] = "1"  # of torch, where it is loaded later: runs are what is parallel
+    if "torch" in sys.modules:
+        sys.modules["torch"].set_num_threads(1)
     with closing(RunState(spec, folder)) as run:
         for record, metrics in run.resume():
             observer.episode(record, metrics, run.series.get(record.index))

@@ -141,14 +141,8 @@ def _drive_clear(
 ) -> tuple[float, float, float]:
     """`_drive` that keeps clear of others: it gives up steering, then driving, where it would meet one.
 
-    Args:
-      bounds: as of `_drive`, like all up to `room`.
-      state: of a frame, `rows x n`.
-      own: its column.
-      path: the one it takes if it does not steer.
-      offset_m: of its middle from the path.
-      stopping: how it brakes on a straight and in a bend, see `drives_into`, and how hard others brake.
-      statics: see `VehicleControl.step`.
+    The arguments up to `room` are those of `_drive`; `state`, `own`, `path` and `offset_m` are those of `drives_into`;
+    `stopping` is how it brakes on a straight and in a bend, and how hard others brake.
     """
     drive, _, intended = wanted
     straight, bent, others_brake_mps2 = stopping
@@ -161,9 +155,7 @@ def _drive_clear(
             continue
         after = _drive(bounds, bends, station_m, behind_per_m, motion, choice, room)
         room_m = room[0] if after[2] > 0.0 else room[1]
-        met = drives_into(
-            state, own, path, station_m, offset_m, after, braking, others_brake_mps2, statics, room_m
-        )
+        met = drives_into(state, own, path, station_m, offset_m, after, braking, others_brake_mps2, statics, room_m)
         if met == CLEAR or (met != AHEAD and choice[1] == 0.0):
             break
     return after
