@@ -34,7 +34,8 @@ try:
 except ImportError:
     from signal import getsignal as handler_of
 
-Arguments, Answer = ParamSpec("Arguments"), TypeVar("Answer")
+Arguments = ParamSpec("Arguments")
+Answer = TypeVar("Answer")
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 TINY = 5e-324  # is 0 where a library has told the processor to flush such numbers
 _INITIAL_TORCH = ("float32", True, 1, False)

@@ -1,7 +1,8 @@
 """Checkpoints of a run.
 
 A checkpoint is an .npz without pickles, so it can run no code, followed by its SHA-256: the arrays and tensors of the
-state, and the rest of it as JSON. A search without a learner so needs no torch. The last but one is kept beside it, for the case that the last one is damaged.
+state, and the rest of it as JSON. So a search without a learner needs no torch. The last but one is kept beside it,
+for the case that the last one is damaged.
 """
 
 import errno

@@ -58,10 +58,10 @@ def execute_run(spec: RunSpec, folder: Path, observer: Observer) -> RunOutcome:
         for record, metrics in run.resume():
             observer.episode(record, metrics, run.series.get(record.index))
         for metrics in rounds(run, folder, observer) if run.in_rounds else episodes(run, folder, observer):
-            record = run.records[-1]
+            record = run.latest[-1]
             observer.episode(record, metrics, run.series.get(record.index))
             run.refuse_dead_ego()
-            if len(run.records) % spec.learner.checkpoint_every == 0:
+            if run.episodes % spec.learner.checkpoint_every == 0:
                 run.save()
         run.save()
     return run.summary(wall_s=time.monotonic() - started, cpu_s=time.process_time() - started_cpu + run.rollouts_cpu_s)
@@ -81,7 +81,7 @@ def episode(run: RunState, env: GuardedEnv) -> RunMetrics:
     In the evaluation phase the policy is frozen. Choice: scenes keep coming from the method's own sampler then, since
     it is the pair of sampler and policy that generates scenarios.
     """
-    env.begin(len(run.records))
+    env.begin(run.episodes)
     proposal = propose(run)
     actor = run.searchers.begin(proposal.genes)
     return tell(run, proposal, play(env, proposal, actor, run.searchers.agent, run.reward))
@@ -98,7 +98,7 @@ def rounds(run: RunState, folder: Path, observer: Observer) -> Iterator[RunMetri
         for proposal in run.proposed:  # an earlier process has asked for them
             rollouts.submit(proposal)
         while not observer.should_stop():
-            while not run.spent and run.next_index < (len(run.records) // batch + ROUNDS_OUT) * batch:
+            while not run.spent and run.next_index < (run.episodes // batch + ROUNDS_OUT) * batch:
                 run.proposed.append(propose(run))
                 rollouts.submit(run.proposed[-1])
             if not run.proposed:
