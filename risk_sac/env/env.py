@@ -28,7 +28,7 @@ from risk_sac.errors import InfeasibleScene, SimulationError
 from risk_sac.host.process_state import c_numbers
 from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.records import Collision, RequirementResult, StoryDeviation, Violation
-from risk_sac.risk.conduct import CONDUCT_ROWS, ConductRoad, conduct_terms, see_signals, soft_cost
+from risk_sac.risk.conduct import CONDUCT_ROWS, ConductRoad, conduct_cost, see_signals
 from risk_sac.risk.measures import Gauge, Measures
 from risk_sac.risk.realism import HardRule, danger_of, refuse_danger, refuse_overlap
 from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
@@ -130,7 +130,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     _artefacts: dict[str, float]  # rule that the episode broke -> when it first did
     _way: Path  # the ego's way ahead at the release
 
-    @c_numbers()
+    @c_numbers
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -157,7 +157,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
                 continue
         raise SimulationError(f"none of {FEASIBLE_TRIES} random scenes of {self.problem.family.name!r} is feasible")
 
-    @c_numbers()
+    @c_numbers
     def step(self, action: Observation) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """One control step of 0.1 s.
 
@@ -188,7 +188,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
             self._artefacts.setdefault("inside_limits", self._frame.time_s)
         if self._frame.teleported:
             self._artefacts.setdefault("no_teleport", self._frame.time_s)
-        self.trace.append(self._frame, self._measures, np.array(shares, dtype=np.float32))
+        self.trace.append(self._frame, self._measures, shares)
         collision = None if contact is None else self._judge(contact)
         self._contact_s = None if collision is None else collision.time_s
         cost = self._cost()
@@ -216,7 +216,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """SUMO's letter of each link of each signal now, the signals in the order of their names."""
         return self._sim.signal_heads()
 
-    @c_numbers()
+    @c_numbers
     def close(self) -> None:
         """Ends the simulation, and lets the ego go."""
         self._sim.close()
@@ -293,10 +293,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         """C_soft of Eq. 5 over the adversaries; updates what it remembers of them."""
         frame, adversaries = self._frame, self._adversaries
         rows = adversaries.rows(frame)
-        seen = frame.kind, frame.link, frame.state
-        road = self._road.facts(rows, frame.state)
-        terms = conduct_terms(rows, adversaries.slots, *seen, self._conduct, road)
-        return float(soft_cost(terms, rows, frame.state))
+        near = self._road.near(rows, frame.state)
+        return conduct_cost(rows, adversaries.slots, frame.kind, frame.link, frame.state, self._conduct, *near)
 
     def _judge(self, contact: Contact) -> Collision:
         frame = self._frame

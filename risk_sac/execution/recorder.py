@@ -27,6 +27,8 @@ from risk_sac.search.run import CHECKPOINT, RunOutcome
 
 logger = logging.getLogger(__name__)
 
+REWRITTEN = 0.1  # share of new episodes from which results.json is written again
+
 
 class Recorder:
     """Observer that writes the results of a run to its folder, then informs another observer.
@@ -56,7 +58,9 @@ class Recorder:
         if record.worst_violation is not None:
             self._failures.append(RecordedFailure.of(self.results.spec.id, record))
         told = self.results.metrics.episodes if self.results.metrics else 0
-        due = (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and metrics.episodes > told
+        # The file has all failures; written at fixed intervals, it would cost an episode the more, the longer a run is.
+        every = max(self.results.spec.learner.checkpoint_every, round(REWRITTEN * told))
+        due = (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and metrics.episodes >= told + every
         if due and not record.evaluating:
             self._write(replace(self.results, metrics=metrics, failures=tuple(self._failures)))
         self._observer.episode(record, metrics, series)

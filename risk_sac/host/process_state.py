@@ -21,10 +21,10 @@ import socket
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from functools import wraps
 from types import TracebackType
-from typing import Any, NamedTuple, NoReturn, Self
+from typing import Any, NamedTuple, NoReturn, ParamSpec, Self, TypeVar
 
 import numpy as np
 
@@ -34,6 +34,8 @@ try:
 except ImportError:
     from signal import getsignal as handler_of
 
+Arguments = ParamSpec("Arguments")
+Answer = TypeVar("Answer")
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 TINY = 5e-324  # is 0 where a library has told the processor to flush such numbers
 _INITIAL_TORCH = ("float32", True, 1, False)
@@ -56,18 +58,21 @@ def leave(status: int) -> NoReturn:
     os._exit(status)  # Python would wait for them
 
 
-@contextmanager
-def c_numbers() -> Iterator[None]:
-    """Read and write numbers in the C locale, as libsumo has to: in others it takes no decimal point."""
-    ours = locale.setlocale(locale.LC_NUMERIC)
-    if ours == "C":
-        yield
-        return
-    locale.setlocale(locale.LC_NUMERIC, "C")
-    try:
-        yield
-    finally:
-        locale.setlocale(locale.LC_NUMERIC, ours)
+def c_numbers(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
+    """Has a function read and write numbers in the C locale, as libsumo has to: others have no decimal point."""
+
+    @wraps(function)
+    def in_c_locale(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
+        ours = locale.setlocale(locale.LC_NUMERIC)
+        if ours == "C":
+            return function(*args, **kwargs)
+        locale.setlocale(locale.LC_NUMERIC, "C")
+        try:
+            return function(*args, **kwargs)
+        finally:
+            locale.setlocale(locale.LC_NUMERIC, ours)
+
+    return in_c_locale
 
 
 def preserved() -> "Preserved":

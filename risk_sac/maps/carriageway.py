@@ -63,17 +63,16 @@ class Carriageway:
 
     def around(self, x_m: float, y_m: float, sector: int) -> Surroundings:
         """Returns the surroundings of a point for a sector of headings, see `sector_of`, or `ANY_WAY`."""
-        key = int(x_m // SQUARE_M), int(y_m // SQUARE_M), sector
+        key = *square_of(x_m, y_m), sector
         if (known := self._known.get(key)) is None:
             known = self._known[key] = self._surroundings(*key)
         return known
 
-    def lanes(self, x_m: float, y_m: float) -> Floats:
-        """Returns the lanes around a point, as in `Surroundings`, without the outline."""
-        key = int(x_m // SQUARE_M), int(y_m // SQUARE_M)
-        if (known := self._lanes.get(key)) is None:
-            near = self._near(_square(*key))
-            known = self._lanes[key] = self._segments[near[near < len(self._segments)]]
+    def lanes(self, square: tuple[int, int]) -> Floats:
+        """Returns the lanes around a square, see `square_of`, as in `Surroundings`, without the outline."""
+        if (known := self._lanes.get(square)) is None:
+            near = self._near(_square(*square))
+            known = self._lanes[square] = self._segments[near[near < len(self._segments)]]
         return known
 
     def _near(self, square: shapely.Geometry) -> NDArray[np.intp]:
@@ -89,6 +88,11 @@ class Carriageway:
             ground = ground.buffer(by_m, join_style="mitre")
         outline = _outline(ground.simplify(EXACT_M).intersection(square), square.bounds)
         return Surroundings(outline, self._segments[near[near < len(self._segments)]])
+
+
+def square_of(x_m: float, y_m: float) -> tuple[int, int]:
+    """Returns the column and the row of the square that a point is in."""
+    return int(x_m // SQUARE_M), int(y_m // SQUARE_M)
 
 
 def _square(column: int, row: int) -> shapely.Polygon:

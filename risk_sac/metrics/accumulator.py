@@ -72,13 +72,28 @@ def _figures(tally: Tally) -> dict[str, Any]:
     return figures
 
 
-def results_digest(records: Sequence[EpisodeRecord]) -> str:
+class ResultsDigest:
     """SHA-256 over one line of canonical JSON per record; equal digests mean equal results.
 
     Keys are sorted, and floats written so that they read back exactly. Records hold no wall-clock values.
     """
-    digest = hashlib.sha256()
-    for record in records:
+
+    def __init__(self) -> None:
+        self._digest = hashlib.sha256()
+
+    def add(self, record: EpisodeRecord) -> None:
+        """Adds the next record."""
         line = json.dumps(record.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
-        digest.update(line.encode() + b"\n")
+        self._digest.update(line.encode() + b"\n")
+
+    def hexdigest(self) -> str:
+        """Returns the digest so far."""
+        return self._digest.hexdigest()
+
+
+def results_digest(records: Sequence[EpisodeRecord]) -> str:
+    """Returns the digest of some records; see `ResultsDigest`."""
+    digest = ResultsDigest()
+    for record in records:
+        digest.add(record)
     return digest.hexdigest()

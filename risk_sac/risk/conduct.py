@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.maps.carriageway import Carriageway
+from risk_sac.maps.carriageway import Carriageway, square_of
 from risk_sac.risk.driving import FEATURES
 from risk_sac.risk.publish import nearest_lane
 from risk_sac.scenario.layout import Layout
@@ -130,6 +130,15 @@ class RoadFacts(NamedTuple):
     junctions: Floats  # a row nx, ny, c and number of its junction for each side of one; nx·x + ny·y <= c within
 
 
+class LanesNear(NamedTuple):
+    """Road around the adversaries, for compiled code."""
+
+    lanes: Floats  # segments of lanes around one adversary after the other, see `Surroundings`
+    first: NDArray[np.intp]  # of each adversary its first segment, then their number
+    usual: tuple[float, float]  # lane width and limit where no lane is near
+    junctions: Floats  # as in `RoadFacts`
+
+
 class ConductRoad:
     """Road of an episode."""
 
@@ -137,18 +146,57 @@ class ConductRoad:
         """Takes a layout, the limit where no lane is near, and the carriageway of the layout's net."""
         sides = [(*side, float(k)) for k, area in enumerate(layout.junctions) for side in area.sides]
         self._junctions = np.array(sides).reshape(-1, 4)
-        self._usual = layout.lane_width_m, limit_mps
+        self._usual = float(layout.lane_width_m), float(limit_mps)
         self._carriageway = carriageway
+        self._squares: list[tuple[int, int]] | None = None
+        self._near = LanesNear(np.empty((0, 7)), np.zeros(1, dtype=np.intp), self._usual, self._junctions)
 
-    def facts(self, rows: NDArray[np.intp], state: Floats) -> RoadFacts:
-        """Reads the facts at the adversaries' places; arguments as of `conduct_terms`."""
-        width_m, limit_mps = np.empty(len(rows)), np.empty(len(rows))
-        xs, ys, headings = state[X].tolist(), state[Y].tolist(), state[HEADING].tolist()
-        for k, row in enumerate(rows.tolist()):
-            lanes = self._carriageway.lanes(xs[row], ys[row])
-            _, limit, width = nearest_lane(lanes, xs[row], ys[row], headings[row])
-            width_m[k], limit_mps[k] = (width, limit) if math.isfinite(limit) else self._usual
-        return RoadFacts(width_m, limit_mps, self._junctions)
+    def near(self, rows: NDArray[np.intp], state: Floats) -> LanesNear:
+        """Looks up the road around the adversaries; arguments as of `conduct_terms`."""
+        xs, ys = state[X].tolist(), state[Y].tolist()
+        squares = [square_of(xs[row], ys[row]) for row in rows.tolist()]
+        if squares != self._squares:  # seldom: a vehicle drives for seconds in the same square
+            self._squares, around = squares, [self._carriageway.lanes(square) for square in squares]
+            first = np.cumsum([0, *map(len, around)], dtype=np.intp)
+            self._near = LanesNear(np.concatenate([np.empty((0, 7)), *around]), first, self._usual, self._junctions)
+        return self._near
+
+
+@compiled
+def road_facts(
+    rows: NDArray[np.intp],
+    state: Floats,
+    lanes: Floats,
+    first: NDArray[np.intp],
+    usual: tuple[float, float],
+    junctions: Floats,
+) -> RoadFacts:
+    """Finds the lane of each adversary, given the fields of `LanesNear`; arguments as of `conduct_terms`."""
+    width_m, limit_mps = np.empty(len(rows)), np.empty(len(rows))
+    for k in range(len(rows)):
+        row = rows[k]
+        around = lanes[first[k] : first[k + 1]]
+        _, limit, width = nearest_lane(around, state[X, row], state[Y, row], state[HEADING, row])
+        width_m[k], limit_mps[k] = (width, limit) if math.isfinite(limit) else usual
+    return RoadFacts(width_m, limit_mps, junctions)
+
+
+@compiled
+def conduct_cost(
+    rows: NDArray[np.intp],
+    slots: NDArray[np.intp],
+    kind: NDArray[np.int8],
+    link: NDArray[np.uint8],
+    state: Floats,
+    memory: Floats,
+    lanes: Floats,
+    first: NDArray[np.intp],
+    usual: tuple[float, float],
+    junctions: Floats,
+) -> float:
+    """Computes the soft realism cost of a step; arguments as of `conduct_terms`, then the fields of `LanesNear`."""
+    road = road_facts(rows, state, lanes, first, usual, junctions)
+    return soft_cost(conduct_terms(rows, slots, kind, link, state, memory, road), rows, state)
 
 
 @compiled

@@ -3,7 +3,7 @@
 import hashlib
 import io
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -74,7 +74,7 @@ class Trace:
                     least[name] = min(after_s, least.get(name, math.inf))
         return least
 
-    def append(self, frame: Frame, measures: Measures, action: NDArray[np.float32] | None) -> None:
+    def append(self, frame: Frame, measures: Measures, action: Sequence[float] | None) -> None:
         """Records a frame and the action that led to it, None up to the release."""
         self.frames.append(frame)
         self.measures.append(measures)

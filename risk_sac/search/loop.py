@@ -1,5 +1,7 @@
 """Runs episodes by Algorithm 1, one after the other or in rounds."""
 
+import os
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -7,7 +9,6 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-import torch
 
 from risk_sac.config import RunSpec
 from risk_sac.records import Ending, EpisodeRecord, RunMetrics, SeriesFile
@@ -50,17 +51,19 @@ def execute_run(spec: RunSpec, folder: Path, observer: Observer) -> RunOutcome:
     """
     started, started_cpu = time.monotonic(), time.process_time()
     folder.mkdir(parents=True, exist_ok=True)
-    torch.set_num_threads(1)  # runs are what is parallel
+    os.environ["OMP_NUM_THREADS"] = "1"  # of torch, where it is loaded later: runs are what is parallel
+    if "torch" in sys.modules:
+        sys.modules["torch"].set_num_threads(1)
     processes = processes_of(spec)
     with closing(RunState(spec, folder)) as run:
         for record, metrics in run.resume():
             observer.episode(record, metrics, run.series.get(record.index))
         played = rounds(run, folder, observer, processes) if run.in_rounds else episodes(run, folder, observer)
         for metrics in played:
-            record = run.records[-1]
+            record = run.latest[-1]
             observer.episode(record, metrics, run.series.get(record.index))
             run.refuse_dead_ego()
-            if len(run.records) % spec.learner.checkpoint_every == 0:
+            if run.episodes % spec.learner.checkpoint_every == 0:
                 run.save()
         run.save()
     used_s = time.process_time() - started_cpu + run.rollouts_cpu_s
@@ -81,7 +84,7 @@ def episode(run: RunState, env: GuardedEnv) -> RunMetrics:
     In the evaluation phase the policy is frozen. Choice: scenes keep coming from the method's own sampler then, since
     it is the pair of sampler and policy that generates scenarios.
     """
-    env.begin(len(run.records))
+    env.begin(run.episodes)
     proposal = propose(run)
     actor = run.searchers.begin(proposal.genes)
     return tell(run, proposal, play(env, proposal, actor, run.searchers.agent, run.reward))
@@ -99,7 +102,7 @@ def rounds(run: RunState, folder: Path, observer: Observer, processes: int) -> I
         for proposal in run.proposed:  # an earlier process has asked for them
             rollouts.submit(proposal)
         while not observer.should_stop():
-            most = (len(run.records) // batch + ROUNDS_OUT) * batch
+            most = (run.episodes // batch + ROUNDS_OUT) * batch
             while not run.spent and not run.waits and run.next_index < most:
                 run.proposed.append(propose(run))
                 rollouts.submit(run.proposed[-1])

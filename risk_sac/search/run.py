@@ -3,6 +3,8 @@
 import hashlib
 import logging
 import os
+import struct
+from array import array
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +16,7 @@ from risk_sac.config import RunSpec, method_of
 from risk_sac.egos.guard import DEAD_AFTER
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import ConfigError
-from risk_sac.metrics import MetricsAccumulator, results_digest
+from risk_sac.metrics import MetricsAccumulator, ResultsDigest
 from risk_sac.records import DrivenBy, EpisodeRecord, Outcome, Phase, RunMetrics, SeriesFile, stored
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder import checkpoint
@@ -30,6 +32,8 @@ from risk_sac.world.jit import cpu_s
 logger = logging.getLogger(__name__)
 
 CHECKPOINT = "checkpoint"
+PLAYED = "played.bin"
+ROW = struct.Struct("<d32s")  # of `played.bin`, for each episode: processor time, s, and SHA-256 of its series
 LATEST = 200  # number of latest records in which the episodes of a dead ego are looked for
 PACKAGES = ("risk-sac", "libsumo", "torch", "botorch", "gpytorch", "rtamt", "numpy")
 
@@ -53,7 +57,8 @@ class RunOutcome:
 class RunState:
     """Parts of a run, and its episodes so far.
 
-    Records are appended to the folder's `episodes.jsonl`; a checkpoint holds the length and digest of that file.
+    Records are appended to the folder's `episodes.jsonl`, and what a resumed run needs of each beside its record to
+    `played.bin`. A checkpoint holds the length and digest of the former, so it does not grow with the episodes.
 
     Attributes:
       spec: what to run.
@@ -61,7 +66,8 @@ class RunState:
       env: the closed loop.
       searchers: propose the scenes and drive the adversaries.
       reward: what the agent is trained on, and the scenes are scored by.
-      records: one per episode.
+      episodes: how many there have been.
+      latest: records of the latest ones; all are in the file.
       proposed: episodes that other processes play, in their order.
       series: time series by episode, where a requirement that counts was violated.
     """
@@ -73,14 +79,16 @@ class RunState:
         self.problem = self.env.problem
         self.searchers = Searchers(spec, self.problem, self.env.observation_size, self.env.action_size)
         self.reward = TrainingReward(method_of(spec.method), spec.learner)
-        self.records: list[EpisodeRecord] = []
+        self.episodes = 0
+        self.latest: deque[EpisodeRecord] = deque(maxlen=LATEST)
         self.proposed: deque[Proposal] = deque()
         self.series: dict[int, SeriesFile] = {}
-        self._episode_cpu_s: list[float] = []
+        self._episode_cpu_s = array("d")
         self._folder = folder
-        self._saved = 0  # records in the newest checkpoint
+        self._saved = 0  # episodes in the newest checkpoint
         self._written = 0  # bytes of `episodes.jsonl` that are of these records
         self._digest = hashlib.sha256()  # of those bytes
+        self._results = ResultsDigest()
         self._search = MetricsAccumulator(self.problem.family.horizon_steps)
         self._evaluation = MetricsAccumulator(self.problem.family.horizon_steps)
         self._cpu_began_s = cpu_s()
@@ -110,7 +118,7 @@ class RunState:
     @property
     def next_index(self) -> int:
         """Index of the next episode to propose."""
-        return len(self.records) + len(self.proposed)
+        return self.episodes + len(self.proposed)
 
     @property
     def _search_episodes(self) -> int:
@@ -123,7 +131,7 @@ class RunState:
         most = budget.episodes if points is None else min(budget.episodes, points)
         if played < budget.least_episodes or budget.cpu_s is None:
             return played < most
-        return played < most and self._episode_cpu_s[min(played, len(self.records)) - 1] < budget.cpu_s
+        return played < most and self._episode_cpu_s[min(played, self.episodes) - 1] < budget.cpu_s
 
     @property
     def phase(self) -> Phase:
@@ -135,7 +143,7 @@ class RunState:
     @property
     def environment_steps(self) -> int:
         """Steps of all episodes so far."""
-        return self.records[-1].environment_steps if self.records else 0
+        return self.latest[-1].environment_steps if self.latest else 0
 
     def add(self, record: EpisodeRecord, played: PlayedEpisode) -> RunMetrics:
         """Adds an episode that was played, and writes its record and the time series of a violation.
@@ -148,11 +156,11 @@ class RunState:
             self.series[record.index] = write_series(file, played.series)
         if self.in_rounds:
             self.rollouts_cpu_s += played.cpu_s
-        self.records.append(record)
         self._append(record)
         self.searchers.add(record)
-        self._episode_cpu_s.append(cpu_s() - self._cpu_began_s + self.rollouts_cpu_s)
-        return self._count(record)
+        metrics = self._count(record)
+        self._append_played(record, cpu_s() - self._cpu_began_s + self.rollouts_cpu_s)
+        return metrics
 
     def refuse_dead_ego(self) -> None:
         """Ends a run whose ego failed in each of the latest episodes.
@@ -162,7 +170,7 @@ class RunState:
         Raises:
           ConfigError: with the reason of the latest failure.
         """
-        driven = [record for record in self.records[-LATEST:] if record.outcome is not Outcome.REJECTED]
+        driven = [record for record in self.latest if record.outcome is not Outcome.REJECTED]
         latest = driven[-DEAD_AFTER:]
         if len(latest) == DEAD_AFTER and all(record.outcome is Outcome.INVALID for record in latest):
             raise ConfigError(
@@ -174,23 +182,22 @@ class RunState:
 
     def save(self) -> None:
         """Writes the checkpoint if there is a new episode; called between episodes only."""
-        if self._saved == len(self.records):
+        if self._saved == self.episodes:
             return
-        with (self._folder / EPISODES).open("rb") as file:
-            os.fsync(file.fileno())
+        for name in (EPISODES, PLAYED):
+            with (self._folder / name).open("rb") as file:
+                os.fsync(file.fileno())
         policies = {id(one.policy): one.policy for one in self.proposed if one.policy is not None}
         numbers = {known: number for number, known in enumerate(policies)}
         state = {
             "episodes_bytes": self._written,
             "episodes_sha256": self._digest.hexdigest(),
-            "series": {index: file.sha256 for index, file in self.series.items()},
-            "episode_cpu_s": self._episode_cpu_s,
             "proposed": [{**one.state(), "policy": numbers.get(id(one.policy))} for one in self.proposed],
             "policies": [policy.state() for policy in policies.values()],
             **self.searchers.state(),
         }
         checkpoint.save(self._folder / CHECKPOINT, state, self.spec.digest)
-        self._saved = len(self.records)
+        self._saved = self.episodes
 
     def resume(self) -> list[tuple[EpisodeRecord, RunMetrics]]:
         """Continues from the folder's newest intact checkpoint; without one the run starts from the beginning.
@@ -208,24 +215,28 @@ class RunState:
         if digest.hexdigest() != state["episodes_sha256"]:
             logger.warning("%s is damaged or gone; the run starts from the beginning", self._folder / EPISODES)
             return []
+        records = records_from_lines(content)
+        played = self._read_played(state, len(records))
+        if played is None:
+            logger.warning("%s is damaged or gone; the run starts from the beginning", self._folder / PLAYED)
+            return []
         self._written, self._digest = len(content), digest
-        self.records = records_from_lines(content)
-        self.series = _series(self._folder, self.records, state["series"])
-        self.searchers.load(state, self.records)
+        digests, self._episode_cpu_s = played
+        self.series = _series(self._folder, records, digests)
+        self.searchers.load(state, records)
         policies = [self.searchers.snapshot_of(policy) for policy in state["policies"]]
         self.proposed = deque(self._proposal(proposed, policies) for proposed in state["proposed"])
-        self._episode_cpu_s = list(state["episode_cpu_s"])
         self._cpu_began_s = cpu_s() - self._episode_cpu_s[-1]
-        self._saved = len(self.records)
-        logger.info("resumed after %d episodes", len(self.records))
-        return [(record, self._count(record)) for record in self.records]
+        self._saved = len(records)
+        logger.info("resumed after %d episodes", len(records))
+        return [(record, self._count(record)) for record in records]
 
     def summary(self, *, wall_s: float, cpu_s: float, processes: int) -> RunOutcome:
         """Summarises the run so far; times and processes are of this invocation."""
         return RunOutcome(
             metrics=self._search.metrics(),
             evaluation=self._evaluation.metrics() if self.spec.budget.evaluation_episodes else None,
-            digest=results_digest(self.records),
+            digest=self._results.hexdigest(),
             finished=self.finished,
             versions={name: version(name) for name in PACKAGES} | {"definitions": str(DEFINITIONS)},
             device=self.searchers.agent.device,
@@ -250,15 +261,43 @@ class RunState:
     def _append(self, record: EpisodeRecord) -> None:
         """Writes a record behind those of this run; what an interrupted run wrote there is cut off."""
         line = stored(record).encode() + b"\n"
-        with (self._folder / EPISODES).open("r+b" if self._written else "wb") as file:
-            file.truncate(self._written)
-            file.seek(self._written)
-            file.write(line)
+        _overwrite(self._folder / EPISODES, self._written, line)
         self._written += len(line)
         self._digest.update(line)
 
+    def _append_played(self, record: EpisodeRecord, spent_s: float) -> None:
+        """Writes the processor time up to the end of an episode, and the digest of its time series if it has one."""
+        series = self.series.get(record.index)
+        digest = bytes(ROW.size - 8) if series is None else bytes.fromhex(series.sha256)
+        _overwrite(self._folder / PLAYED, len(self._episode_cpu_s) * ROW.size, ROW.pack(spent_s, digest))
+        self._episode_cpu_s.append(spent_s)
+
+    def _read_played(self, state: Mapping[str, Any], episodes: int) -> "tuple[Mapping[int, str], array[float]] | None":
+        """Reads what `_append_played` wrote of so many episodes; None if any of it is missing."""
+        if "episode_cpu_s" in state:  # of an earlier version, whose checkpoints held all
+            known, none = state["series"], bytes(ROW.size - 8).hex()
+            rows = [ROW.pack(s, bytes.fromhex(known.get(k, none))) for k, s in enumerate(state["episode_cpu_s"])]
+            _overwrite(self._folder / PLAYED, 0, b"".join(rows))
+        content = _beginning(self._folder / PLAYED, episodes * ROW.size)
+        if len(content) < episodes * ROW.size:
+            return None
+        played = [*ROW.iter_unpack(content)]
+        digests = {index: digest.hex() for index, (_, digest) in enumerate(played) if any(digest)}
+        return digests, array("d", [spent_s for spent_s, _ in played])
+
     def _count(self, record: EpisodeRecord) -> RunMetrics:
+        self.episodes += 1
+        self.latest.append(record)
+        self._results.add(record)
         return (self._evaluation if record.evaluating else self._search).add(record)
+
+
+def _overwrite(file: Path, start: int, content: bytes) -> None:
+    """Writes the end of a file from a position on."""
+    with file.open("r+b" if start else "wb") as opened:
+        opened.truncate(start)
+        opened.seek(start)
+        opened.write(content)
 
 
 def _beginning(file: Path, length: int) -> bytes:

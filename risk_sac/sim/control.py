@@ -150,7 +150,8 @@ class Adversaries:
     def command(self, action: Sequence[float], frame: Frame, sim: SumoSimulation) -> None:
         """Sends one joint action, two entries per adversary in the family's order; `frame` is the latest."""
         first, second = action[::2], action[1::2]
-        rows = dict(zip(frame.ids, range(len(frame.ids)), strict=True))
+        self.rows(frame)
+        rows = self._row
         intended = sim.intended_accel()
         vehicles = {}
         slot = self._slot
@@ -177,10 +178,11 @@ class Adversaries:
         """Rows of the frame that hold adversaries; `slots` are then their places in the family's order."""
         if frame.ids is not self._ids:
             self._ids = frame.ids
-            present = [id_ for id_ in self._order if id_ in frame.ids]
-            self._rows = np.array([frame.ids.index(id_) for id_ in present], dtype=np.intp)
-            self._driven = [(frame.ids.index(id_), self._vehicles[id_]) for id_ in present if id_ in self._vehicles]
-            self.slots = np.array([self._order.index(id_) for id_ in present], dtype=np.intp)
+            self._row = {id_: row for row, id_ in enumerate(frame.ids)}
+            present = [id_ for id_ in self._order if id_ in self._row]
+            self._rows = np.array([self._row[id_] for id_ in present], dtype=np.intp)
+            self._driven = [(self._row[id_], self._vehicles[id_]) for id_ in present if id_ in self._vehicles]
+            self.slots = np.array([self._slot[id_] for id_ in present], dtype=np.intp)
         return self._rows
 
     def keep_limits(self, frame: Frame) -> bool:

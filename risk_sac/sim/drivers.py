@@ -195,7 +195,7 @@ class Drivers:
         They keep the speed they started with, or drive slower for SUMO's models or a pedestrian. SUMO's wish is that of
         the step before, the newest it tells.
         """
-        accel_by_id, candidates = {}, _with(self._outside, reading)
+        accel_by_id = {}
         for id_, driver in self._released.items():
             row = reading.row.get(id_)
             if row is None:  # left the net
@@ -205,7 +205,7 @@ class Drivers:
             wanted = min(models, max(driver.cruise_mps - speed, 0.0) / STEP_S)
             told = None
             if self._outside or reading.near[row]:
-                told = self._decide(driver, row, reading, reading.frame.state, candidates)
+                told = self._decide(driver, row, reading, reading.frame.state, _with(self._outside, reading))
             accel_by_id[id_] = wanted if told is None else min(wanted, told)
         return accel_by_id
 

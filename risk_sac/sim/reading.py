@@ -122,17 +122,13 @@ class Reader:
         get_accel = libsumo.vehicle.getAcceleration
         get_offset = libsumo.vehicle.getLateralLanePosition
         told: list[float] = []  # flat: numpy converts nested sequences at half the speed
-        speed_and_accel, offsets = [], []
         for id_ in self._vehicles:
             if moved and id_ in moved:
-                x, y, angle, speed, lateral, accel, offset, _ = moved[id_]
+                told += moved[id_][:7]
             else:
-                (x, y), angle = get_position(id_), get_angle(id_)
-                speed, lateral, accel = get_speed(id_), get_lateral(id_), get_accel(id_)
-                offset = get_offset(id_)
-            told += (x, y, angle, speed, lateral, accel, offset)
-            speed_and_accel.append((speed, accel))
-            offsets.append(offset)
+                told += get_position(id_)
+                told += (get_angle(id_), get_speed(id_), get_lateral(id_), get_accel(id_), get_offset(id_))
+        speed_and_accel, offsets = [*zip(told[3::7], told[5::7], strict=True)], told[6::7]
         for w in walkers.values():
             told += (w.x_m, w.y_m, w.heading_rad, w.speed_mps, 0.0, w.accel_mps2, 0.0)
         for start in self._statics:

@@ -199,17 +199,19 @@ class Roads:
         their left come oncoming lanes, for a vehicle that uses them. `offset_m` is that of its centre from its lane's,
         positive to the left.
         """
-        moved = self.moved.get(vehicle)
-        lane = libsumo.vehicle.getLaneID(vehicle) if moved is None else moved.lane
-        along = self._along(vehicle, lane, offset_m) if moved is None else moved.along
-        (left_m, right_m), beyond_m = self.room_beside(vehicle, lane, offset_m, width_m), 0.0
+        if (moved := self.moved.get(vehicle)) is None:
+            lane = libsumo.vehicle.getLaneID(vehicle)
+            along = self._along(vehicle, lane, offset_m)
+        else:
+            lane, along = moved.lane, moved.along
+        left_m, right_m = self.room_beside(vehicle, lane, offset_m, width_m)
         if vehicle in self._uses_oncoming:
-            beyond_m = self._oncoming_m(self._routes[vehicle], lane)
-        return LateralRoom(left_m + beyond_m, right_m), along
+            left_m += self._oncoming_m(self._routes[vehicle], lane)
+        return LateralRoom(left_m, right_m), along
 
     def room_beside(self, vehicle: str, lane: str, offset_m: float, width_m: float) -> LateralRoom:
         """Returns the room beside a vehicle's body up to the edges of its own lanes, negative beyond them."""
-        left_m, right_m = self.room(vehicle, lane)
+        left_m, right_m = self._room(self._routes[vehicle], lane)
         spare = -width_m / 2 - EDGE_M
         return LateralRoom(left_m + spare - offset_m, right_m + spare + offset_m)
 
@@ -222,7 +224,7 @@ class Roads:
 
     def _along(self, vehicle: str, lane: str, offset_m: float) -> Along:
         """Locates a vehicle on its path, given its lane."""
-        way = self.way(vehicle, lane)
+        way = self._way(self._routes[vehicle], lane)
         return Along(way.path, self.station_m(vehicle, lane), offset_m, way.ends_m)
 
     def station_m(self, vehicle: str, lane: str) -> float:

@@ -29,6 +29,8 @@ AHEAD_M = 5.0  # distance at which braking for a bend begins; more than BODY_M, 
 NO_BEND_PER_M = 1e-6
 END_M = 2.0  # kept to the end of a lane, at which SUMO halts a vehicle at once
 
+Braking = tuple[float, float, float]  # see `drives_into`
+
 # Rows of the bends of a path.
 HERE = 0  # absolute curvature, 1/m
 SOON = 1  # largest curvature up to AHEAD_M ahead, 1/m
@@ -69,7 +71,7 @@ class VehicleControl:
     accel_mps2: float = 0.0
     lateral_mps: float = 0.0
     _bounds: tuple[float, ...] = field(init=False)
-    _stopping: tuple[tuple[float, float, float], ...] = field(init=False)  # on a straight and in a bend
+    _stopping: tuple[Braking, Braking] = field(init=False)  # on a straight and in a bend
     _path: Path | None = field(init=False, default=None)
     _bends: Floats = field(init=False)  # of that path
     _at_m: float = field(init=False, default=0.0)  # where on it
@@ -79,9 +81,8 @@ class VehicleControl:
         self._bounds = tuple(Bounds.of(self.limits))  # passing one by its name costs as much as a step
         limits = self.limits
         straight = min(limits.brake_mps2, math.sqrt(limits.grip_mps2**2 - limits.lateral_accel_mps2**2))
-        self._stopping = tuple(
-            (brake, limits.jerk_mps3, limits.lateral_accel_mps2) for brake in (straight, limits.approach_mps2)
-        )
+        rest = limits.jerk_mps3, limits.lateral_accel_mps2
+        self._stopping = (straight, *rest), (limits.approach_mps2, *rest)
 
     def step(
         self,
@@ -104,37 +105,60 @@ class VehicleControl:
           others: actors that it keeps clear of.
           statics: how many of them, the last, never move: it stops before these or goes round them.
         """
-        if along.path is not self._path:
+        path, station_m, offset_m, ends_m = along
+        if path is not self._path:
             if self._path is not None:
                 self._behind_per_m = float(self._bends[SOON, index(self._bends, self._at_m)])
-            self._path, self._bends = along.path, bends(along.path, self.limits, along.ends_m)
-        self._at_m = along.station_m
-        bend = self._at_m < BODY_M or bool(self._bends[SOON, index(self._bends, self._at_m)] > NO_BEND_PER_M)
-        stopping = self._stopping[bend]
-        before, sides = (self.speed_mps, self.accel_mps2, self.lateral_mps), tuple(room)
-        choices: tuple[tuple[float, float, float], ...]
-        choices = ((drive, steer, intended_mps2), (drive, 0.0, intended_mps2), (-1.0, 0.0, 0.0))
-        if statics and self.lateral_mps:  # it may be too late to stop
-            choices = (*choices[:2], (0.0, math.copysign(1.0, self.lateral_mps), 0.0), choices[2])
-        for wanted in choices:
-            motion = _drive(self._bounds, self._bends, along.station_m, self._behind_per_m, before, wanted, sides)
-            if others is None:
-                break
-            met = drives_into(
-                *others,
-                along.path,
-                along.station_m,
-                along.offset_m,
-                motion,
-                stopping,
-                self.limits.others_brake_mps2,
-                statics,
-                room.left_m if motion[2] > 0.0 else room.right_m,
-            )
-            if met == CLEAR or (met != AHEAD and wanted[1] == 0.0):
-                break
+            self._path, self._bends = path, bends(path, self.limits, ends_m)
+        self._at_m = station_m
+        course = self._bounds, self._bends, station_m, self._behind_per_m
+        motion = self.speed_mps, self.accel_mps2, self.lateral_mps
+        wanted = float(drive), float(steer), float(intended_mps2)
+        if others is None:
+            motion = _drive(*course, motion, wanted, tuple(room))
+        else:
+            stop = *self._stopping, self.limits.others_brake_mps2
+            motion = _drive_clear(*course, motion, wanted, tuple(room), *others, path, offset_m, stop, statics)
         self.speed_mps, self.accel_mps2, self.lateral_mps = motion
         return VehicleCommand(self.speed_mps, self.lateral_mps)
+
+
+@compiled
+def _drive_clear(
+    bounds: tuple[float, ...],
+    bends: Floats,
+    station_m: float,
+    behind_per_m: float,
+    motion: tuple[float, float, float],
+    wanted: tuple[float, float, float],
+    room: tuple[float, ...],
+    state: Floats,
+    own: int,
+    path: Path,
+    offset_m: float,
+    stopping: tuple[Braking, Braking, float],
+    statics: int,
+) -> tuple[float, float, float]:
+    """`_drive` that keeps clear of others: it gives up steering, then driving, where it would meet one.
+
+    The arguments up to `room` are those of `_drive`; `state`, `own`, `path` and `offset_m` are those of `drives_into`;
+    `stopping` is how it brakes on a straight and in a bend, and how hard others brake.
+    """
+    drive, _, intended = wanted
+    straight, bent, others_brake_mps2 = stopping
+    in_bend = station_m < BODY_M or bends[SOON, index(bends, station_m)] > NO_BEND_PER_M
+    braking, lateral = bent if in_bend else straight, motion[2]
+    choices = (wanted, (drive, 0.0, intended), (0.0, math.copysign(1.0, lateral), 0.0), (-1.0, 0.0, 0.0))
+    after = motion
+    for k, choice in enumerate(choices):
+        if k == 2 and (statics == 0 or lateral == 0.0):  # else it may be too late to stop
+            continue
+        after = _drive(bounds, bends, station_m, behind_per_m, motion, choice, room)
+        room_m = room[0] if after[2] > 0.0 else room[1]
+        met = drives_into(state, own, path, station_m, offset_m, after, braking, others_brake_mps2, statics, room_m)
+        if met == CLEAR or (met != AHEAD and choice[1] == 0.0):
+            break
+    return after
 
 
 @compiled

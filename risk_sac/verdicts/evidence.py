@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.maps.carriageway import carriageway_of
+from risk_sac.maps.carriageway import carriageway_of, square_of
 from risk_sac.risk.publish import nearest_lane
 from risk_sac.scenario.layout import Area, Layout
 from risk_sac.sim.collision import Contact, contact_with
@@ -182,7 +182,7 @@ def lanes_of(evidence: Evidence, actor: int, first: int = 0) -> LaneSeries:
     for t, (x, y) in enumerate(places):
         if math.isnan(x):
             continue
-        _, limit, width = nearest_lane(carriageway.lanes(x, y), x, y, float(e.heading_rad[first + t, actor]))
+        _, limit, width = nearest_lane(carriageway.lanes(square_of(x, y)), x, y, float(e.heading_rad[first + t, actor]))
         if math.isfinite(limit):
             limit_mps[t], width_m[t] = limit, width
     return LaneSeries(limit_mps, width_m)

@@ -1,5 +1,7 @@
 """Turns of a method's own searcher and its guide, and the end of a search."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -177,3 +179,18 @@ def test_without_a_prior_scripts_are_bred_and_the_control_is_refused() -> None:
     control = cold.model_copy(update={"method": "archive-replay"})
     with pytest.raises(ConfigError, match="none, and the method archive-replay"):
         Searchers(control, Problem.from_spec(control), observation_size=20, action_size=4)
+
+
+HEAVY = {"torch", "botorch", "gpytorch", "pandas", "matplotlib", "fastapi", "sqlalchemy"}
+
+
+def test_a_search_without_learning_loads_neither_torch_nor_pictures(tmp_path):
+    code = (
+        "import sys, runpy\n"
+        "try: runpy.run_module('risk_sac', run_name='__main__')\n"
+        f"finally: print(sorted({HEAVY} & set(sys.modules)))"
+    )
+    command = ["run", "--scenario", "low", "--method", "archive", "--episodes", "2", "--out", str(tmp_path / "run")]
+    done = subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True, check=True)
+    assert (tmp_path / "run" / "checkpoint").exists()
+    assert done.stdout.splitlines()[-1] == "[]"

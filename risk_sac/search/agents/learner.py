@@ -9,7 +9,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from torch import Tensor
 
 from risk_sac.config.learner import LagrangianConfig, LearnerConfig
 from risk_sac.config.methods import Method
@@ -17,17 +16,17 @@ from risk_sac.env.problem import check_installed
 from risk_sac.errors import NotFinite
 from risk_sac.records import DrivenBy
 from risk_sac.risk.reward import TrainingReward
-from risk_sac.search.agents.agent import Agent, UpdateResult, check_device
 from risk_sac.search.agents.controls import Decision, Held
-from risk_sac.search.agents.ddpg import DdpgAgent
-from risk_sac.search.agents.replay import Batch, RiskPrioritizedReplay, UniformReplay
-from risk_sac.search.agents.sac import SacAgent
 from risk_sac.search.agents.snapshot import PolicySnapshot
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.frozen_policy import FrozenPolicy
 from risk_sac.world.types import Floats, Vector
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
+    from risk_sac.search.agents.agent import Agent, UpdateResult
+    from risk_sac.search.agents.replay import Batch
     from risk_sac.search.agents.sb3 import Sb3Agent
 
 
@@ -82,6 +81,10 @@ class Learner:
         Raises:
           ConfigError: the device that `config` names is not there.
         """
+        # Here, like the agents below, because a search without a learner needs no torch.
+        from risk_sac.search.agents.agent import check_device
+        from risk_sac.search.agents.replay import RiskPrioritizedReplay, UniformReplay
+
         steps, discount = config.agent.decision_steps, config.agent.discount
         self._held, self._decision = Held(steps), Decision(steps, discount)
         config = config.model_copy(update={"agent": config.agent.model_copy(update={"discount": discount**steps})})
@@ -170,7 +173,7 @@ class Learner:
         if decided is not None:
             self._replay.add(decided)  # Alg. 1, l. 12
 
-    def update(self) -> UpdateResult | None:
+    def update(self) -> "UpdateResult | None":
         """Learn from memory at the pace of `updates_per_step`; None during the warm-up and between two updates.
 
         What the warm-up left undone is made up for, a step's share and at least one update at a time; so it never is if
@@ -244,15 +247,19 @@ class Learner:
     def _make_agent(self, observation_size: int, action_size: int, seed: int) -> "Agent | Sb3Agent":
         sizes, config = (observation_size, action_size), self._config
         if self._method.agent == "ddpg":
+            from risk_sac.search.agents.ddpg import DdpgAgent
+
             return DdpgAgent(*sizes, config.agent, config.ddpg, seed, self.device)
         if self._method.agent == "sac":
+            from risk_sac.search.agents.sac import SacAgent
+
             return SacAgent(*sizes, config.agent, config.sac, seed, self.device)
         check_installed("sb3-sac")
         from risk_sac.search.agents.sb3 import Sb3Agent  # here, because it is an extra
 
         return Sb3Agent(*sizes, config.agent, config.sac, seed)
 
-    def _update_once(self) -> UpdateResult:
+    def _update_once(self) -> "UpdateResult":
         batch_size = self._config.agent.batch_size
         while (new := self._replay.take_unmeasured(batch_size)) is not None:
             new = new.on(self.device)
@@ -262,7 +269,7 @@ class Learner:
         self._replay.update(batch.indices, result.td_errors)
         return result
 
-    def _shaped(self, batch: Batch) -> Tensor:
+    def _shaped(self, batch: "Batch") -> "Tensor":
         """R' of transitions (Alg. 1, l. 9-10), `n`.
 
         Deviation: formed when sampled, so λ is today's and not the one in force when the step was taken.

@@ -1,19 +1,21 @@
 """RISK-SAC that starts from the pretrained policy and goes on learning by Algorithm 1."""
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
 from risk_sac.search.agents.learner import Learner
-from risk_sac.search.agents.sac import SacAgent
 from risk_sac.search.agents.snapshot import PolicySnapshot, drawn_course
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import Folded, PolicyLayout, PretrainedPolicy
 from risk_sac.world.types import Vector
+
+if TYPE_CHECKING:
+    from risk_sac.search.agents.sac import SacAgent
 
 FINE_TUNING = {
     "actor_learning_rate": 3e-4,
@@ -62,15 +64,17 @@ class PretrainedLearner(Learner):
     def _taken(self) -> PolicySnapshot:
         return replace(super()._taken(), shifts=self._start.shifts, mirror=self._mirror)
 
-    def _make_agent(self, observation_size: int, action_size: int, seed: int) -> SacAgent:
+    def _make_agent(self, observation_size: int, action_size: int, seed: int) -> "SacAgent":
+        from risk_sac.search.agents.sac import SacAgent  # here, because of torch
+
         agent, sac = self._config.agent, self._config.sac
         made = SacAgent(observation_size, action_size, agent, sac, seed, self.device, normalised=True)
         made.begin_from(self._start.policy, self._start.critics, self._start.temperature)
         return made
 
     def _drawn(self, observation: Vector, explore: bool) -> Vector:
-        assert isinstance(self._agent, SacAgent)
+        agent = cast("SacAgent", self._agent)
         mirror = self._mirror if self._reflected else None
         seen = observation if mirror is None else mirror.observation(observation)
-        action = self._agent.act(seen, explore, self._shift if explore else None)
+        action = agent.act(seen, explore, self._shift if explore else None)
         return action if mirror is None else mirror.action(action)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,9 +10,10 @@ from risk_sac.env.problem import Problem
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.search.prior.coordinates import Coordinates, Scripted, Translation
 from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, FamilyScripts, PlayedScript, kept
-from risk_sac.search.prior.script_model import ScriptModel
-from risk_sac.search.prior.shipped import shipped_prior
 from risk_sac.world.types import Floats
+
+if TYPE_CHECKING:
+    from risk_sac.search.prior.script_model import ScriptModel
 
 DOUBT = 0.5  # share of the uniform belief beside an earlier run's, whose ego may have been another
 
@@ -24,7 +26,7 @@ class PriorStart:
       earlier: rows of the library, the first ones, that an earlier run has found.
     """
 
-    model: ScriptModel | None  # None: of no shipped family
+    model: "ScriptModel | None"  # None: of no shipped family
     translation: Translation | None
     library: Floats  # n x d
     library_kinds: tuple[str, ...]  # n, names of variants
@@ -50,6 +52,8 @@ def start_of(problem: Problem, prior: str) -> PriorStart | None:
 
 def _shipped(own: Coordinates, family: str) -> PriorStart:
     """What was trained on a shipped family."""
+    from risk_sac.search.prior.shipped import shipped_prior  # here, because its model needs torch
+
     shipped, there = shipped_prior(family), Coordinates.of(FAMILIES[family])
     translation, model, known, kinds = Translation(own, there), shipped.model, shipped.library, shipped.library_kinds
     if there.symmetric:

@@ -6,11 +6,9 @@ Source: RISK-SAC, Sec. III-E.
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-import torch
-from torch.quasirandom import SobolEngine
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError, NotFinite, SceneError
@@ -19,8 +17,11 @@ from risk_sac.scenario.declared import SceneLaw
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.world.types import Floats
 
+if TYPE_CHECKING:
+    from torch import Tensor
+
 State = dict[str, Any]
-"""Tensors and plain values only, so that `torch.load(weights_only=True)` reads it."""
+"""Arrays, tensors and plain values only, which a checkpoint can hold."""
 # Choice: the paper leaves ε open. Mean returns per step are of order 0.1, so 1e-3 is negligible there and keeps f
 # readable while M̄ passes through zero.
 EPSILON = 1e-3
@@ -170,8 +171,11 @@ class SceneOptimizer(ABC):
         return {"kind": self.kind, "dimension": self._dimension, "seed": self._seed}
 
 
-def sobol_points(dimension: int, seed: int, skip: int = 0, count: int = 1) -> torch.Tensor:
+def sobol_points(dimension: int, seed: int, skip: int = 0, count: int = 1) -> "Tensor":
     """Returns points of a scrambled Sobol sequence, `count x d`, in [0, 1], after the first `skip`."""
+    import torch  # here, because loading it takes a second, and most samplers draw no such points
+    from torch.quasirandom import SobolEngine
+
     engine = SobolEngine(dimension, scramble=True, seed=seed)  # type: ignore[no-untyped-call]  # has its own generator
     if skip:
         engine.fast_forward(skip)  # type: ignore[no-untyped-call]

@@ -1,117 +1,15 @@
-"""Bayesian optimisation of scenes with BoTorch; higher values are better.
+"""Bayesian optimisation of scenes with BoTorch."""
 
-Everything works in float64. What draws random numbers takes a seed, and leaves torch's global generator as it was.
-
-References:
-    Ament et al. 2023, Unexpected improvements to expected improvement (LogEI).
-    Hvarfner et al. 2024, Vanilla Bayesian optimization performs great in high dimensions (BoTorch's priors).
-"""
-
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.search.encounter import Encounter
 from risk_sac.search.scene_optimizer.archive import DiscountedBandit
 from risk_sac.search.scene_optimizer.base import SceneOptimizer, State, objective, sobol_points
 from risk_sac.world.types import Floats
-
-with warnings.catch_warnings():
-    # linear_operator compiles its helpers with torch.jit while it is imported.
-    warnings.filterwarnings("ignore", message=r"`torch\.jit\.script", category=DeprecationWarning)
-    from botorch.acquisition import LogExpectedImprovement, PosteriorMean
-    from botorch.fit import fit_gpytorch_mll
-    from botorch.models import SingleTaskGP
-    from botorch.optim import optimize_acqf, optimize_acqf_discrete
-    from botorch.utils.sampling import manual_seed
-    from gpytorch.mlls import ExactMarginalLogLikelihood
-    from gpytorch.settings import fast_pred_var, skip_posterior_variances
-
-Hyperparameters = dict[str, Tensor]
-"""Raw kernel, mean and noise parameters by their name in the model."""
-
-FIT_ITERATIONS = 20  # a warm start continues from here at the next fit
-ASCENT_ITERATIONS = 3  # within about half a nat of the maximum, which takes five times as long
-
-
-def condition(points: Tensor, values: Tensor, hyperparameters: Hyperparameters | None) -> SingleTaskGP:
-    """Returns a Gaussian process with inferred noise on standardised values.
-
-    Args:
-        points: `n x d`, in [0, 1].
-        values: `n`, not all equal.
-        hyperparameters: as `fit` returned them; None takes the priors' modes.
-
-    Returns:
-        A model in evaluation mode: ARD RBF kernel, BoTorch's dimension-scaled priors.
-    """
-    standardised = (values - values.mean()) / values.std()
-    model = SingleTaskGP(points, standardised.unsqueeze(-1), outcome_transform=None)
-    if hyperparameters is not None:
-        model.load_state_dict(hyperparameters, strict=False)  # the priors' buffers stay the model's
-    return model.eval()
-
-
-def fit(points: Tensor, values: Tensor, start: Hyperparameters | None, seed: int) -> Hyperparameters:
-    """Maximises the marginal likelihood from `start`; other arguments as for `condition`."""
-    model = condition(points, values, start)
-    with manual_seed(seed):  # a fit that fails starts again from a draw of the priors
-        fit_gpytorch_mll(
-            ExactMarginalLogLikelihood(model.likelihood, model),
-            optimizer_kwargs={"options": {"maxiter": FIT_ITERATIONS}},
-            warning_handler=lambda warning: True,  # a search that ends early leaves the best parameters so far
-        )
-    return {name: parameter.detach().clone() for name, parameter in model.named_parameters()}
-
-
-def believe(
-    model: SingleTaskGP, points: Tensor, values: Tensor, out: Tensor, hyperparameters: Hyperparameters
-) -> SingleTaskGP:
-    """Returns the model as if points that are out, `m x d`, had their posterior mean; others as for `condition`.
-
-    So the next point is elsewhere. Source: the kriging believer of Ginsbourger et al. 2010, Kriging is well-suited to
-    parallelize optimization.
-    """
-    with skip_posterior_variances(), torch.no_grad():
-        mean = model.posterior(out).mean[:, 0] * values.std() + values.mean()
-    return condition(torch.cat((points, out)), torch.cat((values, mean)), hyperparameters)
-
-
-def maximise_expected_improvement(model: SingleTaskGP, choices: Tensor) -> Tensor:
-    """Returns the point of largest LogEI, `d`.
-
-    A short gradient ascent starts from the best of the choices, `k x d`.
-
-    Choice: the incumbent is the best posterior mean at the observed points. It is not fooled by one lucky noisy value
-    as the best observation would be, and costs one pass, where (q)LogNEI integrates over the incumbent by sampling.
-    """
-    model.requires_grad_(False)
-    bounds = torch.tensor([[0.0], [1.0]], dtype=choices.dtype).expand(2, choices.shape[1])
-    with skip_posterior_variances():
-        incumbent = model.posterior(model.train_inputs[0]).mean.max()
-    acquisition = LogExpectedImprovement(model, incumbent)
-    with fast_pred_var():
-        start, _ = optimize_acqf_discrete(acquisition, q=1, choices=choices)
-        ascent = {"maxiter": ASCENT_ITERATIONS}
-        point: Tensor
-        point, _ = optimize_acqf(
-            acquisition, bounds, q=1, num_restarts=1, batch_initial_conditions=start[None], options=ascent
-        )
-    return point[0]
-
-
-def best_by_mean(model: SingleTaskGP, choices: Tensor) -> Tensor:
-    """Returns the choice of largest posterior mean, `d`, of `k x d`."""
-    point: Tensor
-    with skip_posterior_variances():
-        point, _ = optimize_acqf_discrete(PosteriorMean(model), q=1, choices=choices)
-    return point[0]
-
 
 REFIT_SHARE = 5  # a new fit is due once this part of the kept observations is new
 ANYWHERE, NEAR = 0, 1  # arms of the bandit
@@ -143,7 +41,7 @@ class BotorchOptimizer(SceneOptimizer):
         self._returns: Floats = np.empty(0)  # n, R̄_e; NaN = rejected
         self._asked, self._told, self._filled = 0, 0, 0  # filled: Sobol scenes so far
         self._fitted_at = 0  # value of _told at the last refit
-        self._hyperparameters: Hyperparameters | None = None
+        self._hyperparameters: dict[str, Any] | None = None
         self._bandit = DiscountedBandit(discount=0.95, prior_worth=0.25, prior_cost=5.0, least=0.05)
         self._arm: int | None = None  # that proposed the scene which is out
 
@@ -197,6 +95,17 @@ class BotorchOptimizer(SceneOptimizer):
         return sobol_points(self._dimension, self._seed, self._filled - 1)[0].numpy()
 
     def _propose(self, values: Floats, random: np.random.Generator) -> Floats:
+        # Here, because loading them takes seconds, and the first scenes need no model.
+        import torch
+
+        from risk_sac.search.scene_optimizer.gaussian_process import (
+            believe,
+            best_by_mean,
+            condition,
+            fit,
+            maximise_expected_improvement,
+        )
+
         points, targets, seed = torch.from_numpy(self._points), torch.from_numpy(values), int(random.integers(2**31))
         # Each observation changes the fit less as they accumulate, while a fit's price grows with them.
         due = max(self._config.refit_every, len(values) // REFIT_SHARE)
@@ -226,8 +135,8 @@ class BotorchOptimizer(SceneOptimizer):
         """See `SceneOptimizer.state`."""
         return {
             **super().state(),
-            "points": torch.from_numpy(self._points.copy()),
-            "returns": torch.from_numpy(self._returns.copy()),
+            "points": self._points.copy(),
+            "returns": self._returns.copy(),
             "asked": self._asked,
             "told": self._told,
             "filled": self._filled,
@@ -239,7 +148,7 @@ class BotorchOptimizer(SceneOptimizer):
     def load(self, state: State) -> None:
         """See `SceneOptimizer.load`."""
         super().load(state)
-        self._points, self._returns = state["points"].numpy().copy(), state["returns"].numpy().copy()
+        self._points, self._returns = np.array(state["points"]), np.array(state["returns"])  # once tensors
         self._asked, self._told, self._filled = state["asked"], state["told"], state["filled"]
         self._fitted_at = state["fitted_at"]
         self._hyperparameters = state["hyperparameters"]

@@ -1,12 +1,10 @@
 """Proposes the scenes near an ego's boundary between passing and failing."""
 
 import numpy as np
-import torch
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.scenario.slice import Slice
 from risk_sac.search.encounter import Encounter
-from risk_sac.search.level_set import FailureClassifier, straddle
 from risk_sac.search.scene_optimizer.base import SceneOptimizer, State, sobol_points
 from risk_sac.world.types import Bools, Floats
 
@@ -68,6 +66,8 @@ class BoundarySampler(SceneOptimizer):
         return point
 
     def _most_ambiguous(self, outcomes: list[bool | None], seed: int) -> Floats:
+        from risk_sac.search.level_set import FailureClassifier, straddle  # here: loading gpytorch takes a second
+
         known = np.array([outcome is not None for outcome in outcomes])
         fails = np.array([bool(outcome) for outcome in outcomes])
         candidates = sobol_points(self._points.shape[1], seed, count=CANDIDATES).numpy()
@@ -100,7 +100,7 @@ class BoundarySampler(SceneOptimizer):
         """See `SceneOptimizer.state`."""
         return {
             **super().state(),
-            "points": torch.from_numpy(self._points.copy()),
+            "points": self._points.copy(),
             "fails": list(self._fails),
             "driver": list(self._driver),
             "asked": self._asked,
@@ -110,7 +110,7 @@ class BoundarySampler(SceneOptimizer):
     def load(self, state: State) -> None:
         """See `SceneOptimizer.load`."""
         super().load(state)
-        self._points = state["points"].numpy().copy()
+        self._points = np.array(state["points"])  # once a tensor
         self._fails, self._driver = list(state["fails"]), list(state["driver"])
         self._asked, self._filled = state["asked"], state["filled"]
 

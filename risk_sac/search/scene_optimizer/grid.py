@@ -3,7 +3,6 @@
 import itertools
 
 import numpy as np
-import torch
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError
@@ -82,11 +81,11 @@ def grid_sample(grid: Grid, count: int, seed: int) -> list[int]:
     if 2 * count > grid.size:
         left_out = set(grid_sample(grid, grid.size - count, seed))
         return [number for number in range(grid.size) if number not in left_out]
-    counts = torch.tensor([axis.size for axis in grid.axes], dtype=torch.float64)
+    counts = np.array([axis.size for axis in grid.axes])
     chosen = dict[int, None]()
     for batch in itertools.count():
-        cells = (sobol_points(len(grid.axes), seed, batch * BATCH, BATCH) * counts).long()
-        for levels in torch.minimum(cells, counts.long() - 1).tolist():
+        cells = (sobol_points(len(grid.axes), seed, batch * BATCH, BATCH).numpy() * counts).astype(np.int64)
+        for levels in np.minimum(cells, counts - 1).tolist():
             chosen[grid.number(tuple(levels))] = None
             if len(chosen) == count:
                 return list(chosen)

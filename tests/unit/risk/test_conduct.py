@@ -27,6 +27,7 @@ from risk_sac.risk.conduct import (
     ConductRoad,
     RoadFacts,
     conduct_terms,
+    road_facts,
     soft_cost,
 )
 from risk_sac.risk.driving import FEATURES
@@ -169,7 +170,8 @@ def test_speeding_costs_where_1_of_100_drive_so_fast():
 def test_the_limit_and_the_line_are_those_of_the_lane_where_an_adversary_is():
     road = ConductRoad(MERGE, 30.0, carriageway_of(MERGE.net))
     ramp, main, outside = {"x": 400.0, "y": -32.9, "heading": 0.124}, {"x": 400.0, "y": -1.75}, {"x": -500.0}
-    facts = road.facts(np.array([1, 2, 3]), state_of(EGO, ramp, main, outside))
+    rows, state = np.array([1, 2, 3]), state_of(EGO, ramp, main, outside)
+    facts = road_facts(rows, state, *road.near(rows, state))
     assert facts.limit_mps.tolist() == pytest.approx([22.22, 36.0, 30.0])
     assert facts.lane_width_m.tolist() == pytest.approx([3.5, 3.5, MERGE.lane_width_m])
 

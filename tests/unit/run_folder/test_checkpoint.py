@@ -31,6 +31,7 @@ def example_state():
         "name": "ε",
         "blob": b"\x00\xff",
         "pair": (1, 2.5),
+        "levels": {3: "c", 1: "a"},
         "records": [{"steps": 3}, {"steps": 4}],
         "weights": torch.linspace(0, 1, 7, dtype=torch.float64),
         "torch_generator": torch_generator.get_state(),
@@ -74,6 +75,16 @@ def path(tmp_path):
 def test_state_survives_the_round_trip_with_types_and_bits(path):
     assert_same(checkpoint.load(path, RUN), example_state())
     assert [entry.name for entry in path.parent.iterdir()] == ["run.ckpt"]
+
+
+def test_a_checkpoint_of_an_earlier_version_is_read(tmp_path):
+    mask, weights = torch.tensor([True, False]), torch.arange(3.0)
+    state = {"mask": {"__ndarray__": mask}, "weights": weights, "pair": (1, 2.5), "levels": {3: "c"}}
+    archive = io.BytesIO()
+    torch.save({"run_digest": RUN, "state": state}, archive)
+    path = tmp_path / "run.ckpt"
+    path.write_bytes(archive.getvalue() + hashlib.sha256(archive.getvalue()).digest())
+    assert_same(checkpoint.load(path, RUN), state | {"mask": mask.numpy()})
 
 
 def flipped(content, position):

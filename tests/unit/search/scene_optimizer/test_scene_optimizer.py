@@ -1,4 +1,3 @@
-import io
 import math
 from collections.abc import Callable
 
@@ -10,13 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from risk_sac.config import SceneOptimizerConfig
+from risk_sac.run_folder import checkpoint
 from risk_sac.search.scene_optimizer import (
     ArchiveOptimizer,
     BotorchOptimizer,
     IidSampler,
     SceneOptimizer,
     SobolOptimizer,
-    bayesian,
+    gaussian_process,
 )
 from risk_sac.search.scene_optimizer.base import RunningMaximum, objective
 from risk_sac.world.types import Floats
@@ -87,15 +87,13 @@ def test_same_seed_asks_the_same_scenes_and_another_seed_others(kind):
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("interrupted_at", [1, 21])
-def test_resumed_run_equals_one_never_interrupted(kind, interrupted_at):
+def test_resumed_run_equals_one_never_interrupted(kind, interrupted_at, tmp_path):
     whole = drive(kind(3, QUICK, 1), 30, bowl)
     before, after = kind(3, QUICK, 1), kind(3, QUICK, 1)
     drive(before, interrupted_at, bowl)
-    stored = io.BytesIO()
-    torch.save(before.state(), stored)
+    checkpoint.save(tmp_path / "state", before.state(), "run")
     drive(before, 3, bowl)  # a state must not change with the optimiser it was taken from
-    stored.seek(0)
-    after.load(torch.load(stored, weights_only=True))
+    after.load(checkpoint.load(tmp_path / "state", "run"))
     rest = drive(after, 30 - interrupted_at, lambda episode, u: bowl(episode + interrupted_at, u))
     np.testing.assert_array_equal(rest, whole[interrupted_at:])
 
@@ -174,7 +172,7 @@ def observations(count: int, dimension: int, seed: int) -> tuple[torch.Tensor, t
 def test_the_posterior_is_that_of_the_equations():
     """m(x) = k(x)ᵀ K⁻¹ (y - c) + c,  s²(x) = 1 - k(x)ᵀ K⁻¹ k(x): Rasmussen and Williams 2006, Alg. 2.1."""
     points, values = observations(40, 5, seed=0)
-    model = bayesian.condition(points, values, bayesian.fit(points, values, None, seed=0))
+    model = gaussian_process.condition(points, values, gaussian_process.fit(points, values, None, seed=0))
     lengthscales, constant = model.covar_module.lengthscale.detach(), model.mean_module.constant.detach()
 
     def kernel(a, b):
