@@ -364,11 +364,13 @@ def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
 
 
 def check_installed(method: MethodName) -> None:
-    """Refuses a method whose package is not there.
+    """Refuses a method whose package or sampler is not there.
 
     Raises:
       ConfigError: naming it.
     """
-    needed = METHODS[method].needs
+    if method.startswith(SAMPLER):
+        sampler_of(method)
+    needed = method_of(method).needs
     if needed and find_spec(needed) is None:
         raise ConfigError("methods", f"{method!r}, which needs {needed}", remedy="pip install 'risk-sac[dev]'")

@@ -27,6 +27,7 @@ from risk_sac.search.scene_optimizer import (
     GridSampler,
     IidSampler,
     RateSampler,
+    RegisteredSampler,
     SceneOptimizer,
     SobolOptimizer,
 )
@@ -43,6 +44,7 @@ OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
         GridSampler,
         RateSampler,
         BoundarySampler,
+        RegisteredSampler,
     )
 }
 Actor = Learner | Control
@@ -235,6 +237,8 @@ class Searchers:
             made = IidSampler(*arguments, self._problem.declared)
         elif sampler is RateSampler:
             made = RateSampler(*arguments, self._problem.declared, self._spec.budget.episodes)
+        elif sampler is RegisteredSampler:
+            made = RegisteredSampler(*arguments, self._spec.method)
         elif sampler is BoundarySampler:
             made = BoundarySampler(*arguments, self._problem.slice_of(self._spec))
         elif self._start is None or not actor.genes:
