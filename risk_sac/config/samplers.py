@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 
-from risk_sac.config.methods import SAMPLER
+from risk_sac.config.methods import METHODS, SAMPLER
 from risk_sac.errors import ConfigError, did_you_mean
 
 GROUP = "risk_sac.samplers"
@@ -36,6 +36,11 @@ def samplers() -> Mapping[str, EntryPoint]:
         if points.setdefault(point.name, point).value != point.value:
             raise ConfigError(GROUP, f"two samplers as {point.name!r}", "names of their own")
     return points
+
+
+def named_methods() -> tuple[str, ...]:
+    """Returns the methods that a campaign can name, those of registered samplers last."""
+    return (*METHODS, *(f"{SAMPLER}{name}" for name in sorted(samplers())))
 
 
 def sampler_of(method: str) -> EntryPoint:

@@ -3,6 +3,7 @@
 `cma`, `optuna` and `pymoo` are optional, see the extra `peers`.
 """
 
+import math
 from collections import deque
 from typing import Any
 
@@ -101,6 +102,9 @@ class CmaEs:
         """Learns from a whole generation."""
         self._told.append((self._queue.popleft(), score))
 
+    def _normal(self, *shape: int) -> Floats:
+        return self._random.standard_normal(shape)
+
     def _next_generation(self) -> None:
         import cma
 
@@ -110,7 +114,8 @@ class CmaEs:
             if min(scores) < FAILED or self._strategy.stop():
                 self._strategy = None
         if self._strategy is None:
-            options = {"bounds": [0, 1], "verbose": -9, "seed": int(self._random.integers(1, 2**31))}
+            # Its default is numpy's global generator.
+            options = {"bounds": [0, 1], "verbose": -9, "seed": math.nan, "randn": self._normal}
             first = self._random.random(self._dimension)
             self._strategy = cma.CMAEvolutionStrategy(first, self.DEVIATION, options)
         self._queue, self._told = deque(map(np.asarray, self._strategy.ask())), []

@@ -125,6 +125,6 @@ class RegisteredSampler(SceneOptimizer):
     def _call(self, what: str, call: Callable[[], Any]) -> Any:
         try:
             return call()
-        except Exception as error:  # noqa: BLE001  # foreign code may raise anything
+        except Exception as error:  # foreign code may raise anything
             got = f"{type(error).__name__}: {error}, from {self._method!r}"
             raise ConfigError(f"{GROUP}: {what}", got, "no error") from error
