@@ -11,7 +11,8 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar, get_args
 from risk_sac.cli.console import EGO, number
 from risk_sac.cli.parser import Parser
 from risk_sac.cli.scenarios import kept_name
-from risk_sac.config import METHODS, Behaviour, EgoConfig, FamilyName
+from risk_sac.config import Behaviour, EgoConfig, FamilyName
+from risk_sac.config.samplers import named_methods
 from risk_sac.config.spec_file import read_ego
 from risk_sac.egos.registry import refuse_class
 from risk_sac.errors import ConfigError
@@ -39,7 +40,9 @@ def add_campaign_flags(parser: Parser, *, families: str, methods: str, seeds: in
     scene, search = parser.group("scene"), parser.group("search")
     named = f"shipped, kept or in a file; `risk-sac scenarios list` (default: {families})"
     scene.add_argument("--scenario", dest="families", nargs="+", metavar="NAME_OR_FILE", help=named)
-    search.add_argument("--methods", nargs="+", metavar="NAME", help=f"of {', '.join(METHODS)} (default: {methods})")
+    search.add_argument(
+        "--methods", nargs="+", metavar="NAME", help=f"of {', '.join(named_methods())} (default: {methods})"
+    )
     search.add_argument("--seeds", type=int, metavar="N", help=f"number of seeds (default: {seeds})")
     search.add_argument("--first-seed", type=int, metavar="S", help="first of the N seeds (default: 0)")
     add_budget_flags(parser)

@@ -8,7 +8,6 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from pathlib import Path
-from typing import get_args
 
 from rich.box import SIMPLE_HEAD
 from rich.progress import Progress
@@ -19,6 +18,7 @@ from risk_sac.cli.parser import Commands, add_command
 from risk_sac.cli.scenarios import kept_name
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.config.base import read_text
+from risk_sac.config.samplers import named_methods
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.errors import ConfigError
 from risk_sac.host.machine import cores
@@ -43,7 +43,7 @@ def add_benchmark(commands: Commands) -> None:
         more="The same command again continues an interrupted benchmark.",
         example="benchmark --methods archive --defects blind-right --seeds 2 --out runs/benchmark",
     )
-    search, known = parser.group("search"), get_args(MethodName)
+    search, known = parser.group("search"), named_methods()
     names = f"of {', '.join(known)} (default: {' '.join(METHODS)})"
     search.add_argument("--methods", nargs="+", choices=known, default=METHODS, metavar="NAME", help=names)
     which = search.add_mutually_exclusive_group()

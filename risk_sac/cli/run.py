@@ -5,7 +5,7 @@ import os
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 
@@ -36,7 +36,8 @@ from risk_sac.cli.flags import (
 )
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.cli.scenarios import kept_name
-from risk_sac.config import METHODS, RunMethod, RunSpec
+from risk_sac.config import METHODS, RunSpec
+from risk_sac.config.samplers import named_methods
 from risk_sac.config.spec_file import read_campaign, read_spec
 from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
@@ -70,7 +71,7 @@ def add(commands: Commands) -> None:
     add_scene_flags(run)
     add_map_flags(run, several=False)
     search = run.group("search")
-    search.add_argument("--method", metavar="NAME", help=f"one of {', '.join(get_args(RunMethod))} (default: risk-sac)")
+    search.add_argument("--method", metavar="NAME", help=f"one of {', '.join(named_methods())} (default: risk-sac)")
     search.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
     search.add_argument(
         "--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags override them"

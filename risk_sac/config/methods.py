@@ -1,11 +1,13 @@
 """The methods as rows of data: base agent × {lagrangian, shaping, replay} × scene sampler."""
 
 from collections.abc import Mapping
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from risk_sac.config.base import Settings
 
-MethodName = Literal[
+OwnMethod = Literal[
     "risk-sac",
     "risk-sac-diverse",
     "risk-sac-pretrained",
@@ -27,9 +29,13 @@ MethodName = Literal[
     "rate",
     "boundary",
 ]
+SAMPLER = "sampler-"
+SamplerMethod = Annotated[str, Field(pattern=rf"^{SAMPLER}[a-z][a-z0-9-]{{0,39}}$")]
+"""Archive search's scripts, whose genes and scenes a registered sampler proposes; see `search/samplers.md`."""
+MethodName = OwnMethod | SamplerMethod
 IidName = Literal["iid-undisturbed", "iid-random"]
 """How the runs of a campaign's i.i.d. phase are made, see `Iid`; a spec cannot name them."""
-RunMethod = Literal[MethodName, IidName]
+RunMethod = OwnMethod | IidName | SamplerMethod
 
 
 class Method(Settings):
@@ -46,11 +52,11 @@ class Method(Settings):
     replay: Literal["uniform", "rper"] = "uniform"
     story: bool = False
     """Whether the scenario is played as it is written: others follow its story, and nothing deviates from it."""
-    scenes: Literal["botorch", "archive", "sobol", "iid", "grid", "rate", "boundary"] = "sobol"
+    scenes: Literal["botorch", "archive", "sobol", "iid", "grid", "rate", "boundary", "registered"] = "sobol"
     """`grid`: each point of the grid of the parameters, or of a stratified sample of it; `archive`: bred from
     those that led to distinct failures, together with the scripts' genes; `iid`: drawn one independently of the other,
     by the declared distributions; `rate`: by stages of importance sampling, for a rate under these; `boundary`: where
-    an ego goes from passing to failing over a few parameters."""
+    an ego goes from passing to failing over a few parameters; `registered`: by the user's sampler."""
     takes_turns: bool = False
     """Whether a learner's warm start goes on beside it: scripts and policy act in turn, by what they yield."""
     prior: Literal["none", "library", "policy", "all"] = "none"
@@ -76,7 +82,7 @@ class Method(Settings):
 
 
 # Choice: all learners search scenes with BoTorch, so that their rows differ in the learner alone.
-METHODS: dict[MethodName, Method] = {
+METHODS: dict[OwnMethod, Method] = {
     "risk-sac": Method(
         agent="sac",
         lagrangian=True,
@@ -178,9 +184,15 @@ IID_METHODS: dict[IidName, Method] = {
     ),
 }
 
+SAMPLER_METHOD = Method(
+    agent="scripts", scenes="registered", summary="Scenes and adversaries' scripts, as a registered sampler asks."
+)
+
 _ALL: Mapping[str, Method] = dict([*METHODS.items(), *IID_METHODS.items()])
 
 
 def method_of(name: RunMethod) -> Method:
-    """The row of a run's method, of a search's or of an i.i.d. phase's."""
+    """Returns the row of a run's method, of a search's or of an i.i.d. phase's."""
+    if name.startswith(SAMPLER):
+        return SAMPLER_METHOD
     return _ALL[name]

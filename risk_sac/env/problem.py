@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
-from risk_sac.config import METHODS, CampaignSpec, EgoConfig, Interval, JudgeConfig, Odd, Requirement, RunSpec
+from risk_sac.config import CampaignSpec, EgoConfig, Interval, JudgeConfig, Odd, Requirement, RunSpec
 from risk_sac.config.campaign import check_demand
-from risk_sac.config.methods import MethodName, method_of
+from risk_sac.config.methods import SAMPLER, MethodName, method_of
+from risk_sac.config.samplers import sampler_of
 from risk_sac.egos.registry import pinned
 from risk_sac.env.observation_layout import observation_size
 from risk_sac.errors import ConfigError, OddError, did_you_mean
@@ -370,11 +371,13 @@ def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
 
 
 def check_installed(method: MethodName) -> None:
-    """Refuses a method whose package is not there.
+    """Refuses a method whose package or sampler is not there.
 
     Raises:
       ConfigError: naming it.
     """
-    needed = METHODS[method].needs
+    if method.startswith(SAMPLER):
+        sampler_of(method)
+    needed = method_of(method).needs
     if needed and find_spec(needed) is None:
         raise ConfigError("methods", f"{method!r}, which needs {needed}", remedy="pip install 'risk-sac[dev]'")

@@ -57,6 +57,12 @@ PALETTE = files("risk_sac.report") / "palette.json"
 LOOKS: dict[RunMethod, Look] = {
     method: Look(**look) for method, look in json.loads(PALETTE.read_text(encoding="utf-8")).items()
 }
+OTHER = Look("#999999", ":")  # of a method without one, such as a sampler of the user's
+
+
+def look_of(method: RunMethod) -> Look:
+    """Returns the style of a method."""
+    return LOOKS.get(method, OTHER)
 
 
 def draw(comparison: Comparison, figure: FamilyCurves | Times | Bars, formats: Sequence[Format]) -> list[bytes]:
@@ -80,7 +86,7 @@ def _curves(comparison: Comparison, drawn: FamilyCurves) -> Figure:
     counts = []
     for rank, (method, at, values) in enumerate(curve_values(comparison, family, curve)):
         counts.append(len(values))
-        look = LOOKS[method]
+        look = look_of(method)
         first = min(curve.first, len(at)) - 1
         at, values = at[first:], values[:, first:]
         axes.plot(at, values.mean(axis=0), label=method, zorder=100 - rank, **look.line)  # the reference lies on top
@@ -123,7 +129,7 @@ def _bars(comparison: Comparison, drawn: Bars) -> Figure:
             mean = estimate.mean if estimate else None
             if not mean:  # an invisible bar
                 axes.text(x, 0, "–" if mean is None else "0", ha="center", va="bottom", color="0.4", fontsize=7)
-            axes.bar(x, mean or 0.0, 0.9 * width, color=LOOKS[method].colour, label="" if middle else method)
+            axes.bar(x, mean or 0.0, 0.9 * width, color=look_of(method).colour, label="" if middle else method)
             if estimate and mean is not None and estimate.low is not None and estimate.high is not None:
                 error = [[mean - estimate.low], [estimate.high - mean]]
                 axes.errorbar(x, mean, error, color="0.35", linewidth=0.9, capsize=1.5 if len(methods) > 5 else 3)
@@ -147,7 +153,7 @@ def _times(comparison: Comparison, drawn: Times) -> Figure:
     for cell in (cell for cell in comparison.group(family, phase) if any(cell.contacts_by_second)):
         counts.append(len(cell.seeds))
         for axes, bins in ((conflict, cell.conflicts_by_second), (contact, cell.contacts_by_second)):
-            axes.stairs(bins, label=cell.method, **LOOKS[cell.method].line)
+            axes.stairs(bins, label=cell.method, **look_of(cell.method).line)
     conflict.set(xlabel="release to conflict, s", ylabel=f"valid contacts ({phase})", ylim=(0, None))
     contact.set_xlabel("release to contact, s")
     conflict.margins(x=0)

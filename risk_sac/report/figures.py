@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from risk_sac.config import METHODS, FamilyName, MethodName
+from risk_sac.config import FamilyName, MethodName, method_of
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import METRICS, WINDOW, Metric
 from risk_sac.records import EpisodeRecord, Outcome, Phase
@@ -86,13 +86,13 @@ CURVES = (
         "lambda",
         "dual variable λ",
         _over_search(lambda record: record.dual_variable),
-        methods=lambda method: METHODS[method].lagrangian,
+        methods=lambda method: method_of(method).lagrangian,
     ),
     Curve(
         "alpha",
         "temperature α",
         _over_search(lambda record: record.temperature),
-        methods=lambda method: METHODS[method].stochastic,
+        methods=lambda method: method_of(method).stochastic,
         log=True,
     ),
 )

@@ -29,6 +29,7 @@ from risk_sac.search.scene_optimizer import (
     GridSampler,
     IidSampler,
     RateSampler,
+    RegisteredSampler,
     SceneOptimizer,
     SobolOptimizer,
 )
@@ -45,6 +46,7 @@ OPTIMIZERS: Mapping[str, type[SceneOptimizer]] = {
         GridSampler,
         RateSampler,
         BoundarySampler,
+        RegisteredSampler,
     )
 }
 Actor = Learner | Control
@@ -269,6 +271,8 @@ class Searchers:
             made = IidSampler(*arguments, self._problem.declared)
         elif sampler is RateSampler:
             made = RateSampler(*arguments, self._problem.declared, self._spec.budget.episodes, self._spec.rate)
+        elif sampler is RegisteredSampler:
+            made = RegisteredSampler(*arguments, self._spec.method)
         elif sampler is BoundarySampler:
             made = BoundarySampler(*arguments, self._problem.slice_of(self._spec))
         elif self._start is None or not actor.genes:

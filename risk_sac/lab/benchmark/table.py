@@ -20,7 +20,7 @@ from risk_sac.failures.from_above import canvas, picture
 from risk_sac.lab.benchmark.runs import Detection
 from risk_sac.lab.benchmark.statistics import MethodSummary, balanced, friedman, restricted_means, summaries, survival
 from risk_sac.metrics.metric import wilson_interval
-from risk_sac.report.drawing import CURVE_IN, DPI, LOOKS, STYLE
+from risk_sac.report.drawing import CURVE_IN, DPI, STYLE, look_of
 from risk_sac.report.rendering import interval, number, platform_in_words, table
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.world.types import Floats
@@ -44,7 +44,7 @@ def diagram(methods: Sequence[RunMethod], means: Floats) -> Figure:
     p_values.index = p_values.columns = list(methods)
     figure = canvas(SIZE_IN)
     axes = figure.add_subplot()
-    colours = {method: LOOKS[method].colour for method in methods}
+    colours = {method: look_of(method).colour for method in methods}
     scikit_posthocs.critical_difference_diagram(ranks, p_values, ax=axes, color_palette=colours)
     axes.set_title("mean rank of steps to detection over defects", fontsize=9)
     return figure
@@ -133,7 +133,7 @@ def curves(detections: Sequence[Detection]) -> Figure:
         steps, left = survival(runs)
         places = np.array([0.0, *steps, runs[0].budget_steps])
         shares = np.array([0.0, *(1.0 - left), 1.0 - left[-1]])
-        axes.step(places, shares, where="post", label=method, **LOOKS[method].line)
+        axes.step(places, shares, where="post", label=method, **look_of(method).line)
     axes.set(xlabel="environment steps", ylabel="share of runs that detected", ylim=(0.0, 1.0))
     axes.legend()
     return figure

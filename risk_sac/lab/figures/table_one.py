@@ -26,7 +26,7 @@ from risk_sac.execution.evaluate import run
 from risk_sac.failures.collect import policy_of
 from risk_sac.failures.from_above import canvas, picture
 from risk_sac.lab.figures.side_by_side import Row, rows_of
-from risk_sac.report.drawing import LOOKS, STYLE
+from risk_sac.report.drawing import STYLE, look_of
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
 from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.agents.controls import Held
@@ -137,7 +137,7 @@ def curves(rows: Sequence[Row]) -> Figure:
             of = [row for row in rows if (row["family"], row["method"]) == (family, method)]
             if of:
                 shares = [mean(row[name] for row in of) for name in names]
-                axes.plot([WINDOW * (1 + k) for k in range(len(names))], shares, label=method, **LOOKS[method].line)
+                axes.plot([WINDOW * (1 + k) for k in range(len(names))], shares, label=method, **look_of(method).line)
     panels[0].set_ylabel(f"ECR of {WINDOW} episodes")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(METHODS))
     return figure

@@ -9,3 +9,4 @@ from risk_sac.search.scene_optimizer.bayesian import BotorchOptimizer
 from risk_sac.search.scene_optimizer.boundary import BoundarySampler
 from risk_sac.search.scene_optimizer.grid import GridSampler
 from risk_sac.search.scene_optimizer.rate import RateSampler
+from risk_sac.search.scene_optimizer.registered import RegisteredSampler

@@ -8,7 +8,6 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, Field
 
 from risk_sac.config import (
-    METHODS,
     Behaviour,
     DynamicElements,
     EgoConfig,
@@ -17,8 +16,10 @@ from risk_sac.config import (
     MethodName,
     Odd,
     Requirement,
+    method_of,
 )
 from risk_sac.config.ego import EgoName
+from risk_sac.config.samplers import named_methods
 from risk_sac.egos.defects.catalogue import DEFECTS, DefectKind
 from risk_sac.egos.registry import cards
 from risk_sac.failures.export.formats import FORMATS, FormatName
@@ -265,12 +266,12 @@ def get_trend(
 @router.get("/methods")
 def list_methods() -> Methods:
     """Search methods as rows of a table, with what an episode of each costs."""
-    names = [*USUAL, *(name for name in METHODS if name not in USUAL)]
+    names = [*USUAL, *(name for name in named_methods() if name not in USUAL)]
     return Methods(items=[_method(name) for name in names])
 
 
 def _method(name: MethodName) -> NamedMethod:
-    return _told(NamedMethod, METHODS[name], name=name, usual=name in USUAL, episode_cost=EPISODE_COST.get(name))
+    return _told(NamedMethod, method_of(name), name=name, usual=name in USUAL, episode_cost=EPISODE_COST.get(name))
 
 
 def _told(record: type[R], row: object, **named: object) -> R:
