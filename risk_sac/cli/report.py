@@ -64,7 +64,7 @@ def add_report(commands: Commands) -> None:
 
 def _report(options: argparse.Namespace) -> int:
     # Here, because loading numpy takes a while.
-    from risk_sac.report.document import Origin, report_page, show_command
+    from risk_sac.report.document import CARD_TIMES, Origin, report_page, show_command
     from risk_sac.report.evidence import CampaignEvidence, gathered
     from risk_sac.report.files import read_folders
 
@@ -95,7 +95,7 @@ def _report(options: argparse.Namespace) -> int:
             regress=_regress_command(inputs),
             verify=shlex.join(["risk-sac", "report", VERIFY, str(options.out), *runs]),
             recount=lambda run: f"jq -r .outcome {episodes(run)} | sort | uniq -c",
-            record=lambda run, record: f"jq 'select(.index == {record.index})' {episodes(run)}",
+            record=lambda run, record: f"jq 'select(.index == {record.index}) | ., ({CARD_TIMES})' {episodes(run)}",
             folders=inputs.folders,
             regression=facts.regression,
         )

@@ -29,6 +29,8 @@ from risk_sac.scenario.odd import intersect, paths
 from risk_sac.verdicts import words
 
 MOST_KINDS = 12  # pictured, of a family
+# Filter of jq: what a card says of the contact by the difference of two times.
+CARD_TIMES = ".collision // empty | {conflict_to_contact_s: (.time_s - .judgement.conflict_s)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

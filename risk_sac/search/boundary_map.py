@@ -238,5 +238,6 @@ def _notes(
     if degenerate := sum(point.refused_failure for point in points):
         notes.append(f"{degenerate} failures are refused by a validity rule, such as sideswipes; they count here.")
     if slice_.config.others == "drawn":
-        notes.append("The other parameters are drawn: beyond the boundary more than half of the scenes fail.")
+        beyond = ": beyond the boundary more than half of the scenes fail" if ego.always is None else ""
+        notes.append(f"The other parameters are drawn{beyond}.")
     return notes

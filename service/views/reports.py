@@ -36,7 +36,7 @@ from risk_sac.report import (
     table_json,
     table_markdown,
 )
-from risk_sac.report.document import Origin, report_page
+from risk_sac.report.document import CARD_TIMES, Origin, report_page
 from risk_sac.report.evidence import CampaignFacts, gathered
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.matrix import coverage_matrix
@@ -280,7 +280,8 @@ def evidence(
         show=show,
         regress=shlex.join(["curl", f"{base_url}v1/regressions", "-H", "content-type: application/json", "-d", posted]),
         record=lambda run, record: (
-            shlex.join(["curl", "-s", f"{here}/failures/{record.id_in(run.spec.id)}"]) + " | jq 'del(.series)'"
+            shlex.join(["curl", "-s", f"{here}/failures/{record.id_in(run.spec.id)}"])
+            + f" | jq 'del(.series), ({CARD_TIMES})'"
         ),
         verify=f"{data} && jq -r .signed.digest report.json",
         folders=made.folders,

@@ -81,3 +81,11 @@ def test_with_others_drawn_the_boundary_is_where_half_of_the_scenes_fail():
     assert share == pytest.approx(0.5, abs=0.08)
     assert found.fixed == {}
     assert any(note.startswith("The other parameters are drawn") for note in found.notes)
+
+
+def test_with_others_drawn_and_no_boundary_nothing_is_said_of_what_lies_beyond_it():
+    notes = mapped(THREE[:2], lambda unit: False, others="drawn").notes
+    assert notes == (
+        f"The ego fails in 0 of {POINTS} scenes: there is no boundary in this box.",
+        "The other parameters are drawn.",
+    )

@@ -60,7 +60,7 @@ function RateTable({ run }: { run: Run }) {
                 <th scope="row">{name === "failure" ? "any that counts" : words(name)}</th>
                 <td class="number">{count(estimate.failures)}</td>
                 {estimate.rate === null ? (
-                  <td colSpan={hourly ? 3 : 2}>
+                  <td colSpan={hourly ? 3 : 2} class="why">
                     not estimated: {estimate.why}; at most {small(estimate.at_most)} <span class="faint">(95 %)</span>
                   </td>
                 ) : (
