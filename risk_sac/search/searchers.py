@@ -206,9 +206,11 @@ class Searchers:
     def recall(self, *, guided: bool, origin: Mapping[str, Any] | None = None) -> None:
         """Chooses the searcher that has proposed an episode; `origin` where others were proposed since."""
         self._next = self._guide if guided and self._guide else self._own
-        if origin is not None:
-            self._own.sampler.origin = {}  # the guide's points are none of its own
-            self._next.sampler.origin = origin
+        if origin is None:
+            return
+        self._next.sampler.origin = origin
+        if guided:
+            self._own.sampler.origin = {}  # it is told of the guide's points, too
 
     def learn(self, transitions: Sequence[Transition], snapshot: PolicySnapshot, seed: int) -> None:
         """Lets the learner learn from an episode that another process has played; see `Learner.learn`."""

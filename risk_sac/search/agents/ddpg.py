@@ -32,6 +32,8 @@ class DdpgAgent(Agent):
     Choice: Gaussian noise instead of an Ornstein-Uhlenbeck process, which later work found to gain nothing.
     """
 
+    exploration: float  # σ of the noise
+
     def __init__(
         self,
         observation_size: int,

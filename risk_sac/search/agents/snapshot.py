@@ -76,7 +76,8 @@ def explored(outputs: Vector, exploration: Exploration, random: np.random.Genera
     """
     if isinstance(exploration, float):
         noise = random.standard_normal(len(outputs), np.float32)
-        return np.clip(np.tanh(outputs) + np.float32(exploration) * noise, -1.0, 1.0)
+        noisy: Vector = np.clip(np.tanh(outputs) + np.float32(exploration) * noise, -1.0, 1.0)
+        return noisy
     mean, raw = np.split(outputs, 2)
     log_std = LOG_STD_HALF * np.tanh(raw) + LOG_STD_MIDDLE if exploration == "squashed" else np.clip(raw, *CLIPPED)
     action: Vector = np.tanh(mean + np.exp(log_std) * random.standard_normal(len(mean), np.float32)).astype(np.float32)
