@@ -134,13 +134,6 @@ def file_xml(*parts: str) -> str:
     return f'<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="7"/>{"".join(parts)}</OpenDRIVE>'
 
 
-def end_of(shapes: Sequence[Shape], begin: Turned = (0j, 0.0)) -> Turned:
-    """Point and heading at the end of shapes."""
-    for shape in shapes:
-        begin = shape_at(shape, begin, shape[1])
-    return begin
-
-
 def _lane(section: Lanes, id_: int) -> str:
     before, after = section.links.get(id_, (None, None))
     link = f"<predecessor id='{before}'/>" if before is not None else ""

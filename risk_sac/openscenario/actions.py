@@ -84,9 +84,13 @@ class ActionReader:
             "LateralDistanceAction": self._distance,
             "SynchronizeAction": self._synchronise,
             "FollowTrajectoryAction": self._follow,
-            "AssignRouteAction": self._assign,
-            "AcquirePositionAction": self._acquire,
-            "TeleportAction": self._teleport,
+            "AssignRouteAction": lambda at: at.build(AssignRouteAction, kind="assign_route", route=positions.route(at)),
+            "AcquirePositionAction": lambda at: at.build(
+                AcquirePositionAction, kind="acquire_position", position=positions.position(at.one("Position"))
+            ),
+            "TeleportAction": lambda at: at.build(
+                TeleportAction, kind="teleport", position=positions.position(at.one("Position"))
+            ),
             "VisibilityAction": self._visibility,
         }
 
@@ -157,20 +161,19 @@ class ActionReader:
 
     def _speed(self, at: At) -> SpeedAction:
         dynamics = self._dynamics(at.one("SpeedActionDynamics"))
-        goal = at.one("SpeedActionTarget")
-        target: Any
-        if (absolute := goal.maybe("AbsoluteTargetSpeed")) is not None:
-            target = absolute.number("value")
-        else:
-            relative = goal.one("RelativeTargetSpeed")
-            target = relative.build(
-                RelativeTarget,
-                to=self._entities.named(relative),
-                value=relative.number("value"),
-                how=relative.one_of("speedTargetValueType", _HOW, "delta"),
-                continuous=relative.flag("continuous", False),
-            )
+        target = self._target(at.one("SpeedActionTarget"), "TargetSpeed")
         return at.build(SpeedAction, kind="speed", target=target, dynamics=dynamics)
+
+    def _target(self, at: At, what: str) -> Any:
+        """Reads the child `Absolute…` as a number, or `Relative…` as a value beside an actor's."""
+        if (absolute := at.maybe(f"Absolute{what}")) is not None:
+            return absolute.number("value")
+        relative = at.one(f"Relative{what}")
+        to, value = self._entities.named(relative), relative.number("value")
+        if what == "TargetLane":
+            return relative.build(LaneTarget, to=to, lanes=value)
+        how, continuous = relative.one_of("speedTargetValueType", _HOW, "delta"), relative.flag("continuous", False)
+        return relative.build(RelativeTarget, to=to, value=value, how=how, continuous=continuous)
 
     def _dynamics(self, at: At) -> Dynamics:
         at.constant("followingMode", "position")
@@ -253,33 +256,20 @@ class ActionReader:
     # Across
 
     def _lane_change(self, at: At) -> LaneChangeAction:
-        goal = at.one("LaneChangeTarget")
-        target: Any
-        if (absolute := goal.maybe("AbsoluteTargetLane")) is not None:
-            target = absolute.number("value")
-        else:
-            relative = goal.one("RelativeTargetLane")
-            target = relative.build(LaneTarget, to=self._entities.named(relative), lanes=relative.number("value"))
         return at.build(
             LaneChangeAction,
             kind="lane_change",
-            target=target,
+            target=self._target(at.one("LaneChangeTarget"), "TargetLane"),
             offset_m=at.number_or("targetLaneOffset", 0.0),
             dynamics=self._dynamics(at.one("LaneChangeActionDynamics")),
         )
 
     def _lane_offset(self, at: At) -> LaneOffsetAction:
         goal, dynamics = at.one("LaneOffsetTarget"), at.one("LaneOffsetActionDynamics")
-        target: Any
-        if (absolute := goal.maybe("AbsoluteTargetLaneOffset")) is not None:
-            target = absolute.number("value")
-        else:
-            relative = goal.one("RelativeTargetLaneOffset")
-            target = relative.build(RelativeTarget, to=self._entities.named(relative), value=relative.number("value"))
         return at.build(
             LaneOffsetAction,
             kind="lane_offset",
-            target=target,
+            target=self._target(goal, "TargetLaneOffset"),
             shape=dynamics.one_of("dynamicsShape", _SHAPES),
             lateral_mps2=dynamics.number_or("maxLateralAcc", None),
             continuous=at.flag("continuous", False),
@@ -310,16 +300,6 @@ class ActionReader:
             scale=at.number_or("scale", 1.0),
             offset_s=at.number_or("offset", 0.0),
         )
-
-    def _assign(self, at: At) -> AssignRouteAction:
-        return at.build(AssignRouteAction, kind="assign_route", route=self._positions.route(at))
-
-    def _acquire(self, at: At) -> AcquirePositionAction:
-        position = self._positions.position(at.one("Position"))
-        return at.build(AcquirePositionAction, kind="acquire_position", position=position)
-
-    def _teleport(self, at: At) -> TeleportAction:
-        return at.build(TeleportAction, kind="teleport", position=self._positions.position(at.one("Position")))
 
     def _visibility(self, at: At) -> VisibilityAction:
         at.flag("graphics", True)

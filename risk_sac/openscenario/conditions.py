@@ -21,6 +21,7 @@ from risk_sac.config.story_conditions import (
     TravelledCondition,
     Trigger,
 )
+from risk_sac.config.story_places import Position
 from risk_sac.config.values import MOST_MAGNITUDE
 from risk_sac.openscenario.actions import COORDINATES
 from risk_sac.openscenario.elements import Unread
@@ -29,33 +30,14 @@ from risk_sac.openscenario.positions import Positions
 from risk_sac.openscenario.scope import At
 from risk_sac.openscenario.variables import RULES, Variables
 
-_EDGES = {
-    "none": "none",
-    "rising": "rising",
-    "falling": "falling",
-    "risingOrFalling": "rising_or_falling",
-}
+_EDGES = {name: name for name in ("none", "rising", "falling")} | {"risingOrFalling": "rising_or_falling"}
 _WHICH = {"any": "any", "all": "all"}
 _ALONG = {"longitudinal": "longitudinal", "lateral": "lateral", "euclidianDistance": "euclidean"}
 _ALONG |= {"cartesianDistance": "euclidean", "euclideanDistance": "euclidean"}
 _DIRECTIONS = {name: name for name in ("longitudinal", "lateral", "vertical")}
-_KINDS = {
-    "story": "story",
-    "act": "act",
-    "maneuverGroup": "maneuver_group",
-    "maneuver": "maneuver",
-    "event": "event",
-    "action": "action",
-}
-_STATES = {
-    "standbyState": "standby",
-    "runningState": "running",
-    "completeState": "complete",
-    "startTransition": "start",
-    "endTransition": "end",
-    "stopTransition": "stop",
-    "skipTransition": "skip",
-}
+_KINDS = {name: name for name in ("story", "act", "maneuver", "event", "action")} | {"maneuverGroup": "maneuver_group"}
+_STATES = {f"{name}State": name for name in ("standby", "running", "complete")}
+_STATES |= {f"{name}Transition": name for name in ("start", "end", "stop", "skip")}
 _READ = "a condition on time, distance, speed, place, collision, state, a variable or a parameter"
 _NEVER = "the condition never holds"
 
@@ -73,22 +55,35 @@ class ConditionReader:
           remarks: to which conditions that are not read are added.
         """
         self._positions, self._entities, self._variables, self._remarks = positions, entities, variables, remarks
-        self._of_entities: Mapping[str, Callable[[At, dict[str, Any]], Any]] = {
-            "TimeHeadwayCondition": self._headway,
-            "TimeToCollisionCondition": self._collision_time,
-            "AccelerationCondition": self._acceleration,
-            "StandStillCondition": self._stand_still,
-            "SpeedCondition": self._speed,
-            "RelativeSpeedCondition": self._relative_speed,
-            "TraveledDistanceCondition": self._travelled,
-            "ReachPositionCondition": self._reach,
-            "DistanceCondition": self._distance,
-            "RelativeDistanceCondition": self._relative_distance,
-            "CollisionCondition": self._collision,
-            "AngleCondition": self._angle,
-            "OffroadCondition": self._offroad,
-            "EndOfRoadCondition": self._offroad,
+        self._of_entities: Mapping[str, tuple[type[Any], str, Callable[[At], dict[str, Any]]]] = {
+            "TimeHeadwayCondition": (HeadwayCondition, "time_headway", lambda at: self._to(at) | self._measured(at)),
+            "TimeToCollisionCondition": (CollisionTimeCondition, "time_to_collision", self._collision_time),
+            "AccelerationCondition": (AccelerationCondition, "acceleration", _directed),
+            "StandStillCondition": (StandStillCondition, "stand_still", _lasting),
+            "SpeedCondition": (SpeedCondition, "speed", _directed),
+            "RelativeSpeedCondition": (
+                RelativeSpeedCondition,
+                "relative_speed",
+                lambda at: _directed(at) | self._to(at),
+            ),
+            "TraveledDistanceCondition": (TravelledCondition, "travelled", lambda at: {"value": at.number("value")}),
+            "ReachPositionCondition": (
+                ReachCondition,
+                "reach",
+                lambda at: {"position": self._place(at), "tolerance_m": at.number("tolerance")},
+            ),
+            "DistanceCondition": (
+                DistanceCondition,
+                "distance",
+                lambda at: {"to": self._place(at)} | self._measured(at),
+            ),
+            "RelativeDistanceCondition": (DistanceCondition, "distance", lambda at: self._to(at) | self._measured(at)),
+            "CollisionCondition": (CollisionCondition, "collision", self._touched),
+            "AngleCondition": (AngleCondition, "angle", _angle),
+            "OffroadCondition": (OffroadCondition, "offroad", _lasting),
+            "EndOfRoadCondition": (OffroadCondition, "end_of_road", _lasting),
         }
+        """Element → model, its kind, and what reads the fields that other conditions do not have."""
 
     def trigger(self, at: At | None) -> Trigger | None:
         """Reads a `StartTrigger` or `StopTrigger`; None if it is not there or has no group."""
@@ -149,88 +144,57 @@ class ConditionReader:
         at.element.used = True
         if at.tag not in self._of_entities:
             raise _unread(inner)
-        condition: Condition = self._of_entities[at.tag](at, common)
+        model, kind, fields = self._of_entities[at.tag]
+        condition: Condition = at.build(model, kind=kind, **fields(at), **common)
         return condition
 
-    def _compared(self, at: At) -> dict[str, Any]:
-        return {"rule": at.one_of("rule", RULES), "value": at.number("value")}
+    def _to(self, at: At) -> dict[str, Any]:
+        return {"to": self._entities.named(at)}
 
-    def _measured(self, at: At, along: str) -> dict[str, Any]:
-        """How a distance is measured; `along` where the element does not say."""
-        fields = self._compared(at) | {"freespace": at.flag("freespace", False)}
+    def _place(self, at: At) -> Position:
+        return self._positions.position(at.one("Position"))
+
+    def _measured(self, at: At) -> dict[str, Any]:
+        """How a distance is measured."""
+        fields = _compared(at) | {"freespace": at.flag("freespace", False)}
         fields["coordinates"] = at.one_of("coordinateSystem", COORDINATES, "entity")
         if at.flag("alongRoute", False):  # of version 1.0
             fields |= {"coordinates": "lane"}
-        return fields | {"along": at.one_of("relativeDistanceType", _ALONG, along)}
+        return fields | {"along": at.one_of("relativeDistanceType", _ALONG, "euclidianDistance")}
 
-    def _headway(self, at: At, common: dict[str, Any]) -> HeadwayCondition:
-        measured = self._measured(at, "euclidianDistance")
-        return at.build(HeadwayCondition, kind="time_headway", to=self._entities.named(at), **measured, **common)
-
-    def _collision_time(self, at: At, common: dict[str, Any]) -> CollisionTimeCondition:
+    def _collision_time(self, at: At) -> dict[str, Any]:
         goal = at.one("TimeToCollisionConditionTarget")
         place = goal.maybe("Position")
         to = self._positions.position(place) if place is not None else self._entities.named(goal.one("EntityRef"))
-        measured = self._measured(at, "euclidianDistance")
-        return at.build(CollisionTimeCondition, kind="time_to_collision", to=to, **measured, **common)
+        return {"to": to} | self._measured(at)
 
-    def _distance(self, at: At, common: dict[str, Any]) -> DistanceCondition:
-        to = self._positions.position(at.one("Position"))
-        measured = self._measured(at, "euclidianDistance")
-        return at.build(DistanceCondition, kind="distance", to=to, **measured, **common)
-
-    def _relative_distance(self, at: At, common: dict[str, Any]) -> DistanceCondition:
-        measured = self._measured(at, "euclidianDistance")
-        return at.build(DistanceCondition, kind="distance", to=self._entities.named(at), **measured, **common)
-
-    def _acceleration(self, at: At, common: dict[str, Any]) -> AccelerationCondition:
-        return at.build(
-            AccelerationCondition, kind="acceleration", **self._compared(at), **self._direction(at), **common
-        )
-
-    def _speed(self, at: At, common: dict[str, Any]) -> SpeedCondition:
-        return at.build(SpeedCondition, kind="speed", **self._compared(at), **self._direction(at), **common)
-
-    def _relative_speed(self, at: At, common: dict[str, Any]) -> RelativeSpeedCondition:
-        fields = self._compared(at) | self._direction(at) | common
-        return at.build(RelativeSpeedCondition, kind="relative_speed", to=self._entities.named(at), **fields)
-
-    def _direction(self, at: At) -> dict[str, Any]:
-        return {"direction": at.one_of("direction", _DIRECTIONS)} if "direction" in at.element.attributes else {}
-
-    def _travelled(self, at: At, common: dict[str, Any]) -> TravelledCondition:
-        return at.build(TravelledCondition, kind="travelled", value=at.number("value"), **common)
-
-    def _reach(self, at: At, common: dict[str, Any]) -> ReachCondition:
-        position = self._positions.position(at.one("Position"))
-        return at.build(ReachCondition, kind="reach", position=position, tolerance_m=at.number("tolerance"), **common)
-
-    def _stand_still(self, at: At, common: dict[str, Any]) -> StandStillCondition:
-        return at.build(StandStillCondition, kind="stand_still", duration_s=at.number("duration"), **common)
-
-    def _collision(self, at: At, common: dict[str, Any]) -> CollisionCondition:
+    def _touched(self, at: At) -> dict[str, Any]:
         if (partner := at.maybe("EntityRef")) is not None:
-            return at.build(CollisionCondition, kind="collision", partner=self._entities.named(partner), **common)
+            return {"partner": self._entities.named(partner)}
         for by_type in at.all("ByType", "ByObjectType"):  # any partner: what is touched is nearly always the one meant
             by_type.element.use_all()
             self._remarks.append(f"{by_type.element.place}: not read; a contact with any actor counts")
-        return at.build(CollisionCondition, kind="collision", **common)
+        return {}
 
-    def _angle(self, at: At, common: dict[str, Any]) -> AngleCondition:
-        if at.constant("angleType") != "heading":
-            raise at.unread("angleType heading", _NEVER)
-        return at.build(
-            AngleCondition,
-            kind="angle",
-            angle_rad=at.number("angle"),
-            tolerance_rad=at.number("angleTolerance"),
-            relative=at.constant("coordinateSystem", "world") in ("lane", "road", "trajectory"),
-            **common,
-        )
 
-    def _offroad(self, at: At, common: dict[str, Any]) -> OffroadCondition:
-        kind = "offroad" if at.tag == "OffroadCondition" else "end_of_road"
-        return at.build(OffroadCondition, kind=kind, duration_s=at.number("duration"), **common)
+def _compared(at: At) -> dict[str, Any]:
+    return {"rule": at.one_of("rule", RULES), "value": at.number("value")}
+
+
+def _directed(at: At) -> dict[str, Any]:
+    along = {"direction": at.one_of("direction", _DIRECTIONS)} if "direction" in at.element.attributes else {}
+    return _compared(at) | along
+
+
+def _lasting(at: At) -> dict[str, Any]:
+    return {"duration_s": at.number("duration")}
+
+
+def _angle(at: At) -> dict[str, Any]:
+    if at.constant("angleType") != "heading":
+        raise at.unread("angleType heading", _NEVER)
+    relative = at.constant("coordinateSystem", "world") in ("lane", "road", "trajectory")
+    return {"angle_rad": at.number("angle"), "tolerance_rad": at.number("angleTolerance"), "relative": relative}
 
 
 def _unread(holder: At) -> Unread:

@@ -45,17 +45,18 @@ class Positions:
         self.trajectories: dict[str, Trajectory] = {}
         self._catalogs, self._entities = catalogs, entities
         self._depth = 0
-        self._readers: Mapping[str, Callable[[At], Any]] = {
-            "WorldPosition": self._world,
-            "LanePosition": self._lane,
-            "RoadPosition": self._road,
-            "RelativeLanePosition": self._relative_lane,
-            "RelativeRoadPosition": self._relative_road,
-            "RelativeObjectPosition": self._relative,
-            "RelativeWorldPosition": self._relative,
-            "RoutePosition": self._on_route,
-            "TrajectoryPosition": self._on_trajectory,
+        self._readers: Mapping[str, tuple[type[Any], str, Callable[[At], dict[str, Any]]]] = {
+            "WorldPosition": (WorldPosition, "world", self._world),
+            "LanePosition": (LanePosition, "lane", _lane),
+            "RoadPosition": (RoadPosition, "road", lambda at: {"road": at.text("roadId")} | _along(at)),
+            "RelativeLanePosition": (RelativeLanePosition, "relative_lane", self._relative_lane),
+            "RelativeRoadPosition": (RelativeRoadPosition, "relative_road", self._relative_road),
+            "RelativeObjectPosition": (RelativePosition, "relative", self._relative),
+            "RelativeWorldPosition": (RelativePosition, "relative", self._relative),
+            "RoutePosition": (RoutePosition, "on_route", self._on_route),
+            "TrajectoryPosition": (TrajectoryPosition, "on_trajectory", self._on_trajectory),
         }
+        """Element → model, its kind, and what reads its fields but the heading."""
 
     def position(self, at: At) -> Position:
         """Reads the only child of an element `Position`, or of one that takes its place.
@@ -70,73 +71,47 @@ class Positions:
             at.element.children[0].use_all()
             raise At(at.element.children[0], at.scope).unread(_READ, "the place is unknown")
         here = at.one(*self._readers)
-        position: Position = self._readers[here.tag](here)
+        model, kind, fields = self._readers[here.tag]
+        turned = {} if model is WorldPosition else _turned(here)
+        position: Position = here.build(model, kind=kind, **fields(here), **turned)
         return position
 
-    def _turned(self, at: At) -> dict[str, Any]:
-        """The heading of an element with a child `Orientation`."""
-        if (turn := at.maybe("Orientation")) is None:
-            return {}
-        for name in ("p", "r"):
-            turn.number_or(name, 0.0)
-        kinds = {"relative": "relative", "absolute": "absolute"}
-        return {"heading_rad": turn.number_or("h", 0.0), "heading": turn.one_of("type", kinds, "absolute")}
-
-    def _world(self, at: At) -> WorldPosition:
+    def _world(self, at: At) -> dict[str, Any]:
         for name in ("z", "p", "r"):
             at.number_or(name, 0.0)
         heading = at.number_or("h", None if self._depth else 0.0)  # along a path it may be the path's
-        return at.build(WorldPosition, kind="world", x_m=at.number("x"), y_m=at.number("y"), heading_rad=heading)
+        return {"x_m": at.number("x"), "y_m": at.number("y"), "heading_rad": heading}
 
-    def _lane(self, at: At) -> LanePosition:
-        where = {"s_m": at.number("s"), "offset_m": at.number_or("offset", 0.0), "lane": at.number("laneId")}
-        return at.build(LanePosition, kind="lane", road=at.text("roadId"), **where, **self._turned(at))
-
-    def _road(self, at: At) -> RoadPosition:
-        where = {"s_m": at.number("s"), "t_m": at.number_or("t", 0.0)}
-        return at.build(RoadPosition, kind="road", road=at.text("roadId"), **where, **self._turned(at))
-
-    def _relative_lane(self, at: At) -> RelativeLanePosition:
+    def _relative_lane(self, at: At) -> dict[str, Any]:
         along_lane = "ds" not in at.element.attributes and "dsLane" in at.element.attributes
-        return at.build(
-            RelativeLanePosition,
-            kind="relative_lane",
-            to=self._entities.named(at),
-            lanes=at.number("dLane"),
-            ds_m=at.number("dsLane" if along_lane else "ds"),
-            along="lane" if along_lane else "road",
-            offset_m=at.number_or("offset", 0.0),
-            **self._turned(at),
-        )
+        return {
+            "to": self._entities.named(at),
+            "lanes": at.number("dLane"),
+            "ds_m": at.number("dsLane" if along_lane else "ds"),
+            "along": "lane" if along_lane else "road",
+            "offset_m": at.number_or("offset", 0.0),
+        }
 
-    def _relative_road(self, at: At) -> RelativeRoadPosition:
-        where = {"ds_m": at.number("ds"), "dt_m": at.number("dt")}
-        return at.build(
-            RelativeRoadPosition, kind="relative_road", to=self._entities.named(at), **where, **self._turned(at)
-        )
+    def _relative_road(self, at: At) -> dict[str, Any]:
+        return {"to": self._entities.named(at), "ds_m": at.number("ds"), "dt_m": at.number("dt")}
 
-    def _relative(self, at: At) -> RelativePosition:
+    def _relative(self, at: At) -> dict[str, Any]:
         at.number_or("dz", 0.0)
         axes = "actor" if at.tag == "RelativeObjectPosition" else "world"
-        where = {"dx_m": at.number("dx"), "dy_m": at.number("dy"), "axes": axes}
-        return at.build(RelativePosition, kind="relative", to=self._entities.named(at), **where, **self._turned(at))
+        return {"to": self._entities.named(at), "dx_m": at.number("dx"), "dy_m": at.number("dy"), "axes": axes}
 
-    def _on_route(self, at: At) -> RoutePosition:
-        route = self.route(at.one("RouteRef"))
+    def _on_route(self, at: At) -> dict[str, Any]:
+        route = {"route": self.route(at.one("RouteRef"))}
         place = at.one("InRoutePosition", "InRoute")
         if (lane := place.maybe("FromLaneCoordinates", "LaneCoordinates")) is not None:
-            along = {"s_m": lane.number("pathS"), "lane": lane.number("laneId")}
-            along |= {"offset_m": lane.number_or("laneOffset", 0.0)}
-        elif (road := place.maybe("FromRoadCoordinates", "RoadCoordinates")) is not None:
-            along = {"s_m": road.number("pathS"), "t_m": road.number("t")}
-        else:
-            raise place.unread("FromLaneCoordinates or FromRoadCoordinates", "the place is unknown")
-        return at.build(RoutePosition, kind="on_route", route=route, **along, **self._turned(at))
+            offset = lane.number_or("laneOffset", 0.0)
+            return route | {"s_m": lane.number("pathS"), "lane": lane.number("laneId"), "offset_m": offset}
+        if (road := place.maybe("FromRoadCoordinates", "RoadCoordinates")) is not None:
+            return route | {"s_m": road.number("pathS"), "t_m": road.number("t")}
+        raise place.unread("FromLaneCoordinates or FromRoadCoordinates", "the place is unknown")
 
-    def _on_trajectory(self, at: At) -> TrajectoryPosition:
-        trajectory = self.trajectory(at.one("TrajectoryRef"))
-        where = {"s_m": at.number("s"), "t_m": at.number_or("t", 0.0)}
-        return at.build(TrajectoryPosition, kind="on_trajectory", trajectory=trajectory, **where, **self._turned(at))
+    def _on_trajectory(self, at: At) -> dict[str, Any]:
+        return {"trajectory": self.trajectory(at.one("TrajectoryRef"))} | _along(at)
 
     # Routes
 
@@ -225,6 +200,25 @@ class Positions:
             yield
         finally:
             self._depth -= 1
+
+
+def _turned(at: At) -> dict[str, Any]:
+    """The heading of an element with a child `Orientation`."""
+    if (turn := at.maybe("Orientation")) is None:
+        return {}
+    for name in ("p", "r"):
+        turn.number_or(name, 0.0)
+    kinds = {"relative": "relative", "absolute": "absolute"}
+    return {"heading_rad": turn.number_or("h", 0.0), "heading": turn.one_of("type", kinds, "absolute")}
+
+
+def _along(at: At) -> dict[str, Any]:
+    return {"s_m": at.number("s"), "t_m": at.number_or("t", 0.0)}
+
+
+def _lane(at: At) -> dict[str, Any]:
+    place = {"lane": at.number("laneId"), "s_m": at.number("s"), "offset_m": at.number_or("offset", 0.0)}
+    return {"road": at.text("roadId")} | place
 
 
 def _kept(into: dict[str, Any], name: str, path: Any) -> str:

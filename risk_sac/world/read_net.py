@@ -173,7 +173,7 @@ def _lane(edge: str, index: int, lane: ET.Element, function: str) -> NetLane:
         classes=classes,
         height_m=tuple(z for _, _, z in points),
         original=tuple(
-            name for p in lane.iter("param") if p.get("key") == "origId" for name in p.get("value", "").split()
+            name for p in lane.iter("param") if p.get("key") == ORIGINAL for name in p.get("value", "").split()
         ),
     )
 

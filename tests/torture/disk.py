@@ -51,11 +51,6 @@ class Disk:
         self._set(0, count, 0, 0, 0, failed)
 
     @property
-    def writes(self) -> int:
-        """Counted since the last order."""
-        return self._get()[1]
-
-    @property
     def refused(self) -> int:
         """How many of them."""
         return self._get()[5]
