@@ -144,8 +144,8 @@ def _encode(value: object, where: str, arrays: list[np.ndarray[Any, Any]]) -> ob
             raise TypeError(f"{where} is an array of {array.dtype}; wanted numbers or bool")
         arrays.append(array)
         return {_KIND: kind, "number": len(arrays) - 1}
-    if type(value) in (list, tuple):  # exact: a named tuple would come back as a tuple
-        items = [_encode(item, f"{where}[{index}]", arrays) for index, item in enumerate(value)]  # type: ignore[arg-type]
+    if isinstance(value, list | tuple) and type(value) in (list, tuple):  # a named tuple would come back as a tuple
+        items = [_encode(item, f"{where}[{index}]", arrays) for index, item in enumerate(value)]
         return items if isinstance(value, list) else {_KIND: "tuple", "items": items}
     if isinstance(value, dict):
         if not all(type(key) in (str, int) for key in value):
