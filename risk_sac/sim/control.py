@@ -151,7 +151,7 @@ class Adversaries:
         """Sends one joint action, two entries per adversary in the family's order; `frame` is the latest."""
         first, second = action[::2], action[1::2]
         self.rows(frame)
-        rows = self._row
+        rows = self._row_of
         intended = sim.intended_accel()
         vehicles = {}
         slot = self._slot
@@ -178,10 +178,10 @@ class Adversaries:
         """Rows of the frame that hold adversaries; `slots` are then their places in the family's order."""
         if frame.ids is not self._ids:
             self._ids = frame.ids
-            self._row = {id_: row for row, id_ in enumerate(frame.ids)}
-            present = [id_ for id_ in self._order if id_ in self._row]
-            self._rows = np.array([self._row[id_] for id_ in present], dtype=np.intp)
-            self._driven = [(self._row[id_], self._vehicles[id_]) for id_ in present if id_ in self._vehicles]
+            self._row_of = {id_: row for row, id_ in enumerate(frame.ids)}
+            present = [id_ for id_ in self._order if id_ in self._row_of]
+            self._rows = np.array([self._row_of[id_] for id_ in present], dtype=np.intp)
+            self._driven = [(self._row_of[id_], self._vehicles[id_]) for id_ in present if id_ in self._vehicles]
             self.slots = np.array([self._slot[id_] for id_ in present], dtype=np.intp)
         return self._rows
 
