@@ -72,8 +72,8 @@ class Method(Settings):
 
     @property
     def in_rounds(self) -> bool:
-        """Whether several of its episodes can be asked for at a time; others need each outcome before the next."""
-        return not self.learns and self.scenes not in ("rate", "boundary")
+        """Whether several of its episodes can be asked for at a time; a registered sampler knows of one."""
+        return self.scenes != "registered"
 
     @property
     def learns(self) -> bool:
