@@ -53,7 +53,7 @@ def test_runs_of_the_version_before_are_kept(tmp_path):
     store.close()
     with sqlite3.connect(tmp_path / "test.db") as older:
         older.execute("ALTER TABLE runs DROP COLUMN processes")
-        older.execute("UPDATE alembic_version SET version_num = '0001'")
+        older.execute("UPDATE alembic_version SET version_num = '0002'")
     older.close()
     store = Store(f"sqlite:///{tmp_path}/test.db")
     Ledger(store).start_run(campaign.runs[0].number, 3)
@@ -101,6 +101,7 @@ def test_failures_of_an_older_database_get_their_weight(tmp_path, episode):
     with store.engine.begin() as connection:
         before = connection.exec_driver_sql(asked).scalar()
         connection.exec_driver_sql("ALTER TABLE episodes DROP COLUMN weight")
+        connection.exec_driver_sql("ALTER TABLE runs DROP COLUMN processes")
         connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0001'")
     store.close()
     opened = Store(url)
