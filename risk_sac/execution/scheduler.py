@@ -40,7 +40,7 @@ class QueuedRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlotUse:
-    """The slots that runs share, and who has them."""
+    """Slots that runs share, and those that each project has."""
 
     free: int
     taken: Mapping[str, int]  # by project
