@@ -41,7 +41,7 @@ from risk_sac.config.samplers import named_methods
 from risk_sac.config.spec_file import read_campaign, read_spec
 from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
-from risk_sac.host.machine import cores
+from risk_sac.host.machine import check_batch, cores
 from risk_sac.host.terminal import complain, console, notes
 from risk_sac.metrics import METRICS, Metric, with_published
 from risk_sac.records import RunMetrics
@@ -116,6 +116,7 @@ def _run(options: argparse.Namespace) -> int:
     options.family = options.family and kept_name(options.family)
     named = {name: getattr(options, name) for name in ("family", "method", "seed", "prior")}
     spec = read_spec(options.spec, named | budget_flags(options) | scene_flags(options))
+    check_batch(spec.budget.batch)
     say_adjustments(adjustments(spec))
     from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
 

@@ -14,6 +14,7 @@ import psutil
 import pytest
 from pydantic import ValidationError
 
+from risk_sac import cli
 from risk_sac.config import METHODS, Budget, CampaignSpec, EgoConfig, LearnerConfig, RunMethod, RunSpec, method_of
 from risk_sac.config.boundary import BoundaryConfig
 from risk_sac.config.learner import AgentConfig, WarmStartConfig
@@ -144,13 +145,19 @@ def test_a_learner_learns_from_all_episodes_before_it_is_evaluated(tmp_path: Pat
 
 
 @pytest.mark.parametrize("batch", [33, 1024])
-def test_rounds_too_large_for_the_machine_are_refused(monkeypatch: pytest.MonkeyPatch, batch: int) -> None:
+def test_rounds_too_large_for_the_machine_are_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, batch: int
+) -> None:
     monkeypatch.delenv(ROLLOUTS, raising=False)
     monkeypatch.setattr(machine, "cores", lambda: 2)
     campaign = CampaignSpec(families=("low",), methods=("archive",), budget=Budget(batch=batch))
     with pytest.raises(ConfigError, match=f"budget.batch: got {batch}; wanted at most 32") as refused:
         checked_campaign(campaign)
     assert refused.value.field == "budget.batch"
+    run = ["run", "--scenario", "low", "--method", "archive", "--batch", str(batch), "--out", str(tmp_path / "out")]
+    assert cli.main(run) == 2
+    assert capsys.readouterr().err.startswith(f"--batch: got {batch}; wanted at most 32")
+    assert not (tmp_path / "out").exists()
     monkeypatch.setenv(ROLLOUTS, "64")  # of an ego that takes its time
     assert checked_campaign(campaign).budget.batch == batch
 
