@@ -4,8 +4,7 @@
         [--egos NAME ...]
 
 Three analytic problems, whose rate is exact, and two egos, whose rate plain draws tell. OUT has a CSV of each; what it
-holds is not made again. OUT/coverage.csv compares with Wilson's interval of plain Monte Carlo with 20,000 draws. Two
-processes with one of the egos each share OUT.
+holds is not made again. OUT/coverage.csv compares with Wilson's interval of plain Monte Carlo with 20,000 draws.
 """
 
 import argparse
