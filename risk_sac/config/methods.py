@@ -1,9 +1,11 @@
 """The methods as rows of data: base agent × {lagrangian, shaping, replay} × scene sampler."""
 
+import re
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import Field
+from pydantic import Field, PlainValidator, TypeAdapter, WithJsonSchema
+from pydantic_core import PydanticKnownError
 
 from risk_sac.config.base import Settings
 
@@ -29,13 +31,29 @@ OwnMethod = Literal[
     "rate",
     "boundary",
 ]
-SAMPLER = "sampler-"
-SamplerMethod = Annotated[str, Field(pattern=rf"^{SAMPLER}[a-z][a-z0-9-]{{0,39}}$")]
-"""Archive search's scripts, whose genes and scenes a registered sampler proposes; see `search/samplers.md`."""
-MethodName = OwnMethod | SamplerMethod
 IidName = Literal["iid-undisturbed", "iid-random"]
 """How the runs of a campaign's i.i.d. phase are made, see `Iid`; a spec cannot name them."""
-RunMethod = OwnMethod | IidName | SamplerMethod
+SAMPLER = "sampler-"
+SAMPLER_PATTERN = rf"^{SAMPLER}[a-z][a-z0-9-]{{0,39}}$"
+SamplerMethod = Annotated[str, Field(pattern=SAMPLER_PATTERN)]
+"""Archive search's scripts, whose genes and scenes a registered sampler proposes; see `search/samplers.md`."""
+
+
+def _named(*methods: str) -> tuple[PlainValidator, WithJsonSchema]:
+    """Returns what validates and describes a method's name, so that an error lists the methods and no union."""
+
+    def check(value: Any) -> Any:
+        if isinstance(value, str) and (value in methods or re.fullmatch(SAMPLER_PATTERN, value)):
+            return value
+        known = ", ".join(map(repr, methods))
+        raise PydanticKnownError("literal_error", {"expected": f"{known} or '{SAMPLER}NAME'"})
+
+    schema = TypeAdapter(SamplerMethod).json_schema()
+    return PlainValidator(check), WithJsonSchema({"anyOf": [{"enum": list(methods), "type": "string"}, schema]})
+
+
+MethodName = Annotated[OwnMethod | SamplerMethod, *_named(*get_args(OwnMethod))]
+RunMethod = Annotated[OwnMethod | IidName | SamplerMethod, *_named(*get_args(OwnMethod), *get_args(IidName))]
 
 
 class Method(Settings):
