@@ -114,7 +114,7 @@ def play(spec: RunSpec, folder: Path) -> None:
             env = GuardedEnv(run.env, guard)
             while not run.finished:
                 metrics = episode(run, env)
-                assert_told_in_full(run.records[-1], metrics)
+                assert_told_in_full(run.latest[-1], metrics)
         for contact in run.series.values():
             series = read_series(folder / "failures" / contact.name)
             assert all(np.isfinite(series[name]).all() for name in ("robustness", "soft_min", "least_ttc_s"))
