@@ -12,6 +12,7 @@ from risk_sac import cli
 from risk_sac.config import EgoConfig, RunSpec
 from risk_sac.egos.registry import card_of, cards, pinned
 from risk_sac.env.env import RiskSacEnv
+from risk_sac.env.problem import Problem
 from risk_sac.errors import CheckpointError, ConfigError, InfeasibleScene
 from risk_sac.execution.evaluate import run, verify
 from risk_sac.records import EpisodeRecord, Outcome
@@ -97,8 +98,7 @@ def play(spec: RunSpec, folder: Path) -> tuple[RunResults, list[EpisodeRecord]]:
 def frames(family: str, driver: str | None, episode: int, *, controlled: bool = False) -> list[Frame]:
     """Of an episode without an attack."""
     spec = RunSpec(family=family, method="random", seed=0, ego=EgoConfig(driver=driver))
-    with closing(RiskSacEnv.of(spec)) as env:
-        env = RiskSacEnv(env.problem, spec.learner.reward, controlled=controlled)
+    with closing(RiskSacEnv(Problem.from_spec(spec), spec.learner.reward, controlled=controlled)) as env:
         scene = env.problem.space.from_unit(np.random.default_rng((3, episode)).random(env.problem.space.dimension))
         env.reset(seed=episode, options={"scene": scene})
         ended = False
