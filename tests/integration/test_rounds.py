@@ -100,9 +100,9 @@ def test_neither_processes_nor_kills_change_a_method(tmp_path: Path, processes, 
 def test_killed_processes_change_nothing(tmp_path: Path, processes) -> None:
     processes(2)
     undisturbed = execute_run(spec("archive", 16), tmp_path / "whole", Listener())
-    killer = Killer(after=(1, 6, 9))
+    killer = Killer(after=(1, 8))  # one process each: an episode that dies twice at the same step is left out
     killed = execute_run(spec("archive", 16), tmp_path / "killed", killer)
-    assert killer.killed == 3
+    assert killer.killed == 2
     assert killed.digest == undisturbed.digest
     assert [record.index for record in killer.records] == list(range(16))
     series = [sorted(file.name for file in (tmp_path / name / FAILURES).glob("*")) for name in ("whole", "killed")]
