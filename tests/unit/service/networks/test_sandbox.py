@@ -28,7 +28,7 @@ def checker(folder: Path, code: str) -> str:
     return str(file)
 
 
-def refusal(folder: Path, code: str, wall_s: float = 5) -> str:
+def refusal(folder: Path, code: str, wall_s: float = 60) -> str:
     with pytest.raises(UploadError) as caught:
         inspect(folder, checker(folder, code), wall_s)
     return str(caught.value)
