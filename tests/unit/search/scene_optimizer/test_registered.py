@@ -1,5 +1,7 @@
 """Samplers of the user's, and those that ship."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -124,6 +126,20 @@ def test_a_sampler_that_fails_is_named(monkeypatch, name, said):
     one = sampler("sampler-bad")
     with pytest.raises(ConfigError, match=f"sampler-bad.*{said}|{said}.*sampler-bad"):
         one.tell(one.ask(), 0.1)
+
+
+def test_the_example_of_the_page_climbs(monkeypatch, tmp_path):
+    page = Path("risk_sac/search/samplers.md").read_text(encoding="utf-8")
+    (tmp_path / "hill_of_the_page.py").write_text(page.split("```python\n")[1].split("```")[0])
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(SHIPPED, "hill", ("hill_of_the_page:HillClimber", ""))
+    one = sampler("sampler-hill")
+    distances = []
+    for _ in range(100):
+        point = one.ask()
+        one.tell(point, 0.1, near(point))
+        distances.append(float(np.linalg.norm(point - 0.1)))
+    assert np.mean(distances[-20:]) < 0.7 * np.mean(distances[:5])
 
 
 def test_a_method_without_a_sampler_is_refused_by_name():
