@@ -25,13 +25,14 @@ from risk_sac.scenario.families import density_of
 from risk_sac.verdicts.distinct import DistinctFailures
 
 CLASS = re.compile(r"[\w.]+:\w+")  # matches module:Class, which `risk_sac.egos.serve` takes and no campaign
+
 # Field of a budget → its flag's type, metavar and help.
 BUDGET: Mapping[str, tuple[type, str, str]] = {
     "episodes": (int, "N", "search episodes of a run (default: 300)"),
     "evaluation_episodes": (int, "N", "episodes of the frozen policy (default: 0)"),
     "cpu_s": (float, "S", "processor time after which a search ends (default: none)"),
     "least_episodes": (int, "N", "search episodes that --cpu-s does not cut off (default: 1)"),
-    "batch": (int, "Q", "episodes that are asked for at a time and played in parallel (default: 1)"),
+    "batch": (str, "Q", "episodes that are played in parallel, or auto: two per processor (default: 1)"),
 }
 
 

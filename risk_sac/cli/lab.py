@@ -55,6 +55,8 @@ def add_benchmark(commands: Commands) -> None:
     parser.group("budget").add_argument(
         "--steps", type=number(int, 1, 10_000_000), default=STEPS, metavar="N", help=steps
     )
+    batch = "episodes of a round; another one needs another DIR (default: %(default)s)"
+    search.add_argument("--batch", type=number(int, 1, 1024), default=1, metavar="Q", help=batch)
     jobs = "runs at a time (default: one per core)"
     parser.group("execution").add_argument("--jobs", type=number(int, 1, 1000), metavar="N", help=jobs)
     shown = "write the tables of the runs that have ended so far; play nothing"
@@ -94,6 +96,7 @@ def _benchmark(options: argparse.Namespace) -> int:
         defects=tuple(test_set if options.test_set else options.defects or DEFECTS),
         seeds=tuple(range(options.first_seed, options.first_seed + options.seeds)),
         budget_steps=options.steps,
+        batch=options.batch,
     )
     detections, written_s = ended(benchmark, options.out), -math.inf
     if not options.tables_only:

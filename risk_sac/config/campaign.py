@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
 from risk_sac.config.base import Settings
 from risk_sac.config.boundary import BoundaryConfig, ParameterName
@@ -19,6 +19,7 @@ from risk_sac.config.methods import IID_METHODS, MethodName, RunMethod, method_o
 from risk_sac.config.odd import Odd
 from risk_sac.config.story import DeviationBounds
 from risk_sac.errors import ConfigError
+from risk_sac.host.machine import cores
 
 FamilyName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,59}$")]
 """A scenario that ships, or one that a library of scenarios keeps; its last digits are of its document and nets."""
@@ -26,6 +27,19 @@ Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
 MOST_EPISODES = 2_000_000  # of a campaign; the database takes about 1.2 KB for each
 MOST_FAMILIES = 100  # of a campaign
 Identifier = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
+
+
+def _batch(given: object) -> object:
+    """Returns the number that `auto` means on this machine, and anything else as it is."""
+    return min(AUTO_EACH * cores(), MOST_BATCH) if given == "auto" else given
+
+
+AUTO_EACH, MOST_BATCH = 2, 1024  # episodes of a round: for each processor if it is `auto`, and at most
+Batch = Annotated[
+    int,
+    Field(ge=1, le=MOST_BATCH),
+    BeforeValidator(_batch, json_schema_input_type=Annotated[int, Field(ge=1, le=MOST_BATCH)] | Literal["auto"]),
+]
 
 
 class Requirement(Settings):
@@ -59,9 +73,10 @@ class Budget(Settings):
     """Whether `story-sweep` has to play every point of the grid; it is refused if these are more than `episodes`.
     False: where they are more, it plays a stratified sample of `episodes` points."""
 
-    batch: Annotated[int, Field(ge=1, le=1024)] = 1
-    """Episodes that are asked for at a time, and played in parallel; at most 16 for each processor. The results depend
-    on it, and on nothing else of how they are played. A policy plays a round as it was when the round was asked for."""
+    batch: Batch = 1
+    """Episodes that are asked for at a time, and played in parallel; at most 16 for each processor. `auto`: two for
+    each processor, as a number from then on. The results depend on it, and on nothing else of how they are played. A
+    policy plays a round as it was when the round was asked for."""
 
     @model_validator(mode="after")
     def _least_is_affordable(self) -> Self:

@@ -121,7 +121,7 @@ def first_detection(spec: RunSpec, folder: Path, budget_steps: int) -> Detection
 
 
 def _play(spec: RunSpec, folder: Path, budget_steps: int, before: Detection | None) -> Detection:
-    spec = spec.model_copy(update={"budget": Budget(episodes=MOST_EPISODES)})
+    spec = spec.model_copy(update={"budget": Budget(episodes=MOST_EPISODES, batch=spec.budget.batch)})
     seen = _Candidates(budget_steps, judged=before.episodes if before else 0)
     episode, refuted, failure = None, before.refuted if before else 0, None
     while episode is None:
@@ -171,6 +171,8 @@ class Benchmark:
     defects: tuple[str, ...]
     seeds: tuple[int, ...]
     budget_steps: int
+    batch: int = 1
+    """Episodes of a round; another batch needs another folder."""
 
     def __post_init__(self) -> None:
         """Refuses a method or defect that does not exist.
@@ -189,7 +191,11 @@ class Benchmark:
             for name in self.defects:
                 for method in self.methods:
                     yield RunSpec(
-                        family=DEFECTS[name].families[0], method=method, seed=seed, ego=pinned(ego_with(name))
+                        family=DEFECTS[name].families[0],
+                        method=method,
+                        seed=seed,
+                        budget=Budget(episodes=MOST_EPISODES, batch=self.batch),
+                        ego=pinned(ego_with(name)),
                     )
 
 

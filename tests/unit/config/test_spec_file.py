@@ -12,11 +12,12 @@ from pydantic import ValidationError
 from risk_sac.cli.campaigns.gate import GateBounds
 from risk_sac.cli.regress import read_baseline
 from risk_sac.client.transport import api_key
-from risk_sac.config import CampaignSpec, EgoConfig, Interval
+from risk_sac.config import Budget, CampaignSpec, EgoConfig, Interval
 from risk_sac.config.spec_file import campaign_yaml, read_campaign, read_ego, read_spec
 from risk_sac.egos.registry import card_of
 from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Regression
+from risk_sac.host.machine import cores
 
 FLAGS: dict[str, Any] = dict.fromkeys(("family", "method", "seed", "episodes", "evaluation_episodes"))
 
@@ -148,3 +149,9 @@ def test_an_unknown_behaviour_is_refused_by_its_field():
         read_spec(None, {"family": "low", "behaviour": "wild"})
     assert refused.value.field == "odd.dynamic.behaviour"
     assert "'ordinary', 'emergency' or 'extreme'" in str(refused.value)
+
+
+def test_a_batch_of_auto_is_two_episodes_for_each_processor_and_is_written_as_that_number():
+    budget = Budget.model_validate({"batch": "auto"})
+    assert budget.batch == 2 * cores()
+    assert Budget.model_validate_json(budget.model_dump_json()) == budget

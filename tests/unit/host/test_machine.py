@@ -9,7 +9,7 @@ import pytest
 import risk_sac.host.machine
 import risk_sac.world.jit
 from risk_sac.errors import ConfigError
-from risk_sac.host.machine import cores, user_cache
+from risk_sac.host.machine import MOST_EACH, ROLLOUTS, check_batch, cores, user_cache
 from risk_sac.scenario import library
 
 
@@ -53,6 +53,13 @@ def test_as_many_cores_are_used_as_affinity_and_quotas_allow(tmp_path, monkeypat
 
 def homeless() -> Path:
     raise RuntimeError("Could not determine home directory.")
+
+
+def test_a_round_of_more_than_sixteen_episodes_a_process_is_refused(monkeypatch):
+    monkeypatch.setenv(ROLLOUTS, str(2 * cores()))
+    check_batch(MOST_EACH * 2 * cores())
+    with pytest.raises(ConfigError, match=rf"budget\.batch.*{MOST_EACH * 2 * cores() + 1}.*{ROLLOUTS}"):
+        check_batch(MOST_EACH * 2 * cores() + 1)
 
 
 def test_a_user_without_a_home_has_no_cache_and_the_library_says_so(monkeypatch):
