@@ -56,6 +56,8 @@ class EgoCard(Settings):
     """Within which it responds to a danger, s."""
     deadline_s: Annotated[float, Field(gt=0, le=600)]
     """For each of its answers, s of real time; an episode in which it misses it is invalid."""
+    instances: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    """How many processes of one run may play it at a time; null: any number. A remote ego has one for each server."""
     summary: Annotated[str, Field(max_length=500)] = ""
     """In a sentence."""
 
@@ -163,14 +165,14 @@ def pinned(ego: EgoConfig) -> EgoConfig:
     return ego.model_copy(update={"version": version, "response_time_s": response_s})
 
 
-def servers(ego: EgoConfig) -> int | None:
-    """Counts the servers of a remote ego; None for an ego that any number of processes can play.
+def instances_of(ego: EgoConfig) -> int | None:
+    """Returns how many processes of a run may play an ego at a time; None for any number.
 
     Raises:
       ConfigError: there is no such driver.
     """
     card = None if ego.driver is None else card_of(ego.driver)
-    return len(card.addresses) if isinstance(card, RemoteCard) else None
+    return len(card.addresses) if isinstance(card, RemoteCard) else card and card.instances
 
 
 def load(ego: EgoConfig, server: int = 0) -> Guarded | None:
@@ -275,6 +277,7 @@ def _source(point: EntryPoint) -> Path:
 
 def _declared(source: bytes, name: str) -> dict[str, Any]:
     """The literals that a class declares of itself."""
+    names = "version", "response_time_s", "deadline_s", "instances"
     for node in ast.parse(source).body:
         if isinstance(node, ast.ClassDef) and node.name == name:
             return {"summary": (ast.get_docstring(node) or "").partition("\n")[0]} | {
@@ -282,7 +285,7 @@ def _declared(source: bytes, name: str) -> dict[str, Any]:
                 for each in node.body
                 if isinstance(each, ast.Assign) and isinstance(each.value, ast.Constant)
                 for target in each.targets
-                if isinstance(target, ast.Name) and target.id in ("version", "response_time_s", "deadline_s")
+                if isinstance(target, ast.Name) and target.id in names
             }
     raise SyntaxError(f"it has no class {name!r}")
 

@@ -85,8 +85,8 @@ class Ego(Protocol):
     """Driver in lock-step: one command for each perceived frame, which holds for one step.
 
     The class declares as literals, which are read without running it: `version`, `response_time_s` (within which it
-    responds to a danger, from which its requirements follow) and, if it is not 60, `deadline_s` for each answer. The
-    first line of its docstring is its summary.
+    responds to a danger, from which its requirements follow); if it is not 60, `deadline_s` for each answer; and, if a
+    run may not have any number of them, `instances`. The first line of its docstring is its summary.
     """
 
     def reset(self, episode: EpisodeStart) -> None:

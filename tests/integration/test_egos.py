@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from risk_sac import cli
-from risk_sac.config import EgoConfig, RunSpec
+from risk_sac.config import Budget, EgoConfig, RunSpec
 from risk_sac.egos.registry import card_of, cards, pinned
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.env.problem import Problem
@@ -17,6 +17,7 @@ from risk_sac.errors import CheckpointError, ConfigError, InfeasibleScene
 from risk_sac.execution.evaluate import run, verify
 from risk_sac.records import EpisodeRecord, Outcome
 from risk_sac.run_folder.results import RunResults
+from risk_sac.search.processes import processes_of
 from risk_sac.world.types import Frame
 from tests.ego_processes import CPP_COMPILES, served, served_by_cpp
 
@@ -203,6 +204,16 @@ def test_an_ego_s_card_is_read_without_running_it(install):
     assert (card.kind, card.response_time_s, card.summary) == ("python", 0.4, "Runs nowhere.")
     assert card in cards()
     assert pinned(EgoConfig(driver="example")).response_s == 0.4
+
+
+def test_an_ego_that_allows_two_instances_is_played_by_two_processes(install, monkeypatch, caplog):
+    monkeypatch.setenv("RISK_SAC_ROLLOUTS", "3")
+    rounds = spec_of("example").model_copy(update={"budget": Budget(episodes=8, batch=8)})
+    install()
+    assert processes_of(rounds) == 3
+    install(version='1"\n    instances = 2  # "')
+    assert processes_of(rounds) == 2
+    assert "the ego 'example' allows no more instances" in caplog.text
 
 
 def test_a_request_names_only_what_is_registered(client):

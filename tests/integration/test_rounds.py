@@ -262,4 +262,4 @@ def test_each_server_of_a_remote_ego_sees_the_episodes_of_one_process(
     assert not played[0] & played[1]
     assert len(played[0] | played[1]) == sum(record.outcome != "rejected" for record in listener.records)
     assert outcome.processes == 2
-    assert "rounds of 8 episodes are played by 2 process(es): the ego 'far' has no more servers" in caplog.text
+    assert "rounds of 8 episodes are played by 2 process(es): the ego 'far' allows no more instances" in caplog.text

@@ -3,7 +3,7 @@
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.egos.registry import card_of, servers
+from risk_sac.egos.registry import card_of, instances_of
 from risk_sac.egos.remote.addresses import addresses_of
 from risk_sac.errors import ConfigError
 
@@ -48,9 +48,9 @@ def test_a_card_counts_the_servers_of_its_ego(tmp_path, monkeypatch: pytest.Monk
     file = tmp_path / "egos.toml"
     monkeypatch.setenv("RISK_SAC_EGOS", str(file))
     file.write_text('[far]\naddress = "a:7000-7015"\nversion = "1"\nresponse_time_s = 1\n')
-    assert servers(EgoConfig(driver="far")) == 16
-    assert servers(EgoConfig(driver="r157")) is None
-    assert servers(EgoConfig()) is None
+    assert instances_of(EgoConfig(driver="far")) == 16
+    assert instances_of(EgoConfig(driver="r157")) is None
+    assert instances_of(EgoConfig()) is None
     assert "address" not in card_of("far").model_dump()
     file.write_text('[far]\naddress = "a:b"\nversion = "1"\nresponse_time_s = 1\n')
     with pytest.raises(ConfigError, match=r"RISK_SAC_EGOS: far\.address: got 'a:b'; wanted host:port"):
