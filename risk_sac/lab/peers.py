@@ -24,6 +24,10 @@ class Uniform:
         """Returns the next point."""
         return self._random.random(self._dimension)
 
+    def waits(self) -> bool:
+        """Whether it needs a score before the next point."""
+        return False
+
     def tell(self, point: Floats, score: float) -> None:
         """Learns nothing."""
 
@@ -44,6 +48,10 @@ class CrossEntropy:
         """Returns the next point."""
         buckets = np.array([self._random.choice(self.BUCKETS, p=shares) for shares in self._shares])
         return np.asarray((buckets + self._random.random(len(buckets))) / self.BUCKETS)
+
+    def waits(self) -> bool:
+        """Whether it needs a score before the next point."""
+        return False
 
     def tell(self, point: Floats, score: float) -> None:
         """Moves the histograms towards a failure."""
@@ -67,15 +75,20 @@ class Tpe:
         sampler = optuna.samplers.TPESampler(seed=_seed(seed), multivariate=True)
         self._study = optuna.create_study(sampler=sampler)
         self._names = [f"x{number}" for number in range(dimension)]
+        self._trials: deque[Any] = deque()
 
     def ask(self) -> Floats:
         """Returns the next point."""
-        self._trial = self._study.ask()
-        return np.array([self._trial.suggest_float(name, 0.0, 1.0) for name in self._names])
+        self._trials.append(self._study.ask())
+        return np.array([self._trials[-1].suggest_float(name, 0.0, 1.0) for name in self._names])
+
+    def waits(self) -> bool:
+        """Whether it needs a score before the next point."""
+        return False
 
     def tell(self, point: Floats, score: float) -> None:
         """Ends the trial."""
-        self._study.tell(self._trial, score)
+        self._study.tell(self._trials.popleft(), score)
 
 
 class CmaEs:
@@ -90,17 +103,23 @@ class CmaEs:
         self._dimension, self._random = dimension, np.random.default_rng(seed)
         self._strategy: Any = None
         self._queue: deque[Floats] = deque()
+        self._out: deque[Floats] = deque()
         self._told: list[tuple[Floats, float]] = []
 
     def ask(self) -> Floats:
         """Returns the next point."""
         if not self._queue:
             self._next_generation()
-        return self._queue[0]
+        self._out.append(self._queue.popleft())
+        return self._out[-1]
+
+    def waits(self) -> bool:
+        """Whether it needs a score before the next point."""
+        return bool(self._out) and not self._queue
 
     def tell(self, point: Floats, score: float) -> None:
         """Learns from a whole generation."""
-        self._told.append((self._queue.popleft(), score))
+        self._told.append((self._out.popleft(), score))
 
     def _normal(self, *shape: int) -> Floats:
         return self._random.standard_normal(shape)
@@ -140,6 +159,7 @@ class Nsga2:
         self._algorithm.setup(self._problem, termination=NoTermination(), seed=_seed(seed), verbose=False)
         self._population: Any = None
         self._queue: deque[Floats] = deque()
+        self._out = 0
         self._objectives: list[tuple[float, float]] = []
         self._failures: deque[Floats] = deque(maxlen=self.REMEMBERED)
 
@@ -147,11 +167,16 @@ class Nsga2:
         """Returns the next point."""
         if not self._queue:
             self._next_generation()
-        return np.clip(self._queue[0], 0.0, 1.0)
+        self._out += 1
+        return np.clip(self._queue.popleft(), 0.0, 1.0)
+
+    def waits(self) -> bool:
+        """Whether it needs a score before the next point."""
+        return self._out > 0 and not self._queue
 
     def tell(self, point: Floats, score: float) -> None:
         """Learns from a whole generation."""
-        self._queue.popleft()
+        self._out -= 1
         distance = min((float(np.linalg.norm(point - other)) for other in self._failures), default=1.0)
         self._objectives.append((score, -distance))
         if score < FAILED:

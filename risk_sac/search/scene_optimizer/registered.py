@@ -1,7 +1,7 @@
 """Samplers of the user's: they propose scenes and scripts, and minimise a score."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -23,14 +23,16 @@ PASSED = 0.05  # lowest score of a pass
 class Sampler(Protocol):
     """Proposes points of the unit cube and learns from their scores.
 
-    The same calls in the same order have to lead to the same points: an interrupted run repeats them.
+    The same calls in the same order have to lead to the same points: an interrupted run repeats them. In rounds, a
+    sampler with a method `waits()` is asked again, until that is true, before it is told; answers come in the order of
+    the points.
     """
 
     def ask(self) -> Floats:
         """Returns the next point, `d`, in [0, 1]."""
 
     def tell(self, point: Floats, score: float) -> None:
-        """Learns the score of the point that was asked for last; smaller is better, below 0 the ego failed."""
+        """Learns a point's score; smaller is better, below 0 the ego failed."""
 
 
 SamplerClass = Callable[[int, int], Sampler]
@@ -58,13 +60,6 @@ def score_of(encounter: Encounter) -> float:
     return PASSED + 0.5 * min(max(margin / MARGIN, 0.0), 1.0) + 0.5 * min(max(near_s / NEAR_S, 0.0), 1.0)
 
 
-class _Asked(NamedTuple):
-    """A point that was asked for, and its score."""
-
-    point: Floats
-    score: float
-
-
 class RegisteredSampler(SceneOptimizer):
     """Asks a registered sampler for scenes and scripts.
 
@@ -83,12 +78,15 @@ class RegisteredSampler(SceneOptimizer):
         """
         super().__init__(dimension, config, seed)
         self._method = method
-        self._told: list[_Asked] = []
+        self._calls: list[tuple[list[float], float] | None] = []  # None: `ask`
         self._sampler = self._made()
 
     def waits(self, out: int) -> bool:
-        """See `SceneOptimizer.waits`: a sampler knows of one point at a time."""
-        return out > 0
+        """See `SceneOptimizer.waits`: by default a sampler knows of one point at a time."""
+        if out == 0:
+            return False
+        waits = getattr(self._sampler, "waits", None)
+        return waits is None or bool(self._call("waits", waits))
 
     def ask(self) -> Floats:
         """See `SceneOptimizer.ask`.
@@ -97,28 +95,32 @@ class RegisteredSampler(SceneOptimizer):
           ConfigError: the sampler raised, or its answer is no point of the unit cube.
         """
         point = np.array(self._call("ask", self._sampler.ask), dtype=np.float64)
+        self._calls.append(None)
         if point.shape != (self._dimension,) or not ((point >= 0.0) & (point <= 1.0)).all():
             got = f"{point.tolist()} from {self._method!r}"
             raise ConfigError(f"{GROUP}: ask", got, f"{self._dimension} coordinates in [0, 1]")
         return point
 
     def _learn(self, point: Floats, mean_return: float | None, score: float | None, encounter: Encounter) -> None:
-        told = REFUSED if mean_return is None else score_of(encounter)
-        self._told.append(_Asked(point, told))
-        self._call("tell", lambda: self._sampler.tell(point, told))
+        self._tell(point, REFUSED if mean_return is None else score_of(encounter))
+
+    def _tell(self, point: Floats, score: float) -> None:
+        self._calls.append((point.tolist(), score))
+        self._call("tell", lambda: self._sampler.tell(point, score))
 
     def state(self) -> State:
         """See `SceneOptimizer.state`: all calls, since a sampler need not be able to say where it is."""
-        return {**super().state(), "told": [(asked.point.tolist(), asked.score) for asked in self._told]}
+        return {**super().state(), "calls": list(self._calls)}
 
     def load(self, state: State) -> None:
         """See `SceneOptimizer.load`; repeats the calls."""
         super().load(state)
-        self._told, self._sampler = [], self._made()
-        for point, score in state["told"]:
-            self.ask()
-            self._told.append(_Asked(np.array(point), score))
-            self._call("tell", lambda: self._sampler.tell(self._told[-1].point, self._told[-1].score))
+        self._calls, self._sampler = [], self._made()
+        for call in state["calls"]:
+            if call is None:
+                self.ask()
+            else:
+                self._tell(np.array(call[0]), call[1])
 
     def _made(self) -> Sampler:
         point = sampler_of(self._method)

@@ -89,6 +89,34 @@ def test_a_sampler_that_ships_stays_in_the_cube_and_goes_on_where_it_was(method)
             one.tell(point, None if point[0] > 0.9 else 0.1, near(point))
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_sampler_that_ships_plays_rounds_and_goes_on_between_them(method):
+    first, out, points = sampler(method), [], 0
+    for _ in range(20):
+        while len(out) < 8 and not first.waits(len(out)):
+            out.append(first.ask())
+        points += len(out)
+        again = sampler(method)
+        again.load(first.state())
+        assert len(np.unique(out, axis=0)) == len(out)
+        for _ in range(min(len(out), 5)):
+            point = out.pop(0)
+            for one in (first, again):
+                one.tell(point, 0.1, near(point))
+        assert first.state() == again.state()
+        if not first.waits(len(out)):
+            out.append(first.ask())
+            np.testing.assert_array_equal(again.ask(), out[-1])
+    assert points > 60  # several at a time
+
+
+def test_a_sampler_that_does_not_say_so_plays_one_point_at_a_time(monkeypatch):
+    monkeypatch.setitem(SHIPPED, "bad", (f"{__name__}:Raises", ""))
+    one = sampler("sampler-bad")
+    assert not one.waits(0)
+    assert one.waits(1)
+
+
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "sampler-uniform"])
 def test_a_sampler_that_ships_finds_more_than_uniform_points(method):
     def failures(name: str) -> int:
