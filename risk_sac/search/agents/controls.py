@@ -190,8 +190,12 @@ CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
 
 
 def control(method: RunMethod, family: Family, seed: int) -> Control:
-    """Makes the agent of a method that does not learn."""
+    """Makes the agent of a method that does not learn, or of a peer that does."""
     agent = method_of(method).agent
+    if agent in ("stress-sac", "stress-ppo"):
+        from risk_sac.search.agents.stress import StressPpo, StressSac  # here, because it is an extra
+
+        return (StressSac if agent == "stress-sac" else StressPpo)(2 * len(family.adversaries), seed)
     return ScriptFollower(family) if agent == "scripts" else CONTROLS[agent](2 * len(family.adversaries), seed)
 
 
