@@ -15,10 +15,9 @@ import io
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import get_args
 
 from risk_sac.config import MethodName, RunSpec
-from risk_sac.egos.defects.catalogue import DEFECTS, Defect, Tier, version_of
+from risk_sac.egos.defects.catalogue import DEFECTS, Tier, version_of
 from risk_sac.egos.registry import pinned
 from risk_sac.errors import RiskSacError
 from risk_sac.lab.benchmark.runs import ANSWER, Benchmark, Detection, ego_with, ended, first_detection, folder_of
@@ -74,27 +73,25 @@ def tier_of(detected: int, runs: int) -> Tier:
 def tier_rows(out: Path) -> Iterator[tuple[object, ...]]:
     """Yields a row of tiers.csv for each conjunction of which OUT has runs of random search.
 
-    The test set is every second of a tier by name. The last columns are of the quickest detection by any search.
+    The last columns are of the quickest detection by any search.
     """
-    tiers: dict[Tier, list[tuple[Defect, list[Detection]]]] = {tier: [] for tier in get_args(Tier)}
-    for name in sorted(name for name, defect in DEFECTS.items() if defect.when):
-        files = sorted(out.glob(f"{name}-{version_of(ego_with(name))}-*/{ANSWER}"))
+    for name, defect in sorted(DEFECTS.items()):
+        version = version_of(ego_with(name))
+        files = sorted(out.glob(f"{name}-{version}-*/{ANSWER}")) if defect.when else []
         runs = [Detection.model_validate_json(file.read_bytes()) for file in files]
-        if random := [run for run in runs if run.method == "random"]:
-            tier = tier_of(sum(run.detected is not None for run in random), len(random))
-            tiers[tier].append((DEFECTS[name], runs))
-    for tier, defects in tiers.items():
-        for place, (defect, runs) in enumerate(defects):
-            random = [run for run in runs if run.method == "random"]
-            clean = [run for run in runs if run.method == UNDISTURBED]
-            found = [(run.detected, run.method, run.seed) for run in runs if run.detected is not None]
-            quickest = min(found, default=("", "", ""))
-            yield (
-                *(defect.name, version_of(ego_with(defect.name)), defect.families[0], defect.base, tier, place % 2),
-                *(len(random), sum(run.detected is not None for run in random), random[0].budget_steps),
-                *(sum(run.episodes for run in clean), sum(run.detected is not None for run in clean)),
-                *(quickest[1], quickest[2], quickest[0]),
-            )
+        random = [run for run in runs if run.method == "random"]
+        if not random:
+            continue
+        clean = [run for run in runs if run.method == UNDISTURBED]
+        detected = sum(run.detected is not None for run in random)
+        found = [(run.detected, run.method, run.seed) for run in runs if run.detected is not None]
+        quickest = min(found, default=("", "", ""))
+        yield (
+            *(name, version, defect.families[0], defect.base, tier_of(detected, len(random)), int(defect.test_set)),
+            *(len(random), detected, min(run.budget_steps for run in random)),
+            *(sum(run.episodes for run in clean), sum(run.detected is not None for run in clean)),
+            *(quickest[1], quickest[2], quickest[0]),
+        )
 
 
 def write(file: Path, columns: Sequence[str], lines: Sequence[tuple[object, ...]]) -> None:

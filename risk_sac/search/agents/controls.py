@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from risk_sac.scenario.family import Family
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.scripts import SIZE, Genes, Seen, act, adversaries_seen, cue, is_over
 from risk_sac.world.types import STEP_S, Floats, Vector
+
+if TYPE_CHECKING:
+    from risk_sac.search.agents.stress import StressPpo, StressSac
 
 REDRAWN = 0.1  # share of steps in which an adversary's action is drawn again: it holds for a second on average
 AHEAD_M = 5.0  # between the centres: the ego's length
@@ -181,7 +184,7 @@ class ScriptFollower(NonLearner):
         self.can_stop_early = over or self._behind >= BEHIND_STEPS or self._standing >= STANDING_STEPS
 
 
-Control = IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
+Control = Union[IdleAgent, RandomAgent, ScriptedAgent, ScriptFollower, "StressSac", "StressPpo"]
 CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
     "scripted": ScriptedAgent,
     "random": RandomAgent,

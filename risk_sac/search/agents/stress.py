@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3 import PPO, SAC
-from stable_baselines3.common.buffers import BaseBuffer
 from stable_baselines3.common.logger import Logger
 
 from risk_sac.errors import NotFinite
@@ -72,12 +71,12 @@ class StressAgent(NonLearner):
         buffer = self._buffer
         size = SAC_CAPACITY if buffer.full else buffer.pos
         return {
-            "sizes": self._model.observation_space.shape,
+            "observation_size": self._model.observation_space.shape[0],
             "parameters": copy.deepcopy(self._model.get_parameters()),
             "arrays": {name: getattr(buffer, name)[:size].copy() for name in self.arrays},
             "buffer": (buffer.pos, buffer.full),
             "torch": self._torch,
-            "numpy": self._numpy.get_state(legacy=True)[1:3],
+            "numpy": self._numpy.get_state(legacy=False),
             "updates": self._model._n_updates,
             "log_temperature": self._temperature.detach().clone(),
         }
@@ -87,15 +86,14 @@ class StressAgent(NonLearner):
         if not state:
             return
         with self._noise():
-            self._model = self._make(SpacesOnly(*state["sizes"], self._action_size))
+            self._model = self._make(SpacesOnly(state["observation_size"], self._action_size))
         self._model.set_parameters(copy.deepcopy(state["parameters"]))
         for name, values in state["arrays"].items():
             getattr(self._buffer, name)[: len(values)] = values
         self._buffer.pos, self._buffer.full = state["buffer"]
         self._temperature.data.copy_(state["log_temperature"])
-        keys, place = state["numpy"]
         self._torch = state["torch"]
-        self._numpy.set_state(("MT19937", keys, place))
+        self._numpy.set_state(state["numpy"])
         self._model._n_updates = state["updates"]
 
     def _flush(self, *, ended: bool) -> None:
@@ -142,7 +140,7 @@ class StressAgent(NonLearner):
     def _make(self, spaces: SpacesOnly) -> Any:
         raise NotImplementedError
 
-    def _decide(self, observation: Vector, explore: bool) -> tuple[Vector, Any]:
+    def _decide(self, observation: Vector, explore: bool) -> tuple[Floats | Vector, Any]:
         raise NotImplementedError
 
     def _learn(self, transition: Transition, told: Any, reward: float, ended: bool) -> None:
@@ -155,7 +153,7 @@ class StressSac(StressAgent):
     arrays = SAC_ARRAYS
 
     @property
-    def _buffer(self) -> BaseBuffer:
+    def _buffer(self) -> Any:
         return self._model.replay_buffer
 
     def _make(self, spaces: SpacesOnly) -> SAC:
@@ -163,7 +161,7 @@ class StressSac(StressAgent):
         model.set_logger(Logger(None, []))
         return model
 
-    def _decide(self, observation: Vector, explore: bool) -> tuple[Vector, Any]:
+    def _decide(self, observation: Vector, explore: bool) -> tuple[Floats | Vector, Any]:
         if explore and not self._buffer.full and self._buffer.pos < self._model.learning_starts:
             return np.random.uniform(-1.0, 1.0, self._action_size), None  # noqa: NPY002
         return self._model.predict(observation, deterministic=not explore)[0], None
@@ -182,7 +180,7 @@ class StressPpo(StressAgent):
     arrays = PPO_ARRAYS
 
     @property
-    def _buffer(self) -> BaseBuffer:
+    def _buffer(self) -> Any:
         return self._model.rollout_buffer
 
     def _make(self, spaces: SpacesOnly) -> PPO:
@@ -190,7 +188,7 @@ class StressPpo(StressAgent):
         model.set_logger(Logger(None, []))
         return model
 
-    def _decide(self, observation: Vector, explore: bool) -> tuple[Vector, Any]:
+    def _decide(self, observation: Vector, explore: bool) -> tuple[Floats | Vector, Any]:
         with torch.no_grad():
             action, value, log_prob = self._model.policy(torch.as_tensor(observation)[None], deterministic=not explore)
         return action[0].numpy(), (action.numpy(), value, log_prob)
