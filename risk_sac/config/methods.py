@@ -142,7 +142,7 @@ METHODS: dict[OwnMethod, Method] = {
         agent="sb3",
         scenes="botorch",
         needs="stable_baselines3",
-        summary="Control: the update of Stable-Baselines3's SAC in the place of ours; needs the `dev` extra.",
+        summary="Control: the update of Stable-Baselines3's SAC in the place of ours; needs the `peers` extra.",
     ),
     "ast-sac": Method(
         agent="stress-sac",
