@@ -18,6 +18,8 @@ OwnMethod = Literal[
     "sac-lag",
     "sac",
     "sb3-sac",
+    "ast-sac",
+    "ast-ppo",
     "ddpg-lag",
     "ddpg",
     "archive",
@@ -59,10 +61,10 @@ RunMethod = Annotated[OwnMethod | IidName | SamplerMethod, *_named(*get_args(Own
 class Method(Settings):
     """One row of the table of methods."""
 
-    agent: Literal["sac", "ddpg", "sb3", "scripts", "scripted", "random", "none"]
+    agent: Literal["sac", "ddpg", "sb3", "stress-sac", "stress-ppo", "scripts", "scripted", "random", "none"]
     """`scripts`: each adversary follows a script whose genes are searched with the scene; `scripted`: cuts in and
     brakes, or keeps on; `random`: uniform actions, held for a while; `none`: SUMO drives the adversary vehicles,
-    pedestrians stand."""
+    pedestrians stand; `stress-…`: adaptive stress testing by an agent of Stable-Baselines3."""
     lagrangian: bool = False
     """Whether λ follows the realism cost; without it λ stays 0."""
     shaping: bool = False
@@ -90,8 +92,8 @@ class Method(Settings):
 
     @property
     def in_rounds(self) -> bool:
-        """Whether several of its episodes can be asked for at a time; a registered sampler knows of one."""
-        return self.scenes != "registered"
+        """Whether several of its episodes can be asked for at a time; a registered sampler and a peer know of one."""
+        return self.scenes != "registered" and not self.agent.startswith("stress")
 
     @property
     def learns(self) -> bool:
@@ -140,7 +142,17 @@ METHODS: dict[OwnMethod, Method] = {
         agent="sb3",
         scenes="botorch",
         needs="stable_baselines3",
-        summary="Control: the update of Stable-Baselines3's SAC in the place of ours; needs the `dev` extra.",
+        summary="Control: the update of Stable-Baselines3's SAC in the place of ours; needs the `peers` extra.",
+    ),
+    "ast-sac": Method(
+        agent="stress-sac",
+        needs="stable_baselines3",
+        summary="Peer: adaptive stress testing by Stable-Baselines3's SAC with its defaults; needs the `peers` extra.",
+    ),
+    "ast-ppo": Method(
+        agent="stress-ppo",
+        needs="stable_baselines3",
+        summary="Peer: adaptive stress testing by Stable-Baselines3's PPO with its defaults; needs the `peers` extra.",
     ),
     "ddpg-lag": Method(agent="ddpg", lagrangian=True, scenes="botorch", summary="DDPG under the realism constraint."),
     "ddpg": Method(agent="ddpg", scenes="botorch", summary="Plain DDPG on the risk reward."),

@@ -380,4 +380,4 @@ def check_installed(method: MethodName) -> None:
         sampler_of(method)
     needed = method_of(method).needs
     if needed and find_spec(needed) is None:
-        raise ConfigError("methods", f"{method!r}, which needs {needed}", remedy="pip install 'risk-sac[dev]'")
+        raise ConfigError("methods", f"{method!r}, which needs {needed}", remedy="pip install 'risk-sac[peers]'")

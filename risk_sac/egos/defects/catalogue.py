@@ -16,11 +16,13 @@ from typing import Literal
 import numpy as np
 
 from risk_sac.config import EgoConfig, Settings
+from risk_sac.egos.defects.conjunction import Condition, Conditional
 from risk_sac.egos.seam import Command, Ego, EpisodeStart, Perceived, Trajectory
 from risk_sac.errors import ConfigError
 
 HERE = Path(__file__).parent
 HASH_DIGITS = 12
+Tier = Literal["easy", "medium", "hard"]
 DefectKind = Literal["perception", "memory", "prediction", "planning", "control", "sumo"]
 
 
@@ -50,17 +52,28 @@ class Defect(Settings):
     """Class in the module of its kind."""
     settings: Mapping[str, float] = {}
     """Of SUMO's driver, see `risk_sac.sim.roads`."""
+    when: Condition | None = None
+    """Makes it a conjunction: when it acts, and on which of the others."""
+    ego: str = "idm-aeb"
+    """Registered ego that it is studied with."""
+    tier: Tier | None = None
+    """How hard random search finds a conjunction, by `report/measured/tiers.csv`."""
 
     @property
     def base(self) -> str:
         """The ego that it is studied with, as `--ego` names it."""
-        return "default" if self.kind == "sumo" else "idm-aeb"
+        return "default" if self.kind == "sumo" else self.ego
 
     @property
     def fingerprint(self) -> bytes:
         """Bytes that determine its effect: its row, and the code of its kind."""
         sources = [] if self.kind == "sumo" else [HERE / "defective.py", HERE / f"{self.kind}.py"]
-        row = self.model_dump_json(exclude={"sentence", "families", "test_set"}).encode()
+        told = {"sentence", "families", "test_set", "ego", "tier"}
+        if self.when is None:
+            told.add("when")  # as before there were conjunctions
+        else:
+            sources.append(HERE / "conjunction.py")
+        row = self.model_dump_json(exclude=told).encode()
         return b"\0".join([row, *(source.read_bytes() for source in sources)])
 
 
@@ -123,7 +136,10 @@ class Planted:
         self._sound, self._ego = make(), make()
         for defect in defects:
             decorator = getattr(import_module(f"risk_sac.egos.defects.{defect.kind}"), defect.decorator)
-            self._ego = decorator(self._ego, defect.parameter.value)
+            if defect.when is None:
+                self._ego = decorator(self._ego, defect.parameter.value)
+            else:
+                self._ego = Conditional(self._ego, decorator, defect.parameter.value, defect.when)
 
     def reset(self, episode: EpisodeStart) -> None:
         """Begins an episode."""

@@ -10,12 +10,13 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from risk_sac.config import RunMethod
-from risk_sac.egos.defects.catalogue import DEFECTS
+from risk_sac.egos.defects.catalogue import DEFECTS, Tier
 from risk_sac.failures.from_above import canvas, picture
 from risk_sac.lab.benchmark.runs import Detection
 from risk_sac.lab.benchmark.statistics import MethodSummary, balanced, friedman, restricted_means, summaries, survival
@@ -67,14 +68,20 @@ LEGEND = (
 
 
 def sections(detections: Sequence[Detection]) -> dict[str, list[Detection]]:
-    """Returns the runs of the test set and of all defects.
+    """Returns the runs of the test set, of each tier of it, and of all defects.
 
     Only tasks that every method has played count.
     """
     compared = balanced(detections)
-    test_set = [each for each in compared if all(DEFECTS[name].test_set for name in each.defects)]
-    others = len(compared) > len(test_set)
-    return ({"test-set": test_set} if test_set else {}) | ({"all": compared} if others else {})
+    test_set = [run for run in compared if all(DEFECTS[name].test_set for name in run.defects)]
+    named = {"test-set": test_set, **{f"{tier}-test-set": _of_tier(test_set, tier) for tier in get_args(Tier)}}
+    if len(compared) > len(test_set):
+        named["all"] = compared
+    return {name: runs for name, runs in named.items() if runs}
+
+
+def _of_tier(detections: Sequence[Detection], tier: Tier) -> list[Detection]:
+    return [run for run in detections if all(DEFECTS[name].tier == tier for name in run.defects)]
 
 
 def methods_table(detections: Sequence[Detection]) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from risk_sac.scenario.family import Family
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.scripts import SIZE, Genes, Seen, act, adversaries_seen, cue, is_over
 from risk_sac.world.types import STEP_S, Floats, Vector
+
+if TYPE_CHECKING:
+    from risk_sac.search.agents.stress import StressPpo, StressSac
 
 REDRAWN = 0.1  # share of steps in which an adversary's action is drawn again: it holds for a second on average
 AHEAD_M = 5.0  # between the centres: the ego's length
@@ -181,7 +184,7 @@ class ScriptFollower(NonLearner):
         self.can_stop_early = over or self._behind >= BEHIND_STEPS or self._standing >= STANDING_STEPS
 
 
-Control = IdleAgent | RandomAgent | ScriptedAgent | ScriptFollower
+Control = Union[IdleAgent, RandomAgent, ScriptedAgent, ScriptFollower, "StressSac", "StressPpo"]
 CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
     "scripted": ScriptedAgent,
     "random": RandomAgent,
@@ -190,8 +193,12 @@ CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
 
 
 def control(method: RunMethod, family: Family, seed: int) -> Control:
-    """Makes the agent of a method that does not learn."""
+    """Makes the agent of a method that does not learn, or of a peer that does."""
     agent = method_of(method).agent
+    if agent in ("stress-sac", "stress-ppo"):
+        from risk_sac.search.agents.stress import StressPpo, StressSac  # here, because it is an extra
+
+        return (StressSac if agent == "stress-sac" else StressPpo)(2 * len(family.adversaries), seed)
     return ScriptFollower(family) if agent == "scripts" else CONTROLS[agent](2 * len(family.adversaries), seed)
 
 

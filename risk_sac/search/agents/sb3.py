@@ -29,7 +29,7 @@ from risk_sac.search.frozen_policy import FrozenPolicy
 from risk_sac.world.types import Floats, Vector
 
 
-class _Spaces(gym.Env[Vector, Vector]):
+class SpacesOnly(gym.Env[Vector, Vector]):
     """Spaces from which a model is built; it is never stepped."""
 
     def __init__(self, observation_size: int, action_size: int) -> None:
@@ -56,7 +56,7 @@ class Sb3Agent:
         with self._noise():
             self._model = SAC(
                 "MlpPolicy",
-                _Spaces(observation_size, action_size),
+                SpacesOnly(observation_size, action_size),
                 learning_rate=config.actor_learning_rate,
                 buffer_size=1,
                 batch_size=config.batch_size,

@@ -49,6 +49,8 @@ EPISODE_COST: Mapping[str, float] = {
     "sac-lag": 9.0,
     "sac": 9.0,
     "sb3-sac": 14.0,
+    "ast-sac": 30.0,
+    "ast-ppo": 3.0,
     "ddpg-lag": 8.5,
     "ddpg": 8.5,
     "bo-only": 1.3,

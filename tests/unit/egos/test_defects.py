@@ -13,6 +13,9 @@ import pytest
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.egos.defects.catalogue import DEFECTS, Planted, planted, version_of
+from risk_sac.egos.defects.conjunction import Condition, Conditional
+from risk_sac.egos.defects.perception import ShortSight
+from risk_sac.egos.defects.planning import LateBraking
 from risk_sac.egos.registry import pinned
 from risk_sac.egos.seam import Command, Control, EpisodeStart, Perceived, Vehicle
 from risk_sac.egos.shipped import IdmAeb
@@ -23,7 +26,10 @@ Actor = tuple[str, tuple[Kind, float, float], float, float, float, float]
 """Name, body, m ahead of the ego's centre, m to its left, velocity along and across, m/s."""
 ADMISSION = Path(__file__).parents[3] / "risk_sac/report/measured/admission.csv"  # of risk_sac.lab.figures.defects
 LEAST_SCENES = 500
+TIERS = ADMISSION.with_name("tiers.csv")
+LEAST_CONJUNCTION_SCENES = 40
 PYTHON = [name for name, defect in DEFECTS.items() if defect.kind != "sumo"]
+CONJUNCTIONS = {name for name, defect in DEFECTS.items() if defect.when}
 
 
 def seen(*actors: Actor, time_s: float = 1.5, speed: float = 10.0, turn: float = 0.0, **changes: Any) -> Perceived:
@@ -235,6 +241,69 @@ def test_actuators_do_less_and_later():
     assert begun("steers-aside", Listener(Control(1.0, 0.1))).act(seen()) == Control(1.0, pytest.approx(0.07))
 
 
+def conditional(frames: Sequence[Perceived], grip: float = 9.81, **condition: Any) -> list[Sequence[str]]:
+    """Others that an ego still sees which is blind under a condition."""
+    ego = Listener()
+    blind = Conditional(ego, ShortSight, 0.0, Condition(**condition))
+    vehicle = Vehicle(length_m=4.6, width_m=1.85, grip_mps2=grip)
+    for _ in range(2):  # each episode begins anew
+        ego.seen.clear()
+        blind.reset(EpisodeStart(seed=0, net="", route=(), vehicle=vehicle, step_s=0.1))
+        for frame in frames:
+            blind.act(frame)
+    return [frame.ids[1:] for frame in ego.seen]
+
+
+BIKE = (Kind.VEHICLE, 2.2, 0.9)
+
+
+@pytest.mark.parametrize(
+    ("condition", "acts", "does_not"),
+    [
+        ({"ego_mps": (8.0, 11.0)}, {}, {"speed": 12.0}),
+        ({"friction": (0.0, 0.7)}, {"friction": 0.6}, {"friction": 0.8}),
+        ({"turning": True}, {"bent": 0.4}, {"bent": 0.1}),
+        ({"turning": True}, {"bent": -0.4}, {"bent": -0.1}),
+        ({"bodies": ("motorcycle",)}, {"body": BIKE}, {"body": CAR}),
+        ({"other_mps": (0.0, 6.0)}, {"along": -5.0}, {"along": -7.0}),
+        ({"side": "left"}, {"left": 3.0}, {"left": -3.0}),
+        ({"way": "oncoming"}, {"along": -5.0}, {"along": 5.0}),
+        ({"way": "crossing"}, {"along": 0.0, "across": 5.0}, {"along": -5.0}),
+        ({"side": "right", "ego_mps": (8.0, 11.0)}, {"left": -3.0}, {"left": -3.0, "speed": 12.0}),
+    ],
+)
+@pytest.mark.parametrize("turn", [0.0, 2.5])
+def test_a_conjunction_acts_only_where_all_of_its_condition_holds(condition, acts, does_not, turn):
+    def left_over_where(speed=10.0, friction=1.0, bent=0.0, body=CAR, along=9.0, across=0.0, left=0.0):
+        frame = seen(("other", body, 20.0, left, along, across), speed=speed, turn=turn)
+        path = frame.path.copy()
+        path[3] += bent
+        return conditional([frame._replace(path=path)], friction * 9.81, **condition)
+
+    assert left_over_where(**acts) == [()]
+    assert left_over_where(**does_not) == [("other",)]
+
+
+def test_a_conjunction_acts_after_a_stop_and_after_hiding_and_on_the_second_in_a_lane():
+    frames = [seen(car(20.0), speed=speed, time_s=1.5 + k / 10) for k, speed in enumerate((5.0, 0.2, 5.0))]
+    assert conditional(frames, stopped=True) == [("car",), (), ()]
+    truck = ("truck", TRUCK, 15.0, -3.0, 0.0, 0.0)
+    hidden = [seen(truck, walker(30.0, -6.0 + 12.0 * (k > 3)), time_s=1.5 + k / 10) for k in range(6)]
+    assert [len(ids) for ids in conditional(hidden, hidden_s=0.25)] == [2, 2, 2, 2, 1, 1]
+    assert [len(ids) for ids in conditional(hidden, hidden_s=0.55)] == [2] * 6
+    oncoming = [car(40.0, 3.5, -10.0, name="first"), car(60.0, 3.5, -10.0, name="second"), car(30.0, name="leader")]
+    assert conditional([seen(*oncoming)], follows=True) == [("first", "leader")]
+
+
+def test_a_conjunction_holds_a_command_back_for_some_of_the_others_only():
+    behind = {"bicycle": ("bicycle", (Kind.VEHICLE, 1.6, 0.65), 20.0, 0.0, 0.0, 0.0), "car": car(20.0, along=0.0)}
+    for name, braking in (("bicycle", -1.0), ("car", -7.0)):
+        late = Conditional(Listener(Control(-7.0)), LateBraking, 1.0, Condition(bodies=("bicycle",)))
+        vehicle = Vehicle(length_m=4.6, width_m=1.85)
+        late.reset(EpisodeStart(seed=0, net="", route=(), vehicle=vehicle, step_s=0.1))
+        assert late.act(seen(behind[name])).accel_mps2 == braking
+
+
 @pytest.mark.parametrize("name", PYTHON)
 def test_each_defect_composes_with_a_shipped_ego(name):
     ego = Planted(
@@ -260,7 +329,7 @@ def test_a_defect_is_reached_when_it_first_changes_a_command():
 
 def test_every_row_is_admitted_in_its_first_family():
     rows = {row["defect"]: row for row in csv.DictReader(ADMISSION.read_text(encoding="utf-8").splitlines())}
-    assert rows.keys() == DEFECTS.keys()
+    assert rows.keys() == DEFECTS.keys() - CONJUNCTIONS
     for name, row in rows.items():
         assert row["version"] == version_of(read_ego(f"{DEFECTS[name].base}+{name}")), (
             f"{name} has changed; play it again"
@@ -269,6 +338,22 @@ def test_every_row_is_admitted_in_its_first_family():
         assert int(row["undisturbed_scenes"]) >= LEAST_SCENES, name
         assert row["undisturbed_detected"] == "0", name
         assert 0 < int(row["detected"]) <= 200_000, name
+
+
+def test_every_conjunction_is_detected_by_some_search_and_has_its_tier():
+    rows = {row["defect"]: row for row in csv.DictReader(TIERS.read_text(encoding="utf-8").splitlines())}
+    assert rows.keys() == CONJUNCTIONS
+    for name, row in rows.items():
+        defect = DEFECTS[name]
+        assert row["version"] == version_of(read_ego(f"{defect.base}+{name}")), f"{name} has changed; play it again"
+        assert (row["family"], row["tier"], bool(int(row["test_set"]))) == (
+            defect.families[0],
+            defect.tier,
+            defect.test_set,
+        ), name
+        assert row["undisturbed_detected"] == "0", name
+        assert int(row["undisturbed_scenes"]) >= LEAST_CONJUNCTION_SCENES, name
+        assert int(row["detected"]) > 0, name
 
 
 def test_an_ego_with_a_defect_is_of_another_version():

@@ -3,8 +3,11 @@ import pytest
 
 from risk_sac.config import CampaignSpec, RunMethod, RunSpec
 from risk_sac.config.spec_file import read_ego
+from risk_sac.egos.defects.catalogue import DEFECTS
+from risk_sac.lab.benchmark import table
 from risk_sac.lab.benchmark.runs import ANSWER, Detection, answer_of, first_detection
 from risk_sac.lab.benchmark.statistics import friedman, log_rank, summaries, survival
+from risk_sac.lab.figures.defects import tier_of
 from risk_sac.records import DefectPower
 from risk_sac.report.power import NOT_MEASURED, PlayedCounts, method_power, power_of, runs_of
 
@@ -51,6 +54,23 @@ def test_a_method_is_summed_up_over_defects_and_seeds():
     # of 9 pairs archive is quicker in 9 and in 3; in the 6 others neither detects
     assert archive.a12 == pytest.approx((9 / 9 + (3 + 6 / 2) / 9) / 2)
     assert (random.a12, random.p) == (None, None)
+
+
+def test_the_test_set_is_told_by_tiers(monkeypatch):
+    told = {"latency": {"tier": "hard", "test_set": True}, "short-sight": {"tier": "hard", "test_set": False}}
+    told["weak-brakes"] = {"tier": "easy", "test_set": True}
+    monkeypatch.setattr(table, "DEFECTS", {name: DEFECTS[name].model_copy(update=row) for name, row in told.items()})
+    parts = table.sections([run for name in told for run in runs("archive", name, 100)])
+    assert {name: [run.defects[0] for run in part] for name, part in parts.items()} == {
+        "test-set": ["latency", "weak-brakes"],
+        "easy-test-set": ["weak-brakes"],
+        "hard-test-set": ["latency"],
+        "all": ["latency", "short-sight", "weak-brakes"],
+    }
+
+
+def test_tiers_go_by_the_share_of_runs_of_random_search_that_detect():
+    assert [tier_of(detected, 10) for detected in (0, 2, 3, 7, 8, 10)] == ["hard"] * 2 + ["medium"] * 2 + ["easy"] * 2
 
 
 def test_survival_falls_at_detections_and_not_at_the_budget():
