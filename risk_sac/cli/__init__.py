@@ -91,10 +91,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
+    arguments = sys.argv[1:] if arguments is None else arguments
     options, unknown = _parser(arguments).parse_known_args(arguments)
     if unknown:
         options.parser.refuse(unknown)
-    options.typed = shlex.join(["risk-sac", *(sys.argv[1:] if arguments is None else arguments)])
+    options.typed = shlex.join(["risk-sac", *arguments])
     try:
         _make_absolute(options)
         status: int = options.command(options)
@@ -132,7 +133,7 @@ def _make_absolute(options: argparse.Namespace) -> None:
             os.environ[name] = os.path.abspath(os.environ[name])
 
 
-def _parser(arguments: Sequence[str] | None) -> argparse.ArgumentParser:
+def _parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
     parser = Parser(
         prog="risk-sac",
         description="Finds scenes and adversaries that make an automated vehicle, the ego, fail.",
@@ -141,8 +142,7 @@ def _parser(arguments: Sequence[str] | None) -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"risk-sac {__version__}")
     parser.set_defaults(on_error=FAILED)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    typed = next(iter(sys.argv[1:] if arguments is None else arguments), "")
-    asked = [adder for adder, names in COMMANDS.items() if typed in names]
+    asked = [adder for adder, names in COMMANDS.items() if arguments and arguments[0] in names]
     for adder in asked or COMMANDS:
         module, _, function = adder.rpartition(".")
         getattr(import_module(f"{__name__}.{module}" if module else __name__), function)(commands)
