@@ -5,26 +5,10 @@ import os
 import shlex
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from risk_sac import __version__
-from risk_sac.cli import (
-    boundary,
-    campaigns,
-    egos,
-    grid,
-    lab,
-    places,
-    rate,
-    regress,
-    replay,
-    report,
-    run,
-    scenarios,
-    show,
-    trend,
-    understand,
-)
 from risk_sac.cli.console import FAILED, INTERRUPTED, MISUSED
 from risk_sac.cli.parser import Commands, Parser, add_command, as_typed, example_text, wrong_path
 from risk_sac.egos import registry
@@ -73,6 +57,26 @@ def _keys(options: argparse.Namespace) -> int:
     os.execv(sys.executable, [sys.executable, "-m", "service.keys", *options.rest])
 
 
+COMMANDS = {  # What adds commands, and their names: a command loads no module of another one.
+    "run.add": ("run", "evaluate"),
+    "scenarios.add": ("scenarios",),
+    "places.add": ("places",),
+    "egos.add": ("egos",),
+    "show.add": ("show",),
+    "replay.add": ("bundle", "replay", "verify"),
+    "understand.add": ("minimise", "region", "clusters"),
+    "replay.add_export": ("export",),
+    "regress.add": ("regress",),
+    "grid.add": ("grid",),
+    "rate.add": ("rate",),
+    "boundary.add": ("boundary",),
+    "trend.add": ("trend",),
+    "report.add_report": ("report", "coverage"),
+    "lab.add_benchmark": ("benchmark", "power"),
+    "lab.add_pretrain": ("pretrain",),
+    "add_service_commands": ("serve", "keys"),
+    "campaigns.add": ("campaigns",),
+}
 EPILOG = """exit status:
   0    done
   1    failed
@@ -87,10 +91,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    options, unknown = _parser().parse_known_args(arguments)
+    arguments = sys.argv[1:] if arguments is None else arguments
+    options, unknown = _parser(arguments).parse_known_args(arguments)
     if unknown:
         options.parser.refuse(unknown)
-    options.typed = shlex.join(["risk-sac", *(sys.argv[1:] if arguments is None else arguments)])
+    options.typed = shlex.join(["risk-sac", *arguments])
     try:
         _make_absolute(options)
         status: int = options.command(options)
@@ -128,7 +133,7 @@ def _make_absolute(options: argparse.Namespace) -> None:
             os.environ[name] = os.path.abspath(os.environ[name])
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
     parser = Parser(
         prog="risk-sac",
         description="Finds scenes and adversaries that make an automated vehicle, the ego, fail.",
@@ -137,21 +142,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"risk-sac {__version__}")
     parser.set_defaults(on_error=FAILED)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
-    first = (
-        run.add,
-        scenarios.add,
-        places.add,
-        egos.add,
-        show.add,
-        replay.add,
-        understand.add,
-        replay.add_export,
-        regress.add,
-        grid.add,
-        rate.add,
-        boundary.add,
-        trend.add,
-    )
-    for add in (*first, report.add_report, lab.add_benchmark, lab.add_pretrain, add_service_commands, campaigns.add):
-        add(commands)
+    asked = [adder for adder, names in COMMANDS.items() if arguments and arguments[0] in names]
+    for adder in asked or COMMANDS:
+        module, _, function = adder.rpartition(".")
+        getattr(import_module(f"{__name__}.{module}" if module else __name__), function)(commands)
     return parser

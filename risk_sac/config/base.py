@@ -12,16 +12,17 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, model_validator
 
 from risk_sac.errors import ConfigError, did_you_mean
+from risk_sac.world.documented import Documented
 
 
-class Settings(BaseModel):
+class Settings(Documented):
     """Frozen, closed to unknown fields, and finite.
 
     Every number has bounds, far beyond what is of use and short of where arithmetic ends: between them, a run's figures
     stay finite.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
 
 T = TypeVar("T")

@@ -50,6 +50,7 @@ class Setting(NamedTuple):
 
 def leave(status: int) -> NoReturn:
     """End this process, whatever threads foreign code has left at work."""
+    gc.freeze()  # else Python searches for garbage as it ends, half a second with the simulator loaded
     if all(thread.daemon or thread is threading.main_thread() for thread in threading.enumerate()):
         sys.exit(status)
     logging.shutdown()

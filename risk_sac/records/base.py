@@ -6,6 +6,8 @@ from typing import Annotated, Any, Generic, TypeVar
 from pydantic import BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 from pydantic_core import to_json
 
+from risk_sac.world.documented import Documented
+
 
 def _without_defaults(schema: dict[str, Any]) -> None:
     """Drops defaults from a schema: they are for what was stored before there was the field."""
@@ -13,7 +15,7 @@ def _without_defaults(schema: dict[str, Any]) -> None:
         each.pop("default", None)
 
 
-class Record(BaseModel):
+class Record(Documented):
     """A frozen model that is stored as JSON, answered by the service and read by its client.
 
     Stored JSON, in a run's folder and in the database, has a non-finite number as the string "Infinity", "-Infinity" or
@@ -21,10 +23,8 @@ class Record(BaseModel):
     """
 
     model_config = ConfigDict(
-        frozen=True,
         ser_json_inf_nan="strings",
         serialize_by_alias=True,
-        use_attribute_docstrings=True,
         json_schema_extra=_without_defaults,
         json_schema_serialization_defaults_required=True,
     )

@@ -10,6 +10,7 @@ import logging
 import signal
 import subprocess
 import sys
+import threading
 from collections import deque
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -44,7 +45,10 @@ class RolloutProcess:
 
 
 class Rollouts:
-    """Plays proposals in processes; one that dies is started again, and its episode is played again."""
+    """Plays proposals in processes; one that dies is started again, and its episode is played again.
+
+    A thread receives what was played and sends what waits, so that no process idles while a learner learns.
+    """
 
     def __init__(self, spec: RunSpec, folder: Path, most: int) -> None:
         """Starts no process yet; each gets a folder below `folder` for what its crash guard notes."""
@@ -52,11 +56,17 @@ class Rollouts:
         self._processes: list[RolloutProcess] = []
         self._waiting: deque[Proposal] = deque()
         self._played: dict[int, PlayedEpisode] = {}
+        self._changed, self._closing = threading.Condition(), False
+        self._failure: Exception | None = None
+        self._woken, self._wakes = Pipe(duplex=False)
+        self._thread = threading.Thread(target=self._exchange, daemon=True)
+        self._thread.start()
 
     def submit(self, proposal: Proposal) -> None:
         """Lets a process play a proposal, once one is free."""
-        self._waiting.append(proposal)
-        self._send()
+        with self._changed:
+            self._waiting.append(proposal)
+        self._wakes.send_bytes(b"")
 
     def wait_for(self, index: int, at_most_s: float) -> PlayedEpisode | None:
         """Waits for an episode; returns None if it is not played after `at_most_s`.
@@ -64,24 +74,47 @@ class Rollouts:
         Raises:
           SimulationError: a process failed, or died again and again.
         """
-        if index not in self._played:
-            busy = {one.connection: one for one in self._processes if one.playing is not None}
-            for connection in wait(list(busy), at_most_s):
-                self._receive(busy[connection])  # type: ignore[index]
-            self._send()
-        return self._played.pop(index, None)
+        with self._changed:
+            self._changed.wait_for(lambda: index in self._played or self._failure is not None, at_most_s)
+            if self._failure is not None:
+                raise self._failure
+            return self._played.pop(index, None)
 
     def close(self) -> None:
         """Ends the processes; what they play is lost."""
+        self._closing = True
+        self._wakes.close()
+        for one in [*self._processes]:
+            one.process.kill()  # the thread may be sending to it
+        self._thread.join()
+        self._woken.close()
         for one in self._processes:
             one.process.kill()
             one.connection.close()
             one.process.wait()
         self._processes.clear()
 
+    def _exchange(self) -> None:
+        """Receives and sends until `close`, or until a process fails."""
+        try:
+            while not self._closing:
+                busy = {one.connection: one for one in self._processes if one.playing is not None}
+                for connection in wait([self._woken, *busy]):
+                    if connection is self._woken:
+                        self._woken.recv_bytes()
+                    else:
+                        self._receive(busy[connection])  # type: ignore[index]
+                self._send()
+        except EOFError:  # of `_woken`
+            return
+        except Exception as error:  # noqa: BLE001 - `wait_for` raises it
+            with self._changed:
+                self._failure = error
+                self._changed.notify()
+
     def _send(self) -> None:
         """Gives what waits to processes without an episode."""
-        while self._waiting:
+        while self._waiting and not self._closing:
             free = next((one for one in self._processes if one.playing is None), None)
             if free is None and len(self._processes) < self._most:
                 number = len(self._processes)
@@ -107,11 +140,15 @@ class Rollouts:
             return
         if isinstance(answer, str):
             raise SimulationError(f"a rollout process failed: {answer}")
-        self._played[one.playing.index] = answer
+        with self._changed:
+            self._played[one.playing.index] = answer
+            self._changed.notify()
         one.playing, one.deaths = None, 0
 
     def _restart(self, one: RolloutProcess) -> None:
         """Starts a process again in which the same episode is played; its crash guard leaves out what crashes."""
+        if self._closing:
+            return
         assert one.playing is not None
         one.connection.close()
         status, one.deaths = one.process.wait(), one.deaths + 1

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+
+from risk_sac.world.documented import Documented
 
 Floats = NDArray[np.float64]
 Point = tuple[float, float]  # x, y, m
@@ -148,13 +149,11 @@ Reals = list[OptionalReal]
 RealRows = list[list[OptionalReal]]
 
 
-class Series(BaseModel):
+class Series(Documented):
     """Time series of an episode: `T` steps, `n` actors (the ego first), `M` requirements, `a` actions.
 
     Entries of an actor that is absent are null.
     """
-
-    model_config = ConfigDict(frozen=True, use_attribute_docstrings=True)
 
     time_s: Reals
     """T, of the simulator."""

@@ -181,7 +181,8 @@ def test_without_a_prior_scripts_are_bred_and_the_control_is_refused() -> None:
         Searchers(control, Problem.from_spec(control), observation_size=20, action_size=4)
 
 
-HEAVY = {"torch", "botorch", "gpytorch", "pandas", "matplotlib", "fastapi", "sqlalchemy"}
+HEAVY = {"torch", "botorch", "gpytorch", "pandas", "matplotlib", "fastapi", "sqlalchemy", "jinja2", "httpx"}
+HEAVY |= {"risk_sac.client", "risk_sac.report.trend"}  # of other commands
 
 
 def test_a_search_without_learning_loads_neither_torch_nor_pictures(tmp_path):

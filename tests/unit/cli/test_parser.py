@@ -36,6 +36,13 @@ def test_help_has_a_paragraph_an_example_that_parses_and_fits_80_columns(name, m
     assert options.parser.prog.startswith(name)
 
 
+@pytest.mark.parametrize("names", cli.COMMANDS.values())
+def test_a_command_is_there_when_only_its_own_module_is_loaded(names):
+    added = next(leaves(cli._parser(names)))._subparsers
+    assert added is not None
+    assert tuple(added._group_actions[0].choices or ()) == names
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -119,6 +119,17 @@ def test_a_thread_that_never_ends_does_not_keep_the_process():
     assert (done.returncode, done.stdout) == (3, "done\n"), done.stderr
 
 
+def test_a_process_ends_without_a_search_for_garbage():
+    program = (
+        "import atexit, gc; from risk_sac.host.process_state import leave; "
+        "atexit.register(lambda: print(gc.get_freeze_count() > 0, len(gc.get_objects()))); leave(0)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    frozen, left = done.stdout.split()
+    assert frozen == "True"
+    assert int(left) < 1000
+
+
 def test_a_folder_that_is_gone_is_no_error(tmp_path):
     here, gone = os.getcwd(), tmp_path / "gone"
     gone.mkdir()
