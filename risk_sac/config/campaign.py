@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from risk_sac.config.base import Settings
+from risk_sac.config.base import Settings, is_none
 from risk_sac.config.boundary import BoundaryConfig, ParameterName
 from risk_sac.config.ego import EgoConfig
 from risk_sac.config.learner import LearnerConfig
@@ -75,11 +75,6 @@ class Budget(Settings):
         return self.episodes + self.evaluation_episodes
 
 
-def _is_none(value: object) -> bool:
-    """Whether a setting is left out of what is written, so that digests of older specs hold."""
-    return value is None
-
-
 class Iid(Settings):
     """Final phase that estimates the ego's failure rate in scenes that no search chose.
 
@@ -131,7 +126,7 @@ class RunSpec(Settings):
     """Of actors from the story of their scenario; null: the scenario's own bounds."""
     boundary: BoundaryConfig | None = None
     """Of the method `boundary`; other methods have none."""
-    rate: RateStart | None = Field(default=None, exclude_if=_is_none)
+    rate: RateStart | None = Field(default=None, exclude_if=is_none)
     """Of the method `rate`; other methods have none."""
 
     @property
@@ -183,7 +178,7 @@ class CampaignSpec(Settings):
     """Null: none, and nothing is said of how often the ego fails."""
     boundary: BoundaryConfig | None = None
     """What the method `boundary` searches; null where it is not among the methods."""
-    rate: RateStart | None = Field(default=None, exclude_if=_is_none)
+    rate: RateStart | None = Field(default=None, exclude_if=is_none)
     """Where the method `rate` looks first; null: nowhere before the declared distribution. For one scenario alone."""
 
     @model_validator(mode="after")

@@ -86,7 +86,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         sensor, horizon_steps = problem.ego.sensor, problem.family.horizon_steps
         self._perception = Perception(sensor.memory_s if sensor else 0.0, EVERYTHING)
         ego = load(problem.ego, ego_server)
-        self._pilot = None if ego is None else EgoPilot(ego)
+        self._pilot = None if ego is None else EgoPilot(ego, problem.ego)
         self._sim = SumoSimulation(problem.ego, self._perception, self._pilot, settings_of(problem.ego))
         self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, reward.softmin_sharpness)
         self._violated = ViolationDepth(problem.requirements)

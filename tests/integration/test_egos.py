@@ -4,6 +4,7 @@ import json
 import sys
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -95,9 +96,9 @@ def play(spec: RunSpec, folder: Path) -> tuple[RunResults, list[EpisodeRecord]]:
     return results, [EpisodeRecord.model_validate_json(line) for line in lines]
 
 
-def frames(family: str, driver: str | None, episode: int, *, controlled: bool = False) -> list[Frame]:
+def frames(family: str, driver: str | None, episode: int, *, controlled: bool = False, **ego: Any) -> list[Frame]:
     """Of an episode without an attack."""
-    spec = RunSpec(family=family, method="random", seed=0, ego=EgoConfig(driver=driver))
+    spec = RunSpec(family=family, method="random", seed=0, ego=EgoConfig(driver=driver, **ego))
     with closing(RiskSacEnv(Problem.from_spec(spec), spec.learner.reward, controlled=controlled)) as env:
         scene = env.problem.space.from_unit(np.random.default_rng((3, episode)).random(env.problem.space.dimension))
         env.reset(seed=episode, options={"scene": scene})
@@ -106,6 +107,13 @@ def frames(family: str, driver: str | None, episode: int, *, controlled: bool = 
             *_, terminated, truncated, _ = env.step(np.zeros(env.action_size, dtype=np.float32))
             ended = terminated or truncated
         return env.trace.frames
+
+
+def test_sensors_and_actuators_change_an_episode_and_its_seed_repeats_it():
+    equipment = {"sensors": "camera", "actuators": "by-wire"}
+    exact, first, second = (frames("low", "r157", 1, **ego) for ego in ({}, equipment, equipment))
+    assert [frame.state.tobytes() for frame in first] == [frame.state.tobytes() for frame in second]
+    assert [frame.state.tobytes() for frame in first] != [frame.state.tobytes() for frame in exact]
 
 
 @pytest.mark.parametrize("family", ["low", "mixed", "dense"])
