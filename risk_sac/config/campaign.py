@@ -8,10 +8,11 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
+from urllib.parse import unquote, urlsplit
 
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
-from risk_sac.config.base import Settings, is_none
+from risk_sac.config.base import Settings, is_none, shown
 from risk_sac.config.boundary import BoundaryConfig, ParameterName
 from risk_sac.config.ego import EgoConfig
 from risk_sac.config.learner import LearnerConfig
@@ -156,6 +157,19 @@ class RunSpec(Settings):
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
 
 
+def plain_url(text: str) -> str:
+    """Checks a URL: what parsers read differently, such as a user before the host, is refused."""
+    try:
+        parts = urlsplit(text)
+        plain = text.isascii() and text.isprintable() and not set(text) & set(" \\@#") and parts.port != 0
+    except ValueError:  # of the port, or of brackets
+        plain = False
+    if not plain or parts.scheme not in ("http", "https") or not parts.hostname or ".." in unquote(parts.path):
+        expected = "an http or https URL in ASCII without user, fragment, space, backslash or .."
+        raise ConfigError("", shown(text), expected)
+    return text
+
+
 class CampaignSpec(Settings):
     """Families × methods × seeds on one equal budget."""
 
@@ -180,6 +194,12 @@ class CampaignSpec(Settings):
     """What the method `boundary` searches; null where it is not among the methods."""
     rate: RateStart | None = Field(default=None, exclude_if=is_none)
     """Where the method `rate` looks first; null: nowhere before the declared distribution. For one scenario alone."""
+
+    on_end: Annotated[str, Field(max_length=500), AfterValidator(plain_url)] | None = Field(
+        default=None, exclude_if=is_none
+    )
+    """URL to which the service posts state and headline failures once the campaign has ended; the operator allows it by
+    `RISK_SAC_ON_END`."""
 
     @model_validator(mode="after")
     def _within_reason(self) -> Self:
