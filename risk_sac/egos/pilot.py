@@ -135,9 +135,15 @@ def perceive(frame: Frame, belief: Belief, along: Along, signals: tuple[Signal, 
 
 
 class EgoPilot:
-    """Drives the ego of one episode after the other."""
+    """Drives the ego of one episode after the other.
 
-    _vehicle: Vehicle
+    Attributes:
+      vehicle: the car of the episode and its limits.
+      commanded: the latest command, before the actuators.
+    """
+
+    vehicle: Vehicle
+    commanded: Control
     _motion: Motion
     _road: Road
 
@@ -153,7 +159,7 @@ class EgoPilot:
         grip = layout.friction * GRAVITY_MPS2
         length_m, width_m = float(frame.length_m[0]), float(frame.width_m[0])
         vehicle = Vehicle(length_m=length_m, width_m=width_m, brake_mps2=min(BRAKE_MPS2, grip), grip_mps2=grip)
-        self._vehicle = limited(vehicle, self._actuators)
+        self.vehicle = limited(vehicle, self._actuators)
         own = frame.state[[X, Y, HEADING, SPEED, ACCEL], 0].tolist()
         self._motion = Motion(*own)
         if self._sensing is not None:
@@ -166,7 +172,7 @@ class EgoPilot:
         route = layout.ego.route
         self._road = self._road_around(route)
         self._ego.reset(
-            EpisodeStart(seed=seed, net=layout.net, route=route, vehicle=self._vehicle, step_s=STEP_S, road=self._road)
+            EpisodeStart(seed=seed, net=layout.net, route=route, vehicle=self.vehicle, step_s=STEP_S, road=self._road)
         )
         return self._motion
 
@@ -175,11 +181,17 @@ class EgoPilot:
         perceived = perceive(frame, belief, along, signals_at(self._road.stop_lines))
         command = self._ego.act(perceived if self._sensing is None else self._sensing.perceive(perceived))
         if isinstance(command, Trajectory):
-            command = track(command, self._motion, self._vehicle)
+            command = track(command, self._motion, self.vehicle)
+        self.commanded = command
         if self._actuation is not None:
             command = self._actuation.act(command)
-        self._motion = advance(self._motion, command.accel_mps2, command.steering_rad, self._vehicle, STEP_S)
+        self._motion = advance(self._motion, command.accel_mps2, command.steering_rad, self.vehicle, STEP_S)
         return self._motion
+
+    @property
+    def took_s(self) -> float:
+        """Real time that the latest command took, s."""
+        return self._ego.took_s
 
     @property
     def defect_reached_s(self) -> float | None:
