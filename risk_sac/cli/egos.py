@@ -121,7 +121,7 @@ def _check(options: argparse.Namespace) -> int:
     rows = [
         [
             trial.scenario,
-            f"{trial.decision_ratio:.2f}, {trial.worst_ratio:.2f}\n{trial.late} of {trial.steps}",
+            f"{trial.decision_ratio:.3f}, {trial.worst_ratio:.3f}\n{trial.late} of {trial.steps}",
             str(trial.clipped),
             f"{trial.driven_m:.0f} m\n{trial.stood_s:.1f} s",
             f"{trial.farthest_offset_m:.1f} m",

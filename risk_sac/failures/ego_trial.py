@@ -23,7 +23,7 @@ TRIES = 100  # scenes that are drawn where the middle of the space is unsafe
 STANDING_MPS = 0.3
 LEAST_M = 1.0  # an ego that drives less in the second half of all scenes does not move
 MARGIN_M = 15.0
-DPI = 110
+WIDTH_IN, HIGHEST_IN, DPI = 10.0, 8.0, 110
 SLACK = 1e-6
 METHOD: Literal["no-adversary"] = "no-adversary"
 
@@ -136,18 +136,19 @@ def _drive(env: RiskSacEnv, pilot: EgoPilot, scenario: str) -> EgoTrial:
 
 def _drawn(scenario: str, scene: Scene, series: Series) -> Figure:
     """Draws the ways from above: the ego's with a dot each second, those of others in grey."""
-    figure = canvas((10.0, 7.0))
+    x, y = series["x_m"], series["y_m"]
+    low = np.array([x[:, 0].min(), y[:, 0].min()]) - MARGIN_M
+    high = np.array([x[:, 0].max(), y[:, 0].max()]) + MARGIN_M
+    across, up = high - low
+    figure = canvas((WIDTH_IN, 1.5 + min((WIDTH_IN - 2.0) * up / across, HIGHEST_IN)))
     axis = figure.subplots()
     for surface in roads_of(scenario, scene.values):
         axis.add_patch(Polygon(surface.outline, facecolor=SURFACE_COLOURS[surface.use], edgecolor="0.7", linewidth=0.5))
-    x, y = series["x_m"], series["y_m"]
     axis.plot(x[:, 1:], y[:, 1:], color="0.5", linewidth=1.0)
     axis.plot([], [], color="0.5", label="others")
     axis.plot(x[:, 0], y[:, 0], color=EGO_COLOUR, linewidth=2.0, label="ego")
     second = round(1.0 / STEP_S)
     axis.plot(x[::second, 0], y[::second, 0], "o", color=EGO_COLOUR, markersize=4, label="each second")
-    low = np.array([x[:, 0].min(), y[:, 0].min()]) - MARGIN_M
-    high = np.array([x[:, 0].max(), y[:, 0].max()]) + MARGIN_M
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x, m", ylabel="y, m")
     axis.set_title(f"{scenario}, without an attack", fontsize=10)
     legend(axis)
