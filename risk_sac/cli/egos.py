@@ -13,6 +13,7 @@ from risk_sac.cli.parser import Commands, add_command, add_group, add_json_flag
 from risk_sac.cli.run import drawn
 from risk_sac.cli.scenarios import kept_name
 from risk_sac.config import EgoConfig
+from risk_sac.config.equipment import ACTUATOR_PRESETS, SENSOR_PRESETS
 from risk_sac.config.spec_file import PROFILES, read_campaign
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.egos.registry import SHIPPED, cards
@@ -95,6 +96,8 @@ def _list(options: argparse.Namespace) -> int:
     for card in cards():
         rows.append([card.name, card.kind, f"{card.response_time_s:g} s", f"{card.summary} Version {card.version}"])
     say(folded_table(("name", "kind", "responds\nwithin", "summary"), rows))
+    presets = f"{', '.join(SENSOR_PRESETS)}; actuators: {', '.join(ACTUATOR_PRESETS)}"
+    say(f"A registered ego may have imperfect equipment, as EGO@PRESET. Sensors: {presets}.")
     return OK
 
 
