@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, FilePath, Validatio
 from pydantic_core import ErrorDetails, from_json
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
+from risk_sac.config.campaign import plain_url
 from risk_sac.errors import ConfigError
 from risk_sac.execution import ExecutorName
 from risk_sac.execution.ray import RaySettings
@@ -29,6 +30,10 @@ def _parsed(value: object) -> object:
 
 # Parsed here: pydantic-settings would report invalid JSON before it checks any other setting.
 Names = Annotated[list[str], NoDecode, BeforeValidator(_parsed)]
+
+
+AllowedUrl = Annotated[str, AfterValidator(plain_url), Field(json_schema_extra={"format": "url"})]
+Urls = Annotated[list[AllowedUrl], NoDecode, BeforeValidator(_parsed)]
 
 
 def _rooted(path: object) -> object:
@@ -87,6 +92,10 @@ class ServiceSettings(RaySettings, BaseSettings):
 
     replays: Annotated[int, Field(ge=0, le=10)] = TIMES
     """Replays of each distinct failure of a finished run, in fresh processes; 0 for none."""
+
+    on_end: Urls = []
+    """URLs that `on_end` of a campaign may be or lie below, a JSON list such as `["https://hooks.example/ci"]`; by
+    default none. Messages go there directly, past proxies."""
 
     retention_days: Annotated[float, Field(gt=0)] | None = None
     """Age in days at which ended campaigns are deleted with their files; by default never."""
@@ -157,7 +166,7 @@ LONGEST_VALUE = 80
 BEGIN = "<!-- settings: written by `make settings` -->"
 END = "<!-- /settings -->"
 BOUNDS = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤"}
-TYPES = {"array": "JSON list", "path": "folder", "file-path": "file", "string": "text"}
+TYPES = {"array": "JSON list", "url": "http or https URL", "path": "folder", "file-path": "file", "string": "text"}
 
 
 def read_settings() -> ServiceSettings:

@@ -7,11 +7,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, folded_table, progress_bar, say
+from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, folded_table, print_answer, progress_bar, say
 from risk_sac.cli.flags import add_campaign_flags, campaign_flags, named_ego
-from risk_sac.cli.parser import Commands, add_command, add_group
+from risk_sac.cli.parser import Commands, add_command, add_group, add_json_flag
 from risk_sac.cli.run import drawn
+from risk_sac.cli.scenarios import kept_name
 from risk_sac.config import EgoConfig
+from risk_sac.config.equipment import ACTUATOR_PRESETS, SENSOR_PRESETS
 from risk_sac.config.spec_file import PROFILES, read_campaign
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.egos.registry import SHIPPED, cards
@@ -19,6 +21,7 @@ from risk_sac.host.machine import cores
 from risk_sac.host.terminal import complain
 from risk_sac.metrics import COLUMNS as REQUIREMENT_COLUMNS
 from risk_sac.metrics import pooled_counts, pooled_requirements, requirement_cells, wilson_interval, with_published
+from risk_sac.scenario.shipped import shipped_names
 
 if TYPE_CHECKING:
     from risk_sac.report import FinishedRun
@@ -28,6 +31,9 @@ COLUMNS = (
     *("family", "ego", "runs", "episodes", "invalid", "contacts"),
     *("valid", "ECR (95 %)", "preventable (published)", "PCR (95 %)", "failures"),
 )
+
+
+CHECKED = ("scenario", "decision / step\nmedian, worst\nlate", "clipped", "drove\nstood", "offset", "wrong")
 
 
 def add(commands: Commands) -> None:
@@ -50,6 +56,19 @@ def add(commands: Commands) -> None:
         more="A defect follows the name of an ego, such as idm-aeb+blind-right.",
         example="egos defects",
     )
+    check = add_command(
+        egos,
+        "check",
+        _check,
+        "drive a scene of each shipped scenario without an attack, and tell whether the ego is fit for a search",
+        more="Ends with status 1 if the ego fails, touches something, or does not move.",
+        example="egos check idm-aeb --scenario low mixed --out runs/check",
+    )
+    check.add_argument("ego", metavar="EGO", help="a registered ego, also with defects and presets")
+    scenarios = "scenarios, or files of them (default: all that ship)"
+    check.group("scene").add_argument("--scenario", nargs="+", metavar="NAME", help=scenarios)
+    check.group("output").add_argument("--out", type=Path, metavar="DIR", help="draw each scene into DIR/SCENARIO.png")
+    add_json_flag(check)
     ladder = add_command(
         egos,
         "ladder",
@@ -77,6 +96,8 @@ def _list(options: argparse.Namespace) -> int:
     for card in cards():
         rows.append([card.name, card.kind, f"{card.response_time_s:g} s", f"{card.summary} Version {card.version}"])
     say(folded_table(("name", "kind", "responds\nwithin", "summary"), rows))
+    presets = f"{', '.join(SENSOR_PRESETS)}; actuators: {', '.join(ACTUATOR_PRESETS)}"
+    say(f"A registered ego may have imperfect equipment, as EGO@PRESET. Sensors: {presets}.")
     return OK
 
 
@@ -87,6 +108,34 @@ def _defects(options: argparse.Namespace) -> int:
     ]
     say(folded_table(("defect\nkind", "ego\nfamilies", "sentence"), rows))
     return OK
+
+
+def _check(options: argparse.Namespace) -> int:
+    ego = named_ego(options.ego)
+    from risk_sac.failures.ego_trial import try_ego, unusable  # here, because loading the simulator takes a second
+
+    trials = []
+    for name in options.scenario or shipped_names():
+        trial, drawn = try_ego(ego, kept_name(name))
+        trials.append(trial)
+        if options.out is not None and drawn is not None:
+            options.out.mkdir(parents=True, exist_ok=True)
+            (options.out / f"{trial.scenario}.png").write_bytes(drawn)
+    rows = [
+        [
+            trial.scenario,
+            f"{trial.decision_ratio:.3f}, {trial.worst_ratio:.3f}\n{trial.late} of {trial.steps}",
+            str(trial.clipped),
+            f"{trial.driven_m:.0f} m\n{trial.stood_s:.1f} s",
+            f"{trial.farthest_offset_m:.1f} m",
+            ", ".join(filter(None, (trial.failed, trial.contact and f"contact: {trial.contact}", *trial.violated))),
+        ]
+        for trial in trials
+    ]
+    reasons = unusable(trials)
+    verdict = "\n".join(f"- {reason}" for reason in reasons) or "It is fit for a search."
+    print_answer(options, {"trials": trials, "unusable": reasons}, folded_table(CHECKED, rows), verdict)
+    return FAILED if reasons else OK
 
 
 def _ladder(options: argparse.Namespace) -> int:

@@ -57,6 +57,12 @@ class Interval(Settings):
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Weight = Annotated[float, Field(ge=0, le=1000)]
 
+
+def is_none(value: object) -> bool:
+    """Whether a setting is left out of what is written, so that digests of older specs hold."""
+    return value is None
+
+
 FIELDS = "fields and their values, such as `family: low`"
 MARKS = {  # longer marks come first
     codecs.BOM_UTF32_LE: "UTF-32",

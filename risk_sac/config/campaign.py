@@ -8,10 +8,11 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
+from urllib.parse import unquote, urlsplit
 
-from pydantic import BeforeValidator, Field, StringConstraints, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, StringConstraints, model_validator
 
-from risk_sac.config.base import Settings
+from risk_sac.config.base import Settings, is_none, shown
 from risk_sac.config.boundary import BoundaryConfig, ParameterName
 from risk_sac.config.ego import EgoConfig
 from risk_sac.config.learner import LearnerConfig
@@ -90,11 +91,6 @@ class Budget(Settings):
         return self.episodes + self.evaluation_episodes
 
 
-def _is_none(value: object) -> bool:
-    """Whether a setting is left out of what is written, so that digests of older specs hold."""
-    return value is None
-
-
 class Iid(Settings):
     """Final phase that estimates the ego's failure rate in scenes that no search chose.
 
@@ -146,7 +142,7 @@ class RunSpec(Settings):
     """Of actors from the story of their scenario; null: the scenario's own bounds."""
     boundary: BoundaryConfig | None = None
     """Of the method `boundary`; other methods have none."""
-    rate: RateStart | None = Field(default=None, exclude_if=_is_none)
+    rate: RateStart | None = Field(default=None, exclude_if=is_none)
     """Of the method `rate`; other methods have none."""
 
     @property
@@ -176,6 +172,19 @@ class RunSpec(Settings):
         return hashlib.sha256(self.model_dump_json().encode()).hexdigest()
 
 
+def plain_url(text: str) -> str:
+    """Checks a URL: what parsers read differently, such as a user before the host, is refused."""
+    try:
+        parts = urlsplit(text)
+        plain = text.isascii() and text.isprintable() and not set(text) & set(" \\@#") and parts.port != 0
+    except ValueError:  # of the port, or of brackets
+        plain = False
+    if not plain or parts.scheme not in ("http", "https") or not parts.hostname or ".." in unquote(parts.path):
+        expected = "an http or https URL in ASCII without user, fragment, space, backslash or .."
+        raise ConfigError("", shown(text), expected)
+    return text
+
+
 class CampaignSpec(Settings):
     """Families × methods × seeds on one equal budget."""
 
@@ -198,8 +207,14 @@ class CampaignSpec(Settings):
     """Null: none, and nothing is said of how often the ego fails."""
     boundary: BoundaryConfig | None = None
     """What the method `boundary` searches; null where it is not among the methods."""
-    rate: RateStart | None = Field(default=None, exclude_if=_is_none)
+    rate: RateStart | None = Field(default=None, exclude_if=is_none)
     """Where the method `rate` looks first; null: nowhere before the declared distribution. For one scenario alone."""
+
+    on_end: Annotated[str, Field(max_length=500), AfterValidator(plain_url)] | None = Field(
+        default=None, exclude_if=is_none
+    )
+    """URL to which the service posts state and headline failures once the campaign has ended; the operator allows it by
+    `RISK_SAC_ON_END`."""
 
     @model_validator(mode="after")
     def _within_reason(self) -> Self:

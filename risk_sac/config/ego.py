@@ -5,7 +5,15 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from risk_sac.config.base import Settings
+from risk_sac.config.base import Settings, is_none
+from risk_sac.config.equipment import (
+    ACTUATOR_PRESETS,
+    SENSOR_PRESETS,
+    ActuatorChoice,
+    ActuatorConfig,
+    SensorErrors,
+    Sensors,
+)
 from risk_sac.errors import ConfigError
 
 CarFollowing = Literal["Krauss", "IDM", "EIDM", "ACC", "CACC"]
@@ -52,6 +60,27 @@ class EgoConfig(Settings):
     registered ego declares, or `reaction_time_s`."""
     defects: Annotated[tuple[EgoName, ...], Field(max_length=MOST_DEFECTS)] = ()
     """Known faults to plant into the ego, as `GET /v1/egos` lists them."""
+    sensors: Sensors | None = Field(default=None, exclude_if=is_none)
+    """Errors of what a registered ego perceives: a preset or an object; null: none."""
+    actuators: ActuatorChoice | None = Field(default=None, exclude_if=is_none)
+    """Delays and limits of what a registered ego commands: a preset or an object; null: the car's own."""
+
+    @property
+    def name(self) -> str:
+        """The ego as a command line names it, such as `idm-aeb+latency@radar`."""
+        equipment = (("sensors", self.sensors), ("actuators", self.actuators))
+        chosen = [value if isinstance(value, str) else f"own-{field}" for field, value in equipment if value]
+        return "@".join(("+".join((self.driver or self.profile, *self.defects)), *chosen))
+
+    @property
+    def sensor_errors(self) -> SensorErrors | None:
+        """The errors that `sensors` stands for."""
+        return SENSOR_PRESETS[self.sensors] if isinstance(self.sensors, str) else self.sensors
+
+    @property
+    def actuator_config(self) -> ActuatorConfig | None:
+        """What `actuators` stands for."""
+        return ACTUATOR_PRESETS[self.actuators] if isinstance(self.actuators, str) else self.actuators
 
     @property
     def response_s(self) -> float:
@@ -80,6 +109,11 @@ class EgoConfig(Settings):
             raise ConfigError("version", "a version without a driver", "that of a registered ego, which driver names")
         if len(set(self.defects)) < len(self.defects):
             raise ConfigError("defects", f"{list(self.defects)}", "each defect once")
+        for field, value in (("sensors", self.sensors), ("actuators", self.actuators)):
+            if value is not None and self.driver is None:
+                got = f"{field} of SUMO's driver, which perceives and moves by SUMO's models"
+                remedy = "name a driver such as idm-aeb, or plant a defect of the kind sumo"
+                raise ConfigError(field, got, "a registered ego", remedy)
         models = (self.profile, self.car_following, self.reaction_time_s)
         if self.driver is not None and models != ("default", "Krauss", 0.5):
             got = "a driver beside profile, car_following or reaction_time_s, which SUMO's drivers have"

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -11,11 +11,12 @@ from pydantic import ValidationError
 
 from risk_sac.config import IID_METHODS, Budget, CampaignSpec, EgoConfig, RunSpec
 from risk_sac.config.base import field_errors, read_fields
-from risk_sac.errors import ConfigError
+from risk_sac.config.equipment import ACTUATOR_PRESETS, SENSOR_PRESETS
+from risk_sac.errors import ConfigError, did_you_mean
 
 T = TypeVar("T", RunSpec, CampaignSpec, EgoConfig)
 PROFILES: tuple[str, ...] = get_args(EgoConfig.model_fields["profile"].annotation)
-EGO_NAMES = f"{', '.join(PROFILES)}, a registered ego, one of these with a defect as EGO+DEFECT"
+EGO_NAMES = f"{', '.join(PROFILES)}, a registered ego, one of these as EGO+DEFECT or EGO@PRESET"
 EGO_FILE = "a YAML file with the fields of a campaign's ego"
 DRIVER = re.compile(r"[a-z][a-z0-9_-]{0,39}")
 RUN_DEFAULTS = {"method": "risk-sac", "seed": 0}
@@ -58,17 +59,31 @@ def read_ego(text: str) -> EgoConfig:
 
     It is a profile, a registered ego, or a file with its fields.
 
-    Defects follow a name, such as `idm-aeb+blind-right`. Whether they and an ego of this name exist is found out later.
+    Defects follow a name, then presets of sensors and actuators, such as `idm-aeb+blind-right@radar@by-wire`. Whether
+    the defects and an ego of this name exist is found out later.
     """
-    name, *defects = text.split("+")
-    if name in PROFILES:
-        return _validate(EgoConfig, {"profile": name, "defects": defects})
-    if DRIVER.fullmatch(name) and not Path(text).exists():
-        return _validate(EgoConfig, {"driver": name, "defects": defects})
+    named, *presets = text.split("@")
+    name, *defects = named.split("+")
+    if (name in PROFILES or DRIVER.fullmatch(name)) and not Path(text).exists():
+        driver = "profile" if name in PROFILES else "driver"
+        return _validate(EgoConfig, {driver: name, "defects": defects, **_equipment(presets)})
     if not Path(text).exists():
         remedy = "check the path, or name an ego of `risk-sac egos list`"
         raise ConfigError("ego", f"{text!r}, which is no file", f"{EGO_NAMES}, or {EGO_FILE}", remedy)
     return _validate(EgoConfig, read_fields(Path(text), "ego"))
+
+
+def _equipment(presets: Sequence[str]) -> dict[str, str]:
+    """Returns the fields that presets belong to."""
+    chosen = dict[str, str]()
+    for preset in presets:
+        field = "sensors" if preset in SENSOR_PRESETS else "actuators"
+        if preset not in ACTUATOR_PRESETS.keys() | SENSOR_PRESETS.keys() or field in chosen:
+            got = f"@{preset}" + (f" beside @{chosen[field]}" if field in chosen else "")
+            expected = f"one of {', '.join(SENSOR_PRESETS)} and one of {', '.join(ACTUATOR_PRESETS)}"
+            raise ConfigError("ego", got, expected, did_you_mean(preset, [*SENSOR_PRESETS, *ACTUATOR_PRESETS]))
+        chosen[field] = preset
+    return chosen
 
 
 def campaign_yaml(spec: CampaignSpec) -> str:

@@ -38,7 +38,11 @@ class Malformed(ValueError):
 
 
 class Guarded:
-    """An ego whose every answer is checked."""
+    """An ego whose every answer is checked.
+
+    Attributes:
+      took_s: real time that the latest answer took.
+    """
 
     def __init__(self, make: Callable[[], Ego], deadline_s: float, *, foreign: bool = False) -> None:
         """Makes the ego.
@@ -52,6 +56,7 @@ class Guarded:
         Raises:
           EgoFailed: it cannot be made.
         """
+        self.took_s = 0.0
         self._deadline_s, self._foreign, self._state = deadline_s, foreign, preserved()
         with self._state if foreign else contextlib.nullcontext():
             self._ego = self._asked(make)
@@ -102,9 +107,9 @@ class Guarded:
         except BaseException as error:
             _free()  # the alarm may have rung before the `finally` above had put it off
             raise self._failure(error) from error
-        took_s = time.monotonic() - began
-        if took_s > self._deadline_s:
-            raise EgoFailed(f"the ego took {took_s:.2f} s; wanted at most {self._deadline_s:g} s", reason=DEADLINE)
+        self.took_s = time.monotonic() - began
+        if self.took_s > self._deadline_s:
+            raise EgoFailed(f"the ego took {self.took_s:.2f} s; wanted at most {self._deadline_s:g} s", reason=DEADLINE)
         return answer
 
     def _failure(self, error: BaseException) -> BaseException:

@@ -9,7 +9,9 @@ from itertools import compress
 
 import numpy as np
 
+from risk_sac.config import EgoConfig
 from risk_sac.egos.driving import LEAST_LOOKAHEAD_M, steering_towards
+from risk_sac.egos.equipment import Actuation, Sensing, limited
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.seam import Control, EpisodeStart, Perceived, Trajectory, Vehicle
 from risk_sac.scenario.layout import Layout
@@ -133,40 +135,63 @@ def perceive(frame: Frame, belief: Belief, along: Along, signals: tuple[Signal, 
 
 
 class EgoPilot:
-    """Drives the ego of one episode after the other."""
+    """Drives the ego of one episode after the other.
 
-    _vehicle: Vehicle
+    Attributes:
+      vehicle: the car of the episode and its limits.
+      commanded: the latest command, before the actuators.
+    """
+
+    vehicle: Vehicle
+    commanded: Control
     _motion: Motion
     _road: Road
 
-    def __init__(self, ego: Guarded) -> None:
+    def __init__(self, ego: Guarded, config: EgoConfig) -> None:
         self._ego = ego
+        errors, self._actuators = config.sensor_errors, config.actuator_config
+        self._sensing = None if errors is None else Sensing(errors)
+        self._actuation = None if self._actuators is None else Actuation(self._actuators)
         self._net, self._set_speed_mps, self._road_around = "", math.inf, cache(road_around)
 
     def begin(self, layout: Layout, seed: int, frame: Frame) -> Motion:
         """See `risk_sac.sim.pilot.Pilot.begin`."""
         grip = layout.friction * GRAVITY_MPS2
         length_m, width_m = float(frame.length_m[0]), float(frame.width_m[0])
-        self._vehicle = Vehicle(length_m=length_m, width_m=width_m, brake_mps2=min(BRAKE_MPS2, grip), grip_mps2=grip)
+        vehicle = Vehicle(length_m=length_m, width_m=width_m, brake_mps2=min(BRAKE_MPS2, grip), grip_mps2=grip)
+        self.vehicle = limited(vehicle, self._actuators)
         own = frame.state[[X, Y, HEADING, SPEED, ACCEL], 0].tolist()
         self._motion = Motion(*own)
+        if self._sensing is not None:
+            self._sensing.begin(seed, STEP_S)
+        if self._actuation is not None:
+            self._actuation.begin(self._motion.accel_mps2, self._motion.steering_rad, STEP_S)
         if (layout.net, layout.set_speed_mps) != (self._net, self._set_speed_mps):  # of the same names, or other limits
             self._net, self._set_speed_mps = layout.net, layout.set_speed_mps
             self._road_around.cache_clear()
         route = layout.ego.route
         self._road = self._road_around(route)
         self._ego.reset(
-            EpisodeStart(seed=seed, net=layout.net, route=route, vehicle=self._vehicle, step_s=STEP_S, road=self._road)
+            EpisodeStart(seed=seed, net=layout.net, route=route, vehicle=self.vehicle, step_s=STEP_S, road=self._road)
         )
         return self._motion
 
     def drive(self, frame: Frame, belief: Belief, along: Along) -> Motion:
         """See `risk_sac.sim.pilot.Pilot.drive`."""
-        command = self._ego.act(perceive(frame, belief, along, signals_at(self._road.stop_lines)))
+        perceived = perceive(frame, belief, along, signals_at(self._road.stop_lines))
+        command = self._ego.act(perceived if self._sensing is None else self._sensing.perceive(perceived))
         if isinstance(command, Trajectory):
-            command = track(command, self._motion, self._vehicle)
-        self._motion = advance(self._motion, command.accel_mps2, command.steering_rad, self._vehicle, STEP_S)
+            command = track(command, self._motion, self.vehicle)
+        self.commanded = command
+        if self._actuation is not None:
+            command = self._actuation.act(command)
+        self._motion = advance(self._motion, command.accel_mps2, command.steering_rad, self.vehicle, STEP_S)
         return self._motion
+
+    @property
+    def took_s(self) -> float:
+        """Real time that the latest command took, s."""
+        return self._ego.took_s
 
     @property
     def defect_reached_s(self) -> float | None:

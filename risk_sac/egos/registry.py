@@ -21,6 +21,7 @@ from risk_sac.config import EgoConfig, Settings
 from risk_sac.config.base import field_error, read_text
 from risk_sac.config.ego import EgoName
 from risk_sac.egos.defects.catalogue import Planted, planted, version_of
+from risk_sac.egos.equipment import version_of_equipment
 from risk_sac.egos.guard import Guarded
 from risk_sac.egos.remote.addresses import addresses_of
 from risk_sac.egos.seam import Ego
@@ -139,7 +140,7 @@ def card_of(name: str) -> EgoCard:
 
 
 def pinned(ego: EgoConfig) -> EgoConfig:
-    """Returns the ego with the version and response time of its driver and defects.
+    """Returns the ego with the version and response time of its driver, defects, sensors and actuators.
 
     Raises:
       ConfigError: there is no such driver or defect, a defect does not fit it, or it has another version than the ego
@@ -153,7 +154,7 @@ def pinned(ego: EgoConfig) -> EgoConfig:
         got = f"{list(ego.defects)} for the ego {card.name!r}, which runs in a process of its own"
         raise ConfigError("ego.defects", got, "a Python ego")
     versions = ([card.version] if card else []) + ([version_of(ego)] if defects else [])
-    version = "+".join(versions)
+    version = "+".join(filter(None, (*versions, version_of_equipment(ego))))
     if ego.version not in (None, version):
         raise ConfigError(
             "ego.version",

@@ -86,8 +86,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         sensor, horizon_steps = problem.ego.sensor, problem.family.horizon_steps
         self._perception = Perception(sensor.memory_s if sensor else 0.0, EVERYTHING)
         ego = load(problem.ego, ego_server)
-        self._pilot = None if ego is None else EgoPilot(ego)
-        self._sim = SumoSimulation(problem.ego, self._perception, self._pilot, settings_of(problem.ego))
+        self.pilot = None if ego is None else EgoPilot(ego, problem.ego)
+        self._sim = SumoSimulation(problem.ego, self._perception, self.pilot, settings_of(problem.ego))
         self._gauge = Gauge(problem.requirements, horizon_steps, problem.rss, reward.softmin_sharpness)
         self._violated = ViolationDepth(problem.requirements)
         self._encoder = Encoder(problem.family, problem.space.dimension, len(problem.requirements))
@@ -210,7 +210,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     @property
     def defect_reached_s(self) -> float | None:
         """Time from the release at which a planted defect first changed a command, s; None if none has."""
-        return self._pilot.defect_reached_s if self._pilot and self.problem.ego.defects else None
+        return self.pilot.defect_reached_s if self.pilot and self.problem.ego.defects else None
 
     def signal_heads(self) -> bytes:
         """SUMO's letter of each link of each signal now, the signals in the order of their names."""
@@ -220,8 +220,8 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
     def close(self) -> None:
         """Ends the simulation, and lets the ego go."""
         self._sim.close()
-        if self._pilot is not None:
-            self._pilot.close()
+        if self.pilot is not None:
+            self.pilot.close()
 
     def _start(
         self, scene: Scene, motions: Mapping[str, NDArray[Any]] | None = None

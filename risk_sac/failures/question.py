@@ -61,7 +61,7 @@ class TwinPlay(Record):
           violations: what was violated in the twin.
           name: of the other ego.
         """
-        changed = "no attack" if ego is None else f"ego: {name or ego.driver or ego.profile}"
+        changed = "no attack" if ego is None else f"ego: {name or ego.name}"
         kept = "no contact" if failure.requirement == NO_CONTACT else f"keeps {failure.requirement}"
         violated = {each.requirement: each.event for each in violations}
         told = dict.fromkeys([failure.requirement, *violated], kept) | violated

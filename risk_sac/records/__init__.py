@@ -11,6 +11,7 @@ from risk_sac.records.campaign import (
     CampaignPage,
     CampaignSummary,
     DefectPower,
+    EndNotice,
     MethodPower,
     Power,
     Progress,

@@ -167,6 +167,16 @@ class CampaignPage(Page[CampaignSummary]):
     """Campaigns, newest first."""
 
 
+class EndNotice(Record):
+    """The message to `on_end` of a campaign's spec."""
+
+    state: Literal["waiting", "delivered", "failed"]
+    """waiting: the campaign has not ended, or the next try is due later."""
+    tries: int
+    reason: str | None
+    """Why the latest try failed."""
+
+
 class Campaign(CampaignSummary):
     """A campaign with its runs, in the order they are queued, and what was posted."""
 
@@ -174,6 +184,8 @@ class Campaign(CampaignSummary):
     requirements: Mapping[str, RequirementCounts] = {}
     """Requirement → its funnel, summed over the searches."""
     spec: CampaignSpec
+    notice: EndNotice | None = None
+    """Null: the spec has no `on_end`."""
 
 
 class CampaignCheck(Record):

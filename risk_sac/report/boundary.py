@@ -61,9 +61,7 @@ def _figure(found: BoundaryMap) -> Figure:
         label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
     figure.legend(list(handles.values()), list(handles), loc="outside right upper", fontsize=7)
-    ego = found.ego
-    name = "+".join((ego.driver or ego.profile, *ego.defects))
-    figure.suptitle(f"{found.family}: {name}", fontsize=9, x=0.01, ha="left")
+    figure.suptitle(f"{found.family}: {found.ego.name}", fontsize=9, x=0.01, ha="left")
     return figure
 
 

@@ -76,8 +76,7 @@ class PlayedGrid(Record):
     @property
     def ego(self) -> str:
         """The ego in a word or two."""
-        ego = self.spec.ego
-        return "+".join((ego.driver or ego.profile, *ego.defects))
+        return self.spec.ego.name
 
 
 def played_grids(paths: Sequence[Path], standard: Standard = "r157") -> tuple[PlayedGrid, ...]:

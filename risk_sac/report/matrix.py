@@ -114,7 +114,7 @@ def coverage_matrix(
     covered = CoveredCampaign(
         id=id_,
         label=spec.label,
-        ego=ego_name(spec),
+        ego=spec.ego.name,
         families=spec.families,
         episodes=len(everything),
         failures=sum(record.outcome is Outcome.FAILURE for record in everything),
@@ -140,11 +140,6 @@ def merged(matrices: Sequence[CoverageMatrix]) -> CoverageMatrix:
         pairs[key] = _both(pairs[key], pair) if key in pairs else pair
     definitions = sorted({version for matrix in matrices for version in matrix.definitions})
     return _matrix(campaigns, tuple(groups), tuple(pairs.values()), definitions)
-
-
-def ego_name(spec: CampaignSpec) -> str:
-    """Returns the ego of a campaign as the command line names it."""
-    return "+".join((spec.ego.driver or spec.ego.profile, *spec.ego.defects))
 
 
 def definitions_of(records: Sequence[EpisodeRecord]) -> tuple[int, ...]:

@@ -18,7 +18,7 @@ from risk_sac.records.assessment import (
     ReportedCase,
 )
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.matrix import definitions_of, ego_name
+from risk_sac.report.matrix import definitions_of
 from risk_sac.report.runs import FinishedRun
 from risk_sac.report.scene_facts import SceneFacts
 from risk_sac.report.signing import sha256
@@ -152,11 +152,11 @@ def law_in_words(law: "NumberLaw | WeightsLaw | None") -> str:
 
 def _objective(spec: CampaignSpec, criteria: Sequence[Requirement]) -> str:
     names = [one.name for one in criteria if one.counts == "failure"]
-    return f"Find scenes in which {ego_name(spec)} violates {' or '.join(names) or 'a requirement'}."
+    return f"Find scenes in which {spec.ego.name} violates {' or '.join(names) or 'a requirement'}."
 
 
 def _preconditions(spec: CampaignSpec, document: Scenario) -> Iterator[str]:
-    ego, version = ego_name(spec), spec.ego.version
+    ego, version = spec.ego.name, spec.ego.version
     yield f"The ego is {ego}{f', version {version}' if version else ''}; it responds within {spec.ego.response_s:g} s."
     sensor = spec.ego.sensor
     if sensor is None:

@@ -195,10 +195,11 @@ def check_scenarios(campaigns: Sequence[EndedCampaign]) -> None:
 
 
 def _terms(spec: CampaignSpec) -> CampaignSpec:
-    """Returns the spec without the ego, the label, the order of lists and the choice of seeds."""
+    """Returns the spec without the ego, the label, `on_end`, the order of lists and the choice of seeds."""
     return spec.model_copy(
         update={
             "label": "",
+            "on_end": None,
             "ego": EgoConfig(),
             "families": tuple(sorted(spec.families)),
             "methods": tuple(sorted(spec.methods)),

@@ -22,6 +22,7 @@ from risk_sac.search.prior.earlier import PriorContent, keep
 from risk_sac.search.prior.policy import check_prior
 from service.errors import ConflictError, OutdatedError, StorageError
 from service.runs.cleanup import Retention, StoragePause, check_quota, dispose, exhausted, refused, settle
+from service.runs.end_notices import EndNotices, check_allowed
 from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign
@@ -53,6 +54,7 @@ class Manager:
         self._lock = threading.RLock()
         self._storage = StoragePause(store, self._ledger, settings.data_dir)
         self._retention = Retention(settings, store)
+        self._notices = EndNotices(store, self._ledger, self._lock, settings.on_end)
         self._imports: Imports | None = None
         self._thread = threading.Thread(target=self._work, name="manager", daemon=True)
 
@@ -100,12 +102,14 @@ class Manager:
         if resumed:
             logger.info("%d interrupted runs go back to the queue", resumed)
         self._thread.start()
+        self._notices.start()
 
     def stop(self) -> None:
         """Stops all workers at their next episode boundary and requeues their runs.
 
         Runs whose worker cannot even be killed stay `running`; the next start puts them back in the queue.
         """
+        self._notices.stop()
         with self._lock:
             self._scheduler.stop(self._settings.stop_s)
         self._executor.wake()
@@ -116,9 +120,22 @@ class Manager:
             logger.error("workers of runs %s did not end", sorted(self._scheduler.active))
 
     def submit(
-        self, spec: CampaignSpec, *, project: str = "default", key: str | None = None, prior: PriorContent | None = None
+        self,
+        spec: CampaignSpec,
+        *,
+        project: str = "default",
+        key: str | None = None,
+        prior: PriorContent | None = None,
+        base_url: str = "",
     ) -> StoredCampaign:
         """Queues a campaign with a copy of its prior, or finds the one queued with this idempotency key.
+
+        Args:
+          spec: of the campaign.
+          project: that it belongs to.
+          key: of idempotency.
+          prior: content of its prior.
+          base_url: of the server as the caller sees it, for links in the message to the campaign's end.
 
         Raises:
           ConfigError: the campaign cannot be run; the error names the field.
@@ -137,7 +154,7 @@ class Manager:
             if found is not None:
                 return found
             check_quota(self._store.usage(project), len(spec.runs()), self._settings)
-            campaign = self._ledger.create(spec, project, key)
+            campaign = self._ledger.create(spec, project, key, base_url)
         logger.info("%d runs queued", len(campaign.runs), extra={"campaign": campaign.id})
         self._executor.wake()
         return campaign
@@ -148,6 +165,8 @@ class Manager:
         Raises:
           ConfigError: the campaign cannot be run; the error names the field.
         """
+        if spec.on_end is not None:
+            check_allowed(spec.on_end, self._settings.on_end)
         spec = checked_campaign(spec)
         for family, name in product(spec.families, spec.methods):
             check_prior(name, family, spec.prior)

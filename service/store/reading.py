@@ -11,7 +11,7 @@ from pydantic_core import from_json
 from sqlalchemy import and_, func, or_, select
 from sqlalchemy.orm import Session, selectinload
 
-from risk_sac.records import FINAL, Episode, EpisodeRecord, Outcome, State, StateChange, Triage, TriageState
+from risk_sac.records import FINAL, EndNotice, Episode, EpisodeRecord, Outcome, State, StateChange, Triage, TriageState
 from service.errors import StorageError
 from service.store.database import connect, open_database, storage_errors
 from service.store.queries import (
@@ -26,10 +26,11 @@ from service.store.queries import (
     weighty_page,
 )
 from service.store.stored import StoredCampaign, StoredFailure, StoredPage, StoredRecord, Usage, read_episode
-from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, RunRow, TriageRow, UsageRow
+from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, NoticeRow, RunRow, TriageRow, UsageRow
 
 DAY_HOURS = 24
 BATCH = 1000  # rows in memory at once
+NOTICES = 20  # messages that are read at once
 DRIVERS = ("driver", "profile")  # fields of an ego that name it
 
 
@@ -38,6 +39,15 @@ class Known(NamedTuple):
 
     project: str
     revision: int
+
+
+class DueNotice(NamedTuple):
+    """A message that is due, to the end of the campaign with this id."""
+
+    campaign_id: str
+    url: str
+    link: str
+    tries: int
 
 
 class Revisions:
@@ -145,6 +155,20 @@ class Store:
         with self._reading() as session:
             rows = session.scalars(query.order_by(CampaignRow.number.desc()).limit(limit))
             return [self._campaign(row) for row in rows][::-1]
+
+    def notice(self, campaign_number: int) -> EndNotice | None:
+        """Returns the message to the end of a campaign, None without one."""
+        with self._reading() as session:
+            row = session.get(NoticeRow, campaign_number)
+            return None if row is None else EndNotice.model_validate(row, from_attributes=True)
+
+    def due_notices(self, now: float) -> list[DueNotice]:
+        """Returns the messages of ended campaigns that are due."""
+        due = CampaignRow.state.in_(FINAL), NoticeRow.state == "waiting", NoticeRow.due_at <= now
+        query = select(NoticeRow, CampaignRow.id).join(CampaignRow).where(*due).order_by(NoticeRow.due_at)
+        with self._reading() as session:
+            rows = session.execute(query.limit(NOTICES))
+            return [DueNotice(id_, row.url, row.link, row.tries) for row, id_ in rows]
 
     def revision(self, campaign_id: str, project: str | None = None) -> str:
         """Returns the revision of a campaign, which changes with its runs and episodes."""

@@ -205,6 +205,21 @@ class TriageRow(Base):
     changed_at: Mapped[float]
 
 
+class NoticeRow(Base):
+    """The message that is due when a campaign ends."""
+
+    __tablename__ = "notices"
+    __table_args__ = (Index("notices_state", "state", "due_at"),)
+
+    campaign_number: Mapped[int] = mapped_column(ForeignKey("campaigns.number"), primary_key=True)
+    url: Mapped[str]
+    link: Mapped[str]  # of the campaign
+    state: Mapped[str] = mapped_column(default="waiting")
+    tries: Mapped[int] = mapped_column(default=0)
+    due_at: Mapped[float] = mapped_column(default=0.0)
+    reason: Mapped[str | None] = mapped_column(Text)
+
+
 class UsageRow(Base):
     """Worker time that a project has used in one hour since the epoch."""
 

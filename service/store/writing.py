@@ -30,7 +30,16 @@ from service.store.queries import (
 )
 from service.store.reading import Store
 from service.store.stored import RESUMED, StoredCampaign, advance, campaign_state
-from service.store.tables import IMPORTED, CampaignRow, ChangeRow, EpisodeRow, RequirementRow, RunRow, TriageRow
+from service.store.tables import (
+    IMPORTED,
+    CampaignRow,
+    ChangeRow,
+    EpisodeRow,
+    NoticeRow,
+    RequirementRow,
+    RunRow,
+    TriageRow,
+)
 
 
 class Ledger:
@@ -54,8 +63,10 @@ class Ledger:
             raise ConflictError(message, reason="idempotency_key_reused")
         return campaign
 
-    def create(self, spec: CampaignSpec, project: str = "default", key: str | None = None) -> StoredCampaign:
-        """Stores a new campaign with its runs, all queued."""
+    def create(
+        self, spec: CampaignSpec, project: str = "default", key: str | None = None, base_url: str = ""
+    ) -> StoredCampaign:
+        """Stores a new campaign with its runs, all queued; the message to its end links below the base URL."""
         row = CampaignRow(id=f"c{secrets.token_hex(8)}", project=project, idempotency_key=key, label=spec.label)
         row.spec, row.state, row.created_at = spec.model_dump_json(), State.QUEUED, time.time()
         row.runs = [
@@ -73,6 +84,9 @@ class Ledger:
         with self._writing("creating a campaign") as session:
             session.add(row)
             session.flush()
+            if spec.on_end is not None:
+                link = f"{base_url}v1/campaigns/{row.id}"
+                session.add(NoticeRow(campaign_number=row.number, url=spec.on_end, link=link))
             return StoredCampaign.from_row(row, str(row.revision))
 
     def start_run(self, number: int, processes: int = 1) -> None:
@@ -218,6 +232,24 @@ class Ledger:
             campaign.revision += 1
             return Triage.model_validate(row, from_attributes=True)
 
+    def note_try(self, campaign_id: str, reason: str | None, due_at: float | None = None) -> None:
+        """Notes a try to deliver the message to a campaign's end.
+
+        Args:
+          campaign_id: of the campaign; one that was deleted meanwhile is left alone.
+          reason: why it failed; None if it was delivered.
+          due_at: time of the next try, s since the epoch; None after the last one.
+        """
+        with self._writing("noting a delivery") as session:
+            row = session.scalar(select(NoticeRow).join(CampaignRow).where(CampaignRow.id == campaign_id))
+            if row is None:
+                return
+            campaign = session.get_one(CampaignRow, row.campaign_number, with_for_update=True)
+            row.tries, row.reason, row.due_at = row.tries + 1, reason, due_at or row.due_at
+            if reason is None or due_at is None:
+                row.state = "delivered" if reason is None else "failed"
+            campaign.revision += 1
+
     def delete(self, campaign_id: str) -> None:
         """Deletes a campaign with all its rows."""
         with self._writing("deleting a campaign") as session:
@@ -225,7 +257,7 @@ class Ledger:
             session.expunge_all()
             runs = select(RunRow.number).filter_by(campaign_number=number)
             session.execute(delete(RequirementRow).where(RequirementRow.run_number.in_(runs)))
-            for table in (TriageRow, EpisodeRow, ChangeRow, RunRow):
+            for table in (NoticeRow, TriageRow, EpisodeRow, ChangeRow, RunRow):
                 session.execute(delete(table).where(table.campaign_number == number))
             session.execute(delete(CampaignRow).where(CampaignRow.number == number))
         self._store.revisions.forget(campaign_id)

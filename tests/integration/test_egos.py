@@ -4,6 +4,7 @@ import json
 import sys
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,6 +61,43 @@ def install(tmp_path, monkeypatch):
     return installed
 
 
+def checked(capsys, ego: str, *scenarios: str) -> tuple[int, dict[str, Any]]:
+    status = cli.main(["egos", "check", ego, "--scenario", *scenarios, "--json"])
+    return status, json.loads(capsys.readouterr().out)
+
+
+def test_a_check_of_a_sound_ego_draws_its_ways(tmp_path, capsys):
+    assert cli.main(["egos", "check", "idm-aeb", "--scenario", "low", "--out", str(tmp_path / "out")]) == 0
+    assert "It is fit for a search." in capsys.readouterr().out
+    assert (tmp_path / "out" / "low.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("body", "scenario", "reason"),
+    [
+        ("raise ValueError('no map')", "low", "low: the ego crashed: ValueError: no map"),
+        ("return Control(-20.0, 0.0)", "low", "it stands throughout the second half of every scene"),
+        ("return Control(2.6, lane_keeping(perceived, self.vehicle))", "cyclist_ahead", "cyclist_ahead: it touches "),
+    ],
+)
+def test_a_check_tells_why_an_ego_is_unusable(install, capsys, body, scenario, reason):
+    install(body)
+    status, answer = checked(capsys, "example", scenario)
+    assert status == 1
+    assert answer["unusable"][0].startswith(reason)
+    (trial,) = answer["trials"]
+    assert bool(trial["clipped"]) == ("-20" in body)
+
+
+def test_a_check_counts_late_decisions_and_refuses_the_driver_of_sumo(install, capsys):
+    install("self.steps < 5 and __import__('time').sleep(0.11)")
+    _, answer = checked(capsys, "example", "low")
+    assert answer["trials"][0]["late"] >= 3
+    assert answer["trials"][0]["worst_ratio"] > 1.1
+    assert cli.main(["egos", "check", "careful"]) == 2
+    assert "ego: got 'careful', which SUMO drives; wanted a registered ego" in capsys.readouterr().err
+
+
 def test_what_an_ego_prints_spoils_no_replay(install, tmp_path, monkeypatch):
     install("print('hello', flush=True); __import__('os').write(1, b'{}')")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))  # of the helper process
@@ -96,9 +134,9 @@ def play(spec: RunSpec, folder: Path) -> tuple[RunResults, list[EpisodeRecord]]:
     return results, [EpisodeRecord.model_validate_json(line) for line in lines]
 
 
-def frames(family: str, driver: str | None, episode: int, *, controlled: bool = False) -> list[Frame]:
+def frames(family: str, driver: str | None, episode: int, *, controlled: bool = False, **ego: Any) -> list[Frame]:
     """Of an episode without an attack."""
-    spec = RunSpec(family=family, method="random", seed=0, ego=EgoConfig(driver=driver))
+    spec = RunSpec(family=family, method="random", seed=0, ego=EgoConfig(driver=driver, **ego))
     with closing(RiskSacEnv(Problem.from_spec(spec), spec.learner.reward, controlled=controlled)) as env:
         scene = env.problem.space.from_unit(np.random.default_rng((3, episode)).random(env.problem.space.dimension))
         env.reset(seed=episode, options={"scene": scene})
@@ -107,6 +145,13 @@ def frames(family: str, driver: str | None, episode: int, *, controlled: bool = 
             *_, terminated, truncated, _ = env.step(np.zeros(env.action_size, dtype=np.float32))
             ended = terminated or truncated
         return env.trace.frames
+
+
+def test_sensors_and_actuators_change_an_episode_and_its_seed_repeats_it():
+    equipment = {"sensors": "camera", "actuators": "by-wire"}
+    exact, first, second = (frames("low", "r157", 1, **ego) for ego in ({}, equipment, equipment))
+    assert [frame.state.tobytes() for frame in first] == [frame.state.tobytes() for frame in second]
+    assert [frame.state.tobytes() for frame in first] != [frame.state.tobytes() for frame in exact]
 
 
 @pytest.mark.parametrize("family", ["low", "mixed", "dense"])

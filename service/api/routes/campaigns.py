@@ -160,7 +160,7 @@ def delete_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -
 @router.get("/{campaign_id}", response_model=Campaign, responses=UNKNOWN | LIVE)
 def get_campaign(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
     """State, progress and runs of a campaign."""
-    return _live(campaign_id, request, service, caller, lambda found: campaign_body(found, service.manager.workers))
+    return _live(campaign_id, request, service, caller, lambda found: _body(found, service))
 
 
 @router.get("/{campaign_id}/results", response_model=Results, responses=UNKNOWN | LIVE)
@@ -282,8 +282,16 @@ def _submit(
     caller: Caller,
     idempotency_key: str | None,
 ) -> Response:
-    campaign = service.manager.submit(spec, project=caller.project, key=idempotency_key, prior=prior)
+    campaign = service.manager.submit(
+        spec, project=caller.project, key=idempotency_key, prior=prior, base_url=str(request.base_url)
+    )
     return _accepted(request, campaign, service)
+
+
+def _body(campaign: StoredCampaign, service: Context) -> Campaign:
+    """A campaign in full, with the message to its end."""
+    notice = service.store.notice(campaign.number) if campaign.spec.on_end else None
+    return campaign_body(campaign, service.manager.workers).model_copy(update={"notice": notice})
 
 
 def _live(
@@ -328,7 +336,7 @@ def _digest(content: bytes) -> str:
 
 def _accepted(request: Request, campaign: StoredCampaign, service: Context) -> Response:
     headers = {"Location": link(request, f"/v1/campaigns/{campaign.id}")} | _retry_after(campaign, service)
-    body = wire(campaign_body(campaign, service.manager.workers))
+    body = wire(_body(campaign, service))
     return Response(body, status_code=202, headers=headers, media_type="application/json")
 
 

@@ -18,7 +18,7 @@ from risk_sac.records.coverage import CoverageMatrix
 from risk_sac.report.evidence import CampaignEvidence
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
-from risk_sac.report.matrix import ego_name, merged
+from risk_sac.report.matrix import merged
 from risk_sac.report.rendering import POLICY
 from service.api.context import AskedCampaign, Context, CurrentCaller, Service, caller_of
 from service.api.pages import (
@@ -239,7 +239,7 @@ async def get_project_coverage(
     page = await run_in_threadpool(service.store.campaigns, limit, project=caller.sees, label=label)
     matrices = []
     for campaign in page.items:
-        if ego is not None and ego_name(campaign.spec) != ego:
+        if ego is not None and campaign.spec.ego.name != ego:
             continue
         edition = await run_in_threadpool(service.reports.edition, campaign)
         view = CampaignView(name="coverage", campaign_id=campaign.id, edition=edition)
