@@ -109,6 +109,7 @@ def contrast(one: str, other: str) -> float:
 
 
 SCREENS: dict[str, tuple[str, Callable[[Page], None]]] = {
+    "home": ("", heading),
     "campaigns": ("campaigns", heading),
     "question": ("campaigns", question),
     "nowhere": ("nowhere", heading),

@@ -186,7 +186,7 @@ function Several({ names }: { names: readonly string[] }) {
   );
 }
 
-function Bar({ done, total, name }: { done: number; total: number; name: string }) {
+export function Bar({ done, total, name }: { done: number; total: number; name: string }) {
   return (
     <>
       <div class="progress" role="progressbar" aria-label={`Episodes of ${name}`} aria-valuenow={done} aria-valuemin={0} aria-valuemax={total}>
