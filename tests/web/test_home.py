@@ -25,7 +25,7 @@ def test_an_ego_stands_with_its_newest_campaign_and_what_runs(
         service.client.delete(f"/v1/campaigns/{running}")
     expect(ego.get_by_role("region", name="Running")).to_have_count(0)
     expect(ego.locator(".newest-campaign")).to_contain_text(CAMPAIGN["label"])
-    expect(ego.locator(".scenario-name")).to_have_text(CAMPAIGN["families"])
+    expect(ego.locator(".scenario-names")).to_have_text("low, mixed")
     failures = service.get(campaign)["progress"]["failures"]
     expect(ego.locator(".newest-campaign")).to_contain_text(f"{failures} valid failures")
 

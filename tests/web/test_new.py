@@ -45,9 +45,9 @@ def small(page: Page, label: str = "") -> None:
     """Fills in three episodes of random search."""
     more(page)
     page.get_by_label("Label", exact=True).fill(label)
+    page.get_by_role("checkbox", name="random", exact=True).check()  # first: no method at all is wrong
     for method in ("risk-sac-diverse", "archive"):
         page.get_by_role("checkbox", name=method, exact=True).uncheck()
-    page.get_by_role("checkbox", name="random", exact=True).check()
     page.get_by_label("Episodes", exact=True).fill("3")
 
 

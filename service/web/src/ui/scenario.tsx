@@ -1,5 +1,6 @@
 /** Scenarios wherever they are named: name, summary and a small picture. */
 
+import { Fragment } from "preact";
 import { useEffect, useRef, useState } from "preact/hooks";
 import { get } from "../api/client";
 import { queue } from "../api/turn";
@@ -62,17 +63,22 @@ export function ScenarioNames({ names }: { names: readonly string[] }) {
   }, [names.join()]);
   return (
     <span class="scenario-names">
-      {names.map((name) => (
-        <Named key={name} name={name} scenario={scenarios.get(name)} />
+      {names.map((name, at) => (
+        <Fragment key={name}>
+          <span class="scenario-name">
+            <Named name={name} scenario={scenarios.get(name)} />
+            {at < names.length - 1 && ","}
+          </span>{" "}
+        </Fragment>
       ))}
     </span>
   );
 }
 
 function Named({ name, scenario }: { name: string; scenario: Summary | undefined }) {
-  if (!scenario) return <span class="scenario-name">{name}</span>;
+  if (!scenario) return <>{name}</>;
   return (
-    <a class="scenario-name" href={address(["scenarios", name])} title={scenario.summary}>
+    <a href={address(["scenarios", name])} title={scenario.summary}>
       <ScenarioPicture name={name} />
       {name}
     </a>
