@@ -79,7 +79,7 @@ def add(commands: Commands) -> None:
         inner,
         "draw",
         _draw,
-        "draw a scenario from above with the ranges of all starts",
+        "draw a scenario from above: how it begins, and where its actors may start",
         example="scenarios draw my_scenario.yaml --out my_scenario.png",
     )
     drawing.add_argument("file", metavar="FILE", help=f"{FILE_HELP}; or the name of a scenario")

@@ -169,7 +169,7 @@ class Client:
         return read(ScenarioDetails, response)
 
     def scenario_picture(self, name: str) -> bytes:
-        """Returns a scenario from above as a PNG, with the ranges of all starts."""
+        """Returns a picture of a scenario from above as a PNG."""
         return self._transport.ask("GET", f"v1/scenarios/{_part(name)}/picture.png", patience_s=MAKING_S).content
 
     def delete_scenario(self, name: str) -> None:

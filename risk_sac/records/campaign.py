@@ -189,9 +189,12 @@ class Campaign(CampaignSummary):
 
 
 class CampaignCheck(Record):
-    """Changes from the requested settings to those that a campaign would use."""
+    """What a campaign would use and detect."""
 
     adjustments: tuple[Adjustment, ...]
+    """Changes from the requested settings."""
+    power: Power
+    """Known defects that its budget detects."""
 
 
 class StateChange(Record):

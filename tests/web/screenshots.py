@@ -32,7 +32,6 @@ GRADES = ("preventable", "full_braking", "unavoidable")
 
 # Besides the screens of test_screens.py, which are prepared to show the most.
 PLAIN: dict[str, tuple[str, Callable[[Page], None]]] = {
-    "form": ("new", heading),
     "cards": ("campaigns/{campaign}/failures", heading),
     "live": ("campaigns/{live}", heading),
     "picker": ("compare", heading),

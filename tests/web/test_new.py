@@ -36,10 +36,18 @@ def opened(page: Page, title: str) -> Locator:
     return group
 
 
+def more(page: Page) -> None:
+    """Opens what the three choices leave."""
+    page.get_by_text("More settings").click()
+
+
 def small(page: Page, label: str = "") -> None:
     """Fills in three episodes of random search."""
+    more(page)
     page.get_by_label("Label", exact=True).fill(label)
-    page.get_by_role("checkbox", name="archive", exact=True).uncheck()
+    page.get_by_role("checkbox", name="random", exact=True).check()  # first: no method at all is wrong
+    for method in ("risk-sac-diverse", "archive"):
+        page.get_by_role("checkbox", name=method, exact=True).uncheck()
     page.get_by_label("Episodes", exact=True).fill("3")
 
 
@@ -82,6 +90,7 @@ def test_an_answer_that_was_lost_starts_no_second_campaign(page_at: Callable[...
 def test_a_refusal_stands_beside_its_field(page_at: Callable[..., Page], service: Service) -> None:
     page = page_at("new", allowed=("422",))
     before = len(service.client.get("/v1/campaigns").json()["items"])
+    more(page)
     page.get_by_label("Episodes", exact=True).fill("0")
     page.get_by_role("checkbox", name="low", exact=True).uncheck()
     page.get_by_role("button", name="Start the campaign").click()
@@ -99,6 +108,7 @@ def test_a_refusal_stands_beside_its_field(page_at: Callable[..., Page], service
 
 def test_a_wrong_value_opens_the_group_that_hides_it(page_at: Callable[..., Page]) -> None:
     page = page_at("new", allowed=("422",))
+    more(page)
     learner = opened(page, "Learner")
     agent = opened(page, "Agent")
     agent.get_by_label("Batch size").fill("0")
@@ -110,6 +120,7 @@ def test_a_wrong_value_opens_the_group_that_hides_it(page_at: Callable[..., Page
 
 def test_a_formula_is_checked_while_it_is_written_and_the_fault_has_a_caret(page_at: Callable[..., Page]) -> None:
     page = page_at("new", allowed=("422",))
+    more(page)
     opened(page, "Requirements")
     page.get_by_role("button", name="Add a requirement").click()
     formula = page.get_by_label("Formula")
@@ -150,6 +161,7 @@ def test_what_an_earlier_campaign_set_deep_down_is_cloned_too(page_at: Callable[
 
 def test_a_range_of_the_odd_is_moved_by_keys_and_by_numbers(page_at: Callable[..., Page], service: Service) -> None:
     page = page_at("new")
+    more(page)
     odd = opened(page, "Operational design domain")
     friction = service.client.get("/v1/families").json()["items"][0]["odd"]["environment"]["friction"]
     low = odd.get_by_role("spinbutton", name="Friction, lowest")
@@ -168,6 +180,7 @@ def test_a_range_of_the_odd_is_moved_by_keys_and_by_numbers(page_at: Callable[..
 
 def test_what_a_family_does_not_support_is_said_before_the_campaign_starts(page_at: Callable[..., Page]) -> None:
     page = page_at("new")
+    more(page)
     odd = opened(page, "Operational design domain")
     page.get_by_role("checkbox", name="mixed").check()
     odd.get_by_label("night", exact=True).check()
@@ -217,6 +230,7 @@ def test_an_ego_of_ones_own_is_named_and_refused_beside_the_name(page_at: Callab
 
 def test_numbers_have_as_many_digits_as_help(page_at: Callable[..., Page]) -> None:
     page = page_at("new")
+    more(page)
     for title in ("Delay and sight", "Operational design domain", "Requirements", "Learner"):
         opened(page, title)
     angle = page.get_by_label("Field of view")
@@ -227,3 +241,22 @@ def test_numbers_have_as_many_digits_as_help(page_at: Callable[..., Page]) -> No
     angle.fill("3.141592653589")
     expect(angle).to_have_value("3.141592653589")
     assert curl_body(page)["ego"] == {"sensor": {"field_of_view_rad": 3.141592653589}}
+
+
+def test_each_effort_says_what_it_costs_and_follows_the_scenarios(page_at: Callable[..., Page]) -> None:
+    page = page_at("new")
+    hour = page.get_by_role("button", name="An hour")
+    hour.click()
+    alone = curl_body(page)
+    for scenario in ("mixed", "dense", "cyclist_ahead", "child_between_cars"):
+        page.get_by_role("checkbox", name=scenario).check()
+    expect(hour).to_have_attribute("aria-pressed", "true")
+    chosen = curl_body(page)
+    assert chosen["methods"] == ["risk-sac-diverse", "archive"]
+    assert len(chosen["families"]) == 5
+    assert chosen["budget"]["episodes"] < alone["budget"]["episodes"]
+    episodes = 5 * 2 * len(chosen["seeds"]) * chosen["budget"]["episodes"]
+    expect(hour).to_contain_text(f"{episodes:,} episodes, about")
+    expect(hour).to_contain_text(re.compile("known defects|not measured"))
+    page.get_by_label("Search scenarios").fill("roundabout")
+    page.locator(".choice-card", has_text="roundabout_entry").locator("img").wait_for()

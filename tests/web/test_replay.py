@@ -202,6 +202,12 @@ def test_the_verdict_is_told_in_words(failure: dict[str, Any], page_at: Callable
     assert all(driver.lower() in said for driver in rows)
     assert said.startswith("none of the reference drivers") == (not rows)
     assert said.startswith("only ") == (rows == ["Full braking at once"])
+    happened, fault, plausible = verdict.locator(".verdict-sentences p").all_inner_texts()
+    assert failure["collision"]["other_id"] in happened
+    assert judgement["severity"] in happened
+    at_fault = {"ego": "The ego is at fault", "shared": "Both are at fault", "other": "The other road user is at fault"}
+    assert fault.startswith(at_fault[judgement["fault"]])
+    assert plausible == f"It is {judgement['plausibility']['verdict']}: {judgement['plausibility']['sentence']}."
     if failure["repetition"]:
         expect(verdict).to_contain_text(f"{failure['repetition']['same']} of {failure['repetition']['times']} replays")
 

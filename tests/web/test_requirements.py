@@ -92,6 +92,7 @@ def test_a_violation_without_contact_is_played_with_its_moment_and_its_robustnes
 
 def test_the_form_says_what_shipped_requirements_count_as(page_at: Callable[..., Page]) -> None:
     page = page_at("new")
+    page.get_by_text("More settings").click()
     page.locator("details.group:has(> summary > .group-title:text-is('Requirements')) > summary").click()
     expect(page.get_by_label("no contact")).to_be_disabled()
     expect(page.get_by_label("safe ttc")).to_have_value("report")

@@ -35,6 +35,7 @@ def plots(page: Page) -> None:
 
 
 def form(page: Page) -> None:
+    page.get_by_text("More settings").click()
     for title in ("Defects", "Delay and sight", "Operational design domain", "Requirements", "Learner", "Agent"):
         group = page.locator(f"details.group:has(> summary > .group-title:text-is('{title}'))")
         group.locator("summary").first.click()
@@ -109,9 +110,11 @@ def contrast(one: str, other: str) -> float:
 
 
 SCREENS: dict[str, tuple[str, Callable[[Page], None]]] = {
+    "home": ("", heading),
     "campaigns": ("campaigns", heading),
     "question": ("campaigns", question),
     "nowhere": ("nowhere", heading),
+    "choices": ("new", heading),
     "new": ("new", form),
     "campaign": ("campaigns/{campaign}", curves),
     "failures": ("campaigns/{campaign}/failures?by=episode&family=mixed&brush=closing:1:", triage),

@@ -59,7 +59,7 @@ def test_a_key_is_asked_for_and_kept_in_the_tab_alone(new_page: Callable[..., Pa
         expect(page.get_by_role("alert")).to_contain_text("not one that counts")
         page.get_by_label("Key").fill(key)
         page.get_by_role("button", name="Enter").click()
-        expect(page.get_by_role("heading", name="Campaigns")).to_be_visible()
+        expect(page.get_by_role("heading", name="Find out how your ego fails")).to_be_visible()
         assert page.evaluate("Object.values(sessionStorage)") == [key]
         assert key not in page.evaluate("JSON.stringify(localStorage) + document.cookie")
         page.get_by_role("button", name="Log out").click()

@@ -97,10 +97,10 @@ async def post_campaign(
 
 @router.post("/check", responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
 async def check_campaign(spec: PostedCampaign, service: Service, caller: CurrentCaller) -> CampaignCheck:
-    """Validate a campaign and change nothing; `adjustments` has the values that its episodes would use instead."""
+    """Validate a campaign and change nothing; says which values its episodes would use, and what its budget detects."""
     checked = await run_in_threadpool(service.manager.checked, spec)
     await service.priors.of(spec, caller.project, caller.key_id)
-    return CampaignCheck(adjustments=await run_in_threadpool(adjustments, checked))
+    return CampaignCheck(adjustments=await run_in_threadpool(adjustments, checked), power=power_of(checked, ()))
 
 
 @router.get("", response_model=CampaignPage, responses=TAGGED)

@@ -10,6 +10,7 @@ import { CampaignsScreen } from "./screens/campaigns/screen";
 import { CompareScreen } from "./screens/compare/screen";
 import { CoverageScreen } from "./screens/coverage/screen";
 import { FailuresScreen } from "./screens/failures/screen";
+import { HomeScreen } from "./screens/home/screen";
 import { MapScreen } from "./screens/maps/map";
 import { MapsScreen } from "./screens/maps/screen";
 import { NewScreen } from "./screens/new/screen";
@@ -37,10 +38,11 @@ export function App() {
         <a class="skip" href={location.hash || "#/"} onClick={toContent}>
           Skip to content
         </a>
-        <a class="brand" href="#/campaigns">
+        <a class="brand" href="#/">
           RISK-SAC
         </a>
         <nav aria-label="Main">
+          <Tab to="#/">Egos</Tab>
           <Tab to="#/campaigns">Campaigns</Tab>
           <Tab to="#/new">New campaign</Tab>
           <Tab to="#/scenarios">Scenarios</Tab>
@@ -80,7 +82,8 @@ function Guarded({ children }: { children: ComponentChildren }) {
 }
 
 function screen({ parts, query }: Place): ComponentChildren {
-  const [room = "campaigns", id, part, failure, twin, kind] = parts;
+  const [room, id, part, failure, twin, kind] = parts;
+  if (room === undefined) return <HomeScreen />;
   if (room === "campaigns" && id === undefined) return <CampaignsScreen query={query} />;
   if (room === "new") return <NewScreen query={query} />;
   if (room === "scenarios" && part === undefined) {
@@ -117,7 +120,7 @@ function Nowhere() {
 }
 
 function Tab({ to, children }: { to: string; children: ComponentChildren }) {
-  const room = usePlace().parts[0] ?? "campaigns";
+  const [room] = usePlace().parts;
   return (
     <a href={to} aria-current={placeOf(to).parts[0] === room ? "page" : undefined}>
       {children}

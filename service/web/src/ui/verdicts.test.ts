@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 
-import { faultWords, knownOf, preventedBy } from "./verdicts";
+import { egoPartWords, knownOf, preventedBy } from "./verdicts";
 import type { Collision, Violation } from "./violations";
 
 function broken(...preventing: string[]): Violation {
@@ -32,18 +32,17 @@ test("what the ego knew is said once, of hiding and time together", () => {
 
 const PART = { seen_s: 2.3, braked_after_s: 1.1, braking_mps2: 4, possible_mps2: 7.6, gained_mps: 0.2, started: false, sight_mps: null, sighted_mps: null, left_first: "striker" };
 
-function judged(fault: string | null, changes: Partial<typeof PART> | Record<string, unknown> | null): Collision {
-  return { judgement: { fault, ego_part: changes && { ...PART, ...changes } } } as unknown as Collision;
+function judged(changes: Partial<typeof PART> | Record<string, unknown> | null): Collision {
+  return { judgement: { ego_part: changes && { ...PART, ...changes } } } as unknown as Collision;
 }
 
-test("the fault is told with what the ego did", () => {
-  expect(faultWords(judged("shared", {}))).toBe("Fault: shared. The ego braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s².");
-  expect(faultWords(judged("ego", { braked_after_s: null, started: true, gained_mps: 1.4 }))).toBe(
-    "Fault: ego. The ego did not brake in the conflict; it drove on and gained 1.4 m/s though it saw the striker.",
+test("what the ego did about the striker is one clause", () => {
+  expect(egoPartWords(judged({}))).toBe("the ego braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s²");
+  expect(egoPartWords(judged({ braked_after_s: null, started: true, gained_mps: 1.4 }))).toBe(
+    "the ego did not brake in the conflict; it drove on and gained 1.4 m/s though it saw the striker",
   );
-  expect(faultWords(judged("ego", { braked_after_s: 0, sight_mps: 5.8, sighted_mps: 13.6, left_first: "ego" }))).toBe(
-    "Fault: ego. The ego was braking when the conflict began, by 4.0 of 7.6 m/s²; it drove at 13.6 m/s where its sight allowed 5.8 m/s; it was the first to leave RSS's proper response.",
+  expect(egoPartWords(judged({ braked_after_s: 0, sight_mps: 5.8, sighted_mps: 13.6, left_first: "ego" }))).toBe(
+    "the ego was braking when the conflict began, by 4.0 of 7.6 m/s²; it drove at 13.6 m/s where its sight allowed 5.8 m/s; it was the first to leave RSS's proper response",
   );
-  expect(faultWords(judged(null, null))).toBeNull();
-  expect(faultWords({ requirement: "never_fast", fault: "ego" } as unknown as Violation)).toBe("Fault: ego.");
+  expect(egoPartWords(judged(null))).toBeNull();
 });

@@ -2,7 +2,7 @@
 
 import { number, words } from "./text";
 import type { Body } from "../api/types";
-import { driversOf, faultOf, isContact, type Collision, type Violation } from "./violations";
+import { driversOf, isContact, type Collision, type Violation } from "./violations";
 
 export const GRADES = ["preventable", "full_braking", "unavoidable", "none"] as const;
 export type GradeName = (typeof GRADES)[number];
@@ -63,12 +63,10 @@ export function knownOf({ visible_for_s, other_id, judgement }: Collision): stri
   return `${other_id} was not in the ego's view at the contact${judgement ? ", but when the conflict began" : ""}.`;
 }
 
-/** The fault, and what the ego did about the striker; null of a refused or an older one. */
-export function faultWords(violation: Collision | Violation): string | null {
-  const fault = faultOf(violation);
-  if (fault === null) return null;
+/** What the ego did about the striker; null where that is not on record. */
+export function egoPartWords(violation: Collision | Violation): string | null {
   const part = isContact(violation) ? violation.judgement?.ego_part : null;
-  return `Fault: ${fault}.${part == null ? "" : ` The ego ${egoDid(part)}.`}`;
+  return part == null ? null : `the ego ${egoDid(part)}`;
 }
 
 const GAINS_MPS = 1;

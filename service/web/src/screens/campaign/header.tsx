@@ -5,6 +5,7 @@ import { absolute, download, hasKey, send } from "../../api/client";
 import { ended } from "../../api/ended";
 import type { Body } from "../../api/types";
 import { address, go } from "../../router";
+import { ScenarioNames } from "../../ui/scenario";
 import { count, egoWords, moment, seconds } from "../../ui/text";
 import { Confirm } from "../../ui/confirm";
 
@@ -25,7 +26,9 @@ export function Header({ campaign, again }: { campaign: Campaign; again: () => v
       </div>
       {campaign.reason && <p class="bad breaking">{campaign.reason}</p>}
       <dl class="posted">
-        <Fact name={spec.families.length > 1 ? "Families" : "Family"}>{spec.families.join(", ")}</Fact>
+        <Fact name={spec.families.length > 1 ? "Families" : "Family"}>
+          <ScenarioNames names={spec.families} />
+        </Fact>
         <Fact name={spec.methods.length > 1 ? "Methods" : "Method"}>{spec.methods.join(", ")}</Fact>
         <Fact name="Ego">{egoWords(campaign.ego)}</Fact>
         <Fact name="Behaviour">{spec.odd?.dynamic?.behaviour ?? "ordinary"}</Fact>

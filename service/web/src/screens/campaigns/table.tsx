@@ -3,6 +3,7 @@
 import { Fragment, type ComponentChildren } from "preact";
 import { ended } from "../../api/ended";
 import { address } from "../../router";
+import { ScenarioNames } from "../../ui/scenario";
 import { count, egoWords, headlineWords, moment, percent, seconds } from "../../ui/text";
 import type { Listed } from "./listed";
 import { clicked, type Column, type Order } from "./order";
@@ -142,7 +143,7 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
         {campaign.reason && <span class="reason small">{campaign.reason}</span>}
       </td>
       <td data-head="Families" class="wraps">
-        <Several names={campaign.families} />
+        <ScenarioNames names={campaign.families} />
       </td>
       <td data-head="Methods" class="wraps" title={campaign.methods.join(", ")}>
         <Several names={campaign.methods} />
@@ -186,7 +187,7 @@ function Several({ names }: { names: readonly string[] }) {
   );
 }
 
-function Bar({ done, total, name }: { done: number; total: number; name: string }) {
+export function Bar({ done, total, name }: { done: number; total: number; name: string }) {
   return (
     <>
       <div class="progress" role="progressbar" aria-label={`Episodes of ${name}`} aria-valuenow={done} aria-valuemin={0} aria-valuemax={total}>

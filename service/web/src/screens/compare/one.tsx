@@ -5,6 +5,7 @@ import { useAsked } from "../../api/asked";
 import { download } from "../../api/client";
 import type { Body } from "../../api/types";
 import { address } from "../../router";
+import { ScenarioNames } from "../../ui/scenario";
 import { Empty, Shown } from "../../ui/states";
 import { useTitle } from "../../ui/title";
 import { markOf } from "../campaign/look";
@@ -122,7 +123,7 @@ function Family({ id, table, family, phase }: { id: string; table: Table; family
   return (
     <section class="card family" aria-labelledby={`family-${family}`}>
       <h2 id={`family-${family}`}>
-        Family {family}
+        Family <ScenarioNames names={[family]} />
         {phase === "evaluation" && <span class="faint">, the frozen policies</span>}
       </h2>
       <Methods what="Method" family={family} rows={rows} />

@@ -6,6 +6,7 @@ import { ended } from "../../api/ended";
 import { usePolled } from "../../api/polled";
 import type { Body } from "../../api/types";
 import { address } from "../../router";
+import { ScenarioNames } from "../../ui/scenario";
 import { Empty, Failed, Loading } from "../../ui/states";
 import { useTitle } from "../../ui/title";
 import { COLOURS, type Mark } from "../campaign/look";
@@ -65,7 +66,7 @@ export function Several({ ids }: { ids: string[] }) {
         const rows = lines.filter((line) => line.family === family).map((line) => line.row);
         return (
           <section key={family} class="card family" aria-labelledby={`family-${family}`}>
-            <h2 id={`family-${family}`}>Family {family}</h2>
+            <h2 id={`family-${family}`}>Family <ScenarioNames names={[family]} /></h2>
             <Methods what="Campaign" family={family} rows={rows} />
             <Funnels rows={rows} />
             <Verdicts what="Campaign" family={family} rows={rows} />

@@ -6,6 +6,7 @@ import { useAsked } from "../../api/asked";
 import { ended } from "../../api/ended";
 import type { Body } from "../../api/types";
 import { address } from "../../router";
+import { ScenarioNames } from "../../ui/scenario";
 import { Empty, Shown } from "../../ui/states";
 import { count } from "../../ui/text";
 import { PUBLISHED } from "../../ui/verdicts";
@@ -52,6 +53,7 @@ function Head({ campaign, about, query, table }: HeadProps) {
         </p>
         <h1>Failures</h1>
         {about && <span class={`tag ${about.state}`}>{about.state}</span>}
+        {about && <ScenarioNames names={about.families} />}
         {funnel && (
           <ol class="funnel" aria-label="From failing episodes to the headline">
             {funnel.map(([name, number, meaning]) => (

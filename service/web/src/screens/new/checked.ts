@@ -8,7 +8,7 @@ import type { Wrong } from "./form";
 /** How it stands: `silent` where nothing is known, as with a service that cannot check or does not answer. */
 export type Verdict =
   | { state: "silent" | "asking" }
-  | { state: "good"; adjustments: readonly Body<"Adjustment">[] }
+  | { state: "good"; adjustments: readonly Body<"Adjustment">[]; power: Body<"Power"> }
   | { state: "wrong"; wrong: readonly Wrong[]; why: string };
 
 const PAUSE_MS = 350; // after the last key
@@ -35,8 +35,8 @@ export function useChecked(body: string | null): Verdict {
 
 async function check(body: string): Promise<Verdict> {
   try {
-    const found = await send<Body<"CampaignCheck">>("POST", "v1/campaigns/check", JSON.parse(body));
-    return { state: "good", adjustments: found?.adjustments ?? [] };
+    const { adjustments, power } = (await send<Body<"CampaignCheck">>("POST", "v1/campaigns/check", JSON.parse(body)))!;
+    return { state: "good", adjustments, power };
   } catch (error) {
     if (!(error instanceof Problem)) return { state: "silent" };
     if (error.status === 404 || error.status === 405) able = false;

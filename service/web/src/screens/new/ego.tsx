@@ -18,33 +18,41 @@ const OTHERS = "An ego of yours has a name here once the service registers it: a
 
 interface Props {
   field: Field;
-  /** What is sent of it. */
-  sent: Values;
 }
 
-export function Ego({ field, sent }: Props) {
+export function Ego({ field }: Props) {
   const known = useAsked<Egos>("v1/egos");
-  const { value: ego } = useField<Values>(["ego"]);
-  const fields = field.shape.kind === "object" ? field.shape.fields : [];
-  const left = fields.filter(({ name }) => !APART.includes(name) && !unused(ego).includes(name));
-  const changed = left.some(({ name }) => name in sent);
+  const fields = partsOf(field);
   return (
     <section class="card ego" aria-labelledby="ego-title">
-      <h2 id="ego-title">Ego</h2>
+      <h2 id="ego-title">1. Ego</h2>
       <Shown asked={known} what="the egos">
         {(egos) => (
           <>
             <Driver egos={egos} />
-            <Fields shape={{ kind: "object", about: "", fields: fields.filter(({ name }) => name === "label") }} path={["ego"]} />
+            <Fields shape={{ kind: "object", about: "", fields: fields.filter(({ name }) => name === "label").map((label) => ({ ...label, title: "Version" })) }} path={["ego"]} />
             <Defects field={fields.find(({ name }) => name === "defects")!} egos={egos} />
           </>
         )}
       </Shown>
-      <Group title="Delay and sight" path={["ego"]} changed={changed} open={changed}>
-        <Fields shape={{ kind: "object", about: "", fields: left }} path={["ego"]} />
-      </Group>
     </section>
   );
+}
+
+/** What else an ego has: its delay, and what it sees. */
+export function Perception({ field, sent }: Props & { sent: Values }) {
+  const { value: ego } = useField<Values>(["ego"]);
+  const left = partsOf(field).filter(({ name }) => !APART.includes(name) && !unused(ego).includes(name));
+  const changed = left.some(({ name }) => name in sent);
+  return (
+    <Group title="Delay and sight" path={["ego"]} changed={changed} open={changed}>
+      <Fields shape={{ kind: "object", about: "", fields: left }} path={["ego"]} />
+    </Group>
+  );
+}
+
+function partsOf({ shape }: Field): Field[] {
+  return shape.kind === "object" ? shape.fields : [];
 }
 
 function Driver({ egos }: { egos: Egos }) {

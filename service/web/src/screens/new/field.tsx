@@ -237,13 +237,17 @@ interface Offered {
   offers?: readonly string[];
   /** Leaves out what is not chosen and does not match. */
   matches?: (option: string) => boolean;
+  /** The picture of each. */
+  picture?: (option: string) => ComponentChildren;
+  /** What those are that are folded away. */
+  folded?: string;
   help?: string;
   /** Called when one was chosen or dropped. */
   changed?: () => void;
 }
 
 /** Some of a few names, each with a box. */
-export function Choices({ field, path, abouts = {}, costs = {}, first, help, changed, offers, matches = () => true }: Offered) {
+export function Choices({ field, path, abouts = {}, costs = {}, first, help, changed, offers, matches = () => true, picture, folded: kept = "" }: Offered) {
   const { id, value, change, wrong } = useField<string[]>(path, true);
   const offered = offers ? offers : field.shape.kind === "list" && field.shape.item.kind === "choice" ? field.shape.item.options : [];
   const options = [...new Set([...offered, ...value])]; // a clone may have what a form does not offer: a place of a map
@@ -268,6 +272,7 @@ export function Choices({ field, path, abouts = {}, costs = {}, first, help, cha
         }}
       />
       <span>
+        {picture?.(option)}
         <b>{option}</b>
         {costs[option] && <span class="tag cost">{costs[option] as string}</span>}
         {abouts[option] && (
@@ -287,7 +292,7 @@ export function Choices({ field, path, abouts = {}, costs = {}, first, help, cha
       {folded.length > 0 && (
         <details class="more-choices" open={opened} onToggle={(event) => setOpened(event.currentTarget.open)}>
           <summary>
-            {folded.length} more: {path.at(-1)} for comparisons{picked > 0 && <span class="tag running">{picked} selected</span>}
+            {folded.length} more {kept}{picked > 0 && <span class="tag running">{picked} selected</span>}
           </summary>
           {opened && <div class="choice-grid">{folded.map(card)}</div>}
         </details>

@@ -1,98 +1,79 @@
-/** Campaigns to begin with: what is searched, by what and for how long; all else stays as it is in the form. */
+/** Efforts of a campaign: by which methods, with how many seeds and episodes. Pure. */
 
 import type { Body } from "../../api/types";
 import type { Values } from "./schema";
 
 type Spec = Body<"CampaignSpec">;
 
-interface Preset {
+export interface Effort {
   title: string;
   about: string;
-  families: Spec["families"];
-  methods: Spec["methods"] & object;
-  seeds: number[];
-  episodes: number;
-  evaluation: number;
+  methods: readonly (Spec["methods"] & object)[number][];
+  seeds: readonly number[];
+  /** Processor time of the whole campaign, s; null: as many episodes as `most`. */
+  seconds: number | null;
+  /** Episodes of a run, at most. */
+  most: number;
 }
 
-export const PRESETS: readonly Preset[] = [
-  {
-    title: "Quick look",
-    about: "one road, a minute or so: is there anything at all?",
-    families: ["low"],
-    methods: ["archive", "random"],
-    seeds: [0],
-    episodes: 60,
-    evaluation: 0,
-  },
-  {
-    title: "Nightly",
-    about: "everything, by the two methods that find most",
-    families: ["low", "mixed", "dense"],
-    methods: ["risk-sac-diverse", "archive"],
-    seeds: [0],
-    episodes: 1000,
-    evaluation: 0,
-  },
-  {
-    title: "Compare methods",
-    about: "learners and controls on one family, three seeds each",
-    families: ["mixed"],
-    methods: ["risk-sac", "risk-sac-diverse", "sac-lag", "archive", "bo-only", "random"],
-    seeds: [0, 1, 2],
-    episodes: 500,
-    evaluation: 0,
-  },
-  {
-    title: "Full",
-    about: "the paper's comparison and its ablations: days, not hours",
-    families: ["low", "mixed", "dense"],
-    methods: [
-      "risk-sac",
-      "risk-sac-diverse",
-      "risk-sac-only-rper",
-      "risk-sac-only-rs",
-      "sac-lag",
-      "sac",
-      "ddpg-lag",
-      "ddpg",
-      "archive",
-      "bo-only",
-      "random",
-      "no-adversary",
-    ],
-    seeds: [0, 1, 2, 3, 4],
-    episodes: 2000,
-    evaluation: 100,
-  },
+/** Of an episode of `random`, s: the mean over the shipped scenarios. */
+const RANDOM_EPISODE_S = 0.1;
+const FIND_MOST = ["risk-sac-diverse", "archive"] as const;
+
+export const EFFORTS: readonly Effort[] = [
+  { title: "Quick look", about: "Is there anything at all?", methods: FIND_MOST, seeds: [0], seconds: null, most: 60 },
+  { title: "An hour", about: "Which kinds of failures are there?", methods: FIND_MOST, seeds: [0, 1], seconds: 3600, most: 5_000 },
+  { title: "Overnight", about: "What is left, with a control to compare with?", methods: [...FIND_MOST, "random"], seeds: [0, 1, 2, 3], seconds: 8 * 3600, most: 20_000 },
 ];
 
-export function applied(preset: Preset, spec: Values): Values {
-  const budget = { ...(spec.budget as Values), episodes: preset.episodes, evaluation_episodes: preset.evaluation };
-  return { ...spec, families: [...preset.families], methods: [...preset.methods], seeds: [...preset.seeds], budget };
+/** Method → processor time of an episode as a multiple of one of `random`. */
+export type EpisodeCosts = Readonly<Record<string, number | null>>;
+
+/**
+ * Sets methods, seeds and budget of a spec.
+ *
+ * @param families how many scenarios or places are searched.
+ */
+export function applied({ methods, seeds, seconds, most }: Effort, spec: Values, families: number, costs: EpisodeCosts): Values {
+  const round_s = Math.max(1, families) * seeds.length * RANDOM_EPISODE_S * sum(methods.map((name) => costs[name] ?? 1));
+  const episodes = seconds === null ? most : Math.max(60, Math.min(most, 100 * Math.floor(seconds / round_s / 100)));
+  const budget = { ...(spec.budget as Values), episodes, evaluation_episodes: 0 };
+  return { ...spec, methods: [...methods], seeds: [...seeds], budget };
 }
 
-/** Whether a spec is what a preset made of it. */
-export function isOf(preset: Preset, spec: Values): boolean {
-  const mine = ["families", "methods", "seeds", "budget"] as const;
-  const made = applied(preset, spec);
+/** Whether a spec is what an effort made of it. */
+export function isOf(effort: Effort, spec: Values, families: number, costs: EpisodeCosts): boolean {
+  const mine = ["methods", "seeds", "budget"] as const;
+  const made = applied(effort, spec, families, costs);
   return mine.every((name) => JSON.stringify(made[name]) === JSON.stringify(spec[name]));
 }
 
 export interface Cost {
   runs: number;
   episodes: number;
+  /** Processor time, by the measured time of an episode of each method. */
+  seconds: number;
 }
 
 const TRAFFICS = 2; // of an i.i.d. phase: undisturbed, and with random adversaries
 
-/** What a campaign costs: runs, and episodes in all of them. */
-export function costOf(spec: Values, families = (spec.families as unknown[]).length): Cost {
-  const length = (name: string) => (spec[name] as unknown[]).length;
+/** Runs, episodes and processor time of a campaign. */
+export function costOf(spec: Values, families: number, costs: EpisodeCosts): Cost {
+  const methods = spec.methods as string[];
   const budget = spec.budget as { episodes: number | null; evaluation_episodes: number | null };
   const iid = spec.iid as { episodes: number | null } | null | undefined;
-  const searches = families * length("methods") * length("seeds");
+  const each = (budget.episodes ?? 0) + (budget.evaluation_episodes ?? 0);
+  const searches = families * (spec.seeds as unknown[]).length;
   const drawn = iid ? families * TRAFFICS : 0;
-  const episodes = searches * ((budget.episodes ?? 0) + (budget.evaluation_episodes ?? 0)) + drawn * (iid?.episodes ?? 0);
-  return { runs: searches + drawn, episodes };
+  const ofDrawn = drawn * (iid?.episodes ?? 0);
+  const rounds = searches * each;
+  return {
+    runs: searches * methods.length + drawn,
+    episodes: rounds * methods.length + ofDrawn,
+    seconds: RANDOM_EPISODE_S * (rounds * sum(methods.map((name) => costs[name] ?? 1)) + ofDrawn),
+  };
+}
+
+function sum(values: readonly number[]): number {
+  return values.reduce((total, each) => total + each, 0);
 }

@@ -1,5 +1,6 @@
-/** A new campaign: a form made from the API's own description, and the same as text. */
+/** A new campaign in three choices, more settings made from the API's own description, and the same as text. */
 
+import type { ComponentChildren } from "preact";
 import { useMemo, useState } from "preact/hooks";
 import { useAsked } from "../../api/asked";
 import { call, Problem } from "../../api/client";
@@ -9,12 +10,13 @@ import { Shown } from "../../ui/states";
 import { useTitle } from "../../ui/title";
 import { bodyOf, textOf } from "./body";
 import { useChecked } from "./checked";
-import { Ego } from "./ego";
+import { Efforts } from "./effort";
+import { Ego, Perception } from "./ego";
 import { Choices, Fields, Group, SchemaField } from "./field";
-import { FormContext, type Wrong } from "./form";
+import { FormContext, isWithin, type Wrong } from "./form";
 import { grounded, groundOf, OnMap, useExtent, type Ground } from "./ground";
 import { OddFields } from "./odd";
-import { applied, isOf, PRESETS } from "./presets";
+import { applied, EFFORTS, isOf, type EpisodeCosts } from "./presets";
 import { Preview } from "./preview";
 import { Requirements } from "./requirements";
 import { posted, type Description, type Field, type Json, type Shape, type Values } from "./schema";
@@ -78,28 +80,31 @@ interface Begun {
   scenario?: string | null;
 }
 
-function CampaignForm({ known: [description, families, methods, scenarios], from, ground, scenario }: Begun) {
+function CampaignForm({ known: [description, known, methods, scenarios], from, ground, scenario }: Begun) {
   const shape = useMemo(() => posted(description, "/v1/campaigns"), [description]);
-  const [spec, setSpec] = useState<Values>(() =>
-    from
-      ? (filled(shape, from.spec) as Values)
-      : { ...applied(PRESETS[0]!, filled(shape, {}) as Values), ...(scenario ? { families: [scenario] } : {}) },
-  );
-  const body = useMemo(() => {
-    const whole = bodyOf(shape, spec);
-    return ground ? grounded(ground, whole) : whole;
-  }, [shape, spec]);
+  const episodeCosts: EpisodeCosts = useMemo(() => Object.fromEntries(methods.items.map(({ name, episode_cost }) => [name, episode_cost])), [methods]);
   const extent = useExtent(ground);
+  const sizeOf = (values: Values) => (ground ? (extent ?? 1) : (values.families as string[]).length);
+  const [spec, setSpec] = useState<Values>(() => {
+    const empty = filled(shape, from?.spec ?? {}) as Values;
+    return from ? empty : applied(EFFORTS[0]!, { ...empty, families: [scenario ?? "low"] }, 1, episodeCosts);
+  });
+  const located = (values: Values) => (ground ? grounded(ground, values) : values);
+  const body = useMemo(() => located(bodyOf(shape, spec)), [shape, spec]);
   const text = textOf(body);
   const verdict = useChecked(text);
   const { submit, refused, busy } = useSubmit(text);
   const wrong = verdict.state === "wrong" ? verdict.wrong : refused.text === text ? refused.wrong : [];
   const why = verdict.state === "wrong" && wrong.length === 0 ? verdict.why : refused.text === text ? refused.why : "";
-  const form = useMemo(
-    () => ({ spec, wrong, change: (path: Path, value: Json) => setSpec((before) => put(before, path, value) as Values) }),
-    [spec, wrong],
-  );
-  const chosen = ground ? [] : families.items.filter(({ name }) => (spec.families as string[]).includes(name));
+  const change = (path: Path, value: Json) =>
+    setSpec((before) => {
+      const next = put(before, path, value) as Values;
+      const effort = path[0] === "families" && EFFORTS.find((each) => isOf(each, before, sizeOf(before), episodeCosts));
+      return effort ? applied(effort, next, sizeOf(next), episodeCosts) : next;
+    });
+  const form = useMemo(() => ({ spec, wrong, change }), [spec, wrong, extent]);
+  const families = sizeOf(spec);
+  const chosen = ground ? [] : known.items.filter(({ name }) => (spec.families as string[]).includes(name));
   const field = fieldsOf(shape);
   const tally = (name: string) => leaves(body[name]);
   return (
@@ -112,49 +117,55 @@ function CampaignForm({ known: [description, families, methods, scenarios], from
               one finds the same.
             </p>
           )}
-          <Presets spec={spec} choose={setSpec} />
+          <Ego field={field("ego")} />
           <section class="card">
-            <SchemaField field={field("label")} path={["label"]} />
-            {ground ? (
-              <OnMap ground={ground} extent={extent} />
-            ) : (
-              <Scenarios field={field("families")} items={scenarios.items} />
+            <h2>2. Scenarios</h2>
+            {ground ? <OnMap ground={ground} extent={extent} /> : <Scenarios field={field("families")} items={scenarios.items} />}
+          </section>
+          <section class="card">
+            <h2>3. Effort</h2>
+            <Efforts shape={shape} spec={spec} families={families} costs={episodeCosts} located={located} choose={setSpec} />
+          </section>
+          <More wrong={wrong} begun={from !== undefined}>
+            <section class="card">
+              <SchemaField field={field("label")} path={["label"]} />
+              <Choices
+                field={field("methods")}
+                path={["methods"]}
+                abouts={summaries(methods.items)}
+                costs={costs(methods.items)}
+                first={methods.items.filter(({ usual }) => usual).map(({ name }) => name)}
+                folded="methods for comparisons"
+                help={COST}
+              />
+              <SchemaField field={{ ...field("seeds"), about: "Each method is run once with each; 0-4 is five of them." }} path={["seeds"]} />
+            </section>
+            <section class="card">
+              <h2>Budget of each run</h2>
+              <Fields shape={field("budget").shape} path={["budget"]} />
+            </section>
+            <section class="card">
+              <SchemaField field={{ ...field("iid"), title: "I.i.d. phase", about: aboutOf(field("iid")) }} path={["iid"]} />
+            </section>
+            <Perception field={field("ego")} sent={(body.ego ?? {}) as Values} />
+            {!ground && (
+              <Group title="Operational design domain" about={aboutOf(field("odd"))} path={["odd"]} changed={tally("odd") > 0} open={tally("odd") > 0}>
+                <OddFields shape={field("odd").shape} families={chosen} />
+              </Group>
             )}
-            <Choices
-              field={field("methods")}
-              path={["methods"]}
-              abouts={summaries(methods.items)}
-              costs={costs(methods.items)}
-              first={methods.items.filter(({ usual }) => usual).map(({ name }) => name)}
-              help={COST}
-            />
-            <SchemaField field={{ ...field("seeds"), about: "Each method is run once with each; 0-4 is five of them." }} path={["seeds"]} />
-          </section>
-          <section class="card">
-            <h2>Budget of each run</h2>
-            <Fields shape={field("budget").shape} path={["budget"]} />
-          </section>
-          <section class="card">
-            <SchemaField field={{ ...field("iid"), title: "I.i.d. phase", about: aboutOf(field("iid")) }} path={["iid"]} />
-          </section>
-          <Ego field={field("ego")} sent={(body.ego ?? {}) as Values} />
-          {!ground && (
-            <Group title="Operational design domain" about={aboutOf(field("odd"))} path={["odd"]} changed={tally("odd") > 0} open={tally("odd") > 0}>
-              <OddFields shape={field("odd").shape} families={chosen} />
+            <Group title="Requirements" path={["requirements"]} changed={tally("requirements") > 0} open={tally("requirements") > 0}>
+              <Requirements shape={itemOf(field("requirements").shape)} signals={known.signals} families={chosen} />
             </Group>
-          )}
-          <Group title="Requirements" path={["requirements"]} changed={tally("requirements") > 0} open={tally("requirements") > 0}>
-            <Requirements shape={itemOf(field("requirements").shape)} signals={families.signals} families={chosen} />
-          </Group>
-          <Group title="Prior" path={["prior"]} changed={tally("prior") > 0} open={tally("prior") > 0}>
-            <SchemaField field={{ ...field("prior"), title: "Start from" }} path={["prior"]} />
-          </Group>
-          <Group title="Learner" about={aboutOf(field("learner"))} path={["learner"]} changed={tally("learner") > 0} open={tally("learner") > 0}>
-            <Fields shape={field("learner").shape} path={["learner"]} />
-          </Group>
+            <Group title="Prior" path={["prior"]} changed={tally("prior") > 0} open={tally("prior") > 0}>
+              <SchemaField field={{ ...field("prior"), title: "Start from" }} path={["prior"]} />
+            </Group>
+            <Group title="Learner" about={aboutOf(field("learner"))} path={["learner"]} changed={tally("learner") > 0} open={tally("learner") > 0}>
+              <Fields shape={field("learner").shape} path={["learner"]} />
+            </Group>
+          </More>
         </div>
         <aside class="grid beside" aria-label="What it comes to">
-          <Submit spec={spec} places={ground ? extent : null} verdict={verdict} wrong={wrong} refused={why} busy={busy} />
+          <Submit spec={spec} families={families} costs={episodeCosts} onMap={ground !== null} verdict={verdict} wrong={wrong} refused={why} busy={busy} />
           <Preview body={body} />
         </aside>
       </form>
@@ -162,22 +173,22 @@ function CampaignForm({ known: [description, families, methods, scenarios], from
   );
 }
 
-function Presets({ spec, choose }: { spec: Values; choose: (spec: Values) => void }) {
+const CHOSEN = ["families", "network", "pattern", "place", "places", "ego.driver", "ego.label", "ego.defects"];
+
+/** All that the three choices leave; it opens by itself where something in it is wrong. */
+function More({ wrong, begun, children }: { wrong: readonly Wrong[]; begun: boolean; children: ComponentChildren }) {
+  const [opened, setOpened] = useState(begun);
+  const broken = wrong.filter(({ field }) => !CHOSEN.some((part) => isWithin(field, part))).length;
+  const shown = opened || broken > 0;
   return (
-    <div class="presets" role="group" aria-label="Presets">
-      {PRESETS.map((preset) => (
-        <button
-          key={preset.title}
-          type="button"
-          class="preset"
-          aria-pressed={isOf(preset, spec)}
-          onClick={() => choose(applied(preset, spec))}
-        >
-          <b>{preset.title}</b>
-          <span class="small">{preset.about}</span>
-        </button>
-      ))}
-    </div>
+    <details class="more-settings" open={shown} onToggle={(event) => setOpened(event.currentTarget.open)}>
+      <summary>
+        <span class="group-title">More settings</span>
+        <span class="faint small">label, methods, seeds, budget, operational design domain, requirements, learner</span>
+        {broken > 0 && <span class="tag failed">{broken} wrong</span>}
+      </summary>
+      {shown && <div class="grid parts">{children}</div>}
+    </details>
   );
 }
 

@@ -1,15 +1,18 @@
 /** What the campaign costs, what is wrong with it, and the button that starts it. */
 
 import type { Verdict } from "./checked";
-import { count } from "../../ui/text";
+import { count, seconds } from "../../ui/text";
+import { detects } from "./effort";
 import type { Wrong } from "./form";
-import { costOf } from "./presets";
+import { costOf, type EpisodeCosts } from "./presets";
 import type { Values } from "./schema";
 
 interface Ready {
   spec: Values;
-  /** On a map: how many places, where it is known. */
-  places: number | undefined | null;
+  /** How many scenarios, or places of a map. */
+  families: number;
+  costs: EpisodeCosts;
+  onMap: boolean;
   verdict: Verdict;
   wrong: readonly Wrong[];
   /** Why the last try was refused, where no field is to blame. */
@@ -17,9 +20,9 @@ interface Ready {
   busy: boolean;
 }
 
-export function Submit({ spec, places, verdict, wrong, refused, busy }: Ready) {
+export function Submit({ spec, families, costs, onMap, verdict, wrong, refused, busy }: Ready) {
   const length = (name: string) => (spec[name] as unknown[]).length;
-  const { runs, episodes } = costOf(spec, places === null ? length("families") : (places ?? 0));
+  const { runs, episodes, seconds: cost_s } = costOf(spec, families, costs);
   return (
     <section class="card submit" aria-label="Start">
       <div class="tiles">
@@ -31,9 +34,13 @@ export function Submit({ spec, places, verdict, wrong, refused, busy }: Ready) {
           <b>{count(runs)}</b>
           <span>{runs === 1 ? "run" : "runs"}</span>
         </span>
+        <span class="tile" title="By the measured processor time of an episode of each method; with several workers it takes less.">
+          <b>{seconds(cost_s)}</b>
+          <span>of one processor, about</span>
+        </span>
       </div>
       <p class="help">
-        {places === null ? plural(length("families"), "scenario", "scenarios") : plural(places ?? 0, "place", "places")} × {plural(length("methods"), "method", "methods")} ×{" "}
+        {onMap ? plural(families, "place", "places") : plural(families, "scenario", "scenarios")} × {plural(length("methods"), "method", "methods")} ×{" "}
         {plural(length("seeds"), "seed", "seeds")}
         {spec.iid && ", and the i.i.d. phase"}
       </p>
@@ -43,6 +50,7 @@ export function Submit({ spec, places, verdict, wrong, refused, busy }: Ready) {
       <p class="small verdict" role="status">
         {wrong.length === 0 && SAID[verdict.state]}
       </p>
+      {verdict.state === "good" && wrong.length === 0 && <p class="help">{detects(verdict.power)}</p>}
       {verdict.state === "good" && wrong.length === 0 && verdict.adjustments.length > 0 && (
         <ul class="small adjustments">
           {verdict.adjustments.map(({ families, field, asked, used, why }) => (

@@ -2,7 +2,7 @@ import { describe, expect, it } from "vitest";
 import { bodyOf } from "./body";
 import { faultOf, inserted, pointed } from "./formula";
 import { numbersOf, numbersText } from "./numbers";
-import { costOf } from "./presets";
+import { applied, costOf, EFFORTS, isOf } from "./presets";
 import type { Shape } from "./schema";
 import { curl, quoted } from "./shell";
 
@@ -57,8 +57,24 @@ it("a shell takes any text for one word", () => {
 });
 
 it("a campaign costs what all its runs do", () => {
-  const spec = { families: ["low", "mixed"], methods: ["random"], seeds: [0, 1, 2], budget: { episodes: 10, evaluation_episodes: 5 } };
-  expect(costOf(spec)).toEqual({ runs: 6, episodes: 90 });
+  const spec = { methods: ["random", "archive"], seeds: [0, 1, 2], budget: { episodes: 10, evaluation_episodes: 5 } };
+  expect(costOf(spec, 2, { random: 1, archive: 0.5 })).toMatchObject({ runs: 12, episodes: 180, seconds: 0.1 * 90 * 1.5 });
+});
+
+it("an effort fills its time, whatever the number of scenarios", () => {
+  const hour = EFFORTS.find(({ title }) => title === "An hour")!;
+  const spec = { label: "kept", budget: { episodes: 1, cpu_s: null } };
+  for (const families of [10, 17]) {
+    const made = applied(hour, spec, families, {});
+    expect(costOf(made, families, {}).seconds).toBeGreaterThan(3000);
+    expect(costOf(made, families, {}).seconds).toBeLessThanOrEqual(3600);
+    expect(isOf(hour, made, families, {})).toBe(true);
+    expect(made.label).toBe("kept");
+  }
+});
+
+it("every effort searches with the diverse method", () => {
+  for (const { methods } of EFFORTS) expect(methods).toContain("risk-sac-diverse");
 });
 
 it("an ego is sent without what it has no use for", () => {

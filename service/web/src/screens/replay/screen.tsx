@@ -17,6 +17,7 @@ import { askedTime, conflictBounds, marksOf, useLayers, useStopped, useTimeInAdd
 import { Stage } from "../../stage/stage";
 import { KeyList, Transport } from "../../stage/transport";
 import { DrivenTag } from "../../ui/driven";
+import { ScenarioNames } from "../../ui/scenario";
 import { Empty, Shown } from "../../ui/states";
 import { capital, words } from "../../ui/text";
 import { useTitle } from "../../ui/title";
@@ -37,9 +38,11 @@ interface Props {
 export function ReplayScreen({ campaign, failure, query }: Props) {
   const path = `v1/campaigns/${encodeURIComponent(campaign)}/failures/${encodeURIComponent(failure)}`;
   const asked = useAsked<Body<"Failure">>(path);
+  const about = useAsked<Body<"Campaign">>(`v1/campaigns/${encodeURIComponent(campaign)}`).value;
+  const family = about?.runs.find(({ id }) => id === asked.value?.run_id)?.family;
   return (
     <>
-      <Head campaign={campaign} failure={failure} query={query} known={asked.value} />
+      <Head campaign={campaign} failure={failure} query={query} known={asked.value} family={family} />
       <Shown asked={asked} what="the failure">
         {(known) => {
           const violation = worstOf(known);
@@ -49,7 +52,7 @@ export function ReplayScreen({ campaign, failure, query }: Props) {
               <Verdict failure={known} />
             </>
           ) : (
-            <Replay campaign={campaign} path={path} known={known} series={known.series} violation={violation} query={query} />
+            <Replay campaign={campaign} path={path} known={known} series={known.series} violation={violation} spec={about?.spec} query={query} />
           );
         }}
       </Shown>
@@ -57,7 +60,7 @@ export function ReplayScreen({ campaign, failure, query }: Props) {
   );
 }
 
-function Head({ campaign, failure, query, known }: Props & { known: Body<"Failure"> | undefined }) {
+function Head({ campaign, failure, query, known, family }: Props & { known: Body<"Failure"> | undefined; family: string | undefined }) {
   const listed = listedAround(campaign, failure);
   const neighbour = (id: string | null | undefined, text: string) =>
     id && (
@@ -74,7 +77,13 @@ function Head({ campaign, failure, query, known }: Props & { known: Body<"Failur
         <a href={address(["campaigns", campaign])}>Campaign</a> /{" "}
         <a href={`${address(["campaigns", campaign, "failures"])}${listed.query && `?${listed.query}`}`}>Failures</a> / {failure}
       </nav>
-      <h1 title={violation ? variantOf(violation) : undefined}>{kind ? capital(kind) : `Failure ${failure}`}</h1>
+      <h1>{kind ? capital(kind) : `Failure ${failure}`}</h1>
+      {kind && (
+        <p class="variant faint">
+          {capital(variantOf(violation))}. <a href={address(["campaigns", campaign, "failures"], { kind, by: "variant" })}>Variants of this kind</a>
+        </p>
+      )}
+      {family && <ScenarioNames names={[family]} />}
       {known && <Tags failure={known} />}
       <span class="actions">
         {neighbour(query.get("prev") ?? listed.previous, "Previous")}
@@ -93,12 +102,12 @@ interface Played {
   known: Body<"Failure">;
   series: Series;
   violation: Collision | Violation;
+  spec: Body<"Campaign">["spec"] | undefined;
   query: URLSearchParams;
 }
 
-function Replay({ campaign, path, known, series, violation, query }: Played) {
+function Replay({ campaign, path, known, series, violation, spec, query }: Played) {
   const roads = useAsked<Body<"RoadsBody">>(`${path}/roads`).value;
-  const spec = useAsked<Body<"Campaign">>(`v1/campaigns/${encodeURIComponent(campaign)}`).value?.spec;
   const recording = useMemo(() => recordingOf(series, violation), [series, violation]);
   const clock = useMemo(() => new Clock(recording.time_s, askedTime(query) ?? opening(recording)), [recording]);
   const tripod = useMemo(() => new Tripod(conflictBounds(recording)), [recording]);

@@ -1,8 +1,8 @@
-/** The verdicts in words: which drivers would have prevented it, what happened, and whether it holds. */
+/** The verdict in three sentences, then what reference drivers would have done, and further facts. */
 
 import type { Body } from "../../api/types";
 import { capital, number } from "../../ui/text";
-import { TTC_RULE, driverWords, faultWords, knownOf } from "../../ui/verdicts";
+import { TTC_RULE, driverWords, knownOf } from "../../ui/verdicts";
 import { driversOf, gradeOf, isContact, requirementOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 import * as say from "./words";
 
@@ -16,7 +16,6 @@ export function Verdict({ failure }: { failure: Failure }) {
   const flaky = failure.repetition !== null && failure.repetition.same < failure.repetition.times;
   return (
     <section class="card replay-verdict" aria-label="Verdict">
-      <p class={`verdict-grade grade-${gradeOf(violation) ?? "none"}`}>{say.verdictOf(failure)}</p>
       {refused.length > 0 && (
         <div class="verdict-refused">
           <p>Refused by {refused.length === 1 ? "this rule" : "these rules"}:</p>
@@ -27,13 +26,20 @@ export function Verdict({ failure }: { failure: Failure }) {
           </ul>
         </div>
       )}
-      <p>{say.happenedOf(violation)}</p>
-      {faultWords(violation) && <p>{faultWords(violation)}</p>}
-      {isContact(violation) ? <OfContact collision={violation} /> : <OfViolation violation={violation} />}
+      <div class="verdict-sentences">
+        {say.threeSentences(violation).map((sentence) => (
+          <p>{sentence}</p>
+        ))}
+      </div>
+      <p class={`verdict-grade grade-${gradeOf(violation) ?? "none"}`}>{say.verdictOf(failure)}</p>
       <Drivers violation={violation} />
-      {others.length > 0 && <p class="faint">The episode violated too: {others.join("; ")}.</p>}
       <p class={flaky ? "bad" : "faint"}>{say.repetitionOf(failure)}</p>
       <Triage failure={failure} />
+      <details>
+        <summary>Further facts</summary>
+        {isContact(violation) ? <OfContact collision={violation} /> : <p>The ego {say.manoeuvreOf(violation.ego_manoeuvre)}.</p>}
+        {others.length > 0 && <p class="faint">The episode violated too: {others.join("; ")}.</p>}
+      </details>
     </section>
   );
 }
@@ -47,16 +53,8 @@ function OfContact({ collision }: { collision: Collision }) {
       <p>
         {say.responseOf(judgement, collision.ego_peak_braking_mps2)} {knownOf(collision)}
       </p>
-      <p class={judgement.broke.length + judgement.ego_broke.length > 0 ? "verdict-broke" : ""}>{say.brokeOf(judgement)}</p>
-    </>
-  );
-}
-
-function OfViolation({ violation }: { violation: Violation }) {
-  return (
-    <>
-      <p>The ego {say.manoeuvreOf(violation.ego_manoeuvre)}.</p>
-      <p class={violation.broke.length > 0 ? "verdict-broke" : ""}>{say.egoBrokeOf(violation.broke)}</p>
+      <p>{say.brokeOf(judgement)}</p>
+      <p>The impact speed was {number(judgement.impact_mps, 1)} m/s, the striker's speed {number(collision.other_speed_mps, 1)} m/s.</p>
     </>
   );
 }

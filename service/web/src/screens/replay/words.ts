@@ -2,8 +2,8 @@
 
 import type { Body } from "../../api/types";
 import { capital, number, words } from "../../ui/text";
-import { preventedBy, refusal, TTC_RULE } from "../../ui/verdicts";
-import { isContact, plausibilityOf, worstOf, type Collision, type Violation } from "../../ui/violations";
+import { egoPartWords, preventedBy, refusal, TTC_RULE } from "../../ui/verdicts";
+import { faultOf, isContact, plausibilityOf, worstOf, type Collision, type Violation } from "../../ui/violations";
 
 type Failure = Body<"Failure">;
 type Judgement = Body<"Judgement">;
@@ -58,18 +58,36 @@ export function refusals(violation: Collision | Violation): string[] {
   return Object.entries(violation.verdicts).flatMap(([rule, passed]) => (passed ? [] : [refusal(rule)]));
 }
 
-/** What happened, in a sentence or two. */
+/** The verdict in three sentences: what happened, whose fault it is and why, and how plausible it is. */
+export function threeSentences(violation: Collision | Violation): [string, string, string] {
+  return [happenedOf(violation), faultOfWords(violation), plausibleOf(violation)];
+}
+
+/** What happened, in one sentence. */
 export function happenedOf(violation: Collision | Violation): string {
-  const happened = isContact(violation) ? contactOf(violation) : violationOf(violation);
-  const plausibility = plausibilityOf(violation);
-  return plausibility?.sentence ? `${happened} The adversaries are ${plausibility.verdict}: ${plausibility.sentence}.` : happened;
+  return isContact(violation) ? contactOf(violation) : violationOf(violation);
 }
 
 export function violationOf({ requirement, time_s, robustness, ego_speed_mps, other_id, other_role, other_kind, hidden }: Violation): string {
-  const when = `${number(time_s, 1)} s after the release, at ${number(ego_speed_mps, 1)} m/s`;
-  const least = `The least robustness was ${number(robustness, 2)} scales.`;
-  const near = other_id === null ? "" : ` The ego would have met the ${other_role} ${other_kind} ${other_id} soonest then${hidden ? ", of which it knew nothing" : ""}.`;
-  return `The ego violated ${words(requirement)} ${when}. ${least}${near}`;
+  const near = other_id === null ? "" : `; it would have met the ${other_role} ${other_kind} ${other_id} soonest${hidden ? ", of which it knew nothing" : ""}`;
+  return `The ego violated ${words(requirement)} ${number(time_s, 1)} s after the release at ${number(ego_speed_mps, 1)} m/s, by ${number(robustness === null ? null : -robustness, 2)} scales${near}.`;
+}
+
+const AT_FAULT: Record<string, string> = { ego: "The ego is at fault", shared: "Both are at fault", other: "The other road user is at fault" };
+
+function faultOfWords(violation: Collision | Violation): string {
+  const fault = faultOf(violation);
+  if (fault === null) return "The fault was not judged.";
+  const [theirs, own] = isContact(violation) ? [violation.judgement?.broke ?? [], violation.judgement?.ego_broke ?? []] : [[], violation.broke];
+  const why = [theirs.length ? `the striker ${offences(theirs, BROKE)}` : null, own.length ? `the ego ${offences(own, EGO_BROKE)}` : null, egoPartWords(violation)];
+  const told = why.filter((each) => each !== null).join("; ");
+  return `${AT_FAULT[fault] ?? `Fault: ${fault}`}${told && `: ${told}`}.`;
+}
+
+function plausibleOf(violation: Collision | Violation): string {
+  const plausibility = plausibilityOf(violation);
+  if (plausibility === null) return "How plausible it is was not judged.";
+  return `It is ${plausibility.verdict}${plausibility.sentence && `: ${plausibility.sentence}`}.`;
 }
 
 /** The other requirements that the episode violated, and those that are only reported. */
@@ -87,19 +105,12 @@ export function wouldOf(driver: string, prevents: boolean, contact: boolean): st
 }
 
 function contactOf(collision: Collision): string {
-  const { ego_zone, ego_speed_mps, other_zone, other_role, other_id, other_speed_mps } = collision;
-  return (
-    `The ego's ${ego_zone} touched the ${other_zone} of the ${other_role} ${other_id}. The ego's speed was ` +
-    `${number(ego_speed_mps, 1)} m/s, the striker's ${number(other_speed_mps, 1)} m/s. ${severityInWords(collision)}`
-  );
-}
-
-/** How fast the bodies closed, and how bad that is. */
-function severityInWords({ relative_speed_mps, judgement }: Collision): string {
-  const closing = `The closing speed was ${number(relative_speed_mps, 1)} m/s`;
-  if (judgement?.severity == null || judgement.injury_risk == null) return `${closing}.`;
-  const impact = `${judgement.severity}, for the impact speed was ${number(judgement.impact_mps, 1)} m/s, with a risk of ${judgement.harm}`;
-  return `${closing}: ${impact} of ${number(100 * judgement.injury_risk, 1)} %.`;
+  const { ego_zone, ego_speed_mps, other_zone, other_role, other_id, relative_speed_mps, judgement } = collision;
+  const conflict = judgement ? `In ${CONFLICTS[judgement.conflict_type] ?? words(judgement.conflict_type)}, the` : "The";
+  const touched = `${conflict} ego's ${ego_zone} touched the ${other_zone} of the ${other_role} ${other_id} at ${number(ego_speed_mps, 1)} m/s`;
+  const closing = `closing speed ${number(relative_speed_mps, 1)} m/s`;
+  if (judgement?.severity == null || judgement.injury_risk == null) return `${touched}, ${closing}.`;
+  return `${touched}, ${closing}: ${judgement.severity}, with a ${number(100 * judgement.injury_risk, 1)} % risk of ${judgement.harm}.`;
 }
 
 export function conflictOf({ conflict_type, conflict_s, position, hidden }: Judgement, { time_s, visible_for_s }: Collision): string {
@@ -126,7 +137,7 @@ export function brokeOf({ broke, ego_broke }: Judgement): string {
   return `The striker ${offences(broke, BROKE)}. ${egoBrokeOf(ego_broke)}`;
 }
 
-export function egoBrokeOf(broke: readonly string[]): string {
+function egoBrokeOf(broke: readonly string[]): string {
   return `The ego ${offences(broke, EGO_BROKE)}.`;
 }
 

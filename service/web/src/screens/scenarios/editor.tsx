@@ -5,9 +5,10 @@ import { useAsked } from "../../api/asked";
 import { call, Problem } from "../../api/client";
 import type { Body } from "../../api/types";
 import { address, go, replace } from "../../router";
+import { pathOf } from "../../ui/scenario";
 import { Shown } from "../../ui/states";
 import { useTitle } from "../../ui/title";
-import { checking, pathOf, titleOf } from "./listed";
+import { checking, titleOf } from "./listed";
 import { Said, type Verdict } from "./said";
 import "./scenarios.css";
 

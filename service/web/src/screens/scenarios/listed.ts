@@ -6,8 +6,7 @@ import { words } from "../../ui/text";
 
 export type Summary = Body<"ScenarioSummary">;
 
-/** For pictures and checks, of which the service makes two at once. */
-export const drawing = queue();
+/** For checks, of which the service makes two at once. */
 export const checking = queue();
 
 /** A name in words, without the digest that the service adds: `ramp_merge_0123456789ab` -> "Ramp merge". */
@@ -23,8 +22,4 @@ export function matching<Each extends Pick<Summary, "name" | "summary" | "tags" 
     const said = [name, titleOf(name), summary, ...tags, ...actors].join(" ").toLowerCase();
     return wanted.every((word) => said.includes(word));
   });
-}
-
-export function pathOf(name: string): string {
-  return `v1/scenarios/${encodeURIComponent(name)}`;
 }

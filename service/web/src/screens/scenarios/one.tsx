@@ -6,11 +6,11 @@ import { save, send } from "../../api/client";
 import type { Body } from "../../api/types";
 import { address, go } from "../../router";
 import { Confirm } from "../../ui/confirm";
+import { pathOf, useScenarioPicture } from "../../ui/scenario";
 import { Shown } from "../../ui/states";
 import { count, moment } from "../../ui/text";
-import { useThumbnail } from "../../ui/thumbnails";
 import { useTitle } from "../../ui/title";
-import { drawing, pathOf, titleOf } from "./listed";
+import { titleOf } from "./listed";
 import "./scenarios.css";
 
 type Details = Body<"ScenarioDetails">;
@@ -100,7 +100,7 @@ function Head({ scenario: { name, summary, tags, shipped, created_at, actors, ho
 }
 
 function Picture({ name }: { name: string }) {
-  const url = useThumbnail(`${pathOf(name)}/picture.png`, drawing);
+  const url = useScenarioPicture(name);
   return (
     <figure class="card scenario-picture">
       {url ? (

@@ -1,14 +1,13 @@
 /** All scenarios as cards: those that ship, then the project's own. */
 
-import { useEffect, useRef, useState } from "preact/hooks";
 import { useAsked } from "../../api/asked";
 import type { Body } from "../../api/types";
 import { address, replace } from "../../router";
+import { ScenarioPicture } from "../../ui/scenario";
 import { Empty, Shown } from "../../ui/states";
 import { count } from "../../ui/text";
-import { useThumbnail } from "../../ui/thumbnails";
 import { useTitle } from "../../ui/title";
-import { drawing, matching, pathOf, titleOf, type Summary } from "./listed";
+import { matching, titleOf, type Summary } from "./listed";
 import "./scenarios.css";
 
 export function ScenariosScreen({ query }: { query: URLSearchParams }) {
@@ -63,7 +62,7 @@ export function ScenariosScreen({ query }: { query: URLSearchParams }) {
 function Card({ scenario: { name, summary, tags, shipped } }: { scenario: Summary }) {
   return (
     <li class="card">
-      <Thumbnail name={name} />
+      <ScenarioPicture name={name} />
       <h2>
         <a href={address(["scenarios", name])}>{titleOf(name)}</a>
       </h2>
@@ -78,26 +77,4 @@ function Card({ scenario: { name, summary, tags, shipped } }: { scenario: Summar
       </p>
     </li>
   );
-}
-
-/** The picture of a card, drawn by the service when the card is first seen. */
-function Thumbnail({ name }: { name: string }) {
-  const frame = useRef<HTMLDivElement>(null);
-  const [seen, setSeen] = useState(false);
-  useEffect(() => {
-    const watch = new IntersectionObserver(([entry]) => entry!.isIntersecting && setSeen(true), { rootMargin: "200px" });
-    watch.observe(frame.current!);
-    return () => watch.disconnect();
-  }, []);
-  return (
-    <div ref={frame} class="scenario-frame">
-      {seen && <Drawn name={name} />}
-    </div>
-  );
-}
-
-function Drawn({ name }: { name: string }) {
-  const url = useThumbnail(`${pathOf(name)}/picture.png`, drawing);
-  if (url) return <img src={url} alt="" />;
-  return <span class="faint small">{url === null ? "Drawing …" : "No picture"}</span>;
 }
