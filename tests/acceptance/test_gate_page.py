@@ -13,6 +13,7 @@ from tests.server import ROOT
 PAGE = ROOT / "risk_sac" / "failures" / "gate.md"
 
 
+@pytest.mark.timeout(3600)
 def test_commands_lead_from_an_openscenario_file_to_a_gate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copytree(FILES, tmp_path / "files")
     tool = tmp_path / "bin" / "risk-sac"
