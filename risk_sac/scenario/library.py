@@ -51,7 +51,7 @@ def library() -> Path:
 
 
 def written(document: Scenario) -> str:
-    """Writes a document as YAML, or as JSON if it is long, without the fields that have their defaults."""
+    """Writes a document as YAML, or as JSON if it is long, without defaults."""
     fields = document.model_dump(mode="json", exclude_defaults=True)
     as_json = json.dumps(fields)
     if len(as_json) > MOST_BYTES // 2:  # YAML of so much is slow to read
@@ -60,7 +60,7 @@ def written(document: Scenario) -> str:
 
 
 def own_files(document: Scenario, nets: Mapping[str, str]) -> dict[str, bytes]:
-    """Reads the nets that do not ship, and the road files beside them, by a document's names for them.
+    """Reads a document's own nets and road files, by its names for them.
 
     Args:
       document: of the scenario.

@@ -30,7 +30,7 @@ class Sampler(Protocol):
         """Returns the next point, `d`, in [0, 1]."""
 
     def tell(self, point: Floats, score: float) -> None:
-        """Learns the score of the point that was asked for last; smaller is better, below 0 the ego failed."""
+        """Learns the score of the last point; below 0 the ego failed."""
 
 
 SamplerClass = Callable[[int, int], Sampler]
