@@ -10,7 +10,7 @@ from service.api.description import openapi
 from service.app import create_app
 from service.settings import ServiceSettings
 
-LONGEST = 400  # characters of what stands on one line
+LONGEST = 800  # characters of what stands on one line
 
 
 class _Dumper(yaml.SafeDumper):

@@ -240,6 +240,7 @@ def _import(options: argparse.Namespace) -> int:
     imported = _imported(options.file, options.ego_entity)
     document = imported.document
     if options.out is not None:
+        options.out.parent.mkdir(parents=True, exist_ok=True)
         for name, content in imported.files.items():
             (options.out.parent / name).write_bytes(content)
         options.out.write_text(library.written(document))

@@ -114,7 +114,7 @@ class ScenarioParameter(Settings):
         return tuple(self.rows[0]) if self.rows else ()
 
     def words_of(self, name: str) -> tuple[str, ...]:
-        """Words that a name may have: its own, or those of a column of its rows; empty for numbers."""
+        """Returns the words that a name may have: its own, or those of its rows."""
         if self.rows is None:
             return self.words or ()
         return tuple(dict.fromkeys(word for row in self.rows if isinstance(word := row.get(name), str)))

@@ -22,7 +22,7 @@ ASIDE_M = 0.3  # free width on each side of the ego's body; a vehicle within it 
 
 
 def lane_edges(lane: Lane) -> tuple[Floats, Floats]:
-    """Returns the left and the right edge of a lane, `2 x p` each: a point beside each of its middle."""
+    """Returns the left and right edge of a lane, `2 x p` each."""
     step = np.diff(lane.line, axis=1)
     ahead = step / np.maximum(np.hypot(*step), 1e-9)
     along = np.concatenate((ahead[:, :1], ahead[:, :-1] + ahead[:, 1:], ahead[:, -1:]), axis=1)
@@ -180,7 +180,7 @@ class Driver:
 
 
 def stop_at_signal(perceived: Perceived) -> list[Ahead]:
-    """Returns the stop line of a red signal, or of a yellow one before which it can still stop."""
+    """Returns the stop line of a red signal, or of a yellow one that allows a stop."""
     p = perceived
     gap_m = p.stop_line_m - STOP_LINE_M
     if not math.isfinite(gap_m) or p.stop_line_m < 0.0 or p.signal not in (Signal.RED, Signal.YELLOW):
@@ -213,7 +213,7 @@ def idm(perceived: Perceived, vehicle: Vehicle, ahead: list[Ahead], headway_s: f
 
 
 def time_to_collision(speed_mps: float, ahead: list[Ahead]) -> float:
-    """Returns the time until the first of those ahead is reached at the present speeds, s; inf if none is."""
+    """Returns the time until the first of those ahead is reached, s; else inf."""
     closing = ((each.gap_m, speed_mps - each.speed_mps) for each in ahead)
     return min((gap_m / closing_mps for gap_m, closing_mps in closing if closing_mps > 1e-6), default=math.inf)
 

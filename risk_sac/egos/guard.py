@@ -34,7 +34,7 @@ logger = logging.getLogger(__name__)
 
 
 class Malformed(ValueError):
-    """What an ego answered is no command."""
+    """Answer of an ego that is no command."""
 
 
 class Guarded:

@@ -148,7 +148,7 @@ def serve(sessions: Sessions, address: str) -> tuple[grpc.Server, int]:
 
 
 def table(name: str, address: str, card: EgoCard) -> str:
-    """What registers an ego that is served, for the file of RISK_SAC_EGOS."""
+    """Returns the table of the file of RISK_SAC_EGOS that registers a served ego."""
     told = {"address": address} | card.model_dump(include={"version", "summary", "response_time_s", "deadline_s"})
     return "\n".join([f"[{name}]", *(f"{key} = {json.dumps(value)}" for key, value in told.items())])
 

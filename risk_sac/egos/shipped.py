@@ -59,7 +59,7 @@ OVER_S = 1.0  # a risk that has been gone for so long is over
 
 
 class R157(Driver):
-    """Follows by IDM and brakes as UN R157's human driver: 0.4 s to perceive, 0.75 s to respond, then 0.774 g."""
+    """Follows by IDM and brakes as UN R157's human driver."""
 
     version = "1.0"
     response_time_s = 1.15
@@ -97,7 +97,7 @@ RSS_HEADWAY_S = 1.0
 
 
 class RssResponder(Driver):
-    """Follows by IDM, and brakes by 6 m/s² from 0.3 s after a distance became unsafe by RSS until it is safe again."""
+    """Follows by IDM, and brakes by 6 m/s² while a distance is unsafe by RSS."""
 
     version = "1.0"
     response_time_s = 0.3
@@ -156,7 +156,7 @@ class Broken(Driver):
         self._decided: deque[float] = deque([0.0] * LATE_STEPS)
 
     def act(self, perceived: Perceived) -> Control:
-        """Does what it decided a second ago; it steers in time, or it would leave its lane all by itself."""
+        """Does what it decided a second ago, but steers in time."""
         p = perceived
         near = np.hypot(p.state[X] - p.state[X, 0], p.state[Y] - p.state[Y, 0]) < SIGHT_M
         seen = p._replace(

@@ -1,4 +1,4 @@
-"""What the joint policy sees, in the ego's frame and scaled to about [-1, 1].
+"""Encodes the joint policy's observation, in the ego's frame, scaled to about [-1, 1].
 
 Per adversary its motion relative to the ego and what C_soft remembers of it, then the ego itself, its signal, the
 scene ξ, the robustness of every requirement, where static bodies are and the time left. Robustness and that memory are

@@ -126,7 +126,7 @@ SUMO_KEEPS = frozenset({"on_carriageway", "no_red_light_entry"})  # requirements
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What stays the same over all episodes of a run."""
+    """Constants of all episodes of a run."""
 
     family: Family
     odd: Odd  # complete: the family's default narrowed by the user's
@@ -293,7 +293,7 @@ def requirements_of(spec: CampaignSpec) -> Mapping[str, tuple[Requirement, ...]]
 
 
 def _requirements(spec: RunSpec | CampaignSpec, family: Family, odd: Odd, ego: EgoConfig) -> tuple[Requirement, ...]:
-    """Joins the requirements of an ODD with a scenario's and a user's; raises `ConfigError` for one that is wrong."""
+    """Joins the requirements of an ODD, a scenario and a user; raises `ConfigError`."""
     shipped = {each.name: each for each in requirements_from_odd(odd, ego.response_s)}
     own = {}
     for source, requirements in (("scenario.", family.requirements), ("", spec.requirements)):

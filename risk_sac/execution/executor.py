@@ -113,7 +113,7 @@ class Executor(Protocol):
 
     @property
     def slots(self) -> float:
-        """Processes that play episodes, at least one for each run; infinite if it does not know its room for them."""
+        """Processes that play episodes, at least one per run; infinite if unknown."""
 
     @property
     def slots_per_run(self) -> float:

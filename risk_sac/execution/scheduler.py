@@ -69,7 +69,7 @@ class RunStore(Protocol):
     """Keeps runs; called by the thread that calls the scheduler. Only `start_next` may raise."""
 
     def start_next(self, use: SlotUse) -> QueuedRun | None:
-        """Takes the next run from those that wait, grants it slots, and notes that its worker is about to start."""
+        """Takes the next run that waits, grants it slots, and notes its start."""
 
     def not_started(self, run: QueuedRun, error: OSError) -> None:
         """Its worker could not be started."""

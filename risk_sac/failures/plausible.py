@@ -33,7 +33,7 @@ FACTORS = (0.3, 1.2)  # by which actions are weakened or strengthened
 
 
 def unlikely(evidence: Evidence) -> float:
-    """Computes how unlikely what the adversaries did is: -log p of the least likely feature and of all together, nats.
+    """Computes -log p of the least likely feature and of all together, nats.
 
     Choice: their sum, since either decides the class, and the larger one alone hides what a change gains in the other.
     """

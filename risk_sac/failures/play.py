@@ -178,7 +178,7 @@ def _say(file: Path, *lines: dict[str, object]) -> None:
 
 
 def _tell(file: Path, runs: Prepared) -> None:
-    """Replays the first failures of each variant of all runs, and says of each run which are the same again."""
+    """Replays the first failures of each variant, and reports which repeat."""
     lines = list[dict[str, object]]()
     for folder, (results, env) in runs.items():
         try:

@@ -75,7 +75,7 @@ def _as_played(bundle: Bundle, ego: EgoConfig, played: Played) -> Bundle:
 
 
 def regress_run(folder: Path, ego: EgoConfig) -> Iterator[Regressed]:
-    """Plays the first failures of each variant of a run against another ego, with the run's policy where it has one.
+    """Plays the first failures of each variant of a run against another ego.
 
     Raises:
       ConfigError: the folder holds no run, or none whose policy can act on.

@@ -116,7 +116,7 @@ def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
 
 
 def _lasting(values: Floats, limit: float, least: float) -> list[int]:
-    """Returns the last stretch of two frames or more above a limit, in which the values sum up to `least` over time."""
+    """Returns the last stretch above a limit in which the values sum up to `least`."""
     stretches = [list(frames) for above, frames in groupby(range(len(values)), lambda t: values[t] > limit) if above]
     enough = (frames for frames in reversed(stretches) if len(frames) >= 2 and values[frames].sum() * STEP_S >= least)
     return next(enough, [])

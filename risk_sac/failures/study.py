@@ -49,7 +49,7 @@ def answer(question: Question) -> bytes:
 
 
 def _policy(question: Question) -> FrozenPolicy | None:
-    """Returns the policy of the failure's run, if it learns one; regions and exports have no use for it."""
+    """Returns the policy of the failure's run, if it learns one."""
     if question.subject in ("region", "export") or not method_of(question.spec.method).learns:
         return None
     from risk_sac.failures.collect import policy_of  # imported here: torch takes half of a study's time

@@ -56,7 +56,7 @@ class Tried:
 
     @property
     def unlike(self) -> str | None:
-        """How pedestrians from the left and from the right come out differently; None: the ego lets both pass alike."""
+        """Returns in which way pedestrians from either side differ; None: they do not."""
         left, right = self.sides
         if math.isinf(min(left, right)):
             return "the ego stands although nothing is in its way: no pedestrian can meet it"
@@ -119,7 +119,7 @@ def _episode(env: RiskSacEnv, tried: Tried, draw: np.random.Generator, *, contro
 
 
 def meet(sim: SumoSimulation, family: str, side: int) -> float:
-    """Returns the least distance of an ego, alone on the road, to a pedestrian that would meet it; 0 if it touches it.
+    """Returns the least distance of a lone ego to a pedestrian that would meet it.
 
     The pedestrian crosses where the ego drives on an empty road, and is in the middle of its way at that moment:
     in bends, and where the ego changes lanes, as well as on a straight road.
@@ -154,7 +154,7 @@ def meet(sim: SumoSimulation, family: str, side: int) -> float:
 
 
 def _driven_to(sim: SumoSimulation, alone: Layout) -> tuple[int, float, float, float] | None:
-    """Returns the first step after AHEAD_S in which the ego drives, with x, y and heading; None if it stands."""
+    """Returns the first step after AHEAD_S in which the ego drives, and its pose."""
     sim.reset(alone, 1)
     for step in range(1, MET_STEPS + 1):
         frame = sim.step()
@@ -164,7 +164,7 @@ def _driven_to(sim: SumoSimulation, alone: Layout) -> tuple[int, float, float, f
 
 
 def _at_green(sim: SumoSimulation, layout: Layout, cycle_s: float) -> Layout:
-    """The same at the beginning of the ego's green; unchanged where its signal is never seen to become green."""
+    """The same at the beginning of the ego's green, if there is one."""
     if layout.signal is None:
         return layout
     before = Signal.GREEN

@@ -17,7 +17,7 @@ NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EBADF)
 
 
 def cores(process: Path = Path("/proc/self")) -> int:
-    """Counts the processors that this process may use, by its affinity and the CPU quotas of its control groups.
+    """Counts the processors that this process may use, by affinity and quotas.
 
     Args:
       process: the process's folder in /proc.
@@ -105,7 +105,7 @@ def _unescaped(field: str) -> str:
 
 
 def user_cache() -> Path | None:
-    """Returns the folder in which this user's programs keep what can be made again; None where there is no home."""
+    """Returns the user's cache folder; None where there is no home."""
     told = os.environ.get("XDG_CACHE_HOME", "")
     if os.path.isabs(told):  # others are to be ignored, says the XDG specification
         return Path(told)

@@ -42,7 +42,7 @@ _INITIAL_TORCH = ("float32", True, 1, False)
 
 
 class Setting(NamedTuple):
-    """How a setting is read and set."""
+    """Reader and writer of a setting."""
 
     read: Callable[[], Any]
     set: Callable[[Any], object]
@@ -60,7 +60,7 @@ def leave(status: int) -> NoReturn:
 
 
 def c_numbers(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
-    """Has a function read and write numbers in the C locale, as libsumo has to: others have no decimal point."""
+    """Has a function read and write numbers in the C locale, as libsumo must."""
 
     @wraps(function)
     def in_c_locale(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:

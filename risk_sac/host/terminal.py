@@ -122,7 +122,7 @@ def complain(message: str) -> None:
 
 
 def run_command(command: Callable[[], int]) -> int:
-    """Run a command; returns its exit status, or 1 where its output is lost or the system refuses something."""
+    """Run a command; returns its exit status, or 1 where the system refuses."""
     prepare_streams()
     try:
         status = command()

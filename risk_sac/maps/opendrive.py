@@ -40,7 +40,7 @@ class Crosswalks:
 
 
 def find_crosswalks(file: Path) -> Crosswalks:
-    """Finds the crosswalks of a map; one inside a junction is that of the road that it is nearer to.
+    """Finds the crosswalks of a map, each with its nearest road.
 
     Raises:
       MapError: one lacks its place.
@@ -104,7 +104,7 @@ def sidewalk_options(types: Path, folder: Path) -> list[str]:
 
 
 def crossing_options(walks: Crosswalks, net: Net, folder: Path) -> list[str]:
-    """Options of netconvert for crossings, with the names of a net that it has made of the same roads."""
+    """Returns netconvert's options for crossings, by a net of the same roads."""
     starts = defaultdict[str, set[str]](set)  # where edges begin, by their road
     for id_ in net.edges:
         road, *start = id_.removeprefix("-").rsplit(".", 2)
@@ -201,7 +201,7 @@ def _repair(road: ET.Element, walks: Crosswalks, lost: Counter[str]) -> None:
 
 
 def _draw(geometry: ET.Element) -> None:
-    """Replaces a spiral of nearly constant curvature by an arc, and an arc of nearly none by a line.
+    """Replaces nearly constant spirals by arcs, and nearly straight arcs by lines.
 
     Lines that begin alike are at most ∫ |Δθ| apart, where Δθ(s) is the difference of their headings:
     |κ₁ - κ₀| L² / 12 for a spiral and the arc of its mean curvature, |κ| L² / 2 for an arc and a line.
@@ -258,7 +258,7 @@ def _of_type(kind: ET.Element, lost: Counter[str]) -> float | None:
 def _pieces(
     section: ET.Element, types: Limits, cuts: Set[float], length_m: float, lost: Counter[str]
 ) -> list[tuple[float, list[float | None]]]:
-    """Where a section is cut or its limits change, m from its start, and each lane's limit from there on.
+    """Returns where a section is cut, m, and each lane's limit from there on.
 
     A lane's own limit is ahead of the road's.
     """
@@ -290,7 +290,7 @@ def _at(s: float, limits: Limits) -> float | None:
 
 
 def _begin_at(begin: float, lane: ET.Element) -> None:
-    """Moves the widths of a lane, a + b ds + c ds² + d ds³ from each `sOffset` on, to where it begins now."""
+    """Moves a lane's width polynomials to its new beginning."""
     before = None
     for width in lane.findall("width"):
         s = float(width.attrib["sOffset"]) - begin

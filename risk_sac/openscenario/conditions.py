@@ -155,7 +155,7 @@ class ConditionReader:
         return self._positions.position(at.one("Position"))
 
     def _measured(self, at: At) -> dict[str, Any]:
-        """How a distance is measured."""
+        """Returns the way a distance is measured."""
         fields = _compared(at) | {"freespace": at.flag("freespace", False)}
         fields["coordinates"] = at.one_of("coordinateSystem", COORDINATES, "entity")
         if at.flag("alongRoute", False):  # of version 1.0

@@ -93,7 +93,7 @@ class Parameters:
                     raise part.place.refusal(f"the parameter {name[:80]!r}", f"a declared one: {known}", remedy)
 
     def meaning(self, name: str) -> Meaning | None:
-        """Returns what a parameter's name stands for, a number by its name; None if there is no such parameter."""
+        """Returns the meaning of a parameter's name; None if there is none."""
         if name not in self.declared:
             return None
         if name not in self._meanings:
@@ -135,7 +135,7 @@ class Parameters:
         return f"{name[: _LONGEST_WORD - 5]}_word"
 
     def word(self, name: str, text: str) -> str:
-        """Returns the word that stands for a text of a parameter, or one that stands for no text of it."""
+        """Returns the word for a parameter's text, or one for no text of it."""
         meaning = self.meaning(name)
         words = {text: word for word, text in (meaning.words if meaning else {}).items()}
         return words.get(text) or f"{words_of([text])[text][: _LONGEST_WORD - 6]}_other"

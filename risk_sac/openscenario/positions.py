@@ -222,7 +222,7 @@ def _lane(at: At) -> dict[str, Any]:
 
 
 def _kept(into: dict[str, Any], name: str, path: Any) -> str:
-    """Puts a route or trajectory under its name, or under one beside it if another has it; returns the name."""
+    """Keeps a route or trajectory under its name, or a free one; returns the name."""
     number, unique = 2, name[:190] or "unnamed"
     while unique in into and into[unique] != path:
         unique, number = f"{name[:190]} {number}", number + 1

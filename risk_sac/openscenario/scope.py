@@ -20,7 +20,7 @@ _LITERALS = {"true": 1.0, "false": 0.0, "INF": MOST_MAGNITUDE, "-INF": -MOST_MAG
 
 @dataclass(frozen=True)
 class Meaning:
-    """What an attribute's value or a parameter stands for."""
+    """Meaning of an attribute's value or a parameter."""
 
     text: str = ""
     """As it stands in the file; of a parameter its constant or default value."""

@@ -113,7 +113,7 @@ def holds_scenario(upload: bytes) -> bool:
 
 
 def unpack(upload: bytes, folder: Path) -> Path:
-    """Writes the files of an archive into a folder, those of other kinds left out; returns the file to import.
+    """Unpacks an archive's scenario files into a folder; returns the file to import.
 
     Raises:
       ConfigError: it is damaged or too large, names files outside it, or has not one file to import.

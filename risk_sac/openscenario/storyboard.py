@@ -251,7 +251,7 @@ def moving_actors(init: Init, stories: Mapping[str, tuple[StoryAct, ...]]) -> se
 
 
 def horizon_of(stop: Trigger | None, remarks: list[str]) -> Expression:
-    """Returns the length of an episode: the first time that ends it alone, at most the longest there is."""
+    """Returns the length of an episode: the first time that ends it alone."""
     times = list[Expression]()
     for group in stop or ():
         if len(group) == 1 and isinstance(condition := group[0], TimeCondition) and "greater" in condition.rule:

@@ -76,7 +76,7 @@ def defensive(dimension: int, fitted: Gaussians | None = None) -> Gaussians:
 
 
 def elite(margins: Floats, failed: np.typing.NDArray[np.bool_], latest: int) -> np.typing.NDArray[np.bool_]:
-    """Which draws a proposal is fitted to, `n`: those that failed and, until these are many, those nearest to it.
+    """Selects the draws to fit, `n`: failures and, until these are many, the nearest.
 
     Args:
       margins: `n x r`, of all draws and each requirement; inf where nothing is known.

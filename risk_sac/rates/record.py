@@ -24,7 +24,7 @@ MOST_PER_HOUR = 1e9
 
 
 def stages_of(declared: SceneLaw, draws: int, seed: int, start: RateStart | None = None) -> Stages:
-    """The stages of a run; axes whose values do not tell their share are drawn as declared in all of them."""
+    """Returns the stages of a run; axes that do not tell are drawn as declared."""
     earlier = None if start is None else declared.normals(start.scenes)
     return Stages(int(declared.telling.sum()), draws, seed, earlier)
 
@@ -73,7 +73,7 @@ def write_rates(folder: Path, spec: RunSpec, records: Sequence[EpisodeRecord]) -
 
 
 def rated(problem: Problem) -> tuple[str, ...]:
-    """What has a rate: any failure, and each requirement that counts."""
+    """Lists the events with a rate: any failure, and each requirement that counts."""
     return ANY, *(requirement.name for requirement in problem.requirements if requirement.counts == "failure")
 
 

@@ -195,7 +195,7 @@ class Comparison:
         }
 
     def verified(self, cell: Cell) -> tuple[int, int] | None:
-        """Counts a cell's failures that replay to the bit, and those replayed; None where a run was not replayed."""
+        """Counts a cell's failures that replay to the bit, and those replayed; or None."""
         same = []
         for run in self.of_cell(cell.family, cell.method):
             if run.verified is None:

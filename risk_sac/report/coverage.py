@@ -155,7 +155,7 @@ def axis_of(parameter: Parameter, whole: Parameter, bins: int) -> Axis:
 
 
 def axes_of(family: Family, odd: Odd, bins: int) -> list[Axis]:
-    """Divide the range that the ODD leaves each scene parameter into bins; words and few rows are a bin each."""
+    """Divides each scene parameter's range in the ODD into bins."""
     whole = intersect(family.odd, odd)
     every = with_environment(family.space, odd, whole)
     return [
@@ -165,7 +165,7 @@ def axes_of(family: Family, odd: Odd, bins: int) -> list[Axis]:
 
 
 def _alternatives(family: Family, parameter: Parameter) -> Axis | None:
-    """Makes a bin of each word, or of each of a few rows; None of other parameters, and of those the ODD bounds."""
+    """Makes a bin of each word or row; None of other parameters."""
     document = family.parameters.get(parameter.name)
     if document is None or parameter.categories or not 0 < document.alternatives <= BINS:
         return None

@@ -1,4 +1,4 @@
-"""The report of a campaign: what was found, how often it happens, what is not covered, and what to doubt."""
+"""Writes a campaign's report: findings, rates, gaps and doubts."""
 
 import shlex
 from collections.abc import Callable, Mapping
@@ -139,7 +139,7 @@ def _kinds(comparison: Comparison, family: FamilyName, origin: Origin) -> list[F
 
 
 def _draw(run: FinishedRun, folder: Path | None, record: EpisodeRecord) -> Drawing:
-    """Draws the failure of an episode from above, or says what is missing; `folder` is that of its run."""
+    """Draws a failure from above, or says what is missing; `folder` is its run's."""
     if folder is None:
         return Drawing(None, "the folder of its run is missing")
     try:

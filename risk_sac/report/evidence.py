@@ -1,4 +1,4 @@
-"""Gathers a report's data: funnel, bounds of the i.i.d. phase, coverage, test cases and the digests of all inputs.
+"""Gathers a report's data: funnel, bounds, coverage, test cases, digests of inputs.
 
 Coverage of the search and of that phase are kept apart, but for the matrix, which says what was played at all.
 """

@@ -220,7 +220,7 @@ def read_folders(paths: Sequence[Path]) -> Inputs:
 
 
 def run_folders(paths: Sequence[Path]) -> tuple[Path, ...]:
-    """Lists the folders of the runs that a report of some folders is made from; arguments as of `read_folders`."""
+    """Lists the folders of the runs that a report is made from."""
     whole = paths[0] if len(paths) == 1 and (paths[0] / SPEC).is_file() else None
     return tuple(paths) if whole is None else tuple(sorted((whole / RUNS).glob("*/")))
 

@@ -30,7 +30,7 @@ RUNS = "runs"  # below a campaign's folder
 
 
 class StandardVerdict(StrEnum):
-    """What a standard says of the ego in a scene."""
+    """Verdict of a standard on the ego in a scene."""
 
     PASS = "pass"  # it does not fail
     FAIL = "fail"  # it does, and the competent driver would not
@@ -136,7 +136,7 @@ def _point(
 
 
 def verdict_on(record: EpisodeRecord, standard: Standard) -> StandardVerdict:
-    """What a standard says of the ego in an episode.
+    """Returns a standard's verdict on the ego in an episode.
 
     A failure without contact is always one: no competent driver leaves the road or enters on red.
     """

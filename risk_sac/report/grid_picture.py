@@ -143,7 +143,7 @@ def _shares(places: Mapping[tuple[float, float], Sequence[PlayedPoint]], driver:
 
 
 def _bound(axes: Axes, shares: Floats, label: str, colour: str, dashes: str) -> None:
-    """Draws where a driver avoids half of the scenes; nothing where it avoids all or none, or in a single row."""
+    """Draws where a driver avoids half of the scenes, if it avoids some."""
     if len(shares) < 4 or np.ptp(shares[:, 2]) == 0.0 or min(len(set(shares[:, i])) for i in (0, 1)) < 2:
         return
     low, width = shares[:, :2].min(axis=0), np.ptp(shares[:, :2], axis=0)

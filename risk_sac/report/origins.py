@@ -1,4 +1,4 @@
-"""Where a scenario's failures begin: as it is written, where its parameters are searched, or where others deviate."""
+"""Tells failures of a scenario as written from those of searches and deviations."""
 
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
@@ -40,7 +40,7 @@ class FailureOrigin(Record):
 
 
 def played_as(method: RunMethod) -> PlayedAs | None:
-    """What a method changes of a scenario; None of a control without an attack that plays no story."""
+    """Returns what a method changes of a scenario; None of a control without a story."""
     row = method_of(method)
     if row.story:
         return PlayedAs.AS_WRITTEN if row.scenes == "grid" else PlayedAs.SEARCHED

@@ -1,4 +1,4 @@
-"""What drivers and pedestrians do in daily traffic, and how often.
+"""Lists what drivers and pedestrians do in daily traffic, and how often.
 
 One row per feature: what it measures, of which event, and its distribution among road users. A row without a published
 distribution is measured on SUMO's own drivers in undisturbed scenes, see `risk_sac.verdicts.plausibility`.

@@ -374,5 +374,5 @@ def red_light_braking(frame: Frame, before: Frame | None) -> float:
 
 
 def _crossed_on_red(frame: Frame, before: Frame | None) -> bool:
-    """Whether the ego has just passed a red signal: the next one is suddenly farther, or there is none."""
+    """Whether the ego has just passed a red signal."""
     return before is not None and before.signal is Signal.RED and before.stop_line_m < frame.stop_line_m - 1.0

@@ -1,4 +1,4 @@
-"""Reads .npz files of plain arrays that may come from anywhere: in bounded memory, and nothing in them is executed."""
+"""Reads untrusted .npz files of plain arrays in bounded memory, executing nothing."""
 
 import io
 import zipfile

@@ -209,7 +209,7 @@ def first_of_variants(results: RunResults) -> list[EpisodeRecord]:
 
 
 def read_boundary_map(folder: Path) -> BoundaryMap | None:
-    """Reads the map of a run of the method `boundary`; None where there is none, or it is damaged."""
+    """Reads the map of a `boundary` run; None if absent or damaged."""
     try:
         return BoundaryMap.model_validate_json((folder / BOUNDARY).read_bytes())
     except (FileNotFoundError, ValidationError):
@@ -217,7 +217,7 @@ def read_boundary_map(folder: Path) -> BoundaryMap | None:
 
 
 def read_rates(folder: Path) -> Rates | None:
-    """Reads the rates of a run of the method `rate`; None where there are none, or they are damaged."""
+    """Reads the rates of a `rate` run; None if absent or damaged."""
     try:
         return Rates.model_validate_json((folder / RATES).read_bytes())
     except (FileNotFoundError, ValidationError):

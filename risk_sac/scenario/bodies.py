@@ -44,7 +44,7 @@ CAR_DRIVER = LaneDriver(2.6, 4.5, 9.0)  # SUMO's class passenger
 
 
 class ExportNames(NamedTuple):
-    """What other formats call a body."""
+    """Names of a body in other formats."""
 
     openscenario: str  # vehicleCategory, pedestrianCategory or miscObjectCategory
     commonroad: str  # type of a dynamic obstacle
@@ -88,7 +88,7 @@ class Body:
 
     @property
     def gait(self) -> Literal["walking", "riding"]:
-        """How it moves where it moves freely; begins the names of the features that its motion is judged by."""
+        """Way of moving freely, which begins the names of its motion's features."""
         return "riding" if self.rides else "walking"
 
 

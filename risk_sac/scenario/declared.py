@@ -47,7 +47,7 @@ class DeclaredAxis:
         return min(max((value - self.low) / (self.high - self.low), 0.0), 1.0)
 
     def density(self, unit: float) -> float:
-        """Density at a coordinate in [0, 1], as a multiple of the uniform one; the mean over `WINDOW` of the axis."""
+        """Density at a coordinate in [0, 1], as a multiple of the uniform one."""
         if not self.tells or self.law is None:
             return 1.0
         low = min(max(unit - WINDOW / 2.0, 0.0), 1.0 - WINDOW)
@@ -151,7 +151,7 @@ class SceneLaw:
         return self.density(np.clip(offsets / widths, 0.0, 1.0))
 
     def normals(self, scenes: Iterable[Mapping[str, float]]) -> Floats:
-        """Standard normal numbers, `n x t`, of the scenes within the bounds, for the axes that tell their share."""
+        """Returns standard normal numbers, `n x t`, of the axes that tell their share."""
         low, high = (np.array([getattr(axis, end) for axis in self.axes]) for end in ("low", "high"))
         values = np.array([[scene.get(axis.name, math.nan) for axis in self.axes] for scene in scenes])
         inside = values[((low <= values) & (values <= high)).all(axis=1)]
@@ -161,12 +161,12 @@ class SceneLaw:
 
     @cached_property
     def telling(self) -> np.typing.NDArray[np.bool_]:
-        """Which axes tell their share, `d`."""
+        """Returns which axes tell their share, `d`."""
         return np.array([axis.tells for axis in self.axes], dtype=bool)
 
     @cached_property
     def _order(self) -> np.typing.NDArray[np.intp]:
-        """Axes in the order of the factor: those that tell their share first, so that no other one bears on them."""
+        """Returns the axes in the factor's order: those that tell their share first."""
         return np.argsort(~self.telling, kind="stable")
 
     @cached_property

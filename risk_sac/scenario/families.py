@@ -90,7 +90,7 @@ def sampled(of: Interpreter, count: int = SAMPLED) -> Iterator[Layout | Infeasib
 
 
 def _odd(of: Interpreter) -> Odd:
-    """The default ODD: the roads of the ego's way, what goes on anywhere, and what the document says of it."""
+    """Returns the default ODD: the ego's roads, and what the document says."""
     drawn = list(sampled(of))
     layouts = [layout for layout in drawn if isinstance(layout, Layout)]
     if not layouts:

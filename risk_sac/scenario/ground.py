@@ -34,7 +34,7 @@ def net_of(file: str) -> Net:
 
 
 class GroundAreas(NamedTuple):
-    """Where vehicles and pedestrians meet."""
+    """Areas where vehicles and pedestrians meet."""
 
     crossings: tuple[Area, ...] = ()  # for pedestrians; drivers yield there
     roadway: tuple[Area, ...] = ()  # where vehicles drive, as far as pedestrians may get there

@@ -68,7 +68,7 @@ class Interpreter:
             return False
 
     def value(self, xi: Mapping[str, float]) -> Value:
-        """What the parameters say in a scene."""
+        """Returns the value of an expression in a scene."""
         numbers, words = dict[str, float](), dict[str, str]()
         for name, parameter in self.document.parameters.items():
             if parameter.value is not None:
@@ -189,5 +189,5 @@ def _check_way(layout: Layout) -> None:
 
 
 def _part(share: float, parts: int) -> int:
-    """Which of equal parts of [0, 1] a share lies in."""
+    """Returns the index of the equal part of [0, 1] that has a share."""
     return min(int(share * parts), parts - 1)

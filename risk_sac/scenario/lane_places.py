@@ -92,7 +92,7 @@ def spot_pose(spot: LanePlace) -> Pose:
 
 
 def beside(net: Net, spot: LanePlace, lanes: int) -> LanePlace | None:
-    """Returns the place as many lanes to the left, at the same height; None if no car drives there."""
+    """Returns the place lanes to the left, at the same height, or None."""
     other = net.lanes.get(f"{spot.lane.edge}_{spot.lane.index + lanes}")
     if other is None or not other.drivable:
         return None
@@ -125,7 +125,7 @@ def entry_of(net: Net, lane: NetLane) -> NetLane | None:
 
 
 def _links(net: Net, lane: NetLane) -> list[Link]:
-    """Links of a lane, or the rest of the link that one inside a junction is part of; the straightest first."""
+    """Returns a lane's links, the straightest first."""
     if lane.use == "inside":
         link = _through(net, lane)
         return [] if link is None else [Link(lane, link.target, link.inside[link.inside.index(lane) + 1 :], None, None)]
@@ -151,7 +151,7 @@ def edge_path(net: Net, begin: str, end: str) -> list[str] | None:
 
 
 def joined(net: Net, edges: Iterable[str]) -> list[str]:
-    """Returns edges in the order of driving, with those between them; an edge that no way leads to is left out."""
+    """Returns edges in driving order, with those between them that lead on."""
     path = list[str]()
     for edge in edges:
         if not path:
@@ -162,7 +162,7 @@ def joined(net: Net, edges: Iterable[str]) -> list[str]:
 
 
 def extended(net: Net, edges: Sequence[str], metres: float) -> tuple[str, ...]:
-    """Returns edges of a way, and those straight on after it, until it is long enough or no way goes on."""
+    """Extends a way straight on until it is long enough or ends."""
     way = list(edges)
     left_m = metres - sum(net.edges[edge].lanes[0].length_m for edge in way)
     while left_m > 0.0:

@@ -19,6 +19,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 
 import yaml
+from defusedxml.ElementTree import fromstring
 
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError, did_you_mean
@@ -32,6 +33,9 @@ DIGITS = 12
 KEPT = re.compile(rf"[a-z][a-z0-9_]{{0,46}}_[0-9a-f]{{{DIGITS}}}")
 _NET_FILE = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _NEW, _GONE = ".new-", ".gone-"
+_ELEMENTS = {"net", "location", "type", "edge", "lane", "tlLogic", "phase"}
+_ELEMENTS |= {"junction", "request", "connection", "roundabout"}
+_ORIGIN = "origId"  # parameter of a lane: the OpenDRIVE road and lane that it was converted from
 _SCHEMA = "{http://www.w3.org/2001/XMLSchema-instance}noNamespaceSchemaLocation"
 
 
@@ -47,7 +51,7 @@ def library() -> Path:
 
 
 def written(document: Scenario) -> str:
-    """Writes a document as YAML, or as JSON if it is long, without the fields that have their defaults."""
+    """Writes a document as YAML, or as JSON if it is long, without defaults."""
     fields = document.model_dump(mode="json", exclude_defaults=True)
     as_json = json.dumps(fields)
     if len(as_json) > MOST_BYTES // 2:  # YAML of so much is slow to read
@@ -56,7 +60,7 @@ def written(document: Scenario) -> str:
 
 
 def own_files(document: Scenario, nets: Mapping[str, str]) -> dict[str, bytes]:
-    """Reads the nets that do not ship, and the road files beside them, by a document's names for them.
+    """Reads a document's own nets and road files, by its names for them.
 
     Args:
       document: of the scenario.
@@ -92,10 +96,13 @@ def put(name: str, files: Mapping[str, bytes]) -> None:
 
     Raises:
       ConfigError: the files are not those of the name, or the library cannot be written.
+      ValueError, ParseError: a net has what SUMO must not load. OpenDRIVE files are never given to SUMO.
     """
+    document = _check(files)
+    for net in files.keys() & set(networks(document)):
+        _check_net(files[net])
     if not KEPT.fullmatch(name) or not name.endswith(f"_{_digest(files)}"):
         raise ConfigError("family", f"a scenario {name!r} whose digest is another", "one that was kept under its name")
-    _check(files)
     folder = library() / name
     if folder.is_dir():
         try:
@@ -180,14 +187,26 @@ def prune(folder: Path, named: Collection[str], unused_s: float, started_at: flo
     return removed
 
 
-def _check(files: Mapping[str, bytes]) -> None:
-    """Refuses files that are no document and its nets; raises `ConfigError`."""
+def _check(files: Mapping[str, bytes]) -> Scenario:
+    """Returns the document of files; raises a ConfigError for what is no document and its nets."""
     document = document_from(files[DOCUMENT].decode()) if DOCUMENT in files else None
     if document is None:
         raise ConfigError("family", "a scenario without a document", DOCUMENT)
     for name in files.keys() - {DOCUMENT}:
         if not _NET_FILE.fullmatch(name) or name not in (*networks(document), *roads(document)):
             raise ConfigError("network", repr(name), "a file name that the document names as a network or road")
+    return document
+
+
+def _check_net(net: bytes) -> None:
+    """Raises a ValueError, or a ParseError, for a net that has more than a piece of a map."""
+    for element in fromstring(net, forbid_dtd=True).iter():
+        if element.tag == "param" and element.get("key") == _ORIGIN:
+            continue
+        if element.tag not in _ELEMENTS:
+            raise ValueError(f"its net has a <{element.tag}>; wanted {', '.join(sorted(_ELEMENTS))} alone")
+        if any("$" in value for value in element.attrib.values()):  # which SUMO replaces by what the environment has
+            raise ValueError(f"a <{element.tag}> of its net says $; wanted none")
 
 
 def _digest(files: Mapping[str, bytes]) -> str:

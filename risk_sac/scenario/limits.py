@@ -135,7 +135,7 @@ class Limits:
         return replace(self, **own) if own else self
 
     def _narrowed(self, name: str) -> float:
-        """Returns a bound as a share of the behaviour's preset, at most 1; 1 of one without a preset."""
+        """Returns a bound as a share of the behaviour's preset, at most 1."""
         if name not in PRESETS:
             return 1.0
         field, end = PRESETS[name]

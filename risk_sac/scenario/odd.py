@@ -219,7 +219,7 @@ def _common(ours: Any, theirs: Any) -> Any:
 
 
 def _no_scene(path: str, got: Any, space: SceneSpace) -> OddError:
-    """Returns the error of a field that leaves no value of a scene parameter; it states those of all that it bounds."""
+    """Returns the error of a field that leaves a scene parameter no value."""
     names: dict[str, list[str]] = {}
     for parameter in space.parameters:
         if parameter.odd == path:

@@ -205,7 +205,7 @@ class StoryPlaces:
     # Places of poses
 
     def spot(self, pose: Pose, on: OnRoad | None = None) -> LanePlace | None:
-        """Returns the place on the nearest lane of the pose's direction; None if there is none within 30 m.
+        """Returns the place on the nearest lane within 30 m, or None.
 
         Args:
           pose: in the net's coordinates.
@@ -215,7 +215,7 @@ class StoryPlaces:
         return nearest_lane(self._net, pose.x_m, pose.y_m, pose.heading_rad, among)
 
     def beside(self, spot: LanePlace, lanes: int) -> LanePlace | None:
-        """Returns the place as many lanes to the left, at the same height; None if no car drives there."""
+        """Returns the place lanes to the left, at the same height, or None."""
         return beside(self._net, spot, lanes)
 
     def opendrive(self, pose: Pose) -> OnRoad:
@@ -241,7 +241,7 @@ class StoryPlaces:
         return best[1]
 
     def across(self, place: OnRoad) -> tuple[float, float]:
-        """Returns the direction of the reference line at a place, rad, and how far left of the line the place is, m."""
+        """Returns the reference line's direction, rad, and how far left of it, m."""
         road = self._roads().road(place.road)
         t_m = road.middle(place.lane, place.s_m).t_m + place.offset_m
         return self._beside(road, place.s_m, t_m).heading_rad, t_m
@@ -384,7 +384,7 @@ class StoryPlaces:
         return self._leg_lines(legs)
 
     def _named(self, spot: LanePlace) -> OnRoad | None:
-        """Returns the place on the road file's lane that a lane of the net was made of; None if it has no name."""
+        """Returns the place on the road file's lane of a net's lane, or None."""
         if self._road is None:
             return None
         x_m, y_m, _ = lane_line(spot.lane).pose(spot.at_m)

@@ -1,4 +1,4 @@
-"""Reads a scenario document from YAML or JSON, and names what is wrong by its path in the document."""
+"""Reads a scenario document from YAML or JSON, and locates faults by path."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -116,7 +116,7 @@ def _nodes(node: yaml.Node, path: Location, depth: int) -> Iterator[yaml.Node]:
 
 
 def _faults(error: ValidationError, fields: Any) -> list[ConfigError]:
-    """One error for each path, unknown names first; of the alternatives of a field the one that fits best."""
+    """Returns one error for each path, unknown names first."""
     by_path: dict[Location, list[Mapping[str, Any]]] = {}
     for item in error.errors():
         path = _in_document(item["loc"], fields, missing=item["type"] == "missing")

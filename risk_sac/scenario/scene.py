@@ -144,7 +144,7 @@ class SceneLayout:
         pedestrians: Sequence[PedestrianStart],
         statics: Sequence[StaticStart],
     ) -> StoryPlan:
-        """What the document's story needs; streams are no part of it."""
+        """Returns what the document's story needs, without streams."""
         own = {start.id: start for start in vehicles if start.id in self._bodies}
         for vehicle in own.values():
             self._story.put_vehicle(vehicle)
@@ -190,7 +190,7 @@ class SceneLayout:
         return OnTrack(track, here, 0.0, True, begin)
 
     def _classes(self, driven: Driven) -> tuple[str, ...] | None:
-        """Classes of SUMO of which one must be admitted where an actor starts; None: it starts on any lane."""
+        """Returns SUMO's classes that a start's lane must admit one of, or None."""
         if isinstance(driven, Actor) and driven.role in ("adversary", "static"):
             return None
         body = self._value.word(driven.body)

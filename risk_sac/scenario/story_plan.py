@@ -43,7 +43,7 @@ TIMELESS_ACTIONS = frozenset({"none", "variable", "visibility", "delete"})
 
 
 def is_shifted(event: StoryEvent) -> bool:
-    """Whether a deviation may shift an event's start trigger: it moves an actor, at a time or in a traffic situation.
+    """Whether a deviation may shift an event's start trigger.
 
     An event that begins with its act, or as another element changes, follows what went before.
     """

@@ -60,7 +60,7 @@ class StoryScene:
             self._poses[name] = ahead_of(middle, -self.reach(name, body).ahead_m)
 
     def pose(self, name: str) -> Pose:
-        """Where an actor's reference point starts.
+        """Returns the start of an actor's reference point.
 
         Raises:
           ConfigError: there is no such place, or it depends on an actor that is not there before it.
@@ -84,7 +84,7 @@ class StoryScene:
         return pose
 
     def middle(self, name: str, body: BodyName) -> Pose:
-        """Where the middle of an actor's body starts."""
+        """Returns the start of the middle of an actor's body."""
         return ahead_of(self.pose(name), self.reach(name, body).ahead_m)
 
     def front_spot(self, name: str, body: BodyName) -> LanePlace:

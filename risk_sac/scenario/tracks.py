@@ -63,7 +63,7 @@ def lane_named(
     leading: "Sequence[str] | Turn | None" = None,
     classes: Collection[str] | None = (DRIVER,),
 ) -> NetLane:
-    """Returns a lane by its name, or one for cars by its edge's; raises `ConfigError` if there is none.
+    """Returns a lane by its name or its edge's; raises `ConfigError`.
 
     Args:
       net: where.

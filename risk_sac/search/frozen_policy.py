@@ -1,4 +1,4 @@
-"""A policy that learns no more: plain arrays, so that it can be kept in a file and act without torch."""
+"""Runs a policy that no longer learns, as plain arrays, without torch."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

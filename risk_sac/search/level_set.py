@@ -89,7 +89,7 @@ class FailureClassifier:
         self._latent.eval()
 
     def latent(self, points: Floats, out: Floats | None = None) -> tuple[Floats, Floats]:
-        """Mean and standard deviation of the latent function at points, `n` each; it is above 0 where most fail.
+        """Returns mean and deviation of the latent function; above 0 most fail.
 
         Args:
           points: `n x d`.

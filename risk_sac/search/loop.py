@@ -91,7 +91,7 @@ def episode(run: RunState, env: GuardedEnv) -> RunMetrics:
 
 
 def rounds(run: RunState, folder: Path, observer: Observer, processes: int) -> Iterator[RunMetrics]:
-    """Plays the rest of a run in rounds of `batch` episodes, in parallel; yields the metrics after each episode.
+    """Plays the rest of a run in rounds; yields the metrics after each episode.
 
     Round r + 1 is asked for once round r - 1 is told, and is played while round r is. So no process waits for the
     slowest episode of a round, and the result depends neither on their number nor on their speed. A learner learns from

@@ -105,7 +105,7 @@ class EpisodeSums:
 
 
 class Unplayable(Exception):
-    """An episode could not be played to its end, or at all; its record gets this outcome and reason."""
+    """Error of an episode that could not be played to its end."""
 
     def __init__(self, outcome: Outcome, reason: str, *, begun: bool = True) -> None:
         super().__init__(f"{outcome}: {reason}")
@@ -114,7 +114,7 @@ class Unplayable(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlayedEpisode:
-    """What was played of a proposal."""
+    """Outcome of playing a proposal."""
 
     sums: EpisodeSums
     unplayable: tuple[Outcome, str] | None = None  # why it was not played to its end

@@ -111,7 +111,7 @@ class RunState:
 
     @property
     def waits(self) -> bool:
-        """Whether the next episode depends on one that is out: a stage of `rate`, or the evaluation of a learner."""
+        """Whether the next episode depends on one that is out."""
         learns_yet = self.searchers.learns and any(proposal.learning for proposal in self.proposed)
         return (learns_yet and not self.learning) or self.searchers.waits(len(self.proposed))
 
@@ -266,7 +266,7 @@ class RunState:
         self._digest.update(line)
 
     def _append_played(self, record: EpisodeRecord, spent_s: float) -> None:
-        """Writes the processor time up to the end of an episode, and the digest of its time series if it has one."""
+        """Writes an episode's processor time, and the digest of its series."""
         series = self.series.get(record.index)
         digest = bytes(ROW.size - 8) if series is None else bytes.fromhex(series.sha256)
         _overwrite(self._folder / PLAYED, len(self._episode_cpu_s) * ROW.size, ROW.pack(spent_s, digest))

@@ -104,7 +104,7 @@ def _seen(row: list[float], time_s: float, ego_mps: float, standing_m: Sequence[
 
 
 def act(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:
-    """What an adversary does now.
+    """Returns an adversary's present action.
 
     Args:
       genes: its own.

@@ -186,7 +186,7 @@ class Searchers:
 
     @property
     def origin(self) -> Mapping[str, Any]:
-        """Where the point that was asked for last comes from, see `SceneOptimizer.origin`."""
+        """Origin of the last point, see `SceneOptimizer.origin`."""
         return self._next.sampler.origin
 
     @property

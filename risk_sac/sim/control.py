@@ -167,7 +167,7 @@ class Adversaries:
         sim.apply(vehicles, walkers, self._leads(action))
 
     def _leads(self, action: Sequence[float]) -> Mapping[str, Lead]:
-        """What leads actors of the story away from it."""
+        """Returns what leads actors of the story away from it."""
         slot = self._slot
         return {
             id_: partial(control.step, action[2 * slot[id_]], action[2 * slot[id_] + 1])

@@ -32,7 +32,7 @@ NEAR_S, NEAR_MPS2 = 0.5, 4.5  # the same at speed: what it drives before and whi
 
 @compiled
 def near_outsiders(state: Floats, outside: Bools) -> Bools:
-    """Tells which of the `n` actors have one that SUMO does not know within `NEAR_M`, or their braking distance.
+    """Tells which of the `n` actors are near one that SUMO does not know.
 
     Those have themselves.
     """

@@ -167,7 +167,7 @@ def _lanes_ahead(route: Sequence[str], lane: str) -> list[str]:
 
 
 def needs_lane_change(route: Sequence[str], lane: str) -> bool:
-    """Whether a vehicle on a lane of the route's first edge has to change lanes to follow the route."""
+    """Whether a vehicle has to change lanes to follow its route."""
     return _reach(route[1:], lane) < len(route) - 1
 
 

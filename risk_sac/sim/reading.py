@@ -217,7 +217,7 @@ def _state(told: Floats, before: Floats, bodies: Floats, vehicles: int) -> Float
 
 
 def _walk_signals(signal: str, crossings: Sequence[Area]) -> list[tuple[Area, str, int]]:
-    """The crossings that a signal controls, each grown onto the sidewalks, the signal, and the index of its letter."""
+    """Returns the signal-controlled crossings, with signal and letter index."""
     found = []
     for index, links in enumerate(libsumo.trafficlight.getControlledLinks(signal)):
         for lane in {lane for link in links for lane in link if CROSSING_LANE.fullmatch(lane)}:

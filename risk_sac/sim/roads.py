@@ -141,7 +141,7 @@ class LateralRoom(NamedTuple):
 
 
 class Placed(Protocol):
-    """Place of a vehicle that SUMO does not drive: its lane along its route, and where it is on the path from there."""
+    """Place of a vehicle that SUMO does not drive, by lane and path."""
 
     lane: str
     along: Along
@@ -360,7 +360,7 @@ def hand_over(start: VehicleStart) -> None:
 
 
 def _class_of(start: VehicleStart) -> str:
-    """Returns SUMO's class of a vehicle: a car's, or one that the lane without cars where it starts does not refuse."""
+    """Returns SUMO's class of a vehicle, one that its lane does not refuse."""
     if car_may_use(f"{start.route[0]}_{start.lane}"):
         return CAR
     return ANYWHERE if start.role is Role.ADVERSARY else BODIES[start.body].sumo_class

@@ -185,7 +185,7 @@ def _segment(path: Floats, first: int, station_m: float) -> int:
 
 @compiled
 def _pose_at(path: Floats, first: int, station_m: float, offset_m: float, half_length: float, tilt: float) -> Pose:
-    """Computes the pose of a vehicle whose front bumper is at a station of a path, from its segment `first` on."""
+    """Computes the pose of a vehicle whose front is at a path's station."""
     segment = _segment(path, first, station_m)
     ahead_m, cos, sin = station_m - path[STATION, segment], path[COS, segment], path[SIN, segment]
     heading = path[PATH_HEADING, segment] + tilt

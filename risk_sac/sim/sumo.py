@@ -234,7 +234,7 @@ class SumoSimulation:
         self._walkers.update(walkers)
 
     def _is_beside_own_lanes(self, vehicle: str, command: VehicleCommand) -> bool:
-        """Whether an adversary is or will be outside its own lanes; takes it from SUMO, or hands it back."""
+        """Whether an adversary leaves its own lanes; takes it from SUMO, or returns it."""
         row, moved = self._reading.row[vehicle], self._oncoming.get(vehicle)
         frame, offset_m = self._reading.frame, self._reading.offset_m[row]
         lane = libsumo.vehicle.getLaneID(vehicle) if moved is None else moved.lane
@@ -251,7 +251,7 @@ class SumoSimulation:
 
     @property
     def ego_arrived(self) -> bool:
-        """Whether the ego drove to its route's end, where the episode ends; without a pilot only in a story."""
+        """Whether the ego drove to its route's end, where the episode ends."""
         if self._moved is not None:
             return self._moved.arrived
         if self._story is None:

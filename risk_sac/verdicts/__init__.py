@@ -1,1 +1,1 @@
-"""Pure judges of a contact: what made it, how it came about, and which driver would have prevented it."""
+"""Pure judges of a contact: cause, course, and drivers that prevent it."""

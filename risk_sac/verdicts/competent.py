@@ -1,4 +1,4 @@
-"""Competent drivers in an episode of any outcome: in place of an ego that keeps its lane and its first speed.
+"""Plays competent drivers in an episode of any outcome, for an ego that keeps on.
 
 So the boundary of what a competent driver avoids runs through scenes that the ego itself passes, and is the same for
 all egos. The others move as they did in the recording, in which they may have reacted to the ego. A story may wait for
@@ -74,7 +74,7 @@ def avoided_by(evidence: Evidence, way: Path) -> Mapping[str, bool]:
 
 
 def becomes_dangerous(evidence: Evidence, striker: int, contact: int) -> int | None:
-    """The frame in which a vehicle that drives the ego's way becomes a danger by the regulation; None: it never does.
+    """Returns the frame in which a vehicle becomes a danger by the regulation, or None.
 
     It does where it comes into the ego's way, or into sight, so near that the time to collision is 2 s at most after
     the 0.4 s of evaluation, or where it brakes harder than 5 m/s² in the ego's lane. Choice: with what is further off
@@ -96,7 +96,7 @@ def becomes_dangerous(evidence: Evidence, striker: int, contact: int) -> int | N
 
 
 def keeping_on(evidence: Evidence, way: Path) -> Evidence:
-    """The episode with an ego that keeps its lane and its first speed once the others act, and `BEYOND_S` more."""
+    """Returns the episode with an ego that keeps its lane and first speed."""
     first, more = first_act(evidence), round(BEYOND_S / evidence.step_s)
     e = _prolonged(evidence, more)
     lane = lane_path(evidence, evidence.released)
@@ -121,7 +121,7 @@ def keeping_on(evidence: Evidence, way: Path) -> Evidence:
 
 
 def first_act(evidence: Evidence) -> int:
-    """The first frame from the release on in which another actor acts, or comes into sight; the release if none does.
+    """Returns the first frame in which another actor acts or appears.
 
     One acts that moves across its lane, brakes, or begins to move.
     """
@@ -135,7 +135,7 @@ def first_act(evidence: Evidence) -> int:
 
 
 def first_contact(evidence: Evidence) -> tuple[int, int] | None:
-    """The first frame from the release on in which an actor touches the ego, but not at its rear; and its column."""
+    """Returns frame and column of the first contact that is not at the ego's rear."""
     own, size, contacts = recorded_motion(evidence, 0), recorded_size(evidence, 0), []
     for other in range(1, len(evidence.ids)):
         motion = recorded_motion(evidence, other)

@@ -201,7 +201,7 @@ def entered_on(evidence: Evidence, actor: int, letters: bytes) -> bool:
 
 
 def on_inherited_red(evidence: Evidence) -> bool:
-    """Whether the ego entered on red at a signal that stopped it at the release already, too late to stop.
+    """Whether the ego entered on a red that it inherited at the release.
 
     It could not stop at leisure any more: with 3.4 m/s² after 0.75 s, from where it was at the release.
     """
@@ -232,7 +232,7 @@ def inherits_stop(speed_mps: float, to_line_m: float, after_s: float) -> bool:
 
 
 def entry(evidence: Evidence, actor: int, letters: bytes) -> int | None:
-    """Finds the frame in which a vehicle last came into a junction on one of these letters; None if in none.
+    """Finds the frame of a vehicle's last entry on these letters, or None.
 
     On entry the signal goes from one of these letters to none. A change to another letter is a change of the signal,
     unless the vehicle came into a junction in that step: the letter is then the next junction's.
@@ -322,7 +322,7 @@ def enters_safely(evidence: Evidence, striker: int, seen: BodyOnPath[Floats], le
 
 
 def leaves_room(follower_mps: float, seen: BodyOnPath[Floats], t: int, least_gap_m: float) -> bool:
-    """Whether a body ahead on the follower's path leaves it the room of UN R157, 5.2.5.2, in frame `t`."""
+    """Whether a body ahead leaves the follower the room of UN R157, 5.2.5.2."""
     closing = follower_mps - seen.speed_mps[t]
     needed_s = max(closing, 0.0) / (2 * R157_BRAKES_MPS2) + R157_CUT_IN_S
     return bool(seen.gap_m[t] > least_gap_m and seen.ttc_s[t] > needed_s)
@@ -364,7 +364,7 @@ def turns_into_path(evidence: Evidence, striker: int) -> bool:
 
 
 def intrusion(evidence: Evidence, actor: int, owner: int, seen: BodyOnPath[Floats]) -> int:
-    """Finds when an actor last came 0.3 m into the lane of the owner of the path that it is seen along.
+    """Finds when an actor last came 0.3 m into the path owner's lane.
 
     Returns the frame of the contact if it did not.
     """

@@ -230,7 +230,7 @@ def kept_by(
 
 
 def _stops_at_red(driver: int, history: History, index: int) -> bool:
-    """Whether a driver could stop at the line since its signal turned yellow or red, or since the ego last stood."""
+    """Whether a driver could stop at the line of a yellow or red signal."""
     first = index
     while first > 0 and history.frames[first - 1].signal in (Signal.YELLOW, Signal.RED):
         if history.frames[first].ego_speed_mps < STANDING_MPS:

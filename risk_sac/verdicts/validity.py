@@ -119,7 +119,7 @@ def validity_verdicts(evidence: Evidence, striker: int, contact: Contact, facts:
 
 
 def cuts_off(evidence: Evidence, striker: int) -> bool:
-    """Whether the ego came into the striker's lane in the last 3 s and left it no room to brake.
+    """Whether the ego cut in within 3 s and left the striker no room.
 
     The rule for room is that of `changes_lane_unsafely`, with the striker behind. The ego came over if it moved further
     towards the striker's way than the striker towards it.

@@ -25,7 +25,7 @@ class Size(NamedTuple):
 
 
 class RelativeView(NamedTuple):
-    """The `n` other actors in the ego's frame; the ego is the box |x| <= ego_half_length, |y| <= ego_half_width."""
+    """View of the `n` other actors in the ego's frame."""
 
     x: Floats
     y: Floats
@@ -96,7 +96,7 @@ def frame_view(state: Floats) -> RelativeView:
 
 @compiled
 def _distance(x: float, y: float, cos: float, sin: float, a: float, b: float, ego_a: float, ego_b: float) -> float:
-    """Distance of two bodies that do not overlap: a corner of one of them is nearest to the other.
+    """Computes the distance of two bodies that do not overlap.
 
     The other's half length and width are `a` and `b`, at (x, y) in the ego's frame.
     """
@@ -125,7 +125,7 @@ def along_axes(vx: float, vy: float, cos: float, sin: float) -> tuple[float, flo
 
 @compiled
 def time_to_contact(view: RelativeView) -> Floats:
-    """Time until the bodies touch if both keep their velocity and heading, `n`, s; inf if they never do.
+    """Computes the time until bodies touch at constant velocity, `n`, s; or inf.
 
     Swept as oriented boxes, crossing and oncoming bodies count as much as a leader in the same lane, of which it is
     gap / closing speed (Hayward 1972).
@@ -186,7 +186,7 @@ def line_of_sight(view: RelativeView, occludes: Bools) -> Bools:
 
 
 class Sight(NamedTuple):
-    """What a sensor at the ego's centre can see at best."""
+    """Limits of a sensor at the ego's centre."""
 
     reach_m: float
     half_view_rad: float  # to either side of the ego's heading
@@ -202,7 +202,7 @@ def in_sight(view: RelativeView, vehicle: Bools, sight: Sight) -> Bools:
 
 @compiled
 def bodies_in_sight(view: RelativeView, conceals: Bools, lit: Bools, sight: Sight) -> Bools:
-    """Which of the `n` others are within reach, inside the field of view and not hidden; see `line_of_sight`.
+    """Tells which of the `n` others are in reach, field of view and not hidden.
 
     Bodies that conceal hide what is behind them; those without lights are seen less far at night.
     """
@@ -217,7 +217,7 @@ def bodies_in_sight(view: RelativeView, conceals: Bools, lit: Bools, sight: Sigh
 
 @compiled
 def _crosses(view: RelativeView, wall: int, px: float, py: float) -> bool:
-    """Whether the ray from the ego's centre to (px, py) passes through a body: the slab test in its own axes."""
+    """Whether the ray from the ego's centre to (px, py) passes through a body."""
     cos, sin = view.cos[wall], view.sin[wall]
     ray_x, ray_y = px * cos + py * sin, py * cos - px * sin
     if abs(ray_x) < NO_MOTION:
@@ -276,7 +276,7 @@ ZONE_MARGIN_M = 0.05  # a contact this close to an edge lies on it
 
 
 def contact_point(view: RelativeView) -> tuple[float, float]:
-    """Middle of the corners of either box that lie in the other, in the ego's frame; of the first of the others."""
+    """Computes the middle of the corners of either box that lie in the other."""
     margin = ZONE_MARGIN_M
     a, b = view.ego_half_length, view.ego_half_width
     corner_x, corner_y = (c[:, 0] for c in corners(view))
@@ -293,7 +293,7 @@ def contact_point(view: RelativeView) -> tuple[float, float]:
 
 
 def zone(x: float, y: float, half_length: float, half_width: float) -> str:
-    """Which side of a body the point lies on; a corner belongs to the front or the rear."""
+    """Returns the side of a body that has the point; corners are front or rear."""
     depth = {
         "front": half_length - x,
         "rear": half_length + x,

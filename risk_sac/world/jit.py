@@ -95,5 +95,5 @@ def cpu_s() -> float:
 
 
 def compiled(function: Function) -> Function:
-    """Compiles on first call; the result is kept on disk for the next process where there is a place for it."""
+    """Compiles on first call, and keeps the result on disk."""
     return cast(Function, numba.njit(cache=bool(SETTINGS["CACHE_DIR"]))(function))

@@ -1,4 +1,4 @@
-"""A SUMO net as finders, pictures and exports need it: lanes, how they lead on, right of way and signals."""
+"""Reads a SUMO net for finders, pictures and exports."""
 
 import math
 from collections import defaultdict

@@ -23,7 +23,7 @@ MOST_NODES = 1_000_000  # of the quadrature at once
 
 
 class Begin(NamedTuple):
-    """Where a curve begins: m, m, rad."""
+    """Beginning of a curve: m, m, rad."""
 
     x_m: float
     y_m: float

@@ -1,4 +1,4 @@
-"""Geometry and links of the roads of an OpenDRIVE file: where a lane lies, and which way its traffic drives.
+"""Reads geometry and links of an OpenDRIVE file's roads.
 
 Heights are left out. Source: ASAM OpenDRIVE 1.7: road reference line, lane offset, lane sections, widths and borders.
 """

@@ -1,4 +1,4 @@
-"""Ways along the lanes of an OpenDRIVE file: from lane to lane by their links, and the shortest from road to road.
+"""Finds ways along an OpenDRIVE file's lanes, and between its roads.
 
 Source: ASAM OpenDRIVE 1.7: road linkage, junctions, lane linkage; ASAM OpenSCENARIO XML 1.3: default route.
 """
@@ -47,7 +47,7 @@ class RoadLeg(NamedTuple):
 
 
 def lane_through(road: Roadway, lane: int, from_m: float, to_m: float) -> int | None:
-    """Returns a lane's id at another place of its road, by the links of lane sections; None if it ends before."""
+    """Returns a lane's id at another place of its road; None if it ends before."""
     first, last = road.section_index(from_m), road.section_index(to_m)
     step: int = 1 if last >= first else -1
     end: End = "end" if step > 0 else "start"
@@ -132,7 +132,7 @@ def onward(
     *,
     by_lane: bool = True,
 ) -> tuple[list[RoadLeg], float]:
-    """Returns the legs of a way along a lane, straight on where it forks, and what is left of its length.
+    """Returns the legs of a way along a lane, and its remaining length.
 
     Args:
       file: with the roads.
@@ -170,7 +170,7 @@ def onward(
 
 
 def road_path(file: RoadFile, begin: LaneEnd, from_m: float, goal: LaneEnd, to_m: float) -> list[RoadLeg]:
-    """Returns the shortest way from a place to another, along the reference lines; lanes are changed where need be.
+    """Returns the shortest way between places along the reference lines.
 
     Raises:
       ConfigError: no lane leads there.

@@ -1,4 +1,4 @@
-"""What an episode is made of: its scene, its road and its frames.
+"""Defines an episode's parts: its scene, its road and its frames.
 
 Geometry is metric and mathematical: x east, y north, heading 0 = east, counter-clockwise, radians,
 and every position is the centre of the actor's body. SUMO's own conventions (front bumper, compass
@@ -24,7 +24,7 @@ STEP_S = 0.1  # one control step is one simulation step
 
 
 class Kind(IntEnum):
-    """How an actor moves: in lanes, or anywhere as pedestrians do."""
+    """Way of moving: in lanes, or anywhere as pedestrians do."""
 
     VEHICLE = 0
     PEDESTRIAN = 1

@@ -1,5 +1,6 @@
 """Titles and examples of all calls, for the page that describes the API."""
 
+import inspect
 import itertools
 import json
 import re
@@ -16,7 +17,7 @@ from pydantic import TypeAdapter
 
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.config.methods import RunMethod
-from risk_sac.records import StateChange
+from risk_sac.records import Record, StateChange
 from service.api.gate import PUBLIC
 from service.api.pages import header
 from service.api.posted import campaign_schemas, input_schemas
@@ -197,7 +198,7 @@ def _document(app: FastAPI) -> dict[str, Any]:
                 if int(status) >= 400:
                     response["content"] = {"application/problem+json": response["content"]["application/json"]}
     _describe_guards(document)
-    document["components"]["schemas"] = _simplified(schemas) | _CHOICES
+    document["components"]["schemas"] = _inherited(_simplified(schemas)) | _CHOICES
     document["paths"] = _simplified(document["paths"])
     describe_calls(document["paths"])
     _share(document)
@@ -251,20 +252,54 @@ def _simplified(node: Any) -> Any:
     return node
 
 
+def _inherited(schemas: dict[str, Any]) -> dict[str, Any]:
+    """Returns the schemas, in which fields that several records inherit are those of the base."""
+    known = {each.__name__: each for each in _records(Record)}
+    records = {name: known[name] for name in schemas if name in known}
+    bases = Counter(base for each in records.values() for base in each.__mro__[1:] if base in known.values())
+    for base in (base for base, count in bases.items() if count > 1 and base.__name__ not in schemas):
+        first = schemas[next(name for name, each in records.items() if issubclass(each, base))]
+        own = {key: first["properties"][key] for key in base.model_fields}
+        required = [key for key in first["required"] if key in own]
+        about = {"description": inspect.getdoc(base)} if base.__doc__ else {}
+        schemas = schemas | {base.__name__: about | {"properties": own, "type": "object", "required": required}}
+    return {name: _less_its_base(name, schemas, records) for name in schemas}
+
+
+def _less_its_base(name: str, schemas: Mapping[str, Any], records: Mapping[str, type[Record]]) -> Any:
+    """Returns a schema without what its nearest base among the schemas has, which it names in its place."""
+    schema, record = schemas[name], records.get(name)
+    base = next((each.__name__ for each in record.__mro__[1:] if each.__name__ in schemas), None) if record else None
+    if base is None or not schemas[base]["properties"].items() <= schema["properties"].items():
+        return schema
+    own = {key: each for key, each in schema["properties"].items() if key not in schemas[base]["properties"]}
+    required = [key for key in schema.get("required", []) if key in own]
+    rest = {key: each for key, each in schema.items() if key not in ("properties", "required")}
+    reference = {"allOf": [{"$ref": f"#/components/schemas/{base}"}]}
+    return rest | reference | ({"properties": own} if own else {}) | ({"required": required} if required else {})
+
+
+def _records(base: type[Record]) -> set[type[Record]]:
+    """Returns the classes that derive from a record, at any distance."""
+    return {each for own in base.__subclasses__() for each in (own, *_records(own))}
+
+
 def _share(document: dict[str, Any]) -> None:
-    """Moves repeated parameters, headers and responses to the components."""
+    """Moves repeated parameters, bodies, headers and responses to the components."""
     operations = [operation for path in document["paths"].values() for operation in path.values()]
     responses = [operation["responses"] for operation in operations]
     headers = [response["headers"] for each in responses for response in each.values() if "headers" in response]
     components = document["components"]
     components["parameters"] = _shared("parameters", [operation.get("parameters", []) for operation in operations])
     components["headers"] = _shared("headers", headers)
+    components["requestBodies"] = _shared("requestBodies", operations, ("requestBody",))
     components["responses"] = _shared("responses", responses)
 
 
-def _shared(kind: str, places: Sequence[Any]) -> dict[str, Any]:
-    """Replaces repeated entries by references; returns the referenced components."""
+def _shared(kind: str, places: Sequence[Any], only: Sequence[str] = ()) -> dict[str, Any]:
+    """Replaces repeated entries by references; returns the referenced components. `only` names keys, else all count."""
     entries = [(place, key) for place in places for key in (place if isinstance(place, dict) else range(len(place)))]
+    entries = [(place, key) for place, key in entries if not only or key in only]
     counts = Counter(json.dumps(place[key]) for place, key in entries)
     shared: dict[str, Any] = {}
     for place, key in entries:

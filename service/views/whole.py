@@ -144,7 +144,7 @@ class Content:
 
 @dataclass(frozen=True, slots=True)
 class Sources:
-    """What views are made from; a prior that names a copy is of no campaign."""
+    """Sources of views; a prior that names a copy is of no campaign."""
 
     settings: ServiceSettings
     store: Store
@@ -194,7 +194,7 @@ class _Passing(Exception):
 
 
 class Views(OnDemandCache[CampaignView]):
-    """Makes views of small campaigns at once, and of large ones in a helper process, one at a time."""
+    """Makes views of small campaigns at once, and of large ones in a helper."""
 
     def __init__(self, settings: ServiceSettings, store: Store, reports: Reports, helper: Helper, kept: int) -> None:
         super().__init__(self._helped, "views of large campaigns", kept)

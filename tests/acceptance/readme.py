@@ -1,7 +1,8 @@
 """`python -m tests.acceptance.readme`: runs the commands of README.md in a fresh clone and compares what they print.
 
-Numbers, plurals and blanks may differ, since another kind of processor plays other episodes. `…` stands for any text.
-The commands run in one shell, so `source .venv/bin/activate` lasts.
+A file is saved first where the page says "Save this as". Numbers, plurals and blanks may differ, since another kind of
+processor plays other episodes. `…` stands for any text. The commands run in one shell, so `source .venv/bin/activate`
+lasts.
 """
 
 import os
@@ -16,6 +17,7 @@ from pathlib import Path
 from tests.server import ROOT
 
 CONSOLE = re.compile(r"^```console\n(.*?)^```$", re.M | re.S)
+SAVED = re.compile(r"Save this as `([^`]+)`[^`]*^```\w+\n(.*?)^```$", re.M | re.S)
 ENDED = "README ended:"
 
 
@@ -33,6 +35,13 @@ def steps(text: str) -> Iterator[Step]:
         for part in re.split(r"^\$ ", block, flags=re.M)[1:]:
             command, *shown = part.splitlines()
             yield Step(command, tuple(shown))
+
+
+def save(text: str, folder: Path) -> None:
+    """Saves the files that a page shows into a folder."""
+    for name, content in SAVED.findall(text):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(content, encoding="utf-8")
 
 
 def pattern(line: str) -> str:
@@ -93,7 +102,9 @@ def main() -> None:
     """Runs all commands, the installation and the suite among them."""
     with tempfile.TemporaryDirectory() as folder:
         clone = cloned(Path(folder))
-        check(clone, list(steps((clone / "README.md").read_text(encoding="utf-8"))))
+        text = (clone / "README.md").read_text(encoding="utf-8")
+        save(text, clone)
+        check(clone, list(steps(text)))
     print("README.md: all commands print what it shows")
 
 

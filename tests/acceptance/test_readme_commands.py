@@ -5,15 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.acceptance.readme import check, cloned, steps
+from tests.acceptance.readme import check, cloned, save, steps
 from tests.server import ROOT
 
-README = ROOT / "README.md"
+README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_readme_has_the_two_commands_and_those_of_a_run():
-    commands = [step.command for step in steps(README.read_text(encoding="utf-8"))]
-    assert commands[:3] == ["make demo", "make test", "source .venv/bin/activate"]
+    commands = [step.command for step in steps(README)]
+    assert commands[:2] == ["make install", "source .venv/bin/activate"]
+    assert commands[-2:] == ["make demo", "make test"]
 
 
 @pytest.mark.skipif(not (Path(sys.prefix) / "bin" / "activate").exists(), reason="needs the .venv of `make install`")
@@ -21,5 +22,5 @@ def test_commands_of_a_run_print_what_readme_shows(tmp_path):
     """Those of `make` are left out: `python -m tests.acceptance.readme` runs them too, in half an hour."""
     clone = cloned(tmp_path)
     (clone / ".venv").symlink_to(sys.prefix)
-    wanted = [step for step in steps(README.read_text(encoding="utf-8")) if not step.command.startswith("make")]
-    check(clone, wanted)
+    save(README, clone)
+    check(clone, [step for step in steps(README) if not step.command.startswith("make")])

@@ -83,8 +83,9 @@ def test_every_page_is_reached_from_the_readme() -> None:
     assert set(PAGES) == reached
 
 
-def test_first_heading_of_the_changelog_is_the_version_of_the_package() -> None:
-    assert re.findall(r"^## (\S+)", text_of(CHANGELOG), re.M)[0] == __version__
+def test_the_changelog_has_the_version_of_the_package_and_what_comes_next() -> None:
+    versions = re.findall(r"^## (\S+)( \(unreleased\))?", text_of(CHANGELOG), re.M)
+    assert (__version__ == versions[0][0]) or (versions[0][1] and __version__ == versions[1][0])
 
 
 RISK = (ROOT / "risk_sac" / "risk" / "README.md").read_text(encoding="utf-8")

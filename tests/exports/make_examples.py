@@ -1,6 +1,7 @@
 """`python -m tests.exports.make_examples`: writes the examples, one for each format, and the bundles of the tests.
 
-The bundles say what is played; the episodes are those of a short search. README.md shows the pictures of the families.
+The bundles say what is played; the episodes are those of a short search. `risk_sac/scenario/README.md`
+shows the pictures of the families.
 """
 
 import subprocess

@@ -113,7 +113,7 @@ class FrenetPlanner:
 
 
 def road_map(road: Road, numbers: Mapping[str, int]) -> Any:
-    """Returns the package's map of a road; its lanes have these numbers, its stop lines their places in the road."""
+    """Returns the package's map of a road, with numbered lanes and stop lines."""
     planner_map = fp.RoadMap()
     for road_lane in road.lanes:
         lane, (left, right) = fp.MapLane(), lane_edges(road_lane)

@@ -1,4 +1,4 @@
-"""Tells a planner what holds for it: lanes along the route, stop lines, room beside, others in view; cuts lanes."""
+"""Prepares a planner's input: lanes along the route, stop lines, room, others in view."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,7 @@ BESIDE_M = 0.1  # distance between the ego's body and the lane's edge
 
 
 def lanes_ahead(road: Road, start: str) -> list[str]:
-    """Returns the lanes along the route from a lane on, with as few changes to a lane beside as possible.
+    """Returns the lanes along the route from a lane on, with the fewest lane changes.
 
     It ends on the lane from which the route leads no farther. If the route is out of reach, it is the first lane alone.
     """
@@ -40,7 +40,7 @@ def lanes_ahead(road: Road, start: str) -> list[str]:
 
 
 class SignalStops:
-    """Decides at which signals the ego stops: at a red one, and at a yellow one where it can still stop.
+    """Decides at which red or yellow signals the ego stops.
 
     Once it stops at a yellow one, it does until the signal changes, however hard it has to brake then.
     """

@@ -117,7 +117,7 @@ class StepContext:
 
 
 def listen(serve: Serve) -> str:
-    """Answers steps of sessions in threads of their own; returns the socket's name, or "" where there is none."""
+    """Answers steps of sessions in threads; returns the socket's name, or ""."""
     if sys.platform != "linux":
         return ""
     name = f"risk-sac-ego-{uuid.uuid4()}"

@@ -84,7 +84,7 @@ def rows_in(file: Path) -> list[Row]:
 
 
 def play_grid(file: Path, name: str, config: BoundaryConfig, ego: str) -> list[Row]:
-    """Plays the grid of a case, or goes on with it: a row of the file for each scene, with its outcome."""
+    """Plays the grid of a case into the file's rows, or goes on with it."""
     spec = RunSpec(family=name, method="story-random", seed=SEED, ego=ego_of(ego))
     played = rows_in(file)
     with closing(RiskSacEnv.of(spec)) as env:

@@ -36,7 +36,7 @@ COLUMNS = ("defect", "version", "family", "undisturbed_scenes", "undisturbed_det
 
 
 def undisturbed(name: str, options: argparse.Namespace) -> Detection:
-    """Plays the undisturbed scenes of a defect up to one that detects it; a later call with more goes on."""
+    """Plays undisturbed scenes of a defect up to one that detects it."""
     spec = RunSpec(family=DEFECTS[name].families[0], method=UNDISTURBED, seed=501, ego=pinned(ego_with(name)))
     return first_detection(spec, folder_of(spec, options.out), options.scenes * SCENE_STEPS)
 

@@ -26,7 +26,7 @@ FIELDS = ("family", "seed", "profile", "time_s", "distance_m", "travel_s", "cont
 
 
 def drive(env: RiskSacEnv, seed: int) -> tuple[Floats, str, bool]:
-    """Plays a scene; returns the metres driven after each step, the actor it touches, and if it stands for ever."""
+    """Plays a scene; returns metres driven, the actor touched, and if it stands for ever."""
     env.reset(seed=seed)
     idle, driven, contact = np.zeros(env.action_size, dtype=np.float32), [0.0], ""
     while True:

@@ -89,7 +89,7 @@ def play(spec: RunSpec, folder: Path, steps: int) -> None:
 
 
 def count(spec: RunSpec, folder: Path) -> Mapping[str, int]:
-    """Counts the steps of the funnel, from valid to headline; contacts are judged again by the rules of now."""
+    """Counts the steps of the funnel, judged again by the present rules."""
     records = [judged_now(spec, each, folder) for each in records_from_lines((folder / EPISODES).read_bytes())]
     valid = [(record, each) for record in records for each in record.valid_violations]
     preventable = [(record, each) for record, each in valid if each.preventable]

@@ -49,7 +49,7 @@ class Sweep(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """What a row is about."""
+    """Key of a row."""
 
     sweep: Sweep
     ego: str

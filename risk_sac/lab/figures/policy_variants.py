@@ -40,7 +40,7 @@ HEAD = f"| {' | '.join(COLUMNS)} |\n|{len(COLUMNS) * '---|'}"
 
 
 class PolicyVariant(NamedTuple):
-    """What differs from the shipped policy."""
+    """Differences from the shipped policy."""
 
     kinds: bool = False
     discount: float = AGENT.discount  # of a decision
@@ -58,7 +58,7 @@ VARIANTS = {
 
 
 class OneKind(Goals):
-    """Goals of a policy that is asked for one kind only; a failure of another one is any failure."""
+    """Goals of a policy that is asked for one kind of failure only."""
 
     def __init__(self, name: str) -> None:
         super().__init__(asked=True, names=[name])

@@ -39,7 +39,7 @@ UNDISTURBED_SEED = 58
 
 
 class Cell(NamedTuple):
-    """What a row is about; `method` is empty and `seed` fixed where nothing attacks."""
+    """Key of a row; `method` is empty and `seed` fixed without an attack."""
 
     scenario: str
     ego: str

@@ -42,7 +42,7 @@ HELD_OUT = ("r157", "latency", "late-tracks", "tailgates")
 
 
 def training_egos(family: str) -> dict[str, EgoConfig]:
-    """Returns the egos of a shipped family by name: the sound ones, and those with a defect of the training part."""
+    """Returns a shipped family's training egos by name, sound ones and defects."""
     faulty = {
         name: EgoConfig(driver="idm-aeb", defects=(name,))
         for name, defect in DEFECTS.items()

@@ -156,7 +156,7 @@ def auc(scores: NDArray[np.float32], positive: NDArray[np.bool_]) -> float:
 
 
 def library_of(data: Dataset, model: ScriptModel) -> tuple[NDArray[np.float32], tuple[str, ...]]:
-    """Returns points for a library and their kinds: of each kind those that the model takes to fail most egos.
+    """Returns library points and their kinds, those that the model expects to fail most egos.
 
     Candidates for the headline come before other failures, and the second of a kind after the first of all.
     """

@@ -64,7 +64,7 @@ class PolicySnapshot:
 
 
 def drawn_course(random: np.random.Generator, goals: int, *, mirrored: bool) -> tuple[int, bool]:
-    """Draws what an episode asks a pretrained policy for (0: any failure), and whether it sees it in the mirror."""
+    """Draws the goal of an episode (0: any failure), and whether it is mirrored."""
     goal = int(random.integers(goals + 1))
     return goal, mirrored and bool(random.integers(2))
 

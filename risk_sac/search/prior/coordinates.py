@@ -65,7 +65,7 @@ class Coordinates(NamedTuple):
 
     @property
     def symmetric(self) -> bool:
-        """Whether the ego has a neighbour on either side, so that the mirror image of a point is a point too."""
+        """Whether the mirror image of a point is a point too."""
         return two_sided(self.adversaries, self.space.names)
 
     def reflected(self, points: Floats) -> Floats:
@@ -79,7 +79,7 @@ class Coordinates(NamedTuple):
         return Scripted(self.space.names, values, self.adversaries, points[:, size:], self.mirrored)
 
     def placed(self, scripted: Scripted) -> Floats:
-        """Returns the points of scenes and scripts of any family that is like the same one, `n x dimension`.
+        """Returns the points of scenes and scripts of similar families, `n x dimension`.
 
         Values are clipped to the bounds. A missing parameter is put to its middle, and a missing adversary is passive.
         """
@@ -127,7 +127,7 @@ def other_side(name: str) -> str:
 
 
 def two_sided(adversaries: Sequence[str], parameters: Sequence[str]) -> bool:
-    """Tells whether names of adversaries and parameters on the left have their like on the right, and vice versa."""
+    """Tells whether names on the left have their like on the right, and vice versa."""
     sides = [name for name in parameters if other_side(name) != name]
     both = all(other_side(name) in parameters for name in sides)
     return bool(sides) and both and set(OTHER_SIDE) <= set(adversaries) and len(set(adversaries)) == len(adversaries)

@@ -98,7 +98,7 @@ class SceneOptimizer(ABC):
 
     @property
     def origin(self) -> Mapping[str, Any]:
-        """What the sampler remembers of the point that was asked for last, as plain values.
+        """Origin of the point that was asked for last, as plain values.
 
         Where others were asked for since, it is set again before the point is told; to nothing before a point that
         another sampler has proposed.
@@ -110,7 +110,7 @@ class SceneOptimizer(ABC):
         del origin  # most samplers remember nothing
 
     def waits(self, out: int) -> bool:
-        """Whether the next point depends on what so many points that are out will tell, and cannot be asked for yet."""
+        """Whether the next point depends on results that are out."""
         return False
 
     @abstractmethod

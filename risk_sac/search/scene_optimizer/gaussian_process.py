@@ -63,7 +63,7 @@ def fit(points: Tensor, values: Tensor, start: Hyperparameters | None, seed: int
 def believe(
     model: SingleTaskGP, points: Tensor, values: Tensor, out: Tensor, hyperparameters: Hyperparameters
 ) -> SingleTaskGP:
-    """Returns the model as if points that are out, `m x d`, had their posterior mean; others as for `condition`.
+    """Returns the model with posterior means at points that are out, `m x d`.
 
     So the next point is elsewhere. Source: the kriging believer of Ginsbourger et al. 2010, Kriging is well-suited to
     parallelize optimization.

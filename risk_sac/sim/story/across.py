@@ -80,7 +80,7 @@ class ChangeOffset:
         return False
 
     def _wanted_m(self, mover: Mover, stage: Stage) -> float:
-        """Where it is to be across; relative to another actor, that is beside the other's place on the road."""
+        """Returns the wanted place across, m."""
         target = self._do.target
         if not isinstance(target, RelativeTarget):
             return float(target)

@@ -28,7 +28,7 @@ class Present(NamedTuple):
         return cls(*pose, speed_mps * math.cos(way), speed_mps * math.sin(way), accel_mps2, reach)
 
     def after(self, seconds: float) -> "Present":
-        """Where it is after some time at its velocity."""
+        """Returns the pose after some time at its velocity."""
         return self._replace(x_m=self.x_m + self.vx_mps * seconds, y_m=self.y_m + self.vy_mps * seconds)
 
     @property

@@ -10,7 +10,7 @@ from risk_sac.world.types import STEP_S
 
 
 class EventStart:
-    """When one execution of an event starts.
+    """Start of one execution of an event.
 
     Choice: a trigger comes earlier by `s` where it would fire `s` from now if all actors went on at their velocities,
     and at the latest where it fires. One that would fire in this way only, and never does, has begun the event all the

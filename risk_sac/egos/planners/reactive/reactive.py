@@ -56,7 +56,7 @@ class Reactive:
         self._heading: float | None = None
 
     def act(self, perceived: Perceived) -> Control:
-        """Plans each third step, as the package does, and follows the plan; without one it brakes as hard as it can."""
+        """Plans each third step and follows the plan; without one it brakes hard."""
         ego = perceived.state[:, 0]
         turned = 0.0 if self._heading is None else math.remainder(ego[HEADING] - self._heading, math.tau)
         self._heading = float(ego[HEADING])
