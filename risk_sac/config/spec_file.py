@@ -77,11 +77,12 @@ def _equipment(presets: Sequence[str]) -> dict[str, str]:
     """Returns the fields that presets belong to."""
     chosen = dict[str, str]()
     for preset in presets:
-        field = "sensors" if preset in SENSOR_PRESETS else "actuators"
-        if preset not in ACTUATOR_PRESETS.keys() | SENSOR_PRESETS.keys() or field in chosen:
-            got = f"@{preset}" + (f" beside @{chosen[field]}" if field in chosen else "")
-            expected = f"one of {', '.join(SENSOR_PRESETS)} and one of {', '.join(ACTUATOR_PRESETS)}"
-            raise ConfigError("ego", got, expected, did_you_mean(preset, [*SENSOR_PRESETS, *ACTUATOR_PRESETS]))
+        field, known = "sensors" if preset in SENSOR_PRESETS else "actuators", [*SENSOR_PRESETS, *ACTUATOR_PRESETS]
+        expected = f"at most one of {', '.join(SENSOR_PRESETS)} and one of {', '.join(ACTUATOR_PRESETS)}"
+        if preset not in known:
+            raise ConfigError("ego", f"@{preset}", expected, did_you_mean(preset, known))
+        if field in chosen:
+            raise ConfigError("ego", f"@{preset} beside @{chosen[field]}", expected)
         chosen[field] = preset
     return chosen
 

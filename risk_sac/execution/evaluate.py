@@ -56,9 +56,6 @@ def run(spec: RunSpec, folder: Path, progress: RunProgress) -> RunResults:
       CheckpointError: the folder's checkpoint is of another run.
       OSError: the folder cannot be written.
     """
-    if spec.on_end is not None:
-        got = f"{spec.on_end!r} for a campaign on the command line"
-        raise ConfigError("on_end", got, remedy="leave it out, or post the campaign to a server")
     folder = folder.absolute()  # an ego may change the working directory
     ego, prior = Problem.from_spec(spec).ego, pinned_prior(spec.prior, [spec.family])  # before the folder is claimed
     spec = spec.model_copy(update={"ego": ego, "prior": prior})
@@ -207,6 +204,9 @@ def evaluate(
         raise ConfigError("jobs", f"{jobs}", "at least one process")
     if times < 0:
         raise ConfigError("verify", f"{times}", "0 or more")
+    if spec.on_end is not None:
+        got = f"{spec.on_end!r} for a campaign on the command line"
+        raise ConfigError("on_end", got, remedy="leave it out, or post the campaign to a server")
     folder = folder.absolute()  # an ego may change the working directory
     spec = checked_campaign(spec)  # before the folder is claimed
     spec = spec.model_copy(update={"prior": pinned_prior(spec.prior, spec.families)})

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from contextlib import closing
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -101,7 +101,7 @@ def _begin(env: RiskSacEnv) -> Scene:
 
 def _drive(env: RiskSacEnv, pilot: EgoPilot, scenario: str) -> EgoTrial:
     idle, ratios, clipped, failed, over = np.zeros(env.action_size, np.float32), list[float](), 0, "", False
-    info, first = {}, len(env.trace.frames) - 1
+    info, first = dict[str, Any](), len(env.trace.frames) - 1
     while not over:
         try:
             _, _, terminated, truncated, info = env.step(idle)

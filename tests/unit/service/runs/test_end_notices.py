@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from risk_sac.config import CampaignSpec
 from risk_sac.errors import ConfigError
+from risk_sac.execution.evaluate import evaluate
 from risk_sac.records import EndNotice, State
 from service.runs.end_notices import EndNotices, check_allowed
 from tests.receiver import Receiver
@@ -102,6 +103,13 @@ def test_another_server_goes_on_with_what_is_undelivered(store, ledger, receiver
     ledger.delete(campaign.id)
     assert store.notice(campaign.number) is None
     ledger.note_try(campaign.id, None)  # deleted while it was on its way
+
+
+def test_a_campaign_on_the_command_line_has_no_server_that_tells_its_end(tmp_path):
+    spec = CampaignSpec(families=("low",), methods=("random",), on_end="https://hooks.example/ci")
+    with pytest.raises(ConfigError, match=r"on_end: 'https.* on the command line; leave it out, or post"):
+        evaluate(spec, tmp_path / "out", "", 1, lambda *_: None, "local", 0)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_url_is_allowed_below_a_prefix_of_the_same_origin():
