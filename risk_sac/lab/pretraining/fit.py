@@ -123,11 +123,10 @@ def accuracy(model: ScriptModel, data: Dataset) -> dict[str, float]:
     known = (data.egos[:, None] == np.array(model.egos)[None]).astype(np.float64)
     scores: dict[str, float] = {"episodes": len(data.points), "failures": int(truth["fails"].sum())}
     for belief, word in ((known, "known"), (model.unknown(), "unknown")):
-        if not all(0 < positive.sum() < len(positive) for positive in truth.values()):
-            continue
-        prediction = model.predict(data.batch, belief)
         for name, positive in truth.items():
-            scores[f"{name}, ego {word}"] = round(auc(getattr(prediction, name), positive), 3)
+            if 0 < positive.sum() < len(positive):
+                prediction = getattr(model.predict(data.batch, belief), name)
+                scores[f"{name}, ego {word}"] = round(auc(prediction, positive), 3)
     return scores
 
 

@@ -129,4 +129,4 @@ def test_a_scenario_without_like_has_a_model_and_no_library_and_every_method_sea
 def test_rows_that_depend_on_a_missing_adversary_are_drawn_less_often():
     whole, alone = (start_of(problem_at(low_with(*sides)), "shipped") for sides in (("left", "right"), ()))
     assert whole.library_worth.mean() > 0.99
-    assert alone.library_worth.mean() < 0.2
+    assert alone.library_worth.mean() < 0.5
