@@ -6,7 +6,7 @@ from risk_sac.config import FamilyName, RunSpec
 from risk_sac.records import EpisodeRecord, Outcome
 from risk_sac.run_folder.results import EPISODES, RunResults, write_results
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.search.prior.shipped import shipped_prior
+from risk_sac.search.prior.shipped import shipped_library
 from tests.builders import collision, episode_record
 
 FAILURES, SAFE = 2, 3
@@ -14,7 +14,7 @@ FAILURES, SAFE = 2, 3
 
 def _episodes(family: str, *, scripts: bool = True) -> list[EpisodeRecord]:
     """Two failures of one kind, then safe ones; the point of each is another row of the shipped library."""
-    space, points, found = FAMILIES[family].space, shipped_prior(family).library, []
+    space, points, found = FAMILIES[family].space, shipped_library(family).points, []
     for index in range(FAILURES + SAFE):
         scene, genes = space.from_unit(points[index][: space.dimension]), points[index][space.dimension :]
         failed = index < FAILURES

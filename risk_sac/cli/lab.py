@@ -25,7 +25,7 @@ from risk_sac.host.machine import cores
 from risk_sac.host.terminal import console
 from risk_sac.records import Counts
 from risk_sac.report.power import NOT_MEASURED, BenchmarkRun, PlayedCounts, measured, method_power, power_of, runs_of
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
 
 METHODS: Sequence[MethodName] = ("random", "archive", "risk-sac-diverse")
 SEEDS, STEPS = 10, 20_000
@@ -159,9 +159,10 @@ def add_pretrain(commands: Commands) -> None:
         "pretrain",
         _pretrain,
         "make a prior: play scripts and train a policy before many egos",
-        more="The same command again goes on with an interrupted one. For each family it writes DIR/<family>.npz with"
-        " script model and library, and DIR/<family>-policy.npz with the curve of its training beside it.",
-        example="pretrain --scenario low --streams 2 --chunks 4 --policy-episodes 0 --out results/prior",
+        more="The same command again goes on with an interrupted one. It writes DIR/scripts.npz, one script model for"
+        " all scenarios, and for each family of the paper DIR/<family>.npz with its library and DIR/<family>-policy.npz"
+        " with the curve of its training beside it. Every third shipped document by name only tests the model.",
+        example="pretrain --scenario low left_turn_car --streams 2 --chunks 4 --policy-episodes 0 --out results/prior",
     )
     titles = ("scene", "script model", "policy", "execution", "output")
     scene, scripts, policy, execution, output = map(parser.group, titles)
@@ -169,9 +170,9 @@ def add_pretrain(commands: Commands) -> None:
         "--scenario",
         dest="families",
         nargs="+",
-        default=list(PAPER_FAMILIES),
+        default=[],
         metavar="NAME_OR_FILE",
-        help=f"(default: {' '.join(PAPER_FAMILIES)})",
+        help=f"(default: all that ship; for policies {' '.join(PAPER_FAMILIES)})",
     )
     streams = "independent sequences of script episodes for each family; 0: no script model (default: %(default)s)"
     scripts.add_argument("--streams", type=number(int, 0, 100), default=4, metavar="N", help=streams)
@@ -196,7 +197,7 @@ def _pretrain(options: argparse.Namespace) -> int:
         if options.streams:
             _fit_scripts(options, pool)
         if options.policy_episodes:
-            for family in options.families:
+            for family in options.families or PAPER_FAMILIES:
                 _train_policy(options, pool, family)
     return OK
 
@@ -204,21 +205,27 @@ def _pretrain(options: argparse.Namespace) -> int:
 def _fit_scripts(options: argparse.Namespace, pool: Executor) -> None:
     # Here, because loading torch and the simulator takes seconds.
     from risk_sac.lab.pretraining.episodes import play_stream
-    from risk_sac.lab.pretraining.fit import Dataset, fitted_prior
-    from risk_sac.search.prior.shipped import write_prior
+    from risk_sac.lab.pretraining.fit import Dataset, fit, library_of
+    from risk_sac.search.prior.shipped import MODEL, write_library, write_model
 
     episodes: Path = options.out / "episodes"
     episodes.mkdir(exist_ok=True)
-    wanted = [(family, options.seed, k) for k in range(options.streams) for family in options.families]
+    families = options.families or shipped_names()
+    wanted = [(family, options.seed, k) for k in range(options.streams) for family in families]
     with Progress(console=console) as bar:
         task = bar.add_task("streams", total=len(wanted))
         for ended in as_completed([pool.submit(play_stream, *each, episodes, options.chunks) for each in wanted]):
             ended.result()
             bar.advance(task)
-    for family in options.families:
-        prior = fitted_prior(family, Dataset.read(episodes, family), options.seed)
-        write_prior(options.out / f"{family}.npz", prior)
-        say(f"{family}: {prior.card['episodes']} episodes, AUC of failing {prior.card['auc_fails']:.2f}")
+    data = Dataset.read(episodes, families)
+    model, card = fit(data, options.seed)
+    write_model(options.out / MODEL, model, card)
+    for family in PAPER_FAMILIES:
+        if family in families:
+            write_library(options.out / f"{family}.npz", library_of(data.of([family]), model, family))
+    say(f"{card['episodes']} episodes; area under the ROC curve:")
+    for where, scores in card["area_under_curve"].items():
+        say(f"  {where}: {', '.join(f'{name} {value}' for name, value in scores.items())}")
 
 
 def _train_policy(options: argparse.Namespace, pool: Executor, family: FamilyName) -> None:

@@ -64,9 +64,9 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
 
 
 def check_like(like: Like, vehicles: Sequence[str], pedestrians: Sequence[str]) -> None:
-    """Refuses a shipped family without a prior, and adversaries that stand for none of its adversaries."""
+    """Refuses a shipped family without a library, and adversaries that stand for none of its adversaries."""
     if like.family not in PAPER_FAMILIES:
-        remedy = did_you_mean(like.family, PAPER_FAMILIES) or "leave `like` out to search without a prior"
+        remedy = did_you_mean(like.family, PAPER_FAMILIES) or "leave `like` out to search without a library"
         raise ConfigError("like.family", repr(like.family), f"one of {', '.join(PAPER_FAMILIES)}", remedy)
     if unknown := sorted(like.actors.keys() - {*vehicles, *pedestrians}):
         wanted = f"one of {', '.join((*vehicles, *pedestrians))}"

@@ -11,7 +11,7 @@ from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.reading import document_from
 
 FOLDER = Path(str(files("sumo_nets")))
-PAPER_FAMILIES = ("low", "mixed", "dense")  # families of the paper, which have priors
+PAPER_FAMILIES = ("low", "mixed", "dense")  # families of the paper, which have libraries
 
 
 def scenario_file(name: str) -> Path:

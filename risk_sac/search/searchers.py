@@ -280,8 +280,9 @@ class Searchers:
         elif self._start is None or not actor.genes:
             made = sampler(*arguments)
         else:
-            whole = method_of(self._spec.method).prior == "all" and self._start.model is not None
-            made = (PriorOptimizer if whole else ReplayOptimizer)(*arguments, self._start)
+            whole, rows = method_of(self._spec.method).prior == "all", len(self._start.library)
+            prior = PriorOptimizer if whole else ReplayOptimizer
+            made = prior(*arguments, self._start) if whole or rows else sampler(*arguments)
         if isinstance(made, ArchiveOptimizer) and actor.genes and self._coordinates.symmetric:
             made.reflect = self._coordinates.reflected
         return Searcher(made, actor)

@@ -22,7 +22,7 @@ from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.lab.pretraining.episodes import play
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.search.agents.controls import ScriptFollower
-from risk_sac.search.prior.shipped import shipped_prior
+from risk_sac.search.prior.shipped import shipped_library
 from risk_sac.world.types import Floats
 
 EGOS = {
@@ -42,7 +42,7 @@ def points(family: str, size: int, episodes: int, seed: int) -> Floats:
     """Returns the points that all egos meet, `episodes x size`, in the unit cube."""
     random = np.random.default_rng(seed)
     drawn = random.random((episodes, size))
-    library = shipped_prior(family).library
+    library = shipped_library(family).points
     rows = library[random.integers(len(library), size=episodes)]
     moved = np.clip(rows + random.normal(0.0, DEVIATION, rows.shape), 0.0, 1.0)
     drawn[::2] = moved[::2]

@@ -41,7 +41,7 @@ Case = tuple[FamilyName, str, str, int, str]
 class Until:
     """Observer that stops a run after so many steps."""
 
-    def __init__(self, steps: int) -> None:
+    def __init__(self, steps: float) -> None:
         self._steps, self._spent = steps, 0
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:

@@ -2,14 +2,17 @@
 
     python -m risk_sac.lab.figures.shipped_scenarios OUT undisturbed [--egos EGO ...] [--scenes N]
     python -m risk_sac.lab.figures.shipped_scenarios OUT searches [--egos EGO ...] [--methods NAME ...] [--seeds N]
+        [--steps N]
 
 Both play what OUT lacks and rewrite OUT/undisturbed.csv or OUT/searches.csv after each cell, so that a part is a
-table, too. An ego is `default`, a driver, or a driver and a defect such as `idm-aeb+latency`. Where searches find
-nothing, `uniform_scenes --drivers any` tells what scripts can reach.
+table, too. A search ends after its episodes or its environment steps. An ego is `default`, a driver, or a driver and a
+defect such as `idm-aeb+latency`. Where searches find nothing, `uniform_scenes --drivers any` tells what scripts can
+reach.
 """
 
 import argparse
 import json
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import closing
@@ -21,15 +24,19 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_sac.config import Budget, MethodName, RunSpec
+from risk_sac.egos.registry import pinned
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
-from risk_sac.execution.evaluate import run, verify
+from risk_sac.execution.evaluate import verify
+from risk_sac.execution.recorder import Recorder
 from risk_sac.lab.figures.pretrained_policy import ego_of
+from risk_sac.lab.figures.regression_prior import Until
 from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.records import EpisodeRecord, PlausibilityClass
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
 from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
+from risk_sac.search.loop import execute_run
 
 METHODS: Sequence[MethodName] = ("archive", "random", "risk-sac-diverse", "risk-sac")
 NEWEST_FIRST = (*(name for name in shipped_names() if name not in PAPER_FAMILIES), *PAPER_FAMILIES)
@@ -81,22 +88,23 @@ def undisturbed(out: Path, scenes: int, cell: Cell) -> Row:
     return kept(file, cell._asdict() | {"scenes": played, "refused": refused, "contacts": hits.total(), "with": others})
 
 
-def search(out: Path, episodes: int, cell: Cell) -> Row:
+def search(out: Path, episodes: int, steps: float, cell: Cell) -> Row:
     """Plays a search, or goes on with it, and replays its failures."""
     spec = RunSpec(
         family=cell.scenario,
         method=cell.method,
         seed=cell.seed,
-        ego=ego_of(cell.ego),
+        ego=pinned(ego_of(cell.ego)),
         budget=Budget(episodes=episodes),
     )
-    folder = out / "runs" / "-".join((*cell[:3], str(cell.seed), str(episodes)))
+    folder = out / "runs" / "-".join((*cell[:3], str(cell.seed), str(episodes), f"{steps:g}"))
     file = folder / "row.json"
     if file.exists():
         known: Row = json.loads(file.read_text())
         return known
     if not ((folder / RESULTS).exists() and read_results(folder).finished):
-        run(spec, folder, lambda episode, metrics: None)
+        recorder = Recorder(spec, folder, Until(steps))
+        recorder.finish(execute_run(spec, folder, recorder))
     verify([folder])
     metrics = read_results(folder).metrics
     assert metrics is not None  # the run has a search
@@ -136,6 +144,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--episodes", type=int, default=150, help="of each search (default: %(default)s)")
+    parser.add_argument("--steps", type=float, default=math.inf, help="of each search, at most (default: no bound)")
     parser.add_argument("--scenes", type=int, default=500, help="undisturbed ones (default: %(default)s)")
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args()
@@ -152,7 +161,7 @@ def main() -> None:
             for seed, pair, ego, name in product(seeds, pairs, egos, options.scenarios)
             for method in pair
         ]
-        play = partial(search, options.out, options.episodes)
+        play = partial(search, options.out, options.episodes, options.steps)
     rows_of(play, cells, options.jobs, file)
     print(file.read_text())
 

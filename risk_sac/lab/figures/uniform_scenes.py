@@ -5,8 +5,7 @@
 
 plays each driver before each ego, and rewrites OUT/scenes.csv after each. All meet the same scenes, and nothing is
 learnt. `any` plays up to N scripts in a scene until one fails, half of them random and half mutated from the library.
-So its failures are the ceiling of what scripts can reach there. A scenario without a prior has random scripts alone,
-and no `model`.
+So its failures are the ceiling of what scripts can reach there. A scenario without a library has random scripts alone.
 """
 
 import argparse
@@ -25,7 +24,6 @@ from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.lab.figures.pretrained_policy import ego_of
 from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.lab.pretraining.episodes import ScriptEpisode, outcome_of, play
-from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.prior.start import PriorStart, start_of
@@ -45,9 +43,9 @@ class Matchup(NamedTuple):
     driver: str
 
 
-def script(random: np.random.Generator, start: PriorStart | None, genes: int) -> Floats:
+def script(random: np.random.Generator, start: PriorStart, genes: int) -> Floats:
     """Draws a script: random, or a row of the library mutated by another one."""
-    if start is None:
+    if not len(start.library):
         return random.random(genes)
     own, other = (start.library[random.integers(len(start.library))][-genes:] for _ in range(2))
     return random.random(genes) if random.random() < 0.5 else mutated(own, other, random)
@@ -56,9 +54,7 @@ def script(random: np.random.Generator, start: PriorStart | None, genes: int) ->
 def chosen(random: np.random.Generator, start: PriorStart, scene: Floats, genes: int) -> Floats:
     """Returns the script that the model holds to be worth most in a scene."""
     points = np.array([np.concatenate([scene, script(random, start, genes)]) for _ in range(CHOICE)])
-    assert start.model is not None
-    assert start.translation is not None
-    prediction = start.model.predict(start.translation.known(points), start.belief)
+    prediction = start.model.predict(points, start.belief)
     best: Floats = points[int((prediction.fails + 4.0 * prediction.candidate).argmax())][-genes:]
     return best
 
@@ -74,7 +70,6 @@ def found(cell: Matchup, scenes: int, scripts: int) -> Iterator[ScriptEpisode]:
             scene, seed, episode = drawn.random(space.dimension), int(drawn.integers(1 << 30)), None
             for _ in range(scripts if cell.driver == "any" else 1):
                 if cell.driver == "model":
-                    assert start is not None  # `main` has checked it
                     genes = chosen(random, start, scene, follower.genes)
                 elif cell.driver == "random":
                     genes = random.random(follower.genes)
@@ -117,9 +112,6 @@ def main() -> None:
     parser.add_argument("--scripts", type=int, default=500)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
-    cold = [name for name in options.families if FAMILIES[name].like is None]
-    if cold and "model" in options.drivers:
-        parser.error(f"--drivers: {', '.join(cold)} has no prior; choose from random and any")
     cells = [Matchup(*cell) for cell in product(options.families, options.egos, options.drivers)]
     rows_of(partial(row, options.scenes, options.scripts), cells, options.jobs, options.out / "scenes.csv")
     print((options.out / "scenes.csv").read_text())

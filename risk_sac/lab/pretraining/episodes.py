@@ -18,6 +18,7 @@ from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.run_folder.durable import replace_file
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.encounter import Encounter
 from risk_sac.search.prior.coordinates import Coordinates
@@ -42,11 +43,14 @@ HELD_OUT = ("r157", "latency", "late-tracks", "tailgates")
 
 
 def training_egos(family: str) -> dict[str, EgoConfig]:
-    """Returns a shipped family's training egos by name, sound ones and defects."""
+    """Returns the egos of a family by name: the sound ones, and those with a defect of the training part.
+
+    The catalogue says which defects matter in the paper's families; in any other family all may.
+    """
     faulty = {
         name: EgoConfig(driver="idm-aeb", defects=(name,))
         for name, defect in DEFECTS.items()
-        if not defect.test_set and defect.kind != "sumo" and family in defect.families
+        if not defect.test_set and defect.kind != "sumo" and (family in defect.families or family not in PAPER_FAMILIES)
     }
     return SOUND | faulty
 
@@ -59,7 +63,7 @@ def drawn_ego(egos: Mapping[str, EgoConfig], random: np.random.Generator, sound:
     return names[random.integers(len(names))]
 
 
-CHUNK, TURN = 250, 25  # episodes: of a chunk, and in a row before one ego, since libsumo runs one simulation
+CHUNK, TURN = 250, 10  # episodes: of a chunk, and in a row before one ego, since libsumo runs one simulation
 UNIFORM_SCENES, SCENE_DEVIATION = 0.6, 0.08
 RANDOM_SCRIPTS, UNCHANGED, FAITHFUL = 0.3, 0.3, 0.5  # of the bred ones: not mutated; put before their own scene
 SOUND_SHARE = 0.5  # of the draws, egos without a defect

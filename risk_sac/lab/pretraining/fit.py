@@ -1,123 +1,176 @@
-"""Fits a script model to script episodes."""
+"""Fits the script model to script episodes of many scenarios, and selects the libraries."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch.nn import functional
 
+from risk_sac.config import RunSpec
+from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.report.paired import vargha_delaney
-from risk_sac.search.prior.script_model import CANDIDATE, FAILS, HEADS, MEMBERS, Member, ScriptModel
-from risk_sac.search.prior.shipped import GRID, Prior
+from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
+from risk_sac.search.prior.script_model import CANDIDATE, FAILS, HEADS, MEMBERS, Member, ScriptModel, Tensors
+from risk_sac.search.prior.shipped import GRID, ScriptLibrary
+from risk_sac.search.prior.tokens import TokenBatch, Tokenizer
+from risk_sac.world.types import Floats
 
 LIBRARY = 300  # points of a library, at most
 LEAST_FAILURES = 50  # to fit a model to
-KINDS, OTHER = 47, "another"  # the most frequent kinds that the model tells apart; the rest is one
-HELD_OUT, BATCH, EPOCHS, PATIENCE = 0.1, 512, 40, 4
-RATE, DECAY, DROPOUT = 1e-3, 1e-2, 0.1
+KINDS, OTHER = 95, "another"  # the most frequent kinds that the model tells apart; the rest is one
+HELD_OUT, BATCH, EPOCHS, PATIENCE = 0.1, 256, 40, 6
+RATE, DECAY, DROPOUT = 1e-3, 3e-2, 0.15
 CONCENTRATIONS = (1e-3, 0.03, 0.3, 3.0)  # of the beliefs in training: from an ego that is known to one that is not
-Tensors = tuple[torch.Tensor, ...]  # points, heads, kinds, egos
+EVERY = 3  # documents by name, of which one is held out
+
+
+def held_out_documents() -> tuple[str, ...]:
+    """Names of the shipped documents that no model is fitted to: every third by name, the paper's families apart."""
+    return tuple(sorted(set(shipped_names()) - set(PAPER_FAMILIES))[EVERY - 1 :: EVERY])
 
 
 @dataclass(frozen=True, slots=True)
 class Dataset:
-    """Script episodes of one family, as arrays."""
+    """Script episodes as arrays."""
 
-    points: NDArray[np.float32]  # n x inputs
+    points: Sequence[Floats]  # n, each as long as its family's points are
+    batch: TokenBatch  # of these
     heads: NDArray[np.float32]  # n x HEADS, 0 or 1
     kinds: NDArray[np.str_]  # n; empty where it did not fail
     egos: NDArray[np.str_]
+    families: NDArray[np.str_]
 
     @classmethod
-    def read(cls, folder: Path, family: str) -> "Dataset":
-        """Reads all files of a family."""
-        points, heads, kinds, egos = [], [], [], []
-        for path in sorted(folder.glob(f"{family}-*.npz")):
-            with np.load(path, allow_pickle=False) as arrays:
-                flags, kind = arrays["flags"], arrays["kind"]
-                points.append(arrays["point"].astype(np.float32) / GRID)
+    def read(cls, folder: Path, families: Sequence[str]) -> Self:
+        """Reads all files of families."""
+        points, batches, heads, kinds, egos, of = list[Floats](), list[TokenBatch](), [], [], [], []
+        for family in families:
+            tokenizer = Tokenizer(Problem.from_spec(RunSpec(family=family, method="archive", seed=0)))
+            for path in sorted(folder.glob(f"{family}-[0-9]*.npz")):
+                with np.load(path, allow_pickle=False) as arrays:
+                    flags, kind, point = arrays["flags"], arrays["kind"], arrays["point"] / GRID
+                    egos.append(arrays["ego"])
+                points += list(point)
+                batches.append(tokenizer.batch(point))
                 heads.append(np.stack([kind != "", flags[:, 0], flags[:, 1]], 1).astype(np.float32))
                 kinds.append(kind)
-                egos.append(arrays["ego"])
-        return cls(np.concatenate(points), np.concatenate(heads), np.concatenate(kinds), np.concatenate(egos))
+                of.append(np.full(len(point), family))
+        joined = [np.concatenate(each) for each in (heads, kinds, egos, of)]
+        return cls(points, _padded(batches), *joined)
+
+    def __getitem__(self, rows: NDArray[np.intp]) -> "Dataset":
+        """Returns some of its episodes."""
+        points = [self.points[row] for row in rows]
+        return Dataset(
+            points, self.batch.taken(rows), self.heads[rows], self.kinds[rows], self.egos[rows], self.families[rows]
+        )
+
+    def of(self, families: Sequence[str]) -> "Dataset":
+        """Returns the episodes of some families."""
+        return self[np.flatnonzero(np.isin(self.families, families))]
 
 
-def fitted_prior(family: str, data: Dataset, seed: int) -> Prior:
-    """Fits a family's script model and selects its library.
+def _padded(batches: Sequence[TokenBatch]) -> TokenBatch:
+    """Joins batches with different numbers of actors."""
+    most = max(batch.actors.shape[1] for batch in batches)
+
+    def widened(array: NDArray[Any]) -> NDArray[Any]:
+        missing = [(0, 0), (0, most - array.shape[1]), *[(0, 0)] * (array.ndim - 2)]
+        return np.pad(array, missing)
+
+    by_actor = [[widened(each) for each in (b.actors, b.scripts, b.present, b.turns)] for b in batches]
+    actors, scripts, present, turns = (np.concatenate(each) for each in zip(*by_actor, strict=True))
+    scene, playable = (np.concatenate(each) for each in zip(*((b.scene, b.playable) for b in batches), strict=True))
+    return TokenBatch(scene, actors, scripts, present, turns, playable)
+
+
+def fit(data: Dataset, seed: int) -> tuple[ScriptModel, dict[str, Any]]:
+    """Fits a model; returns it with what it reaches on episodes and documents held out.
 
     Raises:
       ConfigError: too few episodes failed.
     """
-    failed = int(data.heads[:, FAILS].sum())
+    apart = held_out_documents()
+    trained = data[np.flatnonzero(~np.isin(data.families, apart))]
+    failed = int(trained.heads[:, FAILS].sum())
     if failed < LEAST_FAILURES:
-        remedy = "play more chunks"
-        raise ConfigError("chunks", f"{failed} failures in {len(data.points)} episodes", f"{LEAST_FAILURES}", remedy)
-    model, card = fit(data, seed)
-    points, kinds = library_of(data, model)
-    return Prior(family, model, points.astype(np.float64), kinds, card)
-
-
-def fit(data: Dataset, seed: int) -> tuple[ScriptModel, dict[str, Any]]:
-    """Fits a model; returns it with what it reaches on episodes held out."""
-    frequent = [kind for kind, _ in Counter(data.kinds[data.kinds != ""].tolist()).most_common(KINDS)]
-    names = (*frequent, OTHER)
-    place = {kind: i for i, kind in enumerate(frequent)}
-    kinds = torch.tensor([place.get(kind, len(frequent)) for kind in data.kinds.tolist()])
-    points, heads = torch.from_numpy(data.points), torch.from_numpy(data.heads)
-    egos, ego = np.unique(data.egos, return_inverse=True)
-    order = np.random.default_rng(seed).permutation(len(points))
+        got = f"{failed} failures in {len(trained.points)} episodes"
+        raise ConfigError("chunks", got, f"{LEAST_FAILURES}", "play more chunks")
+    frequent = [kind for kind, _ in Counter(trained.kinds[trained.kinds != ""].tolist()).most_common(KINDS)]
+    names, egos = (*frequent, OTHER), tuple(np.unique(trained.egos).tolist())
+    order = np.random.default_rng(seed).permutation(len(trained.points))
     size = int(HELD_OUT * len(order))
-    held, own = torch.from_numpy(order[:size]), torch.from_numpy(order[size:])
-    members, losses = [], []
-    for i in range(MEMBERS):
-        tensors = points, heads, kinds, torch.from_numpy(ego)
-        member, loss = _fit_member(tensors, own, held, (len(names), len(egos)), seed + i)
-        members.append(member)
-        losses.append(loss)
-    model = ScriptModel(members, names, tuple(egos.tolist()))
-    prediction = model.predict(data.points[order[:size]], np.eye(len(egos))[ego[order[:size]]])
-    blind = model.predict(data.points[order[:size]], model.unknown())
-    truth = data.heads[order[:size]]
-    failing = truth[:, FAILS] > 0
-    card = {
-        "episodes": len(points),
-        "loss": losses,
-        "auc_fails": auc(prediction.fails, failing),
-        "auc_candidate": auc(prediction.candidate, truth[:, CANDIDATE] > 0),
-        "auc_fails_unknown": auc(blind.fails, failing),
-        "auc_candidate_unknown": auc(blind.candidate, truth[:, CANDIDATE] > 0),
-        "kind_accuracy": float((prediction.kinds.argmax(1) == kinds[held].numpy())[failing].mean()),
-    }
-    return model, card
+    held, own = trained[order[:size]], trained[order[size:]]
+    members = [_fit_member(own, held, names, egos, seed + i) for i in range(MEMBERS)]
+    model = ScriptModel(members, names, egos)
+    scores = {"held-out episodes": accuracy(model, held)}
+    scores |= {f"held-out episodes of {family}": accuracy(model, held.of([family])) for family in PAPER_FAMILIES}
+    scores |= {"held-out documents": accuracy(model, data.of(apart))}
+    scores |= {family: accuracy(model, data.of([family])) for family in apart}
+    return model, {"episodes": len(trained.points), "failures": failed, "area_under_curve": scores}
 
 
-def _fit_member(
-    data: Tensors, own: torch.Tensor, held: torch.Tensor, sizes: tuple[int, int], seed: int
-) -> tuple[Member, float]:
-    """Fits one member; `sizes` are the numbers of kinds and of egos."""
+def accuracy(model: ScriptModel, data: Dataset) -> dict[str, float]:
+    """Returns areas under the ROC curve; none without an episode that failed and one that did not."""
+    heads = {"fails": FAILS, "candidate": CANDIDATE}
+    truth = {name: data.heads[:, head] > 0 for name, head in heads.items()}
+    known = (data.egos[:, None] == np.array(model.egos)[None]).astype(np.float64)
+    scores: dict[str, float] = {"episodes": len(data.points), "failures": int(truth["fails"].sum())}
+    for belief, word in ((known, "known"), (model.unknown(), "unknown")):
+        for name, positive in truth.items():
+            if 0 < positive.sum() < len(positive):
+                prediction = getattr(model.predict(data.batch, belief), name)
+                scores[f"{name}, ego {word}"] = round(auc(prediction, positive), 3)
+    return scores
+
+
+class _Labelled:
+    """A dataset as tensors, in both images."""
+
+    def __init__(self, data: Dataset, kinds: Sequence[str], egos: Sequence[str]) -> None:
+        place = {kind: i for i, kind in enumerate(kinds)}
+        ego = {name: i for i, name in enumerate(egos)}
+        self.heads = torch.from_numpy(data.heads)
+        self.kinds = torch.tensor([place.get(kind, len(kinds) - 1) for kind in data.kinds.tolist()])
+        self.ego = torch.tensor([ego[name] for name in data.egos.tolist()])
+        nothing = torch.zeros(len(data.points), len(egos))
+        self._sides = [Tensors.of(side, nothing) for side in (data.batch, data.batch.mirrored())]
+
+    def side(self, number: int, rows: torch.Tensor, belief: torch.Tensor) -> Tensors:
+        """Returns some points as they are, 0, or mirrored, 1."""
+        scene, actors, present, _ = self._sides[number]
+        return Tensors(scene[rows], actors[rows], present[rows], belief)
+
+
+def _fit_member(own: Dataset, held: Dataset, kinds: Sequence[str], egos: Sequence[str], seed: int) -> Member:
+    """Fits one member; the epoch counts that is best on `held`."""
     torch.manual_seed(seed)
-    kinds, egos = sizes
-    member = Member(data[0].shape[1] + egos, HEADS + kinds, DROPOUT)
+    member = Member(len(egos), len(kinds), DROPOUT)
     optimiser = torch.optim.AdamW(member.parameters(), RATE, weight_decay=DECAY)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, EPOCHS)
-    held_beliefs = beliefs(data[3][held], egos)
+    learnt, checked = _Labelled(own, kinds, egos), _Labelled(held, kinds, egos)
+    rows = torch.arange(len(held.points))
+    held_points = checked.side(0, rows, beliefs(checked.ego, len(egos)))
     best, state, since = float("inf"), member.state_dict(), 0
     for _ in range(EPOCHS):
         member.train()
-        for batch in own[torch.randperm(len(own))].split(BATCH):  # type: ignore[no-untyped-call]
-            loss = _loss(member, data, batch, beliefs(data[3][batch], egos))
+        for batch in torch.randperm(len(own.points)).split(BATCH):  # type: ignore[no-untyped-call]
+            side = int(torch.randint(2, ()))
+            points = learnt.side(side, batch, beliefs(learnt.ego[batch], len(egos)))
+            loss = _loss(member, points, learnt.heads[batch], learnt.kinds[batch])
             optimiser.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
             optimiser.step()
         schedule.step()
         member.eval()
         with torch.no_grad():
-            value = float(_loss(member, data, held, held_beliefs))
+            value = float(_loss(member, held_points, checked.heads, checked.kinds))
         if value < best:
             best, state, since = value, {name: each.clone() for name, each in member.state_dict().items()}, 0
         else:
@@ -125,7 +178,7 @@ def _fit_member(
             if since >= PATIENCE:
                 break
     member.load_state_dict(state)
-    return member, best
+    return member
 
 
 def beliefs(ego: torch.Tensor, egos: int) -> torch.Tensor:
@@ -139,15 +192,11 @@ def beliefs(ego: torch.Tensor, egos: int) -> torch.Tensor:
     return drawn
 
 
-def _loss(member: Member, data: Tensors, rows: torch.Tensor, belief: torch.Tensor) -> torch.Tensor:
-    points, heads, kinds = (each[rows] for each in data[:3])
-    logits = member(torch.cat([points, belief], 1))
-    loss = functional.binary_cross_entropy_with_logits(logits[:, :HEADS], heads)
-    failing = heads[:, FAILS] > 0
-    if failing.any():
-        share = failing.float().mean()
-        loss = loss + share * functional.cross_entropy(logits[failing, HEADS:], kinds[failing])
-    return loss
+def _loss(member: Member, points: Tensors, heads: torch.Tensor, kinds: torch.Tensor) -> torch.Tensor:
+    logits = member(points)
+    ends = functional.binary_cross_entropy_with_logits(logits[:, :HEADS], heads)
+    of_kinds = functional.cross_entropy(logits[:, HEADS:], kinds, reduction="none")
+    return ends + (heads[:, FAILS] * of_kinds).mean()
 
 
 def auc(scores: NDArray[np.float32], positive: NDArray[np.bool_]) -> float:
@@ -155,14 +204,14 @@ def auc(scores: NDArray[np.float32], positive: NDArray[np.bool_]) -> float:
     return vargha_delaney(scores[positive].tolist(), scores[~positive].tolist())
 
 
-def library_of(data: Dataset, model: ScriptModel) -> tuple[NDArray[np.float32], tuple[str, ...]]:
-    """Returns library points and their kinds, those that the model expects to fail most egos.
+def library_of(data: Dataset, model: ScriptModel, family: str) -> ScriptLibrary:
+    """Returns the library of a family: of each kind those points that seem to fail most egos.
 
     Candidates for the headline come before other failures, and the second of a kind after the first of all.
     """
-    score = model.predict(data.points, model.unknown()).candidate
+    prediction = model.predict(data.batch, model.unknown())
     rows = np.flatnonzero(data.heads[:, FAILS] > 0)
-    rows = rows[np.lexsort((-score[rows], -data.heads[rows, CANDIDATE]))]
+    rows = rows[np.lexsort((-prediction.candidate[rows], -data.heads[rows, CANDIDATE]))]
     rank: Counter[str] = Counter()
     place = []
     for row in rows:
@@ -170,4 +219,5 @@ def library_of(data: Dataset, model: ScriptModel) -> tuple[NDArray[np.float32], 
         place.append((rank[kind], 0 if data.heads[row, CANDIDATE] else 1))
         rank[kind] += 1
     best = rows[np.lexsort(np.array(place).T[::-1])][:LIBRARY]
-    return data.points[best], tuple(data.kinds[best].tolist())
+    points = np.array([data.points[row] for row in best])
+    return ScriptLibrary(family, points, tuple(data.kinds[best].tolist()), prediction.fails[best])

@@ -100,26 +100,6 @@ class Coordinates(NamedTuple):
         return points
 
 
-class Translation:
-    """Maps points of a problem onto those of a shipped family, and back.
-
-    Attributes:
-      scene_size: scene parameters of the problem.
-    """
-
-    def __init__(self, problem: Coordinates, shipped: Coordinates) -> None:
-        self.scene_size = problem.space.dimension
-        self._problem, self._shipped = problem, shipped
-
-    def known(self, points: Floats) -> Floats:
-        """Translates points of the problem, `n x (d + genes)`."""
-        return self._shipped.placed(self._problem.scripted(points))
-
-    def own(self, known: Floats) -> Floats:
-        """Translates points of the shipped family."""
-        return self._problem.placed(self._shipped.scripted(known))
-
-
 def other_side(name: str) -> str:
     """Exchanges left and right at the beginning of a name."""
     side, _, rest = name.partition("_")

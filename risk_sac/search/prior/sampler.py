@@ -1,6 +1,7 @@
 """Proposes scenes and scripts from the prior beside those that an archive search breeds.
 
-Three arms share the episodes by what they have found lately: the script model, the library, and the archive search.
+Arms share the episodes by what they have found lately: the script model, the archive search and, where the scenario
+is like a family of the paper or goes on from an earlier run, a library.
 """
 
 from collections.abc import Mapping
@@ -25,6 +26,7 @@ SCENES = 32  # among which it chooses then
 RANDOM_SCRIPTS = 0.25  # of the scripts among which it chooses
 DISCOUNT, PRIOR_EPISODES, LEAST = 0.97, 5.0, 0.08
 EARLIER_SHARE = 0.5  # of the draws from the library, from what an earlier run found
+UNSEEN_TRUST = 0.5  # share of the model's credit where there is no library
 UNTRIED = 0.5, 1.0, 1.0  # worth per episode that arms are credited with at first
 
 
@@ -74,16 +76,18 @@ class Yields:
 class PriorOptimizer(ArchiveOptimizer):
     """Archive search that the prior proposes points to."""
 
-    kind = "prior"
+    kind = "prior-of-actors"  # in states; those of "prior" had a model for each family
     initial = 0
-    arms: tuple[Arm, ...] = (Arm.ARCHIVE, Arm.LIBRARY, Arm.MODEL)
+    learned = True
 
     def __init__(self, dimension: int, config: SceneOptimizerConfig, seed: int, start: PriorStart) -> None:
         super().__init__(dimension, config, seed)
-        self._model, self._translation = start.model, start.translation
+        self._model, self._genes = start.model, start.model.genes
         self._library, self._library_kinds, self._earlier = start.library, start.library_kinds, start.earlier
         self._library_worth, self._belief = start.library_worth, start.belief
-        self._yields = Yields(self.arms, float(start.library_worth.mean()))
+        arms = {Arm.ARCHIVE: True, Arm.LIBRARY: len(self._library) > 0, Arm.MODEL: self.learned}
+        trust = float(start.library_worth.mean()) if len(self._library) else UNSEEN_TRUST
+        self._yields = Yields(tuple(arm for arm, there in arms.items() if there), trust)
         self._arm = Arm.ARCHIVE
         self._played: list[int] = []  # rows of the library
         self._finds = Finds()
@@ -129,14 +133,12 @@ class PriorOptimizer(ArchiveOptimizer):
 
     def _from_model(self) -> Floats:
         """Returns the best of many points: in one random scene, or in several."""
-        assert self._model is not None
-        assert self._translation is not None
-        size = self._translation.scene_size
+        size = self._dimension - self._genes
         scenes = SCENES if self._random.random() < FREE_SCENES else 1
         points = np.empty((CANDIDATES, self._dimension))
         points[:, :size] = np.repeat(self._random.random((scenes, size)), CANDIDATES // scenes, axis=0)
         points[:, size:] = self._scripts(CANDIDATES, size)
-        prediction = self._model.predict(self._translation.known(points), self._belief)
+        prediction = self._model.predict(points, self._belief)
         worth = NEW_VARIANT * (prediction.fails + CANDIDATE * prediction.candidate)
         novelty = np.array([_novelty(self._finds.variants[kind]) for kind in self._model.kinds])
         best: Floats = points[int((worth * (prediction.kinds @ novelty)).argmax())]
@@ -145,6 +147,8 @@ class PriorOptimizer(ArchiveOptimizer):
     def _scripts(self, count: int, size: int) -> Floats:
         """Draws scripts, `count x genes`: mutated ones of the library and of the own elites, and random ones."""
         known = np.concatenate([self._library, *(each.point[None] for each in self._elites.pool())])[:, size:]
+        if not len(known):
+            return self._random.random((count, self._genes))
         parents = known[self._random.integers(len(known), size=count)]
         changed = self._random.random(parents.shape) < self._random.choice(SHARES, size=(count, 1))
         deviations = self._random.choice(DEVIATIONS, size=(count, 1))
@@ -159,9 +163,9 @@ class PriorOptimizer(ArchiveOptimizer):
         if mean_return is None:
             return
         self._yields.tell(self._arm, self._finds.add(encounter.valid_violations))
-        if Arm.MODEL in self.arms and self._model is not None and self._translation is not None:
-            known = self._translation.known(point[None])[0]
-            self._belief = self._model.believe(self._belief, known, failed=bool(encounter.valid_violations))
+        if self.learned:
+            failed = np.array([bool(encounter.valid_violations)])
+            self._belief = self._model.believe(self._belief, point[None], failed)
 
     def state(self) -> State:
         """See `SceneOptimizer.state`."""
@@ -186,7 +190,7 @@ class ReplayOptimizer(PriorOptimizer):
     """The library and the archive search without the model: the control that learning has to beat."""
 
     kind = "replay"
-    arms = (Arm.ARCHIVE, Arm.LIBRARY)
+    learned = False
 
 
 def _novelty(found: int) -> float:

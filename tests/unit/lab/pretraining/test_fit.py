@@ -5,29 +5,45 @@ from risk_sac.config import RunSpec
 from risk_sac.env.problem import Problem
 from risk_sac.lab.pretraining import fit as fitting
 from risk_sac.lab.pretraining.episodes import training_egos
-from risk_sac.lab.pretraining.fit import Dataset, auc, beliefs, fitted_prior
+from risk_sac.lab.pretraining.fit import Dataset, auc, beliefs, fit, held_out_documents, library_of
+from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.prior.shipped import inputs_of
+from risk_sac.search.prior.tokens import Tokenizer
+from risk_sac.search.scripts import SIZE, Genes
+
+CUE, DRIVE = Genes._fields.index("cue"), Genes._fields.index("drive")
 
 
-def data(count: int = 3000) -> Dataset:
-    """Ego "weak" fails where the first number is above a half, ego "sound" never."""
+def data(count: int = 1500) -> Dataset:
+    """Ego "weak" fails where the leader strikes late, ego "sound" never."""
     random = np.random.default_rng(0)
-    points = random.random((count, inputs_of("low"))).astype(np.float32)
+    problem = Problem.from_spec(RunSpec(family="low", method="archive", seed=0))
+    size, lead = problem.space.dimension, problem.space.dimension + SIZE * problem.family.adversaries.index("lead")
+    points = np.concatenate([np.repeat(random.random((20, size)), count // 20, 0), random.random((count, 24))], axis=1)
+    points[:, lead] = 0.9  # it acts
     egos = np.array(["weak", "sound"])[random.integers(2, size=count)]
-    failed = (points[:, 0] > 0.5) & (egos == "weak")
-    kinds = np.where(failed, np.where(points[:, 1] > 0.5, "a", "b"), "")
-    heads = np.stack([failed, failed, failed & (points[:, 1] > 0.5)], 1).astype(np.float32)
-    return Dataset(points, heads, kinds, egos)
+    failed = (points[:, lead + CUE] > 0.5) & (egos == "weak")
+    kinds = np.where(failed, np.where(points[:, lead + DRIVE] > 0.5, "a", "b"), "")
+    heads = np.stack([failed, failed, failed & (kinds == "a")], 1).astype(np.float32)
+    return Dataset(list(points), Tokenizer(problem).batch(points), heads, kinds, egos, np.full(count, "low"))
 
 
-def test_a_model_learns_which_points_fail_which_ego(monkeypatch):
-    monkeypatch.setattr(fitting, "EPOCHS", 8)
-    prior = fitted_prior("low", data(), seed=0)
-    assert prior.model.egos == ("sound", "weak")
-    assert prior.card["auc_fails"] > 0.97
-    assert prior.card["auc_fails_unknown"] < prior.card["auc_fails"]
-    assert set(prior.library_kinds) == {"a", "b"}
-    assert (prior.library[:, 0] > 0.5).all()
+def test_a_model_learns_which_scripts_fail_which_ego(monkeypatch):
+    monkeypatch.setattr(fitting, "EPOCHS", 12)
+    episodes = data()
+    model, card = fit(episodes, seed=0)
+    assert model.egos == ("sound", "weak")
+    scores = card["area_under_curve"]["held-out episodes"]
+    assert scores["fails, ego known"] > 0.95
+    assert scores["fails, ego unknown"] < scores["fails, ego known"]
+    library = library_of(episodes, model, "low")
+    assert library.points.shape == (len(library.kinds), inputs_of("low"))
+    assert set(library.kinds) == {"a", "b"}
+
+
+def test_every_third_document_is_held_out_and_no_family_of_the_paper():
+    assert held_out_documents()[:2] == ("cyclist_behind_van", "left_turn_motorcycle")
+    assert not set(held_out_documents()) & set(PAPER_FAMILIES)
 
 
 def test_beliefs_are_distributions_under_which_the_ego_is_likely():

@@ -15,7 +15,7 @@ from risk_sac.scenario import library
 from risk_sac.scenario.shipped import shipped_document
 from risk_sac.search.prior.earlier import EarlierScripts, FamilyScripts, kept, pinned_prior
 from risk_sac.search.prior.sampler import PriorOptimizer, ReplayOptimizer
-from risk_sac.search.prior.shipped import inputs_of, shipped_prior
+from risk_sac.search.prior.shipped import inputs_of, shipped_library
 from risk_sac.search.prior.start import start_of
 from tests.earlier_runs import FAILURES, SAFE, run_folder
 
@@ -28,9 +28,9 @@ def own_library(tmp_path, monkeypatch):
 def test_what_an_earlier_run_found_comes_first_and_its_ego_is_believed_in(tmp_path):
     prior = pinned_prior(str(run_folder(tmp_path / "v1")), ["low"])
     problem = Problem.from_spec(RunSpec(family="low", method="risk-sac-diverse", seed=0))
-    shipped, start = shipped_prior("low"), start_of(problem, prior)
-    assert (start.earlier, len(start.library)) == (FAILURES, FAILURES + 2 * len(shipped.library))
-    np.testing.assert_allclose(start.library[:FAILURES], shipped.library[:FAILURES], atol=1e-12)
+    shipped, start = shipped_library("low").points, start_of(problem, prior)
+    assert (start.earlier, len(start.library)) == (FAILURES, FAILURES + 2 * len(shipped))
+    np.testing.assert_allclose(start.library[:FAILURES], shipped[:FAILURES], atol=1e-12)
     assert start.belief.sum() == pytest.approx(1.0)
     assert start.belief.max() > 1.1 / len(start.belief)
     subject = PriorOptimizer(inputs_of("low"), SceneOptimizerConfig(), 1, start)
@@ -95,7 +95,7 @@ def test_a_scenario_without_like_goes_on_from_its_own_scripts_alone(tmp_path):
         pinned_prior(str(run_folder(tmp_path / "low")), [name])
     prior = pinned_prior(str(run_folder(tmp_path / "own", name)), [name])
     start = start_of(Problem.from_spec(RunSpec(family=name, method="risk-sac-diverse", seed=0)), prior)
-    assert (start.model, start.earlier, len(start.library)) == (None, FAILURES, FAILURES)
+    assert (start.earlier, len(start.library)) == (FAILURES, FAILURES)
     subject = ReplayOptimizer(inputs_of("low"), SceneOptimizerConfig(), 1, start)
     for _ in range(40):
         subject.tell(subject.ask(), 0.0)

@@ -5,56 +5,75 @@ import pytest
 
 from risk_sac.config import RunSpec, SceneOptimizerConfig
 from risk_sac.env.problem import Problem
-from risk_sac.errors import ConfigError
+from risk_sac.errors import CheckpointError, ConfigError
 from risk_sac.scenario.shipped import PAPER_FAMILIES
 from risk_sac.search.prior.files import DATA, MOST_BYTES
 from risk_sac.search.prior.sampler import Arm, PriorOptimizer, Yields
-from risk_sac.search.prior.shipped import Prior, inputs_of, read_prior, shipped_prior, write_prior
+from risk_sac.search.prior.script_model import PlacedModel
+from risk_sac.search.prior.shipped import (
+    MODEL,
+    inputs_of,
+    read_library,
+    read_model,
+    shipped_library,
+    shipped_model,
+    write_library,
+    write_model,
+)
 from risk_sac.search.prior.start import start_of
+from risk_sac.search.prior.tokens import Tokenizer
 
 FAMILY = "low"
 
 
-def shipped() -> Prior:
-    return shipped_prior(FAMILY)
+def problem(seed: int = 1) -> Problem:
+    return Problem.from_spec(RunSpec(family=FAMILY, method="risk-sac-diverse", seed=seed))
+
+
+def placed_model() -> PlacedModel:
+    return start_of(problem(), "shipped").model
 
 
 def optimizer(kind: type[PriorOptimizer] = PriorOptimizer, seed: int = 1) -> PriorOptimizer:
-    problem = Problem.from_spec(RunSpec(family=FAMILY, method="risk-sac-diverse", seed=seed))
-    return kind(inputs_of(FAMILY), SceneOptimizerConfig(), seed, start_of(problem, "shipped"))
+    return kind(inputs_of(FAMILY), SceneOptimizerConfig(), seed, start_of(problem(seed), "shipped"))
 
 
-def test_a_prior_is_shipped_for_each_family_within_three_megabytes():
-    assert {path.stem for path in DATA.glob("*.npz")} == {*PAPER_FAMILIES, "low-policy", "mixed-policy"}
+def test_what_ships_is_a_model_and_a_library_for_each_family_of_the_paper():
+    assert {path.name for path in DATA.glob("*.npz")} == {
+        MODEL,
+        *(f"{family}.npz" for family in PAPER_FAMILIES),
+        "low-policy.npz",
+        "mixed-policy.npz",
+    }
     assert sum(path.stat().st_size for path in DATA.glob("*.npz")) <= MOST_BYTES
     for family in PAPER_FAMILIES:
-        prior = shipped_prior(family)
-        assert prior.library.shape == (len(prior.library_kinds), inputs_of(family))
-        assert len(prior.library) <= 300
+        shipped = shipped_library(family)
+        assert shipped.points.shape == (len(shipped.kinds), inputs_of(family))
+        assert len(shipped.points) <= 300
 
 
 def test_the_test_set_and_planners_are_not_among_the_training_egos():
     from risk_sac.egos.defects.catalogue import DEFECTS
 
-    for family in PAPER_FAMILIES:
-        prior = shipped_prior(family)
-        egos = set(prior.model.egos)
-        assert not egos & {name for name, defect in DEFECTS.items() if defect.test_set}
-        assert not egos & {"fop", "fiss", "fiss-plus"}
+    egos = set(shipped_model().egos)
+    assert not egos & {name for name, defect in DEFECTS.items() if defect.test_set}
+    assert not egos & {"fop", "fiss", "fiss-plus"}
 
 
-def test_a_prior_is_read_as_it_was_written(tmp_path):
-    write_prior(tmp_path / "low.npz", shipped())
-    again = read_prior(tmp_path / "low.npz")
-    points = shipped().library[:20]
-    np.testing.assert_array_equal(
-        again.model.predict(points, again.model.unknown()).fails,
-        shipped().model.predict(points, shipped().model.unknown()).fails,
-    )
+def test_model_and_library_are_read_as_they_were_written(tmp_path):
+    batch = Tokenizer(problem()).batch(shipped_library(FAMILY).points[:20])
+    write_model(tmp_path / MODEL, shipped_model(), {})
+    again, unknown = read_model(tmp_path / MODEL), shipped_model().unknown()
+    np.testing.assert_array_equal(again.predict(batch, unknown).fails, shipped_model().predict(batch, unknown).fails)
+    write_library(tmp_path / "low.npz", shipped_library(FAMILY))
+    library = read_library(tmp_path / "low.npz")
+    np.testing.assert_array_equal(library.points, shipped_library(FAMILY).points)
+    np.testing.assert_array_equal(library.fails, shipped_library(FAMILY).fails)
+    assert library.kinds == shipped_library(FAMILY).kinds
 
 
 def test_damaged_oversized_and_pickled_files_are_refused_with_one_line(tmp_path):
-    whole = (DATA / "low.npz").read_bytes()
+    whole = (DATA / MODEL).read_bytes()
     pickled = io.BytesIO()
     np.savez(pickled, meta=np.array([{"family": "low"}], dtype=object))
     for name, content in {
@@ -62,23 +81,33 @@ def test_damaged_oversized_and_pickled_files_are_refused_with_one_line(tmp_path)
         "empty": b"",
         "pickled": pickled.getvalue(),
         "oversized": b"0" * (MOST_BYTES + 1),
+        "a library": (DATA / "low.npz").read_bytes(),
     }.items():
         path = tmp_path / f"{name}.npz"
         path.write_bytes(content)
         with pytest.raises(ConfigError, match=f"{name}.npz") as refused:
-            read_prior(path)
+            read_model(path)
         assert "\n" not in str(refused.value)
+    with pytest.raises(ConfigError):
+        read_library(DATA / MODEL)
 
 
 def test_a_belief_moves_to_egos_that_would_have_failed_too():
-    model = shipped().model
-    point = shipped().library[0]
-    each = model.predict(np.repeat(point[None], len(model.egos), 0), np.eye(len(model.egos))).fails
-    failed = model.believe(model.unknown(), point, failed=True)
-    safe = model.believe(model.unknown(), point, failed=False)
+    model, points = placed_model(), shipped_library(FAMILY).points[:1]
+    unknown = model.unknown()
+    each = model.predict(np.repeat(points, len(unknown), 0), np.eye(len(unknown))).fails
+    failed, safe = (model.believe(unknown, points, np.array([end])) for end in (True, False))
     assert failed.sum() == pytest.approx(1.0)
-    assert failed[each.argmax()] > 1.0 / len(model.egos) > failed[each.argmin()]
-    assert safe[each.argmin()] > 1.0 / len(model.egos) > safe[each.argmax()]
+    assert failed[each.argmax()] > 1.0 / len(unknown) > failed[each.argmin()]
+    assert safe[each.argmin()] > 1.0 / len(unknown) > safe[each.argmax()]
+
+
+def test_a_belief_after_two_episodes_is_that_after_one_and_then_the_other():
+    model, points, ends = placed_model(), shipped_library(FAMILY).points[:2], np.array([True, False])
+    belief = model.unknown()
+    for point, end in zip(points, ends, strict=True):
+        belief = model.believe(belief, point[None], np.array([end]))
+    np.testing.assert_allclose(model.believe(model.unknown(), points, ends), belief)
 
 
 def test_it_goes_on_from_its_state_exactly():
@@ -92,6 +121,11 @@ def test_it_goes_on_from_its_state_exactly():
         np.testing.assert_array_equal(one, other)
         subject.tell(one, 0.0)
         again.tell(other, 0.0)
+
+
+def test_a_state_of_the_prior_by_families_is_refused():
+    with pytest.raises(CheckpointError, match="prior"):
+        optimizer().load(optimizer().state() | {"kind": "prior"})
 
 
 @pytest.mark.parametrize(("trust", "at_first", "later"), [(1.0, 0.2, 0.4), (0.1, 0.6, 0.6)])
