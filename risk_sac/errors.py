@@ -4,7 +4,7 @@ RiskSacError
 ├── ConfigError            a setting is unknown, out of range or contradicts another
 │   ├── OddError           an ODD empties the scene space or contradicts itself
 │   ├── FormulaError       a requirement cannot be parsed or monitored online
-│   └── MapError           a map is none that a pattern could be placed on, or has no such place
+│   └── MapError           no pattern fits on a map, or it has no such place
 ├── SceneError             a scene is not a point of its family's space
 │   └── InfeasibleScene    C_hard: the scene's first frame is physically impossible
 ├── SimulationError        libsumo refused a command or died

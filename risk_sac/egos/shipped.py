@@ -121,7 +121,7 @@ class RssResponder(Driver):
 
 
 def dangerous(perceived: Perceived, column: int) -> bool:
-    """Whether the distances to somebody ahead, along the path and across it, are both smaller than RSS's."""
+    """Whether the distances to a body ahead, along the path and across it, are both smaller than RSS's."""
     p, state = perceived, perceived.state
     near = stretch(p.path, p.station_m - BEHIND_M, p.station_m + REACH_M + BEYOND_M)
     station, across, way = project(near, state[X, column], state[Y, column])

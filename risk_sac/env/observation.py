@@ -1,8 +1,8 @@
 """Encodes the joint policy's observation, in the ego's frame, scaled to about [-1, 1].
 
-Per adversary its motion relative to the ego and what C_soft remembers of it, then the ego itself, its signal, the
-scene ξ, the robustness of every requirement, where static bodies are and the time left. Robustness and that memory are
-part of the state because STL and C_soft keep history: without them neither the shaped reward nor the cost would be
+Per adversary its motion relative to the ego and what C_soft remembers of it; then the ego itself, its signal and the
+scene ξ; then the robustness of every requirement, places of static bodies and the time left. Robustness and that memory
+are part of the state because STL and C_soft keep history: without them neither the shaped reward nor the cost would be
 Markov.
 """
 

@@ -77,7 +77,7 @@ def least_clearance_m(series: Series) -> float:
     """Computes the least gap of an ego to bodies ahead of it or beside it, m.
 
     It counts from the release on. A body behind the ego's rear does not count. Nor does one that stays within
-    `MARGIN_M`, if it came so near to the rear in the ego's own track, or to an ego that had stood for `STOOD_S`.
+    `MARGIN_M`: if it came so near in the ego's own track, from behind, or if the ego had stood for `STOOD_S`.
 
     Args:
       series: time series of an episode, `T` frames and `n` actors, the ego first; NaN where an actor is absent.

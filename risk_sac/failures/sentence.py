@@ -17,7 +17,7 @@ from risk_sac.world.types import STEP_S, Floats, Kind, Role
 IN_LANE_M = 1.5  # a vehicle nearer to the ego's axis leads it, or follows
 ACROSS_MPS = 0.2  # slower lateral motion does not change the place in a lane
 ACTS_MPS2 = 1.5
-GAINS_MPS, MOVES_M = 0.3, 0.2  # least change of speed and of place across that is told
+GAINS_MPS, MOVES_M = 0.3, 0.2  # least change of speed and of place across in a sentence
 DRIVING = {"left_turn": " turning left", "right_turn": " turning right", "lane_change": " changing lanes"}
 
 

@@ -89,7 +89,7 @@ def _as_ascii(error: UnicodeError) -> tuple[str, int]:
 
 
 def flush() -> bool:
-    """Write what is left to write; returns False if that is not possible. Nothing is left then."""
+    """Write the rest of the output; returns False, and drops it, if that is not possible."""
     written = True
     for stream in filter(None, (sys.stdout, sys.stderr)):
         try:

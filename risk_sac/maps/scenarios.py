@@ -29,7 +29,7 @@ def scenario_of(spot: Spot, summary: str, tags: Sequence[str], like: Mapping[str
       fields: parameters, ego, actors and whatever else the document has.
 
     Raises:
-      NoFit: the net's names are none that a document may have.
+      NoFit: a document may not have the net's names.
     """
     try:
         return document_from_fields(

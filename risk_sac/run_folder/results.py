@@ -4,8 +4,9 @@ results.json    the spec, the metrics and every failure, sealed; rewritten at ea
 episodes.jsonl  one `EpisodeRecord` per line; the digest in results.json is formed over them
 failures/       the time series of every failure, see `risk_sac.run_folder.series`
 verified.json   which failures repeated, see `risk_sac.run_folder.results`; sealed
-boundary.json   the map of a run of the method `boundary`, once it has ended; boundary.png draws it
-rates.json      the failure rates of a run of the method `rate`, once it has ended
+boundary.json   the map of a run of the method `boundary`, once it has ended.
+boundary.png    the picture of that map
+rates.json      the failure rates of a run of the method `rate`, once it has ended.
 studies/        cores and regions that were asked for, see `risk_sac.failures.studied`
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """

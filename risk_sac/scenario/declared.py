@@ -1,7 +1,7 @@
 """The declared distribution of a scenario's parameters, over the unit cube of its scene space.
 
-Independent standard normal numbers s become correlated ones, z = L s, these shares, Φ(z), and these the values at which
-the parameters' distributions, truncated to the scene space, have that share. L Lᵀ is the copula's correlation matrix.
+Independent standard normal numbers s become correlated ones, z = L s, and these shares, Φ(z). A value is where the
+parameter's distribution, truncated to the scene space, has that share. L Lᵀ is the copula's correlation matrix.
 """
 
 import math

@@ -36,7 +36,7 @@ class FrozenPolicy:
         """Action in [-1, 1], `action_size`.
 
         Raises:
-          NotFinite: the network is none that anybody has learnt.
+          NotFinite: a weight of the network is not finite.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             action = np.tanh(respond(self.layers, observation, normalised=self.normalised)[: self.action_size])

@@ -199,7 +199,7 @@ def played(guarded: GuardedEnv, proposal: Proposal, method: RunMethod, reward: T
 
 def main() -> None:
     """Serves the process that has started this one."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run decides what is left undone
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run decides what it does not play
     connection, folder, number = Connection(int(sys.argv[1])), Path(sys.argv[2]), int(sys.argv[3])
     try:
         serve(connection, folder, number)

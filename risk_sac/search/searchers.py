@@ -210,7 +210,7 @@ class Searchers:
             return
         self._next.sampler.origin = origin
         if guided:
-            self._own.sampler.origin = {}  # it is told of the guide's points, too
+            self._own.sampler.origin = {}  # it learns the guide's points, too
 
     def learn(self, transitions: Sequence[Transition], snapshot: PolicySnapshot, seed: int) -> None:
         """Lets the learner learn from an episode that another process has played; see `Learner.learn`."""

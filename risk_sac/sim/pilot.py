@@ -48,7 +48,7 @@ class Pilot(Protocol):
 
 
 class MovedVehicle:
-    """A vehicle that SUMO puts where it is told, such as the ego of a pilot.
+    """A vehicle whose place SUMO is given, such as the ego of a pilot.
 
     Attributes:
       motion: after its latest step.

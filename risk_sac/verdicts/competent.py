@@ -5,7 +5,7 @@ all egos. The others move as they did in the recording, in which they may have r
 a distance from the ego, so until the first of them acts the ego is where it was recorded.
 
 Source: UN Regulation 157, Annex 4, Appendix 3 (00 series): a cut-in is perceived once the vehicle is more than 0.375 m
-off its lane's centre, its risk is evaluated for 0.4 s, it is a danger if the time to collision is then 2 s at most, and
+off its lane's centre. Its risk is evaluated for 0.4 s. It is a danger if the time to collision is then 2 s at most, and
 braking begins 0.75 s later. Compared with the JRC's implementation (github.com/ec-jrc/JRC-FSM) and esmini's.
 """
 
@@ -76,9 +76,9 @@ def avoided_by(evidence: Evidence, way: Path) -> Mapping[str, bool]:
 def becomes_dangerous(evidence: Evidence, striker: int, contact: int) -> int | None:
     """Returns the frame in which a vehicle becomes a danger by the regulation, or None.
 
-    It does where it comes into the ego's way, or into sight, so near that the time to collision is 2 s at most after
-    the 0.4 s of evaluation, or where it brakes harder than 5 m/s² in the ego's lane. Choice: with what is further off
-    then the driver keeps its distance, as behind any vehicle ahead.
+    It does where it comes into the ego's way, or into sight, and the time to collision is 2 s at most after the 0.4 s
+    of evaluation. It also does where it brakes harder than 5 m/s² in the ego's lane. Choice: with what is further
+    off then the driver keeps its distance, as behind any vehicle ahead.
     """
     e, seen = evidence, seen_along(evidence.ego_path, evidence, striker)
     width, offset = lanes_of(e, 0).width_m, e.lane_offset_m[:, striker]

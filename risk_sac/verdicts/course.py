@@ -316,11 +316,11 @@ def lane_conflict(
 ) -> tuple[bool, bool]:
     """Detects the beginning and the continuation of a conflict with a same-direction vehicle.
 
-    A vehicle comes over if its body is beyond the marking of the ego's lane, or if it is more than 0.375 m off its own
-    lane's centre towards the ego and reaches that marking within 1 s. The conflict begins when it does so alongside the
-    ego or less than 2 s ahead. One with a leader begins when it brakes harder than 5 m/s², or is less than 2 s ahead.
-    Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in within 4 s.
-    A vehicle that keeps its lane is in no conflict.
+    A vehicle comes over if its body is beyond the marking of the ego's lane. It also does if it is more than 0.375 m
+    off its own lane's centre towards the ego and reaches that marking within 1 s. The conflict begins when it does so
+    alongside the ego or less than 2 s ahead. One with a leader begins when it brakes harder than 5 m/s², or is less
+    than 2 s ahead. Choices: braking counts within 4 s of the ego's way; a conflict goes on while the ego closes in
+    within 4 s. A vehicle that keeps its lane is in no conflict.
 
     `speed_mps` is the ego's, `accel_mps2` the vehicle's. To a wary driver a vehicle comes over whenever it is more than
     0.375 m off its lane's centre.

@@ -331,9 +331,9 @@ def _violation(
 def _inherited(requirement: Requirement, history: History, time_s: float, met: MetActor | None) -> bool:
     """Whether the ego inherited a violation at the release.
 
-    It did if it was violated within 1 s, if the conflict with the actor that brought it about began within 1 s, or if
-    the signal ahead was yellow or red then and the ego could not stop at leisure any more. A story prescribes what is
-    there when it begins.
+    It did if it was violated within 1 s, or the conflict with the actor that brought it about began within 1 s. It also
+    did if the signal ahead was yellow or red then and the ego could not stop at leisure any more. A story prescribes
+    what is there when it begins.
     """
     if history.evidence.tells_story:
         return False

@@ -23,7 +23,7 @@ INSIDE_M = 1e-6  # before the end of a lane section, so that a place lies in it
 
 
 class LaneEnd(NamedTuple):
-    """Begin of a lane, for one who drives onto its road."""
+    """Begin of a lane, for a vehicle that enters its road."""
 
     road: str
     lane: int

@@ -256,7 +256,8 @@ def _inherited(schemas: dict[str, Any]) -> dict[str, Any]:
     """Returns the schemas, in which fields that several records inherit are those of the base."""
     known = {each.__name__: each for each in _records(Record)}
     records = {name: known[name] for name in schemas if name in known}
-    bases = Counter(base for each in records.values() for base in each.__mro__[1:] if base in known.values())
+    ancestors = [base for each in records.values() for base in each.__mro__[1:]]
+    bases = Counter(base for base in ancestors if issubclass(base, Record) and base is not Record)
     for base in (base for base, count in bases.items() if count > 1 and base.__name__ not in schemas):
         first = schemas[next(name for name, each in records.items() if issubclass(each, base))]
         own = {key: first["properties"][key] for key in base.model_fields}

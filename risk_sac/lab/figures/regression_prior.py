@@ -115,7 +115,7 @@ def main() -> None:
 
 
 def write(file: Path, cases: Sequence[Case], detections: Sequence[Detection]) -> None:
-    """Writes the runs, and prints what they come to."""
+    """Writes the runs, and prints their summary."""
     told = list(rows(cases, detections))
     with file.open("w", newline="") as stream:
         writer = csv.DictWriter(stream, told[0])

@@ -119,7 +119,7 @@ class SnapshotActor:
         self.transitions.append(transition)
 
     def update(self) -> None:
-        """Learns nothing: the learner does, once it is told."""
+        """Learns nothing: the learner does, at `tell`."""
 
     def _decide(self, observation: Vector, explore: bool) -> Vector:
         policy, exploration = self._snapshot.policy, self._snapshot.exploration

@@ -19,7 +19,7 @@ from risk_sac.sim.story.cast import STANDS_MPS, Mover, Present
 from risk_sac.sim.story.deviation import ANYWHERE, DeviationRoom
 from risk_sac.world.types import STEP_S
 
-LINE_M = 3000.0  # of the way ahead of a lane's beginning; an actor that comes to its end gets the next piece
+LINE_M = 3000.0  # of the way ahead of a lane's beginning; an actor at its end gets the next piece
 A_POINT = Reach(0.0, 0.0)
 STRAIGHT_M = 1000.0
 
