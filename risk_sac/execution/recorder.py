@@ -1,6 +1,8 @@
 """Writes a run to its folder; `risk_sac.run_folder.results` describes the files."""
 
 import logging
+from array import array
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,7 +38,7 @@ class Recorder:
     The run itself writes its episodes.
 
     Attributes:
-      results: the content of results.json.
+      results: the content of results.json, without its failures.
     """
 
     def __init__(self, spec: RunSpec, folder: Path, observer: Observer) -> None:
@@ -51,18 +53,18 @@ class Recorder:
         self._observer = observer
         self.should_stop = observer.should_stop
         self.results = _results_so_far(spec, folder)
-        self._failures: list[RecordedFailure] = []
+        self._failed = array("I")  # indices of the episodes with a failure
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
         """Counts an episode, and now and then writes the results so far."""
         if record.worst_violation is not None:
-            self._failures.append(RecordedFailure.of(self.results.spec.id, record))
+            self._failed.append(record.index)
         told = self.results.metrics.episodes if self.results.metrics else 0
         # The file has all failures; written at fixed intervals, it would cost an episode the more, the longer a run is.
         every = max(self.results.spec.learner.checkpoint_every, round(REWRITTEN * told))
         due = (record.index + 1) % self.results.spec.learner.checkpoint_every == 0 and metrics.episodes >= told + every
         if due and not record.evaluating:
-            self._write(replace(self.results, metrics=metrics, failures=tuple(self._failures)))
+            self._write(replace(self.results, metrics=metrics), self._failures())
         self._observer.episode(record, metrics, series)
 
     def finish(self, summary: RunOutcome) -> RunResults:
@@ -79,10 +81,11 @@ class Recorder:
             wall_s=self.results.wall_s + summary.wall_s,
             cpu_s=self.results.cpu_s + summary.cpu_s,
             episode_cpu_s=summary.episode_cpu_s,
-            failures=tuple(self._failures),
+            failures=tuple(self._failures()),
         )
         verified = read_verified(self._folder, summary.digest)  # by an earlier invocation
-        self._write(with_headline(results, verified) if verified else results)
+        results = with_headline(results, verified) if verified else results
+        self._write(results, results.failures)
         if summary.finished and method_of(results.spec.method).scenes == "boundary":
             from risk_sac.report.boundary import write_boundary  # here, because other runs need neither
             from risk_sac.search.boundary_map import read_boundary
@@ -90,11 +93,21 @@ class Recorder:
             write_boundary(self._folder, read_boundary(self._folder, {}))
         if summary.finished and results.spec.method == METHOD:
             write_rates(self._folder, results.spec, records_from_lines((self._folder / EPISODES).read_bytes()))
-        return self.results
+        return results
 
-    def _write(self, results: RunResults) -> None:
-        write_results(self._folder, results)
-        self.results = results
+    def _failures(self) -> Iterator[RecordedFailure]:
+        """Reads the failures so far from the run's episodes, since memory that held them would grow."""
+        if not self._failed:
+            return
+        failed = frozenset(self._failed)
+        with (self._folder / EPISODES).open("rb") as lines:
+            for index, line in enumerate(lines):
+                if index in failed:
+                    yield RecordedFailure.of(self.results.spec.id, EpisodeRecord.model_validate_json(line))
+
+    def _write(self, results: RunResults, failures: Iterable[RecordedFailure]) -> None:
+        write_results(self._folder, results, failures)
+        self.results = replace(results, failures=())
 
 
 def _results_so_far(spec: RunSpec, folder: Path) -> RunResults:

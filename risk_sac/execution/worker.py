@@ -36,6 +36,7 @@ from risk_sac.execution.messages import (
     without_folders,
 )
 from risk_sac.host.memory import limit_memory, out_of_memory
+from risk_sac.host.process_state import collect_seldom
 from risk_sac.host.terminal import log_to_stderr
 from risk_sac.records import REPEATS, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.durable import LOCK, lock, remove_temporaries
@@ -128,6 +129,7 @@ class LossyLog(io.FileIO):
 
 def main() -> int:
     """Execute the run; returns the exit status."""
+    collect_seldom()
     folder, (niceness, memory_bytes, replays) = Path(sys.argv[1]), map(int, sys.argv[2:5])
     os.nice(niceness)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # so a KeyboardInterrupt is always the ego's own

@@ -48,6 +48,11 @@ class Setting(NamedTuple):
     set: Callable[[Any], object]
 
 
+def collect_seldom() -> None:
+    """Searches for garbage seldom: modules and episodes are lasting objects, with hardly a cycle among them."""
+    gc.set_threshold(50_000)
+
+
 def leave(status: int) -> NoReturn:
     """End this process, whatever threads foreign code has left at work."""
     gc.freeze()  # else Python searches for garbage as it ends, half a second with the simulator loaded

@@ -10,7 +10,7 @@ import secrets
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import IO, Any, TypeVar
@@ -110,14 +110,16 @@ _END = b"\n}"
 LOCK = ".lock"  # lock file of a folder that one process at a time may work in
 
 
-def replace_file(path: Path, content: bytes | memoryview, *, keep: Path | None = None, mode: int = 0o666) -> None:
+def replace_file(
+    path: Path, content: bytes | memoryview | Iterator[bytes], *, keep: Path | None = None, mode: int = 0o666
+) -> None:
     """Replaces a file in one step.
 
     A crash or a full disk leaves the old file or the new one.
 
     Args:
       path: in an existing folder; it has one writer at a time.
-      content: of the new file.
+      content: of the new file, or its pieces.
       keep: where the old file goes; at every moment there is a whole one at `path` or at `keep`.
       mode: of the new file, before the process's umask.
 
@@ -128,7 +130,7 @@ def replace_file(path: Path, content: bytes | memoryview, *, keep: Path | None =
     try:
         temporary.unlink(missing_ok=True)
         with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
-            file.write(content)
+            file.writelines(content if isinstance(content, Iterator) else [content])
             file.flush()
             os.fsync(file.fileno())
         if keep is not None and path.exists():
@@ -228,6 +230,21 @@ def seal(document: Any) -> bytes:
     kind: Any = type(document)
     text = _adapter(kind).dump_json(document, indent=2)
     return text.removesuffix(_END) + f',\n  "sha256": "{hashlib.sha256(text).hexdigest()}"\n}}\n'.encode()
+
+
+def sealed_pieces(document: Any, rows: Iterable[Any]) -> Iterator[bytes]:
+    """Yields what `seal` returns of a document with these rows in its last field, which is empty, one row at a time."""
+    piece: bytes = _adapter(type(document)).dump_json(document, indent=2).removesuffix(b"[]" + _END)
+    digest, before = hashlib.sha256(piece), b"["
+    yield piece
+    for row in rows:
+        piece = before + b"\n    " + _adapter(type(row)).dump_json(row, indent=2).replace(b"\n", b"\n    ")
+        before = b","
+        digest.update(piece)
+        yield piece
+    piece = b"[]" if before == b"[" else b"\n  ]"
+    digest.update(piece + _END)
+    yield piece + f',\n  "sha256": "{digest.hexdigest()}"\n}}\n'.encode()
 
 
 def unseal(content: bytes, kind: type[T]) -> T:

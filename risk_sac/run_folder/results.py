@@ -11,7 +11,7 @@ studies/        cores and regions that were asked for, see `risk_sac.failures.st
 checkpoint      from which the run goes on; beside it the one before, `checkpoint.previous`
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import REPEATS, Adjustment, DrivenBy, EpisodeId, EpisodeRecord, Repetition, RunMetrics
 from risk_sac.records.boundary import BoundaryMap
 from risk_sac.records.rates import Rates
-from risk_sac.run_folder.durable import read_sealed, write_sealed
+from risk_sac.run_folder.durable import read_sealed, replace_file, sealed_pieces, write_sealed
 from risk_sac.verdicts.distinct import variant_name
 
 RESULTS = "results.json"
@@ -87,9 +87,10 @@ class RunResults:
         raise ConfigError("FAILURE", f"{id_!r}", expected, "`risk-sac show RESULTS --raw` lists them")
 
 
-def write_results(folder: Path, results: RunResults) -> None:
-    """Replaces results.json in one step."""
-    write_sealed(folder / RESULTS, results)
+def write_results(folder: Path, results: RunResults, failures: Iterable[RecordedFailure] | None = None) -> None:
+    """Replaces results.json in one step; `failures` stand in for those of the results, one in memory at a time."""
+    rows = results.failures if failures is None else failures
+    replace_file(folder / RESULTS, sealed_pieces(replace(results, failures=()), rows))
 
 
 def read_results(path: Path) -> RunResults:

@@ -22,6 +22,7 @@ from risk_sac.config import RunMethod, RunSpec, method_of
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import RiskSacError, SimulationError
 from risk_sac.host.memory import memory_limit_bytes, out_of_memory
+from risk_sac.host.process_state import collect_seldom
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder.crash_guard import PATIENCE, CrashGuard
 from risk_sac.search.agents.controls import ScriptFollower, control
@@ -199,6 +200,7 @@ def played(guarded: GuardedEnv, proposal: Proposal, method: RunMethod, reward: T
 
 def main() -> None:
     """Serves the process that has started this one."""
+    collect_seldom()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run decides what it does not play
     connection, folder, number = Connection(int(sys.argv[1])), Path(sys.argv[2]), int(sys.argv[3])
     try:

@@ -1,3 +1,4 @@
+import gc
 import os
 from pathlib import Path
 
@@ -6,9 +7,20 @@ import pytest
 from risk_sac.config import Budget, LearnerConfig, RunSpec
 from risk_sac.errors import CheckpointError, ConfigError
 from risk_sac.execution.evaluate import run
+from risk_sac.execution.recorder import Recorder
 from risk_sac.records import Repetition
-from risk_sac.run_folder.results import EPISODES, RESULTS, Verified, first_of_variants, read_results, write_verified
+from risk_sac.run_folder.results import (
+    EPISODES,
+    RESULTS,
+    RecordedFailure,
+    Verified,
+    first_of_variants,
+    read_results,
+    write_verified,
+)
+from risk_sac.search.loop import execute_run
 from risk_sac.search.run import CHECKPOINT
+from tests.listener import Listener
 
 SPEC = RunSpec(
     family="mixed", method="random", seed=34, budget=Budget(episodes=8), learner=LearnerConfig(checkpoint_every=2)
@@ -33,6 +45,19 @@ def folder(finished, tmp_path):
     for name, content in finished[0].items():
         (tmp_path / name).write_bytes(content)
     return tmp_path
+
+
+def test_a_recorder_keeps_no_failure_in_memory(finished, tmp_path):
+    before = number_of_failures()
+    recorder = Recorder(SPEC, tmp_path, Listener())
+    outcome = execute_run(SPEC, tmp_path, recorder)
+    assert number_of_failures() == before
+    assert recorder.finish(outcome).failures == finished[1].failures
+    assert number_of_failures() == before
+
+
+def number_of_failures() -> int:
+    return sum(type(each) is RecordedFailure for each in gc.get_objects())
 
 
 @pytest.mark.parametrize("damaged", [b"", b'{"spec": 1}', None])

@@ -4,6 +4,7 @@ import json
 import math
 import os
 import stat
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -14,7 +15,7 @@ from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import Episode, EpisodeId, EpisodeRecord, stored, wire
 from risk_sac.run_folder.durable import replace_file, seal, unseal
-from risk_sac.run_folder.results import RESULTS, RunResults, read_results, write_results
+from risk_sac.run_folder.results import RESULTS, RecordedFailure, RunResults, read_results, write_results
 from tests.builders import collision, episode_record, judgement
 
 
@@ -32,6 +33,18 @@ def test_sealed_text_is_json_with_one_more_field():
 @given(st.dictionaries(st.text(), st.integers() | st.text(), min_size=1))
 def test_what_was_sealed_comes_back(value):
     assert unseal(seal(value), dict) == value
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_results_are_written_one_failure_at_a_time_as_if_at_once(tmp_path, count):
+    records = [episode_record(index=index, reason="a\nb", min_ttc_s=math.nan) for index in range(count)]
+    failures = tuple(RecordedFailure.of("run", record) for record in records)
+    results = RunResults(
+        spec=RunSpec(family="low", method="random", seed=0), spec_digest="", adjustments=(), finished=True
+    )
+    write_results(tmp_path, results, iter(failures))
+    assert (tmp_path / RESULTS).read_bytes() == seal(replace(results, failures=failures))
+    assert [each.id for each in read_results(tmp_path).failures] == [each.id for each in failures]
 
 
 def test_every_flipped_bit_and_every_lost_end_is_noticed():
