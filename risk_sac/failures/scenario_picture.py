@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from risk_sac.config import Scenario
 from risk_sac.config.scenario import EGO
 from risk_sac.errors import ConfigError, InfeasibleScene
-from risk_sac.failures.from_above import EGO_COLOUR, HALO, SURFACE_COLOURS, canvas, picture
+from risk_sac.failures.from_above import EGO_COLOUR, HALO, canvas, picture
 from risk_sac.failures.net import surfaces
 from risk_sac.scenario.check import bodies_of, scenes
 from risk_sac.scenario.ground import net_of
@@ -27,6 +27,7 @@ AROUND_M, LEAST_M = 14.0, 30.0  # of road around the actors; height of the view
 AHEAD_S = 2.0  # that arrows show
 SCALE_M = 20.0
 COLOURS = ("tab:red", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:pink", "tab:olive", "tab:cyan")
+SURFACES = {"junction": "0.87", "lane": "0.87", "sidewalk": "0.95", "crossing": "0.72"}  # seen at 76 pixels, too
 TRAFFIC = "0.55"
 RANGE_ALPHA = 0.12
 LABEL: dict[str, Any] = {
@@ -90,7 +91,7 @@ def _figure(
     axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     axis.set_axis_off()
     ground = surfaces(net)
-    for use, colour in SURFACE_COLOURS.items():
+    for use, colour in SURFACES.items():
         outlines = [surface.outline for surface in ground if surface.use == use]
         axis.add_collection(PolyCollection(outlines, facecolors=colour, edgecolors="0.6", linewidths=0.4))
     colours = iter(COLOURS * (1 + len(document.actors) // len(COLOURS)))

@@ -19,6 +19,9 @@ def test_an_ego_stands_with_its_newest_campaign_and_what_runs(
         page = page_at()
         ego = page.locator("[data-ego=default]")
         expect(ego.get_by_role("region", name="Running").get_by_role("link")).to_have_text("at work")
+        expect(
+            page.get_by_role("link", name="1 running").or_(page.get_by_role("link", name="1 queued"))
+        ).to_be_visible()
     finally:
         service.client.post(f"/v1/campaigns/{running}/cancel")
         service.wait(running)

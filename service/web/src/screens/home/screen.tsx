@@ -32,6 +32,7 @@ export function HomeScreen() {
             <>
               <div class="head">
                 <h1>Egos under test</h1>
+                <Queue campaigns={items} />
                 <div class="actions">
                   <a class="button primary" href="#/new">
                     New campaign
@@ -66,6 +67,23 @@ function Place({ to, title, about }: { to: string; title: string; about: string 
     <a class="card place" href={to}>
       <b>{title}</b> <span class="faint small">{about}</span>
     </a>
+  );
+}
+
+/** How many campaigns are at work and wait, of those that are listed. */
+function Queue({ campaigns }: { campaigns: Listed[] }) {
+  const states = (["running", "queued", "paused"] as const).flatMap((state) => {
+    const found = campaigns.filter((campaign) => campaign.state === state).length;
+    return found ? [[state, found] as const] : [];
+  });
+  return (
+    <>
+      {states.map(([state, found]) => (
+        <a key={state} class={`tag ${state}`} href={address(["campaigns"], { state })}>
+          {count(found)} {state}
+        </a>
+      ))}
+    </>
   );
 }
 

@@ -1,7 +1,7 @@
 /** The effort of a campaign: what each choice costs, and which known defects it detects. */
 
 import type { Body } from "../../api/types";
-import { count, seconds } from "../../ui/text";
+import { count } from "../../ui/text";
 import { bodyOf, textOf } from "./body";
 import { useChecked } from "./checked";
 import { applied, costOf, EFFORTS, isOf, type Effort, type EpisodeCosts } from "./presets";
@@ -38,7 +38,7 @@ function EffortCard({ effort, shape, spec, families, costs, located, choose }: E
       <b>{effort.title}</b>
       <span class="small">{effort.about}</span>
       <span>
-        {count(cost.episodes)} episodes, about {seconds(cost.seconds)}
+        {count(cost.episodes)} episodes, about {roughly(cost.seconds)}
       </span>
       <span class="small">
         {effort.methods.join(", ")}: {count(episodes)} each, {effort.seeds.length === 1 ? "1 seed" : `${effort.seeds.length} seeds`}
@@ -54,4 +54,10 @@ export function detects({ methods }: Body<"Power">): string {
     expected !== null && defects.length ? [`${method} detects ${at_least ? "at least " : ""}${Number(expected.toPrecision(2))} of ${defects.length} known defects`] : [],
   );
   return told.length ? `${told.join("; ")}.` : "What it detects is not measured yet.";
+}
+
+/** `40 s`, `28 min`, `8 h`. */
+export function roughly(seconds: number): string {
+  if (seconds < 90) return `${Math.max(1, Math.round(seconds))} s`;
+  return seconds < 5400 ? `${Math.round(seconds / 60)} min` : `${Math.round(seconds / 3600)} h`;
 }

@@ -1,8 +1,8 @@
 /** What the campaign costs, what is wrong with it, and the button that starts it. */
 
 import type { Verdict } from "./checked";
-import { count, seconds } from "../../ui/text";
-import { detects } from "./effort";
+import { count } from "../../ui/text";
+import { detects, roughly } from "./effort";
 import type { Wrong } from "./form";
 import { costOf, type EpisodeCosts } from "./presets";
 import type { Values } from "./schema";
@@ -35,7 +35,7 @@ export function Submit({ spec, families, costs, onMap, verdict, wrong, refused, 
           <span>{runs === 1 ? "run" : "runs"}</span>
         </span>
         <span class="tile" title="By the measured processor time of an episode of each method; with several workers it takes less.">
-          <b>{seconds(cost_s)}</b>
+          <b>{roughly(cost_s)}</b>
           <span>of one processor, about</span>
         </span>
       </div>
