@@ -173,7 +173,9 @@ def instances_of(ego: EgoConfig) -> int | None:
       ConfigError: there is no such driver.
     """
     card = None if ego.driver is None else card_of(ego.driver)
-    return len(card.addresses) if isinstance(card, RemoteCard) else card and card.instances
+    if card is None:
+        return None
+    return len(card.addresses) if isinstance(card, RemoteCard) else card.instances
 
 
 def load(ego: EgoConfig, server: int = 0) -> Guarded | None:
