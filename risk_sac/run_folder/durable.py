@@ -234,11 +234,13 @@ def seal(document: Any) -> bytes:
 
 def sealed_pieces(document: Any, rows: Iterable[Any]) -> Iterator[bytes]:
     """Yields what `seal` returns of a document with these rows in its last field, which is empty, one row at a time."""
-    piece: bytes = _adapter(type(document)).dump_json(document, indent=2).removesuffix(b"[]" + _END)
+    kind: Any = type(document)
+    piece = _adapter(kind).dump_json(document, indent=2).removesuffix(b"[]" + _END)
     digest, before = hashlib.sha256(piece), b"["
     yield piece
     for row in rows:
-        piece = before + b"\n    " + _adapter(type(row)).dump_json(row, indent=2).replace(b"\n", b"\n    ")
+        kind = type(row)
+        piece = before + b"\n    " + _adapter(kind).dump_json(row, indent=2).replace(b"\n", b"\n    ")
         before = b","
         digest.update(piece)
         yield piece

@@ -65,8 +65,7 @@ class Rollouts:
 
     def submit(self, proposal: Proposal) -> None:
         """Lets a process play a proposal, once one is free."""
-        with self._changed:
-            self._waiting.append(proposal)
+        self._waiting.append(proposal)
         self._wakes.send_bytes(b"")
 
     def wait_for(self, index: int, at_most_s: float) -> PlayedEpisode | None:

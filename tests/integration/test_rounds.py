@@ -4,8 +4,9 @@ import os
 import signal
 import subprocess
 import sys
+import time
 import tomllib
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from multiprocessing import Pipe
 from pathlib import Path
 
@@ -24,8 +25,11 @@ from risk_sac.errors import ConfigError
 from risk_sac.host import machine
 from risk_sac.host.machine import ROLLOUTS, rollout_processes
 from risk_sac.records import DrivenBy, EpisodeRecord, RunMetrics, SeriesFile
+from risk_sac.run_folder.crash_guard import CURRENT
 from risk_sac.run_folder.results import FAILURES
-from risk_sac.search.loop import execute_run
+from risk_sac.search.loop import execute_run, propose
+from risk_sac.search.rollouts import Rollouts
+from risk_sac.search.run import RunState
 from tests.ego_processes import served
 from tests.listener import Listener
 
@@ -95,6 +99,19 @@ def test_neither_processes_nor_kills_change_a_method(tmp_path: Path, processes, 
     for limit in (3, 9, 10**9):
         outcome = execute_run(wanted, tmp_path / "stopped", Listener(limit=limit))
     assert digests == {outcome.digest}
+
+
+def test_a_process_plays_on_while_nothing_waits_for_it(tmp_path: Path) -> None:
+    wanted = spec("archive", 3, batch=3)
+    with closing(RunState(wanted, tmp_path)) as run, closing(Rollouts(wanted, tmp_path / "rollouts", 1)) as rollouts:
+        for _ in range(3):
+            run.proposed.append(propose(run))
+            rollouts.submit(run.proposed[-1])
+        noted, index = tmp_path / "rollouts" / "0" / CURRENT, ""
+        while index != "2":
+            time.sleep(0.05)
+            index = noted.read_text()[:12].strip() if noted.exists() else ""
+        assert rollouts.wait_for(0, 0.0) is not None
 
 
 def test_killed_processes_change_nothing(tmp_path: Path, processes) -> None:
