@@ -34,7 +34,7 @@ export function Submit({ spec, families, costs, onMap, verdict, wrong, refused, 
           <b>{count(runs)}</b>
           <span>{runs === 1 ? "run" : "runs"}</span>
         </span>
-        <span class="tile" title="By the measured processor time of an episode of each method; with several workers it takes less.">
+        <span class="tile" title="By the measured processor time of an episode of each method; with several workers it takes less, in dense three times as much.">
           <b>{roughly(cost_s)}</b>
           <span>of one processor, about</span>
         </span>

@@ -58,7 +58,7 @@ it("a shell takes any text for one word", () => {
 
 it("a campaign costs what all its runs do", () => {
   const spec = { methods: ["random", "archive"], seeds: [0, 1, 2], budget: { episodes: 10, evaluation_episodes: 5 } };
-  expect(costOf(spec, 2, { random: 1, archive: 0.5 })).toMatchObject({ runs: 12, episodes: 180, seconds: 0.1 * 90 * 1.5 });
+  expect(costOf(spec, 2, { random: 1, archive: 0.5 })).toMatchObject({ runs: 12, episodes: 180, seconds: 12 * 6 + 0.1 * 90 * 1.5 });
 });
 
 it("an effort fills its time, whatever the number of scenarios", () => {
