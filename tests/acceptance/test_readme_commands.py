@@ -17,6 +17,7 @@ def test_readme_has_the_two_commands_and_those_of_a_run():
     assert commands[-2:] == ["make demo", "make test"]
 
 
+@pytest.mark.timeout(3600)
 @pytest.mark.skipif(not (Path(sys.prefix) / "bin" / "activate").exists(), reason="needs the .venv of `make install`")
 def test_commands_of_a_run_print_what_readme_shows(tmp_path):
     """Those of `make` are left out: `python -m tests.acceptance.readme` runs them too, in half an hour."""
