@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from risk_sac.config import EgoConfig, Settings
-from risk_sac.egos.defects.conjunction import Condition, Conditional
+from risk_sac.egos.defects.condition import Condition
 from risk_sac.egos.seam import Command, Ego, EpisodeStart, Perceived, Trajectory
 from risk_sac.errors import ConfigError
 
@@ -139,7 +139,8 @@ class Planted:
             if defect.when is None:
                 self._ego = decorator(self._ego, defect.parameter.value)
             else:
-                self._ego = Conditional(self._ego, decorator, defect.parameter.value, defect.when)
+                conditional = import_module("risk_sac.egos.defects.conjunction").Conditional  # loads the simulator
+                self._ego = conditional(self._ego, decorator, defect.parameter.value, defect.when)
 
     def reset(self, episode: EpisodeStart) -> None:
         """Begins an episode."""

@@ -1,16 +1,14 @@
 """Conjunctions: defects that act only at some moments, or on some of the others."""
 
-from typing import Literal
-
 import numpy as np
 
-from risk_sac.config import Settings
+from risk_sac.egos.defects.condition import Condition, Range
 from risk_sac.egos.defects.defective import VEHICLE, Defective, in_front, only, turned
 from risk_sac.egos.defects.memory import STANDING_MPS
 from risk_sac.egos.defects.prediction import SAME_WAY
 from risk_sac.egos.driving import PATH_HEADING, STATION
 from risk_sac.egos.seam import Command, Ego, EpisodeStart, Perceived
-from risk_sac.scenario.bodies import BodyName, body_like
+from risk_sac.scenario.bodies import body_like
 from risk_sac.scenario.limits import GRAVITY_MPS2
 from risk_sac.world.geometry import Sight, frame_view, in_sight
 from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, X, Y
@@ -18,34 +16,6 @@ from risk_sac.world.types import HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, X
 EVERYWHERE = Sight(reach_m=np.inf, half_view_rad=np.pi, occlusion=True)
 TURN_AHEAD_M, TURN_RAD = 10.0, 0.3  # a path that far ahead which deviates by more from the ego's heading is a turn
 LEADS_M, LEADS_ASIDE_M = 60.0, 1.5  # a vehicle within these of another's line leads it
-Range = tuple[float, float]
-
-
-class Condition(Settings):
-    """When a defect acts, and on which of the others; all that is given has to hold."""
-
-    ego_mps: Range | None = None
-    """Speed of the ego."""
-    friction: Range | None = None
-    """Of the road."""
-    turning: bool = False
-    """The ego's path turns within the next metres."""
-    stopped: bool = False
-    """The ego has stood since it took over."""
-    bodies: tuple[BodyName, ...] = ()
-    """Of the other, by its size."""
-    other_mps: Range | None = None
-    """Speed of the other."""
-    side: Literal["left", "right"] | None = None
-    """Of the ego's heading, on which the other is."""
-    way: Literal["same", "crossing", "oncoming"] | None = None
-    """Heading of the other against the ego's."""
-    follows: bool = False
-    """The other drives behind a vehicle that is not the ego."""
-    hidden_s: float | None = None
-    """The other has come into the line of sight after so long out of it."""
-
-
 OF_OTHERS = {"bodies", "other_mps", "side", "way", "follows", "hidden_s"}  # the rest is of the ego
 
 

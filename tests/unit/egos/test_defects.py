@@ -13,7 +13,8 @@ import pytest
 from risk_sac.config import EgoConfig
 from risk_sac.config.spec_file import read_ego
 from risk_sac.egos.defects.catalogue import DEFECTS, Planted, planted, version_of
-from risk_sac.egos.defects.conjunction import Condition, Conditional
+from risk_sac.egos.defects.condition import Condition
+from risk_sac.egos.defects.conjunction import Conditional
 from risk_sac.egos.defects.perception import ShortSight
 from risk_sac.egos.defects.planning import LateBraking
 from risk_sac.egos.registry import pinned
