@@ -49,7 +49,7 @@ class LateActuators(Defective):
 
 
 class LocksWheels(Defective):
-    """Locks its wheels where it brakes hard; locked wheels bear half of the grip."""
+    """Locks its wheels where it brakes harder than a share of the grip; locked wheels bear half of it."""
 
     def does(self, command: Command, p: Perceived) -> Command:
         """Reduces hard braking to what locked wheels bear."""

@@ -19,7 +19,7 @@ def offsets(p: Perceived) -> Floats:
 
 
 class LeaderDrivesOn(Defective):
-    """Takes a braking vehicle ahead for one that keeps its recent highest speed."""
+    """Takes a vehicle ahead that brakes for one that goes on at the highest speed of the last seconds."""
 
     def begin(self) -> None:
         """Knows no speed yet."""
