@@ -134,7 +134,7 @@ def test_a_check_keeps_nothing_and_needs_no_key(client):
     for headers in ({}, {"idempotency-key": "nightly"}):
         body = {"families": ["dense"], "methods": ["random"], "label": "never"}
         answer = client.post("/v1/campaigns/check", json=body, headers=headers)
-        assert (answer.status_code, answer.json()) == (200, {"adjustments": []})
+        assert (answer.status_code, answer.json()["adjustments"]) == (200, [])
     assert campaigns() == before
     posted = client.post("/v1/campaigns", json={"families": ["low"]}, headers={"idempotency-key": "nightly"})
     assert posted.status_code == 202, "the key is still free"

@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +13,7 @@ import torch
 from pydantic import ValidationError
 
 from risk_sac.config import METHODS, CampaignSpec, Odd, RunSpec
+from risk_sac.config.base import field_error
 from risk_sac.env.problem import Problem
 from risk_sac.errors import OddError
 from risk_sac.records import EpisodeRecord, RunMetrics
@@ -70,8 +72,13 @@ def schema() -> dict[str, Any]:
 
 OF_ODD = {f"odd.{path}.{end}" for path in SENSIBLE for end in ("low", "high")}  # bounded there, one by one
 BOUNDED = [number for number in numbers(schema()) if number.path not in OF_ODD]
+EQUIPMENT = "ego.sensors.", "ego.actuators."  # of registered egos
 # The budget of processor time apart: at its low end a run is over before it has learnt, sooner on a slower machine.
-FLOATS = [number for number in BOUNDED if number.type == "number" and number.path != "budget.cpu_s"]
+FLOATS = [
+    number
+    for number in BOUNDED
+    if number.type == "number" and number.path != "budget.cpu_s" and not number.path.startswith(EQUIPMENT)
+]
 CORNERS = 12
 IN_TIME = (0, 4, 8)  # two of SAC and one of DDPG; the others in `make torture`
 LEARNING = [name for name, method in METHODS.items() if method.learns]
@@ -90,7 +97,8 @@ def test_a_number_beyond_its_bounds_is_refused_by_name(number: Number) -> None:
     for value in (number.low - 1, number.high * 2 + 1):
         with pytest.raises(ValidationError) as refusal:
             campaign({number.path: [value] if number.path in ("seeds", "learner.agent.hidden_sizes") else value})
-        assert number.path in {".".join(p for p in e["loc"] if isinstance(p, str)) for e in refusal.value.errors()}
+        fields = {re.sub(r"\[\d+\]", "", field_error(error).field) for error in refusal.value.errors()}
+        assert number.path in fields
 
 
 def campaign(changes: dict[str, Any], family: str = "low", method: str = "risk-sac") -> CampaignSpec:
@@ -155,6 +163,13 @@ def test_a_run_with_floats_at_their_bounds_stays_finite(corner: int, tmp_path: P
             ends[number.path] = float((number.low, number.high)[place])
     family, method = ("low", "mixed", "dense")[corner % 3], LEARNING[corner % len(LEARNING)]
     play(campaign(ends, family, method).runs()[0], tmp_path / "run")
+
+
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_a_run_with_equipment_at_its_bounds_stays_finite(end: str, tmp_path: Path) -> None:
+    ends = {number.path: getattr(number, end) for number in BOUNDED if number.path.startswith(EQUIPMENT)}
+    assert len(ends) > 20
+    play(campaign({"ego.driver": "idm-aeb", **ends}, "mixed", "random").runs()[0], tmp_path / "run")
 
 
 def odds() -> Iterator[tuple[str, float, float]]:
