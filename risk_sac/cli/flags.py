@@ -26,13 +26,19 @@ from risk_sac.verdicts.distinct import DistinctFailures
 
 CLASS = re.compile(r"[\w.]+:\w+")  # matches module:Class, which `risk_sac.egos.serve` takes and no campaign
 
+
+def batch_size(text: str) -> int | str:
+    """Returns a batch as a number, or the word as it is."""
+    return int(text) if text.isdecimal() else text
+
+
 # Field of a budget → its flag's type, metavar and help.
-BUDGET: Mapping[str, tuple[type, str, str]] = {
+BUDGET: Mapping[str, tuple[Callable[[str], object], str, str]] = {
     "episodes": (int, "N", "search episodes of a run (default: 300)"),
     "evaluation_episodes": (int, "N", "episodes of the frozen policy (default: 0)"),
     "cpu_s": (float, "S", "processor time after which a search ends (default: none)"),
     "least_episodes": (int, "N", "search episodes that --cpu-s does not cut off (default: 1)"),
-    "batch": (str, "Q", "episodes that are played in parallel, or auto: two per processor (default: 1)"),
+    "batch": (batch_size, "Q", "episodes that are played in parallel, or auto: two per processor (default: 1)"),
 }
 
 
