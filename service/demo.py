@@ -29,7 +29,6 @@ START_S = 60.0
 STOP_S = 60.0
 AWAY_S = 10.0  # short, since the service is not restarted
 DEFECT, FAMILY = "latency", "mixed"  # the prior mostly finds it within the demo's budget, random search mostly does not
-SEED = 2  # finds it early: of the seeds 0 to 5, three find it within 60 episodes
 
 
 class DemoError(Exception):
@@ -87,7 +86,7 @@ def _parser() -> argparse.ArgumentParser:
         "--methods", nargs="+", default=["risk-sac-diverse", "random"], help="search methods, side by side"
     )
     parser.add_argument("--episodes", type=int, default=200, help="search episodes of each run")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[SEED], help="one run per method and seed")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="one run per method and seed")
     parser.add_argument("--out", type=Path, default=Path("results/demo.json"), help="where the results go")
     parser.add_argument(
         "--data-dir",
