@@ -2,7 +2,6 @@
 
 import json
 import re
-import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from playwright.sync_api import Page, expect
 
 from tests.server import Service
 from tests.web.conftest import NET
+from tests.web.test_new import curl_body, small
 
 
 def upload(page: Page, file: Path, label: str = "") -> None:
@@ -46,13 +46,11 @@ def test_from_a_file_to_a_campaign_at_one_of_its_places(
     wanted = [each for each in found if each["pattern"] == "junction" and "from_north" in json.dumps(each)]
     expect(places.locator(".spots").first.locator("li")).to_have_count(len(wanted))
     page.get_by_role("link", name="Start a campaign: Junction at from_north").click()
-    page.get_by_role("checkbox", name="archive", exact=True).uncheck()
-    page.get_by_label("Episodes", exact=True).fill("2")
+    small(page, episodes=2)
     page.get_by_label("I.i.d. phase: none").check()
     page.locator("#field-iid\\.episodes").fill("3")
     expect(page.locator(".tile").first).to_contain_text("8")  # 2 searched, 2 x 3 drawn
-    sent = json.loads(shlex.split(page.get_by_role("region", name="The campaign as curl").inner_text())[-1])
-    assert sent == {
+    assert curl_body(page) == {
         "network": network,
         "pattern": "junction",
         "place": "from_north",

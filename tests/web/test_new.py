@@ -41,14 +41,14 @@ def more(page: Page) -> None:
     page.get_by_text("More settings").click()
 
 
-def small(page: Page, label: str = "") -> None:
-    """Fills in three episodes of random search."""
+def small(page: Page, label: str = "", episodes: int = 3) -> None:
+    """Fills in a few episodes of random search."""
     more(page)
     page.get_by_label("Label", exact=True).fill(label)
     page.get_by_role("checkbox", name="random", exact=True).check()  # first: no method at all is wrong
     for method in ("risk-sac-diverse", "archive"):
         page.get_by_role("checkbox", name=method, exact=True).uncheck()
-    page.get_by_label("Episodes", exact=True).fill("3")
+    page.get_by_label("Episodes", exact=True).fill(str(episodes))
 
 
 def test_what_is_shown_is_what_is_sent_and_what_the_api_then_has(
