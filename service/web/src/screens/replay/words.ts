@@ -16,6 +16,15 @@ const CONFLICTS: Record<string, string> = {
   crossing_vehicle: "a crossing vehicle",
 };
 
+/** How a sentence about a contact begins. */
+const BEGINNINGS: Record<string, string> = {
+  cut_in: "In a cut-in",
+  merge: "As the ego moved over to its neighbour",
+  leader: "Behind a leader that slowed down",
+  pedestrian: "With a pedestrian in its way",
+  crossing_vehicle: "With a vehicle crossing its way",
+};
+
 const MANOEUVRES: Record<string, string> = { straight: "goes straight", left_turn: "turns left", right_turn: "turns right", lane_change: "changes lanes" };
 
 const RESPONSES: Record<string, string> = {
@@ -106,7 +115,8 @@ export function wouldOf(driver: string, prevents: boolean, contact: boolean): st
 
 function contactOf(collision: Collision): string {
   const { ego_zone, ego_speed_mps, other_zone, other_role, other_id, relative_speed_mps, judgement } = collision;
-  const conflict = judgement ? `In ${CONFLICTS[judgement.conflict_type] ?? words(judgement.conflict_type)}, the` : "The";
+  const beginning = judgement && BEGINNINGS[judgement.conflict_type];
+  const conflict = beginning ? `${beginning}, the` : "The";
   const touched = `${conflict} ego's ${ego_zone} touched the ${other_zone} of the ${other_role} ${other_id} at ${number(ego_speed_mps, 1)} m/s`;
   const closing = `closing speed ${number(relative_speed_mps, 1)} m/s`;
   if (judgement?.severity == null || judgement.injury_risk == null) return `${touched}, ${closing}.`;
