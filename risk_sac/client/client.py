@@ -109,11 +109,6 @@ class Client:
         """Returns the REST address of a campaign."""
         return f"{self.url}/{_path(campaign_id)}"
 
-    def page_of(self, campaign_id: str, failure_id: str | None = None) -> str:
-        """Returns the address of a campaign, or of one of its failures, on the service's web page."""
-        failure = "" if failure_id is None else f"/failures/{_part(failure_id)}"
-        return f"{self.url}/page/#/campaigns/{_part(campaign_id)}{failure}"
-
     def submit(self, spec: CampaignSpec | Mapping[str, Any], idempotency_key: str | None = None) -> Campaign:
         """Queues a campaign.
 

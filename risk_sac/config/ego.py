@@ -79,7 +79,7 @@ class EgoConfig(Settings):
 
     @property
     def actuator_config(self) -> ActuatorConfig | None:
-        """What `actuators` stands for."""
+        """The delays and limits that `actuators` stands for."""
         return ACTUATOR_PRESETS[self.actuators] if isinstance(self.actuators, str) else self.actuators
 
     @property

@@ -19,7 +19,7 @@ def _whole_steps(field: str, time_s: float) -> None:
 
 
 class BodyErrors(Settings):
-    """Standard deviations of what is measured of a body, along and across the line of sight, and what is missed."""
+    """Errors of a body's measurement, as standard deviations, and what is missed."""
 
     range_m: Annotated[float, Field(ge=1, le=1000)] = 1000.0
     """Distance between centres beyond which such a body is not perceived, m."""
@@ -38,7 +38,7 @@ class BodyErrors(Settings):
 
 
 class SensorErrors(Settings):
-    """What the sensors add to the line of sight of `sensor`; the ego knows its own motion and the signals exactly."""
+    """Errors of sensors; the ego knows its own motion and the signals exactly."""
 
     vehicles: BodyErrors = BodyErrors()
     pedestrians: BodyErrors = BodyErrors()

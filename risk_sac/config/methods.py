@@ -92,8 +92,8 @@ class Method(Settings):
 
     @property
     def in_rounds(self) -> bool:
-        """Whether several of its episodes can be asked for at a time; a registered sampler and a peer know of one."""
-        return self.scenes != "registered" and not self.agent.startswith("stress")
+        """Says whether several processes can play its episodes; a peer's policy learns in the one that plays."""
+        return not self.agent.startswith("stress")
 
     @property
     def learns(self) -> bool:

@@ -118,7 +118,7 @@ def _measure(state: Floats, column: int, body: BodyErrors, errors: Floats) -> bo
 
 
 class Actuation:
-    """What becomes of a command on its way to the wheels: a dead time, then a first-order lag."""
+    """Dead time, then first-order lag, between a command and the wheels."""
 
     def __init__(self, config: ActuatorConfig) -> None:
         self._config = config
@@ -132,7 +132,7 @@ class Actuation:
         self._follows = [1.0 - math.exp(-step_s / lag_s) if lag_s else 1.0 for lag_s in (c.lag_s, c.steering_lag_s)]
 
     def act(self, control: Control) -> Control:
-        """Returns what the car is told in this step."""
+        """Returns the control that reaches the car in this step."""
         for i, wanted in enumerate(control):
             self._waiting[i].append(wanted)
             self._now[i] += self._follows[i] * (self._waiting[i].popleft() - self._now[i])
@@ -140,7 +140,7 @@ class Actuation:
 
 
 def limited(vehicle: Vehicle, actuators: ActuatorConfig | None) -> Vehicle:
-    """Returns the car with the actuators' limits where they are lower; its ego is told of these, not of lags."""
+    """Returns the car with the actuators' limits; its ego knows these, but no lags."""
     limits = (
         {} if actuators is None else actuators.model_dump(include={"accel_mps2", "brake_mps2", "steering_rate_rad_s"})
     )

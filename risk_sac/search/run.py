@@ -96,8 +96,8 @@ class RunState:
 
     @property
     def in_rounds(self) -> bool:
-        """Whether several episodes are asked for at a time."""
-        return self.spec.budget.batch > 1
+        """Says whether several episodes are asked for at a time."""
+        return self.spec.budget.batch > 1 and method_of(self.spec.method).in_rounds
 
     @property
     def finished(self) -> bool:

@@ -73,7 +73,7 @@ def processes(monkeypatch: pytest.MonkeyPatch):
     return lambda number: monkeypatch.setenv(ROLLOUTS, str(number))
 
 
-@pytest.mark.parametrize("method", ["archive", "bo-only", "risk-sac"])
+@pytest.mark.parametrize("method", ["archive", "bo-only", "risk-sac", "sampler-cross-entropy"])
 def test_the_number_of_processes_changes_nothing(tmp_path: Path, processes, method: RunMethod) -> None:
     digests = set()
     for number in (1, 3):
@@ -159,6 +159,14 @@ def test_a_learner_learns_from_all_episodes_before_it_is_evaluated(tmp_path: Pat
     learnt = [record.temperature for record in search]
     assert len(set(learnt[8:])) == len(learnt[8:])
     assert [record.temperature for record in evaluation] == [learnt[-1]] * 3
+
+
+def test_a_peer_that_learns_where_it_plays_plays_one_episode_after_the_other(tmp_path: Path) -> None:
+    pytest.importorskip("stable_baselines3")
+    one, several = Listener(), Listener()
+    execute_run(spec("ast-ppo", 4, batch=1), tmp_path / "one", one)
+    execute_run(spec("ast-ppo", 4, batch=4), tmp_path / "several", several)
+    assert several.records == one.records
 
 
 @pytest.mark.parametrize("batch", [33, 1024])
