@@ -71,7 +71,7 @@ def _boundary(options: argparse.Namespace) -> int:
     specs = {ego: read_spec(None, own) for ego, own in egos.items()}
     say_adjustments(adjustments(specs[name]))
     from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
-    from risk_sac.report.boundary import write_boundary
+    from risk_sac.report.parameter_plots import write_boundary
     from risk_sac.search.boundary_map import read_boundary
 
     folders = {ego: options.out / Path(ego).stem for ego in specs}
@@ -97,7 +97,7 @@ def _fixed(text: str) -> tuple[str, float | str]:
 
 
 def _table(found: BoundaryMap) -> Table:
-    from risk_sac.report.boundary import in_words
+    from risk_sac.report.parameter_plots import in_words
 
     table = Table(box=SIMPLE_HEAD, padding=0)
     for column in ("driver", "points", "fails in (95 %)", "ego fails, it does not (95 %)"):

@@ -21,7 +21,7 @@ from risk_sac.host.machine import cores
 from risk_sac.host.terminal import complain
 from risk_sac.metrics import COLUMNS as REQUIREMENT_COLUMNS
 from risk_sac.metrics import pooled_counts, pooled_requirements, requirement_cells, wilson_interval, with_published
-from risk_sac.scenario.shipped import shipped_names
+from risk_sac.scenario.reading import shipped_names
 
 if TYPE_CHECKING:
     from risk_sac.report import FinishedRun
@@ -112,7 +112,7 @@ def _defects(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> int:
     ego = named_ego(options.ego)
-    from risk_sac.failures.ego_trial import try_ego, unusable  # here, because loading the simulator takes a second
+    from risk_sac.failures.trials import try_ego, unusable  # here, because loading the simulator takes a second
 
     trials = []
     for name in options.scenario or shipped_names():

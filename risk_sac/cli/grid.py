@@ -44,7 +44,7 @@ def _grid(options: argparse.Namespace) -> int:
     if options.junit is not None:
         write_out(options.junit, grid_junit(grids), "JUnit report", notes)
     if options.picture is not None:
-        from risk_sac.report.grid_picture import grid_png  # here, because loading matplotlib takes a second
+        from risk_sac.report.parameter_plots import grid_png  # here, because loading matplotlib takes a second
 
         over = (options.over[0], options.over[1]) if options.over else varied_axes(grids)
         content = grid_png(grids, over, dict(map(assignment, options.at)))

@@ -24,8 +24,16 @@ from risk_sac.errors import ConfigError
 from risk_sac.host.machine import cores
 from risk_sac.host.terminal import console
 from risk_sac.records import Counts
-from risk_sac.report.power import NOT_MEASURED, BenchmarkRun, PlayedCounts, measured, method_power, power_of, runs_of
-from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
+from risk_sac.report.statistics import (
+    NOT_MEASURED,
+    BenchmarkRun,
+    PlayedCounts,
+    measured,
+    method_power,
+    power_of,
+    runs_of,
+)
+from risk_sac.scenario.reading import PAPER_FAMILIES, shipped_names
 
 METHODS: Sequence[MethodName] = ("random", "archive", "risk-sac-diverse")
 SEEDS, STEPS = 10, 20_000

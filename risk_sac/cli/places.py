@@ -21,7 +21,7 @@ from risk_sac.run_folder.durable import scratch_folder
 from risk_sac.world.net import net_remarks
 
 if TYPE_CHECKING:
-    from risk_sac.failures.tryout import Tried
+    from risk_sac.failures.trials import Tried
 
 SHOWN = 20
 
@@ -104,7 +104,7 @@ def _try_places(chosen: Map, map_survey: Survey, options: argparse.Namespace) ->
 
     Fails if a place does not run, or if the ego is touched without an attack.
     """
-    from risk_sac.failures.tryout import sample, try_out  # here, because loading the simulator takes a second
+    from risk_sac.failures.trials import sample, try_out  # here, because loading the simulator takes a second
 
     tried = []
     for fit in sample(map_survey.fits, options.tries, options.seed):

@@ -18,8 +18,8 @@ from risk_sac.config import EgoConfig
 from risk_sac.config.base import read_text
 from risk_sac.egos.registry import check
 from risk_sac.errors import ConfigError
-from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.failures.export.formats import FORMATS, FormatName, export, names
+from risk_sac.failures.studied import Case, Regression, Verdict
 from risk_sac.host.terminal import console, printable
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import RESULTS, first_of_variants, read_results

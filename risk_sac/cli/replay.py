@@ -60,7 +60,7 @@ def _bundle(options: argparse.Namespace) -> int:
     if one is not None and options.out.is_dir():
         raise ConfigError("--out", f"{options.out}, a folder", "the file for one bundle, such as failure.npz")
     from risk_sac.failures.bundle import write_bundle  # here, because loading the simulator takes a second
-    from risk_sac.failures.collect import bundles
+    from risk_sac.failures.study import bundles
 
     if one is not None:
         write_bundle(options.out, next(bundles(folder, results, [one])))

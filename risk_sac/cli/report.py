@@ -18,7 +18,7 @@ from risk_sac.host.terminal import complain, console
 from risk_sac.records.coverage import CellState
 
 if TYPE_CHECKING:
-    from risk_sac.report.evidence import CampaignFacts
+    from risk_sac.report.document import CampaignFacts
     from risk_sac.report.files import Inputs
     from risk_sac.report.runs import FinishedRun
 
@@ -64,8 +64,7 @@ def add_report(commands: Commands) -> None:
 
 def _report(options: argparse.Namespace) -> int:
     # Here, because loading numpy takes a while.
-    from risk_sac.report.document import CARD_TIMES, Origin, report_page, show_command
-    from risk_sac.report.evidence import CampaignEvidence, gathered
+    from risk_sac.report.document import CARD_TIMES, CampaignEvidence, Origin, gathered, report_page, show_command
     from risk_sac.report.files import read_folders
 
     if options.runs[0].name == VERIFY and options.out is None:  # paths are absolute
@@ -131,7 +130,7 @@ def format_of(file: Path) -> Format:
 def _facts(inputs: "Inputs", runs: Sequence[Path], regression: Path | None) -> "CampaignFacts":
     from risk_sac.env.problem import requirements_of
     from risk_sac.failures.bundle import code_digest
-    from risk_sac.report.evidence import CampaignFacts
+    from risk_sac.report.document import CampaignFacts
     from risk_sac.report.files import run_folders
 
     return CampaignFacts(
@@ -145,8 +144,7 @@ def _facts(inputs: "Inputs", runs: Sequence[Path], regression: Path | None) -> "
 def _verify(words: Sequence[Path], regression: Path | None) -> int:
     """Compares the inputs of a report with those that lie there now."""
     from risk_sac.failures.bundle import code_digest
-    from risk_sac.report.files import SPEC, campaign_in, run_folders
-    from risk_sac.report.signing import changes, input_digests, inputs_in, signed
+    from risk_sac.report.files import SPEC, campaign_in, changes, input_digests, inputs_in, run_folders, signed
 
     file = next(iter(words), None)
     if file is None:

@@ -48,7 +48,7 @@ from risk_sac.records import RunMetrics
 from risk_sac.run_folder.results import TIMES, RunResults
 from risk_sac.scenario.families import family_named
 from risk_sac.scenario.odd import wider_behaviour
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.reading import PAPER_FAMILIES
 
 if TYPE_CHECKING:
     from risk_sac.execution.jobs import Job

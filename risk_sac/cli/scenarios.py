@@ -16,11 +16,11 @@ from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.host.terminal import complain, console
 from risk_sac.scenario import library
 from risk_sac.scenario.check import check_document
-from risk_sac.scenario.reading import read_document
-from risk_sac.scenario.shipped import (
+from risk_sac.scenario.reading import (
     FOLDER,
     nets_of,
     networks,
+    read_document,
     roads,
     scenario_file,
     shipped_document,
@@ -216,7 +216,7 @@ def _check(options: argparse.Namespace) -> int:
     table.add_row("parameters without effect", ", ".join(checked.without_effect) or "none")
     texts = [f"- {remark}" for remark in checked.remarks] or ["Nothing is wrong."]
     if options.out is not None:
-        from risk_sac.failures.scenario_picture import scenario_png
+        from risk_sac.failures.scenario_trial import scenario_png
 
         options.out.write_bytes(scenario_png(document, nets))
         texts.append(f"Drawn: {options.out}")
@@ -226,7 +226,7 @@ def _check(options: argparse.Namespace) -> int:
 
 def _draw(options: argparse.Namespace) -> int:
     document, folder = document_at(options.file)
-    from risk_sac.failures.scenario_picture import scenario_png  # here, because loading matplotlib takes a second
+    from risk_sac.failures.scenario_trial import scenario_png  # here, because loading matplotlib takes a second
 
     out = options.out or Path(options.file).with_suffix(".png").absolute()
     out.write_bytes(scenario_png(document, nets_of(document, folder)))

@@ -73,7 +73,7 @@ class _Asked(NamedTuple):
 
 def _asked(path: Path, failure: str | None) -> _Asked:
     from risk_sac.failures.bundle import read_bundle  # here, for the simulator takes a second to load
-    from risk_sac.failures.collect import bundles
+    from risk_sac.failures.study import bundles
 
     if failure is None:
         if path.is_dir():
@@ -127,7 +127,7 @@ def _minimise(options: argparse.Namespace) -> int:
 
 def _more_plausible(bundle: "Bundle", out: Path | None) -> int:
     from risk_sac.failures.bundle import write_bundle
-    from risk_sac.failures.plausible import most_plausible
+    from risk_sac.failures.minimise import most_plausible
 
     likelier = most_plausible(bundle)
     motion = likelier.manifest.plausible

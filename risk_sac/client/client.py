@@ -12,8 +12,7 @@ from uuid import uuid4
 from risk_sac.client.following import AWAY_S, Event, events, follow
 from risk_sac.client.transport import DEFAULT_URL, Transport, UnexpectedAnswer, api_key, checked_key, checked_url, read
 from risk_sac.config import CampaignSpec, EgoConfig, Scenario
-from risk_sac.failures.cases import CampaignRegression
-from risk_sac.failures.studied import Aim
+from risk_sac.failures.studied import Aim, CampaignRegression
 from risk_sac.records import (
     Campaign,
     CampaignPage,

@@ -35,7 +35,7 @@ from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
 from risk_sac.scenario.limits import conditions, limits_from_odd
-from risk_sac.scenario.shipped import shipped_names
+from risk_sac.scenario.reading import shipped_names
 from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries, RecordedAdversaries, shares_of
 from risk_sac.sim.ego import EVERYTHING, Perception, sight

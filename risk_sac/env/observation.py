@@ -26,7 +26,7 @@ from risk_sac.env.observation_layout import (
 from risk_sac.risk.conduct import MEMORY_SCALE
 from risk_sac.risk.publish import AHEAD, ASIDE, CLOSING_X, CLOSING_Y, COS, GAP, SEEN, SIN, Assessment
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.families import Family
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import ACCEL, LATERAL, SPEED, Floats, Frame
 

@@ -17,10 +17,8 @@ from risk_sac.records import NO_CONTACT, Adjustment
 from risk_sac.risk.requirements import SHIPPED_REQUIREMENTS, requirements_from_odd
 from risk_sac.risk.rss_parameters import RssParameters
 from risk_sac.risk.stl import parsed
-from risk_sac.scenario.declared import SceneLaw
-from risk_sac.scenario.families import family_named
-from risk_sac.scenario.family import Family
-from risk_sac.scenario.grid import DEFAULT_LEVELS, Grid, grid_of
+from risk_sac.scenario.declared import SceneLaw, Slice
+from risk_sac.scenario.families import Family, family_named
 from risk_sac.scenario.limits import GRAVITY_MPS2, VISIBILITY, limits_from_odd, with_environment
 from risk_sac.scenario.odd import (
     TINY,
@@ -31,8 +29,7 @@ from risk_sac.scenario.odd import (
     text_of,
     widest,
 )
-from risk_sac.scenario.slice import Slice
-from risk_sac.scenario.space import SceneSpace
+from risk_sac.scenario.space import DEFAULT_LEVELS, Grid, SceneSpace, grid_of
 from risk_sac.world.types import STEP_S
 
 

@@ -87,7 +87,7 @@ class Recorder:
         results = with_headline(results, verified) if verified else results
         self._write(results, results.failures)
         if summary.finished and method_of(results.spec.method).scenes == "boundary":
-            from risk_sac.report.boundary import write_boundary  # here, because other runs need neither
+            from risk_sac.report.parameter_plots import write_boundary  # here, because other runs need neither
             from risk_sac.search.boundary_map import read_boundary
 
             write_boundary(self._folder, read_boundary(self._folder, {}))

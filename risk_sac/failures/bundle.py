@@ -27,7 +27,7 @@ from risk_sac.records import EpisodeRecord, Record
 from risk_sac.run_folder.arrays import MOST_BYTES, read_limited, unpack_arrays
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.scenario import library
-from risk_sac.scenario.shipped import shipped_names
+from risk_sac.scenario.reading import shipped_names
 from risk_sac.search.frozen_policy import FrozenPolicy
 from risk_sac.search.scripts import SIZE
 from risk_sac.world.types import Scene

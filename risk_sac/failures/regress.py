@@ -20,10 +20,10 @@ from risk_sac.config import EgoConfig, RunSpec, method_of
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import ConfigError, InfeasibleScene, RiskSacError
 from risk_sac.failures.bundle import Bundle, check_world, code_digest, make_bundle, versions
-from risk_sac.failures.cases import Case, Verdict
-from risk_sac.failures.collect import policy_of, recorded_bundle
 from risk_sac.failures.play import Played, Policy, play
 from risk_sac.failures.recording import actions_of, trajectory_digest
+from risk_sac.failures.studied import Case, Verdict
+from risk_sac.failures.study import policy_of, recorded_bundle
 from risk_sac.failures.variants import alike
 from risk_sac.records import Collision, Violation
 from risk_sac.run_folder.results import first_of_variants, read_results

@@ -10,7 +10,7 @@ from risk_sac.records import Collision, ConflictType, Violation
 from risk_sac.scenario.bodies import body_of
 from risk_sac.verdicts.conflict import BRAKES_MPS2, SAME_WAY_COS
 from risk_sac.verdicts.drivers import R157_DELAY_S, R157_PERCEIVES_S
-from risk_sac.verdicts.kinds import ONCOMING_COS, RESPONSES
+from risk_sac.verdicts.labels import ONCOMING_COS, RESPONSES
 from risk_sac.verdicts.offences import IN_WORDS, STANDING_MPS
 from risk_sac.world.types import STEP_S, Floats, Kind, Role
 

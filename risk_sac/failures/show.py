@@ -24,7 +24,6 @@ from risk_sac.failures.from_above import (
 from risk_sac.failures.recording import Recording
 from risk_sac.records import Collision, Violation
 from risk_sac.risk.rss import TTC_CAP_S
-from risk_sac.verdicts.words import began, ego_did, known, prevented_by
 from risk_sac.world.types import STEP_S, Floats
 
 CAPTION_WIDTH = 120  # width of a caption's lines, in characters
@@ -56,16 +55,17 @@ def _contact(collision: Collision) -> Iterator[str]:
     judgement = collision.judgement
     yield (
         f"the ego's {collision.ego_zone}, at {collision.ego_speed_mps:.1f} m/s, touched the {collision.other_zone} of "
-        f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, {known(collision)}"
+        f"{collision.other_role} {collision.other_id!r}, at {collision.other_speed_mps:.1f} m/s, "
+        f"{collision.view_in_words}"
     )
     yield judgement.kind
     yield judgement.variant
     yield collision.severity_in_words
-    yield f"{began(collision)}{_grade(collision)}"
+    yield f"{collision.conflict_in_words}{_grade(collision)}"
     if judgement.plausibility is not None:
         yield judgement.plausibility.in_words
     if judgement.ego_part is not None:
-        yield f"fault: {judgement.fault} · the ego {ego_did(judgement.ego_part)}"
+        yield f"fault: {judgement.fault} · the ego {judgement.ego_part.in_words}"
     yield (
         f"broken by the other: {_words(', '.join(judgement.broke)) or 'nothing'} · "
         f"by the ego: {_words(', '.join(judgement.ego_broke)) or 'nothing'}"
@@ -88,7 +88,7 @@ def _violation(violation: Violation) -> Iterator[str]:
 
 
 def _grade(violation: Collision | Violation) -> str:
-    prevented = prevented_by(violation)
+    prevented = violation.prevention_in_words
     return f" · grade {violation.graded}: {prevented}" if prevented else ""
 
 

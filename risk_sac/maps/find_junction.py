@@ -9,13 +9,15 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from risk_sac.maps.find_stretch import check_limit
-from risk_sac.maps.found import Fit, NoFit, Spot, lacking
-from risk_sac.maps.scenarios import (
+from risk_sac.maps.found import (
     Fields,
+    Fit,
+    NoFit,
+    Spot,
     at_most,
     friction,
     initial_speed,
+    lacking,
     lane_of,
     number,
     pedestrian,
@@ -25,9 +27,9 @@ from risk_sac.maps.scenarios import (
     top_speed,
     walking,
 )
-from risk_sac.maps.ways import AFTER_S, track, way_on
-from risk_sac.scenario.clearance import ROOM_M, too_near, waits_in_the_way
-from risk_sac.scenario.family import MOST_OVER_LIMIT
+from risk_sac.maps.ways import AFTER_S, check_limit, track, way_on
+from risk_sac.scenario.families import MOST_OVER_LIMIT
+from risk_sac.scenario.ground import ROOM_M, too_near, waits_in_the_way
 from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S
 from risk_sac.scenario.tracks import STRAIGHT_RAD, Track
 from risk_sac.world.net import Edge, Link, Net, once
@@ -66,7 +68,7 @@ class Approach:
         return self.links[0].source.way_out_rad
 
 
-def spots(net: Net) -> Iterator[Spot]:
+def junction_spots(net: Net) -> Iterator[Spot]:
     """Every road to a junction that another one leads to as well."""
     for arriving in net.arriving.values():
         if len(arriving) >= FEWEST_ROADS:
@@ -75,7 +77,7 @@ def spots(net: Net) -> Iterator[Spot]:
                 yield Spot(pattern="junction", id=edge.id, x_m=x, y_m=y)
 
 
-def fit(net: Net, spot: Spot) -> Fit:
+def fit_junction(net: Net, spot: Spot) -> Fit:
     """Writes the scenario of the junction at the end of a road.
 
     Raises:

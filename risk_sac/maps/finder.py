@@ -1,27 +1,263 @@
 """Finds the places of a map, and keeps them as scenarios."""
 
 import math
-import xml.etree.ElementTree as ET
-from collections.abc import Callable, Collection, Iterator, Sequence, Set
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import suppress
+from itertools import pairwise
 from pathlib import Path
-from types import ModuleType
 
 from risk_sac.errors import MapError
-from risk_sac.maps import find_crossing, find_junction, find_stretch
-from risk_sac.maps.found import Fit, Misfit, NoFit, Pattern, Spot, Survey
-from risk_sac.maps.scenarios import NET
-from risk_sac.maps.ways import check_lengths, edges_on
+from risk_sac.maps.find_junction import fit_junction, junction_spots, roomy, turn
+from risk_sac.maps.found import (
+    NET,
+    Fields,
+    Fit,
+    Misfit,
+    NoFit,
+    Pattern,
+    Spot,
+    Survey,
+    at_most,
+    cut,
+    friction,
+    initial_speed,
+    lacking,
+    lane_of,
+    number,
+    pedestrian,
+    route_of,
+    scenario_of,
+    signal_parts,
+    top_speed,
+    walking,
+)
+from risk_sac.maps.ways import (
+    AFTER_S,
+    SHORTEST_M,
+    check_lengths,
+    check_limit,
+    fit_stretch,
+    stretch_spots,
+    track,
+    way_on,
+)
 from risk_sac.scenario import library
-from risk_sac.world.net import Net
+from risk_sac.scenario.ground import truck_reaches
+from risk_sac.scenario.layout import LEAD_IN_S, TRUCK_LENGTH_M
+from risk_sac.scenario.tracks import Track
+from risk_sac.world.net import Crossing, Edge, Link, Net, NetLane
 from risk_sac.world.read_net import read_net, read_tree
 
-FINDERS: dict[Pattern, ModuleType] = {
-    "car_following": find_stretch,
-    "crossing": find_crossing,
-    "junction": find_junction,
+NEAREST_M, FARTHEST_M = 25.0, 90.0  # range of the ego's distance from the crossing
+FOLLOWING_M = 25.0  # distance from the ego's front to its follower's
+OCCLUDER_MPS = 12.0
+NEXT_M, OCCLUDER_M = 0.5, 25.0  # range of the occluder's distance from the crossing
+ONCOMING, ONCOMING_MPS = 4, 10.0
+ONCOMING_M, SPACING_M = 60.0, 30.0  # distance of the first oncoming vehicle from the crossing, and between them
+ROOM_BEYOND_M = LEAD_IN_S * OCCLUDER_MPS + TRUCK_LENGTH_M  # least room before a crossing for an oncoming occluder
+OCCLUDED_S = 4.0  # of driving that the way of the occluder goes on
+ONWARD_S = 8.0
+BESIDE_RAD = math.radians(30.0)  # by which lanes beside each other may not be parallel
+MEDIAN_M, SHIFTED_M = 2.0, 6.0  # between them, and from where one ends to where the other begins
+
+
+def crossing_spots(net: Net) -> Iterator[Spot]:
+    """Every road that a crossing crosses where it ends."""
+    for crossing in net.crossings:
+        for id_ in crossing.edges:
+            edge = net.edges.get(id_)
+            if edge is not None and edge.end == crossing.junction and edge.drivable:
+                x, y = edge.drivable[-1].line[-1]
+                yield Spot(pattern="crossing", id=id_, x_m=x, y_m=y)
+
+
+def fit_crossing(net: Net, spot: Spot) -> Fit:
+    """Writes the scenario of the crossing at the end of a road.
+
+    Raises:
+      NoFit: nothing can hide a pedestrian, or there is no room.
+    """
+    edge = net.edges[spot.id]
+    crossing = net.crossings_of[edge.end, edge.id][0]
+    check_limit(edge.drivable[0])
+    beyond = len(edge.drivable) < 2
+    find = _with_oncoming if beyond else _with_neighbour
+    own, ego, occluder, link = find(net, edge, crossing)
+    offset, signal = signal_parts(net, (crossing.signal, link.signal))
+    oncoming = () if beyond else _oncoming(net, edge.id, crossing.edges)
+    if beyond:
+        start: Fields = {"lane": lane_of(net, occluder), "at_m": f"occluder_distance_m + {TRUCK_LENGTH_M:g}"}
+    else:
+        start = _before(net, occluder, "occluder_distance_m")
+    fields = {
+        "parameters": _parameters(own, ego, occluder, beyond=beyond) | offset | friction(),
+        "ego": {"start": _before(net, ego, "ego_distance_m"), "speed": "ego_speed_mps", "route": route_of(net, ego)},
+        "actors": {
+            "occluder": {
+                "body": "truck",
+                "start": start,
+                "speed": "occluder_speed_mps",
+                "route": route_of(net, occluder),
+            },
+            "pedestrian": pedestrian(edge.id, "left" if beyond else "right"),
+            "follower": {
+                "role": "background",
+                "start": {"beside": "ego", "ahead_m": -FOLLOWING_M},
+                "speed": "ego_speed_mps",
+            },
+        },
+        "streams": _streams(net, oncoming),
+        **signal,
+    }
+    kind = "signalised" if crossing.signal is not None else "unsignalised"
+    hidden = "from behind a vehicle that came the other way" if beyond else "from behind a vehicle in the next lane"
+    summary = f"Crossing {crossing.id!r} of {edge.id!r}, {kind}: a pedestrian steps out {hidden}."
+    actors = {name: name for name in ("occluder", "pedestrian")}
+    like = {"family": "mixed", "actors": actors, "mirrored": beyond}  # whose pedestrian comes from the right
+    scenario = scenario_of(spot, summary, ["iso34502:pedestrian"], like, fields)
+    return Fit(spot, scenario, (ego, occluder, *oncoming))
+
+
+def _parameters(own: NetLane, ego: Track, occluder: Track, *, beyond: bool) -> Fields:
+    """States all but the signal's and the road's parameters."""
+    lead_m = LEAD_IN_S * top_speed(own.limit_mps)
+    ego_m = at_most(FARTHEST_M, ego.room_m - FOLLOWING_M - TRUCK_LENGTH_M - lead_m)
+    if beyond:
+        last, meaning = occluder.pieces[-1], "crossing's far edge to the occluder's rear"
+        occluder_m = at_most(OCCLUDER_M, last.length_m - last.reach_m - TRUCK_LENGTH_M)
+    else:
+        meaning = "occluder's front to the crossing's near edge"
+        occluder_m = at_most(OCCLUDER_M, occluder.room_m - TRUCK_LENGTH_M - lead_m)
+    return {
+        **initial_speed("ego_speed_mps", 6, own.limit_mps, "initial speed of the ego"),
+        "ego_distance_m": number((NEAREST_M, ego_m), "m", "ego's front to the crossing's near edge"),
+        "occluder_distance_m": number((NEXT_M, occluder_m), "m", meaning),
+        **initial_speed("occluder_speed_mps", 0, min(OCCLUDER_MPS, own.limit_mps), "initial speed of the occluder"),
+        **walking("pedestrian along the road from the crossing's axis"),
+    }
+
+
+def _before(net: Net, way: Track, distance_m: str) -> Fields:
+    """Starts before the crossing at the end of a track's lane."""
+    return {"lane": lane_of(net, way), "before": "crossing", "distance_m": distance_m}
+
+
+def _streams(net: Net, oncoming: Sequence[Track]) -> Fields:
+    """Oncoming vehicles, on the tracks in turns."""
+    streams, gap_m = {}, SPACING_M * len(oncoming)
+    for i, (name, way) in enumerate(zip(("oncoming", "oncoming_beside"), oncoming, strict=False)):
+        first_m = ONCOMING_M + SPACING_M * i
+        starts_m = [first_m + gap_m * k for k in range(ONCOMING // len(oncoming))]
+        if count := sum(start_m + TRUCK_LENGTH_M <= way.room_m for start_m in starts_m):
+            streams[name] = {
+                "lane": lane_of(net, way),
+                "from_m": first_m - gap_m,
+                "gap_m": gap_m,
+                "count": count,
+                "speed": ONCOMING_MPS,
+                "lead_in": False,
+                "route": route_of(net, way),
+            }
+    return streams
+
+
+def _room_wanted_m(limit_mps: float) -> float:
+    """Least room before a crossing on the ego's track."""
+    return NEAREST_M + FOLLOWING_M + TRUCK_LENGTH_M + LEAD_IN_S * top_speed(limit_mps)
+
+
+def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[NetLane, Track, Track, Link]:
+    """Finds the leftmost lane for the ego beside a lane for the occluder.
+
+    The occluder is on its right. The ego's lane leads on for an episode and is clear of the occluder's.
+    """
+    whys = []
+    for right, own in reversed(list(pairwise(edge.drivable))):
+        try:
+            (ego, link), (occluder, beside) = _ego(net, own), _straight(net, right, OCCLUDED_S)
+            least_m = TRUCK_LENGTH_M + LEAD_IN_S * top_speed(own.limit_mps) + 1.0
+            if occluder.room_m < least_m:
+                raise NoFit(f"the length of the way in on the lane beside is {lacking(occluder.room_m, 'm', least_m)}")
+            if truck_reaches(net, beside, link):
+                raise NoFit(
+                    f"a truck that drives on from {right.id!r} reaches into the way of a vehicle that drives on from "
+                    f"{own.id!r}"
+                )
+            return own, ego, occluder, link
+        except NoFit as why:
+            whys.append(why)
+    raise whys[0]
+
+
+def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[NetLane, Track, Track, Link]:
+    """The one lane, and the lane beside it on which others leave the crossing the other way."""
+    (own,) = edge.drivable
+    lanes = [net.edges[id_].drivable[-1] for id_ in crossing.edges if id_ in net.edges and net.edges[id_].drivable]
+    beside = [lane for lane in lanes if net.edges[lane.edge].start == edge.end and _is_beside(own, lane)]
+    if not beside:
+        raise NoFit(
+            f"{edge.id!r} has 1 lane for cars, and none beside it for oncoming vehicles; wanted one of the two, "
+            "so that a vehicle can hide the pedestrian"
+        )
+    ego, link = _ego(net, own)
+    parked_m = TRUCK_LENGTH_M + OCCLUDER_M
+    occluder = track(net, way_on(net, beside[0], OCCLUDED_S, from_m=parked_m), 0.0, parked_m)
+    if occluder.room_m < ROOM_BEYOND_M:
+        raise NoFit(f"the length of the way in of oncoming vehicles is {lacking(occluder.room_m, 'm', ROOM_BEYOND_M)}")
+    return own, ego, occluder, link
+
+
+def _is_beside(own: NetLane, other: NetLane) -> bool:
+    """Whether a lane begins beside the end of another, on its left, and leads back."""
+    (x, y), (to_x, to_y) = own.line[-1], other.line[0]
+    cos, sin = math.cos(own.way_out_rad), math.sin(own.way_out_rad)
+    left_m = (to_y - y) * cos - (to_x - x) * sin
+    along_m = (to_x - x) * cos + (to_y - y) * sin
+    back = abs(math.remainder(other.way_in_rad - own.way_out_rad, math.tau)) > math.pi - BESIDE_RAD
+    return back and 0.0 < left_m <= (own.width_m + other.width_m) / 2 + MEDIAN_M and abs(along_m) <= SHIFTED_M
+
+
+def _ego(net: Net, own: NetLane) -> tuple[Track, Link]:
+    """The ego's track, if there is room, and the link it begins with."""
+    found, link = _straight(net, own, AFTER_S)
+    return roomy(found, own.edge, _room_wanted_m(own.limit_mps)), link
+
+
+def _straight(net: Net, lane: NetLane, onward_s: float) -> tuple[Track, Link]:
+    """The track over the straightest link of a lane that leads on so far, and that link."""
+    why = NoFit(f"lane {lane.id!r} leads nowhere, or nowhere that its signal ever lets anybody go")
+    for link in sorted(net.onward.get(lane.id, ()), key=lambda link: abs(link.turn_rad)):
+        try:
+            return turn(net, link, onward_s), link
+        except NoFit as error:
+            why = error
+    raise why
+
+
+def _oncoming(net: Net, own: str, crossed: tuple[str, ...]) -> tuple[Track, ...]:
+    """Over the same crossing the other way: the lanes that lead to the other road that it crosses."""
+    links = [
+        link
+        for id_ in crossed
+        if id_ in net.edges and id_ != own
+        for lane in net.edges[id_].drivable
+        for link in net.back.get(lane.id, ())
+        if abs(link.turn_rad) < 0.8
+    ]
+    tracks = []
+    for link in links:
+        with suppress(NoFit):
+            tracks.append(turn(net, link, ONWARD_S))
+    return tuple(tracks[:2])
+
+
+FINDERS: dict[Pattern, tuple[Callable[[Net], Iterator[Spot]], Callable[[Net, Spot], Fit]]] = {
+    "car_following": (stretch_spots, fit_stretch),
+    "crossing": (crossing_spots, fit_crossing),
+    "junction": (junction_spots, fit_junction),
 }
 CANDIDATES: dict[Pattern, str] = {  # what their spots are
-    "car_following": f"road for cars of {find_stretch.SHORTEST_M:g} m or more",
+    "car_following": f"road for cars of {SHORTEST_M:g} m or more",
     "crossing": "road for cars that ends at a crossing",
     "junction": "road to a junction that another one leads to as well",
 }
@@ -39,8 +275,8 @@ def survey(
     """
     fits, misfits = [], []
     spots = list(_spots(net, patterns))
-    for number, spot in enumerate(spots):
-        tell(number / len(spots))
+    for done, spot in enumerate(spots):
+        tell(done / len(spots))
         try:
             fits.append(_fit(net, spot))
         except NoFit as error:
@@ -67,12 +303,12 @@ def place_at(net: Net, pattern: Pattern, id_: str) -> Fit:
 
 def _spots(net: Net, patterns: Collection[Pattern]) -> Iterator[Spot]:
     for pattern in patterns:
-        yield from FINDERS[pattern].spots(net)
+        yield from FINDERS[pattern][0](net)
 
 
 def _fit(net: Net, spot: Spot) -> Fit:
     """Makes the place of a spot; raises `NoFit` where there is none."""
-    fit: Fit = FINDERS[spot.pattern].fit(net, spot)
+    fit = FINDERS[spot.pattern][1](net, spot)
     check_lengths(net, fit.tracks)
     return fit
 
@@ -114,77 +350,3 @@ class Map:
     def keep(self, fit: Fit) -> str:
         """Puts a place into the library; returns the name of its family."""
         return library.keep(fit.scenario, {NET: cut(self.net, self._root, fit)})
-
-
-AROUND_M = 100.0  # unused roads up to this far from a place stay: a picture shows them
-
-
-def cut(net: Net, root: ET.Element, fit: Fit) -> bytes:
-    """The file of the piece around a place; `root` stays as it is."""
-    driven = edges_on(*fit.tracks)
-    crossed = {net.edges[id_].end for id_ in driven} | {net.edges[id_].start for id_ in driven}
-    near = {
-        id_ for id_, j in net.junctions.items() if math.hypot(j.x_m - fit.spot.x_m, j.y_m - fit.spot.y_m) <= AROUND_M
-    }
-    whole = crossed | near
-    edges = {edge.id for edge in net.edges.values() if edge.start in whole or edge.end in whole}
-    touched = {junction for id_ in edges for junction in (net.edges[id_].start, net.edges[id_].end)}
-    # A junction of which all roads are there anyway is whole as well.
-    cut_through = {j for edge in net.edges.values() if edge.id not in edges for j in (edge.start, edge.end)}
-    return _written(root, edges, touched, touched - cut_through, net)
-
-
-def _written(root: ET.Element, edges: Set[str], touched: Set[str], whole: Set[str], net: Net) -> bytes:
-    def at(edge: str) -> str:
-        """The junction at the end of an edge, or the one that it is inside of."""
-        return _inside_of(edge) if edge.startswith(":") else net.edges[edge].end if edge in net.edges else ""
-
-    links = [link for link in root.iter("connection") if at(link.attrib["from"]) in whole]
-    lights = {link.get("tl") for link in links}
-    out = ET.Element(root.tag, root.attrib)
-    out.extend([_alone(child) for child in root if child.tag in ("location", "type")])
-    for edge in root.iter("edge"):
-        id_ = edge.attrib["id"]
-        if _inside_of(id_) in whole if id_.startswith(":") else id_ in edges:
-            out.append(_with(edge, "lane"))
-    # Of several programmes with one name, SUMO runs the last.
-    programmes = {light.attrib["id"]: light for light in root.iter("tlLogic") if light.get("id") in lights}
-    out.extend(map(_fixed, programmes.values()))
-    for junction in root.iter("junction"):
-        id_ = junction.attrib["id"]
-        if (_inside_of(_inside_of(id_), "") if id_.startswith(":") else id_) in whole:
-            out.append(_with(junction, "request"))
-        elif id_ in touched:
-            out.append(_dead_end(junction, edges))
-    out.extend(map(_alone, links))
-    out.extend(_alone(r) for r in root.iter("roundabout") if set(r.get("edges", "").split()) <= edges)
-    return ET.tostring(out, encoding="unicode").encode()
-
-
-def _inside_of(id_: str, colon: str = ":") -> str:
-    """The junction that something is inside of, such as "J" of ":J_3" or ":J_w0"."""
-    return id_.removeprefix(colon).rpartition("_")[0]
-
-
-def _alone(element: ET.Element) -> ET.Element:
-    """The element without its children, which may name what is cut off."""
-    return ET.Element(element.tag, element.attrib)
-
-
-def _with(element: ET.Element, inside: str) -> ET.Element:
-    """The element with its children of one kind alone."""
-    out = _alone(element)
-    out.extend(map(_alone, element.iter(inside)))
-    return out
-
-
-def _fixed(light: ET.Element) -> ET.Element:
-    fixed = _with(light, "phase")
-    fixed.set("type", "static")
-    return fixed
-
-
-def _dead_end(junction: ET.Element, edges: Set[str]) -> ET.Element:
-    arriving = [lane for lane in junction.get("incLanes", "").split() if lane.rpartition("_")[0] in edges]
-    kept = {name: junction.attrib[name] for name in ("id", "x", "y", "shape") if name in junction.attrib}
-    return ET.Element("junction", kept | {"type": "dead_end", "incLanes": " ".join(arriving), "intLanes": ""})

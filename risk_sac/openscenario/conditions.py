@@ -23,12 +23,11 @@ from risk_sac.config.story_conditions import (
 )
 from risk_sac.config.story_places import Position
 from risk_sac.config.values import MOST_MAGNITUDE
-from risk_sac.openscenario.actions import COORDINATES
-from risk_sac.openscenario.elements import Unread
+from risk_sac.openscenario.actions import COORDINATES, RULES, Variables
 from risk_sac.openscenario.entities import Entities
 from risk_sac.openscenario.positions import Positions
 from risk_sac.openscenario.scope import At
-from risk_sac.openscenario.variables import RULES, Variables
+from risk_sac.openscenario.sources import Unread
 
 _EDGES = {name: name for name in ("none", "rising", "falling")} | {"risingOrFalling": "rising_or_falling"}
 _WHICH = {"any": "any", "all": "all"}

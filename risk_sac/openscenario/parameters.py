@@ -14,9 +14,8 @@ from risk_sac.config.distribution import WeightsLaw
 from risk_sac.config.scenario import AllOf, AnyOf, Constraint, ScenarioParameter
 from risk_sac.config.values import CONSTANTS, FUNCTIONS, comparison, term
 from risk_sac.errors import ConfigError, did_you_mean
-from risk_sac.openscenario.elements import XmlElement
-from risk_sac.openscenario.expressions import coded
-from risk_sac.openscenario.scope import At, Meaning, NameScope, literal
+from risk_sac.openscenario.scope import At, Meaning, NameScope, coded, literal
+from risk_sac.openscenario.sources import XmlElement
 
 TEXTS = ("string", "dateTime")
 WHOLE = ("int", "integer", "unsignedInt", "unsignedShort")

@@ -23,8 +23,7 @@ from risk_sac.config.story_places import (
     Vertex,
     WorldPosition,
 )
-from risk_sac.openscenario.catalogs import Alternatives, Catalogs, parametrised
-from risk_sac.openscenario.entities import Entities
+from risk_sac.openscenario.entities import Alternatives, Catalogs, Entities, parametrised
 from risk_sac.openscenario.scope import At, Text
 
 DEEPEST = 8  # trajectories whose points lie on others

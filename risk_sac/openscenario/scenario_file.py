@@ -17,18 +17,15 @@ from risk_sac.config.story_actions import FollowTrajectoryAction
 from risk_sac.errors import ConfigError
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.documents import MAX_BYTES
-from risk_sac.openscenario.actions import ActionReader
-from risk_sac.openscenario.catalogs import Catalogs
+from risk_sac.openscenario.actions import ActionReader, Variables
 from risk_sac.openscenario.conditions import ConditionReader
 from risk_sac.openscenario.distributions import NO_SCOPE, Variation, points_of
-from risk_sac.openscenario.elements import XmlElement, plain
-from risk_sac.openscenario.entities import Entities, Entity
+from risk_sac.openscenario.entities import Catalogs, Entities, Entity
 from risk_sac.openscenario.parameters import Parameters, Varied, allowed, constraints_of
 from risk_sac.openscenario.positions import Positions
 from risk_sac.openscenario.scope import At, NameScope, Text
-from risk_sac.openscenario.sources import SourceFiles
+from risk_sac.openscenario.sources import SourceFiles, XmlElement, plain
 from risk_sac.openscenario.storyboard import Init, StoryboardReader, horizon_of, moving_actors
-from risk_sac.openscenario.variables import Variables
 
 _VARIATION = "ParameterValueDistribution"
 _LONGEST_NAME, _LONGEST_SUMMARY = 40, 300

@@ -20,12 +20,10 @@ from risk_sac.config.story_conditions import TimeCondition, Trigger
 from risk_sac.config.story_places import Position, TrajectoryPosition
 from risk_sac.config.values import Expression
 from risk_sac.openscenario.actions import EGO_EFFECT, ActionReader
-from risk_sac.openscenario.catalogs import Catalogs, parametrised
 from risk_sac.openscenario.conditions import ConditionReader
-from risk_sac.openscenario.elements import Unread
-from risk_sac.openscenario.entities import Entities
-from risk_sac.openscenario.expressions import coded, combined, simplest
-from risk_sac.openscenario.scope import At
+from risk_sac.openscenario.entities import Catalogs, Entities, parametrised
+from risk_sac.openscenario.scope import At, coded, combined, simplest
+from risk_sac.openscenario.sources import Unread
 
 USUAL_HORIZON_S = 60.0  # where no time ends the episode; choice
 _LEAST_HORIZON_S = 1.0

@@ -96,6 +96,29 @@ class EgoPart(Record):
         """Whether it was faster than its sight allowed by more than 10 %."""
         return self.sight_mps is not None and (self.sighted_mps or 0.0) > TOO_FAST * self.sight_mps
 
+    @property
+    def in_words(self) -> str:
+        """Such as "braked 1.1 s after the conflict began, by 4.0 of 7.6 m/s²"; it follows "the ego"."""
+        told = [self._braked]
+        gained = f"gained {self.gained_mps:.1f} m/s" if self.sped_up else ""
+        if self.started or self.sped_up:
+            told.append(" and ".join(filter(None, ("drove on" * self.started, gained))) + " though it saw the striker")
+        if self.too_fast:
+            told.append(f"drove at {self.sighted_mps:.1f} m/s where its sight allowed {self.sight_mps:.1f} m/s")
+        if self.left_first == "ego":
+            told.append("was the first to leave RSS's proper response")
+        return "; it ".join(told)
+
+    @property
+    def _braked(self) -> str:
+        if self.braked_after_s is None:
+            return "did not brake in the conflict"
+        if self.braked_after_s == 0.0:
+            when = "was braking when the conflict began"
+        else:
+            when = f"braked {self.braked_after_s:.1f} s after the conflict began"
+        return f"{when}, by {self.braking_mps2:.1f} of {self.possible_mps2:.1f} m/s²"
+
 
 Harm = Literal["death", "serious injury"]
 

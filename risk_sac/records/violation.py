@@ -25,6 +25,16 @@ NO_CONTACT = "no_contact"  # the requirement that a contact violates
 # Reference drivers by a regulation or a publication, which react to the conflict. `defensive` is our own, and slows
 # before it, which the ego owes only where it could not see.
 PUBLISHED = ("r157", "fsm", "rss")
+FULL_BRAKING, TTC_RULE = "full_braking", "r157_ttc"
+# The sentences below stand in the page's `ui/verdicts.ts` as well.
+DRIVERS_IN_WORDS = {
+    "r157": "R157's driver",
+    "fsm": "the fuzzy safety model",
+    "rss": "the RSS driver",
+    "defensive": "the defensive driver",
+    FULL_BRAKING: "full braking at once",
+    TTC_RULE: "R157's time-to-collision rule",
+}
 # Choice: a class of severity weighs as much as a factor of ten in probability; no contact is as a moderate one.
 SEVERITY_WEIGHTS: Mapping[Severity | None, float] = {
     Severity.MINOR: 0.01,
@@ -75,6 +85,21 @@ class Violated(Record, ABC):
     @abstractmethod
     def graded(self) -> Grade | None:
         """Its grade; None where it is not valid."""
+
+    @property
+    def prevention_in_words(self) -> str | None:
+        """Such as "the RSS driver would have prevented it"; None where no reference driver was asked."""
+        if not self.prevention:
+            return None
+        names = [name for name, prevents in self.prevention.items() if prevents and name != TTC_RULE]
+        by_rule = f"; by {DRIVERS_IN_WORDS[TTC_RULE]} it is preventable" if self.prevention.get(TTC_RULE) else ""
+        if names == [FULL_BRAKING]:
+            only = DRIVERS_IN_WORDS[FULL_BRAKING]
+            return f"of the reference drivers, only {only} would have prevented it{by_rule}"
+        told = [DRIVERS_IN_WORDS.get(name, f"the {name.replace('_', ' ')} driver") for name in names]
+        *first, last = told or ["none of the reference drivers"]
+        told_of = f"{', '.join(first)} and {last}" if first else last
+        return f"{told_of} would have prevented it{by_rule}"
 
     @property
     @abstractmethod
@@ -305,6 +330,30 @@ class Collision(Violated):
             f"impact speed {self.judgement.impact_mps:.1f} m/s, "
             f"risk of {self.judgement.harm} {100 * self.judgement.injury_risk:.1f} %"
         )
+
+    @property
+    def view_in_words(self) -> str:
+        """How long the striker had been in view: "which had been in its view for 1.0 s"; it follows the name.
+
+        What a defect keeps from the ego counts too.
+        """
+        if self.judgement.hidden:
+            if self.visible_for_s > 0.0:
+                return f"which came into its view only {self.visible_for_s:.1f} s before"
+            return "which was not in its view when the conflict began, nor then"
+        if self.visible_for_s > 0.0:
+            return f"which had been in its view for {self.visible_for_s:.1f} s"
+        return "which was not in its view then, but when the conflict began"
+
+    @property
+    def conflict_in_words(self) -> str:
+        """When the conflict began; one that began hidden counts from when the ego could know of it."""
+        before_s = self.time_s - self.judgement.conflict_s
+        if not self.judgement.hidden:
+            return f"the conflict began {before_s:.1f} s before the contact"
+        if self.visible_for_s <= 0.0:
+            return "the conflict was hidden until the contact"
+        return f"the conflict began in hiding and came into sight {before_s:.1f} s before the contact"
 
     @property
     def event(self) -> str:

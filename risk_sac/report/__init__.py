@@ -11,6 +11,6 @@ Loads neither torch nor libsumo, so that a server can do it too.
 from risk_sac.report.comparison import Comparison, MissingRun, compare
 from risk_sac.report.figures import figure_bytes, figure_names
 from risk_sac.report.files import table_csv, table_json, write_report
-from risk_sac.report.paired import PairedTest
 from risk_sac.report.rendering import table_markdown
 from risk_sac.report.runs import FinishedRun, read_run
+from risk_sac.report.statistics import PairedTest

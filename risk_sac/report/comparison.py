@@ -27,9 +27,8 @@ from risk_sac.metrics import (
     pooled_requirements,
 )
 from risk_sac.records import PHASES, Counts, DriverPcr, EpisodeRecord, Phase, Record, RequirementCounts
-from risk_sac.report.origins import FailureOrigin, failure_origins
-from risk_sac.report.paired import PairedTest, corrected, paired_tests
-from risk_sac.report.runs import PAID_FOR, TESTED, FinishedRun, found_within
+from risk_sac.report.runs import PAID_FOR, TESTED, FailureOrigin, FinishedRun, failure_origins, found_within
+from risk_sac.report.statistics import PairedTest, corrected, paired_tests
 
 REFERENCE: MethodName = "risk-sac"
 PAID_REFERENCE: MethodName = "risk-sac-diverse"

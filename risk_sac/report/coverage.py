@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from risk_sac.config import FamilyName, Interval, Odd
 from risk_sac.records import Collision, ConflictType, EpisodeRecord, Outcome, Record
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.families import Family
 from risk_sac.scenario.limits import with_environment
 from risk_sac.scenario.odd import TINY, field, intersect, narrow, paths
 from risk_sac.scenario.space import Parameter, SceneSpace

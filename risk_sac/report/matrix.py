@@ -26,8 +26,6 @@ from risk_sac.records.coverage import (
 )
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.coverage import BINS, NOT_PLAYED, PAIR_BINS, Axis, axes_of
-from risk_sac.report.power import BenchmarkRun, played_by, power_of
-from risk_sac.report.scene_facts import CellKey, SceneFacts
 from risk_sac.report.standards import (
     BEHAVIOURS,
     ISO_34502,
@@ -37,7 +35,10 @@ from risk_sac.report.standards import (
     ROADS,
     TRAFFIC_RULES,
     UNITS,
+    CellKey,
+    SceneFacts,
 )
+from risk_sac.report.statistics import BenchmarkRun, played_by, power_of
 from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.families import family_named
 

@@ -22,8 +22,8 @@ from risk_sac.config import FamilyName, RunSpec
 from risk_sac.metrics import COLUMNS, METRICS, RATIOS, Estimate, Metric, Ratio, requirement_cells, with_published
 from risk_sac.records import DriverPcr
 from risk_sac.report.comparison import DECLARED, REFERENCE, RIVALS, Comparison, declared, metrics_of
-from risk_sac.report.paired import LEVEL, pair_power
 from risk_sac.report.runs import LIMITS, TESTED, Found, found_within
+from risk_sac.report.statistics import LEVEL, pair_power
 
 if TYPE_CHECKING:
     from jinja2 import Environment

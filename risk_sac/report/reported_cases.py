@@ -18,11 +18,10 @@ from risk_sac.records.assessment import (
     ReportedCase,
 )
 from risk_sac.report.comparison import Comparison
+from risk_sac.report.files import sha256
 from risk_sac.report.matrix import definitions_of
 from risk_sac.report.runs import FinishedRun
-from risk_sac.report.scene_facts import SceneFacts
-from risk_sac.report.signing import sha256
-from risk_sac.report.standards import CLAUSES, functional_of
+from risk_sac.report.standards import CLAUSES, SceneFacts, functional_of
 from risk_sac.scenario.families import document_named, family_named, sources_named
 from risk_sac.scenario.layout import LEAD_IN_S
 from risk_sac.scenario.odd import field, paths

@@ -1,20 +1,164 @@
-"""The ground of a net that verdicts look at, as convex polygons, and the kerbs of its crossings."""
+"""The ground of a net as convex polygons, the kerbs of its crossings, and the room that vehicles leave each other.
+
+A vehicle lies along the chord from its front to where its rear passes. Round a bend the chord is shorter than the
+way, so its tail swings out; and between the two the chord cuts the corner.
+
+Ways from lanes beside each other are no foes of one another where they do not cross: SUMO's drivers ignore each other
+there. Where netconvert bends both sharply, they come nearer to each other than cars are wide.
+
+SUMO lets a turning driver wait where the middle of its front reaches the edge of the lane that it is to cross. A car
+that stands askew there has a corner in that lane, and a driver with the right of way does not see it. SUMO does warn a
+driver that crosses its way before that place, or joins it.
+"""
 
 import json
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache, lru_cache
 from importlib.resources import files
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.scenario.clearance import is_near, outlines
-from risk_sac.scenario.layout import CAR_LENGTH_M, CAR_WIDTH_M, Area, areas, ribbon, triangles
-from risk_sac.world.net import Crossing, Net
+from risk_sac.scenario.layout import (
+    CAR_LENGTH_M,
+    CAR_WIDTH_M,
+    TRUCK_LENGTH_M,
+    TRUCK_WIDTH_M,
+    Area,
+    areas,
+    ribbon,
+    triangles,
+)
+from risk_sac.world.net import Crossing, Link, Net, NetLane, once
 from risk_sac.world.read_net import parse_net, read_tree
-from risk_sac.world.types import Point
+from risk_sac.world.types import Floats, Point
+
+SAMPLED_M = 0.5
+ALONG = 9  # points on each side of it
+ROOM_M = CAR_WIDTH_M + 0.15  # between the middles of the ways of two cars
+SPARE_M = CAR_WIDTH_M / 2 + 0.1  # of the box of a waiting vehicle from the middle of a lane that others drive on
+
+
+def outlines(link: Link, length_m: float, width_m: float) -> Floats:
+    """Samples points on both sides of a vehicle along its way.
+
+    Returns x and y in rows, m.
+    """
+    line = np.array([*link.source.line, *link.line, *link.target.line])
+    station_m = _stations_m(line)
+    stop_m = station_m[len(link.source.line) - 1]
+    entry_m = station_m[len(link.source.line) + len(link.line)]
+    front_m = np.arange(stop_m, min(entry_m + length_m, station_m[-1]), SAMPLED_M)
+
+    front, rear = (_points(line, station_m, at_m) for at_m in (front_m, np.maximum(front_m - length_m, 0.0)))
+    (dx, dy), chord_m = front - rear, np.hypot(*(front - rear))
+    forward, left = np.array([dx, dy]) / chord_m, np.array([-dy, dx]) / chord_m
+    middle = front[:, :, None] - forward[:, :, None] * np.linspace(0.0, length_m, ALONG)
+    sides = [middle + side * width_m / 2 * left[:, :, None] for side in (1.0, -1.0)]
+    return np.concatenate([each.reshape(2, -1) for each in sides], axis=1)
+
+
+def is_near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> bool:
+    """Whether a line comes so near to a point."""
+    for (ax, ay), (bx, by) in pairwise(line):
+        dx, dy = bx - ax, by - ay
+        square = dx * dx + dy * dy
+        share = 0.0 if square == 0.0 else min(max(((x_m - ax) * dx + (y_m - ay) * dy) / square, 0.0), 1.0)
+        if math.hypot(ax + share * dx - x_m, ay + share * dy - y_m) <= within_m:
+            return True
+    return False
+
+
+@once
+def too_near(net: Net, link: Link) -> Link | None:
+    """The way beside one across a junction that leaves two cars no room, if there is one."""
+    lanes = net.edges[link.source.edge].lanes
+    for lane in lanes[max(link.source.index - 1, 0) : link.source.index + 2]:
+        for other in net.onward.get(lane.id, ()):
+            beside = lane is not link.source and other.target.edge == link.target.edge
+            if beside and other.target is not link.target and _come_near(link.line, other.line):
+                return other
+    return None
+
+
+def truck_reaches(net: Net, beside: Link, own: Link) -> bool:
+    """Tells whether a truck reaches into a car on the way beside it.
+
+    Both cross the junction.
+
+    Where their lanes fork into several of the next road, SUMO's drivers may take any of them.
+    """
+    ways = [[*each.source.line, *each.line, *each.target.line] for each in _forks(net, own)]
+    points = np.concatenate([outlines(each, TRUCK_LENGTH_M, TRUCK_WIDTH_M) for each in _forks(net, beside)], axis=1)
+    return any(is_near(way, x, y, CAR_WIDTH_M / 2) for way in ways for x, y in points.T.tolist())
+
+
+def _forks(net: Net, link: Link) -> list[Link]:
+    return [other for other in net.onward[link.source.id] if other.target.edge == link.target.edge]
+
+
+def _come_near(line: Sequence[Point], other: Sequence[Point]) -> bool:
+    return any(is_near(other, *point, ROOM_M) for point in line) or any(
+        is_near(line, *point, ROOM_M) for point in other
+    )
+
+
+def waits_in_the_way(net: Net, link: Link) -> NetLane | None:
+    """Finds a priority lane that a car waiting for it reaches into.
+
+    Returns None if the way is clear.
+    """
+    for before, behind in pairwise(link.inside):
+        for lane in net.waits_for.get(behind.id, ()):
+            joins = lane.line[-1] == link.inside[-1].line[-1]
+            if not joins and not _cross(before.line, lane.line) and _off_m(before, lane) < SPARE_M:
+                return lane
+    return None
+
+
+def _off_m(waiting: NetLane, other: NetLane) -> float:
+    """Computes a lane's distance from a car that waits at another's end.
+
+    It is 0 if the lane comes within the car.
+    """
+    (x, y), heading = waiting.line[-1], waiting.way_out_rad
+    cos, sin = math.cos(heading), math.sin(heading)
+    dx, dy = _sampled(np.array(other.line)) - np.array([[x], [y]])
+    ahead_m, aside_m = dx * cos + dy * sin, np.abs(dy * cos - dx * sin)
+    off_x = np.maximum(np.maximum(ahead_m, -CAR_LENGTH_M - ahead_m), 0.0)
+    return float(np.hypot(off_x, np.maximum(aside_m - CAR_WIDTH_M / 2, 0.0)).min())
+
+
+def _sampled(line: Floats) -> Floats:
+    """Points along a line, its corners included; x and y in rows, m."""
+    station_m = _stations_m(line)
+    return _points(line, station_m, np.union1d(station_m, np.arange(0.0, station_m[-1], SAMPLED_M)))
+
+
+def _stations_m(line: Floats) -> Floats:
+    return np.concatenate([[0.0], np.hypot(*np.diff(line, axis=0).T).cumsum()])
+
+
+def _points(line: Floats, station_m: Floats, at_m: Floats) -> Floats:
+    """The points of a line at distances along it; x and y in rows, m."""
+    return np.array([np.interp(at_m, station_m, each) for each in line.T])
+
+
+def _cross(line: Sequence[Point], other: Sequence[Point]) -> bool:
+    return any(
+        _side(a, b, c) * _side(a, b, d) < 0.0 and _side(c, d, a) * _side(c, d, b) < 0.0
+        for a, b in pairwise(line)
+        for c, d in pairwise(other)
+    )
+
+
+def _side(a: Point, b: Point, c: Point) -> float:
+    """Above 0 where a point is to the left of a line."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
 
 CROSSINGS_M = 60.0  # crossings up to this far from a place are recorded
 WALKED_M = 40.0  # a pedestrian's longest way in an episode

@@ -11,11 +11,9 @@ from risk_sac.config.scenario import Scenario
 from risk_sac.config.values import term
 from risk_sac.errors import ConfigError, InfeasibleScene
 from risk_sac.scenario.ground import net_of
-from risk_sac.scenario.layout import Layout
+from risk_sac.scenario.layout import Layout, shifted_groups
 from risk_sac.scenario.scene import SceneLayout, body_named, motion_of
-from risk_sac.scenario.space import Parameter, SceneSpace
-from risk_sac.scenario.story_plan import shifted_groups
-from risk_sac.scenario.value import Value
+from risk_sac.scenario.space import Parameter, SceneSpace, Value
 from risk_sac.world.net import Net
 
 SHIFT = "trigger_shift_"  # begins the name of a scene parameter that shifts an actor's triggers

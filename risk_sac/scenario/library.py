@@ -24,8 +24,7 @@ from defusedxml.ElementTree import fromstring
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError, did_you_mean
 from risk_sac.host.machine import UNWRITABLE, user_cache
-from risk_sac.scenario.reading import MOST_BYTES, document_from
-from risk_sac.scenario.shipped import networks, roads, shipped_names
+from risk_sac.scenario.reading import MOST_BYTES, document_from, networks, roads, shipped_names
 
 VARIABLE = "RISK_SAC_PLACES"
 DOCUMENT = "scenario.yaml"

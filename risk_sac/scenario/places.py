@@ -23,8 +23,8 @@ from risk_sac.scenario.lane_places import (
     nearest_lane,
     spot_pose,
 )
+from risk_sac.scenario.space import Value
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of, trajectory_line
-from risk_sac.scenario.value import Value
 from risk_sac.world.net import Net
 from risk_sac.world.plane_curves import Across
 from risk_sac.world.road_geometry import TOLERANCE_M, RoadFile, Roadway

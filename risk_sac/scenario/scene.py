@@ -21,13 +21,12 @@ from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.bodies import BODIES, BodyName, Motion
 from risk_sac.scenario.ground import ground_of, kerb_of
 from risk_sac.scenario.lane_places import entry_of, lane_line
-from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, StaticStart, VehicleStart
+from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, StaticStart, StoryPlan, VehicleStart
 from risk_sac.scenario.odd import FRICTION
-from risk_sac.scenario.story_plan import StoryPlan
+from risk_sac.scenario.space import Value
 from risk_sac.scenario.story_scene import StoryScene
 from risk_sac.scenario.tracks import Track, Turn, lane_named, routed, straight_on
 from risk_sac.scenario.travel_line import Pose
-from risk_sac.scenario.value import Value
 from risk_sac.world.net import Crossing, Link, Net, NetLane, direction
 from risk_sac.world.read_net import DRIVER
 from risk_sac.world.types import STEP_S, Point, Role

@@ -14,11 +14,10 @@ from risk_sac.config.story_conditions import VariableCondition
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.bodies import BODIES, BodyName
 from risk_sac.scenario.lane_places import LanePlace, extended, joined, nearest_lane
-from risk_sac.scenario.layout import VehicleStart
+from risk_sac.scenario.layout import Deviation, Reach, StoryActor, StoryPlan, VehicleStart, settled
 from risk_sac.scenario.places import StoryPlaces
-from risk_sac.scenario.story_plan import Deviation, Reach, StoryActor, StoryPlan, settled
+from risk_sac.scenario.space import Value
 from risk_sac.scenario.travel_line import Pose, line_of
-from risk_sac.scenario.value import Value
 from risk_sac.world.net import Net, NetLane
 from risk_sac.world.road_geometry import RoadFile
 

@@ -13,7 +13,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.records import EpisodeRecord, Outcome
 from risk_sac.records.boundary import BoundaryAxis, BoundaryMap, BoundaryPoint, BoxShare, DriverMap
 from risk_sac.run_folder.results import EPISODES, read_results, records_from_lines
-from risk_sac.scenario.slice import Slice
+from risk_sac.scenario.declared import Slice
 from risk_sac.search.level_set import FailureClassifier
 from risk_sac.search.scene_optimizer.base import sobol_points
 from risk_sac.world.types import Bools, Floats

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from risk_sac.scenario.bodies import body_of
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.families import Family
+from risk_sac.scenario.layout import StoryPlan
 from risk_sac.scenario.limits import Limits
-from risk_sac.scenario.story_plan import StoryPlan
 from risk_sac.sim.solid import Others, VehicleCommand, Walker, clip, taper, walks_into
 from risk_sac.sim.story.deviation import DeviationControl, Lead
 from risk_sac.sim.sumo import SumoSimulation

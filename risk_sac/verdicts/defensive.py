@@ -30,8 +30,18 @@ from numpy.typing import NDArray
 from risk_sac.verdicts.conflict import BRAKES_MPS2, FIRM_MPS2
 from risk_sac.verdicts.course import CORRIDOR_M, YIELDING_MPS2, entry_distance, pose_at, project, with_margin
 from risk_sac.verdicts.drivers import JERK_MPS3, R157_PERCEIVES_S, r157
-from risk_sac.verdicts.present import RED, OnPath, Street, body_of, conflict_in, must_yield, within
-from risk_sac.verdicts.unseen import Crossings, is_hidden, walls_of
+from risk_sac.verdicts.present import (
+    RED,
+    Crossings,
+    OnPath,
+    Street,
+    conflict_in,
+    is_hidden,
+    moving_box,
+    must_yield,
+    walls_of,
+    within,
+)
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import ACCEL, HEADING, LENGTH, SPEED, VX, VY, WIDTH, Bools, Floats, X, Y
 
@@ -318,7 +328,7 @@ def _comes_across(view: View, i: int, link: int) -> bool:
     apart = math.hypot(state[X, i] - state[X, 0], state[Y, i] - state[Y, 0])
     if apart > reach + speed * REACHES_S + state[LENGTH, i] + 2.0 * ego.size.half_length:
         return False
-    other = body_of(state, i)
+    other = moving_box(state, i)
     times = np.arange(0.0, REACHES_S + TOUCHES_S / 2, TOUCHES_S)
     x, y, heading = other.x + times * other.vx, other.y + times * other.vy, np.full(len(times), other.heading)
     last = ego.s + ego.size.half_length + reach

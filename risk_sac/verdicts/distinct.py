@@ -1,6 +1,6 @@
 """Tells distinct failures apart by kind, and what a search finds by kind and variant.
 
-`risk_sac.verdicts.kinds` names both. Headline, comparisons and distinct failures count kinds; what a search keeps and
+`risk_sac.verdicts.labels` names both. Headline, comparisons and distinct failures count kinds; what a search keeps and
 replays goes by variants, because two to four kinds would starve it.
 
 Choice: names, not the distance to earlier failures. Counts do not depend on the order, so a resumed run or two pooled

@@ -16,8 +16,7 @@ from risk_sac.sim.collision import Contact
 from risk_sac.verdicts.conflict import Conflict, find_conflict, unresponsive
 from risk_sac.verdicts.evidence import Evidence, recorded_contact
 from risk_sac.verdicts.fault import came_first, ego_part, fault, has_to_yield, parts_of_contact, parts_of_violation
-from risk_sac.verdicts.kinds import name_contact, name_violation
-from risk_sac.verdicts.labels import ground, impact, manoeuvre, response, severity
+from risk_sac.verdicts.labels import ground, impact, manoeuvre, name_contact, name_violation, response, severity
 from risk_sac.verdicts.offences import ego_offences, endangered_ego, inherits_stop, striker_offences
 from risk_sac.verdicts.plausibility import plausibility_of
 from risk_sac.verdicts.reference import (

@@ -13,8 +13,7 @@ from risk_sac.verdicts.course import HORIZON_S, Path
 from risk_sac.verdicts.defensive import PRIORITY, PRIORITY_S, SceneAhead, allowed_accel, nothing_remembered
 from risk_sac.verdicts.drivers import R157_PERCEIVES_S, r157
 from risk_sac.verdicts.evidence import Ground
-from risk_sac.verdicts.present import OnPath, conflict_in, street_of
-from risk_sac.verdicts.unseen import concealing, crossings_on
+from risk_sac.verdicts.present import OnPath, concealing, conflict_in, crossings_on, street_of
 from risk_sac.world.geometry import size_of
 from risk_sac.world.types import STEP_S, Bools, Frame, Kind
 

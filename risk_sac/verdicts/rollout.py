@@ -29,8 +29,17 @@ from risk_sac.verdicts.drivers import (
     towards_command,
 )
 from risk_sac.verdicts.evidence import PER_ACTOR, Evidence, recorded_size
-from risk_sac.verdicts.present import OnPath, Street, body_of, street_of
-from risk_sac.verdicts.unseen import Crossings, concealing, crossings_on, is_in_view, walls_of
+from risk_sac.verdicts.present import (
+    Crossings,
+    OnPath,
+    Street,
+    concealing,
+    crossings_on,
+    is_in_view,
+    moving_box,
+    street_of,
+    walls_of,
+)
 from risk_sac.world.geometry import Pose, Size, touches
 from risk_sac.world.jit import compiled
 from risk_sac.world.types import VX, VY, Bools, Floats, Kind, X, Y
@@ -332,7 +341,7 @@ def _drive(task: Task, first: int, after: int, memory: Floats) -> Floats:
         seen, walls = known.copy(), walls_of(state, bodies)
         for i in range(1, len(seen)):
             if seen[i] and task.minds[i]:
-                seen[i] = is_in_view(walls, x, y, body_of(state, i))
+                seen[i] = is_in_view(walls, x, y, moving_box(state, i))
         while point < last and path.s[point + 1] <= s:
             point += 1
         accel = _asked(task, t, OnPath(path, point, s, speed, task.size), state, seen, memory)

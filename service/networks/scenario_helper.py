@@ -24,8 +24,15 @@ from risk_sac.openscenario.scenario_file import Imported, import_scenario
 from risk_sac.openscenario.sources import holds_scenario, unpack
 from risk_sac.scenario import library
 from risk_sac.scenario.check import check_document
-from risk_sac.scenario.reading import MOST_BYTES, document_from, too_long
-from risk_sac.scenario.shipped import nets_of, networks, shipped_document, shipped_names
+from risk_sac.scenario.reading import (
+    MOST_BYTES,
+    document_from,
+    nets_of,
+    networks,
+    shipped_document,
+    shipped_names,
+    too_long,
+)
 from service.networks.schemas import SCENARIO_MEMORY_BYTES
 
 DOCUMENT_ENDS = (".yaml", ".yml", ".json")
@@ -130,7 +137,7 @@ def _text(content: bytes) -> str:
 
 
 def _picture(name: str) -> bytes:
-    from risk_sac.failures.scenario_picture import scenario_png  # here, because loading matplotlib takes a second
+    from risk_sac.failures.scenario_trial import scenario_png  # here, because loading matplotlib takes a second
 
     document, folder = (shipped_document(name), None) if name in shipped_names() else library.kept(name)
     return scenario_png(document, nets_of(document, folder))

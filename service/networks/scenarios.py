@@ -22,7 +22,7 @@ from risk_sac.execution.helper import ANSWER, QUESTION, run_helper
 from risk_sac.records.scenario import ScenarioCheck, ScenarioDetails, ScenarioSummary, summary_of
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.scenario import library
-from risk_sac.scenario.shipped import scenario_file, shipped_document, shipped_names
+from risk_sac.scenario.reading import scenario_file, shipped_document, shipped_names
 from service.errors import BusyError, ConflictError, NotFoundError, StorageError
 from service.networks.schemas import SCENARIO_MEMORY_BYTES, SCENARIO_S
 

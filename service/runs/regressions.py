@@ -20,8 +20,8 @@ from risk_sac.config import EgoConfig
 from risk_sac.egos.registry import pinned
 from risk_sac.execution.helper import ANSWER, QUESTION, run_helper
 from risk_sac.failures.bundle import code_digest
-from risk_sac.failures.cases import CampaignRegression
-from risk_sac.failures.cases import Regression as Cases
+from risk_sac.failures.studied import CampaignRegression
+from risk_sac.failures.studied import Regression as Cases
 from risk_sac.records import State
 from risk_sac.run_folder.durable import replace_file
 from service.errors import ConflictError, NotFoundError, QuotaError, StorageError

@@ -40,7 +40,7 @@ from risk_sac.records import (
     State,
     Total,
 )
-from risk_sac.report.power import PlayedCounts
+from risk_sac.report.statistics import PlayedCounts
 from risk_sac.verdicts.distinct import DistinctFailures
 from risk_sac.world.types import Floats
 from service.errors import OutdatedError

@@ -19,8 +19,8 @@ from risk_sac.env.problem import requirements_of
 from risk_sac.errors import ConfigError
 from risk_sac.failures import studied
 from risk_sac.failures.bundle import code_digest
-from risk_sac.failures.cases import Regression
 from risk_sac.failures.clusters import Overview
+from risk_sac.failures.studied import Regression
 from risk_sac.rates.record import METHOD, rates_of
 from risk_sac.records import Record, State, TriageState, wire
 from risk_sac.records.coverage import CoverageMatrix
@@ -36,8 +36,7 @@ from risk_sac.report import (
     table_json,
     table_markdown,
 )
-from risk_sac.report.document import CARD_TIMES, Origin, report_page
-from risk_sac.report.evidence import CampaignFacts, gathered
+from risk_sac.report.document import CARD_TIMES, CampaignFacts, Origin, gathered, report_page
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.matrix import coverage_matrix
 from risk_sac.report.trend import EndedCampaign, EndedRun, LeftOut, Trend, check_scenarios, driver_name, trend

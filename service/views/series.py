@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from risk_sac import __version__
 from risk_sac.errors import DamagedError
-from risk_sac.failures.net import SignalColour, SurfaceUse, roads_of, signal_heads
+from risk_sac.failures.net import SignalColour, SurfaceUse, roads_of, signal_heads, thumbnail
 from risk_sac.failures.question import Twin, read_twin
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.records import Collision, Episode, Failure, Record, Triage
 from risk_sac.run_folder.arrays import read_limited, unpack_arrays
 from risk_sac.run_folder.results import FAILURES, RecordedFailure

@@ -21,7 +21,7 @@ from risk_sac.config import CampaignSpec, method_of
 from risk_sac.errors import ConfigError, RiskSacError
 from risk_sac.execution.helper import ANSWER, QUESTION
 from risk_sac.execution.messages import without_folders
-from risk_sac.failures.cases import Regression
+from risk_sac.failures.studied import Regression
 from risk_sac.records import Outcome, TriageState, wire
 from risk_sac.report.figures import Format
 from risk_sac.report.grid import PlayedGrid, Standard, grid_csv, grid_junit, played_points, varied_axes
@@ -79,7 +79,7 @@ def written_grid(grid: PlayedGrid, format_: GridFormat, over: Sequence[str]) -> 
     if format_ == "xml":
         return grid_junit([grid])
     if format_ == "png":
-        from risk_sac.report.grid_picture import grid_png  # here, because loading matplotlib takes a second
+        from risk_sac.report.parameter_plots import grid_png  # here, because loading matplotlib takes a second
 
         if len(over) not in (0, 2):
             raise ConfigError("over", ", ".join(over), "two parameters, or none")

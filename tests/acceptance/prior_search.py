@@ -24,7 +24,7 @@ from risk_sac.maps.convert import present_net
 from risk_sac.maps.finder import Map
 from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.results import EPISODES, records_from_lines
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.reading import PAPER_FAMILIES
 from risk_sac.search.loop import execute_run
 from risk_sac.verdicts.distinct import variant_name
 from tests.maps import osm_town

@@ -11,7 +11,7 @@ import pytest
 
 from risk_sac.cli import main
 from risk_sac.failures.bundle import read_bundle
-from risk_sac.failures.cases import Regression, Verdict
+from risk_sac.failures.studied import Regression, Verdict
 from risk_sac.failures.variants import VariantPlayer
 from risk_sac.run_folder.results import first_of_variants, read_results, read_verified
 from tests.acceptance.conftest import Tell

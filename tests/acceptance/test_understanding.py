@@ -15,12 +15,12 @@ from risk_sac.config import EgoConfig
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import ConfigError
 from risk_sac.failures.bundle import MOST_POLICY_BYTES, Bundle, make_bundle, read_bundle, write_bundle
-from risk_sac.failures.cases import Regression, Verdict
-from risk_sac.failures.collect import bundles, policy_of
 from risk_sac.failures.minimise import COPIES, MOST, SHARE
 from risk_sac.failures.play import play
 from risk_sac.failures.recording import actions_of
 from risk_sac.failures.regress import regress, regress_run
+from risk_sac.failures.studied import Regression, Verdict
+from risk_sac.failures.study import bundles, policy_of
 from risk_sac.failures.variants import VariantPlayer
 from risk_sac.report import read_run
 from risk_sac.run_folder.arrays import read_series

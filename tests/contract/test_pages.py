@@ -16,7 +16,7 @@ from risk_sac.failures.from_above import MARKS
 from risk_sac.maps.found import TITLES, Pattern
 from risk_sac.risk.signals import SIGNALS
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.reading import PAPER_FAMILIES
 from service.api.routes.catalogue import list_families
 
 ROOT = Path(__file__).parents[2]

@@ -15,10 +15,9 @@ from risk_sac.errors import SimulationError
 from risk_sac.failures.bundle import Bundle, make_bundle, read_bundle, write_bundle
 from risk_sac.failures.export.formats import FORMATS, FormatName, export, names, write
 from risk_sac.failures.export.recorded import Recorded
-from risk_sac.failures.net import roads_of
+from risk_sac.failures.net import roads_of, thumbnail
 from risk_sac.failures.play import replay
 from risk_sac.failures.recording import Recording
-from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.run_folder.results import RecordedFailure
 
 FOLDER = Path(__file__).with_name("examples")

@@ -8,10 +8,10 @@ import pytest
 
 from risk_sac.failures.export import commonroad, gif, mcap, openscenario
 from risk_sac.failures.export.recorded import Recorded
+from risk_sac.failures.net import thumbnail
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.sentence import story
 from risk_sac.failures.show import draw_recording
-from risk_sac.failures.thumbnail import thumbnail
 from risk_sac.scenario.bodies import BODIES, CODES, BodyName
 from tests.unit.failures.staged import synthetic_contact, synthetic_series
 

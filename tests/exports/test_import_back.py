@@ -13,7 +13,7 @@ from risk_sac.openscenario.scenario_file import import_scenario
 from risk_sac.scenario import library
 from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.interpret import Interpreter
-from risk_sac.scenario.shipped import nets_of
+from risk_sac.scenario.reading import nets_of
 from risk_sac.scenario.story_scene import StoryScene, ahead_of
 from tests.exports.make_examples import FAMILIES
 from tests.openscenario_samples import FILES, VARIATION

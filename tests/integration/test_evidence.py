@@ -8,7 +8,7 @@ import pytest
 
 from risk_sac import cli
 from risk_sac.records.coverage import CellState, CoverageMatrix
-from risk_sac.report.evidence import CampaignEvidence
+from risk_sac.report.document import CampaignEvidence
 from risk_sac.run_folder.results import read_results
 
 LABEL = "night <script>alert(1)</script>"

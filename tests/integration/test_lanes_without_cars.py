@@ -12,11 +12,10 @@ import pytest
 
 from risk_sac.config import EgoConfig
 from risk_sac.scenario.bodies import BODIES, BodyName
-from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.families import FAMILIES, Family
 from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.scenario.limits import limits_from_odd
-from risk_sac.scenario.shipped import FOLDER
+from risk_sac.scenario.reading import FOLDER
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.world.types import SPEED, Floats, Role, X, Y

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.families import FAMILIES, Family
 from risk_sac.scenario.layout import Layout, VehicleStart
 from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, find_contact

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from risk_sac.client import Client
-from risk_sac.report.power import NOT_MEASURED
+from risk_sac.report.statistics import NOT_MEASURED
 
 EPISODES = 24
 

@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 from risk_sac.scenario import library
-from risk_sac.scenario.shipped import shipped_document
+from risk_sac.scenario.reading import shipped_document
 from tests.integration.scripted_worker import DIES, ONCE, WAITS, WELL_BEHAVED
 from tests.ray_cluster import LONG_S, ROOT, Cluster, needs_ray, running, wait_until
 from tests.server import servers

@@ -6,10 +6,8 @@ import pytest
 
 from risk_sac.config import EgoConfig
 from risk_sac.errors import ConfigError
-from risk_sac.scenario.families import family_of
-from risk_sac.scenario.family import Family
-from risk_sac.scenario.reading import document_from_fields
-from risk_sac.scenario.shipped import nets_of
+from risk_sac.scenario.families import Family, family_of
+from risk_sac.scenario.reading import document_from_fields, nets_of
 from risk_sac.sim.sumo import SumoSimulation
 
 

@@ -14,8 +14,7 @@ from risk_sac.env.problem import Problem
 from risk_sac.errors import InfeasibleScene
 from risk_sac.scenario import library
 from risk_sac.scenario.families import family_of
-from risk_sac.scenario.reading import document_from
-from risk_sac.scenario.shipped import nets_of
+from risk_sac.scenario.reading import document_from, nets_of
 from risk_sac.world.types import Frame, Role, Scene
 
 CUT_IN = """

@@ -20,7 +20,7 @@ from risk_sac.cli.parser import Commands, add_command, add_group, add_json_flag
 from risk_sac.cli.regress import cases_table, junit
 from risk_sac.cli.report import OUT, format_of
 from risk_sac.client import Client
-from risk_sac.failures.cases import Regression
+from risk_sac.failures.studied import Regression
 from risk_sac.host.terminal import complain, notes
 from risk_sac.records import State
 

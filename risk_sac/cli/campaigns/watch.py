@@ -31,7 +31,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import complain, notes
 from risk_sac.records import Grade
 from risk_sac.scenario import library
-from risk_sac.scenario.shipped import nets_of
+from risk_sac.scenario.reading import nets_of
 
 SEEDS = 1  # number of seeds if neither the file nor a flag names any
 RATE = number(float, 0, 1)

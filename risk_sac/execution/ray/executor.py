@@ -27,7 +27,7 @@ from risk_sac.execution.ray import ADDRESS, read_settings
 from risk_sac.execution.ray.node import Order
 from risk_sac.run_folder.durable import scratch_name
 from risk_sac.scenario import library
-from risk_sac.scenario.shipped import shipped_names
+from risk_sac.scenario.reading import shipped_names
 from risk_sac.search.prior.earlier import SHIPPED_OR_NONE, file_of
 
 logger = logging.getLogger(__name__)

@@ -20,7 +20,7 @@ from risk_sac.failures.net import colour
 from risk_sac.scenario import library
 from risk_sac.scenario.bodies import Body
 from risk_sac.scenario.interpret import Interpreter
-from risk_sac.scenario.shipped import nets_of
+from risk_sac.scenario.reading import nets_of
 from risk_sac.world.types import STEP_S, Point
 
 VERSION = 2  # of OpenSCENARIO 1

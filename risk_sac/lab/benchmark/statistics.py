@@ -15,7 +15,7 @@ import numpy as np
 from risk_sac.config import RunMethod
 from risk_sac.lab.benchmark.runs import Detection
 from risk_sac.metrics.metric import RESAMPLING_SEED, bootstrap_interval
-from risk_sac.report.paired import vargha_delaney
+from risk_sac.report.statistics import vargha_delaney
 from risk_sac.world.types import Floats
 
 REFERENCE: RunMethod = "random"

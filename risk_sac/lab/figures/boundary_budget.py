@@ -29,7 +29,7 @@ from risk_sac.lab.figures.side_by_side import Row, write_rows
 from risk_sac.openscenario.scenario_file import import_scenario
 from risk_sac.records import Ending, Outcome
 from risk_sac.scenario import library
-from risk_sac.scenario.slice import Slice
+from risk_sac.scenario.declared import Slice
 from risk_sac.search.encounter import Encounter
 from risk_sac.search.level_set import FailureClassifier
 from risk_sac.search.loop import episode_seed

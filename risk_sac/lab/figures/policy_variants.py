@@ -23,7 +23,7 @@ import numpy as np
 from risk_sac.lab.figures.pretrained_policy import EPISODES, episodes
 from risk_sac.lab.pretraining.policy import AGENT, STAGES, Goals, PolicyTraining
 from risk_sac.lab.pretraining.rollouts import PolicyEpisode
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.reading import PAPER_FAMILIES
 from risk_sac.search.agents.transition import Transition
 
 EGOS = ("fiss-plus", "idm-aeb+slow-replanning", "default")

@@ -14,7 +14,7 @@ from pathlib import Path
 from risk_sac.config import EgoConfig, RewardConfig
 from risk_sac.egos.registry import pinned
 from risk_sac.lab.pretraining.rollouts import PolicyEpisode, Turn, play_turn
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.reading import PAPER_FAMILIES
 from risk_sac.search.frozen_policy import Layers
 from risk_sac.search.prior.policy import read_policy, shipped_policy
 

@@ -35,7 +35,7 @@ from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.records import EpisodeRecord, PlausibilityClass
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
-from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
+from risk_sac.scenario.reading import PAPER_FAMILIES, shipped_names
 from risk_sac.search.loop import execute_run
 
 METHODS: Sequence[MethodName] = ("archive", "random", "risk-sac-diverse", "risk-sac")

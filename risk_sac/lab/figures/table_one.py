@@ -23,12 +23,12 @@ from risk_sac.config import Budget, MethodName, RunSpec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.execution.evaluate import run
-from risk_sac.failures.collect import policy_of
 from risk_sac.failures.from_above import canvas, picture
+from risk_sac.failures.study import policy_of
 from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.report.drawing import STYLE, look_of
 from risk_sac.run_folder.results import EPISODES, RESULTS, read_results, records_from_lines
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.reading import PAPER_FAMILIES
 from risk_sac.search.agents.controls import Held
 from risk_sac.search.frozen_policy import FrozenPolicy
 

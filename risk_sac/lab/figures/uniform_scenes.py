@@ -24,7 +24,7 @@ from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.lab.figures.pretrained_policy import ego_of
 from risk_sac.lab.figures.side_by_side import Row, rows_of
 from risk_sac.lab.pretraining.episodes import ScriptEpisode, outcome_of, play
-from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
+from risk_sac.scenario.reading import PAPER_FAMILIES, shipped_names
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.prior.start import PriorStart, start_of
 from risk_sac.search.scene_optimizer.archive import mutated

@@ -18,7 +18,7 @@ from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.reading import PAPER_FAMILIES
 from risk_sac.search.agents.controls import ScriptFollower
 from risk_sac.search.encounter import Encounter
 from risk_sac.search.prior.coordinates import Coordinates

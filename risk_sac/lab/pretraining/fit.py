@@ -14,8 +14,8 @@ from torch.nn import functional
 from risk_sac.config import RunSpec
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
-from risk_sac.report.paired import vargha_delaney
-from risk_sac.scenario.shipped import PAPER_FAMILIES, shipped_names
+from risk_sac.report.statistics import vargha_delaney
+from risk_sac.scenario.reading import PAPER_FAMILIES, shipped_names
 from risk_sac.search.prior.script_model import CANDIDATE, FAILS, HEADS, MEMBERS, Member, ScriptModel, Tensors
 from risk_sac.search.prior.shipped import GRID, ScriptLibrary
 from risk_sac.search.prior.tokens import TokenBatch, Tokenizer

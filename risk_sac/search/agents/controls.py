@@ -9,7 +9,7 @@ import numpy as np
 from risk_sac.config import RunMethod, method_of
 from risk_sac.env.observation_layout import PER_ADVERSARY, X_M, Y_M
 from risk_sac.records import DrivenBy
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.families import Family
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.scripts import SIZE, Genes, Seen, act, adversaries_seen, cue, is_over
 from risk_sac.world.types import STEP_S, Floats, Vector

@@ -9,7 +9,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from risk_sac.env.problem import Problem
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.families import Family
 from risk_sac.scenario.space import SceneSpace
 from risk_sac.search.scripts import SIZE, Genes
 from risk_sac.world.types import Floats

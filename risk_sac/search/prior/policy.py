@@ -20,8 +20,7 @@ from risk_sac.env.observation_layout import MOTION_PER_ADVERSARY, PER_ADVERSARY,
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.records import Collision, Violation
-from risk_sac.scenario.families import family_named
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.families import Family, family_named
 from risk_sac.search.prior.files import DATA, arrays_of, write_arrays
 from risk_sac.world.types import Vector
 

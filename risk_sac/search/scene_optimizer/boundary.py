@@ -3,7 +3,7 @@
 import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.scenario.slice import Slice
+from risk_sac.scenario.declared import Slice
 from risk_sac.search.encounter import Encounter
 from risk_sac.search.scene_optimizer.base import SceneOptimizer, State, sobol_points
 from risk_sac.world.types import Bools, Floats

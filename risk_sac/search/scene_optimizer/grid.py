@@ -6,8 +6,7 @@ import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError
-from risk_sac.scenario.grid import Grid
-from risk_sac.scenario.space import SceneSpace
+from risk_sac.scenario.space import Grid, SceneSpace
 from risk_sac.search.scene_optimizer.base import SceneOptimizer, State, sobol_points
 from risk_sac.world.types import Floats, Scene
 

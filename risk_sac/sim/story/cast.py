@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from risk_sac.scenario.story_plan import Reach, StoryActor
+from risk_sac.scenario.layout import Reach, StoryActor
 from risk_sac.scenario.travel_line import Pose, TravelLine
 from risk_sac.world.types import STEP_S
 

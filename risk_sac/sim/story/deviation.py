@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+from risk_sac.scenario.layout import Deviation
 from risk_sac.scenario.limits import Limits
-from risk_sac.scenario.story_plan import Deviation
 from risk_sac.sim.solid import clip, taper
 from risk_sac.sim.story.cast import Drift, Mover
 from risk_sac.world.types import STEP_S

@@ -6,7 +6,7 @@ It knows nothing of SUMO: it takes where all other actors are, and returns how i
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from risk_sac.scenario.story_plan import StoryPlan
+from risk_sac.scenario.layout import StoryPlan
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.sim.story.actions import doing_of, set_variable
 from risk_sac.sim.story.board import Running, Storyboard

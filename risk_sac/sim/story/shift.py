@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from risk_sac.config.story import StoryEvent
-from risk_sac.scenario.story_plan import is_shifted
+from risk_sac.scenario.layout import is_shifted
 from risk_sac.sim.story.stage import Stage
 from risk_sac.sim.story.triggers import StoryState, TriggerWatch
 from risk_sac.world.types import STEP_S

@@ -10,8 +10,7 @@ from collections.abc import Mapping
 import libsumo
 
 from risk_sac.scenario.bodies import body_of
-from risk_sac.scenario.layout import Layout
-from risk_sac.scenario.story_plan import Reach, StoryActor, StoryPlan
+from risk_sac.scenario.layout import Layout, Reach, StoryActor, StoryPlan
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.sim.reading import Told
 from risk_sac.sim.solid import Walker

@@ -14,7 +14,7 @@ from risk_sac.env.problem import adjustments
 from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Power, Record, Results, State, wire
 from risk_sac.records.boundary import BoundaryMap
 from risk_sac.report.grid import PlayedGrid, Standard
-from risk_sac.report.power import power_of
+from risk_sac.report.statistics import power_of
 from risk_sac.run_folder.results import BOUNDARY, BOUNDARY_PICTURE
 from risk_sac.search.prior.earlier import PriorContent
 from service.api.answer_cache import kept

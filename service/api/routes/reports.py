@@ -11,11 +11,11 @@ from starlette.concurrency import run_in_threadpool
 from risk_sac.config import CampaignSpec, EgoConfig
 from risk_sac.config.base import Settings
 from risk_sac.config.spec_file import campaign_yaml
-from risk_sac.failures.cases import CampaignRegression, Regression
+from risk_sac.failures.studied import CampaignRegression, Regression
 from risk_sac.rates.record import MOST_PER_HOUR
 from risk_sac.records import State
 from risk_sac.records.coverage import CoverageMatrix
-from risk_sac.report.evidence import CampaignEvidence
+from risk_sac.report.document import CampaignEvidence
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table
 from risk_sac.report.matrix import merged

@@ -4,7 +4,7 @@ import pytest
 
 from risk_sac import cli
 from risk_sac.scenario import library
-from risk_sac.scenario.shipped import FOLDER, shipped_document
+from risk_sac.scenario.reading import FOLDER, shipped_document
 
 NET = FOLDER / "low/low.net.xml"
 

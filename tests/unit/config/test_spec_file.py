@@ -16,7 +16,7 @@ from risk_sac.config import Budget, CampaignSpec, EgoConfig, Interval
 from risk_sac.config.spec_file import campaign_yaml, read_campaign, read_ego, read_spec
 from risk_sac.egos.registry import card_of
 from risk_sac.errors import ConfigError
-from risk_sac.failures.cases import Regression
+from risk_sac.failures.studied import Regression
 from risk_sac.host.machine import cores
 
 FLAGS: dict[str, Any] = dict.fromkeys(("family", "method", "seed", "episodes", "evaluation_episodes"))

@@ -19,7 +19,7 @@ from risk_sac.errors import InfeasibleScene
 from risk_sac.records import Collision, Grade, Severity
 from risk_sac.risk.rss import time_to_encounter
 from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.shipped import shipped_names
+from risk_sac.scenario.reading import shipped_names
 from risk_sac.world.geometry import relative_view
 from risk_sac.world.types import Frame, Kind, Scene
 from tests.unit.env.episodes import Outcome, episode, same

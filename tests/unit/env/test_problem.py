@@ -13,7 +13,7 @@ from risk_sac.config import (
 )
 from risk_sac.env.problem import Problem, adjustments, checked_campaign
 from risk_sac.errors import ConfigError, FormulaError, OddError
-from risk_sac.failures.tryout import ALIKE_M, LEFT, MET_M, RIGHT, meet
+from risk_sac.failures.trials import ALIKE_M, LEFT, MET_M, RIGHT, meet
 from risk_sac.sim.sumo import SumoSimulation
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from risk_sac.failures.plausible import changed
+from risk_sac.failures.minimise import changed
 
 ACTIONS = np.zeros((60, 4), np.float32)
 ACTIONS[10:40, 2] = np.where(np.arange(30) % 4 < 2, 1.0, -1.0)

@@ -11,11 +11,10 @@ from shapely import Polygon, box
 
 import sumo_nets
 from risk_sac.config import FamilyName
-from risk_sac.failures.net import LETTERS, roads_of, signal_heads
+from risk_sac.failures.net import EGO, HEIGHT, LETTERS, STRIKER, WIDTH, roads_of, signal_heads, thumbnail
 from risk_sac.failures.recording import Recording, trajectory_digest
 from risk_sac.failures.sentence import sentence, story
 from risk_sac.failures.show import draw_recording
-from risk_sac.failures.thumbnail import EGO, HEIGHT, STRIKER, WIDTH, thumbnail
 from risk_sac.records import ConflictType
 from risk_sac.run_folder.results import RecordedFailure
 from risk_sac.scenario.bodies import CODES

@@ -1,8 +1,8 @@
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.failures.cases import Case, Regression, Verdict
 from risk_sac.failures.regress import compared
+from risk_sac.failures.studied import Case, Regression, Verdict
 from risk_sac.records import Grade
 from tests.builders import collision, judgement, violation
 

@@ -18,14 +18,11 @@ from risk_sac.errors import DamagedError, MapError
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.find_junction import turn
 from risk_sac.maps.finder import Map, place_at, survey
-from risk_sac.maps.found import NoFit, Pattern, lacking
-from risk_sac.maps.scenarios import NET
+from risk_sac.maps.found import NET, NoFit, Pattern, lacking
 from risk_sac.maps.ways import way_back, way_on
 from risk_sac.scenario import library
-from risk_sac.scenario.clearance import too_near, truck_reaches, waits_in_the_way
-from risk_sac.scenario.families import FAMILIES, family_named, family_of
-from risk_sac.scenario.family import Family
-from risk_sac.scenario.ground import kerb_of
+from risk_sac.scenario.families import FAMILIES, Family, family_named, family_of
+from risk_sac.scenario.ground import kerb_of, too_near, truck_reaches, waits_in_the_way
 from risk_sac.scenario.layout import VehicleStart
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.world.net import Crossing, Edge, Link, Net, NetLane

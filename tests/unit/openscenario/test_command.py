@@ -7,8 +7,7 @@ import pytest
 
 from risk_sac import cli
 from risk_sac.scenario import library
-from risk_sac.scenario.reading import read_document
-from risk_sac.scenario.shipped import nets_of
+from risk_sac.scenario.reading import nets_of, read_document
 from tests.openscenario_samples import SCENARIO, VARIATION, copied
 
 

@@ -7,9 +7,9 @@ import pytest
 from risk_sac.config.distribution import HistogramLaw, LognormalLaw, NormalLaw, PoissonLaw, UniformLaw, WeightsLaw
 from risk_sac.errors import ConfigError
 from risk_sac.openscenario.distributions import NO_SCOPE, Variation
-from risk_sac.openscenario.elements import parse
 from risk_sac.openscenario.parameters import Varied
 from risk_sac.openscenario.scope import At
+from risk_sac.openscenario.sources import parse
 
 RANGE = '<Range lowerLimit="1" upperLimit="9"/>'
 

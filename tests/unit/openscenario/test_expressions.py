@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from risk_sac.config.values import term
 from risk_sac.errors import ConfigError
-from risk_sac.openscenario.expressions import combined, translated
+from risk_sac.openscenario.scope import combined, translated
 
 NUMBERS = {"a": 7.5, "b": -2.0, "yes": 1.0, "no": 0.0}
 

@@ -12,8 +12,7 @@ from risk_sac.openscenario.scenario_file import Imported, import_scenario
 from risk_sac.scenario.check import check_document
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.library import written
-from risk_sac.scenario.reading import document_from
-from risk_sac.scenario.shipped import nets_of
+from risk_sac.scenario.reading import document_from, nets_of
 from tests.openscenario_samples import SCENARIO, VARIATION, copied
 
 RANGE = '<DistributionRange stepWidth="10"><Range lowerLimit="40" upperLimit="80"/></DistributionRange>'

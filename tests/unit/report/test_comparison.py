@@ -12,8 +12,8 @@ from risk_sac.metrics import results_digest, wilson_interval
 from risk_sac.report import compare, figure_bytes, figure_names, read_run, write_report
 from risk_sac.report.comparison import declared
 from risk_sac.report.figures import CURVES, window_ecr, window_pcr
-from risk_sac.report.paired import holm
 from risk_sac.report.runs import Limit, cpu_s, episodes, found_within
+from risk_sac.report.statistics import holm
 from risk_sac.run_folder.results import EPISODES, RecordedFailure, RunResults, read_results, write_results
 from risk_sac.scenario.families import FAMILIES
 

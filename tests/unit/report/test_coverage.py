@@ -4,7 +4,7 @@ from risk_sac.config import Interval, Odd, RunSpec
 from risk_sac.metrics import clopper_pearson
 from risk_sac.records import Outcome
 from risk_sac.report.coverage import axis_of, coverage, kinds
-from risk_sac.report.evidence import drawn
+from risk_sac.report.document import drawn
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.space import Parameter
 from tests.builders import collision, episode_record, judgement

@@ -6,13 +6,12 @@ import pytest
 
 from risk_sac.config import CampaignSpec, EgoConfig, Iid
 from risk_sac.config.spec_file import campaign_yaml
-from risk_sac.failures.cases import Case, Regression, Verdict
+from risk_sac.failures.studied import Case, Regression, Verdict
 from risk_sac.records import Grade
 from risk_sac.report import compare
-from risk_sac.report.document import Origin, report_page
-from risk_sac.report.evidence import gathered
+from risk_sac.report.document import Origin, gathered, report_page
 from risk_sac.report.files import read_folders
-from risk_sac.report.power import played_by, power_of
+from risk_sac.report.statistics import played_by, power_of
 from risk_sac.run_folder.results import RunResults, write_results
 from risk_sac.scenario.families import FAMILIES
 

@@ -7,10 +7,9 @@ from risk_sac.records import Outcome, RequirementResult
 from risk_sac.records.coverage import CellState
 from risk_sac.report import compare
 from risk_sac.report.matrix import coverage_matrix, merged
-from risk_sac.report.power import BenchmarkRun
 from risk_sac.report.runs import FinishedRun
-from risk_sac.report.scene_facts import CellKey, SceneFacts
-from risk_sac.report.standards import BEHAVIOURS, MANOEUVRES, ROADS, Functional, functional_of
+from risk_sac.report.standards import BEHAVIOURS, MANOEUVRES, ROADS, CellKey, Functional, SceneFacts, functional_of
+from risk_sac.report.statistics import BenchmarkRun
 from risk_sac.scenario.families import FAMILIES
 from tests.builders import collision, episode_record, judgement
 

@@ -2,8 +2,7 @@
 
 from risk_sac.config import RunSpec
 from risk_sac.records import Grade, Outcome, StoryDeviation
-from risk_sac.report.origins import PlayedAs, failure_origins
-from risk_sac.report.runs import FinishedRun
+from risk_sac.report.runs import FinishedRun, PlayedAs, failure_origins
 from tests.builders import collision, episode_record, judgement
 
 

@@ -9,7 +9,7 @@ from risk_sac.config.distribution import HistogramLaw, NormalLaw, WeightsLaw
 from risk_sac.config.story import Story
 from risk_sac.records import Outcome, TriageState
 from risk_sac.report import compare
-from risk_sac.report.evidence import CampaignEvidence, CampaignFacts, gathered
+from risk_sac.report.document import CampaignEvidence, CampaignFacts, gathered
 from risk_sac.report.reported_cases import _steps, law_in_words
 from risk_sac.report.standards import CLAUSES
 from risk_sac.scenario.families import document_named

@@ -8,8 +8,8 @@ from risk_sac import cli
 from risk_sac.config import CampaignSpec
 from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.errors import ConfigError
-from risk_sac.report import signing
-from risk_sac.report.signing import changes, input_digests, inputs_in, manifest, signed
+from risk_sac.report import files as signing
+from risk_sac.report.files import changes, input_digests, inputs_in, manifest, signed
 from risk_sac.run_folder.results import RunResults, write_results
 
 SPEC = CampaignSpec(families=("low",), methods=("random",))

@@ -4,7 +4,7 @@ import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
-from risk_sac.report.paired import holm, smallest_p, vargha_delaney, wilcoxon_p
+from risk_sac.report.statistics import holm, smallest_p, vargha_delaney, wilcoxon_p
 
 differences = st.lists(st.integers(-6, 6).map(lambda tenths: tenths / 10), max_size=10)
 

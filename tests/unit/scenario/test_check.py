@@ -9,8 +9,7 @@ import yaml
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.check import check_document, without_effect
 from risk_sac.scenario.interpret import Interpreter
-from risk_sac.scenario.reading import MOST_BYTES, document_from
-from risk_sac.scenario.shipped import nets_of, scenario_file, shipped_names
+from risk_sac.scenario.reading import MOST_BYTES, document_from, nets_of, scenario_file, shipped_names
 
 GOOD = """
 name: braking

@@ -6,10 +6,9 @@ import pytest
 from risk_sac.config import EgoConfig
 from risk_sac.errors import InfeasibleScene
 from risk_sac.scenario.bodies import BODIES
-from risk_sac.scenario.families import FAMILIES, family_of
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.families import FAMILIES, Family, family_of
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
-from risk_sac.scenario.shipped import nets_of, shipped_document
+from risk_sac.scenario.reading import nets_of, shipped_document
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.world.types import Kind, Scene
 

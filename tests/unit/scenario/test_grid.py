@@ -4,8 +4,7 @@ import pytest
 
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.errors import ConfigError
-from risk_sac.scenario.grid import DEFAULT_LEVELS, Grid, grid_of
-from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.scenario.space import DEFAULT_LEVELS, Grid, Parameter, SceneSpace, grid_of
 
 STATED = {
     "speed": ScenarioParameter(range=(0.1, 0.7), step=0.3),

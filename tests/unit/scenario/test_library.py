@@ -8,8 +8,15 @@ from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.maps.convert import present_net
 from risk_sac.scenario import library
 from risk_sac.scenario.families import FAMILIES, family_named
-from risk_sac.scenario.reading import document_from
-from risk_sac.scenario.shipped import FOLDER, PAPER_FAMILIES, networks, shipped_document, shipped_names, shipped_net
+from risk_sac.scenario.reading import (
+    FOLDER,
+    PAPER_FAMILIES,
+    document_from,
+    networks,
+    shipped_document,
+    shipped_names,
+    shipped_net,
+)
 
 
 @pytest.fixture(autouse=True)

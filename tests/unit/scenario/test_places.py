@@ -11,8 +11,8 @@ from risk_sac.config.story import Story
 from risk_sac.config.story_places import Position
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.places import OnRoad, StoryPlaces, lanes_beside
+from risk_sac.scenario.space import Value
 from risk_sac.scenario.travel_line import Pose
-from risk_sac.scenario.value import Value
 from tests.unit.scenario.junction_roads import roads_and_net
 
 EAST, NORTH, WEST, SOUTH = 0.0, math.pi / 2, math.pi, -math.pi / 2

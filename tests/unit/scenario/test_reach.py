@@ -7,8 +7,7 @@ from risk_sac.scenario.check import scenes
 from risk_sac.scenario.families import family_of
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.limits import limits_from_odd
-from risk_sac.scenario.reading import document_from_fields
-from risk_sac.scenario.shipped import nets_of
+from risk_sac.scenario.reading import document_from_fields, nets_of
 
 
 def beyond(actor: dict[str, object], horizon_s: float = 2.0) -> list[str]:

@@ -11,7 +11,7 @@ from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import InfeasibleScene
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Layout
-from risk_sac.scenario.shipped import scenario_file, shipped_document, shipped_names
+from risk_sac.scenario.reading import scenario_file, shipped_document, shipped_names
 
 MOST_LINES = 40
 TAGS = ("iso34502:", "ncap:", "un-r157:")

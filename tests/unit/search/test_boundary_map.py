@@ -9,8 +9,8 @@ from risk_sac.config import RunSpec
 from risk_sac.config.boundary import BoundaryConfig
 from risk_sac.env.problem import Problem
 from risk_sac.records import Outcome
-from risk_sac.report import boundary as drawing
-from risk_sac.report.boundary import boundary_png
+from risk_sac.report import parameter_plots as drawing
+from risk_sac.report.parameter_plots import boundary_png
 from risk_sac.search.boundary_map import boundary_map
 from risk_sac.search.scene_optimizer.base import sobol_points
 from tests.builders import collision, episode_record

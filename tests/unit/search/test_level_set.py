@@ -5,7 +5,7 @@ import pytest
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.config.boundary import BoundaryConfig
-from risk_sac.scenario.slice import Slice
+from risk_sac.scenario.declared import Slice
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.search.encounter import Encounter
 from risk_sac.search.level_set import FailureClassifier, straddle

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.scenario.families import FAMILIES
-from risk_sac.scenario.family import Family
+from risk_sac.scenario.families import FAMILIES, Family
 from risk_sac.scenario.layout import Layout, PedestrianStart
 from risk_sac.sim.solid import VehicleCommand
 from risk_sac.sim.sumo import NETS, SumoSimulation

@@ -72,7 +72,7 @@ export function egoPartWords(violation: Collision | Violation): string | null {
 const GAINS_MPS = 1;
 const TOO_FAST = 1.1;
 
-/** What the ego did about the striker; as `risk_sac/verdicts/words.py` says it. */
+/** What the ego did about the striker; as `risk_sac/records/judgement.py` says it. */
 function egoDid({ braked_after_s, braking_mps2, possible_mps2, gained_mps, started, sight_mps, sighted_mps, left_first }: Body<"EgoPart">): string {
   const told = [braked(braked_after_s, `by ${number(braking_mps2, 1)} of ${number(possible_mps2, 1)} m/s²`)];
   const sped = [...(started ? ["drove on"] : []), ...((gained_mps ?? 0) >= GAINS_MPS ? [`gained ${number(gained_mps, 1)} m/s`] : [])];

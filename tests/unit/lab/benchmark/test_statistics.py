@@ -9,7 +9,7 @@ from risk_sac.lab.benchmark.runs import ANSWER, Detection, answer_of, first_dete
 from risk_sac.lab.benchmark.statistics import friedman, log_rank, summaries, survival
 from risk_sac.lab.figures.defects import tier_of
 from risk_sac.records import DefectPower
-from risk_sac.report.power import NOT_MEASURED, PlayedCounts, method_power, power_of, runs_of
+from risk_sac.report.statistics import NOT_MEASURED, PlayedCounts, method_power, power_of, runs_of
 
 BUDGET = 1000
 

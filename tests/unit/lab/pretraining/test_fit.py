@@ -6,7 +6,7 @@ from risk_sac.env.problem import Problem
 from risk_sac.lab.pretraining import fit as fitting
 from risk_sac.lab.pretraining.episodes import training_egos
 from risk_sac.lab.pretraining.fit import Dataset, auc, beliefs, fit, held_out_documents, library_of
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.reading import PAPER_FAMILIES
 from risk_sac.search.prior.shipped import inputs_of
 from risk_sac.search.prior.tokens import Tokenizer
 from risk_sac.search.scripts import SIZE, Genes

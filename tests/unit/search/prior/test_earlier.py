@@ -12,7 +12,7 @@ from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.run_folder.results import EPISODES
 from risk_sac.scenario import library
-from risk_sac.scenario.shipped import shipped_document
+from risk_sac.scenario.reading import shipped_document
 from risk_sac.search.prior.earlier import EarlierScripts, FamilyScripts, kept, pinned_prior
 from risk_sac.search.prior.sampler import PriorOptimizer, ReplayOptimizer
 from risk_sac.search.prior.shipped import inputs_of, shipped_library

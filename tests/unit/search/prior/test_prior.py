@@ -6,7 +6,7 @@ import pytest
 from risk_sac.config import RunSpec, SceneOptimizerConfig
 from risk_sac.env.problem import Problem
 from risk_sac.errors import CheckpointError, ConfigError
-from risk_sac.scenario.shipped import PAPER_FAMILIES
+from risk_sac.scenario.reading import PAPER_FAMILIES
 from risk_sac.search.prior.files import DATA, MOST_BYTES
 from risk_sac.search.prior.sampler import Arm, PriorOptimizer, Yields
 from risk_sac.search.prior.script_model import PlacedModel

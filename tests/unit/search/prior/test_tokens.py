@@ -11,7 +11,7 @@ from risk_sac.env.observation_layout import LIMIT, Y_M
 from risk_sac.env.problem import Problem
 from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.layout import LEAD_IN_S
-from risk_sac.scenario.shipped import shipped_names
+from risk_sac.scenario.reading import shipped_names
 from risk_sac.search.prior.shipped import shipped_model
 from risk_sac.search.prior.tokens import TokenBatch, Tokenizer, placed
 from risk_sac.search.scripts import SIZE, adversaries_seen

@@ -7,9 +7,8 @@ from risk_sac.config import METHODS, Interval, Like, RunSpec
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.scenario import library
-from risk_sac.scenario.families import FAMILIES, family_of
-from risk_sac.scenario.family import Family
-from risk_sac.scenario.shipped import nets_of, shipped_document
+from risk_sac.scenario.families import FAMILIES, Family, family_of
+from risk_sac.scenario.reading import nets_of, shipped_document
 from risk_sac.search.prior.coordinates import Coordinates
 from risk_sac.search.prior.shipped import inputs_of, shipped_library
 from risk_sac.search.prior.start import start_of

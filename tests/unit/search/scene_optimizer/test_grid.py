@@ -5,8 +5,7 @@ import pytest
 
 from risk_sac.config import SceneOptimizerConfig
 from risk_sac.errors import CheckpointError
-from risk_sac.scenario.grid import Grid, GridAxis
-from risk_sac.scenario.space import Parameter, SceneSpace
+from risk_sac.scenario.space import Grid, GridAxis, Parameter, SceneSpace
 from risk_sac.search.scene_optimizer.grid import GridSampler, grid_sample
 
 

@@ -7,10 +7,10 @@ from pydantic import TypeAdapter
 
 from risk_sac.config.story import Story, StoryAct
 from risk_sac.config.story_conditions import Condition
+from risk_sac.scenario.layout import Reach, StoryActor, StoryPlan
 from risk_sac.scenario.places import StoryPlaces
-from risk_sac.scenario.story_plan import Reach, StoryActor, StoryPlan
+from risk_sac.scenario.space import Value
 from risk_sac.scenario.travel_line import Pose
-from risk_sac.scenario.value import Value
 from risk_sac.sim.story.cast import Present
 from risk_sac.sim.story.deviation import NO_LEADS, Lead
 from risk_sac.sim.story.engine import StoryEngine, StoryMotion

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from risk_sac.scenario.story_plan import StoryActor
+from risk_sac.scenario.layout import StoryActor
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.sim.story.cast import Drift
 from tests.unit.sim.story.straight import CAR, POINT, Drive, after, car, one_event, story_of

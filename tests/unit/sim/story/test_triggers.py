@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
+from risk_sac.scenario.layout import Reach, StoryPlan
 from risk_sac.scenario.places import StoryPlaces
-from risk_sac.scenario.story_plan import Reach, StoryPlan
+from risk_sac.scenario.space import Value
 from risk_sac.scenario.travel_line import Pose
-from risk_sac.scenario.value import Value
 from risk_sac.sim.story.cast import Present
 from risk_sac.sim.story.stage import Stage
 from risk_sac.sim.story.triggers import Watch
