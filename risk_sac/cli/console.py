@@ -142,9 +142,7 @@ def requirements_table(
 ) -> Table | None:
     """A row for each requirement below the name of its group, in 80 columns; None without any.
 
-    Args:
-      groups: by name, their requirements.
-      said: by group and requirement, what is said below its rate, in red.
+    `said` is what is said below a rate, in red, by group and requirement.
     """
     if not any(groups.values()):
         return None

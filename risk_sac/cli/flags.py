@@ -74,11 +74,7 @@ def budget_flags(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def assignment(text: str) -> tuple[str, str]:
-    """Splits a NAME=VALUE of `--at`.
-
-    Raises:
-      ConfigError: it has no equals sign.
-    """
+    """Splits a NAME=VALUE of `--at`; raises `ConfigError` without an equals sign."""
     name, equals, value = text.partition("=")
     if not equals:
         raise ConfigError("--at", repr(text), "NAME=VALUE")

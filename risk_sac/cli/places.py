@@ -100,10 +100,7 @@ def _table(heading: str, rows: Sequence[tuple[str, str]], most: int) -> Table:
 
 
 def _try_places(chosen: Map, map_survey: Survey, options: argparse.Namespace) -> int:
-    """Plays at some places and prints a row per pattern.
-
-    Fails if a place does not run, or if the ego is touched without an attack.
-    """
+    """Plays at places and prints a row per pattern; fails if one does not run, or the ego is touched unattacked."""
     from risk_sac.failures.trials import sample, try_out  # here, because loading the simulator takes a second
 
     tried = []

@@ -159,7 +159,6 @@ def _found(metrics: RunMetrics | None) -> str:
 
 
 def _summary(spec: RunSpec, results: RunResults, phases: Mapping[str, RunMetrics]) -> Table:
-    """One column per phase."""
     columns = {name: _figures(metrics) for name, metrics in phases.items()}
     behaviour = wider_behaviour(family_named(spec.family).odd, spec.odd)
     setting = f"{spec.family} · {behaviour} behaviour"

@@ -79,7 +79,6 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _bundled(file: Path) -> tuple[RunSpec, Recording]:
-    """Returns the failure in a bundle, with the spec of its run."""
     from risk_sac.failures.bundle import read_bundle  # here, because loading the simulator takes a second
 
     bundle = read_bundle(file)
@@ -107,20 +106,13 @@ def _draw(options: argparse.Namespace, spec: RunSpec, recording: Recording, file
 
 
 def _names_failure(path: Path) -> bool:
-    """Tells whether a word names a failure of the newest run.
-
-    It does if it is a number or an id, and no file or folder here.
-    """
+    """Tells whether a word is a number or an id of the newest run's failures, and no file or folder here."""
     id_ = path.name
     return path.parent == Path.cwd() and not path.exists() and (id_.isdecimal() or EpisodeId.parse(id_) is not None)
 
 
 def newest_run(folder: Path) -> Path:
-    """Returns the folder of a run below `folder` that was written last, at most three levels down.
-
-    Raises:
-      ConfigError: there is none.
-    """
+    """Returns the run below `folder` that was written last, at most three levels down; raises `ConfigError`."""
     found = [file for depth in range(4) for file in folder.glob("*/" * depth + RESULTS)]
     if not found:
         raise ConfigError("RESULTS", "nothing", "the folder of a run", f"there is none below {folder}")
@@ -161,10 +153,7 @@ def _plain(failure: RecordedFailure) -> dict[str, Any]:
 
 
 def _table(run: str, failures: Sequence[RecordedFailure]) -> Table:
-    """Returns a table of failures by number, under the id of their run.
-
-    Fits 80 columns; only the last one wraps.
-    """
+    """Returns a table of failures by number, under the id of their run, in 80 columns."""
     table = narrow_table(
         "number,\nphase",
         OUTCOME,
@@ -191,7 +180,6 @@ def _table(run: str, failures: Sequence[RecordedFailure]) -> Table:
 
 
 def _of_contact(collision: Collision) -> tuple[str, ...]:
-    """Returns speeds, zones and the begin of the conflict."""
     return (
         f"{collision.ego_speed_mps:.1f}\n{collision.other_speed_mps:.1f}",
         f"{collision.ego_zone}\n{collision.other_zone}",
@@ -206,6 +194,5 @@ def _without_contact(violation: Violation) -> tuple[str, ...]:
 
 
 def _conflict(judgement: Judgement) -> str:
-    """Returns the type of a conflict, and its time after the release and place on the map."""
     began = f"{judgement.conflict_s:.1f}, {judgement.conflict_x_m:.0f} {judgement.conflict_y_m:.0f}"
     return f"{judgement.conflict_type.replace('_', ' ')}\n{began}"

@@ -44,11 +44,7 @@ def carried(family: FamilyName) -> dict[str, NDArray[np.uint8]]:
 
 
 def unpack(family: FamilyName, arrays: MutableMapping[str, NDArray[Any]]) -> None:
-    """Moves a bundle's scenario into this machine's library of scenarios.
-
-    Raises:
-      ValueError: the arrays are no such scenario.
-    """
+    """Moves a bundle's scenario into this machine's library; raises `ValueError` if the arrays are none."""
     names = [name for name in arrays if name.startswith(SCENARIO)]
     files = {name.removeprefix(SCENARIO): arrays.pop(name).tobytes() for name in names}
     if not files or family in shipped_names():

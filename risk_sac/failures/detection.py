@@ -93,10 +93,7 @@ def least_clearance_m(series: Series) -> float:
 
 
 def _surroundings(series: Series) -> tuple[Floats, Bools, Bools]:
-    """Returns the gap to each other actor, and where that actor is.
-
-    That is whether it lies behind the ego's rear, and whether it lies there in the ego's track. Each is `t x (n - 1)`.
-    """
+    """Returns gap, whether behind the ego's rear, and whether there in its track, of other actors, `t x (n - 1)`."""
     time_s = _times(series)
     bodies = np.zeros((len(time_s), ROWS, len(series["ids"])))
     for actor in range(bodies.shape[2]):
@@ -118,7 +115,6 @@ def _surroundings(series: Series) -> tuple[Floats, Bools, Bools]:
 
 
 def _times(series: Series) -> Floats:
-    """Returns the moments since the release that are looked at."""
     since = series["time_s"][series["time_s"] >= series["released_s"]]
     times: Floats = np.linspace(since[0], since[-1], (len(since) - 1) * SUBSTEPS + 1)
     return times

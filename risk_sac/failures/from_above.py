@@ -47,7 +47,7 @@ def picture(draw: Callable[[], Figure], formats: Sequence[str], dpi: float, styl
       draw: makes the figure; in the style, and while nothing else is drawn.
       formats: png | svg | pdf.
       dpi: dots per inch.
-      style: matplotlib's settings that differ from its defaults; its types name them one by one.
+      style: matplotlib's settings that differ from its defaults.
     """
     files = []
     with _DRAWING, mpl.rc_context():
@@ -141,12 +141,7 @@ def draw_from_above(
 ) -> None:
     """Draws everything on the ground.
 
-    Args:
-      axis: where to draw.
-      family: of the scene.
-      recording: of the failure, or of its twin.
-      view: corners of the ground that the axes show, m.
-      m_per_in: what an inch of the page shows.
+    `view` has the corners of the ground that the axes show, m; `m_per_in` is what an inch of the page shows.
     """
     labels = Labels(axis, *view, 1.3 * m_per_in / 72)  # the layout shrinks the axes by up to a third
     for surface in roads_of(family, recording.failure.episode.scene):
@@ -196,7 +191,6 @@ def _ghosts(recording: Recording, actor: int, apart_m: float) -> list[list[float
 
 
 def _draw_actor(axis: Axes, recording: Recording, actor: int, colour: str, *, involved: bool = False) -> None:
-    """Draws the path, and the body at the violation."""
     name = str(recording.series["ids"][actor])
     driver = Role(int(recording.series["role"][actor])).name.lower()
     x, y = recording["x_m"][:, actor], recording["y_m"][:, actor]
@@ -218,16 +212,12 @@ def _draw_body(axis: Axes, recording: Recording, actor: int, time_s: float, **st
 
 
 def _body(recording: Recording, actor: int, time_s: float) -> Floats:
-    """Returns the corners of a body, `4 x 2`, m."""
     size = recording["length_m"][actor], recording["width_m"][actor]
     return on_body(recording.pose(actor, time_s), size, BOX)
 
 
 def _draw_signals(axis: Axes, family: FamilyName, recording: Recording) -> None:
-    """Draws a bar across each lane that ends at a signal.
-
-    It shows the signal at the violation; a green one is open.
-    """
+    """Draws a bar across each lane that ends at a signal, as it is at the violation; a green one is open."""
     time_s = float(recording["released_s"]) + recording.violation.time_s
     for head in signal_heads(family, recording.failure.episode.scene):
         for mark in head.marks(time_s):
@@ -238,10 +228,7 @@ def _draw_signals(axis: Axes, family: FamilyName, recording: Recording) -> None:
 
 
 def _label_body(labels: Labels, recording: Recording, actor: int, times_s: list[float], colour: str) -> None:
-    """Writes the times beside a body, if there is room.
-
-    The side that faces away from the other body comes first.
-    """
+    """Writes the times beside a body, first on the side that faces away from the other body."""
     x, y, heading = recording.pose(actor, -times_s[0])
     partner_x, partner_y, _ = recording.pose((recording.other or 0) if actor == 0 else 0, -times_s[0])
     left = np.array((-np.sin(heading), np.cos(heading)))

@@ -86,7 +86,6 @@ class _MinimalSearch:
         return failed == HELD
 
     def bundle(self, origin: Bundle) -> Bundle:
-        """Returns the minimised failure as a bundle of its own."""
         stage, left = self.stage, self.left
         held, played, sentence = _result(stage, left, self._random)
         # A script would do all that was taken away.
@@ -122,10 +121,7 @@ def _active_adversaries(search: _MinimalSearch) -> list[int]:
 
 
 def _units(search: _MinimalSearch) -> Iterator[list[Cell]]:
-    """Yields candidates for removal, the coarsest first.
-
-    Each group is made from the actions that remain by then.
-    """
+    """Yields candidates for removal, the coarsest first, each group from the actions that remain by then."""
     always = slice(None)
     yield [(always, _columns(k)) for k in _active_adversaries(search)]
     yield [(always, slice(c, c + 1)) for c in np.flatnonzero(search.left.actions.any(axis=0)).tolist()]
@@ -134,10 +130,7 @@ def _units(search: _MinimalSearch) -> Iterator[list[Cell]]:
 
 
 def _reduce_actions(search: _MinimalSearch) -> None:
-    """Hands adversaries over to SUMO, then weakens the remaining actions.
-
-    It tries whole adversaries, then their drive or steering, then segments of 0.5 s.
-    """
+    """Hands adversaries over to SUMO: whole ones, their drive or steering, segments; then weakens the rest."""
     for units in _units(search):
         without(units, lambda cells: search.take(_zeroed(search.left, cells)))
     while search.left.actions.any() and any(search.take(_weaker(search.left, factor)) for factor in AMPLITUDES):
@@ -258,14 +251,12 @@ class _Climb:
     """State of the climb: the least unlikely motion so far."""
 
     def __init__(self, stage: VariantPlayer, score: Unlikely) -> None:
-        """Scores the recording, which the stage has just played."""
         self.stage, self._score = stage, score
         self.best = stage.original
         self.before = self.after = score(stage.evidence())
         self._random = np.random.default_rng(0)
 
     def step(self) -> None:
-        """Plays one change, and keeps it if it is better."""
         variant = replace(self.best, actions=changed(self.best.actions, self._random))
         violation = alike(self.stage.play(variant)[:1], self.stage.failure)
         if violation is None or violation.graded is not self.stage.grade:
@@ -277,7 +268,6 @@ class _Climb:
             self.best, self.after = variant, score
 
     def bundle(self, recorded: Bundle) -> Bundle:
-        """Returns the motion as a bundle, the recording within."""
         stage, best = self.stage, self.best
         held, played, sentence = _result(stage, best, self._random)
         episode = played.record(recorded.manifest.episode).model_copy(update={"script": None})
@@ -310,7 +300,6 @@ def changed(actions: Floats, random: np.random.Generator) -> Floats:
 
 
 def _moved(part: Floats, random: np.random.Generator) -> Floats:
-    """Returns a column's actions over a while, changed in one way."""
     way = random.integers(6)
     if way == 0:
         width = 2 * int(random.integers(1, 6)) + 1

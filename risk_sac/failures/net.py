@@ -146,10 +146,7 @@ def signal_heads(family: FamilyName, scene: Mapping[str, float]) -> Sequence[Sig
 
 
 def _places(lane: NetLane) -> list[tuple[float, float, float]]:
-    """Returns x, y and heading at the end of a lane.
-
-    A crossing is entered from both sides, so it has two.
-    """
+    """Returns x, y and heading at the end of a lane; a crossing is entered from both sides."""
     ends = [(lane.centre[-1], lane.centre[-1] - lane.centre[-2])]
     if lane.use == "crossing":
         ends.append((lane.centre[0], lane.centre[0] - lane.centre[1]))
@@ -222,7 +219,6 @@ class _View:
         return pixels
 
     def shows(self, surface: Surface) -> bool:
-        """Whether any of it can be seen."""
         low, high = self(surface.outline).min(axis=0), self(surface.outline).max(axis=0)
         return bool((high > 0).all() and (low < (WIDTH, HEIGHT)).all())
 
@@ -252,7 +248,6 @@ def _signal(view: _View, head: SignalHead, time_s: float) -> Iterator[str]:
 
 
 def _scale_bar(view: _View) -> Iterator[str]:
-    """Draws a length of a round number of metres at the lower left."""
     length_m = max(each for each in SCALES_M if each * view.scale <= BAR_PX)
     left, top = 6.0, HEIGHT - 6.0
     yield _line(np.array([(left, top), (left + length_m * view.scale, top)]), GREY, 1.5, "")

@@ -124,10 +124,7 @@ def repeated(env: RiskSacEnv, spec: RunSpec, episode: EpisodeRecord, recorded: S
 
 
 def twin_recording(spec: RunSpec, recording: Recording, changed: EgoConfig | None, name: str = "") -> Recording:
-    """Plays a recorded failure's twin, to be drawn beside it.
-
-    The twin bears the other ego's name.
-    """
+    """Plays a recorded failure's twin, which bears the other ego's name, to be drawn beside it."""
     played = twin(spec, recording.failure.episode, actions_of(recording.series), changed)
     told = TwinPlay.of(changed, recording.violation, played.found, name)
     return replace(recording, series=played.series, twin=told.title)
@@ -157,10 +154,7 @@ Prepared = Mapping[Path, tuple[RunResults, RiskSacEnv]]
 
 
 def _prepared(file: Path, folders: Sequence[Path]) -> Prepared:
-    """Opens the runs that can be played here.
-
-    For each other run a line states why not, such as an ego that is not installed.
-    """
+    """Opens the runs that can be played here; for each other run a line states why not."""
     prepared = {}
     for folder in folders:
         results = read_results(folder)
@@ -178,7 +172,6 @@ def _say(file: Path, *lines: dict[str, object]) -> None:
 
 
 def _tell(file: Path, runs: Prepared) -> None:
-    """Replays the first failures of each variant, and reports which repeat."""
     lines = list[dict[str, object]]()
     for folder, (results, env) in runs.items():
         try:

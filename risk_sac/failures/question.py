@@ -53,14 +53,7 @@ class TwinPlay(Record):
         violations: Sequence[Collision | Violation],
         name: str = "",
     ) -> Self:
-        """Describes a twin with another ego, or with None: without an attack.
-
-        Args:
-          ego: the other one.
-          failure: what it is the twin of.
-          violations: what was violated in the twin.
-          name: of the other ego.
-        """
+        """Describes a twin with another ego, or with None: without an attack; `violations` are the twin's."""
         changed = "no attack" if ego is None else f"ego: {name or ego.name}"
         kept = "no contact" if failure.requirement == NO_CONTACT else f"keeps {failure.requirement}"
         violated = {each.requirement: each.event for each in violations}

@@ -74,10 +74,7 @@ class Recording:
 
     @property
     def conflict_s(self) -> float | None:
-        """Time when the conflict began; None if not recorded.
-
-        It is None in a twin, without a contact, or if it was before the recording.
-        """
+        """Time when the conflict began; None in a twin, without a contact, or if it was before the recording."""
         if self.twin or self.collision is None:
             return None
         began_s = self.collision.judgement.conflict_s - self.collision.time_s
@@ -85,10 +82,7 @@ class Recording:
 
     @cached_property
     def other(self) -> int | None:
-        """Column of the touched or most relevant actor; None without one.
-
-        The ego's column is 0.
-        """
+        """Column of the touched or most relevant actor, the ego's being 0; None without one."""
         other = self.violation.other_id
         return None if other is None else [str(id_) for id_ in self.series["ids"]].index(other)
 

@@ -68,7 +68,6 @@ def regress(bundle: Bundle, ego: EgoConfig) -> Regressed:
 
 
 def _as_played(bundle: Bundle, ego: EgoConfig, played: Played) -> Bundle:
-    """Returns a bundle of how another ego fares in the scene of a failure."""
     spec = bundle.manifest.spec.model_copy(update={"ego": ego})
     episode = played.record(bundle.manifest.episode)
     return make_bundle(spec, episode, played.series, played.signal_heads, bundle.policy)
@@ -161,7 +160,6 @@ def _play(spec: RunSpec, bundle: Bundle, policy: Policy | None) -> Played:
 
 
 def _follow(spec: RunSpec, bundle: Bundle) -> Played:
-    """Plays the scripts that found the failure, from the release on."""
     with closing(RiskSacEnv.of(spec)) as env:
         follower = ScriptFollower(env.problem.family)
         follower.begin(np.array(bundle.manifest.episode.script))

@@ -35,13 +35,10 @@ NEAR_M = 5.0  # between the middles of two ways on which bodies may touch; choic
 
 
 def out_of_reach(layouts: Sequence[Layout], limits: Limits) -> list[str]:
-    """Names of the adversaries that in no scene can come near the ego's way.
+    """Names the adversaries that in no scene can come near the ego's way.
 
-    A vehicle follows lanes, over any turn, as fast as it may; what moves freely goes straight there.
-
-    Args:
-      layouts: of scenes.
-      limits: of adversaries, before those of their bodies.
+    A vehicle follows lanes, over any turn, as fast as it may; what moves freely goes straight there. `limits` are those
+    before the bodies' own.
     """
     reached: dict[str, bool] = {}
     for layout in layouts:
@@ -63,7 +60,6 @@ def out_of_reach(layouts: Sequence[Layout], limits: Limits) -> list[str]:
 
 
 def _way(net: Net, start: VehicleStart, route: Sequence[str], most_m: float) -> shapely.Geometry:
-    """All lanes of a route from a start on, and the ways between them."""
     shapes = list(_rest(net, start, most_m))
     left_m = most_m - (net.edges[route[0]].lanes[0].length_m - start.position_m)
     for edge, following in pairwise(route):
@@ -78,7 +74,6 @@ def _way(net: Net, start: VehicleStart, route: Sequence[str], most_m: float) -> 
 
 
 def _anywhere(net: Net, start: VehicleStart, most_m: float) -> shapely.Geometry:
-    """All lanes that a vehicle may get to."""
     first = start.route[0]
     shapes, been = (
         list(_rest(net, start, most_m)),
@@ -115,11 +110,7 @@ PLAYED = 20
 def try_document(document: Scenario, nets: Mapping[str, str], count: int = PLAYED, seed: int = 0) -> ScenarioCheck:
     """Checks a document, and plays scenes of it with the default ego and undisturbed traffic.
 
-    Args:
-      document: of the scenario.
-      nets: the file of each network that it names.
-      count: scenes.
-      seed: of scenes and SUMO.
+    `nets` has the file of each network that it names; `seed` is of scenes and SUMO.
 
     Raises:
       ConfigError: the document has a fault, with its path.
@@ -159,7 +150,6 @@ def try_document(document: Scenario, nets: Mapping[str, str], count: int = PLAYE
 
 
 def _remarks(checked: ScenarioCheck) -> Iterator[str]:
-    """Lists what is to be mended, one sentence each."""
     if checked.contacts:
         yield f"the default ego touches something in {checked.contacts} of {checked.played} scenes unattacked"
     if not checked.played:
@@ -205,11 +195,7 @@ def scenario_png(document: Scenario, nets: Mapping[str, str]) -> bytes:
     """Draws a scenario; equal documents give equal bytes.
 
     The view holds the ego and its adversaries in the middle of all ranges. Arrows show where they are 2 s later if they
-    go straight on; faint bodies show other starts.
-
-    Args:
-      document: of the scenario; of several nets the first scene's is drawn.
-      nets: the file of each network that it names.
+    go straight on; faint bodies show other starts. Of several nets the first scene's is drawn.
 
     Raises:
       ConfigError: none of the scenes is possible.

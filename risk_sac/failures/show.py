@@ -123,10 +123,7 @@ def _distance(axis: Axes, recording: Recording) -> None:
 
 
 def _near_m(recording: Recording) -> float:
-    """Returns a scale for the distances from 1 s before the conflict on.
-
-    The distances of the approach before it would flatten them.
-    """
+    """Returns a scale for the distances from 1 s before the conflict on; those before would flatten them."""
     began_s = -VIEW_S if recording.conflict_s is None else recording.conflict_s
     near = _least(recording, "distance_m")[recording.time_s >= began_s - 1.0]
     return 1.08 * max([LEAST_M, *map(float, near[np.isfinite(near)])])
@@ -190,7 +187,6 @@ def _name_instants(axis: Axes, recording: Recording) -> None:
 
 
 def _instants(recording: Recording) -> Iterator[tuple[float, str, str]]:
-    """Yields time, name and colour of what is marked."""
     yield 0.0, recording.moment + (" in the failure" if recording.twin else ""), "black"
     if recording.collision is not None and recording.collision.visible_for_s > 0 and not recording.twin:
         yield recording.time_s[-1] - recording.collision.visible_for_s, "in the ego's view from here", SEEN_COLOUR
@@ -217,10 +213,7 @@ def recording_bytes(family: FamilyName, recording: Recording, format_: str, twin
 
 
 def draw_recording(family: FamilyName, recording: Recording, twin: Recording | None = None) -> Figure:
-    """Draws the view from above, and one panel per kind of measurement over a common time axis.
-
-    A twin is drawn beside it, on the same ground, clock and scales.
-    """
+    """Draws the view from above, and a panel per kind of measurement; a twin beside it, on the same scales."""
     columns = [recording] if twin is None else [recording, twin]
     low, high = _extent(recording)
     view_in = PANEL_WIDTH_IN * (high - low)[1] / (high - low)[0]
@@ -248,10 +241,7 @@ def draw_recording(family: FamilyName, recording: Recording, twin: Recording | N
 
 
 def _extent(recording: Recording) -> tuple[Floats, Floats]:
-    """Computes the corners of the ground that both covered in the last seconds.
-
-    They are widened to a shape that fits the page.
-    """
+    """Computes the corners of the ground that both covered in the last seconds, widened to fit the page."""
     begin_s = recording.conflict_s
     shown = recording.time_s >= min(-VIEW_S, max(begin_s, -PANELS_S) if begin_s is not None else 0.0)
     shown &= recording.time_s < STEP_S

@@ -147,10 +147,7 @@ def edition(folder: Path) -> str:
 
 
 def read_studies(folder: Path, digest: str) -> Mapping[int, Studied]:
-    """Reads the studies of results with this digest, by episode index.
-
-    Damaged files are left out.
-    """
+    """Reads the studies of results with this digest, by episode index; damaged files are left out."""
     studies: dict[int, Studied] = {}
     for file in sorted((folder / STUDIES).glob("*.json")):
         name = _NAME.fullmatch(file.name)
@@ -225,10 +222,7 @@ class Regression(Record):
         return ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items()))
 
     def beside(self, baseline: "Regression") -> "Regression":
-        """Marks the cases that the baseline has too as known.
-
-        Such a case has the same verdict and the same failure instead.
-        """
+        """Marks the cases that the baseline has with the same verdict and the same failure instead as known."""
         known = {(case.digest, case.verdict, case.found) for case in baseline.cases}
         cases = tuple(
             case.model_copy(update={"known": (case.digest, case.verdict, case.found) in known}) for case in self.cases

@@ -59,7 +59,6 @@ def answer(question: Question) -> bytes:
 
 
 def _policy(question: Question) -> FrozenPolicy | None:
-    """Returns the policy of the failure's run, if it learns one."""
     if question.subject in ("region", "export") or not method_of(question.spec.method).learns:
         return None
     folder = question.series.parents[len(Path(FAILURES).parts)]

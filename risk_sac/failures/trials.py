@@ -223,14 +223,7 @@ def sample(fits: Sequence[Fit], count: int, seed: int) -> list[Fit]:
 
 
 def try_out(fit: Fit, family: str, episodes: int, seed: int) -> Tried:
-    """Plays at one place.
-
-    Args:
-      fit: the place.
-      family: its name in the library.
-      episodes: scenes, each without an attack and with random actions.
-      seed: of scenes, actions and SUMO.
-    """
+    """Plays at one place so many scenes, each without an attack and with random actions."""
     tried = Tried(fit)
     problem = Problem.from_spec(RunSpec(family=family, method="random", seed=0))
     for controlled in (False, True):
@@ -260,15 +253,10 @@ def _episode(env: RiskSacEnv, tried: Tried, draw: np.random.Generator, *, contro
 
 
 def meet(sim: SumoSimulation, family: str, side: int) -> float:
-    """Returns the least distance of a lone ego to a pedestrian that would meet it.
+    """Returns the least distance of a lone ego to a pedestrian that would meet it, m.
 
     The pedestrian crosses where the ego drives on an empty road, and is in the middle of its way at that moment:
-    in bends, and where the ego changes lanes, as well as on a straight road.
-
-    Args:
-      sim: plays it.
-      family: of the place; the ego starts as in the middle of its scenes.
-      side: LEFT or RIGHT, from where the pedestrian comes.
+    in bends, and where the ego changes lanes, as well as on a straight road. It comes from `side`, LEFT or RIGHT.
     """
     found = family_named(family)
     middle = found.layout(found.space.from_unit(np.full(found.space.dimension, 0.5)).values)

@@ -96,7 +96,6 @@ def square_of(x_m: float, y_m: float) -> tuple[int, int]:
 
 
 def _square(column: int, row: int) -> shapely.Polygon:
-    """Returns a square of the net with its margin."""
     x, y = column * SQUARE_M, row * SQUARE_M
     return shapely.box(x - MARGIN_M, y - MARGIN_M, x + SQUARE_M + MARGIN_M, y + SQUARE_M + MARGIN_M)
 

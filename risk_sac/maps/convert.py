@@ -52,11 +52,7 @@ def present_net(file: Path, folder: Path, name: str = "") -> Converted:
     """Writes the map as a net of the present format into `folder`.
 
     It may be a net, an OSM extract or OpenDRIVE, plain, in gzip, or in a zip archive; its content tells, not its name.
-
-    Args:
-      file: the map.
-      folder: for the net and for what comes before it.
-      name: what messages call the map; by default the file's name.
+    Messages call it `name`, or else by its file.
 
     Raises:
       MapError: it is none of them, or has left-hand traffic, or netconvert refuses it or is not there.
@@ -107,11 +103,7 @@ def limit(resource_: int, most: int, pid: int = 0) -> None:
 
 
 def netconvert() -> tuple[str, dict[str, str]]:
-    """Finds the netconvert program and its environment.
-
-    Raises:
-      MapError: it is not installed.
-    """
+    """Finds the netconvert program and its environment; raises `MapError` if it is not installed."""
     package = importlib.util.find_spec("sumo")
     for home in package.submodule_search_locations or () if package else ():
         if program := shutil.which("netconvert", path=str(Path(home) / "bin")):

@@ -126,12 +126,7 @@ class Document:
 
 
 def rewritten(upload: Path, folder: Path, name: str) -> list[Document]:
-    """Writes the documents of a file, which may be packed by gzip or zip, again into a folder.
-
-    Args:
-      upload: the file.
-      folder: for the documents, under names of ours.
-      name: what messages call the file.
+    """Writes the documents of a file, plain or packed by gzip or zip, again into a folder under names of ours.
 
     Raises:
       MapError: with the line, if the file holds what no map needs.

@@ -78,11 +78,7 @@ def junction_spots(net: Net) -> Iterator[Spot]:
 
 
 def fit_junction(net: Net, spot: Spot) -> Fit:
-    """Writes the scenario of the junction at the end of a road.
-
-    Raises:
-      NoFit: nothing crosses, or there is too little road.
-    """
+    """Writes the scenario of the junction at the end of a road; raises `NoFit` if nothing crosses, or without room."""
     edge = net.edges[spot.id]
     at = net.junctions[edge.end]
     own = approach(net, edge)
@@ -185,11 +181,7 @@ def _moving(net: Net, leg: Leg) -> Fields:
 
 
 def approach(net: Net, edge: Edge) -> Approach:
-    """Finds the ways on from a road, each from its leftmost lane.
-
-    Raises:
-      NoFit: the road is a dead end.
-    """
+    """Finds the ways on from a road, each from its leftmost lane; raises `NoFit` for a dead end."""
     by_target: dict[str, Link] = {}
     for lane in edge.drivable:  # from right to left, so that the leftmost stays
         for link in net.onward.get(lane.id, ()):
@@ -203,11 +195,7 @@ def approach(net: Net, edge: Edge) -> Approach:
 
 
 def leg(net: Net, road: Approach, name: str, onward_s: float) -> Leg:
-    """Finds a vehicle's tracks from a road across the junction.
-
-    Raises:
-      NoFit: no way has room.
-    """
+    """Finds a vehicle's tracks from a road across the junction; raises `NoFit` if no way has room."""
     links, tracks, whys = list[Link](), list[Track](), list[NoFit]()
     check_limit(road.links[0].source)
     limit_mps = road.links[0].source.limit_mps
@@ -285,10 +273,7 @@ def stream(net: Net, road: Approach) -> Track | None:
 
 
 def _others(net: Net, own: Approach) -> Mapping[str, Approach]:
-    """Finds the roads with a way that is a foe of the ego's.
-
-    Of several from one side it takes the one most square to the ego's.
-    """
+    """Finds roads with a way that is a foe of the ego's; of several from one side the one most square to it."""
     best: dict[str, tuple[float, Approach]] = {}
     for edge in net.arriving[own.edge.end]:
         links = [link for lane in edge.drivable for link in net.onward.get(lane.id, ())]

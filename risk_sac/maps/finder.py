@@ -72,11 +72,7 @@ def crossing_spots(net: Net) -> Iterator[Spot]:
 
 
 def fit_crossing(net: Net, spot: Spot) -> Fit:
-    """Writes the scenario of the crossing at the end of a road.
-
-    Raises:
-      NoFit: nothing can hide a pedestrian, or there is no room.
-    """
+    """Writes the scenario of the crossing at the end of a road; raises `NoFit` without cover or room."""
     edge = net.edges[spot.id]
     crossing = net.crossings_of[edge.end, edge.id][0]
     check_limit(edge.drivable[0])
@@ -119,7 +115,6 @@ def fit_crossing(net: Net, spot: Spot) -> Fit:
 
 
 def _parameters(own: NetLane, ego: Track, occluder: Track, *, beyond: bool) -> Fields:
-    """States all but the signal's and the road's parameters."""
     lead_m = LEAD_IN_S * top_speed(own.limit_mps)
     ego_m = at_most(FARTHEST_M, ego.room_m - FOLLOWING_M - TRUCK_LENGTH_M - lead_m)
     if beyond:
@@ -138,12 +133,10 @@ def _parameters(own: NetLane, ego: Track, occluder: Track, *, beyond: bool) -> F
 
 
 def _before(net: Net, way: Track, distance_m: str) -> Fields:
-    """Starts before the crossing at the end of a track's lane."""
     return {"lane": lane_of(net, way), "before": "crossing", "distance_m": distance_m}
 
 
 def _streams(net: Net, oncoming: Sequence[Track]) -> Fields:
-    """Oncoming vehicles, on the tracks in turns."""
     streams, gap_m = {}, SPACING_M * len(oncoming)
     for i, (name, way) in enumerate(zip(("oncoming", "oncoming_beside"), oncoming, strict=False)):
         first_m = ONCOMING_M + SPACING_M * i
@@ -167,10 +160,7 @@ def _room_wanted_m(limit_mps: float) -> float:
 
 
 def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[NetLane, Track, Track, Link]:
-    """Finds the leftmost lane for the ego beside a lane for the occluder.
-
-    The occluder is on its right. The ego's lane leads on for an episode and is clear of the occluder's.
-    """
+    """Finds the leftmost lane for the ego that leads on for an episode, beside and clear of the occluder's."""
     whys = []
     for right, own in reversed(list(pairwise(edge.drivable))):
         try:
@@ -266,13 +256,7 @@ CANDIDATES: dict[Pattern, str] = {  # what their spots are
 def survey(
     net: Net, patterns: Collection[Pattern] = tuple(FINDERS), tell: Callable[[float], None] = lambda share: None
 ) -> Survey:
-    """All places where patterns fit, and why elsewhere they do not.
-
-    Args:
-      net: where.
-      patterns: which.
-      tell: called with the share of spots that was looked at.
-    """
+    """All places where patterns fit, and why elsewhere they do not; `tell` gets the share that was looked at."""
     fits, misfits = [], []
     spots = list(_spots(net, patterns))
     for done, spot in enumerate(spots):
@@ -307,7 +291,6 @@ def _spots(net: Net, patterns: Collection[Pattern]) -> Iterator[Spot]:
 
 
 def _fit(net: Net, spot: Spot) -> Fit:
-    """Makes the place of a spot; raises `NoFit` where there is none."""
     fit = FINDERS[spot.pattern][1](net, spot)
     check_lengths(net, fit.tracks)
     return fit
@@ -334,11 +317,7 @@ class Map:
         self.net: Net = read_net(file, self._root)
 
     def fits(self, pattern: Pattern, place: str | None) -> Sequence[Fit]:
-        """Makes one place, or all places that a pattern fits.
-
-        Raises:
-          MapError: it does not fit at the one, or nowhere.
-        """
+        """Makes one place, or all that a pattern fits; raises `MapError` if it does not fit there, or nowhere."""
         if place is not None:
             return [place_at(self.net, pattern, place)]
         places = survey(self.net, (pattern,))

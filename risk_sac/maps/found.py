@@ -100,14 +100,7 @@ Fields = dict[str, Any]
 
 
 def scenario_of(spot: Spot, summary: str, tags: Sequence[str], like: Mapping[str, Any], fields: Fields) -> Scenario:
-    """Makes the document of a place.
-
-    Args:
-      spot: of the place; it names the document.
-      summary: of the place, cut off if it is too long.
-      tags: of the document.
-      like: the shipped family whose prior fits.
-      fields: parameters, ego, actors and whatever else the document has.
+    """Makes the document of a place; `like` is the shipped family whose prior fits.
 
     Raises:
       NoFit: a document may not have the net's names.
@@ -146,10 +139,7 @@ def friction() -> Fields:
 
 
 def initial_speed(name: str, low: float, limit_mps: float, meaning: str) -> Fields:
-    """States the parameter of a vehicle's initial speed.
-
-    It begins at `low`, or at half the road's limit if that is lower.
-    """
+    """States a vehicle's initial speed, which begins at `low`, or at half the road's limit if that is lower."""
     odd = "dynamic.ego_speed_mps" if name.startswith("ego") else "dynamic.vehicle_speed_mps"
     high = top_speed(limit_mps)
     return {name: number((at_most(low, high / 2), at_most(high, high)), "m/s", meaning, odd)}

@@ -40,11 +40,7 @@ class Crosswalks:
 
 
 def find_crosswalks(file: Path) -> Crosswalks:
-    """Finds the crosswalks of a map, each with its nearest road.
-
-    Raises:
-      MapError: one lacks its place.
-    """
+    """Finds the crosswalks of a map, each with its nearest road; raises `MapError` if one lacks its place."""
     at, links = defaultdict[str, set[float]](set), dict[str, set[tuple[str, str]]]()
     for _, road in ET.iterparse(file):
         if road.tag == "road":
@@ -92,11 +88,9 @@ def add_sidewalks(section: ET.Element) -> None:
 
 
 def sidewalk_options(types: Path, folder: Path) -> list[str]:
-    """Options of netconvert for sidewalks, and for edges named after where they begin.
+    """Options of netconvert for sidewalks, by SUMO's types, and for edges named after where they begin.
 
-    Args:
-      types: the folder of SUMO's types.
-      folder: that netconvert runs in; a comma in a path would make a list.
+    The types are copied into the folder that netconvert runs in, for a comma in a path would make a list.
     """
     for name in _TYPES:
         shutil.copyfile(types / name, folder / name)
@@ -151,10 +145,7 @@ Limits = Sequence[tuple[float, float | None]]  # m at which one begins, and m/s;
 def ready(file: Path, target: Path, walks: Crosswalks) -> list[str]:
     """Writes a map for netconvert; returns remarks on what it lacks and what is lost.
 
-    Args:
-      file: the map.
-      target: for netconvert.
-      walks: where roads get sidewalks, and a lane section begins.
+    Lane sections begin at the crosswalks, and their roads get sidewalks.
 
     Raises:
       MapError: netconvert could not read it.
@@ -258,10 +249,7 @@ def _of_type(kind: ET.Element, lost: Counter[str]) -> float | None:
 def _pieces(
     section: ET.Element, types: Limits, cuts: Set[float], length_m: float, lost: Counter[str]
 ) -> list[tuple[float, list[float | None]]]:
-    """Returns where a section is cut, m, and each lane's limit from there on.
-
-    A lane's own limit is ahead of the road's.
-    """
+    """Returns where a section is cut, m, and each lane's limit from there on; its own is ahead of the road's."""
     lanes = section.findall("*/lane")
     own = [_sorted((float(s.attrib["sOffset"]), _mps(s, lost)) for s in lane.iterfind("speed")) for lane in lanes]
     begins = [0.0]

@@ -47,16 +47,9 @@ class LaneWay:
 
 
 def way_on(net: Net, first: NetLane, seconds: float, through: Link | None = None, from_m: float = 0.0) -> LaneWay:
-    """Finds the straightest way on that takes `seconds` at the speed limits.
+    """Finds the straightest way on that takes `seconds` at the speed limits and uses no edge twice.
 
-    It uses no edge twice.
-
-    Args:
-      net: where.
-      first: lane that the way begins with.
-      seconds: of driving.
-      through: link that the way takes first.
-      from_m: along the first lane, from where the seconds count.
+    The seconds count from `from_m` along the first lane; `through` is the link that the way takes first.
 
     Raises:
       NoFit: every way is too short.
@@ -64,7 +57,6 @@ def way_on(net: Net, first: NetLane, seconds: float, through: Link | None = None
     tries, farthest, reached_s = TRIES, first.edge, 0.0
 
     def extend(lanes: list[NetLane], links: list[Link], gone_s: float, following: Sequence[Link]) -> LaneWay | None:
-        """Searches depth first, the straightest way first."""
         nonlocal tries, farthest, reached_s
         if gone_s > reached_s:
             farthest, reached_s = lanes[-1].edge, gone_s
@@ -126,11 +118,7 @@ def way_back(net: Net, last: NetLane, metres: float, onward: Sequence[str] = ())
 def track(net: Net, on: LaneWay, reference_m: float, beyond_m: float = 0.0) -> Track:
     """The track of a way, with the lanes that lead to it.
 
-    Args:
-      net: where.
-      on: its first lane has the reference.
-      reference_m: from the beginning of that lane.
-      beyond_m: how far beyond the reference a vehicle may start.
+    The reference lies `reference_m` from the beginning of its first lane; vehicles may start `beyond_m` beyond it.
     """
     back = way_back(net, on.lanes[0], BEFORE_M - reference_m, [lane.edge for lane in on.lanes[1:]])
     been = {lane.edge for lane in on.lanes}
@@ -171,10 +159,7 @@ def _reach(net: Net, lane: NetLane, following: Sequence[str]) -> int:
 
 
 def check_lengths(net: Net, tracks: Iterable[Track]) -> None:
-    """Raises `NoFit` if a lane on tracks is longer or shorter than its shape.
-
-    SUMO drives a lane by its `length`, and places bodies by its shape.
-    """
+    """Raises `NoFit` if a lane on tracks, which SUMO drives by its `length`, is longer or shorter than its shape."""
     for each in tracks:
         edges = [*(piece.edge for piece in each.pieces), *each.onward]
         for edge, following in zip(edges, [*edges[1:], ""], strict=True):

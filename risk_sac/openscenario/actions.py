@@ -108,12 +108,7 @@ class Variables:
         return {"value": at.number("value")}
 
     def condition(self, at: At, common: dict[str, Any]) -> VariableCondition:
-        """Reads a `VariableCondition`, or a `ParameterCondition`.
-
-        Args:
-          at: the element.
-          common: fields that all conditions have.
-        """
+        """Reads a `VariableCondition` or `ParameterCondition`; `common` has the fields that all conditions have."""
         rule = at.one_of("rule", RULES)
         if at.tag == "VariableCondition":
             name = self._name(at, "variableRef")
@@ -170,14 +165,7 @@ class ActionReader:
     """Reads actions."""
 
     def __init__(self, positions: Positions, entities: Entities, variables: Variables, remarks: list[str]) -> None:
-        """Prepares to read.
-
-        Args:
-          positions: reads places.
-          entities: that actions name.
-          variables: that actions set.
-          remarks: to which actions that are not read are added.
-        """
+        """Prepares to read; actions that are not read are added to `remarks`."""
         self._positions, self._entities, self._variables, self._remarks = positions, entities, variables, remarks
         self._readers: Mapping[str, Callable[[At], Any]] = {
             "SpeedAction": self._speed,

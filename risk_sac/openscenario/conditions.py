@@ -45,14 +45,7 @@ class ConditionReader:
     """Reads conditions and triggers."""
 
     def __init__(self, positions: Positions, entities: Entities, variables: Variables, remarks: list[str]) -> None:
-        """Prepares to read.
-
-        Args:
-          positions: reads places.
-          entities: that conditions name.
-          variables: that conditions compare.
-          remarks: to which conditions that are not read are added.
-        """
+        """Prepares to read; conditions that are not read are added to `remarks`."""
         self._positions, self._entities, self._variables, self._remarks = positions, entities, variables, remarks
         self._of_entities: Mapping[str, tuple[type[Any], str, Callable[[At], dict[str, Any]]]] = {
             "TimeHeadwayCondition": (HeadwayCondition, "time_headway", lambda at: self._to(at) | self._measured(at)),
@@ -154,7 +147,6 @@ class ConditionReader:
         return self._positions.position(at.one("Position"))
 
     def _measured(self, at: At) -> dict[str, Any]:
-        """Returns the way a distance is measured."""
         fields = _compared(at) | {"freespace": at.flag("freespace", False)}
         fields["coordinates"] = at.one_of("coordinateSystem", COORDINATES, "entity")
         if at.flag("alongRoute", False):  # of version 1.0

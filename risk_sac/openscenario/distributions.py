@@ -40,20 +40,11 @@ class Variation:
     """Reads what a variation file says of parameters."""
 
     def __init__(self, kinds: Mapping[str, str], remarks: list[str]) -> None:
-        """Prepares to read.
-
-        Args:
-          kinds: type of each parameter of the scenario file.
-          remarks: to which distributions that are not read are added.
-        """
+        """Prepares to read, with the type of each parameter; distributions that are not read are added to `remarks`."""
         self._kinds, self._remarks = kinds, remarks
 
     def read(self, block: At) -> list[Varied]:
-        """Reads the element `ParameterValueDistribution`.
-
-        Raises:
-          ConfigError: a value is wrong, a parameter is there twice, or the grid has too many points.
-        """
+        """Reads the element `ParameterValueDistribution`; raises `ConfigError`, also for too large a grid."""
         varied = list[Varied]()
         for part in block.all("Deterministic"):
             for at in part.all("DeterministicSingleParameterDistribution"):

@@ -28,13 +28,7 @@ class Catalogs:
     """Catalogs that a scenario file gives the folders of."""
 
     def __init__(self, sources: SourceFiles, file: Path, locations: At | None) -> None:
-        """Notes the folders; files are read when an entry is wanted.
-
-        Args:
-          sources: reads files.
-          file: the scenario file.
-          locations: its element `CatalogLocations`.
-        """
+        """Notes the folders of `CatalogLocations`; files are read when an entry is wanted."""
         self._sources, self._file = sources, file
         self._folders = (
             [folder for kind in locations.element.children for folder in _folders(kind)] if locations else []
@@ -132,11 +126,7 @@ def assignments(reference: At) -> dict[str, Meaning]:
 
 
 def parametrised(at: At, assigned: Mapping[str, Meaning]) -> At:
-    """Returns an element with its own `ParameterDeclarations` in its scope.
-
-    Args:
-      at: the element, in the scope outside it.
-      assigned: value of a parameter in place of the declared one.
+    """Returns an element, in the scope outside it, with its own `ParameterDeclarations`, or values in their place.
 
     Raises:
       ConfigError: a value names a parameter that is not declared before it, or an assigned one is not declared.
@@ -200,12 +190,9 @@ class Entities:
     """All entities of a scenario file, by the file's names."""
 
     def __init__(self, block: At, catalogs: Catalogs, ego: str | None) -> None:
-        """Reads the entities.
+        """Reads the element `Entities`.
 
-        Args:
-          block: the element `Entities`.
-          catalogs: where references lead.
-          ego: name of the ego; None: the one that is named Ego, or the only one with a controller.
+        The ego is that of this name; by None the one that is named Ego, or the only one with a controller.
 
         Raises:
           ConfigError: there is no ego or more than one, or an entity cannot be read.
@@ -276,7 +263,6 @@ class Entities:
 
 
 def _body(entry: At) -> BodyName:
-    """Returns the body of the category and of the nearest size."""
     box = _box(entry)
     if entry.tag == "Vehicle":
         category = entry.constant("vehicleCategory", "car")
@@ -314,7 +300,6 @@ def _box(entry: At) -> Box:
 
 
 def _ego(block: At, objects: list[At], wanted: str | None) -> str:
-    """Returns the file's name of the ego."""
     names = [at.constant("name") for at in objects]
     if wanted is not None:
         if wanted not in names:

@@ -59,11 +59,7 @@ class Parameters:
     """All parameters of a scenario file."""
 
     def __init__(self, declarations: Sequence[At], varied: Sequence[Varied] = ()) -> None:
-        """Reads the declarations.
-
-        Args:
-          declarations: elements `ParameterDeclaration`.
-          varied: what a variation file says of them.
+        """Reads elements `ParameterDeclaration`, and what a variation file says of them.
 
         Raises:
           ConfigError: one has no value, is there twice, or does not exist.
@@ -257,11 +253,7 @@ _SIGNS: Mapping[str, tuple[str, ...]] = {
 
 
 def constraints_of(parameters: Parameters) -> list[Constraint]:
-    """Returns the constraints between numbers that vary.
-
-    Raises:
-      ConfigError: a constant breaks its constraints.
-    """
+    """Returns the constraints between numbers that vary; raises `ConfigError` if a constant breaks its own."""
     return [constraint for declared in parameters.declared.values() for constraint in _of(declared, parameters)]
 
 

@@ -34,12 +34,7 @@ class Positions:
     """Reads positions, and collects routes and trajectories by name."""
 
     def __init__(self, catalogs: Catalogs, entities: Entities) -> None:
-        """Prepares to read.
-
-        Args:
-          catalogs: of routes and trajectories.
-          entities: that positions are relative to.
-        """
+        """Prepares to read."""
         self.routes: dict[str, RoutePath] = {}
         self.trajectories: dict[str, Trajectory] = {}
         self._catalogs, self._entities = catalogs, entities
@@ -202,7 +197,6 @@ class Positions:
 
 
 def _turned(at: At) -> dict[str, Any]:
-    """The heading of an element with a child `Orientation`."""
     if (turn := at.maybe("Orientation")) is None:
         return {}
     for name in ("p", "r"):

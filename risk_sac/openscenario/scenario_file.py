@@ -60,10 +60,10 @@ class Imported:
 
 
 def import_scenario(file: Path, within: Path | None = None, ego: str | None = None) -> Imported:
-    """Reads a scenario or variation file.
+    """Reads a scenario or variation file of OpenSCENARIO XML 1.0 to 1.3.
 
     Args:
-      file: of OpenSCENARIO XML 1.0 to 1.3.
+      file: to read.
       within: the folder that no other file may lie outside of; None: any that the user may read.
       ego: the entity that is the ego; None: the one that is named Ego, or the only one with a controller.
 
@@ -253,7 +253,6 @@ def _actor(entity: Entity, init: Init, *, moves: bool) -> Actor:
 
 
 def _name(stem: str) -> str:
-    """Returns a document's name for a file's."""
     plain = re.sub(r"[^a-z0-9]+", "_", stem.lower()).strip("_")
     return (plain if plain[:1].isalpha() else f"scenario_{plain}")[:_LONGEST_NAME].strip("_")
 
@@ -313,14 +312,7 @@ def missing(at: At, text: Text, sources: SourceFiles, file: Path) -> list[str]:
 
 
 def converted(at: At, text: Text, sources: SourceFiles, file: Path, remarks: list[str]) -> RoadFiles:
-    """Converts all roads that a scenario may be on.
-
-    Args:
-      at: the element that names them.
-      text: their names.
-      sources: reads files.
-      file: the scenario file.
-      remarks: to which what a road loses is added.
+    """Converts all roads that a scenario may be on; what a road loses is added to `remarks`.
 
     Raises:
       ConfigError: a road is not there, is no OpenDRIVE, or cannot be converted.

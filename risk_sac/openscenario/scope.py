@@ -49,14 +49,10 @@ class _Code(NamedTuple):
 
 
 def translated(text: str, name_of: Callable[[str], Expression]) -> Expression:
-    """Translates what stands between `${` and `}`.
-
-    Args:
-      text: the expression.
-      name_of: what a parameter's name stands for in the document; raises `ConfigError`.
+    """Translates what stands between `${` and `}`, by what a parameter's name stands for in the document.
 
     Raises:
-      ConfigError: it is no expression, or too long.
+      ConfigError: it is no expression, or too long, or a name is unknown.
     """
     if len(text) > LONGEST:
         raise ConfigError("", f"an expression of {len(text)} characters", f"at most {LONGEST}")
@@ -183,12 +179,7 @@ class NameScope:
     """Names that `$name` may stand for."""
 
     def __init__(self, find: Callable[[str], Meaning | None], names: Callable[[], list[str]]) -> None:
-        """Prepares to look names up.
-
-        Args:
-          find: the meaning of a name, or None.
-          names: all names, to suggest one.
-        """
+        """Prepares to look names up; all `names` are there to suggest one."""
         self._find, self._names = find, names
 
     def inner(self, own: Mapping[str, Meaning]) -> "NameScope":

@@ -105,10 +105,6 @@ def plain(text: str) -> str:
 def parse(content: bytes, file: str) -> XmlElement:
     """Reads the elements of a file.
 
-    Args:
-      content: the file's bytes.
-      file: what messages call it.
-
     Raises:
       ConfigError: it is no well-formed XML, has a document type, or is beyond a limit.
     """
@@ -171,22 +167,13 @@ class SourceFiles:
     """Files of one import."""
 
     def __init__(self, within: Path | None = None) -> None:
-        """Prepares to read.
-
-        Args:
-          within: the folder that no file may lie outside of; None: any that the user may read.
-        """
+        """Prepares to read within a folder that no file may lie outside of; None: any that the user may read."""
         self._within = within.resolve() if within is not None else None
         self._roots: dict[Path, XmlElement] = {}  # of files that were read
         self._count = 0
 
     def find(self, name: str, beside: Path, place: XmlElement) -> Path:
-        """Returns the path of a file or folder that an element names.
-
-        Args:
-          name: as the element has it, with either kind of slash.
-          beside: the file that the element is in.
-          place: the element.
+        """Returns the path of a file or folder that an element names, with either kind of slash, beside its file.
 
         Raises:
           ConfigError: it is not there, or outside the upload.

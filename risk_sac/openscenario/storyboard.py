@@ -72,11 +72,7 @@ class StoryboardReader:
     # Init
 
     def init(self, block: At) -> Init:
-        """Reads the element `Init`.
-
-        Raises:
-          ConfigError: an entity has no start, or one that is not read.
-        """
+        """Reads the element `Init`; raises `ConfigError` if an entity has no start, or one that is not read."""
         init = Init({entity.name: Begun() for entity in self._entities.all.values()})
         for holder in block.all("Actions"):
             for at in holder.all("GlobalAction"):

@@ -303,10 +303,7 @@ def declared(test: PairedTest) -> bool:
 
 
 def _paid_tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequence[FinishedRun]) -> Iterator[PairedTest]:
-    """Tests our own search against every other one, corrected per family.
-
-    Where it does not take part, the first method takes its place.
-    """
+    """Tests our own search, or else the first method, against every other one, corrected per family."""
     first = PAID_REFERENCE if PAID_REFERENCE in methods else methods[0]
     for family in spec.families:
         values = {
@@ -317,7 +314,6 @@ def _paid_tests(spec: CampaignSpec, methods: Sequence[MethodName], runs: Sequenc
 
 
 def _paid(run: FinishedRun) -> float | None:
-    """Counts the headline failures within the tested budget."""
     found = found_within(run, TESTED)
     return None if found is None else float(found.headline)
 

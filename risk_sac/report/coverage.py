@@ -136,12 +136,9 @@ class Axis:
 
 
 def axis_of(parameter: Parameter, whole: Parameter, bins: int) -> Axis:
-    """Divide the range of a parameter into bins.
+    """Divides the range of a parameter, as the ODD bounds it, into bins.
 
-    Args:
-      parameter: as the ODD bounds it.
-      whole: the same as its family has it; its halves are its categories, if it has some.
-      bins: of a number; a category is a bin, and a parameter with a single value is one.
+    A category is a bin: the halves of `whole`, the same as its family has it. So is a single value.
     """
     if whole.categories:
         middle = (whole.low + whole.high) / 2  # belongs to the upper half

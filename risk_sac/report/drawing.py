@@ -145,7 +145,6 @@ def _bars(comparison: Comparison, drawn: Bars) -> Figure:
 
 
 def _times(comparison: Comparison, drawn: Times) -> Figure:
-    """Histograms of the time from the adversaries' release to the conflict and to the contact."""
     family, phase = drawn.family, drawn.phase
     figure = canvas(TIMES_IN)
     conflict, contact = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -168,7 +167,6 @@ def _canvas(size: tuple[float, float]) -> tuple[Figure, Axes]:
 
 
 def _seeds(counts: Sequence[int]) -> str:
-    """Over how many runs the means were taken, in words."""
     most = max(counts, default=0)
     return ("" if len(set(counts)) < 2 else "up to ") + ("1 seed" if most == 1 else f"{most} seeds")
 

@@ -200,8 +200,7 @@ class Inputs:
 def read_folders(paths: Sequence[Path]) -> Inputs:
     """Reads runs, and says why those are missing that are not finished, not there, or damaged.
 
-    Args:
-      paths: one folder of `risk-sac evaluate`, or folders of runs that share all but family, method, seed and budget.
+    The paths are one folder of `risk-sac evaluate`, or runs that share all but family, method, seed and budget.
 
     Raises:
       ConfigError: there is no run, or they are of different campaigns.
@@ -229,11 +228,7 @@ def run_folders(paths: Sequence[Path]) -> tuple[Path, ...]:
 
 
 def campaign_in(paths: Sequence[Path]) -> tuple[CampaignSpec, Mapping[Path, RunResults]]:
-    """Reads the campaign of some folders, and the results of its runs by their folder; arguments as above.
-
-    Raises:
-      ConfigError: there is no run, or they are of different campaigns.
-    """
+    """Reads the campaign of some folders, and the results of its runs by folder; see `read_folders`."""
     whole = paths[0] if len(paths) == 1 and (paths[0] / SPEC).is_file() else None
     if whole is None:
         results = {path: read_results(path) for path in paths}
@@ -300,16 +295,9 @@ def sha256(content: bytes) -> str:
 def input_digests(
     spec: CampaignSpec, folders: Iterable[Path], *, code: str = "", regression: str = ""
 ) -> Mapping[str, str]:
-    """Digests the inputs of a report.
+    """Digests the inputs of a report: name → SHA-256.
 
-    Args:
-      spec: of the campaign.
-      folders: of its runs; files that are not there have no line.
-      code: SHA-256 over the sources that make the report; no line if empty.
-      regression: JSON of the regression in it; no line if empty.
-
-    Returns:
-      Name → SHA-256.
+    Files that are not there have no line, nor have an empty `code`, SHA-256 over the sources, and `regression`, JSON.
     """
     digests = {"campaign": spec.digest, "benchmark": sha256(MEASURED.read_bytes())}
     digests |= {"code": code} if code else {}

@@ -80,11 +80,7 @@ class PlayedGrid(Record):
 
 
 def played_grids(paths: Sequence[Path], standard: Standard = "r157") -> tuple[PlayedGrid, ...]:
-    """Reads the scenes of runs, finished or not.
-
-    Args:
-      paths: folders of runs; or of campaigns, whose runs of other methods are left out.
-      standard: the driver that tells a failure from a scene that is out of scope.
+    """Reads the scenes of runs, finished or not; of campaigns' folders, those of methods that play a story.
 
     Raises:
       ConfigError: there is no such run.
@@ -212,10 +208,7 @@ SAID = {
 
 
 def grid_junit(grids: Sequence[PlayedGrid]) -> bytes:
-    """Writes a suite for each run and a case for each scene.
-
-    Cases are grouped by the value of the first parameter that varies.
-    """
+    """Writes a suite for each run and a case for each scene, grouped by the first parameter that varies."""
     report = JUnitXml("risk-sac grid")
     for grid in grids:
         suite = TestSuite(printable(f"{grid.spec.family}.{grid.ego}"))

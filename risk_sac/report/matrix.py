@@ -75,7 +75,6 @@ class _Count:
     families: dict[str, None] = field(default_factory=dict)
 
     def add(self, family: str, *, failed: bool, reached: bool | None = None) -> None:
-        """Counts an episode."""
         self.played += 1
         self.failed += failed
         self.families[family] = None
@@ -88,10 +87,7 @@ def coverage_matrix(
 ) -> CoverageMatrix:
     """Builds the matrix of the finished runs of one campaign.
 
-    Args:
-      comparison: of its runs.
-      id_: of the campaign; the first digits of its spec's digest if empty.
-      benchmark: runs that power follows from; those that are shipped if None.
+    `id_` is the campaign's, or the first digits of its spec's digest; power follows from the benchmark's runs.
     """
     spec, id_ = comparison.spec, id_ or comparison.spec.digest[:12]
     counts: defaultdict[CellKey, _Count] = defaultdict(_Count)
@@ -272,7 +268,6 @@ def _groups(
 
 
 def _bodies_of(role: str) -> Iterator[str]:
-    """Yields the bodies that an actor of a role can have."""
     for name, body in BODIES.items():
         moving = "lanes" in body.moves if role in ("ego", "background") else body.moves != ("not",)
         if moving or role == "static":

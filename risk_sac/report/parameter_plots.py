@@ -105,7 +105,6 @@ def _slice_words(axis: BoundaryAxis, level: int) -> str:
 
 
 def _values(found: BoundaryMap, told: DriverMap, cut: tuple[int, ...]) -> Floats:
-    """The probabilities of a driver over the first two axes."""
     values = np.array(told.probability).reshape([len(axis.levels) for axis in found.axes])
     for level in reversed(cut):
         values = values[..., level]
@@ -148,13 +147,8 @@ DRIVERS: Mapping[str, tuple[str, str, str]] = {  # words, colour, dashes
 def grid_png(grids: Sequence[PlayedGrid], over: tuple[str, str], at: Mapping[str, str]) -> bytes:
     """Draws the scenes of some runs over two parameters; equal runs give equal bytes.
 
-    A place has the worst verdict of its scenes. The lines are where a driver avoids half of
-    the scenes.
-
-    Args:
-      grids: of one scenario, such as with several egos.
-      over: the parameters.
-      at: parameter → number or word; of the others only scenes with these values are drawn.
+    A place has the worst verdict of its scenes. The lines are where a driver avoids half of them. `at` has values of
+    other parameters, as text; scenes with other values are left out.
 
     Raises:
       ConfigError: a parameter is not there, or no scene has these values.
@@ -214,7 +208,6 @@ def _figure(
 
 
 def _words(chosen: Iterable[Sequence[PlayedPoint]], name: str) -> list[str]:
-    """The words that scenes have of a parameter; none of numbers."""
     values = (point.values[name] for points in chosen for point in points)
     return sorted({value for value in values if isinstance(value, str)})
 

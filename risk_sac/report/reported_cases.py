@@ -84,11 +84,7 @@ def reported_cases(
 ) -> Iterator[ReportedCase]:
     """Yields a test case for each scenario of a campaign that can still be read.
 
-    Args:
-      comparison: of the campaign's finished runs.
-      requirements: scenario → those that its episodes are monitored by.
-      estimates: scenario → bounds of its i.i.d. phase.
-      people: failures of the campaign by what people made of them; None: not known.
+    `estimates` are bounds of the i.i.d. phases; `people`, failures by what people made of them, or None if not known.
     """
     spec = comparison.spec
     for name in spec.families:

@@ -79,8 +79,8 @@ def read_run(folder: Path) -> FinishedRun:
     """Reads a finished run back.
 
     Raises:
-        ConfigError: the folder holds none, or its episodes are not those that its digest was formed over.
-        OSError: it cannot be read.
+      ConfigError: the folder holds none, or its episodes are not those that its digest was formed over.
+      OSError: it cannot be read.
     """
     results = read_results(folder)
     if not results.finished or results.digest is None:
@@ -144,10 +144,7 @@ LIMITS = (Limit("10 CPU s", cpu_s, 10.0), TESTED, Limit("300 episodes", episodes
 
 
 def found_within(run: FinishedRun, limit: Limit) -> Found | None:
-    """Counts the search's findings within the limit.
-
-    The last episode that counts has ended within it. Returns None if the search ended before the limit.
-    """
+    """Counts what the search found in episodes that ended within the limit; None if it ended before the limit."""
     spent = limit.spent(run)
     if not spent or spent[-1] < limit.most:
         return None

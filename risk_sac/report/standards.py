@@ -243,7 +243,6 @@ class SceneFacts:
 
     @cached_property
     def _of_scenario(self) -> frozenset[CellKey]:
-        """Cells of all its episodes."""
         tags, scenery = self._document.tags, self.odd.scenery
         cells = [CellKey("functional_scenarios", f"{f.road}, {f.manoeuvre}", f.behaviour) for f in functional_of(tags)]
         cells += [CellKey("tags", "tags", tag) for tag in tags]

@@ -98,17 +98,11 @@ DECIMALS = 12  # beyond which two differences are the same
 
 
 def wilcoxon_p(differences: Sequence[float]) -> float:
-    """Exact two-sided p of Wilcoxon's signed-rank test.
+    """Exact two-sided p of Wilcoxon's signed-rank test, in (0, 1]; 1 where no difference is left.
 
     Under the null hypothesis each |difference| is as likely to be positive as negative. The distribution of the rank
     sum is counted over all 2^n signs, with the mid-ranks that the differences have, so ties keep it exact.
     Choice: zero differences are left out, as Wilcoxon did; differences that only rounding tells apart are ties.
-
-    Args:
-        differences: one per pair, finite.
-
-    Returns:
-        In (0, 1]; 1 where no difference is left.
 
     Source: Wilcoxon 1945, Individual comparisons by ranking methods.
     """
@@ -172,9 +166,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def vargha_delaney(first: Sequence[float], second: Sequence[float]) -> float:
-    """Computes A12: the chance that a first value exceeds a second one.
-
-    Ties count half.
+    """Computes A12: the chance that a first value exceeds a second one; ties count half.
 
     Source: Vargha & Delaney 2000, A critique and improvement of the CL common language effect size statistics.
     """
@@ -261,10 +253,8 @@ def played_by(finished: "Sequence[FinishedRun]") -> list[PlayedCounts]:
 def power_of(spec: CampaignSpec, played: Collection[PlayedCounts], runs: Sequence[BenchmarkRun] | None = None) -> Power:
     """Returns what the budget of a campaign is worth; says so where nothing was measured at all.
 
-    Args:
-      spec: of the campaign.
-      played: by its searches so far. Only these count, but where a method has none yet in a family.
-      runs: of the benchmark; those that are shipped if None.
+    Only what its searches have `played` counts, but where a method has none yet in a family. `runs` are the
+    benchmark's; the shipped ones if None.
     """
     methods, runs = [], measured() if runs is None else runs
     if not runs:
@@ -316,13 +306,7 @@ def _shared_steps(family: str, methods: Sequence[MethodPower], runs: Sequence[Be
 
 
 def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequence[BenchmarkRun]) -> MethodPower:
-    """Returns how many known defects a method detects.
-
-    Args:
-      method: its name.
-      budgets: family → environment steps of a run, and how many runs there are, each with a seed of its own.
-      runs: of the benchmark.
-    """
+    """Returns how many known defects a method detects in its budgets by family: steps of a run, and runs."""
     defects, at_least = [], False
     of_method = [run for run in runs if run.method == method and run.family in budgets]
     for defect, family in dict.fromkeys((run.defect, run.family) for run in of_method):
@@ -356,10 +340,7 @@ def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequ
 
 
 def _chance(defect: DefectPower, seeds: int) -> float:
-    """Returns the chance that one of so many seeds detects the defect.
-
-    It is the share of all choices of that many measured runs, or of all runs, in which at least one detected it.
-    """
+    """Returns the share of all choices of so many measured runs in which at least one detects the defect."""
     chosen = min(seeds, defect.runs)
     return 1 - comb(defect.runs - defect.detected, chosen) / comb(defect.runs, chosen)
 

@@ -157,12 +157,7 @@ def driver_name(ego: EgoConfig) -> str:
 
 
 def trend(campaigns: Sequence[EndedCampaign], left_out: Iterable[LeftOut] = ()) -> Trend:
-    """Compares the versions of each ego.
-
-    Args:
-      campaigns: oldest first; a version's place is that of its first campaign.
-      left_out: those that cannot be read.
-    """
+    """Compares the versions of each ego; of campaigns, oldest first, the first places a version."""
     rows: dict[tuple[str, str], list[EndedCampaign]] = {}
     order: dict[tuple[str, str], int] = {}
     for campaign in campaigns:
@@ -183,11 +178,7 @@ def trend(campaigns: Sequence[EndedCampaign], left_out: Iterable[LeftOut] = ()) 
 
 
 def check_scenarios(campaigns: Sequence[EndedCampaign]) -> None:
-    """Refuses campaigns that were chosen to be compared and are of different scenarios.
-
-    Raises:
-      ConfigError: two of them are.
-    """
+    """Raises a ConfigError for campaigns that were chosen to be compared and are of different scenarios."""
     for campaign in campaigns[1:]:
         if set(campaign.spec.families) != set(campaigns[0].spec.families):
             said = (f"{', '.join(sorted(each.spec.families))} in {each.id}" for each in (campaigns[0], campaign))

@@ -30,10 +30,6 @@ TOUCHING_M = 0.01  # by which bodies side by side may overlap
 def check_document(document: Scenario, nets: Mapping[str, str]) -> None:
     """Refuses a document that cannot be played as it is written.
 
-    Args:
-      document: of the scenario.
-      nets: the file of each network that it names.
-
     Raises:
       ConfigError: with the path of the fault in the document.
     """
@@ -71,13 +67,7 @@ def scenes(of: Interpreter, count: int = SCENES) -> Iterator[Scene]:
 
 
 def bodies_of(layout: Layout, net: Net, after_s: float = 0.0) -> dict[str, Floats]:
-    """Corners of each actor, `4 x 2`, m.
-
-    Args:
-      layout: of the scene.
-      net: of the layout.
-      after_s: time since the start, in which all go on straight ahead at their initial speeds.
-    """
+    """Corners of each actor, `4 x 2`, m, so long after the start if all go on straight at their initial speeds."""
     boxes = {start.id: _in_lane(start, net) for start in (layout.ego, *layout.vehicles)}
     boxes |= {start.id: _box(start.x_m, start.y_m, start.heading_rad, start.shape) for start in layout.pedestrians}
     speeds_mps = {start.id: start.speed_mps for start in (layout.ego, *layout.vehicles)}
@@ -150,7 +140,6 @@ def _check_range(of_term: Term, of: Interpreter, path: str, text: Expression) ->
 
 
 def _check_names(of_term: Term, of: Interpreter, path: str, text: Expression) -> None:
-    """Refuses names that are no numbers of the document."""
     if unknown := sorted(of_term.names() - of.numbers):
         name, known = unknown[0], sorted(of.numbers)
         words = name in of.document.words

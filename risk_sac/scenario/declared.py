@@ -76,10 +76,7 @@ class SceneLaw:
     ) -> "SceneLaw":
         """The distribution over a scene space that an ODD may have narrowed.
 
-        Args:
-          space: the scene space; a parameter that the document lacks, such as friction, has all values alike.
-          parameters: of the document.
-          correlation: between parameters of the document.
+        A parameter that the document lacks, such as friction, has all values alike.
 
         Raises:
           ConfigError: a distribution has no mass between its parameter's bounds.

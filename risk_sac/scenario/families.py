@@ -123,12 +123,7 @@ SAMPLED = 64  # scenes whose layouts say which roads a scenario has
 
 
 def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Family:
-    """Returns the family of a document.
-
-    Args:
-      document: of the scenario.
-      nets: the file of each network that it names, below `sumo_nets/` or anywhere.
-      name: of the family; the document's own if it is left out.
+    """Returns the family of a document, whose nets lie below `sumo_nets/` or anywhere, by its own name or another.
 
     Raises:
       ConfigError: the document does not fit its nets.
@@ -239,11 +234,7 @@ def _shipped(name: str) -> Family:
 
 
 def family_named(name: str, deviation: DeviationBounds | None = None) -> Family:
-    """Returns a family, shipped or of the library.
-
-    Args:
-      name: of the family.
-      deviation: bounds that take the place of those of its story; None keeps these.
+    """Returns a family, shipped or of the library; `deviation` takes the place of the bounds of its story.
 
     Raises:
       ConfigError: no family has this name.
@@ -261,10 +252,7 @@ def _kept(name: str, deviation: DeviationBounds | None) -> Family:
 
 
 def density_of(name: str) -> Callable[[Mapping[str, float]], float]:
-    """Returns the declared density of a family's scenes, as a multiple of the uniform one.
-
-    It is 1 everywhere where the family declares no distribution, or is gone.
-    """
+    """Returns the declared density of a family's scenes; 1 where none is declared or the family is gone."""
     try:
         declared = family_named(name).declared
     except ConfigError:

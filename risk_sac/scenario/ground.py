@@ -43,10 +43,7 @@ SPARE_M = CAR_WIDTH_M / 2 + 0.1  # of the box of a waiting vehicle from the midd
 
 
 def outlines(link: Link, length_m: float, width_m: float) -> Floats:
-    """Samples points on both sides of a vehicle along its way.
-
-    Returns x and y in rows, m.
-    """
+    """Samples points on both sides of a vehicle along its way; x and y in rows, m."""
     line = np.array([*link.source.line, *link.line, *link.target.line])
     station_m = _stations_m(line)
     stop_m = station_m[len(link.source.line) - 1]
@@ -85,9 +82,7 @@ def too_near(net: Net, link: Link) -> Link | None:
 
 
 def truck_reaches(net: Net, beside: Link, own: Link) -> bool:
-    """Tells whether a truck reaches into a car on the way beside it.
-
-    Both cross the junction.
+    """Tells whether a truck reaches into a car on the way beside it; both cross the junction.
 
     Where their lanes fork into several of the next road, SUMO's drivers may take any of them.
     """
@@ -107,10 +102,7 @@ def _come_near(line: Sequence[Point], other: Sequence[Point]) -> bool:
 
 
 def waits_in_the_way(net: Net, link: Link) -> NetLane | None:
-    """Finds a priority lane that a car waiting for it reaches into.
-
-    Returns None if the way is clear.
-    """
+    """Finds a priority lane that a car waiting for it reaches into; None if the way is clear."""
     for before, behind in pairwise(link.inside):
         for lane in net.waits_for.get(behind.id, ()):
             joins = lane.line[-1] == link.inside[-1].line[-1]
@@ -120,10 +112,7 @@ def waits_in_the_way(net: Net, link: Link) -> NetLane | None:
 
 
 def _off_m(waiting: NetLane, other: NetLane) -> float:
-    """Computes a lane's distance from a car that waits at another's end.
-
-    It is 0 if the lane comes within the car.
-    """
+    """Computes a lane's distance from a car that waits at another's end; 0 if it comes within the car."""
     (x, y), heading = waiting.line[-1], waiting.way_out_rad
     cos, sin = math.cos(heading), math.sin(heading)
     dx, dy = _sampled(np.array(other.line)) - np.array([[x], [y]])
@@ -187,12 +176,10 @@ class GroundAreas(NamedTuple):
 
 @cache
 def ground_of(file: str, places: tuple[Point, ...], *, walked: bool) -> GroundAreas:
-    """Returns the ground of a net around places.
+    """Returns the ground of a net around places, x and y, m.
 
-    Args:
-      file: the net's; beside it may lie a `ground.json`, which says it for the whole net.
-      places: x and y, m.
-      walked: whether pedestrians may get there; if not, crossings and roadway are left out.
+    Beside the file may lie a `ground.json`, which says it for the whole net. Crossings and roadway are left out if no
+    pedestrian may get there.
     """
     measured = Path(str(files("sumo_nets"))) / Path(file).parent / GROUND_FILE
     if measured.exists():
@@ -230,7 +217,6 @@ def _around(net: Net, x_m: float, y_m: float, *, walked: bool) -> tuple[Polygons
 
 
 def _rounded(polygons: Iterable[Sequence[Point]]) -> Iterator[tuple[Point, ...]]:
-    """To a millimetre."""
     return (tuple((round(x, 3), round(y, 3)) for x, y in polygon) for polygon in polygons)
 
 

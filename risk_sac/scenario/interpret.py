@@ -84,11 +84,7 @@ class Interpreter:
         return Value(numbers, words)
 
     def layout(self, xi: Mapping[str, float]) -> Layout:
-        """The start of an episode.
-
-        Raises:
-          InfeasibleScene: a constraint does not hold, or a value does not exist.
-        """
+        """The start of an episode; raises `InfeasibleScene` if a constraint fails, or a value does not exist."""
         try:
             value = self.value(xi)
             for number, constraint in enumerate(self.document.constraints):
@@ -187,5 +183,4 @@ def _check_way(layout: Layout) -> None:
 
 
 def _part(share: float, parts: int) -> int:
-    """Returns the index of the equal part of [0, 1] that has a share."""
     return min(int(share * parts), parts - 1)

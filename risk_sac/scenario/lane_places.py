@@ -59,12 +59,8 @@ def nearest_lane(
 ) -> LanePlace | None:
     """Returns the place on the nearest lane for cars within 30 m.
 
-    Args:
-      net: where.
-      x_m: of the point.
-      y_m: of the point.
-      heading_rad: within 90° of which the lane leads; None: any lane.
-      among: original names of lanes that are preferred, such as `0_-4`.
+    The lane leads within 90° of the heading, if there is one; lanes with the original names `among` are preferred, such
+    as `0_-4`.
     """
     lanes, rows, tree = _pieces(net)
     if not (math.isfinite(x_m) and math.isfinite(y_m)):
@@ -114,7 +110,6 @@ def lanes_ahead(net: Net, lane: NetLane, length_m: float, edges: Sequence[str] =
 
 
 def _through(net: Net, lane: NetLane) -> Link | None:
-    """Returns the link that a lane inside a junction is part of."""
     return next((link for links in net.onward.values() for link in links if lane in link.inside), None)
 
 

@@ -82,13 +82,9 @@ def shifted_groups(story: Story) -> Iterator[tuple[str, ...]]:
 
 
 def settled(part: Any, of: Callable[[Any, str], float], choose: Callable[[Any], Any], path: str = "") -> Any:
-    """Replaces expressions by their values, and choices by what is chosen.
+    """Replaces expressions by their values, and choices by what is chosen, in settings, or mappings or tuples of some.
 
-    Args:
-      part: settings, or a mapping or tuple of some.
-      of: the value of an expression, given its path.
-      choose: what a choice stands for.
-      path: of the part in its document.
+    `path` is the part's in its document.
     """
     if isinstance(part, Chosen):
         return settled(choose(part), of, choose, path)

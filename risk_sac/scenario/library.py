@@ -59,12 +59,7 @@ def written(document: Scenario) -> str:
 
 
 def own_files(document: Scenario, nets: Mapping[str, str]) -> dict[str, bytes]:
-    """Reads a document's own nets and road files, by its names for them.
-
-    Args:
-      document: of the scenario.
-      nets: as `nets_of` returns them.
-    """
+    """Reads a document's own nets and road files, by its names for them; `nets` as `nets_of` returns them."""
     own = {name: Path(file) for name, file in nets.items() if Path(file).is_absolute()}
     folders = {file.parent for file in own.values()}
     own |= {name: folder / name for name in roads(document) for folder in folders if (folder / name).is_file()}
@@ -72,14 +67,9 @@ def own_files(document: Scenario, nets: Mapping[str, str]) -> dict[str, bytes]:
 
 
 def keep(document: Scenario, own: Mapping[str, bytes]) -> str:
-    """Puts a scenario into the library.
+    """Puts a scenario into the library; returns its name, that of the document and a digest.
 
-    Args:
-      document: of the scenario.
-      own: network of the document → its SUMO net, shipped ones left out; road → its OpenDRIVE file.
-
-    Returns:
-      Its name, that of the document and a digest.
+    `own` has the SUMO nets of its networks, without shipped ones, and the OpenDRIVE files of its roads.
 
     Raises:
       ConfigError: a net has no name of a file, or the library cannot be written.
@@ -164,9 +154,7 @@ def listed() -> list[str]:
 
 
 def prune(folder: Path, named: Collection[str], unused_s: float, started_at: float) -> list[str]:
-    """Removes a service's scenarios that are old and not named.
-
-    Returns their names.
+    """Removes a service's scenarios that are old and not named; returns their names.
 
     Args:
       folder: the library; never that of a person, whose run folders are unknown.

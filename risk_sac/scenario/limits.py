@@ -135,7 +135,6 @@ class Limits:
         return replace(self, **own) if own else self
 
     def _narrowed(self, name: str) -> float:
-        """Returns a bound as a share of the behaviour's preset, at most 1."""
         if name not in PRESETS:
             return 1.0
         field, end = PRESETS[name]
@@ -223,10 +222,7 @@ class Conditions(NamedTuple):
 def with_environment(space: SceneSpace, user: Odd, odd: Odd) -> SceneSpace:
     """Returns a family's space with the parameters that a user's environment adds or widens.
 
-    Args:
-      space: of the family.
-      user: as the user stated it; the ego is no part of the rule, so that another ego can play the same scenes.
-      odd: the user's and the family's together.
+    The ego is no part of the rule, so that another ego can play the same scenes. `odd` is the user's and the family's.
     """
     environment, parameters = odd.environment, list(space.parameters)
     for index, parameter in enumerate(parameters):

@@ -55,25 +55,14 @@ class StoryPlaces:
     """Places of one net and of the road file that it was converted from."""
 
     def __init__(self, net: Net, road: RoadFile | None, story: Story, value: Value) -> None:
-        """Prepares to find places.
-
-        Args:
-          net: SUMO's.
-          road: the OpenDRIVE file; without it only points, relative positions and SUMO's lanes can be found.
-          story: with the routes and trajectories that positions name.
-          value: of the scene's parameters.
-        """
+        """Prepares to find places; without a `road` only points, relative positions and SUMO's lanes are found."""
         self._net, self._road, self._story, self._value = net, road, story, value
         self._open = list[str]()  # trajectories that are being resolved
 
     # Positions
 
     def pose(self, position: Position, of: Of) -> Pose:
-        """Returns the pose of a position in the net's coordinates.
-
-        Args:
-          position: in the road file's coordinates.
-          of: returns the present pose of an actor's reference point.
+        """Returns the pose of a position of the road file in the net's coordinates; `of` has actors' present poses.
 
         Raises:
           ConfigError: there is no such place; `field` is that of the position.
@@ -93,7 +82,6 @@ class StoryPlaces:
         return here if near is None else here._replace(heading_rad=spot_pose(near).heading_rad)
 
     def _base(self, position: Position, of: Of) -> Pose:
-        """Returns the pose of a position without its own heading."""
         number = self._number
         match position.kind:
             case "lane":
@@ -205,12 +193,7 @@ class StoryPlaces:
     # Places of poses
 
     def spot(self, pose: Pose, on: OnRoad | None = None) -> LanePlace | None:
-        """Returns the place on the nearest lane within 30 m, or None.
-
-        Args:
-          pose: in the net's coordinates.
-          on: place on the road file's lane, whose lanes of the net are preferred.
-        """
+        """Returns the place on the nearest lane within 30 m, or None; the lanes of the net at `on` are preferred."""
         among = (f"{on.road}_{on.lane}",) if on is not None else ()
         return nearest_lane(self._net, pose.x_m, pose.y_m, pose.heading_rad, among)
 
@@ -249,12 +232,7 @@ class StoryPlaces:
     # Lines
 
     def trajectory(self, name: str, of: Of, start: Pose | None = None) -> TravelLine:
-        """Returns the line of a trajectory.
-
-        Args:
-          name: of the story's trajectory.
-          of: returns the present pose of an actor's reference point.
-          start: where a trajectory begins that does not say it.
+        """Returns the line of one of the story's trajectories; `start` is for one that does not say where it begins.
 
         Raises:
           ConfigError: there is none of this name, it names itself, or its times go back.
@@ -317,7 +295,6 @@ class StoryPlaces:
         return (*path.waypoints, path.waypoints[0]) if path.closed else path.waypoints
 
     def _legs(self, name: str, of: Of) -> list[RoadLeg]:
-        """Returns the legs of a route, from its first waypoint to its last."""
         places = [
             self.on_road(waypoint) if isinstance(waypoint, LanePosition) else self.opendrive(self.pose(waypoint, of))
             for waypoint in self._waypoints(name)
@@ -364,12 +341,9 @@ class StoryPlaces:
         return there if leg.forward else there._replace(heading_rad=there.heading_rad + math.pi)
 
     def ahead(self, spot: LanePlace, length_m: float, edges: Sequence[str] = ()) -> TravelLine:
-        """Returns the way on from a place, along the middles of lanes.
+        """Returns the way on from a place, without its offset, along the middles of lanes.
 
-        Args:
-          spot: where it begins; its offset is left out.
-          length_m: of the line; it is shorter where no lane goes on.
-          edges: of a route; without them, and after them, the straightest way.
+        It is shorter than `length_m` where no lane goes on; without edges, and after them, it is the straightest.
         """
         place = self._named(spot)
         if place is None:
@@ -384,7 +358,6 @@ class StoryPlaces:
         return self._leg_lines(legs)
 
     def _named(self, spot: LanePlace) -> OnRoad | None:
-        """Returns the place on the road file's lane of a net's lane, or None."""
         if self._road is None:
             return None
         x_m, y_m, _ = lane_line(spot.lane).pose(spot.at_m)

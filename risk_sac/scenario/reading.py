@@ -30,10 +30,7 @@ def read_document(file: Path, field: str = "scenario") -> Scenario:
 
 
 def document_from(text: str) -> Scenario:
-    """Reads a document from text.
-
-    Args:
-      text: YAML or JSON.
+    """Reads a document from YAML or JSON.
 
     Raises:
       ConfigError: it is too long, no YAML, names a field twice, or is no document; `field` is the path.
@@ -201,11 +198,7 @@ def _alternatives(document: Scenario, name: Net) -> Iterable[str]:
 
 
 def nets_of(document: Scenario, folder: Path | None = None) -> Mapping[str, str]:
-    """Finds the file of each network that a document names.
-
-    Args:
-      document: of the scenario.
-      folder: beside which its own nets lie; None: it has shipped ones alone.
+    """Finds the file of each network that a document names, its own beside a folder, if there is one.
 
     Raises:
       ConfigError: a net or a road file is not there.
@@ -224,5 +217,4 @@ def nets_of(document: Scenario, folder: Path | None = None) -> Mapping[str, str]
 
 
 def _beside(name: str, folder: Path) -> bool:
-    """Whether a name is that of a file in a folder."""
     return "/" not in name and not name.startswith(".") and (folder / name).is_file()

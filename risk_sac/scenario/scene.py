@@ -70,7 +70,6 @@ def motion_of(document: Scenario, name: str, body: BodyName) -> Motion:
 
 
 def _after(route: tuple[str, ...] | None, lane: str) -> tuple[str, ...]:
-    """The route after an edge."""
     return route[route.index(lane) + 1 :] if route and lane in route else ()
 
 
@@ -78,15 +77,7 @@ class SceneLayout:
     """One scene of a document while its layout is made."""
 
     def __init__(self, document: Scenario, value: Value, file: str, net: Net, longest_s: float) -> None:
-        """Prepares to make it.
-
-        Args:
-          document: of the scenario.
-          value: of the scene's parameters.
-          file: of the scene's net.
-          net: its contents.
-          longest_s: longest episode of the scenario; roads lead on for so long.
-        """
+        """Prepares to make it; roads lead on for `longest_s`, the scenario's longest episode."""
         self._value, self._document, self._file, self._net = value, document, file, net
         self._driven_s = longest_s + LEAD_IN_S
         self._placed: dict[str, OnTrack] = {}
@@ -237,7 +228,6 @@ class SceneLayout:
                 raise ConfigError(f"{path}.start.{field}", f"{stated:g}", "0 for an actor that moves so", remedy)
 
     def _place(self, name: str, moving: Moving, path: str) -> OnTrack:
-        """Places an actor on its track."""
         start, of = moving.start, self._value.of
         if (other := start.reference) is not None:
             if other not in self._placed:
@@ -302,7 +292,6 @@ class SceneLayout:
         return BODIES[self._bodies[name]].sized(self._size_m(name)).length_m
 
     def _size_m(self, name: str) -> tuple[float, float] | None:
-        """Length and width that the document states of an actor's body."""
         moving = self._document.ego if name == EGO else self._document.actors[name]
         box = self._value.choose(moving.box)
         return None if box is None else (box.length_m, box.width_m)
@@ -373,11 +362,7 @@ class SceneLayout:
         return x_m, y_m, *_unit(along_rad + turned)
 
     def _stream(self, name: str, stream: Stream) -> Iterator[VehicleStart]:
-        """Its vehicles.
-
-        One that would be too close to another on its lane starts behind that, or is left out where the road is too
-        short.
-        """
+        """Its vehicles; one too close to another on its lane starts behind that, or is left out without room."""
         value, path = self._value, f"streams.{name}"
         body = body_named(value.word(stream.body), f"{path}.body")
         gap_m, speed_mps = value.of(stream.gap_m, f"{path}.gap_m"), value.of(stream.speed, f"{path}.speed")
@@ -406,7 +391,6 @@ class SceneLayout:
                 yield place.before_m + (reach_m[piece.edge, piece.lane] - piece.reach_m), self._speeds[name]
 
     def _signal(self) -> str | None:
-        """Returns the traffic light that the document's `signal` times; see `SignalTiming`."""
         named = self._document.signal.id
         if named is not None and named not in self._net.programs:
             known = ", ".join(self._net.programs) or "the net has none"

@@ -103,10 +103,7 @@ class SceneSpace:
         return points[[self.allows(point) for point in points]]
 
     def to_unit(self, scene: Scene) -> Floats:
-        """Maps a scene into the unit cube, `d`.
-
-        A parameter without room maps to 0.
-        """
+        """Maps a scene into the unit cube, `d`; a parameter without room maps to 0."""
         self.check(scene)
         offset = np.array([scene.values[name] for name in self.names]) - self.low
         width = self.high - self.low
@@ -247,11 +244,7 @@ class Grid:
 
 
 def grid_of(space: SceneSpace, parameters: Mapping[str, ScenarioParameter]) -> Grid:
-    """Makes the grid of a scene space.
-
-    Args:
-      space: the scenario's, narrowed by an ODD.
-      parameters: of the scenario's document; a parameter of the space that is not among them has a range without step.
+    """Makes the grid of a scene space that an ODD narrowed; what the document lacks has a range without step.
 
     Raises:
       ConfigError: the ODD leaves none of a parameter's values.

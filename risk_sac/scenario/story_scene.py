@@ -99,13 +99,7 @@ class StoryScene:
     def route(self, name: str, lane: NetLane, metres: float) -> tuple[str, ...] | None:
         """Returns the edges of an actor's first trajectory or route of the story, and straight on after it.
 
-        Args:
-          name: the actor.
-          lane: on which it starts.
-          metres: after which the way may end.
-
-        Returns:
-          The edges, or None where the story states no way.
+        The way may end after so many metres. None where the story states no way.
 
         Raises:
           ConfigError: there is no such way.
@@ -144,14 +138,7 @@ class StoryScene:
         free: Mapping[str, bool],
         ego: VehicleStart,
     ) -> StoryPlan:
-        """Everything that the engine needs.
-
-        Args:
-          bodies: of all actors of the scene.
-          speeds_mps: at which they start.
-          free: of each actor that moves, whether it moves anywhere.
-          ego: its start.
-        """
+        """Everything that the engine needs; `free` says of each actor that moves whether it moves anywhere."""
         actors, others = dict[str, StoryActor](), dict[str, StoryActor]()
         for name, body in bodies.items():
             start = StoryActor(self.pose(name), speeds_mps.get(name, 0.0), self.reach(name, body), free.get(name, True))

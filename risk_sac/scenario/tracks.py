@@ -110,14 +110,7 @@ def _links(net: Net, lane: NetLane, edge: str) -> list[Link]:
 
 
 def routed(net: Net, lane: NetLane, reference_m: float, route: Sequence[str], field: str) -> Track:
-    """The track of a route that is written down, with the lane of the reference on it.
-
-    Args:
-      net: where.
-      lane: with the reference.
-      reference_m: from the lane's beginning.
-      route: edges, or lanes.
-      field: path of the route in the document.
+    """The track of a route of edges or lanes, with the lane of the reference, m from its beginning, on it.
 
     Raises:
       ConfigError: an edge is not there, two do not meet, or the lane is not on it.
@@ -143,15 +136,9 @@ def routed(net: Net, lane: NetLane, reference_m: float, route: Sequence[str], fi
 
 
 def straight_on(net: Net, lane: NetLane, reference_m: float, metres: float, turn: str | None, field: str) -> Track:
-    """The track that goes straight on from a lane, after a turn if one is given.
+    """The track that goes straight on from a lane, after a turn at its end if one is given.
 
-    Args:
-      net: where.
-      lane: with the reference.
-      reference_m: from the lane's beginning.
-      metres: after which the way may end.
-      turn: left, straight or right, at the lane's end.
-      field: path of the turn in the document.
+    The reference lies `reference_m` from the lane's beginning; the way may end after so many metres.
 
     Raises:
       ConfigError: the lane does not turn so.
@@ -186,11 +173,7 @@ def _ahead(
 ) -> tuple[list[NetLane], list[Link], list[str]]:
     """Lanes that follow a lane without a lane change, the links to them, and the edges after these.
 
-    Args:
-      net: where.
-      lane: the first one.
-      edges: after its own.
-      route: the same, each as an edge, or as the lane to take.
+    `route` has each of the `edges` as an edge, or as the lane to take.
     """
     lanes, links = [lane], list[Link]()
     for edge, item in zip(edges, route, strict=True):

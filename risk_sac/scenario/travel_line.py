@@ -43,12 +43,7 @@ class TravelLine:
         return float(self.station_m[-1])
 
     def pose(self, station_m: float, left_m: float = 0.0) -> Pose:
-        """Returns the pose at a station; before its begin and beyond its end the line goes straight on.
-
-        Args:
-          station_m: along the line.
-          left_m: of the line, at right angles to its direction of travel.
-        """
+        """Returns the pose at a station, `left_m` of the line, which goes straight on before and beyond."""
         i = self._piece(station_m)
         (x0, y0), (x1, y1) = self.points[i], self.points[i + 1]
         length = self.station_m[i + 1] - self.station_m[i]
@@ -60,10 +55,7 @@ class TravelLine:
         return Pose(float(x), float(y), float(heading))
 
     def project(self, x_m: float, y_m: float) -> tuple[float, float]:
-        """Returns the station of a point and how far left of the line it is.
-
-        Its begin and its end go straight on, so that a station may be negative or more than the length.
-        """
+        """Returns a point's station and how far left of the line it is; both ends of the line go straight on."""
         begins, steps = self.points[:-1], np.diff(self.points, axis=0)
         lengths = np.diff(self.station_m)
         safe = np.maximum(lengths, SAME_M)
@@ -106,7 +98,6 @@ class TravelLine:
         return float(np.interp(time_s, self.times_s, self.station_m))
 
     def _piece(self, station_m: float) -> int:
-        """Returns the piece of a station, which has a length."""
         i = int(np.searchsorted(self.station_m, station_m, side="right")) - 1
         i = min(max(i, 0), len(self.station_m) - 2)
         lengths = np.diff(self.station_m)
@@ -123,13 +114,7 @@ def _side(left: float, beyond: float) -> float:
 
 
 def line_of(points: Floats, heading: Floats | None = None, times_s: Floats | None = None) -> TravelLine:
-    """Returns the line through points.
-
-    Args:
-      points: `n x 2`; two at least that differ.
-      heading: `n`; without it the direction of travel.
-      times_s: `n`.
-    """
+    """Returns the line through points, `n x 2`, of which two differ; without headings, in the direction of travel."""
     keep = np.concatenate(([True], np.hypot(*np.diff(points, axis=0).T) > SAME_M))
     if heading is None:
         points, times_s = points[keep], None if times_s is None else times_s[keep]
@@ -147,12 +132,9 @@ def directions(points: Floats) -> Floats:
 
 
 def polyline(corners: Floats, facing: Sequence[float | None], times_s: Floats | None = None) -> TravelLine:
-    """Returns a line of straight pieces.
+    """Returns a line of straight pieces through corners, `n x 2`.
 
-    Args:
-      corners: `n x 2`.
-      facing: `n` headings of the body, which turns evenly between corners; None: the direction of travel.
-      times_s: `n`.
+    A body that faces `n` headings turns evenly between corners; else it faces the direction of travel.
     """
     points, heading, times = list[Floats](), list[float](), list[float]()
     for i in range(len(corners) - 1):
@@ -176,13 +158,9 @@ Number = Callable[[str | float, str], float]
 
 
 def trajectory_line(trajectory: Trajectory, resolve: Resolve, number: Number, start: Pose | None) -> TravelLine:
-    """Returns the line of a trajectory in the net's coordinates.
+    """Returns the line of a story's trajectory in the net's coordinates.
 
-    Args:
-      trajectory: of the story.
-      resolve: returns the pose of a position.
-      number: returns the value of an expression; its path is for errors.
-      start: where a clothoid begins that does not say it.
+    `start` is where a clothoid begins that does not say it; an expression's path is for errors.
 
     Raises:
       ConfigError: it has no length, no begin, or times that go back.
@@ -210,7 +188,6 @@ def _polyline(trajectory: Polyline, resolve: Resolve, number: Number) -> TravelL
 
 
 def _is_faced(position: Position) -> bool:
-    """Whether a position states a heading of its own."""
     if isinstance(position, WorldPosition):
         return position.heading_rad is not None
     return position.heading == "absolute" or position.heading_rad != 0.0

@@ -39,10 +39,7 @@ class Observed(NamedTuple):
 
 
 def observed_of(evidence: Evidence) -> list[Observed]:
-    """Lists the features of all adversaries that acted, in the frames from the release on.
-
-    An adversary acts if it moves.
-    """
+    """Lists the features of all adversaries that acted, that is moved, in the frames from the release on."""
     observed: list[Observed] = []
     path = None
     released = int(np.searchsorted(evidence.time_s, -1e-6))
@@ -84,11 +81,7 @@ def _vehicle(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Obse
 
 
 def _around(e: Evidence, actor: int, frames: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
-    """Computes where all actors are, as seen from one.
-
-    Returns:
-      Metres ahead, metres to its left, cosine of the angle between the headings; each `F x n`.
-    """
+    """Computes metres ahead of one actor and to its left, and the cosine of the headings; each `F x n`."""
     heading = e.heading_rad[frames, actor][:, None]
     dx, dy = e.x_m[frames] - e.x_m[frames, actor][:, None], e.y_m[frames] - e.y_m[frames, actor][:, None]
     cos, sin = np.cos(heading), np.sin(heading)
@@ -195,10 +188,7 @@ def _junctions(
 
 
 def _arrives_after(e: Evidence, actor: int, frame: int) -> float | None:
-    """Finds when a vehicle with priority reaches the actor's way, s.
-
-    The way is that since `frame`, from which the time counts. None if no such vehicle does.
-    """
+    """Finds when a vehicle with priority reaches the actor's way since `frame`, s from then; None if none does."""
     x, y = e.x_m[frame:, actor], e.y_m[frame:, actor]
     soonest = None
     for other in np.flatnonzero(e.kind == Kind.VEHICLE).tolist():
@@ -249,10 +239,7 @@ def _walker(e: Evidence, actor: int, frames: NDArray[np.intp], seen: BodyOnPath[
 def _steps_out(
     e: Evidence, actor: int, frames: NDArray[np.intp], on_road: Bools, on_crossing: Bools, seen: BodyOnPath[Floats]
 ) -> Iterator[Observed]:
-    """Measures how a pedestrian steps onto the road.
-
-    It does so on red, or before a gap where it has no priority.
-    """
+    """Measures how a pedestrian steps onto the road on red, or before a gap where it has no priority."""
     for t in (np.flatnonzero(on_road[1:] & ~on_road[:-1]) + 1).tolist():
         frame, link = int(frames[t]), int(e.link[frames[t], actor])
         time_s = float(e.time_s[frame])
@@ -268,11 +255,7 @@ def _steps_out(
 
 
 def pedal_changes(held: Floats, time_s: Floats) -> tuple[float, float]:
-    """Counts changes between gas and brake in the 5 s with most.
-
-    Returns:
-      The number, and the time of the last of them.
-    """
+    """Counts changes between gas and brake in the 5 s with most; returns the time of the last as well."""
     touched = np.flatnonzero(np.abs(held) > TOUCHED_MPS2)
     changed = touched[1:][np.diff(np.sign(held[touched])) != 0]
     if not len(changed):
@@ -293,10 +276,7 @@ def smoothed(values: Floats, frames: int = SMOOTH) -> Floats:
 
 
 def runs(does: Bools) -> list[tuple[int, int]]:
-    """Lists the stretches in which a condition holds.
-
-    Each is its first frame and the one after its last.
-    """
+    """Lists stretches in which a condition holds: the first frame and the one after the last."""
     flags, found, last = does.tobytes(), [], 0  # ten times as fast as np.diff on arrays of an episode's length
     while (first := flags.find(1, last)) >= 0:
         last = flags.find(0, first)

@@ -121,10 +121,7 @@ def keeping_on(evidence: Evidence, way: Path) -> Evidence:
 
 
 def first_act(evidence: Evidence) -> int:
-    """Returns the first frame in which another actor acts or appears.
-
-    One acts that moves across its lane, brakes, or begins to move.
-    """
+    """Returns the first frame in which another actor appears, moves across its lane, brakes or begins to move."""
     e, since = evidence, slice(evidence.released, None)
     walks, stood = e.kind[1:] == Kind.PEDESTRIAN, e.speed_mps[e.released, 1:] < MOVES_MPS
     acts = (np.abs(e.lateral_mps[since, 1:]) > MOVES_MPS) & ~walks

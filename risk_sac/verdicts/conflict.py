@@ -185,10 +185,7 @@ def unresponsive(evidence: Evidence, conflict: Conflict) -> bool:
 
 @compiled
 def lasting_since(begins: Bools, lasts: Bools) -> int:
-    """Finds the first frame of a condition that lasts until the last frame.
-
-    In the last frame the condition holds anyway.
-    """
+    """Finds the first frame of a condition that lasts until the last frame, in which it holds anyway."""
     first, missing = len(begins) - 1, 0
     for t in range(len(begins) - 2, -1, -1):
         if begins[t]:

@@ -298,10 +298,8 @@ def towards(across_m: float, offset_m: float, lane_width_m: float) -> float:
     """Computes a vehicle's offset from its lane's centre towards the ego, m.
 
     SUMO's offset jumps by a lane's width when the vehicle passes to the next lane; where it stands across the ego's
-    path tells which lane's centre is meant. Without a recorded offset (NaN) that place alone decides.
-
-    `across_m` is its centre's distance from the ego's path, positive to the left, `offset_m` that from its lane's
-    centre.
+    path tells which lane's centre is meant. Without a recorded offset (NaN) that place alone decides. `across_m` is its
+    distance from the ego's path, positive to the left, `offset_m` that from its lane's centre.
     """
     seen = lane_width_m - abs(across_m)
     if math.isnan(offset_m):

@@ -296,7 +296,6 @@ def _beside(view: View, i: int, remembered: Floats) -> float:
 
 @compiled
 def _nearing_mps(state: Floats, i: int, across: float, heading: float) -> float:
-    """Speed of an actor towards the path, sideways."""
     left_mps: float = state[VY, i] * math.cos(heading) - state[VX, i] * math.sin(heading)
     return -math.copysign(1.0, across) * left_mps
 

@@ -102,11 +102,7 @@ class Evidence:
         return replace(self, **{name: getattr(self, name)[: frame + 1] for name in over_time})
 
     def column(self, id_: str) -> int:
-        """Column of an actor that is there in the last frame.
-
-        Raises:
-          ValueError: it is not, or it is the ego.
-        """
+        """Column of an actor that is there in the last frame; raises `ValueError` if it is not, or is the ego."""
         if id_ not in self.ids[1:]:
             raise ValueError(f"striker {id_!r} is not among the recorded {self.ids[1:]}")
         column = self.ids.index(id_)
@@ -135,10 +131,7 @@ class Evidence:
 
 
 def inside(areas: Sequence[Area], x_m: Floats, y_m: Floats, margin_m: float = 0.0) -> Bools:
-    """Tells which points lie in any of the areas.
-
-    Points up to `margin_m` outside an area count too.
-    """
+    """Tells which points lie in any of the areas, or up to `margin_m` outside."""
     found = np.zeros(np.shape(x_m), dtype=np.bool_)
     for area in areas:
         here = np.ones(np.shape(x_m), dtype=np.bool_)
@@ -151,10 +144,7 @@ def inside(areas: Sequence[Area], x_m: Floats, y_m: Floats, margin_m: float = 0.
 def soon_inside(
     areas: Sequence[Area], x_m: Floats, y_m: Floats, vx_mps: Floats, vy_mps: Floats, ahead_s: float
 ) -> Bools:
-    """Tells which points are in one of the areas within `ahead_s`.
-
-    They keep their velocity.
-    """
+    """Tells which points are in an area within `ahead_s` if they keep their velocity."""
     t = np.linspace(0.0, ahead_s, KERB_STEPS + 1)[:, None]
     soon: Bools = np.any(inside(areas, x_m + t * vx_mps, y_m + t * vy_mps), axis=0)
     return soon

@@ -164,10 +164,7 @@ def ego_part(evidence: Evidence, striker: int, conflict: Conflict, yields: str |
 
 
 def in_view_from(evidence: Evidence, striker: int) -> int | None:
-    """Finds the frame since which the striker was continuously in view.
-
-    Breaks of up to 0.5 s are ignored. Returns None if it is out of view at the end.
-    """
+    """Finds the frame since which the striker was in view, but for breaks of 0.5 s; None if it ends unseen."""
     frames = np.flatnonzero(evidence.known[:, striker])
     flicker = round(FLICKER_S / evidence.step_s)
     if len(frames) == 0 or len(evidence.time_s) - 1 - frames[-1] > flicker:
@@ -356,12 +353,7 @@ def parts_of_violation(
 ) -> Parts:
     """Sums up a violation without contact.
 
-    Args:
-      own: whether the requirement speaks of the ego's own driving only, or nothing was in its way.
-      yields: which of ego and striker had to yield, see `has_to_yield`.
-      other_broke: what the actor that mattered most broke.
-      broke: what the ego broke.
-      grade: of the violation.
+    `own`: the requirement speaks of the ego's own driving only, or nothing was in its way; `yields`: `has_to_yield`.
     """
     if own:
         return Parts(ego_erred=grade is Grade.PREVENTABLE)

@@ -81,10 +81,7 @@ def severity(impact_mps: float, risk: float) -> Severity:
 
 
 def impact(evidence: Evidence, striker: int, contact: Contact) -> Impact:
-    """Computes the impact of a contact.
-
-    Between vehicles, and with an obstacle, the risk is that of the occupants who are worse off.
-    """
+    """Computes the impact of a contact; between vehicles, the risk of the occupants who are worse off."""
     ego, other = (body_of(int(evidence.body[actor])) for actor in (0, striker))
     closing_mps = max(0.0, contact.closing_normal_mps)
     match other.injury:
@@ -115,10 +112,7 @@ LANE_CHANGE_M = 1.0
 
 
 def ground(evidence: Evidence, striker: int) -> str:
-    """Names the ground of the contact: lane, junction, crossing or beside_crossing.
-
-    Crossings matter to pedestrians only.
-    """
+    """Names the ground: lane, junction, crossing or beside_crossing, which matter to pedestrians only."""
     where, here = evidence.ground, (evidence.x_m[-1:, striker], evidence.y_m[-1:, striker])
     if evidence.kind[striker] == Kind.PEDESTRIAN:
         if inside(where.crossings, *here)[0]:

@@ -71,10 +71,7 @@ class R157Reflex:
         self._last_s = 0.0
 
     def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
-        """Computes its braking now, m/s²; 0 while it perceives no conflict.
-
-        Arguments as of `conflicts_now`.
-        """
+        """Computes its braking now, m/s²; 0 while it perceives no conflict. Arguments as of `conflicts_now`."""
         now = frame.time_s
         if conflicts_now(frame, path, seen, self._ground).any():
             self._since_s, self._last_s = (now if self._since_s is None else self._since_s), now
@@ -99,10 +96,7 @@ class DefensiveReflex:
         self._priority_s = -math.inf  # when its signal last gave it priority
 
     def braking(self, frame: Frame, path: Path, seen: Bools) -> float:
-        """Computes its braking now, m/s²; 0 where nothing restrains it.
-
-        Arguments as of `conflicts_now`.
-        """
+        """Computes its braking now, m/s²; 0 where nothing restrains it. Arguments as of `conflicts_now`."""
         if frame.ids != self._ids:
             before, self._memory = self._memory, nothing_remembered(len(frame.ids))
             for column, id_ in enumerate(frame.ids):

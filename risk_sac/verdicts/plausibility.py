@@ -57,13 +57,7 @@ def plausibility_of(evidence: Evidence) -> Plausibility:
 
 
 def judge_observed(observed: Iterable[Observed], ids: Sequence[str], traffic: Undisturbed) -> Plausibility:
-    """Judges features of adversaries.
-
-    Args:
-      observed: of all adversaries that acted, events in their order.
-      ids: of the actors, by column.
-      traffic: distributions of the features without a published one.
-    """
+    """Judges features of all adversaries that acted, by the traffic's distributions without a published one."""
     judged = [_probability(each, traffic) for each in observed]
     published = [each for each in judged if each.published]
     least, joint = _least(judged), _joint(judged, traffic.scale)

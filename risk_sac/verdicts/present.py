@@ -53,10 +53,7 @@ class Crossings(NamedTuple):
 
 
 def boxes_of(crossings: Sequence[Area]) -> Floats:
-    """Computes the rectangles about crossings, `k x 6`.
-
-    A row is: centre, direction of the longest side, half the size along it and across it.
-    """
+    """Computes rectangles about crossings, `k x 6`: centre, direction of the longest side, half the sizes."""
     found = np.empty((len(crossings), 6))
     for row, area in zip(found, crossings, strict=True):
         corners = np.array(_corners(area))
@@ -71,7 +68,6 @@ def boxes_of(crossings: Sequence[Area]) -> Floats:
 
 
 def _corners(area: Area) -> list[tuple[float, float]]:
-    """Computes the corners of an area."""
     found = []
     for (ax, ay, a), (bx, by, b) in zip(area.sides, (*area.sides[1:], area.sides[0]), strict=True):
         cross = ax * by - ay * bx
@@ -125,10 +121,7 @@ def concealing(codes: Iterable[int]) -> Bools:
 
 @compiled
 def walls_of(state: Floats, hides: Bools) -> Floats:
-    """Lists the bodies that hide what is behind them, `w x 6`.
-
-    A row is: centre, cosine and sine of the heading, half the size.
-    """
+    """Lists the bodies that hide what is behind them, `w x 6`: centre, cos and sin of the heading, half sizes."""
     found, count = np.empty((len(hides), 6)), 0
     for i in range(len(hides)):
         if hides[i] and not math.isnan(state[X, i]):  # it has left
@@ -153,10 +146,7 @@ def is_in_view(walls: Floats, eye_x: float, eye_y: float, body: MovingBox[float]
 
 @compiled
 def is_hidden(walls: Floats, eye_x: float, eye_y: float, x: float, y: float) -> bool:
-    """Tells whether a body lies between the eye and a place.
-
-    A body that stands on the place hides nothing there.
-    """
+    """Tells whether a body lies between the eye and a place; one that stands on the place hides nothing."""
     for k in range(len(walls)):
         cos, sin, half_length, half_width = walls[k, 2], walls[k, 3], walls[k, 4], walls[k, 5]
         ex, ey = eye_x - walls[k, 0], eye_y - walls[k, 1]
@@ -227,9 +217,7 @@ def moving_box(state: Floats, i: int) -> MovingBox[float]:
 
 @compiled
 def conflict_in(ego: OnPath, state: Floats, i: int, vehicle: bool, link: int, street: Street, wary: bool) -> float:
-    """Computes the time until the ego reaches a conflicting actor, s.
-
-    It is inf without a conflict, and 0 where the two drive alongside.
+    """Computes the time until the ego reaches a conflicting actor, s; inf without a conflict, 0 alongside.
 
     Args:
       ego: on its path.

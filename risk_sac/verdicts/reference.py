@@ -120,12 +120,7 @@ def _met(evidence: Evidence, path: Path, striker: int) -> list[int]:
 
 
 def grade(keeps: Mapping[str, bool], drivers: Collection[str] = PREVENTING) -> Grade:
-    """Grades a violation by which reference drivers would have prevented it.
-
-    Args:
-      keeps: reference driver → whether it keeps the requirement.
-      drivers: those whose word counts.
-    """
+    """Grades a violation by which reference drivers would keep the requirement; `drivers` are those that count."""
     if any(keeps.get(name, False) for name in drivers):
         return Grade.PREVENTABLE
     return Grade.FULL_BRAKING if keeps["full_braking"] else Grade.UNAVOIDABLE
@@ -161,10 +156,7 @@ def _track(evidence: Evidence, other: int) -> MovingBox[Floats]:
 
 
 def _outcome(evidence: Evidence, other: int, ending: RolloutEnd | None, *, kept: bool) -> ReferenceOutcome:
-    """Converts an ending into an outcome; None takes the ego's own.
-
-    `kept`: the driver is on a path that the ego did not take.
-    """
+    """Converts an ending into an outcome; None takes the ego's own. `kept`: on a path that the ego did not take."""
     if ending is None:
         return AVOIDED if kept else ReferenceOutcome(avoids=False, impact_speed_mps=float(evidence.speed_mps[-1, 0]))
     size, other_size = recorded_size(evidence, 0), recorded_size(evidence, other)

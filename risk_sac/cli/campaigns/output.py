@@ -41,11 +41,7 @@ def add_newest_command(
 
 
 def chosen_id(client: Client, options: argparse.Namespace) -> str:
-    """Returns the id of the campaign that the command line names, or of the newest.
-
-    Raises:
-      ConfigError: the service has no campaign.
-    """
+    """Returns the id of the campaign that the command line names, or of the newest; raises `ConfigError`."""
     if options.id is not None:
         return str(options.id)
     newest = next(client.campaigns(page=1), None)

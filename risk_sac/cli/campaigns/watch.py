@@ -146,7 +146,6 @@ def _report(client: Client, results: Results, bounds: GateBounds, file: Path) ->
 
 
 def _first_failures(client: Client, campaign_id: str, run_id: str) -> list[Episode]:
-    """Of a run, the preventable ones first."""
     found: dict[str, Episode] = {}
     for grade in (Grade.PREVENTABLE, None):
         failures = client.failures(campaign_id, run=run_id, grade=grade, page=NAMED_FAILURES)

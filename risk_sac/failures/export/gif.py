@@ -70,7 +70,6 @@ class Canvas:
         return self._picture.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS)
 
     def _placed(self, points: Floats) -> list[tuple[float, float]]:
-        """Returns the pixels of points on the map."""
         pixels = (points - self._middle) * (self._scale, -self._scale) + (WIDTH * FINE / 2, HEIGHT * FINE / 2)
         return [(float(x), float(y)) for x, y in pixels]
 

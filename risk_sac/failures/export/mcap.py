@@ -75,7 +75,6 @@ def _turned(heading_rad: float) -> fox.Quaternion:
 
 
 def _surface(lane: NetLane) -> fox.SceneEntity:
-    """A lane as a strip of triangles, with lines along a road's edges."""
     raised_m = {"lane": 0.0, "inside": 0.01, "sidewalk": 0.0, "crossing": 0.02}[lane.use]
     left, right = (_points(edge, np.array(lane.height_m) + raised_m) for edge in boundaries(lane.centre, lane.width_m))
     strip = [corner for pair in zip(left, right, strict=True) for corner in pair]
@@ -134,7 +133,6 @@ def _body(failure: Recorded, actor: ExportedActor, frame: int) -> fox.SceneEntit
 
 
 def _signals(failure: Recorded, frame: int) -> fox.SceneUpdate:
-    """A ball over the end of each lane for each of its heads."""
     entities = []
     for lane in failure.net.lanes.values():
         for place, head in enumerate(lane.heads):
@@ -187,12 +185,10 @@ def _measured(failure: Recorded, frame: int) -> dict[str, object]:
 
 
 def _number(value: float) -> float | None:
-    """Returns null for what is not finite."""
     return float(value) if np.isfinite(value) else None
 
 
 def _moments(failure: Recorded) -> Iterator[tuple[int, str]]:
-    """Frames and what happens in them."""
     released = round(failure.released_s * 10)
     yield released, "the adversaries are released"
     if isinstance(failure.violation, Collision):

@@ -119,10 +119,7 @@ def reference_line(
 
 
 def _cubic(start: Stop, end: Stop) -> Floats:
-    """Returns Hermite's cubic between two stops, in the frame of the first.
-
-    The coefficients are of p, p² and p³, `3 x 2`.
-    """
+    """Returns Hermite's cubic between two stops, in the frame of the first: factors of p, p², p³, `3 x 2`."""
     cos, sin = start.direction
     frame = np.array([(cos, -sin), (sin, cos)])
     chord, leaves = (end.place - start.place) @ frame, end.direction @ frame
@@ -134,7 +131,6 @@ def _cubic(start: Stop, end: Stop) -> Floats:
 
 
 def _length_m(cubic: Floats) -> float:
-    """Length of a cubic, by Gauss-Legendre quadrature."""
     places, weights = np.polynomial.legendre.leggauss(16)
     p = (places + 1.0) / 2.0
     slopes = np.stack((np.ones_like(p), 2.0 * p, 3.0 * p**2), axis=1) @ cubic
@@ -222,7 +218,6 @@ def _turns(net: Net) -> Iterator[tuple[NetLane, Sequence[NetLane], NetLane | Non
 
 
 def _road(lanes: Sequence[NetLane], number: int) -> ExportedRoad:
-    """Lays a road along the middle of an edge."""
     left, half_m = lanes[0], sum(lane.width_m for lane in lanes) / 2
     points = moved(left.centre, left.width_m / 2 - half_m)
     line = reference_line(points, half_m)
@@ -230,10 +225,7 @@ def _road(lanes: Sequence[NetLane], number: int) -> ExportedRoad:
 
 
 def _turn(number: int, start: NetLane, inside: Sequence[NetLane], end: NetLane | None) -> ExportedRoad:
-    """Lays a road along lanes inside a junction.
-
-    It keeps the directions of the roads before and after it.
-    """
+    """Lays a road along lanes inside a junction, with the directions of the roads before and after it."""
     points = np.concatenate([inside[0].centre[:1], *(lane.centre[1:] for lane in inside)])
     height_m = np.concatenate([inside[0].height_m[:1], *(lane.height_m[1:] for lane in inside)])
     way_out = None if end is None else _way(end.centre[:2])
@@ -342,7 +334,6 @@ def _crossings(net: Net, roads: Mapping[str, ExportedRoad]) -> Mapping[str, Sequ
 
 
 def _write_crossing(objects: ET.Element, road: ExportedRoad, crossing: NetLane) -> None:
-    """Adds a crossing as an outline beside the end of a road, in the frame of that end."""
     end = road.line.stops[-1]
     cos, sin = end.direction
     s, t = road.line.length_m, 0.0

@@ -118,7 +118,6 @@ def _scenario(failure: Recorded, world: World, *, free: bool) -> bytes:
 
 
 def _roads(failure: Recorded, world: World) -> xosc.RoadNetwork:
-    """The road file, and what its signals show from the first frame on."""
     network = xosc.RoadNetwork(world.road)
     drawn = set[str | None]()
     if world.road == ROADS:  # signals of another file have other names
@@ -158,7 +157,6 @@ def _body(actor: ExportedActor, name: str) -> xosc.Vehicle | xosc.Pedestrian | x
 
 
 def _category(categories: Any, body: Body) -> Any:
-    """Returns the format's word for a body, as the body's row has it."""
     return getattr(categories, body.export.openscenario)
 
 
@@ -201,6 +199,5 @@ def _event(name: str, action: object, from_s: float) -> xosc.Event:
 
 
 def _at(name: str, time_s: float, point: str = "start") -> xosc.ValueTrigger:
-    """Returns the trigger at a moment of the scenario's clock."""
     condition = xosc.SimulationTimeCondition(time_s, xosc.Rule.greaterOrEqual)
     return xosc.ValueTrigger(name, 0, xosc.ConditionEdge.none, condition, triggeringpoint=point)

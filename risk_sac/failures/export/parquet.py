@@ -102,7 +102,6 @@ def _verdict(record: EpisodeRecord) -> dict[str, Any]:
 
 
 def _type(annotation: Any) -> pa.DataType:
-    """The column's type of a field."""
     origin, arguments = get_origin(annotation), get_args(annotation)
     if origin is Annotated:
         return _type(arguments[0])

@@ -62,11 +62,7 @@ class Recorded:
 
     @classmethod
     def of(cls, bundle: Bundle) -> "Recorded":
-        """Reads a bundle.
-
-        Raises:
-          ConfigError: its net is gone or another one, or it lacks an array or a violation.
-        """
+        """Reads a bundle; raises `ConfigError` if its net is gone or another, or an array or a violation is missing."""
         manifest, series = bundle.manifest, bundle.series
         check_world(manifest)
         _check(manifest, series)
@@ -108,10 +104,7 @@ class Recorded:
 
     @property
     def striker(self) -> int | None:
-        """Finds the column of the actor that the ego touched.
-
-        Without a contact it is the actor that mattered most; None without one.
-        """
+        """Column of the actor that the ego touched, or else of the one that mattered most; None without one."""
         ids = [actor.id for actor in self.actors]
         return None if self.violation.other_id is None else ids.index(self.violation.other_id)
 
@@ -150,10 +143,7 @@ class Recorded:
         return letters
 
     def offset_s(self, signal: str, frame: int) -> float:
-        """Computes a signal's position in its program at a frame, s.
-
-        The frame may be one after the last.
-        """
+        """Computes a signal's position in its program at a frame, s; the frame may be one after the last."""
         begins_s = self.layout.signal_offset_s if signal == self.layout.signal else 0.0
         return begins_s + float(self.series["time_s"][0]) + frame * STEP_S
 
@@ -176,7 +166,6 @@ def _actor(series: Series, column: int, net: Net) -> ExportedActor:
 
 
 def _check(manifest: Manifest, series: Series) -> None:
-    """Refuses what no recording looks like."""
     frames, actors = len(series["time_s"]), len(np.atleast_1d(series.get("ids", np.empty(0))))
     wanted = dict.fromkeys((*PER_FRAME, "visible"), (frames, actors)) | dict.fromkeys(PER_ACTOR, (actors,))
     for name, shape in wanted.items():
@@ -188,10 +177,7 @@ def _check(manifest: Manifest, series: Series) -> None:
 
 
 def goal(failure: Recorded) -> tuple[NetLane, Floats]:
-    """Returns the goal of a free ego: a lane and a place on it.
-
-    The lane is one of its last road; the place is x, y and heading.
-    """
+    """Returns the goal of a free ego: a lane of its last road, and x, y and heading on it."""
     start = failure.layout.ego
     lanes, last = failure.net.lanes, start.route[-1]
     reached, ahead = None, [lanes[f"{start.route[0]}_{start.lane}"]]

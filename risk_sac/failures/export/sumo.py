@@ -122,7 +122,6 @@ def files(failure: Recorded) -> Files:
 
 
 def _configuration(failure: Recorded, log: SumoLog) -> bytes:
-    """Returns the options of the replay as a configuration, which sumo-gui opens too."""
     root = ET.Element("configuration")
     root.append(ET.Comment(f" {failure.name}; {BESIDE} has what SUMO cannot express, replay.py plays it "))
     options = ET.SubElement(root, "options")
@@ -143,7 +142,6 @@ def _pairs(words: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def _commands(failure: Recorded, log: SumoLog) -> bytes:
-    """Returns the commands before each step, a line each."""
     head = {"failure": failure.name, "ego": failure.ego.id, "striker": failure.violation.other_id, "zoom": ZOOM}
     told = ",\n".join(json.dumps(calls) for calls in log.calls)
     return f'{json.dumps(head)[:-1]}, "commands": [\n{told}\n]}}\n'.encode()
