@@ -42,11 +42,7 @@ def add(commands: Commands) -> None:
         commands, "egos", "list and compare egos, the vehicles under test", example="egos list"
     ).add_subparsers(required=True, metavar="COMMAND")
     add_command(
-        egos,
-        "list",
-        _list,
-        "list SUMO's driver models, the shipped egos and the registered ones",
-        example="egos list",
+        egos, "list", _list, "list SUMO's driver models, the shipped egos and the registered ones", example="egos list"
     )
     add_command(
         egos,

@@ -237,10 +237,7 @@ def _gravest(worst: Worst) -> tuple[bool, int, bool, bool]:
 
 
 WEIGHT = "weight"
-SORTS: Mapping[str, Callable[[Worst], Any]] = {
-    "severity": _gravest,
-    "speed": lambda worst: -worst.ego_speed_mps,
-}
+SORTS: Mapping[str, Callable[[Worst], Any]] = {"severity": _gravest, "speed": lambda worst: -worst.ego_speed_mps}
 SORTED_BY = (
     "found (the order of the search), weight (severity times plausibility, times the scene's density where a "
     "distribution is declared), severity (plausible and worst first) or speed (the fastest ego first)"

@@ -66,10 +66,7 @@ def add(commands: Commands) -> None:
     )
     importing.add_argument("file", type=Path, metavar="FILE.xosc", help="a scenario, or a variation file that names it")
     importing.add_argument(
-        "--out",
-        type=Path,
-        metavar="DOC.yaml",
-        help="write the document and its roads (default: keep it by name)",
+        "--out", type=Path, metavar="DOC.yaml", help="write the document and its roads (default: keep it by name)"
     )
     importing.add_argument(
         "--ego-entity", metavar="NAME", help="the ego (default: the entity named Ego, or the one with a controller)"

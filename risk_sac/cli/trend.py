@@ -10,16 +10,7 @@ from rich.table import Table
 
 from risk_sac.cli.console import OK, counted, or_dash, print_answer
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
-from risk_sac.report.trend import (
-    EndedCampaign,
-    EndedRun,
-    LeftOut,
-    Trend,
-    TrendRate,
-    TrendRow,
-    check_scenarios,
-    trend,
-)
+from risk_sac.report.trend import EndedCampaign, EndedRun, LeftOut, Trend, TrendRate, TrendRow, check_scenarios, trend
 from risk_sac.run_folder.results import read_boundary_map, read_rates, read_verified, with_headline
 
 

@@ -30,11 +30,7 @@ def add(commands: Commands) -> None:
         example="minimise runs/low 42 --out core.npz",
     )
     region = add_command(
-        commands,
-        "region",
-        _region,
-        "measure how many neighbours of a failure fail too",
-        example="region runs/low 42",
+        commands, "region", _region, "measure how many neighbours of a failure fail too", example="region runs/low 42"
     )
     for parser, metavar, out in (
         (minimise, "FILE.npz", "write the core there, as a bundle"),

@@ -272,12 +272,7 @@ class _Climb:
         held, played, sentence = _result(stage, best, self._random)
         episode = played.record(recorded.manifest.episode).model_copy(update={"script": None})
         motion = PlausibleMotion(
-            before=self.before,
-            after=self.after,
-            episodes=stage.played + 1,
-            held=held,
-            copies=COPIES,
-            sentence=sentence,
+            before=self.before, after=self.after, episodes=stage.played + 1, held=held, copies=COPIES, sentence=sentence
         )
         made = make_bundle(recorded.manifest.spec, episode, played.series, played.signal_heads, recorded.policy)
         manifest = made.manifest.model_copy(update={"plausible": motion})

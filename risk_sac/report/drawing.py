@@ -15,13 +15,7 @@ from risk_sac.config import RunMethod
 from risk_sac.failures.from_above import canvas, picture
 from risk_sac.metrics import RESAMPLING_SEED
 from risk_sac.report.comparison import Comparison
-from risk_sac.report.figures import (
-    Bars,
-    FamilyCurves,
-    Format,
-    Times,
-    curve_values,
-)
+from risk_sac.report.figures import Bars, FamilyCurves, Format, Times, curve_values
 from risk_sac.world.types import Floats
 
 RESAMPLES = 2000  # per curve; a band needs less than a table

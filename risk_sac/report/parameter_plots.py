@@ -25,11 +25,7 @@ from risk_sac.world.types import Floats
 MAP_PANEL_IN, MAP_DPI = (4.4, 3.9), 120
 MOST_PANELS = 9  # slices of the third and fourth axis
 # Driver → words, colour and dashes of its boundary; other egos take the rest in turn.
-LINES = {
-    "ego": ("the ego", "black", "-"),
-    "r157": ("R157's driver", "#1f5fbf", "--"),
-    "fsm": ("FSM", "#0a7d68", ":"),
-}
+LINES = {"ego": ("the ego", "black", "-"), "r157": ("R157's driver", "#1f5fbf", "--"), "fsm": ("FSM", "#0a7d68", ":")}
 OTHERS = (("#8e44ad", "-."), ("#8c510a", "--"), ("#555555", ":"), ("#c2185b", "-."))
 FAILS, PASSES = "#c0392b", "#2471a3"
 

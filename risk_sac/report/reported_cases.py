@@ -114,11 +114,7 @@ def reported_cases(
             result=_result(searches, records, criteria),
             estimates=estimates.get(name, ()),
             recording=tuple(_recorded(run) for run in runs),
-            judged_by=CaseJudges(
-                definitions=definitions_of(records),
-                drivers=_drivers(spec, name),
-                people=people,
-            ),
+            judged_by=CaseJudges(definitions=definitions_of(records), drivers=_drivers(spec, name), people=people),
         )
 
 

@@ -122,10 +122,7 @@ ODD_ATTRIBUTES = (
     OddAttribute(ENVIRONMENT, "connectivity and positioning", (), NOT_STATED),
     OddAttribute(DYNAMIC, "motor vehicles", ("car", "van", "truck", "bus"), "bodies of a scene's actors"),
     OddAttribute(
-        DYNAMIC,
-        "vulnerable road users",
-        ("pedestrian", "child", "bicycle", "motorcycle"),
-        "bodies of a scene's actors",
+        DYNAMIC, "vulnerable road users", ("pedestrian", "child", "bicycle", "motorcycle"), "bodies of a scene's actors"
     ),
     OddAttribute(DYNAMIC, "animals and horse riders", (), "no body of this kind"),
     OddAttribute(DYNAMIC, "special vehicles", (), "no body of this kind"),

@@ -31,14 +31,7 @@ from risk_sac.scenario.layout import Layout
 from risk_sac.scenario.library import DOCUMENT, kept
 from risk_sac.scenario.limits import behaving, preset
 from risk_sac.scenario.odd import SIGNAL_OF
-from risk_sac.scenario.reading import (
-    FOLDER,
-    PAPER_FAMILIES,
-    nets_of,
-    scenario_file,
-    shipped_document,
-    shipped_names,
-)
+from risk_sac.scenario.reading import FOLDER, PAPER_FAMILIES, nets_of, scenario_file, shipped_document, shipped_names
 from risk_sac.scenario.scene import steps_of
 from risk_sac.scenario.space import SceneSpace
 

@@ -153,8 +153,7 @@ def _share(parameter: Parameter, allowed: tuple[str, ...]) -> Interval | None:
     if not lower and not upper:
         return None
     return Interval(
-        low=parameter.low if lower else middle,
-        high=parameter.high if upper else math.nextafter(middle, parameter.low),
+        low=parameter.low if lower else middle, high=parameter.high if upper else math.nextafter(middle, parameter.low)
     )
 
 

@@ -7,16 +7,7 @@ from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple, get_args
 
-from risk_sac.config.scenario import (
-    EGO,
-    LONGEST_HORIZON_S,
-    Actor,
-    Driven,
-    Moving,
-    Scenario,
-    Start,
-    Stream,
-)
+from risk_sac.config.scenario import EGO, LONGEST_HORIZON_S, Actor, Driven, Moving, Scenario, Start, Stream
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.bodies import BODIES, BodyName, Motion
 from risk_sac.scenario.ground import ground_of, kerb_of
@@ -129,10 +120,7 @@ class SceneLayout:
         )
 
     def _plan(
-        self,
-        vehicles: Sequence[VehicleStart],
-        pedestrians: Sequence[PedestrianStart],
-        statics: Sequence[StaticStart],
+        self, vehicles: Sequence[VehicleStart], pedestrians: Sequence[PedestrianStart], statics: Sequence[StaticStart]
     ) -> StoryPlan:
         """Returns what the document's story needs, without streams."""
         own = {start.id: start for start in vehicles if start.id in self._bodies}

@@ -82,11 +82,7 @@ class Finds:
 
     def state(self) -> dict[str, Any]:
         """Returns plain values to continue from."""
-        return {
-            "variants": dict(self.variants),
-            "kinds": sorted(self._kinds),
-            "candidates": sorted(self._candidates),
-        }
+        return {"variants": dict(self.variants), "kinds": sorted(self._kinds), "candidates": sorted(self._candidates)}
 
     def load(self, state: dict[str, Any]) -> None:
         """Continues from `state()`."""

@@ -20,17 +20,7 @@ from risk_sac.world.types import HEADING, LENGTH, STEP_S, VX, VY, WIDTH, Bools, 
 Letters = NDArray[Any]  # as numbers
 KERB_STEPS = 10  # looks within the time ahead
 
-PER_ACTOR = (
-    "x_m",
-    "y_m",
-    "heading_rad",
-    "vx_mps",
-    "vy_mps",
-    "speed_mps",
-    "lateral_mps",
-    "accel_mps2",
-    "lane_offset_m",
-)
+PER_ACTOR = ("x_m", "y_m", "heading_rad", "vx_mps", "vy_mps", "speed_mps", "lateral_mps", "accel_mps2", "lane_offset_m")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -233,10 +223,7 @@ def front_moved_across(evidence: Evidence) -> Floats:
 
 
 def keeps_lane(evidence: Evidence, first: int) -> bool:
-    """Whether the ego kept its lane from frame `first` on.
-
-    Choice: its front moved across by 0.375 m at most.
-    """
+    """Whether the ego kept its lane from frame `first` on. Choice: its front moved across by 0.375 m at most."""
     moved = front_moved_across(evidence)[first:]
     return bool(np.abs(moved - moved[0]).max() <= WANDER_M)
 

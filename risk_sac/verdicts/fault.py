@@ -358,7 +358,5 @@ def parts_of_violation(
     if own:
         return Parts(ego_erred=grade is Grade.PREVENTABLE)
     return Parts(
-        ego_erred=bool(broke) or grade is Grade.PREVENTABLE,
-        other_broke=bool(other_broke),
-        ego_yields=yields == "ego",
+        ego_erred=bool(broke) or grade is Grade.PREVENTABLE, other_broke=bool(other_broke), ego_yields=yields == "ego"
     )

@@ -86,12 +86,7 @@ def collision_of(
         simulator_agrees=facts.simulator_agrees,
         verdicts=verdicts,
         judgement=judge(
-            evidence,
-            other,
-            valid=all(verdicts.values()),
-            conflict=conflict,
-            contact=contact,
-            preventing=drivers,
+            evidence, other, valid=all(verdicts.values()), conflict=conflict, contact=contact, preventing=drivers
         ),
     )
 

@@ -165,10 +165,7 @@ def response(evidence: Evidence, conflict: Conflict) -> str:
 ONCOMING_COS = math.cos(math.radians(135.0))
 FAST_MPS = 30 / 3.6  # Choice: where pedestrians begin to die; see `severity`
 LATE_S = 2.0  # Choice: what R157's driver needs to be at full braking
-STRIKERS = {
-    ConflictType.LEADER: "leader",
-    ConflictType.MERGE: "neighbour",
-}
+STRIKERS = {ConflictType.LEADER: "leader", ConflictType.MERGE: "neighbour"}
 MANOEUVRES = {
     "straight": "ego goes straight",
     "left_turn": "ego turns left",

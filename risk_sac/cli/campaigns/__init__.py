@@ -6,13 +6,7 @@ import time
 from pathlib import Path
 
 from risk_sac.cli.campaigns import failures, watch
-from risk_sac.cli.campaigns.output import (
-    add_campaign_command,
-    add_newest_command,
-    campaigns_table,
-    chosen_id,
-    line,
-)
+from risk_sac.cli.campaigns.output import add_campaign_command, add_newest_command, campaigns_table, chosen_id, line
 from risk_sac.cli.campaigns.watch import shown
 from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, print_answer, write_out
 from risk_sac.cli.flags import add_limit, named_ego
