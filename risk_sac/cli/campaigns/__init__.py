@@ -11,7 +11,7 @@ from risk_sac.cli.campaigns.watch import shown
 from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, print_answer, write_out
 from risk_sac.cli.flags import add_limit, named_ego
 from risk_sac.cli.parser import Commands, add_command, add_group, add_json_flag
-from risk_sac.cli.regress import cases_table, junit
+from risk_sac.cli.replay import cases_table, junit
 from risk_sac.cli.report import OUT, format_of
 from risk_sac.client import Client
 from risk_sac.failures.studied import Regression
