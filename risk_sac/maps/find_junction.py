@@ -9,24 +9,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from risk_sac.maps.found import (
-    Fields,
-    Fit,
-    NoFit,
-    Spot,
-    at_most,
-    friction,
-    initial_speed,
-    lacking,
-    lane_of,
-    number,
-    pedestrian,
-    route_of,
-    scenario_of,
-    signal_parts,
-    top_speed,
-    walking,
-)
+from risk_sac.maps import found as parts
+from risk_sac.maps.found import Fields, Fit, NoFit, Spot
 from risk_sac.maps.ways import AFTER_S, check_limit, track, way_on
 from risk_sac.scenario.families import MOST_OVER_LIMIT
 from risk_sac.scenario.ground import ROOM_M, too_near, waits_in_the_way
@@ -106,7 +90,7 @@ def fit_junction(net: Net, spot: Spot) -> Fit:
         f"{'crosses or turns' if len(legs) == 1 else 'cross or turn'}{', and a pedestrian walks' if walked else ''}."
     )
     like = {"family": "dense", "actors": {name: name for name in (*legs, *["pedestrian"] * walked)}}
-    scenario = scenario_of(spot, summary, ["iso34502:intersection"], like, fields)
+    scenario = parts.scenario_of(spot, summary, ["iso34502:intersection"], like, fields)
     return Fit(spot, scenario, (*(way for one in (ego, *legs.values()) for way in one.turns), *streams.values()))
 
 
@@ -123,31 +107,31 @@ class Leg:
 
 def _fields(net: Net, own: Approach, legs: Sequence[Leg], streams: Mapping[str, Track], *, walked: bool) -> Fields:
     """States what the document of a junction has; the first leg is the ego's."""
-    offset, signal = signal_parts(net, [link.signal for link in own.links])
+    offset, signal = parts.signal_parts(net, [link.signal for link in own.links])
     parameters: Fields = {}
     for one in legs:
         parameters |= _parameters(one)
     if walked:
-        parameters |= walking("pedestrian across the near crossing's axis")
+        parameters |= parts.walking("pedestrian across the near crossing's axis")
     if streams:
-        parameters["background_gap_m"] = number((15.0, WIDEST_GAP_M), "m", "spacing of the background vehicles")
+        parameters["background_gap_m"] = parts.number((15.0, WIDEST_GAP_M), "m", "spacing of the background vehicles")
     actors = {one.name: _moving(net, one) for one in legs[1:]}
     if walked:
-        actors["pedestrian"] = pedestrian(own.edge.id)
+        actors["pedestrian"] = parts.pedestrian(own.edge.id)
     traffic = {
         name: {
-            "lane": lane_of(net, way),
+            "lane": parts.lane_of(net, way),
             "from_m": STREAM_M,
             "gap_m": "background_gap_m",
             "speed": STREAM_MPS,
-            "route": route_of(net, way),
+            "route": parts.route_of(net, way),
         }
         for name, way in streams.items()
     }
     fastest_mps = max(one.limit_mps for one in legs)
     odd = {"dynamic": {"vehicle_speed_mps": {"low": 0.0, "high": fastest_mps * MOST_OVER_LIMIT}}}
     return {
-        "parameters": parameters | offset | friction(),
+        "parameters": parameters | offset | parts.friction(),
         "ego": _moving(net, legs[0]),
         "actors": actors,
         "streams": traffic,
@@ -160,9 +144,9 @@ def _parameters(leg: Leg) -> Fields:
     name, who = leg.name, WHO[leg.name]
     turn = {f"{name}_turn": {"words": leg.words, "meaning": f"which way {who} goes"}} if len(leg.words) > 1 else {}
     room_m = min(way.room_m for way in leg.turns)
-    high_m = at_most(FARTHEST_M, room_m - CAR_LENGTH_M - LEAD_IN_S * top_speed(leg.limit_mps))
-    distance = number((NEAREST_M, high_m), "m", f"{who}'s front to its stop line")
-    speed = initial_speed(f"{name}_speed_mps", 5, leg.limit_mps, f"initial speed of {who}")
+    high_m = parts.at_most(FARTHEST_M, room_m - CAR_LENGTH_M - LEAD_IN_S * parts.top_speed(leg.limit_mps))
+    distance = parts.number((NEAREST_M, high_m), "m", f"{who}'s front to its stop line")
+    speed = parts.initial_speed(f"{name}_speed_mps", 5, leg.limit_mps, f"initial speed of {who}")
     return {**turn, f"{name}_distance_m": distance, **speed}
 
 
@@ -174,7 +158,7 @@ def _moving(net: Net, leg: Leg) -> Fields:
             return values[0]
         return {"by": f"{leg.name}_turn", "of": dict(zip(leg.words, values, strict=True))}
 
-    lane, route = (chosen([part(net, way) for way in leg.turns]) for part in (lane_of, route_of))
+    lane, route = (chosen([part(net, way) for way in leg.turns]) for part in (parts.lane_of, parts.route_of))
     before = "stop_line" if leg.signalised else "junction"
     start = {"lane": lane, "before": before, "distance_m": f"{leg.name}_distance_m"}
     return {"start": start, "speed": f"{leg.name}_speed_mps", "route": route}
@@ -220,13 +204,13 @@ def _words(links: Sequence[Link]) -> tuple[str, ...]:
 
 def _room_wanted_m(limit_mps: float) -> float:
     """Least room before a stop line."""
-    return NEAREST_M + LEAST_RANGE_M + CAR_LENGTH_M + LEAD_IN_S * top_speed(limit_mps)
+    return NEAREST_M + LEAST_RANGE_M + CAR_LENGTH_M + LEAD_IN_S * parts.top_speed(limit_mps)
 
 
 def roomy(track: Track, edge: str, wanted_m: float) -> Track:
     """The track; raises `NoFit` if it begins too near to its reference."""
     if track.room_m < wanted_m:
-        raise NoFit(f"the length of the way in on {edge!r} is {lacking(track.room_m, 'm', wanted_m)}")
+        raise NoFit(f"the length of the way in on {edge!r} is {parts.lacking(track.room_m, 'm', wanted_m)}")
     return track
 
 

@@ -7,30 +7,9 @@ from itertools import pairwise
 from pathlib import Path
 
 from risk_sac.errors import MapError
+from risk_sac.maps import found as parts
 from risk_sac.maps.find_junction import fit_junction, junction_spots, roomy, turn
-from risk_sac.maps.found import (
-    NET,
-    Fields,
-    Fit,
-    Misfit,
-    NoFit,
-    Pattern,
-    Spot,
-    Survey,
-    at_most,
-    cut,
-    friction,
-    initial_speed,
-    lacking,
-    lane_of,
-    number,
-    pedestrian,
-    route_of,
-    scenario_of,
-    signal_parts,
-    top_speed,
-    walking,
-)
+from risk_sac.maps.found import NET, Fields, Fit, Misfit, NoFit, Pattern, Spot, Survey
 from risk_sac.maps.ways import (
     AFTER_S,
     SHORTEST_M,
@@ -79,23 +58,27 @@ def fit_crossing(net: Net, spot: Spot) -> Fit:
     beyond = len(edge.drivable) < 2
     find = _with_oncoming if beyond else _with_neighbour
     own, ego, occluder, link = find(net, edge, crossing)
-    offset, signal = signal_parts(net, (crossing.signal, link.signal))
+    offset, signal = parts.signal_parts(net, (crossing.signal, link.signal))
     oncoming = () if beyond else _oncoming(net, edge.id, crossing.edges)
     if beyond:
-        start: Fields = {"lane": lane_of(net, occluder), "at_m": f"occluder_distance_m + {TRUCK_LENGTH_M:g}"}
+        start: Fields = {"lane": parts.lane_of(net, occluder), "at_m": f"occluder_distance_m + {TRUCK_LENGTH_M:g}"}
     else:
         start = _before(net, occluder, "occluder_distance_m")
     fields = {
-        "parameters": _parameters(own, ego, occluder, beyond=beyond) | offset | friction(),
-        "ego": {"start": _before(net, ego, "ego_distance_m"), "speed": "ego_speed_mps", "route": route_of(net, ego)},
+        "parameters": _parameters(own, ego, occluder, beyond=beyond) | offset | parts.friction(),
+        "ego": {
+            "start": _before(net, ego, "ego_distance_m"),
+            "speed": "ego_speed_mps",
+            "route": parts.route_of(net, ego),
+        },
         "actors": {
             "occluder": {
                 "body": "truck",
                 "start": start,
                 "speed": "occluder_speed_mps",
-                "route": route_of(net, occluder),
+                "route": parts.route_of(net, occluder),
             },
-            "pedestrian": pedestrian(edge.id, "left" if beyond else "right"),
+            "pedestrian": parts.pedestrian(edge.id, "left" if beyond else "right"),
             "follower": {
                 "role": "background",
                 "start": {"beside": "ego", "ahead_m": -FOLLOWING_M},
@@ -110,30 +93,32 @@ def fit_crossing(net: Net, spot: Spot) -> Fit:
     summary = f"Crossing {crossing.id!r} of {edge.id!r}, {kind}: a pedestrian steps out {hidden}."
     actors = {name: name for name in ("occluder", "pedestrian")}
     like = {"family": "mixed", "actors": actors, "mirrored": beyond}  # whose pedestrian comes from the right
-    scenario = scenario_of(spot, summary, ["iso34502:pedestrian"], like, fields)
+    scenario = parts.scenario_of(spot, summary, ["iso34502:pedestrian"], like, fields)
     return Fit(spot, scenario, (ego, occluder, *oncoming))
 
 
 def _parameters(own: NetLane, ego: Track, occluder: Track, *, beyond: bool) -> Fields:
-    lead_m = LEAD_IN_S * top_speed(own.limit_mps)
-    ego_m = at_most(FARTHEST_M, ego.room_m - FOLLOWING_M - TRUCK_LENGTH_M - lead_m)
+    lead_m = LEAD_IN_S * parts.top_speed(own.limit_mps)
+    ego_m = parts.at_most(FARTHEST_M, ego.room_m - FOLLOWING_M - TRUCK_LENGTH_M - lead_m)
     if beyond:
         last, meaning = occluder.pieces[-1], "crossing's far edge to the occluder's rear"
-        occluder_m = at_most(OCCLUDER_M, last.length_m - last.reach_m - TRUCK_LENGTH_M)
+        occluder_m = parts.at_most(OCCLUDER_M, last.length_m - last.reach_m - TRUCK_LENGTH_M)
     else:
         meaning = "occluder's front to the crossing's near edge"
-        occluder_m = at_most(OCCLUDER_M, occluder.room_m - TRUCK_LENGTH_M - lead_m)
+        occluder_m = parts.at_most(OCCLUDER_M, occluder.room_m - TRUCK_LENGTH_M - lead_m)
     return {
-        **initial_speed("ego_speed_mps", 6, own.limit_mps, "initial speed of the ego"),
-        "ego_distance_m": number((NEAREST_M, ego_m), "m", "ego's front to the crossing's near edge"),
-        "occluder_distance_m": number((NEXT_M, occluder_m), "m", meaning),
-        **initial_speed("occluder_speed_mps", 0, min(OCCLUDER_MPS, own.limit_mps), "initial speed of the occluder"),
-        **walking("pedestrian along the road from the crossing's axis"),
+        **parts.initial_speed("ego_speed_mps", 6, own.limit_mps, "initial speed of the ego"),
+        "ego_distance_m": parts.number((NEAREST_M, ego_m), "m", "ego's front to the crossing's near edge"),
+        "occluder_distance_m": parts.number((NEXT_M, occluder_m), "m", meaning),
+        **parts.initial_speed(
+            "occluder_speed_mps", 0, min(OCCLUDER_MPS, own.limit_mps), "initial speed of the occluder"
+        ),
+        **parts.walking("pedestrian along the road from the crossing's axis"),
     }
 
 
 def _before(net: Net, way: Track, distance_m: str) -> Fields:
-    return {"lane": lane_of(net, way), "before": "crossing", "distance_m": distance_m}
+    return {"lane": parts.lane_of(net, way), "before": "crossing", "distance_m": distance_m}
 
 
 def _streams(net: Net, oncoming: Sequence[Track]) -> Fields:
@@ -143,20 +128,20 @@ def _streams(net: Net, oncoming: Sequence[Track]) -> Fields:
         starts_m = [first_m + gap_m * k for k in range(ONCOMING // len(oncoming))]
         if count := sum(start_m + TRUCK_LENGTH_M <= way.room_m for start_m in starts_m):
             streams[name] = {
-                "lane": lane_of(net, way),
+                "lane": parts.lane_of(net, way),
                 "from_m": first_m - gap_m,
                 "gap_m": gap_m,
                 "count": count,
                 "speed": ONCOMING_MPS,
                 "lead_in": False,
-                "route": route_of(net, way),
+                "route": parts.route_of(net, way),
             }
     return streams
 
 
 def _room_wanted_m(limit_mps: float) -> float:
     """Least room before a crossing on the ego's track."""
-    return NEAREST_M + FOLLOWING_M + TRUCK_LENGTH_M + LEAD_IN_S * top_speed(limit_mps)
+    return NEAREST_M + FOLLOWING_M + TRUCK_LENGTH_M + LEAD_IN_S * parts.top_speed(limit_mps)
 
 
 def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[NetLane, Track, Track, Link]:
@@ -165,9 +150,11 @@ def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[NetLane, Track, 
     for right, own in reversed(list(pairwise(edge.drivable))):
         try:
             (ego, link), (occluder, beside) = _ego(net, own), _straight(net, right, OCCLUDED_S)
-            least_m = TRUCK_LENGTH_M + LEAD_IN_S * top_speed(own.limit_mps) + 1.0
+            least_m = TRUCK_LENGTH_M + LEAD_IN_S * parts.top_speed(own.limit_mps) + 1.0
             if occluder.room_m < least_m:
-                raise NoFit(f"the length of the way in on the lane beside is {lacking(occluder.room_m, 'm', least_m)}")
+                raise NoFit(
+                    f"the length of the way in on the lane beside is {parts.lacking(occluder.room_m, 'm', least_m)}"
+                )
             if truck_reaches(net, beside, link):
                 raise NoFit(
                     f"a truck that drives on from {right.id!r} reaches into the way of a vehicle that drives on from "
@@ -193,7 +180,9 @@ def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[NetLane, T
     parked_m = TRUCK_LENGTH_M + OCCLUDER_M
     occluder = track(net, way_on(net, beside[0], OCCLUDED_S, from_m=parked_m), 0.0, parked_m)
     if occluder.room_m < ROOM_BEYOND_M:
-        raise NoFit(f"the length of the way in of oncoming vehicles is {lacking(occluder.room_m, 'm', ROOM_BEYOND_M)}")
+        raise NoFit(
+            f"the length of the way in of oncoming vehicles is {parts.lacking(occluder.room_m, 'm', ROOM_BEYOND_M)}"
+        )
     return own, ego, occluder, link
 
 
@@ -328,4 +317,4 @@ class Map:
 
     def keep(self, fit: Fit) -> str:
         """Puts a place into the library; returns the name of its family."""
-        return library.keep(fit.scenario, {NET: cut(self.net, self._root, fit)})
+        return library.keep(fit.scenario, {NET: parts.cut(self.net, self._root, fit)})

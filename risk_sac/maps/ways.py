@@ -9,24 +9,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
-from risk_sac.maps.found import (
-    Fields,
-    Fit,
-    NoFit,
-    Spot,
-    at_most,
-    friction,
-    initial_speed,
-    lacking,
-    lane_of,
-    number,
-    route_of,
-    scenario_of,
-    signal_parts,
-)
+from risk_sac.maps import found as parts
+from risk_sac.maps.found import Fields, Fit, NoFit, Spot
 from risk_sac.scenario.ground import too_near
 from risk_sac.scenario.layout import CAR_LENGTH_M
-from risk_sac.scenario.tracks import Piece, Track
+from risk_sac.scenario.tracks import Track, pieces_of
 from risk_sac.world.net import Edge, Link, Net, NetLane, once
 
 DRIVEN_S = 17.0  # longer than an episode: the ego must not reach the end of the map
@@ -77,7 +64,7 @@ def way_on(net: Net, first: NetLane, seconds: float, through: Link | None = None
     way = extend([first], [], left_s, [through] if through else _onward(net, first))
     if way is None:
         found = f"the longest way on that was found ends with edge {farthest!r}"
-        raise NoFit(f"{found} after driving {lacking(reached_s, 's', seconds)}")
+        raise NoFit(f"{found} after driving {parts.lacking(reached_s, 's', seconds)}")
     return way
 
 
@@ -125,13 +112,7 @@ def track(net: Net, on: LaneWay, reference_m: float, beyond_m: float = 0.0) -> T
     first = next((i + 1 for i in reversed(range(len(back.lanes) - 1)) if back.lanes[i].edge in been), 0)
     lanes, links = [*back.lanes[first:], *on.lanes[1:]], [*back.links[first:], *on.links]
     own = len(back.lanes) - 1 - first
-    reach_m = [0.0] * len(lanes)
-    reach_m[own] = reference_m
-    for i in reversed(range(own)):
-        reach_m[i] = reach_m[i + 1] + links[i].inside_m + lanes[i].length_m
-    for i in range(own + 1, len(lanes)):
-        reach_m[i] = reach_m[i - 1] - lanes[i - 1].length_m - links[i - 1].inside_m
-    pieces = tuple(_piece(lane, reach) for lane, reach in zip(lanes, reach_m, strict=True))
+    pieces = pieces_of(lanes, links, own, reference_m)
     most = max(i for i, piece in enumerate(pieces) if i <= own or piece.reach_m > -beyond_m)
     return Track(pieces=pieces[: most + 1], onward=tuple(piece.edge for piece in pieces[most + 1 :]))
 
@@ -188,11 +169,6 @@ def _most_off_m(lane: NetLane) -> float:
     return round(max(OFF_M, OFF_SHARE * lane.length_m), 2)
 
 
-def _piece(lane: NetLane, reach_m: float) -> Piece:
-    reach_m, length_m = round(reach_m, 2), lane.length_m
-    return Piece(edge=lane.edge, lane=lane.index, reach_m=reach_m, length_m=length_m, limit_mps=lane.limit_mps)
-
-
 def _bend(link: Link) -> float:
     return abs(link.turn_rad)
 
@@ -225,49 +201,51 @@ def fit_stretch(net: Net, spot: Spot) -> Fit:
     own, way = _lane_to_drive(net, edge, reference_m)
     ego = track(net, way, reference_m, PIECES_M)
     if ego.room_m < LEAST_BEHIND_M:
-        raise NoFit(f"the room behind the ego is {lacking(ego.room_m, 'm', LEAST_BEHIND_M)}")
+        raise NoFit(f"the room behind the ego is {parts.lacking(ego.room_m, 'm', LEAST_BEHIND_M)}")
     aside = {1: "left", -1: "right"}
     lanes = {aside[n]: lane for lane in edge.drivable if (n := lane.index - own.index) in aside}
     sides = {side: beside for side in ("left", "right") if (beside := _beside(net, lanes.get(side), reference_m))}
     followed = ego.room_m >= LEAST_FOLLOWING_M + 2 * CAR_LENGTH_M + CLEAR_M
-    offset, signal = signal_parts(net, [link.signal for link in _soon(way, own.length_m - reference_m)])
+    offset, signal = parts.signal_parts(net, [link.signal for link in _soon(way, own.length_m - reference_m)])
     actors: Fields = {"lead": {"start": {"ahead_of": "ego", "gap_m": "lead_gap_m"}, "speed": "lead_speed_mps"}}
     parameters = {
-        **initial_speed("ego_speed_mps", 8, own.limit_mps, "initial speed of the ego"),
-        "lead_gap_m": number((8.0, 50.0), "m", "gap from the ego's front to the leader's rear"),
-        **initial_speed("lead_speed_mps", 6, own.limit_mps, "initial speed of the leader"),
+        **parts.initial_speed("ego_speed_mps", 8, own.limit_mps, "initial speed of the ego"),
+        "lead_gap_m": parts.number((8.0, 50.0), "m", "gap from the ego's front to the leader's rear"),
+        **parts.initial_speed("lead_speed_mps", 6, own.limit_mps, "initial speed of the leader"),
     }
     for side, beside in sides.items():
         lanes_left = 1 if side == "left" else -1
         actors[side] = {
             "start": {"beside": "ego", "ahead_m": f"{side}_offset_m", "lanes_left": lanes_left},
             "speed": f"{side}_speed_mps",
-            "route": route_of(net, beside),
+            "route": parts.route_of(net, beside),
         }
-        low_m = -at_most(BEHIND_M, beside.room_m - CAR_LENGTH_M - CLEAR_M)
-        parameters[f"{side}_offset_m"] = number(
+        low_m = -parts.at_most(BEHIND_M, beside.room_m - CAR_LENGTH_M - CLEAR_M)
+        parameters[f"{side}_offset_m"] = parts.number(
             (low_m, AHEAD_M), "m", f"{side} neighbour's front relative to the ego's"
         )
-        parameters |= initial_speed(f"{side}_speed_mps", 6, own.limit_mps, f"initial speed of the {side} neighbour")
+        parameters |= parts.initial_speed(
+            f"{side}_speed_mps", 6, own.limit_mps, f"initial speed of the {side} neighbour"
+        )
     if followed:
         behind = {"behind": "ego", "gap_m": "follower_gap_m"}
         actors["follower"] = {"role": "background", "start": behind, "speed": "ego_speed_mps"}
-        high_m = at_most(MOST_FOLLOWING_M, ego.room_m - 2 * CAR_LENGTH_M - CLEAR_M)
+        high_m = parts.at_most(MOST_FOLLOWING_M, ego.room_m - 2 * CAR_LENGTH_M - CLEAR_M)
         meaning = "gap from the follower's front to the ego's rear"
-        parameters["follower_gap_m"] = number((LEAST_FOLLOWING_M, high_m), "m", meaning)
+        parameters["follower_gap_m"] = parts.number((LEAST_FOLLOWING_M, high_m), "m", meaning)
     ahead = {"beside": "ego", "ahead_m": f"lead_gap_m + {DISTANT_M:g}"}
     actors["distant"] = {"role": "background", "start": ahead, "speed": "lead_speed_mps"}
-    start = {"lane": lane_of(net, ego), "at_m": reference_m, "lead_in": False}
+    start = {"lane": parts.lane_of(net, ego), "at_m": reference_m, "lead_in": False}
     fields = {
-        "parameters": parameters | offset | friction(),
-        "ego": {"start": start, "speed": "ego_speed_mps", "route": route_of(net, ego)},
+        "parameters": parameters | offset | parts.friction(),
+        "ego": {"start": start, "speed": "ego_speed_mps", "route": parts.route_of(net, ego)},
         "actors": actors,
         **signal,
     }
     # Most failures of the shipped family come from its left.
     like = {"family": "low", "actors": {name: name for name in ("lead", *sides)}, "mirrored": [*sides] == ["right"]}
     tags = ["iso34502:deceleration", *["iso34502:cut-in"] * bool(sides)]
-    scenario = scenario_of(spot, _summary(edge.id, tuple(sides)), tags, like, fields)
+    scenario = parts.scenario_of(spot, _summary(edge.id, tuple(sides)), tags, like, fields)
     return Fit(spot, scenario, (ego, *sides.values()), rare=not sides)
 
 

@@ -3,30 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from risk_sac.config import story_actions as act
 from risk_sac.config.scenario import EGO
-from risk_sac.config.story_actions import (
-    AcquirePositionAction,
-    Action,
-    AssignRouteAction,
-    DeleteAction,
-    DistanceAction,
-    Dynamics,
-    FinalSpeed,
-    FollowTrajectoryAction,
-    LaneChangeAction,
-    LaneOffsetAction,
-    LaneTarget,
-    NoAction,
-    RelativeTarget,
-    SpeedAction,
-    SpeedEntry,
-    SpeedProfileAction,
-    SynchroniseAction,
-    TeleportAction,
-    TrajectoryTiming,
-    VariableAction,
-    VisibilityAction,
-)
 from risk_sac.config.story_conditions import VariableCondition
 from risk_sac.config.values import Expression
 from risk_sac.errors import ConfigError
@@ -64,17 +42,17 @@ class Variables:
             else:
                 self.numbers[name] = at.number("value")
 
-    def action(self, at: At) -> VariableAction:
+    def action(self, at: At) -> act.VariableAction:
         """Reads a `VariableAction`, or a `ParameterAction`, which makes a variable of the parameter."""
         name = self._name(at, "variableRef" if at.tag == "VariableAction" else "parameterRef")
         setting, change = at.maybe("SetAction"), at.maybe("ModifyAction")
         if setting is not None:
-            return at.build(VariableAction, kind="variable", variable=name, **self._value(setting, name))
+            return at.build(act.VariableAction, variable=name, **self._value(setting, name))
         if change is None:
             raise at.refusal("neither SetAction nor ModifyAction", "one of them")
         step = change.one("Rule").one("AddValue", "MultiplyByValue")
         how = "add" if step.tag == "AddValue" else "multiply"
-        return at.build(VariableAction, kind="variable", variable=name, value=step.number("value"), how=how)
+        return at.build(act.VariableAction, variable=name, value=step.number("value"), how=how)
 
     def _name(self, at: At, attribute: str) -> str:
         name = at.constant(attribute)
@@ -84,7 +62,7 @@ class Variables:
             raise at.unknown(attribute, name, [*self.numbers, *self.words])
         return name
 
-    def begin(self, actions: list[VariableAction]) -> None:
+    def begin(self, actions: list[act.VariableAction]) -> None:
         """Gives variables the values that are set at time 0; raises `ConfigError` for other changes."""
         for action in actions:
             if action.how != "set":
@@ -156,7 +134,7 @@ _EFFECTS = {
     "SetMonitorAction": "nothing is monitored",
 }
 _READ = "an action on speed, lane, distance, route, place, visibility or a variable"
-WAYS = AssignRouteAction | FollowTrajectoryAction | AcquirePositionAction
+WAYS = act.AssignRouteAction | act.FollowTrajectoryAction | act.AcquirePositionAction
 """Actions that say where an actor goes; the ego drives there."""
 EGO_EFFECT = "the ego drives by itself"
 
@@ -176,17 +154,15 @@ class ActionReader:
             "LateralDistanceAction": self._distance,
             "SynchronizeAction": self._synchronise,
             "FollowTrajectoryAction": self._follow,
-            "AssignRouteAction": lambda at: at.build(AssignRouteAction, kind="assign_route", route=positions.route(at)),
+            "AssignRouteAction": lambda at: at.build(act.AssignRouteAction, route=positions.route(at)),
             "AcquirePositionAction": lambda at: at.build(
-                AcquirePositionAction, kind="acquire_position", position=positions.position(at.one("Position"))
+                act.AcquirePositionAction, position=positions.position(at.one("Position"))
             ),
-            "TeleportAction": lambda at: at.build(
-                TeleportAction, kind="teleport", position=positions.position(at.one("Position"))
-            ),
+            "TeleportAction": lambda at: at.build(act.TeleportAction, position=positions.position(at.one("Position"))),
             "VisibilityAction": self._visibility,
         }
 
-    def of_event(self, at: At, actors: tuple[str, ...]) -> Action:
+    def of_event(self, at: At, actors: tuple[str, ...]) -> act.Action:
         """Reads an element `Action` of an event; one that is not read does nothing, and is reported."""
         holder = at.one("PrivateAction", "GlobalAction", "UserDefinedAction")
         if holder.tag == "UserDefinedAction":
@@ -197,11 +173,11 @@ class ActionReader:
             action = self.private(holder)
         except Unread as error:
             return self._reported(error)
-        if actors == (EGO,) and not isinstance(action, WAYS | NoAction):
+        if actors == (EGO,) and not isinstance(action, WAYS | act.NoAction):
             return self._none(holder, EGO_EFFECT)
         return action
 
-    def private(self, holder: At) -> Action:
+    def private(self, holder: At) -> act.Action:
         """Reads an element `PrivateAction`.
 
         Raises:
@@ -210,13 +186,9 @@ class ActionReader:
         """
         here = holder
         while here.tag in ("PrivateAction", "LongitudinalAction", "LateralAction", "RoutingAction"):
-            children = here.element.children
-            if len(children) != 1:
-                raise here.refusal(f"{len(children)} actions", "one")
-            children[0].used = True
-            here = At(children[0], here.scope)
+            here = here.only("actions")
         if here.tag in self._readers:
-            action: Action = self._readers[here.tag](here)
+            action: act.Action = self._readers[here.tag](here)
             return action
         if here.tag in _ONLY_EGO:
             return self._none(here, "controllers are ignored: the ego is the one that is tested")
@@ -225,36 +197,33 @@ class ActionReader:
         here.element.use_all()
         raise here.unread(_READ, "the action does nothing")
 
-    def on_all(self, holder: At) -> Action:
+    def on_all(self, holder: At) -> act.Action:
         """Reads an element `GlobalAction`; one that is not read does nothing, and is reported."""
-        if len(holder.element.children) != 1:
-            raise holder.refusal(f"{len(holder.element.children)} actions", "one")
-        here = At(holder.element.children[0], holder.scope)
-        here.element.used = True
+        here = holder.only("actions")
         if here.tag == "EntityAction":
             if here.maybe("DeleteEntityAction") is not None:
                 name = self._entities.named(here)
-                return here.build(DeleteAction, kind="delete", actor=name)
+                return here.build(act.DeleteAction, actor=name)
             here.element.use_all()
             raise here.unread("DeleteEntityAction", "the entity does not appear")
         if here.tag in ("VariableAction", "ParameterAction"):
             return self._variables.action(here)
         return self._none(here, _EFFECTS.get(here.tag, "the action does nothing"))
 
-    def _none(self, at: At, effect: str) -> NoAction:
+    def _none(self, at: At, effect: str) -> act.NoAction:
         at.element.use_all()
         return self._reported(at.unread(_READ, effect))
 
-    def _reported(self, error: Unread) -> NoAction:
+    def _reported(self, error: Unread) -> act.NoAction:
         self._remarks.append(f"{error.field}: not read; {error.effect}")
-        return NoAction(kind="none")
+        return act.NoAction(kind="none")
 
     # Along
 
-    def _speed(self, at: At) -> SpeedAction:
+    def _speed(self, at: At) -> act.SpeedAction:
         dynamics = self._dynamics(at.one("SpeedActionDynamics"))
         target = self._target(at.one("SpeedActionTarget"), "TargetSpeed")
-        return at.build(SpeedAction, kind="speed", target=target, dynamics=dynamics)
+        return at.build(act.SpeedAction, target=target, dynamics=dynamics)
 
     def _target(self, at: At, what: str) -> Any:
         """Reads the child `Absolute…` as a number, or `Relative…` as a value beside an actor's."""
@@ -263,27 +232,26 @@ class ActionReader:
         relative = at.one(f"Relative{what}")
         to, value = self._entities.named(relative), relative.number("value")
         if what == "TargetLane":
-            return relative.build(LaneTarget, to=to, lanes=value)
+            return relative.build(act.LaneTarget, to=to, lanes=value)
         how, continuous = relative.one_of("speedTargetValueType", _HOW, "delta"), relative.flag("continuous", False)
-        return relative.build(RelativeTarget, to=to, value=value, how=how, continuous=continuous)
+        return relative.build(act.RelativeTarget, to=to, value=value, how=how, continuous=continuous)
 
-    def _dynamics(self, at: At) -> Dynamics:
+    def _dynamics(self, at: At) -> act.Dynamics:
         at.constant("followingMode", "position")
         return at.build(
-            Dynamics,
+            act.Dynamics,
             shape=at.one_of("dynamicsShape", _SHAPES),
             by=at.one_of("dynamicsDimension", _BY, "time"),
             value=at.number_or("value", 0.0),
         )
 
-    def _profile(self, at: At) -> SpeedProfileAction:
+    def _profile(self, at: At) -> act.SpeedProfileAction:
         entries = [
-            entry.build(SpeedEntry, speed=entry.number("speed"), time_s=entry.number_or("time", None))
+            entry.build(act.SpeedEntry, speed=entry.number("speed"), time_s=entry.number_or("time", None))
             for entry in at.all("SpeedProfileEntry")
         ]
         return at.build(
-            SpeedProfileAction,
-            kind="speed_profile",
+            act.SpeedProfileAction,
             entries=tuple(entries),
             to=self._entities.named(at) if "entityRef" in at.element.attributes else None,
             mode=at.one_of("followingMode", _MODES, "position"),
@@ -299,11 +267,11 @@ class ActionReader:
         names = {"accel_mps2": "maxAcceleration", "brake_mps2": "maxDeceleration", "speed_mps": "maxSpeed"}
         return {name: bounds.number_or(attribute, None) for name, attribute in names.items()}
 
-    def _distance(self, at: At) -> DistanceAction:
+    def _distance(self, at: At) -> act.DistanceAction:
         along = at.tag == "LongitudinalDistanceAction"
         default = "trailingReferencedEntity" if along else "any"
         return at.build(
-            DistanceAction,
+            act.DistanceAction,
             kind="longitudinal_distance" if along else "lateral_distance",
             to=self._entities.named(at),
             distance_m=at.number_or("distance", None),
@@ -315,11 +283,10 @@ class ActionReader:
             **self._bounds(at),
         )
 
-    def _synchronise(self, at: At) -> SynchroniseAction:
+    def _synchronise(self, at: At) -> act.SynchroniseAction:
         goal = at.maybe("FinalSpeed")
         return at.build(
-            SynchroniseAction,
-            kind="synchronise",
+            act.SynchroniseAction,
             master=self._entities.named(at, "masterEntityRef"),
             master_target=self._positions.position(at.one("TargetPositionMaster")),
             target=self._positions.position(at.one("TargetPosition")),
@@ -328,18 +295,18 @@ class ActionReader:
             tolerance_m=at.number_or("targetTolerance", 0.0),
         )
 
-    def _final_speed(self, at: At, action: At) -> FinalSpeed:
+    def _final_speed(self, at: At, action: At) -> act.FinalSpeed:
         inner = at.one("AbsoluteSpeed", "RelativeSpeedToMaster")
         speed: Any = inner.number("value")
         if inner.tag == "RelativeSpeedToMaster":
             how = inner.one_of("speedTargetValueType", _HOW, "delta")
             speed = inner.build(
-                RelativeTarget, to=self._entities.named(action, "masterEntityRef"), value=speed, how=how
+                act.RelativeTarget, to=self._entities.named(action, "masterEntityRef"), value=speed, how=how
             )
         holder = inner.maybe("SteadyState") or inner
         metres, seconds = holder.maybe("TargetDistanceSteadyState"), holder.maybe("TargetTimeSteadyState")
         return inner.build(
-            FinalSpeed,
+            act.FinalSpeed,
             speed=speed,
             steady_m=metres.number("distance") if metres is not None else None,
             steady_s=seconds.number("time") if seconds is not None else None,
@@ -347,20 +314,18 @@ class ActionReader:
 
     # Across
 
-    def _lane_change(self, at: At) -> LaneChangeAction:
+    def _lane_change(self, at: At) -> act.LaneChangeAction:
         return at.build(
-            LaneChangeAction,
-            kind="lane_change",
+            act.LaneChangeAction,
             target=self._target(at.one("LaneChangeTarget"), "TargetLane"),
             offset_m=at.number_or("targetLaneOffset", 0.0),
             dynamics=self._dynamics(at.one("LaneChangeActionDynamics")),
         )
 
-    def _lane_offset(self, at: At) -> LaneOffsetAction:
+    def _lane_offset(self, at: At) -> act.LaneOffsetAction:
         goal, dynamics = at.one("LaneOffsetTarget"), at.one("LaneOffsetActionDynamics")
         return at.build(
-            LaneOffsetAction,
-            kind="lane_offset",
+            act.LaneOffsetAction,
             target=self._target(goal, "TargetLaneOffset"),
             shape=dynamics.one_of("dynamicsShape", _SHAPES),
             lateral_mps2=dynamics.number_or("maxLateralAcc", None),
@@ -369,30 +334,29 @@ class ActionReader:
 
     # Ways and places
 
-    def _follow(self, at: At) -> FollowTrajectoryAction:
+    def _follow(self, at: At) -> act.FollowTrajectoryAction:
         holder = at.maybe("TrajectoryRef") or at
         times, mode = at.maybe("TimeReference"), at.maybe("TrajectoryFollowingMode")
         timing = times.maybe("Timing") if times is not None else None
         if times is not None:
             times.maybe("None")
         return at.build(
-            FollowTrajectoryAction,
-            kind="follow_trajectory",
+            act.FollowTrajectoryAction,
             trajectory=self._positions.trajectory(holder),
             timing=self._timing(timing) if timing is not None else None,
             mode=mode.one_of("followingMode", _MODES) if mode is not None else "position",
             from_m=at.number_or("initialDistanceOffset", 0.0),
         )
 
-    def _timing(self, at: At) -> TrajectoryTiming:
+    def _timing(self, at: At) -> act.TrajectoryTiming:
         domains = {"absolute": "absolute", "relative": "relative"}
         return at.build(
-            TrajectoryTiming,
+            act.TrajectoryTiming,
             domain=at.one_of("domainAbsoluteRelative", domains, "absolute"),
             scale=at.number_or("scale", 1.0),
             offset_s=at.number_or("offset", 0.0),
         )
 
-    def _visibility(self, at: At) -> VisibilityAction:
+    def _visibility(self, at: At) -> act.VisibilityAction:
         at.flag("graphics", True)
-        return at.build(VisibilityAction, kind="visibility", traffic=at.flag("traffic"), sensors=at.flag("sensors"))
+        return at.build(act.VisibilityAction, traffic=at.flag("traffic"), sensors=at.flag("sensors"))

@@ -3,24 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from risk_sac.config.story_conditions import (
-    AccelerationCondition,
-    AngleCondition,
-    CollisionCondition,
-    CollisionTimeCondition,
-    Condition,
-    DistanceCondition,
-    HeadwayCondition,
-    OffroadCondition,
-    ReachCondition,
-    RelativeSpeedCondition,
-    SpeedCondition,
-    StandStillCondition,
-    StateCondition,
-    TimeCondition,
-    TravelledCondition,
-    Trigger,
-)
+from risk_sac.config import story_conditions as when
 from risk_sac.config.story_places import Position
 from risk_sac.config.values import MOST_MAGNITUDE
 from risk_sac.openscenario.actions import COORDINATES, RULES, Variables
@@ -47,44 +30,35 @@ class ConditionReader:
     def __init__(self, positions: Positions, entities: Entities, variables: Variables, remarks: list[str]) -> None:
         """Prepares to read; conditions that are not read are added to `remarks`."""
         self._positions, self._entities, self._variables, self._remarks = positions, entities, variables, remarks
-        self._of_entities: Mapping[str, tuple[type[Any], str, Callable[[At], dict[str, Any]]]] = {
-            "TimeHeadwayCondition": (HeadwayCondition, "time_headway", lambda at: self._to(at) | self._measured(at)),
-            "TimeToCollisionCondition": (CollisionTimeCondition, "time_to_collision", self._collision_time),
-            "AccelerationCondition": (AccelerationCondition, "acceleration", _directed),
-            "StandStillCondition": (StandStillCondition, "stand_still", _lasting),
-            "SpeedCondition": (SpeedCondition, "speed", _directed),
-            "RelativeSpeedCondition": (
-                RelativeSpeedCondition,
-                "relative_speed",
-                lambda at: _directed(at) | self._to(at),
-            ),
-            "TraveledDistanceCondition": (TravelledCondition, "travelled", lambda at: {"value": at.number("value")}),
+        self._of_entities: Mapping[str, tuple[type[Any], Callable[[At], dict[str, Any]]]] = {
+            "TimeHeadwayCondition": (when.HeadwayCondition, lambda at: self._to(at) | self._measured(at)),
+            "TimeToCollisionCondition": (when.CollisionTimeCondition, self._collision_time),
+            "AccelerationCondition": (when.AccelerationCondition, _directed),
+            "StandStillCondition": (when.StandStillCondition, _lasting),
+            "SpeedCondition": (when.SpeedCondition, _directed),
+            "RelativeSpeedCondition": (when.RelativeSpeedCondition, lambda at: _directed(at) | self._to(at)),
+            "TraveledDistanceCondition": (when.TravelledCondition, lambda at: {"value": at.number("value")}),
             "ReachPositionCondition": (
-                ReachCondition,
-                "reach",
+                when.ReachCondition,
                 lambda at: {"position": self._place(at), "tolerance_m": at.number("tolerance")},
             ),
-            "DistanceCondition": (
-                DistanceCondition,
-                "distance",
-                lambda at: {"to": self._place(at)} | self._measured(at),
-            ),
-            "RelativeDistanceCondition": (DistanceCondition, "distance", lambda at: self._to(at) | self._measured(at)),
-            "CollisionCondition": (CollisionCondition, "collision", self._touched),
-            "AngleCondition": (AngleCondition, "angle", _angle),
-            "OffroadCondition": (OffroadCondition, "offroad", _lasting),
-            "EndOfRoadCondition": (OffroadCondition, "end_of_road", _lasting),
+            "DistanceCondition": (when.DistanceCondition, lambda at: {"to": self._place(at)} | self._measured(at)),
+            "RelativeDistanceCondition": (when.DistanceCondition, lambda at: self._to(at) | self._measured(at)),
+            "CollisionCondition": (when.CollisionCondition, self._touched),
+            "AngleCondition": (when.AngleCondition, _angle),
+            "OffroadCondition": (when.OffroadCondition, lambda at: {"kind": "offroad"} | _lasting(at)),
+            "EndOfRoadCondition": (when.OffroadCondition, lambda at: {"kind": "end_of_road"} | _lasting(at)),
         }
-        """Element → model, its kind, and what reads the fields that other conditions do not have."""
+        """Element → model, and what reads the fields that other conditions do not have."""
 
-    def trigger(self, at: At | None) -> Trigger | None:
+    def trigger(self, at: At | None) -> when.Trigger | None:
         """Reads a `StartTrigger` or `StopTrigger`; None if it is not there or has no group."""
         if at is None:
             return None
         groups = tuple(tuple(map(self._condition, group.all("Condition"))) for group in at.all("ConditionGroup"))
         return tuple(group for group in groups if group) or None
 
-    def _condition(self, at: At) -> Condition:
+    def _condition(self, at: At) -> when.Condition:
         common = {
             "name": at.constant("name", "condition")[:200] or "condition",
             "delay_s": at.number_or("delay", 0.0),
@@ -92,25 +66,22 @@ class ConditionReader:
         }
         holder = at.one("ByEntityCondition", "ByValueCondition")
         try:
-            condition: Condition
+            condition: when.Condition
             if holder.tag == "ByEntityCondition":
                 condition = self._by_entity(holder, common)
             else:
                 condition = self._by_value(holder, common)
         except Unread as error:
             self._remarks.append(f"{error.field}: not read; {error.effect}")
-            return at.build(TimeCondition, kind="time", rule="greater", value=MOST_MAGNITUDE, **common)
+            return at.build(when.TimeCondition, rule="greater", value=MOST_MAGNITUDE, **common)
         return condition
 
-    def _by_value(self, holder: At, common: dict[str, Any]) -> Condition:
+    def _by_value(self, holder: At, common: dict[str, Any]) -> when.Condition:
         if (at := holder.maybe("SimulationTimeCondition")) is not None:
-            return at.build(
-                TimeCondition, kind="time", rule=at.one_of("rule", RULES), value=at.number("value"), **common
-            )
+            return at.build(when.TimeCondition, rule=at.one_of("rule", RULES), value=at.number("value"), **common)
         if (at := holder.maybe("StoryboardElementStateCondition")) is not None:
             return at.build(
-                StateCondition,
-                kind="state",
+                when.StateCondition,
                 element=at.constant("storyboardElementRef"),
                 of_kind=at.one_of("storyboardElementType", _KINDS),
                 state=at.one_of("state", _STATES),
@@ -120,7 +91,7 @@ class ConditionReader:
             return self._variables.condition(at, common)
         raise _unread(holder)
 
-    def _by_entity(self, holder: At, common: dict[str, Any]) -> Condition:
+    def _by_entity(self, holder: At, common: dict[str, Any]) -> when.Condition:
         triggering = holder.one("TriggeringEntities")
         names = [name for ref in triggering.all("EntityRef") for name in self._entities.members(ref)]
         common |= {
@@ -130,14 +101,11 @@ class ConditionReader:
         if not names:
             raise triggering.refusal("no entity", "an EntityRef at least")
         inner = holder.one("EntityCondition")
-        if len(inner.element.children) != 1:
-            raise inner.refusal(f"{len(inner.element.children)} conditions", "one")
-        at = At(inner.element.children[0], inner.scope)
-        at.element.used = True
+        at = inner.only("conditions")
         if at.tag not in self._of_entities:
             raise _unread(inner)
-        model, kind, fields = self._of_entities[at.tag]
-        condition: Condition = at.build(model, kind=kind, **fields(at), **common)
+        model, fields = self._of_entities[at.tag]
+        condition: when.Condition = at.build(model, **fields(at), **common)
         return condition
 
     def _to(self, at: At) -> dict[str, Any]:

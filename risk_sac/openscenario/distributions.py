@@ -7,15 +7,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from risk_sac.config.distribution import (
-    HistogramBin,
-    HistogramLaw,
-    LognormalLaw,
-    NormalLaw,
-    PoissonLaw,
-    UniformLaw,
-    WeightsLaw,
-)
+from risk_sac.config import distribution as laws
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.errors import ConfigError
 from risk_sac.openscenario.parameters import WHOLE, Varied
@@ -113,7 +105,7 @@ class Variation:
             elements = law.all("Element")
             weights = tuple(one.number("weight") for one in elements)
             rows = _rows(at, name, [one.constant("value") for one in elements])
-            yield Varied(name, at.element, rows=rows, weights=law.build(WeightsLaw, kind="weights", weights=weights))
+            yield Varied(name, at.element, rows=rows, weights=law.build(laws.WeightsLaw, weights=weights))
         else:
             of = _LAWS[law.tag](law)
             bounds = law.maybe("Range")
@@ -142,13 +134,13 @@ def _bounds(at: At) -> tuple[float, float]:
     return low, high
 
 
-def _uniform(at: At) -> UniformLaw:
+def _uniform(at: At) -> laws.UniformLaw:
     low, high = _bounds(at.one("Range"))
-    return at.build(UniformLaw, kind="uniform", low=low, high=high)
+    return at.build(laws.UniformLaw, low=low, high=high)
 
 
-def _normal(at: At) -> NormalLaw:
-    return at.build(NormalLaw, kind="normal", mean=at.number("expectedValue"), deviation=_deviation(at))
+def _normal(at: At) -> laws.NormalLaw:
+    return at.build(laws.NormalLaw, mean=at.number("expectedValue"), deviation=_deviation(at))
 
 
 def _deviation(at: At) -> float:
@@ -158,21 +150,21 @@ def _deviation(at: At) -> float:
     return math.sqrt(variance)
 
 
-def _lognormal(at: At) -> LognormalLaw:
+def _lognormal(at: At) -> laws.LognormalLaw:
     """Reads the mean and the variance of the logarithm."""
-    return at.build(LognormalLaw, kind="lognormal", log_mean=at.number("expectedValue"), log_deviation=_deviation(at))
+    return at.build(laws.LognormalLaw, log_mean=at.number("expectedValue"), log_deviation=_deviation(at))
 
 
-def _poisson(at: At) -> PoissonLaw:
-    return at.build(PoissonLaw, kind="poisson", expected=at.number("expectedValue"))
+def _poisson(at: At) -> laws.PoissonLaw:
+    return at.build(laws.PoissonLaw, expected=at.number("expectedValue"))
 
 
-def _histogram(at: At) -> HistogramLaw:
+def _histogram(at: At) -> laws.HistogramLaw:
     bins = []
     for part in at.all("Bin"):
         low, high = _bounds(part.one("Range"))
-        bins.append(part.build(HistogramBin, low=low, high=high, weight=part.number("weight")))
-    return at.build(HistogramLaw, kind="histogram", bins=tuple(sorted(bins, key=lambda part: part.low)))
+        bins.append(part.build(laws.HistogramBin, low=low, high=high, weight=part.number("weight")))
+    return at.build(laws.HistogramLaw, bins=tuple(sorted(bins, key=lambda part: part.low)))
 
 
 _LAWS: Mapping[str, Callable[[At], Any]] = {

@@ -5,24 +5,8 @@ from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any
 
+from risk_sac.config import story_places as places
 from risk_sac.config.base import Chosen
-from risk_sac.config.story_places import (
-    ClothoidSegment,
-    ClothoidSpline,
-    LanePosition,
-    Polyline,
-    Position,
-    RelativeLanePosition,
-    RelativePosition,
-    RelativeRoadPosition,
-    RoadPosition,
-    RoutePath,
-    RoutePosition,
-    Trajectory,
-    TrajectoryPosition,
-    Vertex,
-    WorldPosition,
-)
 from risk_sac.openscenario.entities import Alternatives, Catalogs, Entities, parametrised
 from risk_sac.openscenario.scope import At, Text
 
@@ -35,24 +19,24 @@ class Positions:
 
     def __init__(self, catalogs: Catalogs, entities: Entities) -> None:
         """Prepares to read."""
-        self.routes: dict[str, RoutePath] = {}
-        self.trajectories: dict[str, Trajectory] = {}
+        self.routes: dict[str, places.RoutePath] = {}
+        self.trajectories: dict[str, places.Trajectory] = {}
         self._catalogs, self._entities = catalogs, entities
         self._depth = 0
-        self._readers: Mapping[str, tuple[type[Any], str, Callable[[At], dict[str, Any]]]] = {
-            "WorldPosition": (WorldPosition, "world", self._world),
-            "LanePosition": (LanePosition, "lane", _lane),
-            "RoadPosition": (RoadPosition, "road", lambda at: {"road": at.text("roadId")} | _along(at)),
-            "RelativeLanePosition": (RelativeLanePosition, "relative_lane", self._relative_lane),
-            "RelativeRoadPosition": (RelativeRoadPosition, "relative_road", self._relative_road),
-            "RelativeObjectPosition": (RelativePosition, "relative", self._relative),
-            "RelativeWorldPosition": (RelativePosition, "relative", self._relative),
-            "RoutePosition": (RoutePosition, "on_route", self._on_route),
-            "TrajectoryPosition": (TrajectoryPosition, "on_trajectory", self._on_trajectory),
+        self._readers: Mapping[str, tuple[type[Any], Callable[[At], dict[str, Any]]]] = {
+            "WorldPosition": (places.WorldPosition, self._world),
+            "LanePosition": (places.LanePosition, _lane),
+            "RoadPosition": (places.RoadPosition, lambda at: {"road": at.text("roadId")} | _along(at)),
+            "RelativeLanePosition": (places.RelativeLanePosition, self._relative_lane),
+            "RelativeRoadPosition": (places.RelativeRoadPosition, self._relative_road),
+            "RelativeObjectPosition": (places.RelativePosition, self._relative),
+            "RelativeWorldPosition": (places.RelativePosition, self._relative),
+            "RoutePosition": (places.RoutePosition, self._on_route),
+            "TrajectoryPosition": (places.TrajectoryPosition, self._on_trajectory),
         }
-        """Element → model, its kind, and what reads its fields but the heading."""
+        """Element → model, and what reads its fields but the heading."""
 
-    def position(self, at: At) -> Position:
+    def position(self, at: At) -> places.Position:
         """Reads the only child of an element `Position`, or of one that takes its place.
 
         Raises:
@@ -65,9 +49,9 @@ class Positions:
             at.element.children[0].use_all()
             raise At(at.element.children[0], at.scope).unread(_READ, "the place is unknown")
         here = at.one(*self._readers)
-        model, kind, fields = self._readers[here.tag]
-        turned = {} if model is WorldPosition else _turned(here)
-        position: Position = here.build(model, kind=kind, **fields(here), **turned)
+        model, fields = self._readers[here.tag]
+        turned = {} if model is places.WorldPosition else _turned(here)
+        position: places.Position = here.build(model, **fields(here), **turned)
         return position
 
     def _world(self, at: At) -> dict[str, Any]:
@@ -113,12 +97,12 @@ class Positions:
         """Collects the route that an element has as a child or names; returns its name."""
         return self._collected(holder, "Route", self.routes, self._route)
 
-    def _route(self, at: At) -> RoutePath:
+    def _route(self, at: At) -> places.RoutePath:
         waypoints = []
         for waypoint in at.all("Waypoint"):
             waypoint.constant("routeStrategy", "shortest")
             waypoints.append(self.position(waypoint.one("Position")))
-        return at.build(RoutePath, waypoints=tuple(waypoints), closed=at.flag("closed", False))
+        return at.build(places.RoutePath, waypoints=tuple(waypoints), closed=at.flag("closed", False))
 
     # Trajectories
 
@@ -126,30 +110,30 @@ class Positions:
         """Collects the trajectory that an element has as a child or names; returns its name."""
         return self._collected(holder, "Trajectory", self.trajectories, self._trajectory)
 
-    def _trajectory(self, at: At) -> Trajectory:
+    def _trajectory(self, at: At) -> places.Trajectory:
         closed = at.flag("closed", False)
         shape = at.one("Shape")
         if (line := shape.maybe("Polyline")) is not None:
             vertices = [self._vertex(vertex) for vertex in line.all("Vertex")]
             _check_times(line, vertices)
-            return line.build(Polyline, kind="polyline", vertices=tuple(vertices), closed=closed)
+            return line.build(places.Polyline, vertices=tuple(vertices), closed=closed)
         if (spline := shape.maybe("ClothoidSpline")) is not None:
             end = spline.number_or("timeEnd", None)
             segments = [self._segment(segment) for segment in spline.all("ClothoidSplineSegment", "Segment")]
-            return spline.build(ClothoidSpline, kind="clothoids", segments=tuple(segments), end_time_s=end)
+            return spline.build(places.ClothoidSpline, segments=tuple(segments), end_time_s=end)
         if (clothoid := shape.maybe("Clothoid")) is not None:
             return self._clothoid(clothoid)
         for child in shape.element.children:
             child.use_all()
         raise shape.unread("Polyline, Clothoid or ClothoidSpline", "the trajectory is unknown")
 
-    def _vertex(self, at: At) -> Vertex:
-        return at.build(Vertex, position=self.position(at.one("Position")), time_s=at.number_or("time", None))
+    def _vertex(self, at: At) -> places.Vertex:
+        return at.build(places.Vertex, position=self.position(at.one("Position")), time_s=at.number_or("time", None))
 
-    def _segment(self, at: At) -> ClothoidSegment:
+    def _segment(self, at: At) -> places.ClothoidSegment:
         start = at.maybe("PositionStart")
         return at.build(
-            ClothoidSegment,
+            places.ClothoidSegment,
             curvature_start=at.number("curvatureStart"),
             curvature_end=at.number("curvatureEnd"),
             length_m=at.number("length"),
@@ -158,12 +142,12 @@ class Positions:
             time_s=at.number_or("timeStart", None),
         )
 
-    def _clothoid(self, at: At) -> ClothoidSpline:
+    def _clothoid(self, at: At) -> places.ClothoidSpline:
         """Reads a clothoid, whose curvature changes by `curvaturePrime` per metre."""
         curvature, length = at.number("curvature"), at.number("length")
         prime = at.number("curvatureDot" if "curvatureDot" in at.element.attributes else "curvaturePrime")
         segment = at.build(
-            ClothoidSegment,
+            places.ClothoidSegment,
             curvature_start=curvature,
             curvature_end=at.combined(curvature, "+", at.combined(prime, "*", length)),
             length_m=length,
@@ -171,7 +155,7 @@ class Positions:
             time_s=at.number_or("startTime", None),
         )
         end = at.number_or("stopTime", None)
-        return at.build(ClothoidSpline, kind="clothoids", segments=(segment,), end_time_s=end)
+        return at.build(places.ClothoidSpline, segments=(segment,), end_time_s=end)
 
     def _collected(self, holder: At, tag: str, into: dict[str, Any], read: Callable[[At], Any]) -> Text:
         if (inline := holder.maybe(tag)) is not None:
@@ -223,7 +207,7 @@ def _kept(into: dict[str, Any], name: str, path: Any) -> str:
     return unique
 
 
-def _check_times(at: At, vertices: list[Vertex]) -> None:
+def _check_times(at: At, vertices: list[places.Vertex]) -> None:
     """Refuses times that go backwards, as far as they are constants, or that only some points have."""
     times = [vertex.time_s for vertex in vertices]
     if any(time is None for time in times) and any(time is not None for time in times):

@@ -321,6 +321,14 @@ class At:
             raise self.refusal(got, f"one of <{'>, <'.join(tags)}>")
         return children[0]
 
+    def only(self, what: str) -> "At":
+        """Returns the only child, of any name; raises `ConfigError` with what there are in place of one."""
+        children = self.element.children
+        if len(children) != 1:
+            raise self.refusal(f"{len(children)} {what}", "one")
+        children[0].used = True
+        return At(children[0], self.scope)
+
     def _children(self) -> str:
         tags = list(dict.fromkeys(child.tag for child in self.element.children))
         return f"only <{'>, <'.join(tags[:5])}>" if tags else "no child"

@@ -10,7 +10,7 @@ import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 from xml.parsers.expat import ExpatError, ParserCreate
 
 from pydantic import ValidationError
@@ -82,7 +82,10 @@ class XmlElement:
             child.use_all()
 
     def build(self, model: type[Built], **fields: Any) -> Built:
-        """Makes a model of what was read here; raises `ConfigError` with this place."""
+        """Makes a model of what was read here, of its only kind; raises `ConfigError` with this place."""
+        kinds = get_args(model.model_fields["kind"].annotation) if "kind" in model.model_fields else ()
+        if len(kinds) == 1:
+            fields["kind"] = kinds[0]
         try:
             return model(**fields)
         except ValidationError as error:

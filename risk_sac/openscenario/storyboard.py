@@ -117,7 +117,7 @@ class StoryboardReader:
             return
         if isinstance(action, FollowTrajectoryAction) and start.position is None:
             place = {"trajectory": action.trajectory, "s_m": action.from_m}
-            start.position, start.place = at.build(TrajectoryPosition, kind="on_trajectory", **place), at.element.place
+            start.position, start.place = at.build(TrajectoryPosition, **place), at.element.place
         way = isinstance(action, FollowTrajectoryAction | AssignRouteAction | AcquirePositionAction)
         if name == EGO and not way and not isinstance(action, NoAction):
             self._remarks.append(f"{at.element.place}: not read; {EGO_EFFECT}")

@@ -27,7 +27,15 @@ from risk_sac.metrics import (
     pooled_requirements,
 )
 from risk_sac.records import PHASES, Counts, DriverPcr, EpisodeRecord, Phase, Record, RequirementCounts
-from risk_sac.report.runs import PAID_FOR, TESTED, FailureOrigin, FinishedRun, failure_origins, found_within
+from risk_sac.report.runs import (
+    PAID_FOR,
+    TESTED,
+    FailureOrigin,
+    FinishedRun,
+    failure_origins,
+    found_within,
+    versions_of,
+)
 from risk_sac.report.statistics import PairedTest, corrected, paired_tests
 
 REFERENCE: MethodName = "risk-sac"
@@ -209,11 +217,8 @@ class Comparison:
 
     @property
     def versions(self) -> Mapping[str, str]:
-        """Package -> its version; all of them where runs differ."""
-        names = sorted({name for run in self.runs for name in run.versions})
-        return {
-            name: ", ".join(sorted({run.versions[name] for run in self.runs if name in run.versions})) for name in names
-        }
+        """Package → its version; all of them where runs differ."""
+        return versions_of(self.runs)
 
 
 def compare(

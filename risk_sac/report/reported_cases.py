@@ -20,7 +20,7 @@ from risk_sac.records.assessment import (
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.files import sha256
 from risk_sac.report.matrix import definitions_of
-from risk_sac.report.runs import FinishedRun
+from risk_sac.report.runs import FinishedRun, versions_of
 from risk_sac.report.standards import CLAUSES, SceneFacts, functional_of
 from risk_sac.scenario.families import document_named, family_named, sources_named
 from risk_sac.scenario.layout import LEAD_IN_S
@@ -109,7 +109,7 @@ def reported_cases(
             inputs=tuple(_inputs(document, facts)),
             constraints=tuple(map(str, document.constraints)),
             steps=tuple(_steps(spec, name, document)),
-            platform=_versions(runs),
+            platform=versions_of(runs),
             pass_criteria=criteria,
             result=_result(searches, records, criteria),
             estimates=estimates.get(name, ()),
@@ -186,11 +186,6 @@ def _steps(spec: CampaignSpec, name: FamilyName, document: Scenario) -> Iterator
     yield f"End at a contact, or after {family_named(name).horizon_steps * STEP_S:g} s."
     yield "Judge each violation: valid, preventable, fault, severity, plausibility, kind."
     yield f"Repeat for {spec.budget.episodes} episodes with each method and seed; replay the first failure of a kind."
-
-
-def _versions(runs: Sequence[FinishedRun]) -> Mapping[str, str]:
-    names = sorted({name for run in runs for name in run.versions})
-    return {name: ", ".join(sorted({run.versions[name] for run in runs if name in run.versions})) for name in names}
 
 
 def _result(

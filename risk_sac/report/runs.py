@@ -75,6 +75,12 @@ class FinishedRun:
         return tuple(findings)
 
 
+def versions_of(runs: Sequence[FinishedRun]) -> Mapping[str, str]:
+    """Package → its version; all of them where runs differ."""
+    names = sorted({name for run in runs for name in run.versions})
+    return {name: ", ".join(sorted({run.versions[name] for run in runs if name in run.versions})) for name in names}
+
+
 def read_run(folder: Path) -> FinishedRun:
     """Reads a finished run back.
 

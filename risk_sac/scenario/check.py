@@ -17,6 +17,7 @@ from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.interpret import Interpreter
 from risk_sac.scenario.layout import LEAD_IN_S, Layout, VehicleStart
 from risk_sac.scenario.odd import paths
+from risk_sac.scenario.reading import alternatives
 from risk_sac.scenario.scene import body_named, motion_of, steps_of
 from risk_sac.scenario.story_scene import ahead_of
 from risk_sac.world.net import Net
@@ -177,7 +178,7 @@ def _check_bodies(of: Interpreter) -> None:
     moving: dict[str, Moving] = {EGO: document.ego, **{f"actors.{name}": a for name, a in document.actors.items()}}
     streams: dict[str, Moving | Stream] = {f"streams.{name}": stream for name, stream in document.streams.items()}
     for path, actor in (moving | streams).items():
-        for name in of.alternatives(actor.body):
+        for name in alternatives(of.document, actor.body):
             body = body_named(name, f"{path}.body")
             motion = motion_of(document, path.removeprefix("actors."), body) if path in moving else "lanes"
             if motion not in BODIES[body].moves and motion != "not":

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import shapely
 
 from risk_sac.scenario.layout import (
     CAR_LENGTH_M,
@@ -58,15 +59,11 @@ def outlines(link: Link, length_m: float, width_m: float) -> Floats:
     return np.concatenate([each.reshape(2, -1) for each in sides], axis=1)
 
 
-def is_near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> bool:
-    """Whether a line comes so near to a point."""
-    for (ax, ay), (bx, by) in pairwise(line):
-        dx, dy = bx - ax, by - ay
-        square = dx * dx + dy * dy
-        share = 0.0 if square == 0.0 else min(max(((x_m - ax) * dx + (y_m - ay) * dy) / square, 0.0), 1.0)
-        if math.hypot(ax + share * dx - x_m, ay + share * dy - y_m) <= within_m:
-            return True
-    return False
+def is_near(line: Sequence[Point], points: Sequence[Point] | Floats, within_m: float) -> bool:
+    """Whether a line comes so near to one of some points, `n x 2`, m."""
+    if len(line) < 2 or not len(points):
+        return False
+    return bool(shapely.dwithin(shapely.LineString(line), shapely.points(points), within_m).any())
 
 
 @once
@@ -76,7 +73,9 @@ def too_near(net: Net, link: Link) -> Link | None:
     for lane in lanes[max(link.source.index - 1, 0) : link.source.index + 2]:
         for other in net.onward.get(lane.id, ()):
             beside = lane is not link.source and other.target.edge == link.target.edge
-            if beside and other.target is not link.target and _come_near(link.line, other.line):
+            if not beside or other.target is link.target:
+                continue
+            if is_near(other.line, link.line, ROOM_M) or is_near(link.line, other.line, ROOM_M):
                 return other
     return None
 
@@ -88,17 +87,11 @@ def truck_reaches(net: Net, beside: Link, own: Link) -> bool:
     """
     ways = [[*each.source.line, *each.line, *each.target.line] for each in _forks(net, own)]
     points = np.concatenate([outlines(each, TRUCK_LENGTH_M, TRUCK_WIDTH_M) for each in _forks(net, beside)], axis=1)
-    return any(is_near(way, x, y, CAR_WIDTH_M / 2) for way in ways for x, y in points.T.tolist())
+    return any(is_near(way, points.T, CAR_WIDTH_M / 2) for way in ways)
 
 
 def _forks(net: Net, link: Link) -> list[Link]:
     return [other for other in net.onward[link.source.id] if other.target.edge == link.target.edge]
-
-
-def _come_near(line: Sequence[Point], other: Sequence[Point]) -> bool:
-    return any(is_near(other, *point, ROOM_M) for point in line) or any(
-        is_near(line, *point, ROOM_M) for point in other
-    )
 
 
 def waits_in_the_way(net: Net, link: Link) -> NetLane | None:

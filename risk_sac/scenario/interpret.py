@@ -12,6 +12,7 @@ from risk_sac.config.values import term
 from risk_sac.errors import ConfigError, InfeasibleScene
 from risk_sac.scenario.ground import net_of
 from risk_sac.scenario.layout import Layout, shifted_groups
+from risk_sac.scenario.reading import alternatives
 from risk_sac.scenario.scene import SceneLayout, body_named, motion_of
 from risk_sac.scenario.space import Parameter, SceneSpace, Value
 from risk_sac.world.net import Net
@@ -113,7 +114,7 @@ class Interpreter:
         driven, walking = list[str](), list[str]()
         for name, actor in self.document.actors.items():
             if actor.role == "adversary" or (actor.role == "story" and self._deviates(name)):
-                bodies = self.alternatives(actor.body)
+                bodies = alternatives(self.document, actor.body)
                 motions = {motion_of(self.document, name, body_named(body, f"actors.{name}.body")) for body in bodies}
                 if len(motions) > 1:
                     wanted = "bodies that all drive in lanes, or all move freely"
@@ -123,16 +124,10 @@ class Interpreter:
 
     def _deviates(self, name: str) -> bool:
         """Whether methods may lead an actor away from the document's story."""
-        story, bodies = self.document.story, self.alternatives(self.document.actors[name].body)
+        story, bodies = self.document.story, alternatives(self.document, self.document.actors[name].body)
         if story is None or not any(story.deviation.model_dump().values()):
             return False
         return all(motion_of(self.document, name, body_named(body, f"actors.{name}.body")) != "not" for body in bodies)
-
-    def alternatives(self, name: "str | Chosen[str]") -> tuple[str, ...]:
-        """All names that a field may stand for, over the words of parameters."""
-        if isinstance(name, Chosen):
-            return tuple(name.of.values())
-        return self.document.words.get(name, (name,))
 
     def crossings(self, file: str) -> set[CrossingType]:
         """Kinds of the crossings whose kerbs its actors start at, on one of its nets."""

@@ -1,7 +1,7 @@
 """Reads scenario documents, locates faults by path, and names those that ship with the package."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -11,8 +11,7 @@ import yaml
 from pydantic import ValidationError
 
 from risk_sac.config import Scenario
-from risk_sac.config.base import UNKNOWN_FIELD, Location, dotted, field_error, read_text
-from risk_sac.config.scenario import Net
+from risk_sac.config.base import UNKNOWN_FIELD, Chosen, Location, dotted, field_error, read_text
 from risk_sac.errors import ConfigError, did_you_mean
 
 MOST_BYTES = 200_000  # of a document; choice: the shipped ones have up to 5,000
@@ -184,17 +183,18 @@ def shipped_net(name: str, remedy: str = "") -> str:
 
 def networks(document: Scenario) -> Iterator[str]:
     """All networks that a document names."""
-    yield from _alternatives(document, document.network)
+    yield from alternatives(document, document.network)
 
 
 def roads(document: Scenario) -> Iterator[str]:
     """All road files that a document names."""
     if document.road is not None:
-        yield from _alternatives(document, document.road)
+        yield from alternatives(document, document.road)
 
 
-def _alternatives(document: Scenario, name: Net) -> Iterable[str]:
-    return document.words.get(name, (name,)) if isinstance(name, str) else name.of.values()
+def alternatives(document: Scenario, name: str | Chosen[str]) -> tuple[str, ...]:
+    """All names that a field may stand for, over the words of parameters."""
+    return document.words.get(name, (name,)) if isinstance(name, str) else tuple(name.of.values())
 
 
 def nets_of(document: Scenario, folder: Path | None = None) -> Mapping[str, str]:

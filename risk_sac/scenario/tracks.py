@@ -194,15 +194,18 @@ def _track(
     on: list[Link],
     onward: list[str],
 ) -> Track:
-    lanes, links = [*lanes, *ahead], [*links, *on]
+    return Track(pieces_of([*lanes, *ahead], [*links, *on], own, reference_m), tuple(onward))
+
+
+def pieces_of(lanes: Sequence[NetLane], links: Sequence[Link], own: int, reference_m: float) -> tuple[Piece, ...]:
+    """Returns the pieces of lanes and the links between them; the reference is on lane `own`, m from its beginning."""
     reach_m = [0.0] * len(lanes)
     reach_m[own] = reference_m
     for i in reversed(range(own)):
         reach_m[i] = reach_m[i + 1] + links[i].inside_m + lanes[i].length_m
     for i in range(own + 1, len(lanes)):
         reach_m[i] = reach_m[i - 1] - lanes[i - 1].length_m - links[i - 1].inside_m
-    pieces = (
+    return tuple(
         Piece(lane.edge, lane.index, round(reach, 2), lane.length_m, lane.limit_mps)
         for lane, reach in zip(lanes, reach_m, strict=True)
     )
-    return Track(tuple(pieces), tuple(onward))
