@@ -189,14 +189,9 @@ def top_speed(limit_mps: float) -> float:
     return math.floor(limit_mps * 10 + 1e-9) / 10
 
 
-def own_piece(track: Track) -> Piece:
-    """Returns the lane with the track's reference."""
-    return next(piece for piece in reversed(track.pieces) if piece.reach_m >= 0.0)
-
-
 def lane_of(net: Net, track: Track) -> str:
     """Names the lane with the track's reference; raises `NoFit` if an edge has that name."""
-    return _lane(net, own_piece(track))
+    return _lane(net, next(piece for piece in reversed(track.pieces) if piece.reach_m >= 0.0))
 
 
 def route_of(net: Net, track: Track) -> list[str]:
@@ -211,17 +206,12 @@ def _lane(net: Net, piece: Piece) -> str:
     return name
 
 
-def edges_on(*tracks: Track) -> set[str]:
-    """Lists all edges that vehicles on the tracks may reach."""
-    return {piece.edge for track in tracks for piece in track.pieces} | {e for track in tracks for e in track.onward}
-
-
 AROUND_M = 100.0  # unused roads up to this far from a place stay: a picture shows them
 
 
 def cut(net: Net, root: ET.Element, fit: Fit) -> bytes:
     """The file of the piece around a place; `root` stays as it is."""
-    driven = edges_on(*fit.tracks)
+    driven = {edge for track in fit.tracks for edge in track.edges}
     crossed = {net.edges[id_].end for id_ in driven} | {net.edges[id_].start for id_ in driven}
     near = {
         id_ for id_, j in net.junctions.items() if math.hypot(j.x_m - fit.spot.x_m, j.y_m - fit.spot.y_m) <= AROUND_M

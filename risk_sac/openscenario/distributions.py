@@ -139,24 +139,11 @@ def _uniform(at: At) -> laws.UniformLaw:
     return at.build(laws.UniformLaw, low=low, high=high)
 
 
-def _normal(at: At) -> laws.NormalLaw:
-    return at.build(laws.NormalLaw, mean=at.number("expectedValue"), deviation=_deviation(at))
-
-
 def _deviation(at: At) -> float:
     variance = at.number("variance")
     if not isinstance(variance, float) or variance <= 0.0:
         raise at.refusal(f"variance {variance}", "a number above 0")
     return math.sqrt(variance)
-
-
-def _lognormal(at: At) -> laws.LognormalLaw:
-    """Reads the mean and the variance of the logarithm."""
-    return at.build(laws.LognormalLaw, log_mean=at.number("expectedValue"), log_deviation=_deviation(at))
-
-
-def _poisson(at: At) -> laws.PoissonLaw:
-    return at.build(laws.PoissonLaw, expected=at.number("expectedValue"))
 
 
 def _histogram(at: At) -> laws.HistogramLaw:
@@ -169,9 +156,13 @@ def _histogram(at: At) -> laws.HistogramLaw:
 
 _LAWS: Mapping[str, Callable[[At], Any]] = {
     "UniformDistribution": _uniform,
-    "NormalDistribution": _normal,
-    "LogNormalDistribution": _lognormal,
-    "PoissonDistribution": _poisson,
+    "NormalDistribution": lambda at: at.build(
+        laws.NormalLaw, mean=at.number("expectedValue"), deviation=_deviation(at)
+    ),
+    "LogNormalDistribution": lambda at: at.build(  # mean and variance of the logarithm
+        laws.LognormalLaw, log_mean=at.number("expectedValue"), log_deviation=_deviation(at)
+    ),
+    "PoissonDistribution": lambda at: at.build(laws.PoissonLaw, expected=at.number("expectedValue")),
     "Histogram": _histogram,
 }
 

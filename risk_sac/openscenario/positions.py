@@ -28,11 +28,17 @@ class Positions:
             "LanePosition": (places.LanePosition, _lane),
             "RoadPosition": (places.RoadPosition, lambda at: {"road": at.text("roadId")} | _along(at)),
             "RelativeLanePosition": (places.RelativeLanePosition, self._relative_lane),
-            "RelativeRoadPosition": (places.RelativeRoadPosition, self._relative_road),
+            "RelativeRoadPosition": (
+                places.RelativeRoadPosition,
+                lambda at: {"to": entities.named(at), "ds_m": at.number("ds"), "dt_m": at.number("dt")},
+            ),
             "RelativeObjectPosition": (places.RelativePosition, self._relative),
             "RelativeWorldPosition": (places.RelativePosition, self._relative),
             "RoutePosition": (places.RoutePosition, self._on_route),
-            "TrajectoryPosition": (places.TrajectoryPosition, self._on_trajectory),
+            "TrajectoryPosition": (
+                places.TrajectoryPosition,
+                lambda at: {"trajectory": self.trajectory(at.one("TrajectoryRef"))} | _along(at),
+            ),
         }
         """Element → model, and what reads its fields but the heading."""
 
@@ -70,9 +76,6 @@ class Positions:
             "offset_m": at.number_or("offset", 0.0),
         }
 
-    def _relative_road(self, at: At) -> dict[str, Any]:
-        return {"to": self._entities.named(at), "ds_m": at.number("ds"), "dt_m": at.number("dt")}
-
     def _relative(self, at: At) -> dict[str, Any]:
         at.number_or("dz", 0.0)
         axes = "actor" if at.tag == "RelativeObjectPosition" else "world"
@@ -87,9 +90,6 @@ class Positions:
         if (road := place.maybe("FromRoadCoordinates", "RoadCoordinates")) is not None:
             return route | {"s_m": road.number("pathS"), "t_m": road.number("t")}
         raise place.unread("FromLaneCoordinates or FromRoadCoordinates", "the place is unknown")
-
-    def _on_trajectory(self, at: At) -> dict[str, Any]:
-        return {"trajectory": self.trajectory(at.one("TrajectoryRef"))} | _along(at)
 
     # Routes
 

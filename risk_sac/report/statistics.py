@@ -127,11 +127,6 @@ def smallest_p(pairs: int) -> float:
     return min(1.0, 2 / (1 << pairs))
 
 
-def pairs_needed(hypotheses: int, level: float) -> int:
-    """The fewest pairs with which one of so many tests can pass Holm's correction at a level."""
-    return 1 + math.ceil(math.log2(hypotheses / level))
-
-
 class PairPower(NamedTuple):
     """Statistical power of tests with this number of pairs."""
 
@@ -139,14 +134,14 @@ class PairPower(NamedTuple):
     pairs: int
     smallest: float  # p that so many pairs can give
     corrected: float  # over all hypotheses
-    needed: int | None  # pairs, where these are too few for any test to pass
+    needed: int | None  # pairs with which one can pass, where these are too few for any
 
 
 def pair_power(tests: Sequence[PairedTest]) -> PairPower:
     """Computes what tests with so many pairs can show."""
     hypotheses, pairs = sum(test.p is not None for test in tests), max(test.pairs for test in tests)
     corrected = hypotheses * smallest_p(pairs)
-    needed = pairs_needed(hypotheses, LEVEL) if corrected > LEVEL else None
+    needed = 1 + math.ceil(math.log2(hypotheses / LEVEL)) if corrected > LEVEL else None
     return PairPower(hypotheses, pairs, smallest_p(pairs), min(1.0, corrected), needed)
 
 

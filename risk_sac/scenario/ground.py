@@ -195,18 +195,19 @@ def _around(net: Net, x_m: float, y_m: float, *, walked: bool) -> tuple[Polygons
     ]
     if not walked:
         return [], [], junctions
+    here = [(x_m, y_m)]
     crossings = [
         quad
         for crossing in net.crossings
-        if is_near(crossing.line, x_m, y_m, CROSSINGS_M)
+        if is_near(crossing.line, here, CROSSINGS_M)
         for quad in ribbon(crossing.line, crossing.width_m)
     ]
-    lanes = [lane for edge in net.edges.values() for lane in edge.drivable if is_near(lane.line, x_m, y_m, WALKED_M)]
+    lanes = [lane for edge in net.edges.values() for lane in edge.drivable if is_near(lane.line, here, WALKED_M)]
     for junction in net.junctions.values():
         if math.hypot(junction.x_m - x_m, junction.y_m - y_m) <= 3 * WALKED_M:
-            lanes += [lane for lane in net.inside.get(junction.id, ()) if is_near(lane.line, x_m, y_m, WALKED_M)]
+            lanes += [lane for lane in net.inside.get(junction.id, ()) if is_near(lane.line, here, WALKED_M)]
     quads = (quad for lane in lanes for quad in ribbon(lane.line, lane.width_m))
-    return crossings, [quad for quad in quads if is_near((*quad, quad[0]), x_m, y_m, WALKED_M)], junctions
+    return crossings, [quad for quad in quads if is_near((*quad, quad[0]), here, WALKED_M)], junctions
 
 
 def _rounded(polygons: Iterable[Sequence[Point]]) -> Iterator[tuple[Point, ...]]:

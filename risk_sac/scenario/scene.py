@@ -18,7 +18,7 @@ from risk_sac.scenario.space import Value
 from risk_sac.scenario.story_scene import StoryScene
 from risk_sac.scenario.tracks import Track, Turn, lane_named, routed, straight_on
 from risk_sac.scenario.travel_line import Pose
-from risk_sac.world.net import Crossing, Link, Net, NetLane, direction
+from risk_sac.world.net import Crossing, Net, NetLane, direction
 from risk_sac.world.read_net import DRIVER
 from risk_sac.world.types import STEP_S, Point, Role
 
@@ -384,14 +384,11 @@ class SceneLayout:
             known = ", ".join(self._net.programs) or "the net has none"
             raise ConfigError("signal.id", repr(named), "a traffic light of the net", f"known: {known}")
         edges = self._placed[EGO].track.edges
-        lit = {(link.source.edge, link.target.edge): link.signal for link in _all_links(self._net) if link.signal}
+        links = (link for leading in self._net.onward.values() for link in leading)
+        lit = {(link.source.edge, link.target.edge): link.signal for link in links if link.signal}
         met = (lit.get(pair) for pair in pairwise(edges))
         only = next(iter(self._net.programs), None) if len(self._net.programs) == 1 else None
         return named or next(filter(None, met), only)
-
-
-def _all_links(net: Net) -> Iterator[Link]:
-    return (link for links in net.onward.values() for link in links)
 
 
 def _started(name: str, role: Role, place: OnTrack, speed_mps: float, body: BodyName) -> VehicleStart:
