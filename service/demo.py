@@ -165,7 +165,7 @@ def _write(out: Path, campaign: Campaign, results: Results, failures: Sequence[E
 
 def first_detections(campaign: Campaign, failures: Sequence[Episode], data_dir: Path) -> Mapping[str, Episode | None]:
     """Returns of each search, by id, the first failure that detects the defect; see `detected`."""
-    from risk_sac.failures.detection import detected  # here, because loading the simulator takes seconds
+    from risk_sac.failures.play import detected  # here, because loading the simulator takes seconds
 
     detections: dict[str, Episode | None] = {}
     for spec in campaign.spec.searches():

@@ -179,8 +179,8 @@ def _failures(path: Path) -> Iterator[tuple[str, EpisodeRecord]]:
 
 
 def _clusters(options: argparse.Namespace) -> int:
-    from risk_sac.failures.clusters import overview
     from risk_sac.metrics import with_published
+    from risk_sac.report.runs import overview
 
     summary = overview(episode for run in options.runs for episode in _failures(run))
     table = narrow_table("failures", "variants", "preventable", "kind; look first at")

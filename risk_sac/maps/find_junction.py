@@ -14,8 +14,8 @@ from risk_sac.maps.found import Fields, Fit, NoFit, Spot
 from risk_sac.maps.ways import AFTER_S, check_limit, track, way_on
 from risk_sac.scenario.families import MOST_OVER_LIMIT
 from risk_sac.scenario.ground import ROOM_M, too_near, waits_in_the_way
+from risk_sac.scenario.lane_places import STRAIGHT_RAD, Track
 from risk_sac.scenario.layout import CAR_LENGTH_M, LEAD_IN_S
-from risk_sac.scenario.tracks import STRAIGHT_RAD, Track
 from risk_sac.world.net import Edge, Link, Net, once
 
 NEAREST_M, FARTHEST_M = 10.0, 90.0  # range of the distance of attacker and ego from the stop line

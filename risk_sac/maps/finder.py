@@ -22,8 +22,8 @@ from risk_sac.maps.ways import (
 )
 from risk_sac.scenario import library
 from risk_sac.scenario.ground import truck_reaches
+from risk_sac.scenario.lane_places import Track
 from risk_sac.scenario.layout import LEAD_IN_S, TRUCK_LENGTH_M
-from risk_sac.scenario.tracks import Track
 from risk_sac.world.net import Crossing, Edge, Link, Net, NetLane
 from risk_sac.world.read_net import read_net, read_tree
 

@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError
+from risk_sac.scenario.lane_places import Piece, Track
 from risk_sac.scenario.reading import document_from_fields
-from risk_sac.scenario.tracks import Piece, Track
 from risk_sac.world.net import Net
 
 Pattern = Literal["car_following", "crossing", "junction"]

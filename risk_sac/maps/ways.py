@@ -12,8 +12,8 @@ from itertools import pairwise
 from risk_sac.maps import found as parts
 from risk_sac.maps.found import Fields, Fit, NoFit, Spot
 from risk_sac.scenario.ground import too_near
+from risk_sac.scenario.lane_places import Track, pieces_of
 from risk_sac.scenario.layout import CAR_LENGTH_M
-from risk_sac.scenario.tracks import Track, pieces_of
 from risk_sac.world.net import Edge, Link, Net, NetLane, once
 
 DRIVEN_S = 17.0  # longer than an episode: the ego must not reach the end of the map

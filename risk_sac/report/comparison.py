@@ -8,7 +8,6 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from risk_sac.config import CampaignSpec, FamilyName, MethodName, RunMethod, RunSpec
-from risk_sac.failures.clusters import Overview, overview
 from risk_sac.failures.studied import Studied
 from risk_sac.metrics import (
     METRICS,
@@ -32,8 +31,10 @@ from risk_sac.report.runs import (
     TESTED,
     FailureOrigin,
     FinishedRun,
+    Overview,
     failure_origins,
     found_within,
+    overview,
     versions_of,
 )
 from risk_sac.report.statistics import PairedTest, corrected, paired_tests

@@ -11,7 +11,6 @@ from pathlib import Path
 from risk_sac.config import IID_METHODS, CampaignSpec, FamilyName, IidName, Requirement
 from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.errors import ConfigError, DamagedError, RiskSacError
-from risk_sac.failures.clusters import Cluster, Overview
 from risk_sac.failures.net import roads_of, signal_heads, thumbnail
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.studied import Regression
@@ -25,7 +24,7 @@ from risk_sac.report.files import input_digests, manifest, signed
 from risk_sac.report.matrix import coverage_matrix
 from risk_sac.report.rendering import Layout, render
 from risk_sac.report.reported_cases import CLAUSE_ROWS, CRASHED, FIGURES, TRAFFIC, allowed, reported_cases
-from risk_sac.report.runs import FinishedRun
+from risk_sac.report.runs import Cluster, FinishedRun, Overview
 from risk_sac.report.statistics import played_by, power_of
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, RecordedFailure, series_name

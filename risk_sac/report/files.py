@@ -17,7 +17,6 @@ from pydantic import Field
 from risk_sac.config import IID_METHODS, CampaignSpec, FamilyName, Iid, MethodName, RunSpec
 from risk_sac.config.spec_file import read_campaign
 from risk_sac.errors import ConfigError
-from risk_sac.failures.clusters import Overview
 from risk_sac.failures.studied import Studied
 from risk_sac.metrics import METRICS
 from risk_sac.records import DrivenBy, Fault, Phase, Record, RunMetrics, Severity
@@ -25,7 +24,7 @@ from risk_sac.records.assessment import InputDigest, SignedInputs
 from risk_sac.report.comparison import Cell, Comparison, MissingRun, compare
 from risk_sac.report.figures import FORMATS, figure_files, figure_names
 from risk_sac.report.rendering import table_markdown, this_platform
-from risk_sac.report.runs import FailureOrigin, FinishedRun, read_run
+from risk_sac.report.runs import FailureOrigin, FinishedRun, Overview, read_run
 from risk_sac.report.statistics import MEASURED, PairedTest
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import EPISODES, FAILURES, RESULTS, VERIFIED, RunResults, read_results

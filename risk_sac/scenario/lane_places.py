@@ -1,17 +1,20 @@
-"""Places on the lanes of a SUMO net, and ways from edge to edge."""
+"""Places on the lanes of a SUMO net, and ways of vehicles through it, lane by lane."""
 
 import itertools
 import math
 from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from heapq import heappop, heappush
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import shapely
 
+from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of
 from risk_sac.world.net import Link, Net, NetLane, once
+from risk_sac.world.read_net import DRIVER
 from risk_sac.world.types import Floats
 
 FARTHEST_M = 30.0  # of a pose from the line of its lane
@@ -169,3 +172,204 @@ def extended(net: Net, edges: Sequence[str], metres: float) -> tuple[str, ...]:
         way.append(link.target.edge)
         left_m -= link.inside_m + link.target.length_m
     return tuple(way)
+
+
+Turn = Literal["left", "straight", "right"]
+STRAIGHT_RAD = math.radians(30.0)  # largest bend of a way that goes straight on
+BACK_M = 400.0  # of road before a reference, where no route says more
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A lane on the way to a reference, such as a stop line, or beyond it."""
+
+    edge: str
+    lane: int  # index on its edge; 0 is the rightmost
+    reach_m: float  # from the beginning of the lane to the reference; negative beyond it
+    length_m: float
+    limit_mps: float
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A way through the net on which vehicles start, lane by lane."""
+
+    pieces: tuple[Piece, ...]  # in the order of driving; those inside junctions are left out
+    onward: tuple[str, ...]  # edges that follow the last piece
+
+    @property
+    def room_m(self) -> float:
+        """Length of the track before its reference, m."""
+        return self.pieces[0].reach_m
+
+    @property
+    def edges(self) -> tuple[str, ...]:
+        """All edges, in the order of driving."""
+        return tuple(piece.edge for piece in self.pieces) + self.onward
+
+    def start(self, before_m: float, lead_m: float = 0.0) -> tuple[tuple[str, ...], Piece, float]:
+        """Route, lane, and position on it of a front bumper `before_m`, and `lead_m` more, before the reference.
+
+        A vehicle that would start inside a junction starts at its entry.
+        """
+        first = len(self.pieces) - 1
+        while first > 0 and self.pieces[first].reach_m - before_m - lead_m < 0.0:
+            first -= 1
+        piece = self.pieces[first]
+        position_m = min(max(piece.reach_m - before_m - lead_m, 0.0), piece.length_m)
+        return tuple(piece.edge for piece in self.pieces[first:]) + self.onward, piece, position_m
+
+
+def lane_named(
+    net: Net,
+    name: str,
+    field: str,
+    leading: "Sequence[str] | Turn | None" = None,
+    classes: Collection[str] | None = (DRIVER,),
+) -> NetLane:
+    """Returns a lane by its name or its edge's; raises `ConfigError`.
+
+    Args:
+      net: where.
+      name: a lane, or an edge, of which the leftmost lane is taken that leads on.
+      field: path of the name in the document.
+      leading: edges that the way goes on with, or a turn.
+      classes: of SUMO, of which it has to admit one; None: any lane of a road does.
+    """
+    if name in net.edges:
+        lanes = net.edges[name].drivable
+        if isinstance(leading, str):
+            fits = [lane for lane in lanes if any(_turns(link, leading) for link in net.onward.get(lane.id, ()))]
+        else:
+            fits = [lane for lane in lanes if not leading or _links_to(net, lane, leading[0])] or list(lanes)
+        if fits:
+            return fits[-1]
+        if lanes:
+            raise ConfigError(field, f"{name!r}, from which no lane leads {leading}", "another edge or turn")
+    lane = net.lanes.get(name)
+    if lane is None or lane.use != "lane":
+        raise ConfigError(field, repr(name), "a lane or an edge of the net", _near(name, [*net.edges, *net.lanes]))
+    if classes is not None and not lane.admits(classes):
+        got = f"{name!r}, on which no {' or '.join(classes)} may drive"
+        raise ConfigError(field, got, f"a lane for {' or '.join(classes)}")
+    return lane
+
+
+def _near(name: str, known: Sequence[str]) -> str:
+    shown = [id_ for id_ in known if not id_.startswith(":")]
+    listed = ", ".join(shown[:12]) + (", …" if len(shown) > 12 else "")
+    return did_you_mean(name, shown) or f"the net has {listed}"
+
+
+def _turns(link: Link, turn: str) -> bool:
+    if turn == "straight":
+        return abs(link.turn_rad) <= STRAIGHT_RAD
+    return link.turn_rad > STRAIGHT_RAD if turn == "left" else link.turn_rad < -STRAIGHT_RAD
+
+
+def _links_to(net: Net, lane: NetLane, edge: str) -> list[Link]:
+    """Links of a lane to an edge, the straightest first."""
+    links = [link for link in net.onward.get(lane.id, ()) if link.target.edge == edge]
+    return sorted(links, key=lambda link: abs(link.turn_rad))
+
+
+def routed(net: Net, lane: NetLane, reference_m: float, route: Sequence[str], field: str) -> Track:
+    """The track of a route of edges or lanes, with the lane of the reference, m from its beginning, on it.
+
+    Raises:
+      ConfigError: an edge is not there, two do not meet, or the lane is not on it.
+    """
+    edges = [item if item in net.edges else lane_named(net, item, f"{field}[{i}]").edge for i, item in enumerate(route)]
+    for i, (edge, following) in enumerate(itertools.pairwise(edges)):
+        if not any(_links_to(net, drivable, following) for drivable in net.edges[edge].drivable):
+            beyond = sorted({k.target.edge for d in net.edges[edge].drivable for k in net.onward.get(d.id, ())})
+            wanted = f"an edge that {edge!r} leads to: {', '.join(beyond) or 'there is none'}"
+            raise ConfigError(f"{field}[{i + 1}]", repr(following), wanted)
+    if lane.edge not in edges:
+        raise ConfigError(field, ", ".join(route), f"a route over {lane.edge!r}, where the actor starts")
+    own = edges.index(lane.edge)
+    lanes, links = [lane], list[Link]()
+    for i in reversed(range(own)):
+        arriving = [link for link in net.back.get(lanes[0].id, ()) if link.source.edge == edges[i]]
+        arriving = [link for link in arriving if route[i] in (edges[i], link.source.id)]
+        if not arriving:
+            break
+        links.insert(0, min(arriving, key=lambda link: abs(link.turn_rad)))
+        lanes.insert(0, links[0].source)
+    return _track(lanes, links, lanes.index(lane), reference_m, *_ahead(net, lane, edges[own + 1 :], route[own + 1 :]))
+
+
+def straight_on(net: Net, lane: NetLane, reference_m: float, metres: float, turn: str | None, field: str) -> Track:
+    """The track that goes straight on from a lane, after a turn at its end if one is given.
+
+    The reference lies `reference_m` from the lane's beginning; the way may end after so many metres.
+
+    Raises:
+      ConfigError: the lane does not turn so.
+    """
+    ahead, length_m, here = list[str](), lane.length_m - reference_m, lane
+    while length_m < metres:
+        been = {lane.edge, *ahead}
+        links = sorted(net.onward.get(here.id, ()), key=lambda link: abs(link.turn_rad))
+        if turn is not None and not ahead:
+            links = [link for link in links if _turns(link, turn)]
+            if not links:
+                raise ConfigError(field, turn, f"a turn that lane {lane.id!r} leads to")
+        links = [link for link in links if link.target.edge not in been]
+        if not links:
+            break
+        here = links[0].target
+        ahead.append(here.edge)
+        length_m += links[0].inside_m + here.length_m
+    lanes, back = [lane], list[Link]()
+    while sum(one.length_m for one in lanes[:-1]) + reference_m < BACK_M:
+        been = {*ahead, *(one.edge for one in lanes)}
+        arriving = [link for link in net.back.get(lanes[0].id, ()) if link.source.edge not in been]
+        if not arriving or any(link.signal for link in arriving):  # who starts before a signal may stand there for good
+            break
+        back.insert(0, min(arriving, key=lambda link: abs(link.turn_rad)))
+        lanes.insert(0, back[0].source)
+    return _track(lanes, back, len(lanes) - 1, reference_m, *_ahead(net, lane, ahead, ahead))
+
+
+def _ahead(
+    net: Net, lane: NetLane, edges: Sequence[str], route: Sequence[str]
+) -> tuple[list[NetLane], list[Link], list[str]]:
+    """Lanes that follow a lane without a lane change, the links to them, and the edges after these.
+
+    `route` has each of the `edges` as an edge, or as the lane to take.
+    """
+    lanes, links = [lane], list[Link]()
+    for edge, item in zip(edges, route, strict=True):
+        on = [link for link in _links_to(net, lanes[-1], edge) if item in (edge, link.target.id)]
+        if not on:
+            break
+        links.append(on[0])
+        lanes.append(on[0].target)
+    return lanes[1:], links, list(edges[len(links) :])
+
+
+def _track(
+    lanes: list[NetLane],
+    links: list[Link],
+    own: int,
+    reference_m: float,
+    ahead: list[NetLane],
+    on: list[Link],
+    onward: list[str],
+) -> Track:
+    return Track(pieces_of([*lanes, *ahead], [*links, *on], own, reference_m), tuple(onward))
+
+
+def pieces_of(lanes: Sequence[NetLane], links: Sequence[Link], own: int, reference_m: float) -> tuple[Piece, ...]:
+    """Returns the pieces of lanes and the links between them; the reference is on lane `own`, m from its beginning."""
+    reach_m = [0.0] * len(lanes)
+    reach_m[own] = reference_m
+    for i in reversed(range(own)):
+        reach_m[i] = reach_m[i + 1] + links[i].inside_m + lanes[i].length_m
+    for i in range(own + 1, len(lanes)):
+        reach_m[i] = reach_m[i - 1] - lanes[i - 1].length_m - links[i - 1].inside_m
+    return tuple(
+        Piece(lane.edge, lane.index, round(reach, 2), lane.length_m, lane.limit_mps)
+        for lane, reach in zip(lanes, reach_m, strict=True)
+    )

@@ -11,12 +11,11 @@ from risk_sac.config.scenario import EGO, LONGEST_HORIZON_S, Actor, Driven, Movi
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.bodies import BODIES, BodyName, Motion
 from risk_sac.scenario.ground import ground_of, kerb_of
-from risk_sac.scenario.lane_places import entry_of, lane_line
+from risk_sac.scenario.lane_places import Track, Turn, entry_of, lane_line, lane_named, routed, straight_on
 from risk_sac.scenario.layout import LEAD_IN_S, Layout, PedestrianStart, StaticStart, StoryPlan, VehicleStart
 from risk_sac.scenario.odd import FRICTION
 from risk_sac.scenario.space import Value
 from risk_sac.scenario.story_scene import StoryScene
-from risk_sac.scenario.tracks import Track, Turn, lane_named, routed, straight_on
 from risk_sac.scenario.travel_line import Pose
 from risk_sac.world.net import Crossing, Net, NetLane, direction
 from risk_sac.world.read_net import DRIVER

@@ -19,7 +19,6 @@ from risk_sac.env.problem import requirements_of
 from risk_sac.errors import ConfigError
 from risk_sac.failures import studied
 from risk_sac.failures.bundle import code_digest
-from risk_sac.failures.clusters import Overview
 from risk_sac.failures.studied import Regression
 from risk_sac.rates.record import METHOD, rates_of
 from risk_sac.records import Record, State, TriageState, wire
@@ -39,6 +38,7 @@ from risk_sac.report import (
 from risk_sac.report.document import CARD_TIMES, CampaignFacts, Origin, gathered, report_page
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.matrix import coverage_matrix
+from risk_sac.report.runs import Overview
 from risk_sac.report.trend import EndedCampaign, EndedRun, LeftOut, Trend, check_scenarios, driver_name, trend
 from risk_sac.run_folder.results import read_boundary_map, read_rates
 from risk_sac.scenario.families import family_named

@@ -11,8 +11,7 @@ from risk_sac.cli import main
 from risk_sac.config import RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.env.env import RiskSacEnv
-from risk_sac.failures.detection import detected, without_defects
-from risk_sac.failures.play import play
+from risk_sac.failures.play import detected, play, without_defects
 from risk_sac.lab.benchmark.runs import Detection, first_detection
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, series_name

@@ -14,7 +14,7 @@ from risk_sac.egos.defects.catalogue import DEFECTS, version_of
 from risk_sac.egos.registry import pinned
 from risk_sac.env.problem import check_installed
 from risk_sac.errors import ConfigError, RiskSacError
-from risk_sac.failures.detection import candidates, detected
+from risk_sac.failures.play import candidates, detected
 from risk_sac.records import EpisodeRecord, Record, RunMetrics, SeriesFile
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.durable import replace_file
@@ -45,7 +45,7 @@ class Detection(Record):
     triggered: int | None
     """Until a requirement was first validly violated; null if none was."""
     detected: int | None
-    """Until a failure first showed the defect, see `failures.detection`; null if none did."""
+    """Until a failure first showed the defect, see `failures.play`; null if none did."""
     refuted: int
     """Candidates that the ego without the defects has too."""
     kind: str

@@ -3,7 +3,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from risk_sac.failures.detection import least_clearance_m
+from risk_sac.failures.play import least_clearance_m
 from risk_sac.failures.recording import Series
 
 LENGTH_M, WIDTH_M, STEPS = 4.6, 1.85, 41

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from risk_sac.failures import play
-from risk_sac.failures.clusters import vendi
 from risk_sac.failures.minimise import _reduce_actions, without
 from risk_sac.failures.question import TwinPlay, read_twin, twin_bytes
 from risk_sac.failures.studied import STUDIES, Core, Extent, Studied, note, read_studies
 from risk_sac.failures.variants import Variant, alike
 from risk_sac.records import Collision, ConflictType, EpisodeRecord, Grade, Outcome
+from risk_sac.report.runs import vendi
 from tests.builders import collision, episode_record, judgement, violation
 from tests.unit.failures.staged import synthetic_series
 
