@@ -9,18 +9,10 @@ from typing import Any, TypeAlias
 
 from pydantic import BaseModel, TypeAdapter
 from pydantic_core import to_json
+from rich import progress
 from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.markup import escape
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    TaskID,
-    TextColumn,
-    TimeRemainingColumn,
-)
 from rich.table import Column, Table
 
 from risk_sac.config.spec_file import EGO_FILE, EGO_NAMES
@@ -81,24 +73,26 @@ def write_out(file: Path, content: bytes, what: str = "", said_on: Output = cons
         said_on.print(f"{what}: {file}", markup=False, soft_wrap=True)
 
 
-def columns(bar: BarColumn) -> tuple[ProgressColumn, ...]:
+def columns(bar: progress.BarColumn) -> tuple[progress.ProgressColumn, ...]:
     """Columns around a bar; the field `found`, the search's findings, wraps on narrow terminals."""
-    found = TextColumn("{task.fields[found]}", table_column=Column(no_wrap=False))
-    return TextColumn("{task.description}"), bar, MofNCompleteColumn(), found
+    found = progress.TextColumn("{task.fields[found]}", table_column=Column(no_wrap=False))
+    return progress.TextColumn("{task.description}"), bar, progress.MofNCompleteColumn(), found
 
 
-def progress_bar() -> Progress:
+def progress_bar() -> progress.Progress:
     """Returns bars with the time that remains; nothing is drawn where standard error is no terminal."""
-    return Progress(*columns(BarColumn()), TimeRemainingColumn(), console=notes, disable=not notes.is_terminal)
+    return progress.Progress(
+        *columns(progress.BarColumn()), progress.TimeRemainingColumn(), console=notes, disable=not notes.is_terminal
+    )
 
 
 class Board:
     """One bar for all runs, and one for each run at work."""
 
-    def __init__(self, bar: Progress) -> None:
+    def __init__(self, bar: progress.Progress) -> None:
         self._bar = bar
         self._all = bar.add_task("all runs", total=None, found="")
-        self._tasks: dict[str, TaskID] = {}
+        self._tasks: dict[str, progress.TaskID] = {}
 
     def show(self, done: int, total: int, found: str, at_work: Mapping[str, tuple[int, int]]) -> None:
         """Draw the present state; `at_work` has done and total of each run at work, by its name."""

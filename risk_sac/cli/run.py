@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
+from risk_sac.cli import flags
 from risk_sac.cli.console import (
     FAILED,
     INTERRUPTED,
@@ -22,17 +23,6 @@ from risk_sac.cli.console import (
     progress_bar,
     requirements_table,
     say_adjustments,
-)
-from risk_sac.cli.flags import (
-    add_budget_flags,
-    add_campaign_flags,
-    add_map_flags,
-    add_prior_flag,
-    add_scene_flags,
-    budget_flags,
-    campaign_flags,
-    families_on_map,
-    scene_flags,
 )
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.cli.scenarios import kept_name
@@ -68,16 +58,16 @@ def add(commands: Commands) -> None:
     )
     named = "scenario that ships, is kept or in a file; `risk-sac scenarios list`"
     run.group("scene").add_argument("--scenario", dest="family", metavar="NAME_OR_FILE", help=named)
-    add_scene_flags(run)
-    add_map_flags(run, several=False)
+    flags.add_scene_flags(run)
+    flags.add_map_flags(run, several=False)
     search = run.group("search")
     search.add_argument("--method", metavar="NAME", help=f"one of {', '.join(named_methods())} (default: risk-sac)")
     search.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
     search.add_argument(
         "--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags override them"
     )
-    add_prior_flag(run)
-    add_budget_flags(run)
+    flags.add_prior_flag(run)
+    flags.add_budget_flags(run)
     run.group("output").add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
     add_json_flag(run)
 
@@ -89,10 +79,10 @@ def add(commands: Commands) -> None:
         more="Writes tables and figures. The same command again continues an interrupted comparison.",
         example="evaluate --scenario low --methods archive random --seeds 3 --episodes 100 --out runs/compared",
     )
-    add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
-    add_scene_flags(evaluate)
-    add_prior_flag(evaluate)
-    add_map_flags(evaluate, several=True)
+    flags.add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
+    flags.add_scene_flags(evaluate)
+    flags.add_prior_flag(evaluate)
+    flags.add_map_flags(evaluate, several=True)
     execution = evaluate.group("execution")
     jobs = "processes that play episodes (default: one per core, or as many as a cluster has room for)"
     execution.add_argument("--jobs", type=int, metavar="N", help=jobs)
@@ -107,7 +97,7 @@ def add(commands: Commands) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    families = families_on_map(options)
+    families = flags.families_on_map(options)
     if families:
         options.family = families[0]
     if options.spec is None and options.family is None:
@@ -115,7 +105,7 @@ def _run(options: argparse.Namespace) -> int:
         raise ConfigError("family", "nothing", "low, mixed or dense", remedy)
     options.family = options.family and kept_name(options.family)
     named = {name: getattr(options, name) for name in ("family", "method", "seed", "prior")}
-    spec = read_spec(options.spec, named | budget_flags(options) | scene_flags(options))
+    spec = read_spec(options.spec, named | flags.budget_flags(options) | flags.scene_flags(options))
     check_batch(spec.budget.batch)
     say_adjustments(adjustments(spec))
     from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
@@ -202,8 +192,8 @@ def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
 def _evaluate(options: argparse.Namespace) -> int:
     methods = [name for name, method in METHODS.items() if not method.needs and method.scenes != "boundary"]
     defaults = {"families": list(PAPER_FAMILIES), "methods": methods, "seeds": list(range(SEEDS))}
-    options.families = families_on_map(options) or options.families
-    spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | scene_flags(options), defaults)
+    options.families = flags.families_on_map(options) or options.families
+    spec = read_campaign(options.spec, flags.campaign_flags(options, SEEDS) | flags.scene_flags(options), defaults)
     say_adjustments(adjustments(spec))
     # Here, because loading what checks the settings takes seconds.
     from risk_sac.execution.evaluate import evaluate

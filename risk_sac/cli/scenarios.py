@@ -14,18 +14,8 @@ from risk_sac.cli.parser import Commands, Parser, add_command, add_group, add_js
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.host.terminal import complain, console
-from risk_sac.scenario import library
+from risk_sac.scenario import library, reading
 from risk_sac.scenario.check import check_document
-from risk_sac.scenario.reading import (
-    FOLDER,
-    nets_of,
-    networks,
-    read_document,
-    roads,
-    scenario_file,
-    shipped_document,
-    shipped_names,
-)
 
 if TYPE_CHECKING:
     from risk_sac.openscenario.scenario_file import Imported
@@ -100,7 +90,7 @@ def kept_name(name_or_file: str) -> str:
         return _kept(_imported(Path(name_or_file)))
     try:
         document, folder = document_at(name_or_file)
-        nets = nets_of(document, folder)
+        nets = reading.nets_of(document, folder)
         check_document(document, nets)
     except ConfigError as error:
         for fault in (error, *error.others):
@@ -131,7 +121,7 @@ def _kept(imported: "Imported") -> str:
         for name, content in imported.files.items():
             Path(folder, name).write_bytes(content)
         try:
-            check_document(imported.document, nets_of(imported.document, Path(folder)))
+            check_document(imported.document, reading.nets_of(imported.document, Path(folder)))
         except ConfigError as error:
             raise imported.located(error) from error
     return library.keep(imported.document, imported.files)
@@ -146,15 +136,15 @@ def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
     if is_file(name_or_file) and is_openscenario(name_or_file):
         return library.kept(kept_name(name_or_file))
     if is_file(name_or_file):
-        return read_document(Path(name_or_file)), Path(name_or_file).absolute().parent
-    if name_or_file in shipped_names():
-        return shipped_document(name_or_file), None
+        return reading.read_document(Path(name_or_file)), Path(name_or_file).absolute().parent
+    if name_or_file in reading.shipped_names():
+        return reading.shipped_document(name_or_file), None
     try:
         return library.kept(name_or_file)
     except ConfigError as error:
         known = library.listed()
         close = next((name for name in known if name.startswith(f"{name_or_file}_")), name_or_file)
-        remedy = did_you_mean(close, (*shipped_names(), *known)) or error.remedy
+        remedy = did_you_mean(close, (*reading.shipped_names(), *known)) or error.remedy
         raise ConfigError("scenario", error.got, error.expected, remedy) from None
 
 
@@ -169,7 +159,7 @@ def is_file(name_or_file: str) -> bool:
 
 
 def _list(options: argparse.Namespace) -> int:
-    documents = {name: document_at(name)[0] for name in (*shipped_names(), *library.listed())}
+    documents = {name: document_at(name)[0] for name in (*reading.shipped_names(), *library.listed())}
     rows = [
         {
             "name": name,
@@ -194,13 +184,13 @@ def _show(options: argparse.Namespace) -> int:
 
 def _text(name: str) -> str:
     document, _ = document_at(name)
-    return scenario_file(name).read_text() if name in shipped_names() else library.written(document)
+    return reading.scenario_file(name).read_text() if name in reading.shipped_names() else library.written(document)
 
 
 def _check(options: argparse.Namespace) -> int:
     """Fails if the ego is touched without an attack, or if nothing could be played."""
     document, folder = document_at(options.file)
-    nets = nets_of(document, folder)
+    nets = reading.nets_of(document, folder)
     from risk_sac.failures.scenario_trial import try_document  # here, because loading the simulator takes a second
 
     checked = try_document(document, nets)
@@ -226,7 +216,7 @@ def _draw(options: argparse.Namespace) -> int:
     from risk_sac.failures.scenario_trial import scenario_png  # here, because loading matplotlib takes a second
 
     out = options.out or Path(options.file).with_suffix(".png").absolute()
-    out.write_bytes(scenario_png(document, nets_of(document, folder)))
+    out.write_bytes(scenario_png(document, reading.nets_of(document, folder)))
     say(f"Drawn: {out}")
     return OK
 
@@ -248,7 +238,7 @@ def _import(options: argparse.Namespace) -> int:
     table.add_row("actors", ", ".join(document.actors) or "none")
     table.add_row("parameters that vary", ", ".join(axes(document)) or "none")
     table.add_row("points of the grid", str(imported.points))
-    table.add_row("roads", ", ".join(roads(document)))
+    table.add_row("roads", ", ".join(reading.roads(document)))
     answer = {
         "where": where,
         "actors": list(document.actors),
@@ -268,7 +258,7 @@ def axes(document: Scenario) -> list[str]:
 def _copy(options: argparse.Namespace) -> int:
     document, folder = document_at(options.name)
     files = {options.file: _text(options.name).encode()}
-    for name in (*networks(document), *roads(document)):
+    for name in (*reading.networks(document), *reading.roads(document)):
         if folder is not None and (folder / name).is_file():
             files[options.file.parent / name] = (folder / name).read_bytes()
     if not options.file.parent.is_dir():
@@ -278,6 +268,6 @@ def _copy(options: argparse.Namespace) -> int:
             raise ConfigError("file", f"{file}, which is there", "a new file", "choose another name or folder")
     for file, content in files.items():
         file.write_bytes(content)
-    own = "its nets beside it" if folder is not None else f"its net ships: {FOLDER / document.name}"
+    own = "its nets beside it" if folder is not None else f"its net ships: {reading.FOLDER / document.name}"
     say(f"Written: {options.file}; {own}.")
     return OK

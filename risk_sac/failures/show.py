@@ -12,15 +12,7 @@ from matplotlib.patches import Rectangle
 
 from risk_sac.config import FamilyName
 from risk_sac.errors import ConfigError
-from risk_sac.failures.from_above import (
-    CONFLICT_COLOUR,
-    EGO_COLOUR,
-    OTHER_COLOUR,
-    canvas,
-    draw_from_above,
-    legend,
-    picture,
-)
+from risk_sac.failures import from_above
 from risk_sac.failures.recording import Recording
 from risk_sac.records import Collision, Violation
 from risk_sac.risk.rss import TTC_CAP_S
@@ -101,7 +93,7 @@ def _speeds(axis: Axes, recording: Recording) -> None:
     axis.set_ylabel("speed\nm/s")
     if any(True for _ in recording.hidden()):
         axis.add_patch(Rectangle((0, 0), 0, 0, color=HIDDEN_COLOUR, label="hidden from the ego"))
-    legend(axis)
+    from_above.legend(axis)
 
 
 def _accelerations(axis: Axes, recording: Recording) -> None:
@@ -110,7 +102,7 @@ def _accelerations(axis: Axes, recording: Recording) -> None:
 
 
 def _both(axis: Axes, recording: Recording, name: str) -> None:
-    for actor, colour in zip(recording.involved, (EGO_COLOUR, OTHER_COLOUR), strict=False):
+    for actor, colour in zip(recording.involved, (from_above.EGO_COLOUR, from_above.OTHER_COLOUR), strict=False):
         label = str(recording.series["ids"][actor])
         axis.plot(recording.time_s, recording[name][:, actor], color=colour, linewidth=1.2, label=label)
 
@@ -154,7 +146,7 @@ def _robustness(axis: Axes, recording: Recording) -> None:
     )
     axis.axhline(0, color="0.6", linewidth=0.6)
     axis.set_ylabel("requirements\nviolated below 0")
-    legend(axis)
+    from_above.legend(axis)
 
 
 PANELS: tuple[Callable[[Axes, Recording], None], ...] = (_speeds, _accelerations, _distance, _ttc, _robustness)
@@ -195,7 +187,7 @@ def _instants(recording: Recording) -> Iterator[tuple[float, str, str]]:
             yield other.time_s - recording.violation.time_s, f"{other.requirement} violated", ALSO_COLOUR
     yield recording.released_s, "adversaries released", RELEASE_COLOUR
     if recording.conflict_s is not None:
-        yield recording.conflict_s, "conflict begins", CONFLICT_COLOUR
+        yield recording.conflict_s, "conflict begins", from_above.CONFLICT_COLOUR
 
 
 def draw(family: FamilyName, recording: Recording, file: Path, twin: Recording | None = None) -> None:
@@ -209,7 +201,7 @@ def draw(family: FamilyName, recording: Recording, file: Path, twin: Recording |
 
 def recording_bytes(family: FamilyName, recording: Recording, format_: str, twin: Recording | None = None) -> bytes:
     """Returns the picture of a failure as a png, pdf or svg."""
-    return picture(partial(draw_recording, family, recording, twin), [format_], DPI, {})[0]
+    return from_above.picture(partial(draw_recording, family, recording, twin), [format_], DPI, {})[0]
 
 
 def draw_recording(family: FamilyName, recording: Recording, twin: Recording | None = None) -> Figure:
@@ -218,11 +210,11 @@ def draw_recording(family: FamilyName, recording: Recording, twin: Recording | N
     low, high = _extent(recording)
     view_in = PANEL_WIDTH_IN * (high - low)[1] / (high - low)[0]
     heights = (view_in, *(PANEL_IN for _ in PANELS))
-    figure = canvas((WIDTH_IN * len(columns), sum(heights) + 1.2))
+    figure = from_above.canvas((WIDTH_IN * len(columns), sum(heights) + 1.2))
     grid = figure.subplots(len(heights), len(columns), height_ratios=heights, squeeze=False)
     figure.suptitle(caption(family, recording), fontsize=11)
     for column, (view, *axes) in zip(columns, grid.T, strict=True):
-        draw_from_above(view, family, column, (low, high), m_per_in=(high - low)[0] / PANEL_WIDTH_IN)
+        from_above.draw_from_above(view, family, column, (low, high), m_per_in=(high - low)[0] / PANEL_WIDTH_IN)
         view.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         if twin is not None:
             view.set_title(column.twin or "the failure", fontsize=10)

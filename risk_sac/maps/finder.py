@@ -8,18 +8,9 @@ from pathlib import Path
 
 from risk_sac.errors import MapError
 from risk_sac.maps import found as parts
+from risk_sac.maps import ways
 from risk_sac.maps.find_junction import fit_junction, junction_spots, roomy, turn
 from risk_sac.maps.found import NET, Fields, Fit, Misfit, NoFit, Pattern, Spot, Survey
-from risk_sac.maps.ways import (
-    AFTER_S,
-    SHORTEST_M,
-    check_lengths,
-    check_limit,
-    fit_stretch,
-    stretch_spots,
-    track,
-    way_on,
-)
 from risk_sac.scenario import library
 from risk_sac.scenario.ground import truck_reaches
 from risk_sac.scenario.lane_places import Track
@@ -54,7 +45,7 @@ def fit_crossing(net: Net, spot: Spot) -> Fit:
     """Writes the scenario of the crossing at the end of a road; raises `NoFit` without cover or room."""
     edge = net.edges[spot.id]
     crossing = net.crossings_of[edge.end, edge.id][0]
-    check_limit(edge.drivable[0])
+    ways.check_limit(edge.drivable[0])
     beyond = len(edge.drivable) < 2
     find = _with_oncoming if beyond else _with_neighbour
     own, ego, occluder, link = find(net, edge, crossing)
@@ -178,7 +169,7 @@ def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[NetLane, T
         )
     ego, link = _ego(net, own)
     parked_m = TRUCK_LENGTH_M + OCCLUDER_M
-    occluder = track(net, way_on(net, beside[0], OCCLUDED_S, from_m=parked_m), 0.0, parked_m)
+    occluder = ways.track(net, ways.way_on(net, beside[0], OCCLUDED_S, from_m=parked_m), 0.0, parked_m)
     if occluder.room_m < ROOM_BEYOND_M:
         raise NoFit(
             f"the length of the way in of oncoming vehicles is {parts.lacking(occluder.room_m, 'm', ROOM_BEYOND_M)}"
@@ -198,7 +189,7 @@ def _is_beside(own: NetLane, other: NetLane) -> bool:
 
 def _ego(net: Net, own: NetLane) -> tuple[Track, Link]:
     """The ego's track, if there is room, and the link it begins with."""
-    found, link = _straight(net, own, AFTER_S)
+    found, link = _straight(net, own, ways.AFTER_S)
     return roomy(found, own.edge, _room_wanted_m(own.limit_mps)), link
 
 
@@ -231,12 +222,12 @@ def _oncoming(net: Net, own: str, crossed: tuple[str, ...]) -> tuple[Track, ...]
 
 
 FINDERS: dict[Pattern, tuple[Callable[[Net], Iterator[Spot]], Callable[[Net, Spot], Fit]]] = {
-    "car_following": (stretch_spots, fit_stretch),
+    "car_following": (ways.stretch_spots, ways.fit_stretch),
     "crossing": (crossing_spots, fit_crossing),
     "junction": (junction_spots, fit_junction),
 }
 CANDIDATES: dict[Pattern, str] = {  # what their spots are
-    "car_following": f"road for cars of {SHORTEST_M:g} m or more",
+    "car_following": f"road for cars of {ways.SHORTEST_M:g} m or more",
     "crossing": "road for cars that ends at a crossing",
     "junction": "road to a junction that another one leads to as well",
 }
@@ -281,7 +272,7 @@ def _spots(net: Net, patterns: Collection[Pattern]) -> Iterator[Spot]:
 
 def _fit(net: Net, spot: Spot) -> Fit:
     fit = FINDERS[spot.pattern][1](net, spot)
-    check_lengths(net, fit.tracks)
+    ways.check_lengths(net, fit.tracks)
     return fit
 
 

@@ -24,20 +24,9 @@ from risk_sac.records.coverage import (
     CoveredCampaign,
     CoveredPair,
 )
+from risk_sac.report import standards
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.coverage import BINS, NOT_PLAYED, PAIR_BINS, Axis, axes_of
-from risk_sac.report.standards import (
-    BEHAVIOURS,
-    ISO_34502,
-    ISO_34503,
-    MANOEUVRES,
-    ODD_ATTRIBUTES,
-    ROADS,
-    TRAFFIC_RULES,
-    UNITS,
-    CellKey,
-    SceneFacts,
-)
 from risk_sac.report.statistics import BenchmarkRun, played_by, power_of
 from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.families import family_named
@@ -53,15 +42,15 @@ LIMITS = (
     "A requirement is reached where less than one scale of robustness was left; violations are those that count.",
 )
 TITLES: Mapping[str, tuple[str, str]] = {
-    "odd": ("Operational design domain", ISO_34503),
-    "functional_scenarios": ("Functional scenarios", ISO_34502),
+    "odd": ("Operational design domain", standards.ISO_34503),
+    "functional_scenarios": ("Functional scenarios", standards.ISO_34502),
     "tags": ("Tags of the scenarios", ""),
     "requirements": ("Requirements", ""),
     "traffic_rules": ("Traffic rules", "Convention on Road Traffic, Vienna 1968, by title"),
     "parameters": ("Scene parameters", ""),
     "bodies": ("Bodies", ""),
 }
-RULED = ("no_contact", *(rule.requirement for rule in TRAFFIC_RULES if rule.requirement))
+RULED = ("no_contact", *(rule.requirement for rule in standards.TRAFFIC_RULES if rule.requirement))
 ROLES = ("ego", "adversary", "story", "background", "static")
 
 
@@ -90,7 +79,7 @@ def coverage_matrix(
     `id_` is the campaign's, or the first digits of its spec's digest; power follows from the benchmark's runs.
     """
     spec, id_ = comparison.spec, id_ or comparison.spec.digest[:12]
-    counts: defaultdict[CellKey, _Count] = defaultdict(_Count)
+    counts: defaultdict[standards.CellKey, _Count] = defaultdict(_Count)
     axes: dict[FamilyName, list[Axis]] = {}
     pairs: list[CoveredPair] = []
     records: dict[FamilyName, list[EpisodeRecord]] = {}
@@ -98,7 +87,7 @@ def coverage_matrix(
         records.setdefault(run.spec.family, []).extend(run.records)
     everything: list[EpisodeRecord] = []
     for family, of_family in records.items():
-        facts, axes[family] = SceneFacts(family, spec.odd), axes_of(family_named(family), spec.odd, BINS)
+        facts, axes[family] = standards.SceneFacts(family, spec.odd), axes_of(family_named(family), spec.odd, BINS)
         names = {axis.parameter.name for axis in axes[family]}
         played = [one for one in of_family if one.outcome not in NOT_PLAYED and names <= one.scene.keys()]
         everything += played
@@ -158,16 +147,18 @@ def _matrix(
     )
 
 
-def _bins(family: str, axes: Sequence[Axis], record: EpisodeRecord) -> Iterator[CellKey]:
+def _bins(family: str, axes: Sequence[Axis], record: EpisodeRecord) -> Iterator[standards.CellKey]:
     for axis in axes:
         place = axis.places(np.array([record.scene[axis.parameter.name]]))[0]
-        yield CellKey("parameters", axis.parameter.name, axis.names[place], family)
+        yield standards.CellKey("parameters", axis.parameter.name, axis.names[place], family)
 
 
-def _count_requirements(counts: Mapping[CellKey, _Count], family: str, record: EpisodeRecord) -> None:
+def _count_requirements(counts: Mapping[standards.CellKey, _Count], family: str, record: EpisodeRecord) -> None:
     for name, result in record.requirements.items():
         violated = name in record.failed if result.counts == "failure" else result.violated_s is not None
-        counts[CellKey("requirements", name, family)].add(family, failed=violated, reached=result.robustness < 1.0)
+        counts[standards.CellKey("requirements", name, family)].add(
+            family, failed=violated, reached=result.robustness < 1.0
+        )
 
 
 def _power(
@@ -184,7 +175,7 @@ def _power(
 
 
 def _groups(
-    counts: Mapping[CellKey, _Count],
+    counts: Mapping[standards.CellKey, _Count],
     axes: Mapping[FamilyName, Sequence[Axis]],
     id_: str,
     power: Mapping[FamilyName, CellPower | None],
@@ -194,7 +185,7 @@ def _groups(
         met = [key.cell for key in counts if (key.group, key.row, key.family) == (group, row, family)]
         made = []
         for name in dict.fromkeys((*names, *met)):
-            count = counts.get(CellKey(group, row, name, family), _Count())
+            count = counts.get(standards.CellKey(group, row, name, family), _Count())
             measured = [one for one in map(power.get, count.families) if one is not None]
             best = max(measured, key=lambda one: one.expected, default=None)
             made.append(
@@ -219,21 +210,21 @@ def _groups(
             CoverageRow(
                 name=attribute.name,
                 meaning=f"{attribute.branch}: {attribute.meaning}",
-                unit=UNITS.get(attribute.name, ""),
+                unit=standards.UNITS.get(attribute.name, ""),
                 cells=cells("odd", attribute.name, attribute.values)
                 if attribute.values
                 else (_inexpressible("any", attribute.meaning),),
             )
-            for attribute in ODD_ATTRIBUTES
+            for attribute in standards.ODD_ATTRIBUTES
         ],
         "functional_scenarios": [
             CoverageRow(
                 name=f"{road}, {manoeuvre}",
                 meaning=f"{road} road; the ego's manoeuvre is {manoeuvre}",
-                cells=cells("functional_scenarios", f"{road}, {manoeuvre}", BEHAVIOURS),
+                cells=cells("functional_scenarios", f"{road}, {manoeuvre}", standards.BEHAVIOURS),
             )
-            for road in ROADS
-            for manoeuvre in MANOEUVRES
+            for road in standards.ROADS
+            for manoeuvre in standards.MANOEUVRES
         ],
         "tags": [CoverageRow(name="tags", meaning="words of the documents", cells=cells("tags", "tags", ()))],
         "requirements": [
@@ -245,7 +236,7 @@ def _groups(
                 meaning=": ".join(part for part in (rule.requirement, rule.note) if part),
                 cells=of_requirement.get(rule.requirement) or (_inexpressible("any", rule.note),),
             )
-            for rule in TRAFFIC_RULES
+            for rule in standards.TRAFFIC_RULES
         ],
         "parameters": [
             CoverageRow(

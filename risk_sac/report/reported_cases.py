@@ -6,17 +6,7 @@ from risk_sac.config import CampaignSpec, FamilyName, Interval, JudgeConfig, Req
 from risk_sac.config.distribution import HistogramLaw, NumberLaw, WeightsLaw
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import pooled_headline
-from risk_sac.records import EpisodeRecord, Outcome, TriageState
-from risk_sac.records.assessment import (
-    CaseEstimate,
-    CaseInput,
-    CaseJudges,
-    CaseResult,
-    CaseRun,
-    ClauseRow,
-    FigureNote,
-    ReportedCase,
-)
+from risk_sac.records import EpisodeRecord, Outcome, TriageState, assessment
 from risk_sac.report.comparison import Comparison
 from risk_sac.report.files import sha256
 from risk_sac.report.matrix import definitions_of
@@ -30,58 +20,58 @@ from risk_sac.world.types import STEP_S
 CRASHED = "sim_crash"  # the reason of an episode that was left out because the simulator died in it
 TRAFFIC = {"iid-undisturbed": "undisturbed traffic", "iid-random": "random adversaries"}
 FIGURES = (
-    FigureNote(
+    assessment.FigureNote(
         figure="episodes, refused, contacts, failures, kinds, cells of the coverage",
         kind="count",
         rests_on="the recorded episodes, each judged by written definitions",
         does_not_show="how often anything happens: a search chose the scenes",
     ),
-    FigureNote(
+    assessment.FigureNote(
         figure="headline failures, verified",
         kind="count",
         rests_on="failures that were the same to the bit when replayed",
         does_not_show="failures that the budget did not find",
     ),
-    FigureNote(
+    assessment.FigureNote(
         figure="bounds of the i.i.d. phase",
         kind="estimate",
         rests_on="independent draws of scenes; Clopper and Pearson, one-sided, 95 %",
         does_not_show="a rate on the road: no road has these scenes in these shares",
     ),
-    FigureNote(
+    assessment.FigureNote(
         figure="rates of requirements and PCR in the funnel, with Wilson's interval",
         kind="estimate",
         rests_on="episodes of a search as if they were independent, which they are not",
         does_not_show="a rate in any traffic; the interval is for comparing methods",
     ),
-    FigureNote(
+    assessment.FigureNote(
         figure="power: known faults that the budget detects",
         kind="estimate",
         rests_on="runs of a benchmark with other egos, in which faults were planted",
         does_not_show="anything of this ego",
     ),
-    FigureNote(
+    assessment.FigureNote(
         figure="preventable, fault, severity, plausibility",
         kind="model",
         rests_on="reference drivers, written rules and published distributions",
         does_not_show="what a person would have done, or an injury",
     ),
-    FigureNote(
+    assessment.FigureNote(
         figure="processor seconds",
         kind="measurement",
         rests_on="the machine of the runs",
         does_not_show="times on another machine",
     ),
 )
-CLAUSE_ROWS = tuple(ClauseRow(field=row.field, standard=row.standard, clause=row.clause) for row in CLAUSES)
+CLAUSE_ROWS = tuple(assessment.ClauseRow(field=row.field, standard=row.standard, clause=row.clause) for row in CLAUSES)
 
 
 def reported_cases(
     comparison: Comparison,
     requirements: Mapping[FamilyName, tuple[Requirement, ...]],
-    estimates: Mapping[FamilyName, tuple[CaseEstimate, ...]],
+    estimates: Mapping[FamilyName, tuple[assessment.CaseEstimate, ...]],
     people: Mapping[TriageState, int] | None,
-) -> Iterator[ReportedCase]:
+) -> Iterator[assessment.ReportedCase]:
     """Yields a test case for each scenario of a campaign that can still be read.
 
     `estimates` are bounds of the i.i.d. phases; `people`, failures by what people made of them, or None if not known.
@@ -96,7 +86,7 @@ def reported_cases(
         searches = [run for run in runs if not run.spec.iid]
         records = [record for run in searches for record in run.records]
         criteria = requirements.get(name, ())
-        yield ReportedCase(
+        yield assessment.ReportedCase(
             identifier=f"{name}-{spec.digest[:12]}",
             scenario=name,
             summary=document.summary,
@@ -114,7 +104,9 @@ def reported_cases(
             result=_result(searches, records, criteria),
             estimates=estimates.get(name, ()),
             recording=tuple(_recorded(run) for run in runs),
-            judged_by=CaseJudges(definitions=definitions_of(records), drivers=_drivers(spec, name), people=people),
+            judged_by=assessment.CaseJudges(
+                definitions=definitions_of(records), drivers=_drivers(spec, name), people=people
+            ),
         )
 
 
@@ -164,11 +156,11 @@ def _preconditions(spec: CampaignSpec, document: Scenario) -> Iterator[str]:
         yield f"Streams of background traffic: {', '.join(document.streams)}."
 
 
-def _inputs(document: Scenario, facts: SceneFacts) -> Iterator[CaseInput]:
+def _inputs(document: Scenario, facts: SceneFacts) -> Iterator[assessment.CaseInput]:
     for parameter in facts.space.parameters:
         own = document.parameters.get(parameter.name)
         law = own.distribution if own else None
-        yield CaseInput(
+        yield assessment.CaseInput(
             **{name: getattr(parameter, name) for name in ("name", "unit", "meaning", "low", "high")},
             words=(own.words if own else None) or parameter.categories,
             distribution=law_in_words(law),
@@ -190,7 +182,7 @@ def _steps(spec: CampaignSpec, name: FamilyName, document: Scenario) -> Iterator
 
 def _result(
     runs: Sequence[FinishedRun], records: Sequence[EpisodeRecord], criteria: Sequence[Requirement]
-) -> CaseResult:
+) -> assessment.CaseResult:
     unended = sum(record.outcome is Outcome.INVALID or record.reason == CRASHED for record in records)
     refused = sum(record.outcome is Outcome.REJECTED and record.reason != CRASHED for record in records)
     failures = sum(record.outcome is Outcome.FAILURE for record in records)
@@ -206,7 +198,7 @@ def _result(
         )
         for one in criteria
     }
-    return CaseResult(
+    return assessment.CaseResult(
         verdict="failed" if failures else "no_failure_found" if played else "not_played",
         episodes=len(records),
         refused=refused,
@@ -222,9 +214,9 @@ def _result(
     )
 
 
-def _recorded(run: FinishedRun) -> CaseRun:
+def _recorded(run: FinishedRun) -> assessment.CaseRun:
     repeated = run.verified.episodes.values() if run.verified else None
-    return CaseRun(
+    return assessment.CaseRun(
         id=run.spec.id,
         method=run.spec.method,
         seed=run.spec.seed,

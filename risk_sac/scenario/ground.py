@@ -23,24 +23,15 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from risk_sac.scenario.layout import (
-    CAR_LENGTH_M,
-    CAR_WIDTH_M,
-    TRUCK_LENGTH_M,
-    TRUCK_WIDTH_M,
-    Area,
-    areas,
-    ribbon,
-    triangles,
-)
+from risk_sac.scenario import layout
 from risk_sac.world.net import Crossing, Link, Net, NetLane, once
 from risk_sac.world.read_net import parse_net, read_tree
 from risk_sac.world.types import Floats, Point
 
 SAMPLED_M = 0.5
 ALONG = 9  # points on each side of it
-ROOM_M = CAR_WIDTH_M + 0.15  # between the middles of the ways of two cars
-SPARE_M = CAR_WIDTH_M / 2 + 0.1  # of the box of a waiting vehicle from the middle of a lane that others drive on
+ROOM_M = layout.CAR_WIDTH_M + 0.15  # between the middles of the ways of two cars
+SPARE_M = layout.CAR_WIDTH_M / 2 + 0.1  # of the box of a waiting vehicle from the middle of a lane that others drive on
 
 
 def outlines(link: Link, length_m: float, width_m: float) -> Floats:
@@ -86,8 +77,10 @@ def truck_reaches(net: Net, beside: Link, own: Link) -> bool:
     Where their lanes fork into several of the next road, SUMO's drivers may take any of them.
     """
     ways = [[*each.source.line, *each.line, *each.target.line] for each in _forks(net, own)]
-    points = np.concatenate([outlines(each, TRUCK_LENGTH_M, TRUCK_WIDTH_M) for each in _forks(net, beside)], axis=1)
-    return any(is_near(way, points.T, CAR_WIDTH_M / 2) for way in ways)
+    points = np.concatenate(
+        [outlines(each, layout.TRUCK_LENGTH_M, layout.TRUCK_WIDTH_M) for each in _forks(net, beside)], axis=1
+    )
+    return any(is_near(way, points.T, layout.CAR_WIDTH_M / 2) for way in ways)
 
 
 def _forks(net: Net, link: Link) -> list[Link]:
@@ -110,8 +103,8 @@ def _off_m(waiting: NetLane, other: NetLane) -> float:
     cos, sin = math.cos(heading), math.sin(heading)
     dx, dy = _sampled(np.array(other.line)) - np.array([[x], [y]])
     ahead_m, aside_m = dx * cos + dy * sin, np.abs(dy * cos - dx * sin)
-    off_x = np.maximum(np.maximum(ahead_m, -CAR_LENGTH_M - ahead_m), 0.0)
-    return float(np.hypot(off_x, np.maximum(aside_m - CAR_WIDTH_M / 2, 0.0)).min())
+    off_x = np.maximum(np.maximum(ahead_m, -layout.CAR_LENGTH_M - ahead_m), 0.0)
+    return float(np.hypot(off_x, np.maximum(aside_m - layout.CAR_WIDTH_M / 2, 0.0)).min())
 
 
 def _sampled(line: Floats) -> Floats:
@@ -162,9 +155,9 @@ def net_of(file: str) -> Net:
 class GroundAreas(NamedTuple):
     """Areas where vehicles and pedestrians meet."""
 
-    crossings: tuple[Area, ...] = ()  # for pedestrians; drivers yield there
-    roadway: tuple[Area, ...] = ()  # where vehicles drive, as far as pedestrians may get there
-    junctions: tuple[Area, ...] = ()  # where the ways of vehicles cross
+    crossings: tuple[layout.Area, ...] = ()  # for pedestrians; drivers yield there
+    roadway: tuple[layout.Area, ...] = ()  # where vehicles drive, as far as pedestrians may get there
+    junctions: tuple[layout.Area, ...] = ()  # where the ways of vehicles cross
 
 
 @cache
@@ -176,13 +169,15 @@ def ground_of(file: str, places: tuple[Point, ...], *, walked: bool) -> GroundAr
     """
     measured = Path(str(files("sumo_nets"))) / Path(file).parent / GROUND_FILE
     if measured.exists():
-        return GroundAreas(**{name: areas(corners) for name, corners in json.loads(measured.read_bytes()).items()})
+        return GroundAreas(
+            **{name: layout.areas(corners) for name, corners in json.loads(measured.read_bytes()).items()}
+        )
     net = net_of(file)
     kinds: tuple[list[Sequence[Point]], ...] = [], [], []
     for x_m, y_m in places:
         for polygons, new in zip(kinds, _around(net, x_m, y_m, walked=walked), strict=True):
             polygons += [polygon for polygon in _rounded(new) if polygon not in polygons]
-    return GroundAreas(*map(areas, kinds))
+    return GroundAreas(*map(layout.areas, kinds))
 
 
 def _around(net: Net, x_m: float, y_m: float, *, walked: bool) -> tuple[Polygons, Polygons, Polygons]:
@@ -191,7 +186,7 @@ def _around(net: Net, x_m: float, y_m: float, *, walked: bool) -> tuple[Polygons
         triangle
         for junction in net.junctions.values()
         if math.hypot(junction.x_m - x_m, junction.y_m - y_m) <= JUNCTIONS_M and len(junction.foes) >= LEGS
-        for triangle in triangles(junction.outline)
+        for triangle in layout.triangles(junction.outline)
     ]
     if not walked:
         return [], [], junctions
@@ -200,13 +195,13 @@ def _around(net: Net, x_m: float, y_m: float, *, walked: bool) -> tuple[Polygons
         quad
         for crossing in net.crossings
         if is_near(crossing.line, here, CROSSINGS_M)
-        for quad in ribbon(crossing.line, crossing.width_m)
+        for quad in layout.ribbon(crossing.line, crossing.width_m)
     ]
     lanes = [lane for edge in net.edges.values() for lane in edge.drivable if is_near(lane.line, here, WALKED_M)]
     for junction in net.junctions.values():
         if math.hypot(junction.x_m - x_m, junction.y_m - y_m) <= 3 * WALKED_M:
             lanes += [lane for lane in net.inside.get(junction.id, ()) if is_near(lane.line, here, WALKED_M)]
-    quads = (quad for lane in lanes for quad in ribbon(lane.line, lane.width_m))
+    quads = (quad for lane in lanes for quad in layout.ribbon(lane.line, lane.width_m))
     return crossings, [quad for quad in quads if is_near((*quad, quad[0]), here, WALKED_M)], junctions
 
 
@@ -244,7 +239,7 @@ def _turned_over_m(net: Net, junction: str, kerb: Kerb) -> float:
     links = [link for edge in net.arriving[junction] for lane in edge.drivable for link in net.onward.get(lane.id, ())]
     if not links:
         return 0.0
-    x, y = np.concatenate([outlines(link, CAR_LENGTH_M, CAR_WIDTH_M) for link in links], axis=1)
+    x, y = np.concatenate([outlines(link, layout.CAR_LENGTH_M, layout.CAR_WIDTH_M) for link in links], axis=1)
     along_m = (x - kerb.x_m) * kerb.along_x + (y - kerb.y_m) * kerb.along_y
     across_m = (y - kerb.y_m) * kerb.along_x - (x - kerb.x_m) * kerb.along_y
     met = (np.abs(across_m) <= BESIDE_M) & (along_m >= -MOST_BACK_M) & (along_m < CLEAR_M)

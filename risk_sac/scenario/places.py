@@ -13,16 +13,7 @@ import numpy as np
 from risk_sac.config.story import Story
 from risk_sac.config.story_places import LanePosition, Position, RelativeLanePosition, RoutePosition, WorldPosition
 from risk_sac.errors import ConfigError, did_you_mean
-from risk_sac.scenario.lane_places import (
-    FARTHEST_M,
-    LanePlace,
-    beside,
-    joined,
-    lane_line,
-    lanes_ahead,
-    nearest_lane,
-    spot_pose,
-)
+from risk_sac.scenario import lane_places
 from risk_sac.scenario.space import Value
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of, trajectory_line
 from risk_sac.world.net import Net
@@ -78,8 +69,8 @@ class StoryPlaces:
         here = self._shifted(x_m, y_m, 0.0)
         if position.heading_rad is not None:
             return here._replace(heading_rad=self._number(position.heading_rad, "heading_rad"))
-        near = nearest_lane(self._net, here.x_m, here.y_m, None)
-        return here if near is None else here._replace(heading_rad=spot_pose(near).heading_rad)
+        near = lane_places.nearest_lane(self._net, here.x_m, here.y_m, None)
+        return here if near is None else here._replace(heading_rad=lane_places.spot_pose(near).heading_rad)
 
     def _base(self, position: Position, of: Of) -> Pose:
         number = self._number
@@ -169,7 +160,7 @@ class StoryPlaces:
     def _relative_spot(self, other: Pose, lanes: int, ds_m: float, offset_m: float) -> Pose:
         """Returns the pose on SUMO's lanes; their direction is that of the reference line."""
         spot = self.spot(other)
-        there = beside(self._net, spot, lanes) if spot is not None else None
+        there = lane_places.beside(self._net, spot, lanes) if spot is not None else None
         if there is None:
             raise ConfigError("lanes", f"{lanes} lanes left of a pose", "a lane for cars")
         line = self.ahead(there, max(ds_m, 0.0)) if there.at_m + ds_m >= 0.0 else None
@@ -192,14 +183,14 @@ class StoryPlaces:
 
     # Places of poses
 
-    def spot(self, pose: Pose, on: OnRoad | None = None) -> LanePlace | None:
+    def spot(self, pose: Pose, on: OnRoad | None = None) -> lane_places.LanePlace | None:
         """Returns the place on the nearest lane within 30 m, or None; the lanes of the net at `on` are preferred."""
         among = (f"{on.road}_{on.lane}",) if on is not None else ()
-        return nearest_lane(self._net, pose.x_m, pose.y_m, pose.heading_rad, among)
+        return lane_places.nearest_lane(self._net, pose.x_m, pose.y_m, pose.heading_rad, among)
 
-    def beside(self, spot: LanePlace, lanes: int) -> LanePlace | None:
+    def beside(self, spot: lane_places.LanePlace, lanes: int) -> lane_places.LanePlace | None:
         """Returns the place lanes to the left, at the same height, or None."""
-        return beside(self._net, spot, lanes)
+        return lane_places.beside(self._net, spot, lanes)
 
     def opendrive(self, pose: Pose) -> OnRoad:
         """Returns road, lane, s and offset of a pose; raises `ConfigError` if no road is near.
@@ -219,7 +210,7 @@ class StoryPlaces:
             rank = (round(outside, 2), turned > math.pi / 2, round(turned, 2), abs(t_m - middle.t_m))
             if best is None or rank < best[0]:
                 best = rank, OnRoad(road.id, lane, s_m, t_m - middle.t_m)
-        if best is None or best[0][0] > FARTHEST_M:
+        if best is None or best[0][0] > lane_places.FARTHEST_M:
             raise ConfigError("", f"the point {x_m:.1f}, {y_m:.1f} without a road near it", "a point on a road")
         return best[1]
 
@@ -257,7 +248,9 @@ class StoryPlaces:
         """
         if self._road is None:
             poses = [self.pose(waypoint, of) for waypoint in self._waypoints(name)]
-            edges = joined(self._net, [spot.lane.edge for pose in poses if (spot := self.spot(pose)) is not None])
+            edges = lane_places.joined(
+                self._net, [spot.lane.edge for pose in poses if (spot := self.spot(pose)) is not None]
+            )
             first = self.spot(poses[0])
             if first is None:
                 raise ConfigError("waypoints", "a first waypoint without a lane near it", "a point on a lane")
@@ -274,7 +267,7 @@ class StoryPlaces:
         first, last = self.spot(here), self.spot(there)
         if first is None or last is None:
             raise ConfigError("position", "a place without a lane near it", "a place near a lane")
-        edges = tuple(joined(self._net, [first.lane.edge, last.lane.edge]))
+        edges = tuple(lane_places.joined(self._net, [first.lane.edge, last.lane.edge]))
         return RouteLine(
             self.ahead(first, sum(self._net.edges[edge].lanes[0].length_m for edge in edges), edges), edges
         )
@@ -285,7 +278,9 @@ class StoryPlaces:
         spots = (
             self.spot(line.pose(station)._replace(heading_rad=line.direction_rad(station))) for station in stations
         )
-        return tuple(joined(self._net, [s.lane.edge for s in spots if s is not None and s.lane.use == "lane"]))
+        return tuple(
+            lane_places.joined(self._net, [s.lane.edge for s in spots if s is not None and s.lane.use == "lane"])
+        )
 
     def _waypoints(self, name: str) -> Sequence[Position]:
         routes = self._story.routes
@@ -340,27 +335,27 @@ class StoryPlaces:
         there = self._shifted(*road.point(at_m, across))
         return there if leg.forward else there._replace(heading_rad=there.heading_rad + math.pi)
 
-    def ahead(self, spot: LanePlace, length_m: float, edges: Sequence[str] = ()) -> TravelLine:
+    def ahead(self, spot: lane_places.LanePlace, length_m: float, edges: Sequence[str] = ()) -> TravelLine:
         """Returns the way on from a place, without its offset, along the middles of lanes.
 
         It is shorter than `length_m` where no lane goes on; without edges, and after them, it is the straightest.
         """
         place = self._named(spot)
         if place is None:
-            lanes = lanes_ahead(self._net, spot.lane, length_m + spot.at_m, edges)
+            lanes = lane_places.lanes_ahead(self._net, spot.lane, length_m + spot.at_m, edges)
             line = line_of(np.concatenate([lane.centre for lane in lanes]))
             return line.cut(spot.at_m, min(spot.at_m + length_m, line.length_m))
         roads = self._roads()
-        lanes = lanes_ahead(self._net, spot.lane, length_m, edges) if edges else []
+        lanes = lane_places.lanes_ahead(self._net, spot.lane, length_m, edges) if edges else []
         keep = {name.rpartition("_")[0] for lane in lanes for name in lane.original}
         begin = LaneEnd(place.road, place.lane, not roads.road(place.road).backwards(place.lane))
         legs, _ = onward(roads, begin, place.s_m, length_m, keep)
         return self._leg_lines(legs)
 
-    def _named(self, spot: LanePlace) -> OnRoad | None:
+    def _named(self, spot: lane_places.LanePlace) -> OnRoad | None:
         if self._road is None:
             return None
-        x_m, y_m, _ = lane_line(spot.lane).pose(spot.at_m)
+        x_m, y_m, _ = lane_places.lane_line(spot.lane).pose(spot.at_m)
         x_m, y_m = x_m - self._net.shift_m[0], y_m - self._net.shift_m[1]
         places = list[tuple[float, OnRoad]]()
         for name in spot.lane.original:
