@@ -12,8 +12,9 @@ from risk_sac.config.story_actions import Coordinates, LaneTarget
 from risk_sac.config.story_conditions import Along
 from risk_sac.config.story_places import LanePosition, Position
 from risk_sac.errors import ConfigError
+from risk_sac.scenario.lane_places import LanePlace
 from risk_sac.scenario.layout import Reach, StoryPlan
-from risk_sac.scenario.places import LanePlace, OnRoad, StoryPlaces
+from risk_sac.scenario.places import OnRoad, StoryPlaces
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of
 from risk_sac.sim.story.cast import STANDS_MPS, Mover, Present
 from risk_sac.sim.story.deviation import ANYWHERE, DeviationRoom
