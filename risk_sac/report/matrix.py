@@ -191,10 +191,7 @@ def _groups(
             made.append(
                 _cell(
                     name,
-                    count.played,
-                    count.failed,
-                    reached=count.reached,
-                    families=tuple(count.families),
+                    count,
                     campaigns=(id_,) if count.played else (),
                     failing=(id_,) if count.failed else (),
                     power=best,
@@ -267,17 +264,15 @@ def _bodies_of(role: str) -> Iterator[str]:
 
 def _cell(
     name: str,
-    played: int,
-    failed: int,
+    count: _Count,
     *,
-    reached: int | None,
-    families: tuple[str, ...],
     campaigns: tuple[str, ...],
     failing: tuple[str, ...],
     power: CellPower | None,
     unplayed: str = "never played",
 ) -> CoverageCell:
     """Returns a cell with its state, and that in words; `unplayed` are those of one without an episode."""
+    played, failed, reached = count.played, count.failed, count.reached
     state = CellState.FAILED if failed else CellState.PLAYED if played else CellState.NEVER
     if reached == 0 and not failed:
         state = CellState.NEVER
@@ -295,7 +290,7 @@ def _cell(
         played=played,
         failed=failed,
         reached=reached,
-        families=families,
+        families=tuple(count.families),
         campaigns=campaigns,
         failing=failing,
         power=power if state is CellState.PLAYED else None,
@@ -354,12 +349,11 @@ def _merged_cell(cells: Sequence[CoverageCell]) -> CoverageCell:
     if cells[0].state is CellState.INEXPRESSIBLE:
         return cells[0]
     reached = [cell.reached for cell in cells if cell.reached is not None]
+    played, failed = sum(cell.played for cell in cells), sum(cell.failed for cell in cells)
+    families = dict.fromkeys(name for cell in cells for name in cell.families)
     return _cell(
         cells[0].name,
-        sum(cell.played for cell in cells),
-        sum(cell.failed for cell in cells),
-        reached=sum(reached) if reached else None,
-        families=_union(*(cell.families for cell in cells)),
+        _Count(played, failed, sum(reached) if reached else None, families),
         campaigns=_union(*(cell.campaigns for cell in cells)),
         failing=_union(*(cell.failing for cell in cells)),
         power=max((cell.power for cell in cells if cell.power), key=lambda one: one.expected, default=None),
