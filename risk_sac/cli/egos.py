@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, folded_table, print_answer, progress_bar, say
-from risk_sac.cli.flags import add_campaign_flags, campaign_flags, named_ego
+from risk_sac.cli.flags import add_campaign_flags, campaign_flags, kept_name, named_ego
 from risk_sac.cli.parser import Commands, add_command, add_group, add_json_flag
 from risk_sac.cli.run import drawn
-from risk_sac.cli.scenarios import kept_name
 from risk_sac.config import EgoConfig
 from risk_sac.config.equipment import ACTUATOR_PRESETS, SENSOR_PRESETS
 from risk_sac.config.spec_file import PROFILES, read_campaign

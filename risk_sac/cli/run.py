@@ -32,10 +32,10 @@ from risk_sac.cli.flags import (
     budget_flags,
     campaign_flags,
     families_on_map,
+    kept_name,
     scene_flags,
 )
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
-from risk_sac.cli.scenarios import kept_name
 from risk_sac.config import METHODS, RunSpec
 from risk_sac.config.samplers import named_methods
 from risk_sac.config.spec_file import read_campaign, read_spec
