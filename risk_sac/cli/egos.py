@@ -12,7 +12,7 @@ from risk_sac.cli.flags import add_campaign_flags, campaign_flags, kept_name, na
 from risk_sac.cli.parser import Commands, add_command, add_group, add_json_flag
 from risk_sac.cli.run import drawn
 from risk_sac.config import EgoConfig
-from risk_sac.config.equipment import ACTUATOR_PRESETS, SENSOR_PRESETS
+from risk_sac.config.ego import ACTUATOR_PRESETS, SENSOR_PRESETS
 from risk_sac.config.spec_file import PROFILES, read_campaign
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.egos.registry import SHIPPED, cards

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, get_args
 from risk_sac.cli.console import EGO, number
 from risk_sac.cli.parser import Parser
 from risk_sac.config import Behaviour, EgoConfig, Scenario
-from risk_sac.config.samplers import named_methods
+from risk_sac.config.methods import named_methods
 from risk_sac.config.spec_file import read_ego
 from risk_sac.egos.registry import refuse_class
 from risk_sac.errors import ConfigError, did_you_mean

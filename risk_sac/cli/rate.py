@@ -15,11 +15,9 @@ from risk_sac.config.spec_file import read_spec
 from risk_sac.env.problem import Problem, adjustments
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.host.terminal import notes
-from risk_sac.rates.earlier import start_in
-from risk_sac.rates.record import METHOD, check_exposure, rated, rates_of
+from risk_sac.rates.record import METHOD, check_exposure, rated, rates_of, start_in
 from risk_sac.records import RunMetrics
-from risk_sac.records.boundary import BoundaryMap
-from risk_sac.records.rates import HourlyRate, RateEstimate, Rates
+from risk_sac.records.rates import BoundaryMap, HourlyRate, RateEstimate, Rates
 from risk_sac.report.runs import read_records
 from risk_sac.run_folder.results import BOUNDARY_PICTURE, EPISODES
 

@@ -1,4 +1,4 @@
-"""`risk-sac bundle`, `replay` and `verify`: writes failures into files and plays them again."""
+"""`risk-sac bundle`, `replay`, `verify`, `export`, `minimise`, `region` and `clusters`: plays failures again."""
 
 import argparse
 import textwrap

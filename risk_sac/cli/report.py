@@ -18,7 +18,7 @@ from risk_sac.cli.regress import read_baseline
 from risk_sac.config.base import read_text
 from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import complain, console, notes
-from risk_sac.records.coverage import CellState
+from risk_sac.records.assessment import CellState
 from risk_sac.report.grid import STANDARDS, PlayedGrid, StandardVerdict, grid_csv, grid_junit, played_grids, varied_axes
 from risk_sac.report.trend import (
     EndedCampaign,

@@ -37,7 +37,7 @@ from risk_sac.cli.flags import (
 )
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
 from risk_sac.config import METHODS, RunSpec
-from risk_sac.config.samplers import named_methods
+from risk_sac.config.methods import named_methods
 from risk_sac.config.spec_file import read_campaign, read_spec
 from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError

@@ -1,4 +1,4 @@
-"""`risk-sac scenarios`: lists, shows, checks, imports, draws and copies scenario documents."""
+"""`risk-sac scenarios` and `places`: works on scenario documents, and lists where patterns fit on a map."""
 
 import argparse
 import json

@@ -14,7 +14,7 @@ from risk_sac.config.scenario import EGO
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.env.problem import Problem
 from risk_sac.errors import EgoFailed, InfeasibleScene, SimulationError
-from risk_sac.records.scenario import ScenarioCheck
+from risk_sac.records.campaign import ScenarioCheck
 from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.check import check_document, scenes, without_effect
 from risk_sac.scenario.families import family_of

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from risk_sac.config.story_conditions import (
+from risk_sac.config.story import (
     AccelerationCondition,
     AngleCondition,
     CollisionCondition,
@@ -21,7 +21,7 @@ from risk_sac.config.story_conditions import (
     TravelledCondition,
     Trigger,
 )
-from risk_sac.config.story_places import Position
+from risk_sac.config.story_actions import Position
 from risk_sac.config.values import MOST_MAGNITUDE
 from risk_sac.openscenario.actions import COORDINATES
 from risk_sac.openscenario.elements import Unread

@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 from risk_sac.config.base import Chosen
-from risk_sac.config.story_places import (
+from risk_sac.config.story_actions import (
     ClothoidSegment,
     ClothoidSpline,
     LanePosition,

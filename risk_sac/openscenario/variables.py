@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from risk_sac.config.story import VariableCondition
 from risk_sac.config.story_actions import VariableAction
-from risk_sac.config.story_conditions import VariableCondition
 from risk_sac.config.values import Expression
 from risk_sac.errors import ConfigError
 from risk_sac.openscenario.parameters import TEXTS, Parameters

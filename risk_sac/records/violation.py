@@ -4,8 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
 from risk_sac.records.base import Least, Real, Record
-from risk_sac.records.judgement import Fault, Grade, Judgement, Severity
-from risk_sac.records.plausibility import Plausibility
+from risk_sac.records.judgement import Fault, Grade, Judgement, Plausibility, Severity
 
 REPEATS = "repeats"  # rule that a violation fails if its replay goes another way; asked of nothing else
 # Rules among a collision's verdicts that are about the simulator or the control, not about fault.

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from risk_sac.failures.from_above import canvas, picture
 from risk_sac.records import stored
-from risk_sac.records.boundary import BoundaryAxis, BoundaryMap, BoxShare, DriverMap
+from risk_sac.records.rates import BoundaryAxis, BoundaryMap, BoxShare, DriverMap
 from risk_sac.report.drawing import STYLE
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.run_folder.results import BOUNDARY, BOUNDARY_PICTURE

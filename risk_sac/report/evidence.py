@@ -13,8 +13,7 @@ from risk_sac.failures.cases import Regression
 from risk_sac.failures.clusters import Overview
 from risk_sac.metrics import clopper_pearson, pooled_requirements, preventable, published
 from risk_sac.records import EpisodeRecord, Outcome, Power, Record, TriageState
-from risk_sac.records.assessment import CaseEstimate, ClauseRow, FigureNote, ReportedCase, SignedInputs
-from risk_sac.records.coverage import CoverageMatrix
+from risk_sac.records.assessment import CaseEstimate, ClauseRow, CoverageMatrix, FigureNote, ReportedCase, SignedInputs
 from risk_sac.report.comparison import Cell, Comparison
 from risk_sac.report.coverage import NOT_PLAYED, Coverage, coverage
 from risk_sac.report.matrix import coverage_matrix

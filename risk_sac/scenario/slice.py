@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.campaign import BoundaryConfig
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario.declared import SceneLaw

@@ -19,7 +19,7 @@ from typing import Any
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.execution.helper import ANSWER, QUESTION, run_helper
-from risk_sac.records.scenario import ScenarioCheck, ScenarioDetails, ScenarioSummary, summary_of
+from risk_sac.records.campaign import ScenarioCheck, ScenarioDetails, ScenarioSummary, summary_of
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.scenario import library
 from risk_sac.scenario.shipped import scenario_file, shipped_document, shipped_names

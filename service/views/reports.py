@@ -23,7 +23,7 @@ from risk_sac.failures.cases import Regression
 from risk_sac.failures.clusters import Overview
 from risk_sac.rates.record import METHOD, rates_of
 from risk_sac.records import Record, State, TriageState, wire
-from risk_sac.records.coverage import CoverageMatrix
+from risk_sac.records.assessment import CoverageMatrix
 from risk_sac.records.rates import Rates
 from risk_sac.report import (
     Comparison,

@@ -1,4 +1,8 @@
-"""Compares a campaign's results with the bounds of a CI job. Pure."""
+"""Compares a campaign's results with the bounds of a CI job, and writes them as JUnit XML. Pure.
+
+The report has a suite per family and a case per run. Each family and method has a case for each requirement that counts
+or has a bound. Where there are other bounds, it has one more. These cases fail as the exit status does.
+"""
 
 import argparse
 from collections.abc import Collection, Iterator, Mapping, Sequence
