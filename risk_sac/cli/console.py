@@ -113,10 +113,8 @@ class Board:
 
 def narrow_table(*columns: str, **style: Any) -> Table:
     """Returns an empty table without lines, of which only the last column wraps."""
-    table = Table(box=SIMPLE_HEAD, padding=0, **style)
-    for name in columns:
-        table.add_column(name, no_wrap=name != columns[-1])
-    return table
+    unwrapped = (Column(name, no_wrap=name != columns[-1]) for name in columns)
+    return Table(*unwrapped, box=SIMPLE_HEAD, padding=0, **style)
 
 
 def say_adjustments(found: Iterable[Adjustment]) -> None:

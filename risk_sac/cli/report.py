@@ -232,13 +232,11 @@ def _grid(options: argparse.Namespace) -> int:
 
 
 def _grid_table(grids: Sequence[PlayedGrid]) -> Table:
-    table = Table(box=SIMPLE_HEAD, padding=0)
-    table.add_column("run", overflow="fold")
-    for name in ("ego", "scenes", *(verdict.value.replace("_", "\n") for verdict in StandardVerdict)):
-        table.add_column(name, no_wrap=True)
+    names = ("ego", "scenes", *(verdict.value.replace("_", "\n") for verdict in StandardVerdict))
+    columns = [Column("run", overflow="fold"), *(Column(name, no_wrap=True) for name in names)]
+    table = Table(*columns, box=SIMPLE_HEAD, padding=0)
     for grid in grids:
-        counts = (str(count) for count in grid.counts.values())
-        table.add_row(grid.spec.id, grid.ego, str(len(grid.points)), *counts)
+        table.add_row(grid.spec.id, grid.ego, str(len(grid.points)), *map(str, grid.counts.values()))
     return table
 
 

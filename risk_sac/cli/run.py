@@ -2,7 +2,7 @@
 
 import argparse
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -118,20 +118,13 @@ def _run(options: argparse.Namespace) -> int:
     spec = read_spec(options.spec, named | budget_flags(options) | scene_flags(options))
     check_batch(spec.budget.batch)
     say_adjustments(adjustments(spec))
-    from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
-
-    total = spec.budget.total_episodes
-    with progress_bar() as bar:
-        task = bar.add_task(f"{spec.family} {spec.method}", total=total, found="")
-
-        def advance(done: int, metrics: RunMetrics | None) -> None:
-            bar.update(task, completed=done, found=_found(metrics))
-
-        results = run(spec, options.out, advance)
+    results = play_run(spec, options.out, f"{spec.family} {spec.method}", _found)
     if not results.finished:
         done = sum(phase.episodes for phase in (results.metrics, results.evaluation) if phase)
         again = "The same command again goes on from there."
-        notes.print(f"Stopped after {done} of {counted(total, 'episode')}. {again}", soft_wrap=True)
+        notes.print(
+            f"Stopped after {done} of {counted(spec.budget.total_episodes, 'episode')}. {again}", soft_wrap=True
+        )
         return INTERRUPTED
     phases = {"i.i.d." if spec.iid else "search": results.metrics, "evaluation": results.evaluation}
     played = {name: metrics for name, metrics in phases.items() if metrics is not None}
@@ -147,9 +140,20 @@ def _run(options: argparse.Namespace) -> int:
     return OK
 
 
-def _found(metrics: RunMetrics | None) -> str:
-    if metrics is None:
-        return ""
+def play_run(spec: RunSpec, folder: Path, name: str, found: Callable[[RunMetrics], str]) -> RunResults:
+    """Plays a run, or continues it, behind a bar with a name and with what was found so far."""
+    from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
+
+    with progress_bar() as bar:
+        task = bar.add_task(name, total=spec.budget.total_episodes, found="")
+
+        def advance(done: int, metrics: RunMetrics | None) -> None:
+            bar.update(task, completed=done, found=found(metrics) if metrics else "")
+
+        return run(spec, folder, advance)
+
+
+def _found(metrics: RunMetrics) -> str:
     preventable = with_published(metrics.distinct_preventable, metrics.distinct_published)
     return (
         f"contacts {metrics.raw_collisions} → valid {metrics.collisions}  failures {metrics.failures} → "

@@ -13,9 +13,7 @@ from rich.table import Table
 
 from risk_sac.cli.campaigns.watch import (
     add_campaign_command,
-    add_newest_command,
     add_watch,
-    campaigns_table,
     chosen_id,
     line,
     shown,
@@ -28,6 +26,7 @@ from risk_sac.cli.console import (
     OUTCOME,
     in_words,
     offences,
+    on_one_line,
     or_dash,
     outcome,
     print_answer,
@@ -38,7 +37,7 @@ from risk_sac.cli.parser import FAILURE_HELP, Commands, Parser, add_command, add
 from risk_sac.cli.regress import cases_table, junit
 from risk_sac.cli.report import OUT, format_of
 from risk_sac.cli.show import WEIGHT, add_filter_flags, listed, wanted
-from risk_sac.client import Client, Episode
+from risk_sac.client import CampaignSummary, Client, Episode
 from risk_sac.errors import ConfigError
 from risk_sac.failures.cases import Regression
 from risk_sac.failures.question import Twin
@@ -75,11 +74,12 @@ def add_management(commands: Commands) -> None:
         example="campaigns delete ID",
     )
 
-    parser = add_newest_command(
+    parser = add_campaign_command(
         commands,
         "report",
         _report,
         "write one file on what a campaign found, with bounds, coverage and limits",
+        newest=True,
         example="campaigns report --out report.html",
     )
     output = parser.group("output")
@@ -104,6 +104,27 @@ def _list(options: argparse.Namespace) -> int:
         found = list(itertools.islice(client.campaigns(**filters), options.limit))
     print_answer(options, found, campaigns_table(found))
     return OK
+
+
+def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
+    """One row per campaign."""
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    for name in ("id", "state", "head-\nline", "epi-\nsodes", "fail-\nures", "posted"):
+        words = name in ("id", "state", "posted")
+        table.add_column(name, no_wrap=True, justify="left" if words else "right")
+    table.add_column("label")
+    for campaign in campaigns:
+        progress = campaign.progress
+        table.add_row(
+            campaign.id,
+            campaign.state,
+            or_dash(progress.headline, "d"),
+            f"{progress.episodes_done}/{progress.episodes_total}",
+            str(progress.failures),
+            f"{campaign.created_at.astimezone():%Y-%m-%d %H:%M}",
+            escape(on_one_line(campaign.label)),
+        )
+    return table
 
 
 def _cancel(options: argparse.Namespace) -> int:
@@ -195,11 +216,12 @@ def add(commands: Commands) -> None:
 
 def add_failures(commands: Commands) -> None:
     """Adds the commands."""
-    parser = add_newest_command(
+    parser = add_campaign_command(
         commands,
         "list",
         _list_failures,
         "list the failures of a campaign",
+        newest=True,
         example="campaigns failures list --preventable --distinct --sort severity",
     )
     add_filter_flags(parser)
@@ -318,50 +340,37 @@ def _lines(failure: Episode) -> Iterator[str]:
     yield f"{failure.id}: {failure.outcome}{f' ({in_words([failure.reason])})' if failure.reason else ''}"
     if failure.driven_by is not None:
         yield f"  driven by  {failure.driven_by}"
-    if failure.collision is not None:
-        yield from _contact(failure.collision)
-    for violation in failure.violations:
-        yield from _violation(violation)
+    contact = () if failure.collision is None else (failure.collision,)
+    for violation in (*contact, *failure.violations):
+        yield from (f"  {name:10} {said}" for name, said in _told(violation).items() if said)
 
 
-def _violation(violation: Violation) -> Iterator[str]:
-    actor = f"; the {violation.other_role} {violation.other_id!r} is next" if violation.other_id else ""
-    yield (
-        f"  violation  of {violation.requirement} from {or_dash(violation.time_s, '.1f')} s after the adversaries' "
-        f"release, at {or_dash(violation.ego_speed_mps, '.1f')} m/s; least robustness "
-        f"{or_dash(violation.robustness, '.2f')} scales{actor}"
-    )
-    yield f"  kind       {violation.kind}"
-    yield f"  variant    {violation.variant}"
-    yield f"  grade      {_grade(violation)}"
-    yield from _plausible(violation)
-    if violation.fault:
-        yield f"  fault      {violation.fault}"
-    yield f"  the ego    broke {in_words(violation.broke) or 'nothing'}"
+def _told(violation: Collision | Violation) -> dict[str, str | None]:
+    """What is said of a violation; nothing of what has no words."""
+    if isinstance(violation, Violation):
+        broken, severity = {"the ego": violation.broke}, None
+    else:
+        judgement, severity = violation.judgement, violation.severity_in_words
+        broken = {"the ego": judgement.ego_broke, "the other": judgement.broke}
+    return {
+        **dict([_event(violation)]),
+        "kind": violation.kind,
+        "variant": violation.variant,
+        "grade": violation.graded or "none: it is not valid",
+        "plausible": None if violation.behaviour is None else violation.behaviour.in_words,
+        "severity": severity,
+        "fault": violation.blamed,
+        **{who: f"broke {in_words(broke) or 'nothing'}" for who, broke in broken.items()},
+    }
 
 
-def _grade(violation: Collision | Violation) -> str:
-    return violation.graded or "none: it is not valid"
-
-
-def _plausible(violation: Collision | Violation) -> Iterator[str]:
-    if violation.behaviour is not None:
-        yield f"  plausible  {violation.behaviour.in_words}"
-
-
-def _contact(collision: Collision) -> Iterator[str]:
-    yield (
-        f"  contact    {or_dash(collision.time_s, '.1f')} s after the adversaries' release: the ego's "
-        f"{collision.ego_zone} at {or_dash(collision.ego_speed_mps, '.1f')} m/s, the {collision.other_zone} of "
-        f"{collision.other_role} {collision.other_id!r} at {or_dash(collision.other_speed_mps, '.1f')} m/s"
-    )
-    judgement = collision.judgement
-    yield f"  kind       {judgement.kind}"
-    yield f"  variant    {judgement.variant}"
-    yield f"  grade      {_grade(collision)}"
-    yield from _plausible(collision)
-    yield f"  severity   {collision.severity_in_words}"
-    if judgement.fault:
-        yield f"  fault      {judgement.fault}"
-    yield f"  the ego    broke {in_words(judgement.ego_broke) or 'nothing'}"
-    yield f"  the other  broke {in_words(judgement.broke) or 'nothing'}"
+def _event(violation: Collision | Violation) -> tuple[str, str]:
+    speed = or_dash(violation.ego_speed_mps, ".1f")
+    time = f"{or_dash(violation.time_s, '.1f')} s after the adversaries' release"
+    actor = f"{violation.other_role} {violation.other_id!r}"
+    if isinstance(violation, Violation):
+        robustness = f"least robustness {or_dash(violation.robustness, '.2f')} scales"
+        following = f"; the {actor} is next" if violation.other_id else ""
+        return "violation", f"of {violation.requirement} from {time}, at {speed} m/s; {robustness}{following}"
+    other = f"the {violation.other_zone} of {actor} at {or_dash(violation.other_speed_mps, '.1f')} m/s"
+    return "contact", f"{time}: the ego's {violation.ego_zone} at {speed} m/s, {other}"

@@ -3,13 +3,12 @@
 import argparse
 import itertools
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Group
-from rich.markup import escape
 from rich.progress import BarColumn, Progress
 from rich.table import Table
 
@@ -86,13 +85,15 @@ def add_watch(commands: Commands) -> None:
     _add_watch_flags(parser)
 
     example = "campaigns watch --max-ecr 0.2 --junit junit.xml"
-    parser = add_newest_command(
-        commands, "watch", _watch, "follow a campaign to its end and judge its results", example=example
+    parser = add_campaign_command(
+        commands, "watch", _watch, "follow a campaign to its end and judge its results", newest=True, example=example
     )
     _add_watch_flags(parser)
 
     example = "campaigns results --max-ecr 0.2"
-    parser = add_newest_command(commands, "results", _results, "show the results of a campaign so far", example=example)
+    parser = add_campaign_command(
+        commands, "results", _results, "show the results of a campaign so far", newest=True, example=example
+    )
     _add_gate_flags(parser)
 
 
@@ -276,20 +277,18 @@ RATES = ("ECR\n95 %", "PCR\n95 %")
 
 
 def add_campaign_command(
-    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str, *, example: str, **text: str
+    commands: Commands,
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    summary: str,
+    *,
+    example: str,
+    newest: bool = False,
 ) -> Parser:
-    """Adds a command on one campaign; returns its parser."""
-    parser = add_command(commands, name, run, summary, example=example, **text)
-    parser.add_argument("id", metavar="ID", help="id of the campaign")
-    return parser
-
-
-def add_newest_command(
-    commands: Commands, name: str, run: Callable[[argparse.Namespace], int], summary: str, *, example: str, **text: str
-) -> Parser:
-    """Adds a command on one campaign, by default the newest; returns its parser."""
-    parser = add_command(commands, name, run, summary, example=example, **text)
-    parser.add_argument("id", nargs="?", metavar="ID", help="id of the campaign (default: the newest)")
+    """Adds a command on one campaign, by default the newest where that is allowed; returns its parser."""
+    parser = add_command(commands, name, run, summary, example=example)
+    default = " (default: the newest)" if newest else ""
+    parser.add_argument("id", nargs="?" if newest else None, metavar="ID", help=f"id of the campaign{default}")
     return parser
 
 
@@ -336,27 +335,6 @@ def _by_requirement(campaign: CampaignSummary) -> str:
     found = pooled_requirements(searches)
     counts = ", ".join(f"{name} {each.valid}" for name, each in found.items() if each.valid)
     return f" ({counts})" if counts else ""
-
-
-def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
-    """One row per campaign."""
-    table = Table(box=SIMPLE_HEAD, padding=0)
-    for name in ("id", "state", "head-\nline", "epi-\nsodes", "fail-\nures", "posted"):
-        words = name in ("id", "state", "posted")
-        table.add_column(name, no_wrap=True, justify="left" if words else "right")
-    table.add_column("label")
-    for campaign in campaigns:
-        progress = campaign.progress
-        table.add_row(
-            campaign.id,
-            campaign.state,
-            or_dash(progress.headline, "d"),
-            f"{progress.episodes_done}/{progress.episodes_total}",
-            str(progress.failures),
-            f"{campaign.created_at.astimezone():%Y-%m-%d %H:%M}",
-            escape(on_one_line(campaign.label)),
-        )
-    return table
 
 
 def results_tables(results: Results, bounds: GateBounds) -> Group:
