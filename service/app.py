@@ -42,8 +42,8 @@ from service.store.database import READERS, cursor_secret, held
 from service.store.reading import Store
 from service.views.on_demand import KEPT, Helper, OnDemandCache
 from service.views.reports import Reports
+from service.views.series import EpisodeTables, Studies
 from service.views.series import pictures as pictures_of_failures
-from service.views.studies import EpisodeTables, Studies
 from service.views.whole import VIEWS_KEPT, Priors, Views
 
 

@@ -14,8 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from risk_sac.cli.campaigns.gate import GateBounds
-from risk_sac.cli.campaigns.output import driven_by_table, results_table
-from risk_sac.cli.campaigns.watch import shown
+from risk_sac.cli.campaigns.watch import driven_by_table, results_table, shown
 from risk_sac.cli.console import headline
 from risk_sac.client import Campaign, Client, ClientError, Episode, Results, Unreachable
 from risk_sac.egos.defects.catalogue import DEFECTS

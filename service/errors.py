@@ -1,5 +1,8 @@
 """Errors of the service; `service.api.problems` maps them to HTTP statuses."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from risk_sac.errors import RiskSacError
 
 
@@ -38,6 +41,15 @@ class KeysError(ServiceError):
 
 class StorageError(ServiceError):
     """Read or write that database or data folder refused; the message is the reason."""
+
+
+@contextmanager
+def disk_refusals(what: str) -> Iterator[None]:
+    """Turns an error of the disk within the body into a StorageError that says what cannot be done."""
+    try:
+        yield
+    except OSError as error:
+        raise StorageError(f"{what} ({error.strerror})") from error
 
 
 class OutdatedError(StorageError):

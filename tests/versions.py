@@ -5,7 +5,7 @@ from typing import Any
 
 from risk_sac.config import CampaignSpec
 from risk_sac.records import RequirementCounts, RunMetrics
-from risk_sac.records.boundary import BoundaryMap
+from risk_sac.records.rates import BoundaryMap
 from risk_sac.report.trend import EndedCampaign, EndedRun
 from tests.builders import run_metrics
 

@@ -9,10 +9,18 @@ from typing import Any, TypeAlias
 
 from pydantic import BaseModel, TypeAdapter
 from pydantic_core import to_json
-from rich import progress
 from rich.box import SIMPLE_HEAD
 from rich.console import RenderableType
 from rich.markup import escape
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Column, Table
 
 from risk_sac.config.spec_file import EGO_FILE, EGO_NAMES
@@ -73,26 +81,24 @@ def write_out(file: Path, content: bytes, what: str = "", said_on: Output = cons
         said_on.print(f"{what}: {file}", markup=False, soft_wrap=True)
 
 
-def columns(bar: progress.BarColumn) -> tuple[progress.ProgressColumn, ...]:
+def columns(bar: BarColumn) -> tuple[ProgressColumn, ...]:
     """Columns around a bar; the field `found`, the search's findings, wraps on narrow terminals."""
-    found = progress.TextColumn("{task.fields[found]}", table_column=Column(no_wrap=False))
-    return progress.TextColumn("{task.description}"), bar, progress.MofNCompleteColumn(), found
+    found = TextColumn("{task.fields[found]}", table_column=Column(no_wrap=False))
+    return TextColumn("{task.description}"), bar, MofNCompleteColumn(), found
 
 
-def progress_bar() -> progress.Progress:
+def progress_bar() -> Progress:
     """Returns bars with the time that remains; nothing is drawn where standard error is no terminal."""
-    return progress.Progress(
-        *columns(progress.BarColumn()), progress.TimeRemainingColumn(), console=notes, disable=not notes.is_terminal
-    )
+    return Progress(*columns(BarColumn()), TimeRemainingColumn(), console=notes, disable=not notes.is_terminal)
 
 
 class Board:
     """One bar for all runs, and one for each run at work."""
 
-    def __init__(self, bar: progress.Progress) -> None:
+    def __init__(self, bar: Progress) -> None:
         self._bar = bar
         self._all = bar.add_task("all runs", total=None, found="")
-        self._tasks: dict[str, progress.TaskID] = {}
+        self._tasks: dict[str, TaskID] = {}
 
     def show(self, done: int, total: int, found: str, at_work: Mapping[str, tuple[int, int]]) -> None:
         """Draw the present state; `at_work` has done and total of each run at work, by its name."""
@@ -107,10 +113,8 @@ class Board:
 
 def narrow_table(*columns: str, **style: Any) -> Table:
     """Returns an empty table without lines, of which only the last column wraps."""
-    table = Table(box=SIMPLE_HEAD, padding=0, **style)
-    for name in columns:
-        table.add_column(name, no_wrap=name != columns[-1])
-    return table
+    unwrapped = (Column(name, no_wrap=name != columns[-1]) for name in columns)
+    return Table(*unwrapped, box=SIMPLE_HEAD, padding=0, **style)
 
 
 def say_adjustments(found: Iterable[Adjustment]) -> None:
@@ -136,7 +140,9 @@ def requirements_table(
 ) -> Table | None:
     """A row for each requirement below the name of its group, in 80 columns; None without any.
 
-    `said` is what is said below a rate, in red, by group and requirement.
+    Args:
+      groups: by name, their requirements.
+      said: by group and requirement, what is said below its rate, in red.
     """
     if not any(groups.values()):
         return None

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from risk_sac.cli.console import FAILED, INTERRUPTED, OK, Board, folded_table, print_answer, progress_bar, say
-from risk_sac.cli.flags import add_campaign_flags, campaign_flags, named_ego
+from risk_sac.cli.flags import add_campaign_flags, campaign_flags, kept_name, named_ego
 from risk_sac.cli.parser import Commands, add_command, add_group, add_json_flag
 from risk_sac.cli.run import drawn
-from risk_sac.cli.scenarios import kept_name
 from risk_sac.config import EgoConfig
-from risk_sac.config.equipment import ACTUATOR_PRESETS, SENSOR_PRESETS
+from risk_sac.config.ego import ACTUATOR_PRESETS, SENSOR_PRESETS
 from risk_sac.config.spec_file import PROFILES, read_campaign
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.egos.registry import SHIPPED, cards
@@ -108,7 +107,7 @@ def _defects(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> int:
     ego = named_ego(options.ego)
-    from risk_sac.failures.trials import try_ego, unusable  # here, because loading the simulator takes a second
+    from risk_sac.failures.trials import try_ego, unusable
 
     trials = []
     for name in options.scenario or shipped_names():
@@ -181,7 +180,6 @@ def _rows(family: str, found: "dict[str, Sequence[FinishedRun]]") -> list[list[s
 
 
 def _requirements(family: str, found: "dict[str, Sequence[FinishedRun]]") -> Iterator[list[str]]:
-    """The funnel of each requirement of each ego."""
     for name, runs in found.items():
         pooled = pooled_requirements([run.metrics["search"] for run in runs if run.spec.family == family])
         yield from ([family, name, *requirement_cells(each, counts)] for each, counts in pooled.items())

@@ -1,29 +1,31 @@
-"""Flags of campaigns, runs, egos, places and lists of failures."""
+"""Flags of campaigns, runs, egos, places and lists, and the scenarios that they name."""
 
 import argparse
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import islice
-from operator import itemgetter
+import tempfile
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from risk_sac.cli.console import EGO, number
 from risk_sac.cli.parser import Parser
-from risk_sac.cli.scenarios import kept_name
-from risk_sac.config import Behaviour, EgoConfig, FamilyName
-from risk_sac.config.samplers import named_methods
+from risk_sac.config import Behaviour, EgoConfig, Scenario
+from risk_sac.config.methods import named_methods
 from risk_sac.config.spec_file import read_ego
 from risk_sac.egos.registry import refuse_class
-from risk_sac.errors import ConfigError
-from risk_sac.host.terminal import notes
+from risk_sac.errors import ConfigError, did_you_mean
+from risk_sac.host.terminal import complain
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.finder import FINDERS, Map
-from risk_sac.records import Collision, DrivenBy, EpisodeRecord, Fault, Grade, PlausibilityClass, Severity, Violation
 from risk_sac.run_folder.durable import scratch_folder
-from risk_sac.scenario.families import density_of
-from risk_sac.verdicts.distinct import DistinctFailures
+from risk_sac.scenario import library
+from risk_sac.scenario.check import check_document
+from risk_sac.scenario.reading import nets_of, read_document, shipped_document, shipped_names
 
+if TYPE_CHECKING:
+    from risk_sac.openscenario.scenario_file import Imported
+
+OPENSCENARIO = ".xosc"
 CLASS = re.compile(r"[\w.]+:\w+")  # matches module:Class, which `risk_sac.egos.serve` takes and no campaign
 
 
@@ -74,7 +76,11 @@ def budget_flags(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def assignment(text: str) -> tuple[str, str]:
-    """Splits a NAME=VALUE of `--at`; raises `ConfigError` without an equals sign."""
+    """Splits a NAME=VALUE of `--at`.
+
+    Raises:
+      ConfigError: it has no equals sign.
+    """
     name, equals, value = text.partition("=")
     if not equals:
         raise ConfigError("--at", repr(text), "NAME=VALUE")
@@ -185,83 +191,7 @@ def families_on_map(options: argparse.Namespace) -> list[str] | None:
         return [chosen.keep(fit) for fit in chosen.fits(options.pattern, options.place)]
 
 
-E = TypeVar("E", bound=EpisodeRecord)
-Worst: TypeAlias = Collision | Violation
 LIMIT = 20
-
-
-class Filter(NamedTuple):
-    """A flag that keeps the failures with a value."""
-
-    what: str
-    keeps: Callable[[EpisodeRecord, Worst, str], bool]
-    choices: Sequence[str] | None = None
-
-
-def _severity(worst: Worst) -> Severity | None:
-    return worst.severity if isinstance(worst, Collision) else None
-
-
-def _plausibility(worst: Worst) -> PlausibilityClass | None:
-    return None if worst.behaviour is None else worst.behaviour.verdict
-
-
-def _broke(worst: Worst) -> Sequence[str]:
-    if isinstance(worst, Violation):
-        return worst.broke
-    return worst.judgement.broke
-
-
-FILTERS: Mapping[str, Filter] = {
-    "grade": Filter("of this grade", lambda _, worst, wanted: worst.graded == wanted, [*Grade]),
-    "plausibility": Filter(
-        "as plausible as this", lambda _, worst, wanted: _plausibility(worst) == wanted, [*PlausibilityClass]
-    ),
-    "severity": Filter("of this severity", lambda _, worst, wanted: _severity(worst) == wanted, [*Severity]),
-    "fault": Filter("caused by this party", lambda _, worst, wanted: worst.blamed == wanted, [*Fault]),
-    "driven_by": Filter("whose adversaries this drove", lambda each, _, wanted: each.driven_by == wanted, [*DrivenBy]),
-    "requirement": Filter(
-        "that violate this requirement, such as no_contact", lambda each, _, wanted: wanted in each.failed
-    ),
-    "broke": Filter(
-        "whose striker broke this rule, such as red_light", lambda _, worst, wanted: wanted in _broke(worst)
-    ),
-    "kind": Filter("of this kind, in the words of the list", lambda _, worst, wanted: worst.kind == wanted),
-}
-
-
-def _gravest(worst: Worst) -> tuple[bool, int, bool, bool]:
-    severity = _severity(worst)
-    rank = [*Severity].index(severity) if severity else -1
-    return not worst.plausible, -rank, not worst.preventable, worst.blamed is not Fault.EGO
-
-
-WEIGHT = "weight"
-SORTS: Mapping[str, Callable[[Worst], Any]] = {"severity": _gravest, "speed": lambda worst: -worst.ego_speed_mps}
-SORTED_BY = (
-    "found (the order of the search), weight (severity times plausibility, times the scene's density where a "
-    "distribution is declared), severity (plausible and worst first) or speed (the fastest ego first)"
-)
-
-
-def add_filter_flags(parser: Parser) -> None:
-    """Adds the flags of a list of failures."""
-    group = parser.group("choice of failures")
-    for name, filter_ in FILTERS.items():
-        choices = f": {', '.join(filter_.choices)}" if filter_.choices else ""
-        what = f"only those {filter_.what}{choices}"
-        flag = f"--{name.replace('_', '-')}"
-        group.add_argument(flag, choices=filter_.choices, metavar=name.upper(), help=what)
-    group.add_argument(
-        "--preventable", dest="grade", action="store_const", const=str(Grade.PREVENTABLE), help="--grade preventable"
-    )
-    group.add_argument("--distinct", action="store_true", help="only the first of each kind")
-    group.add_argument("--raw", action="store_true", help="also those that a validity rule refused")
-    orders = ["found", WEIGHT, *SORTS]
-    group.add_argument(
-        "--sort", choices=orders, metavar="ORDER", default="found", help=f"by {SORTED_BY} (default: found)"
-    )
-    add_limit(parser)
 
 
 def add_limit(parser: Parser) -> None:
@@ -272,46 +202,76 @@ def add_limit(parser: Parser) -> None:
     )
 
 
-def wanted(options: argparse.Namespace) -> dict[str, str | None]:
-    """Returns the value of each filter; None where it was not given."""
-    return {name: getattr(options, name) for name in FILTERS}
+def kept_name(name_or_file: str) -> str:
+    """Returns the name of a scenario; a document's or an OpenSCENARIO file's is put into the library first.
 
-
-def matching(options: argparse.Namespace, failures: Iterable[E]) -> Iterator[E]:
-    """Yields the failures that the filters keep."""
-    given = {FILTERS[name].keeps: value for name, value in wanted(options).items() if value is not None}
-    for failure in failures:
-        worst = failure.worst_violation
-        if worst is None or not (worst.valid or options.raw):
-            continue
-        if all(keeps(failure, worst, value) for keeps, value in given.items()):
-            yield failure
-
-
-def listed(options: argparse.Namespace, failures: Iterable[E], family: FamilyName | None = None) -> list[E]:
-    """Returns the failures to list, and notes on standard error if --limit leaves some out.
-
-    Args:
-      options: of the command line.
-      failures: all of them.
-      family: whose declared density weighs them; None: they come in the order of their weight where that is asked for.
+    Raises:
+      ConfigError: the document has a fault, or there is none.
     """
-    if options.distinct:
-        failures = _first_of_each_kind(failures)
-    if options.sort == WEIGHT and family is not None:
-        density = density_of(family)
-        judged = ((-worst.weight(density(each.scene)), each) for each in failures if (worst := each.worst_violation))
-        failures = [each for _, each in sorted(judged, key=itemgetter(0))]
-    elif options.sort in SORTS:
-        order = SORTS[options.sort]
-        judged = ((order(worst), each) for each in failures if (worst := each.worst_violation))
-        failures = [each for _, each in sorted(judged, key=itemgetter(0))]
-    found = list(islice(failures, options.limit + 1))
-    if len(found) > options.limit:
-        notes.print(f"There are more: --limit is {options.limit}.")
-    return found[: options.limit]
+    if not is_file(name_or_file):
+        return name_or_file
+    if Path(name_or_file).suffix.lower() == OPENSCENARIO:
+        return keep_imported(imported_file(Path(name_or_file)))
+    try:
+        document, folder = document_at(name_or_file)
+        nets = nets_of(document, folder)
+        check_document(document, nets)
+    except ConfigError as error:
+        for fault in (error, *error.others):
+            fault.field = f"{name_or_file}: {fault.field}".removesuffix(": ")
+        raise
+    return library.keep(document, library.own_files(document, nets))
 
 
-def _first_of_each_kind(failures: Iterable[E]) -> Iterator[E]:
-    kinds = DistinctFailures()
-    return (failure for failure in failures if sum(map(kinds.add, failure.valid_violations)))
+def imported_file(file: Path, ego: str | None = None) -> "Imported":
+    """Imports an OpenSCENARIO file, and says what differs from it."""
+    from risk_sac.openscenario.scenario_file import import_scenario  # imported here: few commands need it
+
+    imported = import_scenario(file, ego=ego)
+    origin = imported.document.origin
+    for remark in origin.remarks if origin is not None else ():
+        complain(f"warning: {remark}")
+    return imported
+
+
+def keep_imported(imported: "Imported") -> str:
+    """Puts an imported scenario into the library, once its document is checked; returns its name."""
+    with tempfile.TemporaryDirectory() as folder:
+        for name, content in imported.files.items():
+            Path(folder, name).write_bytes(content)
+        try:
+            check_document(imported.document, nets_of(imported.document, Path(folder)))
+        except ConfigError as error:
+            raise imported.located(error) from error
+    return library.keep(imported.document, imported.files)
+
+
+def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
+    """Returns a scenario's document, and the folder of its own nets if it has one.
+
+    Raises:
+      ConfigError: there is no such scenario or file, or the document has a fault.
+    """
+    if is_file(name_or_file) and Path(name_or_file).suffix.lower() == OPENSCENARIO:
+        return library.kept(kept_name(name_or_file))
+    if is_file(name_or_file):
+        return read_document(Path(name_or_file)), Path(name_or_file).absolute().parent
+    if name_or_file in shipped_names():
+        return shipped_document(name_or_file), None
+    try:
+        return library.kept(name_or_file)
+    except ConfigError as error:
+        known = library.listed()
+        close = next((name for name in known if name.startswith(f"{name_or_file}_")), name_or_file)
+        remedy = did_you_mean(close, (*shipped_names(), *known)) or error.remedy
+        raise ConfigError("scenario", error.got, error.expected, remedy) from None
+
+
+def is_file(name_or_file: str) -> bool:
+    """Whether a word names a file: it has a folder or an ending."""
+    if Path(name_or_file).suffix or "/" in name_or_file:
+        if not Path(name_or_file).is_file():
+            remedy = "check its path, or name a scenario of `risk-sac scenarios list`"
+            raise ConfigError("scenario", f"{name_or_file}, which is no file", "a document", remedy)
+        return True
+    return False

@@ -14,11 +14,11 @@ from rich.progress import Progress
 from rich.table import Table
 
 from risk_sac.cli.console import OK, folded_table, number, say
+from risk_sac.cli.flags import kept_name
 from risk_sac.cli.parser import Commands, add_command
-from risk_sac.cli.scenarios import kept_name
 from risk_sac.config import FamilyName, MethodName
 from risk_sac.config.base import read_text
-from risk_sac.config.samplers import named_methods
+from risk_sac.config.methods import named_methods
 from risk_sac.egos.defects.catalogue import DEFECTS
 from risk_sac.errors import ConfigError
 from risk_sac.host.machine import cores

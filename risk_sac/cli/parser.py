@@ -159,7 +159,10 @@ def as_typed(error: ConfigError, options: argparse.Namespace) -> str:
 
 
 def wrong_path(error: OSError, options: argparse.Namespace) -> ConfigError | None:
-    """Returns the error of an argument's unreadable file; None for a file that no argument names."""
+    """Returns the error of an argument's unreadable file.
+
+    None for a file that no argument names.
+    """
     named = {action.dest: action for action in options.parser._actions}
     for name, value in vars(options).items():
         values = value if isinstance(value, list) else [value]

@@ -1,33 +1,30 @@
-"""`risk-sac rate` and `boundary`: how often an ego fails, and where it goes from passing to failing."""
+"""`risk-sac rate` and `boundary`: how often, and where, an ego fails in a scenario without an attack."""
 
 import argparse
 from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
-from rich.table import Table
+from rich.table import Column, Table
 
-from risk_sac.cli.console import EGO, INTERRUPTED, OK, counted, print_answer, progress_bar, say_adjustments
-from risk_sac.cli.flags import add_scene_flags, assignment, named_ego, scene_flags
+from risk_sac.cli.console import EGO, INTERRUPTED, OK, counted, print_answer, say_adjustments
+from risk_sac.cli.flags import add_scene_flags, assignment, kept_name, named_ego, scene_flags
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
-from risk_sac.cli.scenarios import kept_name
-from risk_sac.config import RunSpec
+from risk_sac.cli.run import play_run
 from risk_sac.config.spec_file import read_spec
 from risk_sac.env.problem import Problem, adjustments
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.host.terminal import notes
-from risk_sac.rates.earlier import start_in
-from risk_sac.rates.record import METHOD, check_exposure, rated, rates_of
-from risk_sac.records import RunMetrics
-from risk_sac.records.boundary import BoundaryMap
-from risk_sac.records.rates import HourlyRate, RateEstimate, Rates
+from risk_sac.rates.record import METHOD, check_exposure, rated, rates_of, start_in
+from risk_sac.records.rates import BoundaryMap, HourlyRate, RateEstimate, Rates
 from risk_sac.report.runs import read_records
 from risk_sac.run_folder.results import BOUNDARY_PICTURE, EPISODES
 
 DRAWS = 2000
+PER_PARAMETER = 40  # episodes of a boundary for each parameter; choice
 
 
-def add(commands: Commands) -> None:
+def add_rate(commands: Commands) -> None:
     """Adds the command."""
     rate = add_command(
         commands,
@@ -56,50 +53,35 @@ def add(commands: Commands) -> None:
 
 def _rate(options: argparse.Namespace) -> int:
     named = {"family": kept_name(options.family), "method": METHOD, "seed": options.seed, "episodes": options.episodes}
-    spec = read_spec(None, named | scene_flags(options) | _start(options, named["family"]))
-    _check(spec, options)
+    start = {} if options.earlier is None else {"rate": start_in(options.earlier, named["family"]).model_dump()}
+    spec = read_spec(None, named | scene_flags(options) | start)
+    check_exposure(options.exposure)
+    known = rated(Problem.from_spec(spec))
+    if options.requirement is not None and options.requirement not in known:
+        remedy = did_you_mean(options.requirement, known)
+        raise ConfigError("requirement", repr(options.requirement), f"one of {', '.join(known)}", remedy)
     say_adjustments(adjustments(spec))
-    from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
-
-    with progress_bar() as bar:
-        task = bar.add_task(f"{spec.family} {spec.method}", total=spec.budget.episodes, found="")
-
-        def advance(done: int, metrics: RunMetrics | None) -> None:
-            bar.update(task, completed=done, found=f"failures {metrics.failures}" if metrics else "")
-
-        results = run(spec, options.out, advance)
+    results = play_run(
+        spec, options.out, f"{spec.family} {spec.method}", lambda metrics: f"failures {metrics.failures}"
+    )
     answer = rates_of(spec, read_records(options.out / EPISODES), options.exposure)
     if options.requirement is not None:
         only = {options.requirement: answer.rates[options.requirement]}
         answer = answer.model_copy(update={"rates": only})
-    texts = (_objections(answer), _drawn(answer), answer.meaning)
-    print_answer(options, answer, _table(answer), *filter(None, texts))
+    objections = (f"{name}: not estimated: {each.why}" for name, each in answer.rates.items() if each.rate is None)
+    texts = ("\n".join(objections), _drawn(answer), answer.meaning)
+    print_answer(options, answer, _rate_table(answer), *filter(None, texts))
     if not results.finished:
         notes.print(f"Stopped after {counted(answer.draws, 'draw')}. The same command again goes on from there.")
         return INTERRUPTED
     return OK
 
 
-def _start(options: argparse.Namespace, family: str) -> dict[str, Any]:
-    """Returns the field of the spec that says where to look first; none without `--from`."""
-    return {} if options.earlier is None else {"rate": start_in(options.earlier, family).model_dump()}
-
-
-def _check(spec: RunSpec, options: argparse.Namespace) -> None:
-    """Refuses, before anything is played, what the answer cannot be given for."""
-    check_exposure(options.exposure)
-    known = rated(Problem.from_spec(spec))
-    if options.requirement is not None and options.requirement not in known:
-        remedy = did_you_mean(options.requirement, known)
-        raise ConfigError("requirement", repr(options.requirement), f"one of {', '.join(known)}", remedy)
-
-
-def _table(answer: Rates) -> Table:
+def _rate_table(answer: Rates) -> Table:
     title = f"{answer.run_id}: {answer.played} of {counted(answer.draws, 'draw')} played"
-    table = Table(box=SIMPLE_HEAD, padding=0, title=title)
     checked = ("effective\nfailures", "largest\nshare", "declared\nshare")
-    for name in ("requirement", "failures", "rate", "95 %", "per hour", *checked):
-        table.add_column(name, overflow="fold")
+    names = ("requirement", "failures", "rate", "95 %", "per hour", *checked)
+    table = Table(*(Column(name, overflow="fold") for name in names), box=SIMPLE_HEAD, padding=0, title=title)
     for name, estimate in answer.rates.items():
         shares = (f"{share:.0%}" for share in (estimate.largest_share, estimate.declared_share))
         told = (*_said(estimate), _hourly(estimate.per_hour), f"{estimate.effective_failures:.0f}", *shares)
@@ -113,18 +95,11 @@ def _said(estimate: RateEstimate) -> tuple[str, str]:
     return f"{estimate.rate:.3g}", f"{estimate.low:.3g} to {estimate.high:.3g}"
 
 
-def _objections(answer: Rates) -> str:
-    """Says of each rate that is not estimated why."""
-    objected = [f"{name}: not estimated: {each.why}" for name, each in answer.rates.items() if each.rate is None]
-    return "\n".join(objected)
-
-
 def _hourly(rate: HourlyRate | None) -> str:
     return "" if rate is None else f"{rate.rate:.3g} ({rate.low:.3g} to {rate.high:.3g})"
 
 
 def _drawn(answer: Rates) -> str:
-    """Says which parameters have a distribution, and from where."""
     told = [
         f"{name}: {drawn.kind}, {drawn.source or 'choice'}"
         for name, drawn in answer.distributions.items()
@@ -132,9 +107,6 @@ def _drawn(answer: Rates) -> str:
     ]
     alike = [name for name, drawn in answer.distributions.items() if drawn.kind == "uniform"]
     return "\n".join([*told, *([f"uniform, a choice: {', '.join(alike)}"] if alike else [])])
-
-
-EPISODES_EACH = 40  # for each parameter; choice
 
 
 def add_boundary(commands: Commands) -> None:
@@ -156,7 +128,7 @@ def add_boundary(commands: Commands) -> None:
     requirement = "whose violation is failing (default: a contact, or any requirement that counts)"
     search.add_argument("--requirement", default="", metavar="NAME", help=requirement)
     search.add_argument(
-        "--episodes", type=int, metavar="N", help=f"for each ego (default: {EPISODES_EACH} per parameter)"
+        "--episodes", type=int, metavar="N", help=f"for each ego (default: {PER_PARAMETER} per parameter)"
     )
     search.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
     add_scene_flags(boundary)
@@ -179,7 +151,7 @@ def _boundary(options: argparse.Namespace) -> int:
         "family": family,
         "method": "boundary",
         "seed": options.seed,
-        "episodes": options.episodes or EPISODES_EACH * len(options.over),
+        "episodes": options.episodes or PER_PARAMETER * len(options.over),
         "boundary": asked,
         **scene_flags(options),
     }
@@ -189,16 +161,12 @@ def _boundary(options: argparse.Namespace) -> int:
     }
     specs = {ego: read_spec(None, own) for ego, own in egos.items()}
     say_adjustments(adjustments(specs[name]))
-    from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
     from risk_sac.report.parameter_plots import write_boundary
     from risk_sac.search.boundary_map import read_boundary
 
     folders = {ego: options.out / Path(ego).stem for ego in specs}
     for ego, spec in specs.items():
-        with progress_bar() as bar:
-            task = bar.add_task(ego, total=spec.budget.episodes, found="")
-            results = run(spec, folders[ego], lambda done, _: bar.update(task, completed=done))  # noqa: B023
-        if not results.finished:
+        if not play_run(spec, folders[ego], ego, lambda _: "").finished:
             notes.print("Stopped. The same command again goes on from there.")
             return INTERRUPTED
     found = read_boundary(folders.pop(name), folders)
@@ -218,9 +186,8 @@ def _fixed(text: str) -> tuple[str, float | str]:
 def _boundary_table(found: BoundaryMap) -> Table:
     from risk_sac.report.parameter_plots import in_words
 
-    table = Table(box=SIMPLE_HEAD, padding=0)
-    for column in ("driver", "points", "fails in (95 %)", "ego fails, it does not (95 %)"):
-        table.add_column(column)
+    columns = ("driver", "points", "fails in (95 %)", "ego fails, it does not (95 %)")
+    table = Table(*columns, box=SIMPLE_HEAD, padding=0)
     for told in found.maps:
         alone = "" if told.ego_fails_alone is None else in_words(told.ego_fails_alone)
         how = f"{told.name}, judged" if told.judged else told.name

@@ -1,32 +1,28 @@
-"""`risk-sac bundle`, `replay`, `verify`, `export` and `regress`: writes failures into files and plays them again."""
+"""`risk-sac bundle`, `replay`, `verify`, `export`, `minimise`, `region` and `clusters`: plays failures again."""
 
 import argparse
 import textwrap
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
-from junitparser import Error, Failure, Skipped
-from junitparser.xunit2 import JUnitXml, TestCase, TestSuite
-from pydantic import ValidationError
 from rich.markup import escape
-from rich.table import Table
 
-from risk_sac.cli.console import COULD_NOT_RUN, EGO, FAILED, OK, counted, narrow_table, print_answer, say
-from risk_sac.cli.flags import named_ego
+from risk_sac.cli.console import FAILED, OK, counted, narrow_table, print_answer, say
 from risk_sac.cli.parser import WIDTH, Commands, add_command, add_failure_arguments, add_json_flag
-from risk_sac.config import EgoConfig
-from risk_sac.config.base import read_text
-from risk_sac.egos.registry import check
 from risk_sac.errors import ConfigError, SimulationError
-from risk_sac.failures.export.formats import FORMATS, Files, FormatName, check_carries, export, names
-from risk_sac.failures.studied import Case, Regression, Verdict
+from risk_sac.failures.export.formats import FORMATS, Files, FormatName, check_carries, export
+from risk_sac.failures.studied import Aim, Studied, note, valid_failure
 from risk_sac.host.machine import cores
-from risk_sac.host.terminal import complain, console, printable
+from risk_sac.host.terminal import complain, console
 from risk_sac.metrics import pooled_headline
+from risk_sac.records import EpisodeRecord
 from risk_sac.run_folder.durable import replace_file
-from risk_sac.run_folder.results import RESULTS, TIMES, first_of_variants, read_results
+from risk_sac.run_folder.results import RESULTS, TIMES, first_of_variants, read_results, read_verified
+
+if TYPE_CHECKING:
+    from risk_sac.failures.bundle import Bundle
 
 
 def add(commands: Commands) -> None:
@@ -180,7 +176,6 @@ def _failure(name: FormatName, bundle: Path) -> Files:
 
 
 def _runs(folders: list[Path]) -> Iterator[Path]:
-    """Finds the folders of runs among the given ones and directly below them."""
     for folder in folders:
         runs = [folder] if (folder / RESULTS).exists() else sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
         if not runs:
@@ -190,137 +185,175 @@ def _runs(folders: list[Path]) -> Iterator[Path]:
         yield from runs
 
 
-if TYPE_CHECKING:
-    from risk_sac.failures.bundle import Bundle
-    from risk_sac.failures.regress import Regressed
-
-
-def add_regress(commands: Commands) -> None:
-    """Adds the command."""
-    regress = add_command(
+def add_understand(commands: Commands) -> None:
+    """Adds the commands."""
+    minimise = add_command(
         commands,
-        "regress",
-        _regress,
-        "play old failures against another ego",
-        more="The exit status is 1 if one of them is not fixed, and 2 if they could not be played.",
-        example="regress --failures failures/ --ego careful --junit regress.xml",
+        "minimise",
+        _minimise,
+        "reduce a failure to the least that still makes the ego fail",
+        example="minimise runs/low 42 --out core.npz",
     )
-    regress.set_defaults(on_error=COULD_NOT_RUN)
-    failures = "bundles, folders of bundles, or folders of runs; their policy acts on after the recorded actions"
-    cases = regress.group("cases")
-    cases.add_argument("--failures", type=Path, nargs="+", required=True, metavar="SET", help=failures)
-    cases.add_argument("--ego", required=True, metavar="EGO", help=EGO)
-    cases.add_argument("--baseline", type=Path, metavar="FILE.json", help="known cases, as --out wrote them")
-    output = regress.group("output")
-    output.add_argument("--out", type=Path, metavar="FILE.json", help="write the cases there")
-    output.add_argument("--junit", type=Path, metavar="FILE.xml", help="write a JUnit report there")
-    exports = "write what is neither fixed nor known there, as it happens now: bundles, and --format"
-    output.add_argument("--exports", type=Path, metavar="FOLDER", help=exports)
-    of_failure = [*map(str, names("failure"))]
-    kinds = f"with --exports: {', '.join(of_failure)}; see `risk-sac export --help`"
-    output.add_argument("--format", nargs="+", default=[], choices=of_failure, metavar="FORMAT", help=kinds)
+    region = add_command(
+        commands, "region", _region, "measure how many neighbours of a failure fail too", example="region runs/low 42"
+    )
+    for parser, metavar, out in (
+        (minimise, "FILE.npz", "write the core there, as a bundle"),
+        (region, "FILE.json", "write the shares there"),
+    ):
+        what = "a bundle, or the folder of a finished run, where the report finds the outcome"
+        parser.add_argument("path", type=Path, metavar="PATH", help=what)
+        parser.add_argument("failure", nargs="?", metavar="FAILURE", help="of a run: id of a failure, or its number")
+        parser.group("output").add_argument("--out", type=Path, metavar=metavar, help=out)
+    minimise.add_argument(
+        "--aim",
+        choices=get_args(Aim),
+        default="smallest",
+        help="smallest: the fewest and weakest actions; most-plausible: the least unlikely motion that still fails, "
+        "in a bundle that keeps the recording too",
+    )
+    clusters = add_command(
+        commands,
+        "clusters",
+        _clusters,
+        "sort the failures of runs into kinds, with one example of each",
+        example="clusters runs/low runs/mixed",
+    )
+    clusters.add_argument("runs", type=Path, nargs="+", metavar="RUN", help="folder of a run, or its results.json")
+    clusters.group("output").add_argument("--out", type=Path, metavar="FILE.json", help="write the kinds there")
+    add_json_flag(clusters)
 
 
-def _regress(options: argparse.Namespace) -> int:
-    ego = named_ego(options.ego)
-    check(ego)  # else each case would be "not comparable"
-    if options.format and options.exports is None:
-        raise ConfigError("--format", "it without --exports", "both")
-    for file in filter(None, (options.out, options.junit)):
-        file.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
-    baseline = read_baseline(options.baseline) if options.baseline else None
-    regressed = list(_cases(options.failures, ego))
-    regression = Regression(ego=ego, cases=tuple(each.case for each in regressed))
-    if baseline is not None:
-        regression = regression.beside(baseline)
-    console.print(cases_table(regression))
-    if options.out is not None:
-        replace_file(options.out, regression.model_dump_json(indent=2).encode())
-    if options.junit is not None:
-        replace_file(options.junit, junit(regression))
-    if options.exports is not None:
-        bundles = [each.bundle for each, case in zip(regressed, regression.cases, strict=True) if not case.passed]
-        _export_bundles(options.exports, [*map(FormatName, options.format)], bundles)
-    return OK if regression.passed else FAILED
+class _Asked(NamedTuple):
+    bundle: "Bundle"
+    folder: Path | None = None  # of its run; None of a bundle's
+    digest: str = ""  # of the run's results
 
 
-def cases_table(regression: Regression) -> Table:
-    """The cases, and below them how many there are of each verdict."""
-    caption = f"{counted(len(regression.cases), 'failure')}: {regression.counts_in_words}"
-    table = narrow_table("verdict", "failure, and what happens now", caption=caption, caption_justify="left")
-    for case in regression.cases:
-        table.add_row(case.verdict_in_words, escape(f"{case.id}: {case.name}\n  {case.reason}"))
-    return table
-
-
-def _export_bundles(folder: Path, formats: list[FormatName], bundles: list["Bundle"]) -> None:
-    """Bundles, and beside each the formats."""
-    from risk_sac.failures.bundle import write_bundle
-    from risk_sac.failures.export.formats import write
-    from risk_sac.failures.export.recorded import Recorded
-
-    for bundle in bundles:
-        stem = bundle.manifest.name
-        write_bundle(folder / f"{stem}.npz", bundle)
-        for name in formats:
-            suffix = FORMATS[name].suffix
-            out = folder / f"{stem}{f'-{name}' if suffix == '.zip' else ''}{suffix}"
-            write(FORMATS[name], export(name, Recorded.of(bundle)), out)
-    console.print(f"{counted(len(bundles), 'failure')} to look at: {folder}", soft_wrap=True)
-
-
-def _cases(paths: list[Path], ego: EgoConfig) -> Iterator["Regressed"]:
-    """Plays the failures of files and runs; reads all of them before it plays the first."""
+def _asked(path: Path, failure: str | None) -> _Asked:
     from risk_sac.failures.bundle import read_bundle  # here, for the simulator takes a second to load
-    from risk_sac.failures.regress import regress, regress_run
+    from risk_sac.failures.study import bundles
 
-    files: list[Path] = []
-    runs: list[Path] = []
-    for path in paths:
-        if path.is_dir() and (path / RESULTS).exists():
-            runs.append(path)
-        else:
-            files += sorted(path.glob("*.npz")) if path.is_dir() else [path]
-    bundles = [read_bundle(file) for file in files]
-    if not bundles and not any(first_of_variants(read_results(run)) for run in runs):
-        raise ConfigError("--failures", f"there is no failure in {', '.join(map(str, paths))}")
-    yield from (regress(bundle, ego) for bundle in bundles)
-    for run in runs:
-        yield from regress_run(run, ego)
+    if failure is None:
+        if path.is_dir():
+            raise ConfigError("FAILURE", f"{path}, which is a folder", "a bundle, or a failure of its run too")
+        return _Asked(read_bundle(path))
+    results, folder = read_results(path), path if path.is_dir() else path.parent
+    if results.digest is None:
+        raise ConfigError("PATH", f"the run in {folder} is not finished")
+    named = results.failure(failure)
+    valid_failure(named.id, named.episode)  # before it is played
+    (bundle,) = bundles(folder, results, [named.episode])
+    return _Asked(bundle, folder, results.digest)
 
 
-def read_baseline(file: Path, flag: str = "--baseline") -> Regression:
-    """Read the cases that `--out` wrote."""
-    try:
-        return Regression.model_validate_json(read_text(file, flag))
-    except ValidationError as error:
-        raise ConfigError(flag, f"{file} was not written by `risk-sac regress`") from error
+def _note(asked: _Asked, studied: Studied) -> None:
+    if asked.folder is not None:
+        note(asked.folder, asked.digest, asked.bundle.manifest.episode.index, studied)
 
 
-FAILS = (Verdict.STILL_FAILING, Verdict.NEW_KIND)
+def _minimise(options: argparse.Namespace) -> int:
+    from risk_sac.failures.bundle import write_bundle
+    from risk_sac.failures.minimise import minimise
+
+    asked = _asked(options.path, options.failure)
+    if asked.folder is None and options.out is None:
+        raise ConfigError("--out", "nothing", "a file for the core of a bundle")
+    if options.aim == "most-plausible":
+        return _more_plausible(asked.bundle, options.out)
+    minimal = minimise(asked.bundle)
+    core = minimal.manifest.core
+    assert core is not None  # that is what `minimise` makes
+    if options.out is not None:
+        write_bundle(options.out, minimal)
+    before, after = core.before, core.after
+    lines = [
+        core.sentence,
+        f"adversaries that act: {after.adversaries} of {before.adversaries}",
+        f"segments of 0.5 s: {after.segments} of {before.segments}; drive and steering apart: "
+        f"{after.channels} of {before.channels}",
+        f"parameters of the scene in the middle of their ranges: {core.plain_parameters} of {core.parameters}",
+        f"copies, perturbed by 1 %, that fail as well: {core.held} of {core.copies}",
+        f"played: {counted(core.episodes, 'episode')}",
+    ]
+    if options.out is not None:
+        lines.append(f"Bundle: {options.out}")
+    say("\n".join(lines))
+    _note(asked, Studied(core=core))
+    return OK
 
 
-def junit(regression: Regression) -> bytes:
-    """The report: fixed passes, known is skipped; what is flaky or cannot be compared is an error."""
-    suite = TestSuite("regression")
-    suite.add_property("ego", regression.ego.model_dump_json())
-    suite.add_testcases([_case(case) for case in regression.cases])
-    report = JUnitXml("risk-sac regress")
-    report.add_testsuite(suite)
-    report.update_statistics()
-    text: bytes = report.tostring()
-    return text
+def _more_plausible(bundle: "Bundle", out: Path | None) -> int:
+    from risk_sac.failures.bundle import write_bundle
+    from risk_sac.failures.minimise import most_plausible
+
+    likelier = most_plausible(bundle)
+    motion = likelier.manifest.plausible
+    assert motion is not None  # that is what `most_plausible` makes
+    before, after = (_behaviour(each.manifest.episode) for each in (bundle, likelier))
+    if out is not None:
+        write_bundle(out, likelier)
+    lines = [
+        motion.sentence,
+        f"recorded: {before}",
+        f"most plausible: {after}",
+        f"unlikeliness, -log p: {motion.before:.1f} before, {motion.after:.1f} after",
+        f"copies, perturbed by 1 %, that fail as well: {motion.held} of {motion.copies}",
+        f"played: {counted(motion.episodes, 'episode')}",
+        *([] if out is None else [f"Bundle, with the recording: {out}"]),
+    ]
+    say("\n".join(lines))
+    return OK
 
 
-def _case(case: Case) -> TestCase:
-    test_case = TestCase(printable(case.id), printable(case.name))
-    if case.grade is not None:
-        test_case.add_property("grade", case.grade)
-    said = printable(f"{case.verdict.replace('_', ' ')}: {case.reason}")
-    if case.verdict is Verdict.FIXED:
-        test_case.system_out = said
-    elif case.known:
-        test_case.append(Skipped(f"known; {said}"))
-    else:
-        test_case.append((Failure if case.verdict in FAILS else Error)(said, case.verdict))
-    return test_case
+def _behaviour(episode: EpisodeRecord) -> str:
+    violation = episode.worst_violation
+    return "" if violation is None or violation.behaviour is None else violation.behaviour.in_words
+
+
+def _region(options: argparse.Namespace) -> int:
+    from risk_sac.failures.variants import region
+
+    asked = _asked(options.path, options.failure)
+    if options.out is not None:
+        options.out.parent.mkdir(parents=True, exist_ok=True)  # before anything is played in vain
+    failing_region = region(asked.bundle)
+    title = escape(asked.bundle.manifest.id)
+    table = narrow_table("changed", "fail", "of", "share", "95 % interval", title=title)
+    for share in failing_region.shares:
+        rate, interval = f"{share.failed / share.played:.2f}", f"{share.low:.2f} - {share.high:.2f}"
+        table.add_row(share.what, str(share.failed), str(share.played), rate, interval)
+    console.print(table)
+    console.print("a needle: most scenes right beside it do not fail" if failing_region.needle else "no needle")
+    if options.out is not None:
+        replace_file(options.out, failing_region.model_dump_json(indent=2).encode())
+    _note(asked, Studied(region=failing_region))
+    return OK
+
+
+def _failures(path: Path) -> Iterator[tuple[str, EpisodeRecord]]:
+    """The failures of a run with their ids; flaky ones and their like are refused."""
+    results = read_results(path)
+    verified = read_verified(path if path.is_dir() else path.parent, results.digest or "")
+    episodes = [failure.episode for failure in results.failures]
+    for episode in verified.judged(episodes) if verified else episodes:
+        yield episode.id_in(results.spec.id), episode
+
+
+def _clusters(options: argparse.Namespace) -> int:
+    from risk_sac.metrics import with_published
+    from risk_sac.report.runs import overview
+
+    summary = overview(episode for run in options.runs for episode in _failures(run))
+    table = narrow_table("failures", "variants", "preventable", "kind; look first at")
+    for cluster in summary.clusters:
+        first = f"{cluster.name}\n  {cluster.representative} ({cluster.grade})"
+        preventable = with_published(cluster.preventable, cluster.published)
+        table.add_row(str(cluster.failures), str(cluster.variants), preventable, escape(first))
+    kinds = f"{counted(len(summary.clusters), 'kind')}; effective number of kinds (Vendi score): {summary.vendi:.1f}"
+    note = "in brackets: preventable by R157, FSM or RSS"
+    covered = f"cells of the taxonomy with a contact: {summary.covered} of {summary.cells}"
+    print_answer(options, summary, table, f"{kinds}\n{covered}\n{note}")
+    if options.out is not None:
+        replace_file(options.out, summary.model_dump_json(indent=2).encode())
+    return OK

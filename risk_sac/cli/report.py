@@ -1,29 +1,33 @@
-"""`risk-sac report`, `coverage` and `grid`: reports, their verification, coverage, and verdicts on a sweep."""
+"""`risk-sac report`, `coverage`, `grid` and `trend`: what finished runs say, alone and together."""
 
 import argparse
 import json
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from rich.box import SIMPLE_HEAD
+from rich.markup import escape
 from rich.table import Column, Table
 
-from risk_sac.cli.console import FAILED, OK, counted, print_answer, write_out
+from risk_sac.cli.console import FAILED, OK, counted, or_dash, print_answer, write_out
 from risk_sac.cli.flags import assignment
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
-from risk_sac.cli.replay import read_baseline
+from risk_sac.cli.regress import read_baseline
 from risk_sac.config.base import read_text
 from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import complain, console, notes
-from risk_sac.records.coverage import CellState
+from risk_sac.records.assessment import CellState
 from risk_sac.report.grid import STANDARDS, PlayedGrid, StandardVerdict, grid_csv, grid_junit, played_grids, varied_axes
+from risk_sac.report.trend import EndedCampaign, EndedRun, LeftOut, Trend, TrendRate, TrendRow, check_scenarios, trend
+from risk_sac.run_folder.results import read_boundary_map, read_rates, read_verified, with_headline
 
 if TYPE_CHECKING:
     from risk_sac.report.document import CampaignFacts
     from risk_sac.report.files import Inputs
     from risk_sac.report.runs import FinishedRun
+
 
 Format = Literal["html", "md", "json"]
 OUT = "report.html, report.md, or its data as report.json"
@@ -145,7 +149,6 @@ def _facts(inputs: "Inputs", runs: Sequence[Path], regression: Path | None) -> "
 
 
 def _verify(words: Sequence[Path], regression: Path | None) -> int:
-    """Compares the inputs of a report with those that lie there now."""
     from risk_sac.failures.bundle import code_digest
     from risk_sac.report.files import SPEC, campaign_in, changes, input_digests, inputs_in, run_folders, signed
 
@@ -172,7 +175,6 @@ def _verify(words: Sequence[Path], regression: Path | None) -> int:
 
 
 def _regress_command(inputs: "Inputs") -> str:
-    """Returns the command that plays the failures of all finished searches."""
     runs = [str(inputs.folders[run.spec.digest]) for run in inputs.comparison.runs]
     return shlex.join(["risk-sac", "regress", "--failures", *runs, "--ego", "EGO", "--out", "cases.json"])
 
@@ -207,7 +209,7 @@ def _grid(options: argparse.Namespace) -> int:
     if options.junit is not None:
         write_out(options.junit, grid_junit(grids), "JUnit report", notes)
     if options.picture is not None:
-        from risk_sac.report.parameter_plots import grid_png  # here, because loading matplotlib takes a second
+        from risk_sac.report.parameter_plots import grid_png
 
         over = (options.over[0], options.over[1]) if options.over else varied_axes(grids)
         content = grid_png(grids, over, dict(map(assignment, options.at)))
@@ -217,11 +219,107 @@ def _grid(options: argparse.Namespace) -> int:
 
 
 def _grid_table(grids: Sequence[PlayedGrid]) -> Table:
-    table = Table(box=SIMPLE_HEAD, padding=0)
-    table.add_column("run", overflow="fold")
-    for name in ("ego", "scenes", *(verdict.value.replace("_", "\n") for verdict in StandardVerdict)):
-        table.add_column(name, no_wrap=True)
+    names = ("ego", "scenes", *(verdict.value.replace("_", "\n") for verdict in StandardVerdict))
+    columns = [Column("run", overflow="fold"), *(Column(name, no_wrap=True) for name in names)]
+    table = Table(*columns, box=SIMPLE_HEAD, padding=0)
     for grid in grids:
-        counts = (str(count) for count in grid.counts.values())
-        table.add_row(grid.spec.id, grid.ego, str(len(grid.points)), *counts)
+        table.add_row(grid.spec.id, grid.ego, str(len(grid.points)), *map(str, grid.counts.values()))
     return table
+
+
+def add_trend(commands: Commands) -> None:
+    """Adds the command."""
+    parser = add_command(
+        commands,
+        "trend",
+        _trend,
+        "compare the versions of an ego over campaigns of the same scenarios",
+        more="Campaigns with another budget, other methods or another behaviour are in a table of their own.",
+        example="trend runs/v1.3 runs/v1.4 runs/v1.5",
+    )
+    folders = "folders of `risk-sac evaluate`, or of single runs, oldest version first"
+    parser.add_argument("runs", type=Path, nargs="+", metavar="RUNS", help=folders)
+    add_json_flag(parser)
+
+
+def _trend(options: argparse.Namespace) -> int:
+    found = trend_of_folders(options.runs)
+    print_answer(options, found, *_texts(found))
+    return OK
+
+
+def trend_of_folders(folders: Sequence[Path]) -> Trend:
+    """Compares the versions of each ego by the campaigns in folders, oldest first.
+
+    Raises:
+      ConfigError: a folder has no run, or the campaigns are of different scenarios.
+    """
+    from risk_sac.report.files import campaign_in  # here, because loading numpy takes a while
+
+    ended, left_out = [], []
+    for folder in folders:
+        spec, results = campaign_in([folder])
+        runs = []
+        for path, result in results.items():
+            verified = read_verified(path, result.digest) if result.digest else None
+            told = with_headline(result, verified) if verified else result
+            runs.append(
+                EndedRun(
+                    family=told.spec.family,
+                    method=told.spec.method,
+                    iid=told.spec.iid,
+                    phases=tuple(phase for phase in (told.metrics, told.evaluation) if phase is not None),
+                    versions=told.versions or {},
+                    boundary=read_boundary_map(path),
+                    rates=read_rates(path),
+                )
+            )
+        done = {result.spec.digest for result in results.values() if result.finished}
+        if missing := [run.id for run in spec.runs() if run.digest not in done]:
+            left_out.append(LeftOut(campaign_id=str(folder), reason=f"{missing[0]} is not finished"))
+        else:
+            ended.append(EndedCampaign(id=str(folder), spec=spec, runs=tuple(runs)))
+    check_scenarios(ended)
+    return trend(ended, left_out)
+
+
+def _texts(found: Trend) -> Iterator[str | Table]:
+    for row in found.rows:
+        yield _heading(row)
+        yield _trend_table(row)
+    for left in found.left_out:
+        yield f"Left out: {left.campaign_id}: {left.reason}"
+
+
+def _heading(row: TrendRow) -> str:
+    parts = [
+        f"{row.ego}: {', '.join(row.families)}",
+        ", ".join(row.methods),
+        counted(row.seeds, "seed"),
+        counted(row.budget.episodes, "episode"),
+        *([] if row.iid_episodes is None else [counted(row.iid_episodes, "fresh scene")]),
+        row.behaviour,
+    ]
+    return "; ".join(parts) + (f"; differs in {', '.join(row.differs)}" if row.differs else "")
+
+
+def _trend_table(row: TrendRow) -> Table:
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    table.add_column("version", overflow="fold")
+    for name in ("head-\nline", "new", "gone", "re-\nturned"):
+        table.add_column(name, no_wrap=True, justify="right")
+    table.add_column("rate of failures, 95 %", overflow="fold")
+    for before, point in zip((None, *row.points), row.points, strict=False):
+        if before is not None and point.changed:
+            changes = (f"{name} {before.software[name]} → {point.software[name]}" for name in point.changed)
+            table.add_row(*[""] * 5, f"not comparable: {', '.join(changes)}")
+        counts = ("-" if kinds is None else str(len(kinds)) for kinds in (point.new, point.gone, point.returned))
+        rates = "\n".join(_trend_rate(rate) for rate in point.rates if rate.requirement is None) or "-"
+        named = escape(" ".join([point.version, *(f"({setting})" for setting in point.settings)]))
+        table.add_row(named, "-" if point.headline is None else str(point.headline), *counts, rates)
+    return table
+
+
+def _trend_rate(rate: TrendRate) -> str:
+    value, low, high = (or_dash(figure, ".3f") for figure in (rate.rate, rate.low, rate.high))
+    return f"{value} [{low}, {high}] {rate.family}, {rate.method.removeprefix('iid-')}"

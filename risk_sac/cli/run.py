@@ -2,14 +2,13 @@
 
 import argparse
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from risk_sac.cli import flags
 from risk_sac.cli.console import (
     FAILED,
     INTERRUPTED,
@@ -24,10 +23,21 @@ from risk_sac.cli.console import (
     requirements_table,
     say_adjustments,
 )
+from risk_sac.cli.flags import (
+    add_budget_flags,
+    add_campaign_flags,
+    add_map_flags,
+    add_prior_flag,
+    add_scene_flags,
+    budget_flags,
+    campaign_flags,
+    families_on_map,
+    kept_name,
+    scene_flags,
+)
 from risk_sac.cli.parser import Commands, add_command, add_json_flag
-from risk_sac.cli.scenarios import kept_name
 from risk_sac.config import METHODS, RunSpec
-from risk_sac.config.samplers import named_methods
+from risk_sac.config.methods import named_methods
 from risk_sac.config.spec_file import read_campaign, read_spec
 from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
@@ -58,16 +68,16 @@ def add(commands: Commands) -> None:
     )
     named = "scenario that ships, is kept or in a file; `risk-sac scenarios list`"
     run.group("scene").add_argument("--scenario", dest="family", metavar="NAME_OR_FILE", help=named)
-    flags.add_scene_flags(run)
-    flags.add_map_flags(run, several=False)
+    add_scene_flags(run)
+    add_map_flags(run, several=False)
     search = run.group("search")
     search.add_argument("--method", metavar="NAME", help=f"one of {', '.join(named_methods())} (default: risk-sac)")
     search.add_argument("--seed", type=int, metavar="S", help="(default: 0)")
     search.add_argument(
         "--spec", type=Path, metavar="FILE.yaml", help="settings of a run or campaign; flags override them"
     )
-    flags.add_prior_flag(run)
-    flags.add_budget_flags(run)
+    add_prior_flag(run)
+    add_budget_flags(run)
     run.group("output").add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the results")
     add_json_flag(run)
 
@@ -79,10 +89,10 @@ def add(commands: Commands) -> None:
         more="Writes tables and figures. The same command again continues an interrupted comparison.",
         example="evaluate --scenario low --methods archive random --seeds 3 --episodes 100 --out runs/compared",
     )
-    flags.add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
-    flags.add_scene_flags(evaluate)
-    flags.add_prior_flag(evaluate)
-    flags.add_map_flags(evaluate, several=True)
+    add_campaign_flags(evaluate, families="all", methods="all", seeds=SEEDS)
+    add_scene_flags(evaluate)
+    add_prior_flag(evaluate)
+    add_map_flags(evaluate, several=True)
     execution = evaluate.group("execution")
     jobs = "processes that play episodes (default: one per core, or as many as a cluster has room for)"
     execution.add_argument("--jobs", type=int, metavar="N", help=jobs)
@@ -97,7 +107,7 @@ def add(commands: Commands) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    families = flags.families_on_map(options)
+    families = families_on_map(options)
     if families:
         options.family = families[0]
     if options.spec is None and options.family is None:
@@ -105,23 +115,16 @@ def _run(options: argparse.Namespace) -> int:
         raise ConfigError("family", "nothing", "low, mixed or dense", remedy)
     options.family = options.family and kept_name(options.family)
     named = {name: getattr(options, name) for name in ("family", "method", "seed", "prior")}
-    spec = read_spec(options.spec, named | flags.budget_flags(options) | flags.scene_flags(options))
+    spec = read_spec(options.spec, named | budget_flags(options) | scene_flags(options))
     check_batch(spec.budget.batch)
     say_adjustments(adjustments(spec))
-    from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
-
-    total = spec.budget.total_episodes
-    with progress_bar() as bar:
-        task = bar.add_task(f"{spec.family} {spec.method}", total=total, found="")
-
-        def advance(done: int, metrics: RunMetrics | None) -> None:
-            bar.update(task, completed=done, found=_found(metrics))
-
-        results = run(spec, options.out, advance)
+    results = play_run(spec, options.out, f"{spec.family} {spec.method}", _found)
     if not results.finished:
         done = sum(phase.episodes for phase in (results.metrics, results.evaluation) if phase)
         again = "The same command again goes on from there."
-        notes.print(f"Stopped after {done} of {counted(total, 'episode')}. {again}", soft_wrap=True)
+        notes.print(
+            f"Stopped after {done} of {counted(spec.budget.total_episodes, 'episode')}. {again}", soft_wrap=True
+        )
         return INTERRUPTED
     phases = {"i.i.d." if spec.iid else "search": results.metrics, "evaluation": results.evaluation}
     played = {name: metrics for name, metrics in phases.items() if metrics is not None}
@@ -137,9 +140,20 @@ def _run(options: argparse.Namespace) -> int:
     return OK
 
 
-def _found(metrics: RunMetrics | None) -> str:
-    if metrics is None:
-        return ""
+def play_run(spec: RunSpec, folder: Path, name: str, found: Callable[[RunMetrics], str]) -> RunResults:
+    """Plays a run, or continues it, behind a bar with a name and with what was found so far."""
+    from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
+
+    with progress_bar() as bar:
+        task = bar.add_task(name, total=spec.budget.total_episodes, found="")
+
+        def advance(done: int, metrics: RunMetrics | None) -> None:
+            bar.update(task, completed=done, found=found(metrics) if metrics else "")
+
+        return run(spec, folder, advance)
+
+
+def _found(metrics: RunMetrics) -> str:
     preventable = with_published(metrics.distinct_preventable, metrics.distinct_published)
     return (
         f"contacts {metrics.raw_collisions} → valid {metrics.collisions}  failures {metrics.failures} → "
@@ -182,7 +196,6 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
 
 
 def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
-    """Name and value of a metric, with its interval if it has one."""
     name, value = f"{metric.words} {metric.symbol}".strip(), metric.value(metrics)
     interval = None if value is None else metric.interval(value, metrics)
     text = or_dash(value, ".3f")
@@ -192,8 +205,8 @@ def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
 def _evaluate(options: argparse.Namespace) -> int:
     methods = [name for name, method in METHODS.items() if not method.needs and method.scenes != "boundary"]
     defaults = {"families": list(PAPER_FAMILIES), "methods": methods, "seeds": list(range(SEEDS))}
-    options.families = flags.families_on_map(options) or options.families
-    spec = read_campaign(options.spec, flags.campaign_flags(options, SEEDS) | flags.scene_flags(options), defaults)
+    options.families = families_on_map(options) or options.families
+    spec = read_campaign(options.spec, campaign_flags(options, SEEDS) | scene_flags(options), defaults)
     say_adjustments(adjustments(spec))
     # Here, because loading what checks the settings takes seconds.
     from risk_sac.execution.evaluate import evaluate

@@ -1,7 +1,8 @@
-"""`risk-sac scenarios`: lists, shows, checks, imports, draws and copies scenario documents."""
+"""`risk-sac scenarios` and `places`: works on scenario documents, and lists where patterns fit on a map."""
 
 import argparse
-import tempfile
+import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,18 +10,24 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from risk_sac.cli.console import FAILED, OK, print_answer, say
+from risk_sac.cli.console import FAILED, OK, counted, print_answer, say
+from risk_sac.cli.flags import MAP_HELP, document_at, imported_file, keep_imported
 from risk_sac.cli.parser import Commands, Parser, add_command, add_group, add_json_flag
 from risk_sac.config import Scenario
-from risk_sac.errors import ConfigError, did_you_mean
-from risk_sac.host.terminal import complain, console
-from risk_sac.scenario import library, reading
-from risk_sac.scenario.check import check_document
+from risk_sac.errors import ConfigError
+from risk_sac.host.terminal import console
+from risk_sac.maps.convert import present_net
+from risk_sac.maps.finder import FINDERS, Map, survey
+from risk_sac.maps.found import TITLES, Pattern, Survey
+from risk_sac.run_folder.durable import scratch_folder
+from risk_sac.scenario import library
+from risk_sac.scenario.reading import FOLDER, nets_of, networks, roads, scenario_file, shipped_names
+from risk_sac.world.net import net_remarks
 
 if TYPE_CHECKING:
-    from risk_sac.openscenario.scenario_file import Imported
+    from risk_sac.failures.trials import Tried
 
-OPENSCENARIO = ".xosc"
+
 FILE_HELP = "a scenario document, YAML or JSON, with its nets beside it"
 
 
@@ -78,88 +85,8 @@ def add(commands: Commands) -> None:
     copying.add_argument("file", type=Path, metavar="FILE", help="that is written, its nets beside it")
 
 
-def kept_name(name_or_file: str) -> str:
-    """Returns the name of a scenario; a document's or an OpenSCENARIO file's is put into the library first.
-
-    Raises:
-      ConfigError: the document has a fault, or there is none.
-    """
-    if not is_file(name_or_file):
-        return name_or_file
-    if is_openscenario(name_or_file):
-        return _kept(_imported(Path(name_or_file)))
-    try:
-        document, folder = document_at(name_or_file)
-        nets = reading.nets_of(document, folder)
-        check_document(document, nets)
-    except ConfigError as error:
-        for fault in (error, *error.others):
-            fault.field = f"{name_or_file}: {fault.field}".removesuffix(": ")
-        raise
-    return library.keep(document, library.own_files(document, nets))
-
-
-def is_openscenario(file: str) -> bool:
-    """Whether a file is OpenSCENARIO XML, by its ending."""
-    return Path(file).suffix.lower() == OPENSCENARIO
-
-
-def _imported(file: Path, ego: str | None = None) -> "Imported":
-    """Imports an OpenSCENARIO file, and says what differs from it."""
-    from risk_sac.openscenario.scenario_file import import_scenario  # imported here: few commands need it
-
-    imported = import_scenario(file, ego=ego)
-    origin = imported.document.origin
-    for remark in origin.remarks if origin is not None else ():
-        complain(f"warning: {remark}")
-    return imported
-
-
-def _kept(imported: "Imported") -> str:
-    """Puts an imported scenario into the library, once its document is checked; returns its name."""
-    with tempfile.TemporaryDirectory() as folder:
-        for name, content in imported.files.items():
-            Path(folder, name).write_bytes(content)
-        try:
-            check_document(imported.document, reading.nets_of(imported.document, Path(folder)))
-        except ConfigError as error:
-            raise imported.located(error) from error
-    return library.keep(imported.document, imported.files)
-
-
-def document_at(name_or_file: str) -> tuple[Scenario, Path | None]:
-    """Returns a scenario's document, and the folder of its own nets if it has one.
-
-    Raises:
-      ConfigError: there is no such scenario or file, or the document has a fault.
-    """
-    if is_file(name_or_file) and is_openscenario(name_or_file):
-        return library.kept(kept_name(name_or_file))
-    if is_file(name_or_file):
-        return reading.read_document(Path(name_or_file)), Path(name_or_file).absolute().parent
-    if name_or_file in reading.shipped_names():
-        return reading.shipped_document(name_or_file), None
-    try:
-        return library.kept(name_or_file)
-    except ConfigError as error:
-        known = library.listed()
-        close = next((name for name in known if name.startswith(f"{name_or_file}_")), name_or_file)
-        remedy = did_you_mean(close, (*reading.shipped_names(), *known)) or error.remedy
-        raise ConfigError("scenario", error.got, error.expected, remedy) from None
-
-
-def is_file(name_or_file: str) -> bool:
-    """Whether a word names a file: it has a folder or an ending."""
-    if Path(name_or_file).suffix or "/" in name_or_file:
-        if not Path(name_or_file).is_file():
-            remedy = "check its path, or name a scenario of `risk-sac scenarios list`"
-            raise ConfigError("scenario", f"{name_or_file}, which is no file", "a document", remedy)
-        return True
-    return False
-
-
 def _list(options: argparse.Namespace) -> int:
-    documents = {name: document_at(name)[0] for name in (*reading.shipped_names(), *library.listed())}
+    documents = {name: document_at(name)[0] for name in (*shipped_names(), *library.listed())}
     rows = [
         {
             "name": name,
@@ -184,13 +111,12 @@ def _show(options: argparse.Namespace) -> int:
 
 def _text(name: str) -> str:
     document, _ = document_at(name)
-    return reading.scenario_file(name).read_text() if name in reading.shipped_names() else library.written(document)
+    return scenario_file(name).read_text() if name in shipped_names() else library.written(document)
 
 
 def _check(options: argparse.Namespace) -> int:
-    """Fails if the ego is touched without an attack, or if nothing could be played."""
     document, folder = document_at(options.file)
-    nets = reading.nets_of(document, folder)
+    nets = nets_of(document, folder)
     from risk_sac.failures.scenario_trial import try_document  # here, because loading the simulator takes a second
 
     checked = try_document(document, nets)
@@ -213,10 +139,10 @@ def _check(options: argparse.Namespace) -> int:
 
 def _draw(options: argparse.Namespace) -> int:
     document, folder = document_at(options.file)
-    from risk_sac.failures.scenario_trial import scenario_png  # here, because loading matplotlib takes a second
+    from risk_sac.failures.scenario_trial import scenario_png
 
     out = options.out or Path(options.file).with_suffix(".png").absolute()
-    out.write_bytes(scenario_png(document, reading.nets_of(document, folder)))
+    out.write_bytes(scenario_png(document, nets_of(document, folder)))
     say(f"Drawn: {out}")
     return OK
 
@@ -224,7 +150,7 @@ def _draw(options: argparse.Namespace) -> int:
 def _import(options: argparse.Namespace) -> int:
     if options.out is not None and options.out.exists():
         raise ConfigError("out", f"{options.out}, which is there", "a new file", "choose another name")
-    imported = _imported(options.file, options.ego_entity)
+    imported = imported_file(options.file, options.ego_entity)
     document = imported.document
     if options.out is not None:
         options.out.parent.mkdir(parents=True, exist_ok=True)
@@ -233,12 +159,12 @@ def _import(options: argparse.Namespace) -> int:
         options.out.write_text(library.written(document))
         where = f"Written: {options.out}; its roads and nets beside it."
     else:
-        where = f"Kept as {_kept(imported)}."
+        where = f"Kept as {keep_imported(imported)}."
     table = Table("", "", box=None, show_header=False)
     table.add_row("actors", ", ".join(document.actors) or "none")
     table.add_row("parameters that vary", ", ".join(axes(document)) or "none")
     table.add_row("points of the grid", str(imported.points))
-    table.add_row("roads", ", ".join(reading.roads(document)))
+    table.add_row("roads", ", ".join(roads(document)))
     answer = {
         "where": where,
         "actors": list(document.actors),
@@ -258,7 +184,7 @@ def axes(document: Scenario) -> list[str]:
 def _copy(options: argparse.Namespace) -> int:
     document, folder = document_at(options.name)
     files = {options.file: _text(options.name).encode()}
-    for name in (*reading.networks(document), *reading.roads(document)):
+    for name in (*networks(document), *roads(document)):
         if folder is not None and (folder / name).is_file():
             files[options.file.parent / name] = (folder / name).read_bytes()
     if not options.file.parent.is_dir():
@@ -268,6 +194,128 @@ def _copy(options: argparse.Namespace) -> int:
             raise ConfigError("file", f"{file}, which is there", "a new file", "choose another name or folder")
     for file, content in files.items():
         file.write_bytes(content)
-    own = "its nets beside it" if folder is not None else f"its net ships: {reading.FOLDER / document.name}"
+    own = "its nets beside it" if folder is not None else f"its net ships: {FOLDER / document.name}"
     say(f"Written: {options.file}; {own}.")
     return OK
+
+
+SHOWN = 20
+
+
+def add_places(commands: Commands) -> None:
+    """Adds the command."""
+    places = add_command(
+        commands,
+        "places",
+        _places,
+        "list the places of a map where a pattern fits",
+        more="With --try, also plays there.",
+        example="places town.net.xml --pattern crossing --out town.png",
+    )
+    places.add_argument("network", type=Path, metavar="MAP", help=MAP_HELP)
+    choice = places.group("choice")
+    choice.add_argument("--pattern", choices=list(FINDERS), help="only this one (default: all)")
+    choice.add_argument("--why", action="store_true", help="list also where they do not fit, and why")
+    choice.add_argument("--all", action="store_true", help=f"list all (default: {SHOWN} of each pattern)")
+    trial = places.group("trial")
+    trial.add_argument("--try", dest="tries", type=int, metavar="N", help="play at N random places of each pattern")
+    trial.add_argument("--episodes", type=int, default=20, metavar="N", help="of each place (default: %(default)s)")
+    trial.add_argument("--seed", type=int, default=0, metavar="N", help="of the choice (default: %(default)s)")
+    places.group("output").add_argument("--out", type=Path, metavar="FILE.png", help="draw the map with its places")
+    add_json_flag(places)
+
+
+def _places(options: argparse.Namespace) -> int:
+    patterns: tuple[Pattern, ...] = (options.pattern,) if options.pattern else tuple(FINDERS)
+    with scratch_folder() as folder:
+        converted = present_net(options.network, folder)
+        chosen = Map(converted.file)
+        map_survey = survey(chosen.net, patterns)
+        warnings = [*converted.warnings, *net_remarks(chosen.net)]
+        if options.out is not None:
+            from risk_sac.failures.from_above import map_png  # here, because loading matplotlib takes a second
+
+            options.out.write_bytes(map_png(chosen.net, map_survey))
+        if options.tries is not None:
+            return _try_places(chosen, map_survey, options)
+    if options.json:
+        fits, misfits = [fit.told() for fit in map_survey.fits], [misfit.told() for misfit in map_survey.misfits]
+        said = {"places": fits, "elsewhere": misfits, "nowhere": map_survey.nowhere, "warnings": warnings}
+        console.out(json.dumps(said), highlight=False)
+        return OK
+    for warning in warnings:
+        console.print(f"warning: {warning}", soft_wrap=True, markup=False)
+    for pattern in patterns:
+        _tell(pattern, map_survey, most=len(map_survey.fits) if options.all else SHOWN, why=options.why)
+    if options.out is not None:
+        console.print(f"Drawn: {options.out}", soft_wrap=True)
+    return OK
+
+
+def _tell(pattern: Pattern, map_survey: Survey, most: int, *, why: bool) -> None:
+    fits = [fit for fit in map_survey.fits if fit.spot.pattern == pattern]
+    misfits = [misfit for misfit in map_survey.misfits if misfit.spot.pattern == pattern]
+    rare = sum(fit.rare for fit in fits)
+    marked = f", contacts are rare at {rare} of them" if rare else ""
+    counts = f"{counted(len(fits), 'place')}{marked}; does not fit at {len(misfits)}"
+    nowhere = f": {map_survey.nowhere[pattern]}" if pattern in map_survey.nowhere else ""
+    console.print(f"{TITLES[pattern]} ({pattern}): {counts}{nowhere}", highlight=False)
+    if fits:
+        console.print(_places_table("what", [(fit.spot.id, fit.summary) for fit in fits], most))
+    if why and misfits:
+        console.print(_places_table("why not", [(misfit.spot.id, misfit.why) for misfit in misfits], most))
+
+
+def _places_table(heading: str, rows: Sequence[tuple[str, str]], most: int) -> Table:
+    table = Table("place", heading, box=SIMPLE_HEAD)
+    for row in rows[:most]:
+        table.add_row(*map(escape, row))
+    if len(rows) > most:
+        table.add_row("…", f"and {len(rows) - most} more: --all")
+    return table
+
+
+def _try_places(chosen: Map, map_survey: Survey, options: argparse.Namespace) -> int:
+    """Plays at some places and prints a row per pattern.
+
+    Fails if a place does not run, or if the ego is touched without an attack.
+    """
+    from risk_sac.failures.trials import sample, try_out
+
+    tried = []
+    for fit in sample(map_survey.fits, options.tries, options.seed):
+        tried.append(try_out(fit, chosen.keep(fit), options.episodes, options.seed))
+        for why in _wrong(tried[-1]):
+            console.print(f"{fit.spot.pattern} at {fit.spot.id}: {why}", markup=False, soft_wrap=True)
+    console.print(_tried(map_survey, tried))
+    return FAILED if any(not each.runs or each.touched_unattacked for each in tried) else OK
+
+
+def _wrong(tried: "Tried") -> list[str]:
+    whys = list(dict.fromkeys(tried.invalid))
+    if not tried.played and not tried.invalid:
+        whys.append(f"all scenes are refused: {dict(tried.rejected)}")
+    if tried.touched_unattacked:
+        whys.append(f"{tried.touched_unattacked} contacts without an attack")
+    if tried.unlike is not None:
+        whys.append(tried.unlike)
+    return whys
+
+
+def _tried(map_survey: Survey, tried: Sequence["Tried"]) -> Table:
+    names = ("pattern", "places", "tried", "run", "played", "refused", "invalid", "touched, unattacked", "mirrored")
+    table = Table(*names, box=SIMPLE_HEAD)
+    for pattern in dict.fromkeys(each.fit.spot.pattern for each in tried):
+        own = [each for each in tried if each.fit.spot.pattern == pattern]
+        row = (
+            map_survey.counts[pattern],
+            len(own),
+            sum(each.runs for each in own),
+            sum(each.played for each in own),
+            sum(each.rejected.total() for each in own),
+            sum(len(each.invalid) for each in own),
+            sum(each.touched_unattacked for each in own),
+            sum(each.unlike is None for each in own),
+        )
+        table.add_row(escape(pattern), *map(str, row))
+    return table

@@ -1,10 +1,12 @@
-"""`risk-sac show`: lists and draws the failures of a run."""
+"""`risk-sac show`: lists and draws the failures of a run; flags that choose failures."""
 
 import argparse
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
+from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from rich.table import Table
 
@@ -20,18 +22,32 @@ from risk_sac.cli.console import (
     outcome,
     print_answer,
 )
-from risk_sac.cli.flags import add_filter_flags, listed, matching
-from risk_sac.cli.parser import FAILURE_HELP, RESULTS_HELP, Commands, add_command, add_json_flag
-from risk_sac.config import RunSpec
+from risk_sac.cli.flags import add_limit
+from risk_sac.cli.parser import FAILURE_HELP, RESULTS_HELP, Commands, Parser, add_command, add_json_flag
+from risk_sac.config import FamilyName, RunSpec
 from risk_sac.config.spec_file import read_ego
 from risk_sac.errors import ConfigError
 from risk_sac.failures.question import IDLE
 from risk_sac.failures.recording import Recording
 from risk_sac.host.terminal import notes
 from risk_sac.metrics import headline_driven_by
-from risk_sac.records import Collision, EpisodeId, Judgement, RunMetrics, Violation
+from risk_sac.records import (
+    Collision,
+    DrivenBy,
+    EpisodeId,
+    EpisodeRecord,
+    Fault,
+    Grade,
+    Judgement,
+    PlausibilityClass,
+    RunMetrics,
+    Severity,
+    Violation,
+)
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import RESULTS, RecordedFailure, RunResults, read_results
+from risk_sac.scenario.families import density_of
+from risk_sac.verdicts.distinct import DistinctFailures
 
 NAME_WIDTH = 20  # of a requirement's name in the list
 
@@ -106,13 +122,20 @@ def _draw(options: argparse.Namespace, spec: RunSpec, recording: Recording, file
 
 
 def _names_failure(path: Path) -> bool:
-    """Tells whether a word is a number or an id of the newest run's failures, and no file or folder here."""
+    """Tells whether a word names a failure of the newest run.
+
+    It does if it is a number or an id, and no file or folder here.
+    """
     id_ = path.name
     return path.parent == Path.cwd() and not path.exists() and (id_.isdecimal() or EpisodeId.parse(id_) is not None)
 
 
 def newest_run(folder: Path) -> Path:
-    """Returns the run below `folder` that was written last, at most three levels down; raises `ConfigError`."""
+    """Returns the folder of a run below `folder` that was written last, at most three levels down.
+
+    Raises:
+      ConfigError: there is none.
+    """
     found = [file for depth in range(4) for file in folder.glob("*/" * depth + RESULTS)]
     if not found:
         raise ConfigError("RESULTS", "nothing", "the folder of a run", f"there is none below {folder}")
@@ -153,7 +176,10 @@ def _plain(failure: RecordedFailure) -> dict[str, Any]:
 
 
 def _table(run: str, failures: Sequence[RecordedFailure]) -> Table:
-    """Returns a table of failures by number, under the id of their run, in 80 columns."""
+    """Returns a table of failures by number, under the id of their run.
+
+    Fits 80 columns; only the last one wraps.
+    """
     table = narrow_table(
         "number,\nphase",
         OUTCOME,
@@ -196,3 +222,126 @@ def _without_contact(violation: Violation) -> tuple[str, ...]:
 def _conflict(judgement: Judgement) -> str:
     began = f"{judgement.conflict_s:.1f}, {judgement.conflict_x_m:.0f} {judgement.conflict_y_m:.0f}"
     return f"{judgement.conflict_type.replace('_', ' ')}\n{began}"
+
+
+E = TypeVar("E", bound=EpisodeRecord)
+Worst: TypeAlias = Collision | Violation
+
+
+class Filter(NamedTuple):
+    """A flag that keeps the failures with a value."""
+
+    what: str
+    keeps: Callable[[EpisodeRecord, Worst, str], bool]
+    choices: Sequence[str] | None = None
+
+
+def _severity(worst: Worst) -> Severity | None:
+    return worst.severity if isinstance(worst, Collision) else None
+
+
+def _plausibility(worst: Worst) -> PlausibilityClass | None:
+    return None if worst.behaviour is None else worst.behaviour.verdict
+
+
+def _broke(worst: Worst) -> Sequence[str]:
+    if isinstance(worst, Violation):
+        return worst.broke
+    return worst.judgement.broke
+
+
+FILTERS: Mapping[str, Filter] = {
+    "grade": Filter("of this grade", lambda _, worst, wanted: worst.graded == wanted, [*Grade]),
+    "plausibility": Filter(
+        "as plausible as this", lambda _, worst, wanted: _plausibility(worst) == wanted, [*PlausibilityClass]
+    ),
+    "severity": Filter("of this severity", lambda _, worst, wanted: _severity(worst) == wanted, [*Severity]),
+    "fault": Filter("caused by this party", lambda _, worst, wanted: worst.blamed == wanted, [*Fault]),
+    "driven_by": Filter("whose adversaries this drove", lambda each, _, wanted: each.driven_by == wanted, [*DrivenBy]),
+    "requirement": Filter(
+        "that violate this requirement, such as no_contact", lambda each, _, wanted: wanted in each.failed
+    ),
+    "broke": Filter(
+        "whose striker broke this rule, such as red_light", lambda _, worst, wanted: wanted in _broke(worst)
+    ),
+    "kind": Filter("of this kind, in the words of the list", lambda _, worst, wanted: worst.kind == wanted),
+}
+
+
+def _gravest(worst: Worst) -> tuple[bool, int, bool, bool]:
+    severity = _severity(worst)
+    rank = [*Severity].index(severity) if severity else -1
+    return not worst.plausible, -rank, not worst.preventable, worst.blamed is not Fault.EGO
+
+
+WEIGHT = "weight"
+SORTS: Mapping[str, Callable[[Worst], Any]] = {"severity": _gravest, "speed": lambda worst: -worst.ego_speed_mps}
+SORTED_BY = (
+    "found (the order of the search), weight (severity times plausibility, times the scene's density where a "
+    "distribution is declared), severity (plausible and worst first) or speed (the fastest ego first)"
+)
+
+
+def add_filter_flags(parser: Parser) -> None:
+    """Adds the flags of a list of failures."""
+    group = parser.group("choice of failures")
+    for name, filter_ in FILTERS.items():
+        choices = f": {', '.join(filter_.choices)}" if filter_.choices else ""
+        what = f"only those {filter_.what}{choices}"
+        flag = f"--{name.replace('_', '-')}"
+        group.add_argument(flag, choices=filter_.choices, metavar=name.upper(), help=what)
+    group.add_argument(
+        "--preventable", dest="grade", action="store_const", const=str(Grade.PREVENTABLE), help="--grade preventable"
+    )
+    group.add_argument("--distinct", action="store_true", help="only the first of each kind")
+    group.add_argument("--raw", action="store_true", help="also those that a validity rule refused")
+    orders = ["found", WEIGHT, *SORTS]
+    group.add_argument(
+        "--sort", choices=orders, metavar="ORDER", default="found", help=f"by {SORTED_BY} (default: found)"
+    )
+    add_limit(parser)
+
+
+def wanted(options: argparse.Namespace) -> dict[str, str | None]:
+    """Returns the value of each filter; None where it was not given."""
+    return {name: getattr(options, name) for name in FILTERS}
+
+
+def matching(options: argparse.Namespace, failures: Iterable[E]) -> Iterator[E]:
+    """Yields the failures that the filters keep."""
+    given = {FILTERS[name].keeps: value for name, value in wanted(options).items() if value is not None}
+    for failure in failures:
+        worst = failure.worst_violation
+        if worst is None or not (worst.valid or options.raw):
+            continue
+        if all(keeps(failure, worst, value) for keeps, value in given.items()):
+            yield failure
+
+
+def listed(options: argparse.Namespace, failures: Iterable[E], family: FamilyName | None = None) -> list[E]:
+    """Returns the failures to list, and notes on standard error if --limit leaves some out.
+
+    Args:
+      options: of the command line.
+      failures: all of them.
+      family: whose declared density weighs them; None: they come in the order of their weight where that is asked for.
+    """
+    if options.distinct:
+        failures = _first_of_each_kind(failures)
+    if options.sort == WEIGHT and family is not None:
+        density = density_of(family)
+        judged = ((-worst.weight(density(each.scene)), each) for each in failures if (worst := each.worst_violation))
+        failures = [each for _, each in sorted(judged, key=itemgetter(0))]
+    elif options.sort in SORTS:
+        order = SORTS[options.sort]
+        judged = ((order(worst), each) for each in failures if (worst := each.worst_violation))
+        failures = [each for _, each in sorted(judged, key=itemgetter(0))]
+    found = list(islice(failures, options.limit + 1))
+    if len(found) > options.limit:
+        notes.print(f"There are more: --limit is {options.limit}.")
+    return found[: options.limit]
+
+
+def _first_of_each_kind(failures: Iterable[E]) -> Iterator[E]:
+    kinds = DistinctFailures()
+    return (failure for failure in failures if sum(map(kinds.add, failure.valid_violations)))

@@ -13,8 +13,7 @@ with Client("http://127.0.0.1:8000") as client:
 """
 
 from risk_sac.client.client import Client
-from risk_sac.client.following import Event
-from risk_sac.client.transport import ClientError, Overdue, Refused, StreamLost, UnexpectedAnswer, Unreachable
+from risk_sac.client.transport import ClientError, Event, Overdue, Refused, StreamLost, UnexpectedAnswer, Unreachable
 from risk_sac.records import (
     Campaign,
     CampaignSummary,

@@ -9,8 +9,19 @@ from typing import Any, Literal, Self, TypeVar
 from urllib.parse import quote
 from uuid import uuid4
 
-from risk_sac.client.following import AWAY_S, Event, events, follow
-from risk_sac.client.transport import DEFAULT_URL, Transport, UnexpectedAnswer, api_key, checked_key, checked_url, read
+from risk_sac.client.transport import (
+    AWAY_S,
+    DEFAULT_URL,
+    Event,
+    Transport,
+    UnexpectedAnswer,
+    api_key,
+    checked_key,
+    checked_url,
+    events,
+    follow,
+    read,
+)
 from risk_sac.config import CampaignSpec, EgoConfig, Scenario
 from risk_sac.failures.studied import Aim, CampaignRegression
 from risk_sac.records import (
@@ -31,8 +42,8 @@ from risk_sac.records import (
     Results,
     Severity,
 )
-from risk_sac.records.boundary import BoundaryMap
-from risk_sac.records.scenario import ScenarioDetails, ScenarioList, ScenarioSummary
+from risk_sac.records.campaign import ScenarioDetails, ScenarioList, ScenarioSummary
+from risk_sac.records.rates import BoundaryMap
 from risk_sac.scenario.library import written
 
 TIMEOUT_S = 30.0  # longest silence within one answer

@@ -12,8 +12,7 @@ from urllib.parse import unquote, urlsplit
 
 from pydantic import AfterValidator, BeforeValidator, Field, StringConstraints, model_validator
 
-from risk_sac.config.base import Settings, is_none, shown
-from risk_sac.config.boundary import BoundaryConfig, ParameterName
+from risk_sac.config.base import Settings, Word, is_none, shown
 from risk_sac.config.ego import EgoConfig
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import IID_METHODS, MethodName, RunMethod, method_of
@@ -21,6 +20,31 @@ from risk_sac.config.odd import Odd
 from risk_sac.config.story import DeviationBounds
 from risk_sac.errors import ConfigError
 from risk_sac.host.machine import cores
+
+ParameterName = Annotated[str, StringConstraints(min_length=1, max_length=200)]
+
+
+class BoundaryConfig(Settings):
+    """Parameters over which the method `boundary` searches, and what failing means."""
+
+    over: Annotated[tuple[ParameterName, ...], Field(min_length=2, max_length=4)]
+    """Scene parameters with a range. The picture's axes are the first two."""
+    others: Literal["fixed", "drawn"] = "fixed"
+    """fixed: each other parameter has its median. drawn: it is drawn from its distribution, so the boundary is where
+    half of the scenes fail."""
+    at: Annotated[Mapping[ParameterName, float | Word], Field(max_length=100)] = {}
+    """Other parameter → number or word that it has in all scenes."""
+    requirement: Annotated[str, Field(max_length=40)] = ""
+    """The one whose violation is failing; by default a contact, or a violation of any requirement that counts."""
+
+    @model_validator(mode="after")
+    def _each_once(self) -> Self:
+        if len(set(self.over)) < len(self.over):
+            raise ConfigError("over", ", ".join(self.over), "each parameter once")
+        if twice := [name for name in self.over if name in self.at]:
+            raise ConfigError(f"at.{twice[0]}", "a parameter of `over`", "another one")
+        return self
+
 
 FamilyName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,59}$")]
 """A scenario that ships, or one that a library of scenarios keeps; its last digits are of its document and nets."""

@@ -24,7 +24,7 @@ from risk_sac.config.distribution import (
 )
 from risk_sac.config.odd import Odd
 from risk_sac.config.story import Story
-from risk_sac.config.story_places import Position
+from risk_sac.config.story_actions import Position
 from risk_sac.config.values import ARITHMETIC, Comparison, Expression
 from risk_sac.errors import ConfigError, did_you_mean
 

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from risk_sac.config import IID_METHODS, Budget, CampaignSpec, EgoConfig, RunSpec
 from risk_sac.config.base import field_errors, read_fields
-from risk_sac.config.equipment import ACTUATOR_PRESETS, SENSOR_PRESETS
+from risk_sac.config.ego import ACTUATOR_PRESETS, SENSOR_PRESETS
 from risk_sac.errors import ConfigError, did_you_mean
 
 T = TypeVar("T", RunSpec, CampaignSpec, EgoConfig)

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from risk_sac.config import EgoConfig
-from risk_sac.config.equipment import ActuatorConfig, BodyErrors, SensorErrors
+from risk_sac.config.ego import ActuatorConfig, BodyErrors, SensorErrors
 from risk_sac.egos.seam import Control, Perceived, Vehicle
 from risk_sac.world.types import SPEED, VX, VY, Floats, Kind, X, Y
 

@@ -8,6 +8,7 @@ of its code runs in the server.
 import ast
 import hashlib
 import os
+import re
 import tomllib
 from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
@@ -23,9 +24,45 @@ from risk_sac.config.ego import EgoName
 from risk_sac.egos.defects.catalogue import Planted, planted, version_of
 from risk_sac.egos.equipment import version_of_equipment
 from risk_sac.egos.guard import Guarded
-from risk_sac.egos.remote.addresses import addresses_of
 from risk_sac.egos.seam import Ego
 from risk_sac.errors import ConfigError, EgoFailed, did_you_mean
+
+MOST_SERVERS = 1024
+ADDRESSES = "host:port, host:first-last or unix:path, or several of them with commas between"
+EXAMPLE = "write for example 127.0.0.1:7000-7015"
+_PORTS = re.compile(r"(?P<host>[\w.-]+|\[[0-9A-Fa-f:.%\w]+\]):(?P<first>\d{1,5})(?:-(?P<last>\d{1,5}))?", re.ASCII)
+_UNIX = re.compile(r"unix:[^,\s]+")
+
+
+def addresses_of(text: str) -> tuple[str, ...]:
+    """Returns the addresses that a text names, one per server.
+
+    `host:first-last` names consecutive ports. An address that is named twice is of a server that plays two episodes at
+    a time.
+
+    Raises:
+      ConfigError: the text names no address, or more than `MOST_SERVERS`; its field is empty.
+    """
+    addresses = []
+    for part in text.split(","):
+        addresses += _addresses(part.strip(), text)
+    if len(addresses) > MOST_SERVERS:
+        raise ConfigError("", f"{len(addresses)} addresses", f"at most {MOST_SERVERS}", "name fewer ports")
+    return tuple(addresses)
+
+
+def _addresses(part: str, text: str) -> list[str]:
+    if _UNIX.fullmatch(part):
+        return [part]
+    named = _PORTS.fullmatch(part)
+    if named is None:
+        inside = "" if part == text else f" in {text!r}"
+        raise ConfigError("", f"{part!r}{inside}", ADDRESSES, EXAMPLE)
+    first, last = int(named["first"]), int(named["last"] or named["first"])
+    if not 1 <= first <= last <= 65535:
+        raise ConfigError("", f"{part!r}", "ports from 1 to 65535, the first not beyond the last", EXAMPLE)
+    return [f"{named['host']}:{port}" for port in range(first, last + 1)]
+
 
 GROUP, FILE = "risk_sac.egos", "RISK_SAC_EGOS"
 SHIPPED = {

@@ -20,13 +20,13 @@ import numpy as np
 from risk_sac.egos.guard import MALFORMED, Guarded
 from risk_sac.egos.registry import EgoCard, make
 from risk_sac.egos.remote import ego_pb2
-from risk_sac.egos.remote.local_steps import listen
 from risk_sac.egos.remote.messages import (
     METHODS,
     PROTOCOL,
     SERVICE,
     command_message,
     episode_of,
+    listen,
     path_of,
     perceived_of,
 )

@@ -7,8 +7,7 @@ from typing import Any
 
 from risk_sac.config import CampaignSpec, EgoConfig, Interval, JudgeConfig, Odd, Requirement, RunSpec
 from risk_sac.config.campaign import check_demand
-from risk_sac.config.methods import SAMPLER, MethodName, method_of
-from risk_sac.config.samplers import sampler_of
+from risk_sac.config.methods import SAMPLER, MethodName, method_of, sampler_of
 from risk_sac.egos.registry import pinned
 from risk_sac.env.observation_layout import observation_size
 from risk_sac.errors import ConfigError, OddError, did_you_mean

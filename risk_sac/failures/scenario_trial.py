@@ -20,7 +20,7 @@ from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError, EgoFailed, InfeasibleScene, SimulationError
 from risk_sac.failures.from_above import EGO_COLOUR, HALO, canvas, picture
 from risk_sac.failures.net import surfaces
-from risk_sac.records.scenario import ScenarioCheck
+from risk_sac.records.campaign import ScenarioCheck
 from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.check import bodies_of, check_document, scenes, without_effect
 from risk_sac.scenario.families import family_of

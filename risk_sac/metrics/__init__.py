@@ -5,7 +5,6 @@ A figure is a row of `rows`: its names, its formula, and how runs are pooled. `t
 Source: RISK-SAC, Sec. IV (evaluation metrics); what the paper leaves open is marked as a choice.
 """
 
-from risk_sac.metrics.accumulator import MetricsAccumulator, ResultsDigest, results_digest
 from risk_sac.metrics.metric import (
     FEATURES,
     RESAMPLING_SEED,
@@ -26,7 +25,7 @@ from risk_sac.metrics.metric import (
     pooled_published,
     wilson_interval,
 )
-from risk_sac.metrics.rows import METRICS, RATIOS, MetricName
+from risk_sac.metrics.rows import METRICS, RATIOS, MetricName, MetricsAccumulator, ResultsDigest, results_digest
 from risk_sac.metrics.tally import (
     COLUMNS,
     WINDOW,

@@ -5,7 +5,7 @@ from typing import Any
 
 from risk_sac.config import story_actions as act
 from risk_sac.config.scenario import EGO
-from risk_sac.config.story_conditions import VariableCondition
+from risk_sac.config.story import VariableCondition
 from risk_sac.config.values import Expression
 from risk_sac.errors import ConfigError
 from risk_sac.openscenario.entities import Entities

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from risk_sac.config import story_conditions as when
-from risk_sac.config.story_places import Position
+from risk_sac.config import story as when
+from risk_sac.config.story_actions import Position
 from risk_sac.config.values import MOST_MAGNITUDE
 from risk_sac.openscenario.actions import COORDINATES, RULES, Variables
 from risk_sac.openscenario.entities import Entities

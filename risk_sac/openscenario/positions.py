@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from itertools import pairwise
 from typing import Any
 
-from risk_sac.config import story_places as places
+from risk_sac.config import story_actions as places
 from risk_sac.config.base import Chosen
 from risk_sac.openscenario.entities import Alternatives, Catalogs, Entities, parametrised
 from risk_sac.openscenario.scope import At, Text

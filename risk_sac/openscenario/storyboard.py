@@ -4,20 +4,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from risk_sac.config.scenario import EGO, LONGEST_HORIZON_S
-from risk_sac.config.story import InitAction, Maneuver, ManeuverGroup, NamedAction, StoryAct, StoryEvent
+from risk_sac.config.story import (
+    InitAction,
+    Maneuver,
+    ManeuverGroup,
+    NamedAction,
+    StoryAct,
+    StoryEvent,
+    TimeCondition,
+    Trigger,
+)
 from risk_sac.config.story_actions import (
     AcquirePositionAction,
     AssignRouteAction,
     DeleteAction,
     FollowTrajectoryAction,
     NoAction,
+    Position,
     RelativeTarget,
     SpeedAction,
     TeleportAction,
+    TrajectoryPosition,
     VariableAction,
 )
-from risk_sac.config.story_conditions import TimeCondition, Trigger
-from risk_sac.config.story_places import Position, TrajectoryPosition
 from risk_sac.config.values import Expression
 from risk_sac.openscenario.actions import EGO_EFFECT, ActionReader
 from risk_sac.openscenario.conditions import ConditionReader

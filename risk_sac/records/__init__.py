@@ -39,15 +39,17 @@ from risk_sac.records.episode import (
 )
 from risk_sac.records.judgement import (
     GAINS_MPS,
+    BehaviourFact,
     ConflictType,
     EgoPart,
     Fault,
     Grade,
     Judgement,
+    Plausibility,
+    PlausibilityClass,
     ReferenceOutcome,
     Severity,
 )
-from risk_sac.records.plausibility import BehaviourFact, Plausibility, PlausibilityClass
 from risk_sac.records.run import (
     FINAL,
     Counts,

@@ -4,8 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
 from risk_sac.records.base import Least, Real, Record
-from risk_sac.records.judgement import Fault, Grade, Judgement, Severity
-from risk_sac.records.plausibility import Plausibility
+from risk_sac.records.judgement import Fault, Grade, Judgement, Plausibility, Severity
 
 REPEATS = "repeats"  # rule that a violation fails if its replay goes another way; asked of nothing else
 # Rules among a collision's verdicts that are about the simulator or the control, not about fault.
@@ -83,8 +82,13 @@ class Violated(Record, ABC):
 
     @property
     @abstractmethod
+    def judged(self) -> "Violation | Judgement":
+        """What has the grade, the fault, the plausibility and the drivers."""
+
+    @property
     def graded(self) -> Grade | None:
         """Its grade; None where it is not valid."""
+        return self.judged.grade
 
     @property
     def prevention_in_words(self) -> str | None:
@@ -102,19 +106,20 @@ class Violated(Record, ABC):
         return f"{told_of} would have prevented it{by_rule}"
 
     @property
-    @abstractmethod
     def blamed(self) -> Fault | None:
         """Party that caused it; None where it is not valid."""
+        return self.judged.fault
 
     @property
-    @abstractmethod
     def behaviour(self) -> Plausibility | None:
         """How plausible its adversaries' behaviour is; None where it is not valid."""
+        return self.judged.plausibility
 
     @property
-    @abstractmethod
     def prevention(self) -> Mapping[str, bool]:
         """Reference driver → whether it would have prevented it; empty where none was asked."""
+        drivers = self.judged.drivers
+        return {name: each if isinstance(each, bool) else each.avoids for name, each in drivers.items()}
 
     @property
     def preventable(self) -> bool:
@@ -206,24 +211,9 @@ class Violation(Violated):
     """Version of the definitions it was judged by."""
 
     @property
-    def graded(self) -> Grade | None:
-        """See `Violated.graded`."""
-        return self.grade
-
-    @property
-    def blamed(self) -> Fault | None:
-        """See `Violated.blamed`."""
-        return self.fault
-
-    @property
-    def behaviour(self) -> Plausibility | None:
-        """See `Violated.behaviour`."""
-        return self.plausibility
-
-    @property
-    def prevention(self) -> Mapping[str, bool]:
-        """See `Violated.prevention`."""
-        return self.drivers
+    def judged(self) -> "Violation":
+        """See `Violated.judged`."""
+        return self
 
     @property
     def severity(self) -> Severity | None:
@@ -293,24 +283,9 @@ class Collision(Violated):
         return NO_CONTACT
 
     @property
-    def graded(self) -> Grade | None:
-        """See `Violated.graded`."""
-        return self.judgement.grade
-
-    @property
-    def blamed(self) -> Fault | None:
-        """See `Violated.blamed`."""
-        return self.judgement.fault
-
-    @property
-    def behaviour(self) -> Plausibility | None:
-        """See `Violated.behaviour`."""
-        return self.judgement.plausibility
-
-    @property
-    def prevention(self) -> Mapping[str, bool]:
-        """See `Violated.prevention`."""
-        return {name: driver.avoids for name, driver in self.judgement.drivers.items()}
+    def judged(self) -> Judgement:
+        """See `Violated.judged`."""
+        return self.judgement
 
     @property
     def severity(self) -> Severity:

@@ -16,8 +16,7 @@ from risk_sac.failures.recording import Recording
 from risk_sac.failures.studied import Regression
 from risk_sac.metrics import clopper_pearson, pooled_requirements, preventable, published
 from risk_sac.records import Collision, EpisodeRecord, Outcome, Power, Record, TriageState, Violation
-from risk_sac.records.assessment import CaseEstimate, ClauseRow, FigureNote, ReportedCase, SignedInputs
-from risk_sac.records.coverage import CoverageMatrix
+from risk_sac.records.assessment import CaseEstimate, ClauseRow, CoverageMatrix, FigureNote, ReportedCase, SignedInputs
 from risk_sac.report.comparison import Cell, Comparison
 from risk_sac.report.coverage import NOT_PLAYED, Coverage, coverage
 from risk_sac.report.files import input_digests, manifest, signed

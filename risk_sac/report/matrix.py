@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from risk_sac.config import CampaignSpec, FamilyName
 from risk_sac.records import EpisodeRecord, Outcome
-from risk_sac.records.coverage import (
+from risk_sac.records.assessment import (
     CellPower,
     CellState,
     CoverageCell,

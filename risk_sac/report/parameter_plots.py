@@ -15,7 +15,7 @@ from matplotlib.tri import Triangulation
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.failures.from_above import canvas, picture
 from risk_sac.records import stored
-from risk_sac.records.boundary import BoundaryAxis, BoundaryMap, BoxShare, DriverMap
+from risk_sac.records.rates import BoundaryAxis, BoundaryMap, BoxShare, DriverMap
 from risk_sac.report.drawing import STYLE
 from risk_sac.report.grid import PlayedGrid, PlayedPoint, StandardVerdict
 from risk_sac.run_folder.durable import replace_file

@@ -15,8 +15,7 @@ from risk_sac.config import Budget, CampaignSpec, EgoConfig, Iid
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import pooled_headline, pooled_published, pooled_requirements, wilson_interval
 from risk_sac.records import Real, Record, RequirementCounts, RunMetrics
-from risk_sac.records.boundary import BoundaryMap
-from risk_sac.records.rates import ANY, Rates
+from risk_sac.records.rates import ANY, BoundaryMap, Rates
 
 SOFTWARE = ("definitions", "risk-sac", "libsumo")
 """What results rest on beside the terms; a change of one of these ends a line."""

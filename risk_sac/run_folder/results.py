@@ -20,8 +20,7 @@ from pydantic import ValidationError
 from risk_sac.config import RunSpec
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.records import REPEATS, Adjustment, DrivenBy, EpisodeId, EpisodeRecord, Repetition, RunMetrics
-from risk_sac.records.boundary import BoundaryMap
-from risk_sac.records.rates import Rates
+from risk_sac.records.rates import BoundaryMap, Rates
 from risk_sac.run_folder.durable import read_sealed, replace_file, sealed_pieces, write_sealed
 from risk_sac.verdicts.distinct import variant_name
 

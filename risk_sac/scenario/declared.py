@@ -12,7 +12,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.campaign import BoundaryConfig
 from risk_sac.config.distribution import LEAST_MASS, NumberLaw, PoissonLaw, RankCorrelation
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.errors import ConfigError, did_you_mean

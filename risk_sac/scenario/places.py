@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_sac.config.story import Story
-from risk_sac.config.story_places import LanePosition, Position, RelativeLanePosition, RoutePosition, WorldPosition
+from risk_sac.config.story_actions import LanePosition, Position, RelativeLanePosition, RoutePosition, WorldPosition
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.scenario import lane_places
 from risk_sac.scenario.space import Value

@@ -8,9 +8,8 @@ from typing import Any
 
 from risk_sac.config.base import Settings
 from risk_sac.config.scenario import EGO, Moving, Scenario
-from risk_sac.config.story import Story
+from risk_sac.config.story import Story, VariableCondition
 from risk_sac.config.story_actions import AcquirePositionAction, Action, AssignRouteAction, FollowTrajectoryAction
-from risk_sac.config.story_conditions import VariableCondition
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.bodies import BODIES, BodyName
 from risk_sac.scenario.lane_places import LanePlace, extended, joined, nearest_lane

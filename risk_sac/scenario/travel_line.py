@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from risk_sac.config.story_places import ClothoidSpline, Polyline, Position, Trajectory, WorldPosition
+from risk_sac.config.story_actions import ClothoidSpline, Polyline, Position, Trajectory, WorldPosition
 from risk_sac.errors import ConfigError
 from risk_sac.world.plane_curves import Begin, Clothoid
 from risk_sac.world.types import Floats

@@ -11,7 +11,7 @@ from risk_sac.config import RunSpec
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.records import EpisodeRecord, Outcome
-from risk_sac.records.boundary import BoundaryAxis, BoundaryMap, BoundaryPoint, BoxShare, DriverMap
+from risk_sac.records.rates import BoundaryAxis, BoundaryMap, BoundaryPoint, BoxShare, DriverMap
 from risk_sac.run_folder.results import EPISODES, read_results, records_from_lines
 from risk_sac.scenario.declared import Slice
 from risk_sac.search.level_set import FailureClassifier

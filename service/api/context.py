@@ -21,8 +21,7 @@ from service.store.reading import Store
 from service.store.stored import StoredCampaign
 from service.views.on_demand import OnDemandCache
 from service.views.reports import Reports
-from service.views.series import Picture
-from service.views.studies import EpisodeTables, Studies
+from service.views.series import EpisodeTables, Picture, Studies
 from service.views.whole import Priors, Views
 
 

@@ -22,7 +22,7 @@ from pydantic import TypeAdapter, ValidationError
 from risk_sac.errors import DamagedError
 from risk_sac.execution.helper import ANSWER, run_helper
 from risk_sac.run_folder.durable import read_sealed, seal, sync_folder
-from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError, UploadError
+from service.errors import BusyError, ConflictError, NotFoundError, QuotaError, StorageError, UploadError, disk_refusals
 from service.networks.schemas import LOG_BYTES, WALL_S, BoundingBox, CheckReport, Network, StoredNetwork
 from service.store.stored import StoredPage
 
@@ -48,10 +48,8 @@ class Incoming:
         """Writes one more piece of the upload."""
         self.bytes += len(chunk)
         self._hash.update(chunk)
-        try:
+        with disk_refusals("an upload cannot be received"):
             self._file.write(chunk)
-        except OSError as error:
-            raise StorageError(f"an upload cannot be received ({error.strerror})") from error
 
     def complete(self) -> str:
         """Returns the SHA-256 of the upload, now that it is there."""
@@ -71,7 +69,7 @@ class Incoming:
 
 def inspect(folder: Path, checker: str = CHECKER, wall_s: float = WALL_S) -> CheckReport:
     """Checks the file `upload` of a folder in a separate process and returns its report."""
-    try:
+    with disk_refusals("the upload cannot be checked"):
         result = run_helper(
             checker,
             [ANSWER],
@@ -81,8 +79,6 @@ def inspect(folder: Path, checker: str = CHECKER, wall_s: float = WALL_S) -> Che
             environment={"PATH": os.environ.get("PATH", os.defpath)},
             log=folder / LOG,
         )
-    except OSError as error:
-        raise StorageError(f"the upload cannot be checked ({error.strerror})") from error
     status = result.status
     if status < 0:
         raise UploadError(_ended_by(-status, wall_s))
@@ -139,7 +135,7 @@ class NetworkStore:
             self._check_share(key_id)
             self._at_work[key_id] += 1
         try:
-            with _refusals("an upload cannot be received"):
+            with disk_refusals("an upload cannot be received"):
                 (self._folder / INCOMING).mkdir(parents=True, exist_ok=True)
                 incoming = Incoming(Path(tempfile.mkdtemp(dir=self._folder / INCOMING)))
             try:
@@ -160,7 +156,7 @@ class NetworkStore:
     def add(self, incoming: Incoming, project: str, label: str) -> Network:
         """Checks an upload that has arrived, and keeps it."""
         self._check_room(project)
-        with _refusals("a network cannot be stored"):
+        with disk_refusals("a network cannot be stored"):
             sha256 = incoming.complete()
             report = inspect(incoming.folder)
             network = _network(report, label, sha256, incoming.bytes)
@@ -180,13 +176,13 @@ class NetworkStore:
     def uploaded_before(self, incoming: Incoming, project: str) -> Network | None:
         """Finds the project's network with the same bytes as a received upload."""
         sha256 = incoming.complete()
-        with _refusals("the networks cannot be read"):
+        with disk_refusals("the networks cannot be read"):
             every = (network for path in self._paths(project) if (network := _readable(path)) is not None)
             return next((network for network in every if network.sha256 == sha256), None)
 
     def list(self, limit: int, before: int | None, project: str | None) -> StoredPage[Network]:
         """Lists networks, newest first, before the `last` of an earlier page; skips damaged ones."""
-        with _refusals("the networks cannot be read"):
+        with disk_refusals("the networks cannot be read"):
             found = sorted((_number(path), path) for path in self._paths(project))
             older = [(number, path) for number, path in reversed(found) if before is None or number < before]
             page = older[:limit]
@@ -196,7 +192,7 @@ class NetworkStore:
     def get(self, network_id: str, project: str | None) -> Network:
         """Returns one network; raises NotFoundError if it is missing or another project's."""
         path = self._path(network_id, project)
-        with _refusals("a network cannot be read"):
+        with disk_refusals("a network cannot be read"):
             return _read(path)
 
     def folder(self, network_id: str, project: str | None) -> Path:
@@ -206,7 +202,7 @@ class NetworkStore:
 
     def check_files(self, folder: Path) -> None:
         """Raises `StorageError` if a file of a network differs from what the checker wrote."""
-        with _refusals("a network cannot be read"):
+        with disk_refusals("a network cannot be read"):
             for file in _read(folder).files:
                 if hashlib.sha256((folder / file.name).read_bytes()).hexdigest() != file.sha256:
                     raise StorageError(
@@ -217,7 +213,7 @@ class NetworkStore:
         """Removes a network, first from the listing and then from the disk."""
         path = self._path(network_id, project)
         grave = self._folder / INCOMING / f"deleted-{network_id}-{secrets.token_hex(4)}"
-        with _refusals("a network cannot be deleted"):
+        with disk_refusals("a network cannot be deleted"):
             grave.parent.mkdir(exist_ok=True)
             path.rename(grave)
             sync_folder(path.parent)
@@ -228,7 +224,7 @@ class NetworkStore:
         return (path for home in homes if home.is_dir() for path in home.iterdir() if _ID.fullmatch(path.name))
 
     def _path(self, network_id: str, project: str | None) -> Path:
-        with _refusals("the networks cannot be read"):
+        with disk_refusals("the networks cannot be read"):
             for path in self._paths(project):
                 if path.name == network_id:
                     return path
@@ -276,11 +272,3 @@ def _sync(folder: Path) -> None:
     for path in folder.iterdir():
         sync_folder(path)  # a file's descriptor, too, writes down the file
     sync_folder(folder)
-
-
-@contextmanager
-def _refusals(what: str) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise StorageError(f"{what} ({error.strerror})") from error

@@ -10,8 +10,7 @@ import os
 import secrets
 import shutil
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -19,21 +18,22 @@ from typing import Any
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.execution.helper import ANSWER, QUESTION, run_helper
-from risk_sac.records.scenario import ScenarioCheck, ScenarioDetails, ScenarioSummary, summary_of
+from risk_sac.records.campaign import ScenarioCheck, ScenarioDetails, ScenarioSummary, summary_of
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.scenario import library
 from risk_sac.scenario.reading import scenario_file, shipped_document, shipped_names
-from service.errors import BusyError, ConflictError, NotFoundError, StorageError
-from service.networks.schemas import SCENARIO_MEMORY_BYTES, SCENARIO_S
+from service.errors import BusyError, ConflictError, NotFoundError, StorageError, disk_refusals
+from service.networks.schemas import MEMORY_BYTES, SCENARIO_S
 
 logger = logging.getLogger(__name__)
 
-HELPER = "service.networks.scenario_helper"
+HELPER = "service.networks.helper"
 NICENESS = 5
 AT_ONCE = 2
 MOST_WAITING = 8
 MOST = 200  # scenarios of one project
 RETRY_AFTER_S = 5
+PNG = b"\x89PNG"
 
 
 class Scenarios:
@@ -89,23 +89,22 @@ class Scenarios:
         if sum(1 for _ in self._records(project)) >= MOST:
             said = f"project {project!r} has {MOST} scenarios; wanted fewer: delete one first"
             raise ConflictError(said, reason="too_many_scenarios")
-        name = str(self._helped("add", upload, ego_entity)["name"])
+        name = str(json.loads(self._run("add", upload, ego_entity))["name"])
         record = self._folder / project / name
         new = not record.exists()
         if new:
-            with _refusals("a scenario cannot be stored"):
+            with disk_refusals("a scenario cannot be stored"):
                 record.parent.mkdir(parents=True, exist_ok=True)
                 replace_file(record, datetime.now(UTC).isoformat().encode())
         return self.get(name, project), new
 
     def check(self, upload: bytes, ego_entity: str = "") -> ScenarioCheck:
         """Checks a document and plays 20 scenes of it; raises `ConfigError` as `add` does, and stores nothing."""
-        return ScenarioCheck.model_validate(self._helped("check", upload, ego_entity))
+        return ScenarioCheck.model_validate_json(self._run("check", upload, ego_entity))
 
     def picture(self, name: str) -> bytes:
         """Draws a scenario that `get` has returned."""
-        content = self._run("picture", b"", name)
-        return content if content.startswith(b"\x89PNG") else _refused(content)
+        return self._run("picture", b"", name)
 
     def delete(self, name: str, project: str | None, in_use: Callable[[], set[str]]) -> None:
         """Removes a project's scenario.
@@ -126,7 +125,7 @@ class Scenarios:
             raise ConflictError(
                 f"a campaign names {name}; wanted none: delete its campaigns first", reason="scenario_in_use"
             )
-        with _refusals("a scenario cannot be deleted"):
+        with disk_refusals("a scenario cannot be deleted"):
             for record in list(self._records(project)):
                 if record.name == name:
                     record.unlink(missing_ok=True)
@@ -140,7 +139,7 @@ class Scenarios:
         return {record.name for record in self._records(None)}
 
     def _document(self, name: str) -> Scenario:
-        with _refusals("a scenario cannot be read"):
+        with disk_refusals("a scenario cannot be read"):
             return library.kept(name)[0]
 
     def _records(self, project: str | None) -> Iterator[Path]:
@@ -153,11 +152,6 @@ class Scenarios:
                 return record
         raise NotFoundError(f"there is no scenario {name!r}", field="scenario", got=name)
 
-    def _helped(self, action: str, upload: bytes, ego_entity: str) -> dict[str, Any]:
-        content = self._run(action, upload, ego_entity)
-        report: dict[str, Any] = json.loads(content)
-        return _refused(content) if report.keys() & {"faults", "damaged"} else report
-
     def _run(self, action: str, upload: bytes, *arguments: str) -> bytes:
         """Runs the helper in turn; returns its answer."""
         with self._lock:
@@ -165,35 +159,71 @@ class Scenarios:
                 said = f"{MOST_WAITING} scenarios are checked or drawn; wanted fewer: try again in {RETRY_AFTER_S} s"
                 raise BusyError(said, RETRY_AFTER_S)
             self._waiting += 1
-        environment = {**os.environ, library.VARIABLE: str(self._places.absolute())}
-        environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        too_slow = ("", f"one whose check takes more than {SCENARIO_S} s", "a shorter horizon or a smaller network")
         try:
-            with self._turn, _refusals("a scenario cannot be checked"):
-                result = run_helper(
-                    HELPER,
-                    [QUESTION, ANSWER, action, *arguments],
-                    question=upload,
+            with self._turn:
+                return ask_helper(
+                    (action, *arguments),
+                    self._places,
+                    "the scenario cannot be checked",
+                    too_slow,
                     wall_s=SCENARIO_S,
-                    memory_bytes=SCENARIO_MEMORY_BYTES,
-                    niceness=NICENESS,
-                    environment=environment,
+                    question=upload,
+                    environment=os.environ,
                     stopping=self._stopping,
                 )
         finally:
             with self._lock:
                 self._waiting -= 1
-        if result.timed_out:
-            got = f"one whose check takes more than {SCENARIO_S} s"
-            raise ConfigError("", got, "a shorter horizon or a smaller network")
-        if not result.answer:
-            logger.error("the helper ended with status %d: %s", result.status, result.log)
-            raise StorageError(f"the scenario cannot be checked ({result.reason})")
-        return result.answer
 
 
-def _refused(content: bytes) -> Any:
-    """Raises the error that a helper has answered with."""
+def ask_helper(
+    arguments: Sequence[str],
+    places: Path,
+    failing: str,
+    too_slow: tuple[str, str, str],
+    *,
+    environment: Mapping[str, str],
+    **how: Any,
+) -> bytes:
+    """Returns what `service.networks.helper` answers.
+
+    Args:
+      arguments: its action, and what that takes.
+      places: the library.
+      failing: begins the message of a StorageError.
+      too_slow: field, got and expected of the ConfigError where it takes too long.
+      environment: of the process, beside what it needs itself.
+      how: as `run_helper` takes it.
+
+    Raises:
+      ConfigError: it refuses the question, or takes too long.
+      StorageError: it cannot be started, has met damage, or ended without an answer.
+    """
+    own = {library.VARIABLE: str(places.absolute()), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    with disk_refusals(failing):
+        places.mkdir(parents=True, exist_ok=True)
+        result = run_helper(
+            HELPER,
+            [QUESTION, ANSWER, *arguments],
+            memory_bytes=MEMORY_BYTES,
+            niceness=NICENESS,
+            environment={**environment, **own},
+            **how,
+        )
+    if result.timed_out:
+        raise ConfigError(*too_slow)
+    if not result.answer:
+        logger.error("the helper ended with status %d: %s", result.status, result.log)
+        raise StorageError(f"{failing} ({result.reason})")
+    return result.answer if result.answer.startswith(PNG) else _accepted(result.answer)
+
+
+def _accepted(content: bytes) -> bytes:
+    """Returns a report, or raises the error that it tells."""
     report = json.loads(content)
+    if not report.keys() & {"faults", "damaged"}:
+        return content
     if "damaged" in report:
         raise StorageError(str(report["damaged"]))
     first, *others = (ConfigError(*fault) for fault in report["faults"])
@@ -203,11 +233,3 @@ def _refused(content: bytes) -> Any:
 
 def _time(record: Path) -> datetime:
     return datetime.fromisoformat(record.read_text())
-
-
-@contextmanager
-def _refusals(what: str) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise StorageError(f"{what} ({error.strerror})") from error

@@ -8,16 +8,13 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from risk_sac.errors import ConfigError, DamagedError
-from risk_sac.execution.helper import ANSWER, run_helper
+from risk_sac.errors import DamagedError
 from risk_sac.run_folder.durable import read_sealed
-from risk_sac.scenario.library import VARIABLE
-from service.errors import BusyError, StorageError
+from service.errors import BusyError, disk_refusals
 from service.networks.network_store import NetworkStore
-from service.networks.schemas import PICTURE, PLACES, PROGRESS, SURVEY_MEMORY_BYTES, SURVEY_S, Places
+from service.networks.scenarios import ask_helper
+from service.networks.schemas import PICTURE, PLACES, PROGRESS, SURVEY_S, Places
 
-SURVEYOR = "service.networks.surveyor"
-NICENESS = 5
 AT_ONCE = 2
 MOST_WAITING = 16
 RETRY_AFTER_S = 5
@@ -83,14 +80,13 @@ class Surveys:
 
     def _still_there(self, families: Sequence[str]) -> bool:
         """Returns whether the library has them, and marks them as used."""
-        try:
-            for name in families:
-                os.utime(self._library / name)
-        except FileNotFoundError:
-            return False
-        except OSError as error:
-            raise StorageError(f"the library of places cannot be written ({error.strerror})") from error
-        return True
+        with disk_refusals("the library of places cannot be written"):
+            try:
+                for name in families:
+                    os.utime(self._library / name)
+            except FileNotFoundError:
+                return False
+            return True
 
     def _job(self, asked: Asked, folder: Path, arguments: Sequence[str]) -> Future[dict[str, Any]]:
         """Returns the job for a question: a running or finished one, or else a new one."""
@@ -108,35 +104,23 @@ class Surveys:
 
     def _run(self, folder: Path, arguments: Sequence[str]) -> dict[str, Any]:
         self._networks.check_files(folder)
-        environment = {"PATH": os.environ.get("PATH", os.defpath), VARIABLE: str(self._library.absolute())}
-        environment |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MPLCONFIGDIR": str(self._library)}
+        too_slow = "network", f"one on which looking for places takes more than {SURVEY_S} s", "a smaller network"
         try:
-            self._library.mkdir(parents=True, exist_ok=True)
-            result = run_helper(
-                SURVEYOR,
-                [ANSWER, *arguments],
-                wall_s=SURVEY_S,
-                memory_bytes=SURVEY_MEMORY_BYTES,
-                niceness=NICENESS,
-                isolated=True,
-                cwd=folder,
-                environment=environment,
-                stopping=lambda: self._stopped.is_set() or self._stopping(),
+            report: dict[str, Any] = json.loads(
+                ask_helper(
+                    arguments,
+                    self._library,
+                    "places cannot be looked for",
+                    too_slow,
+                    wall_s=SURVEY_S,
+                    isolated=True,
+                    cwd=folder,
+                    environment={"PATH": os.environ.get("PATH", os.defpath), "MPLCONFIGDIR": str(self._library)},
+                    stopping=lambda: self._stopped.is_set() or self._stopping(),
+                )
             )
-        except OSError as error:
-            raise StorageError(f"places cannot be looked for ({error.strerror})") from error
         finally:
             (folder / PROGRESS).unlink(missing_ok=True)
-        if result.timed_out:
-            got = f"one on which looking for places takes more than {SURVEY_S} s"
-            raise ConfigError("network", got, "a smaller network")
-        try:
-            report: dict[str, Any] = json.loads(result.answer)
-        except ValueError as error:
-            said = result.log.splitlines()[-1:]
-            raise StorageError(f"places cannot be looked for (status {result.status}: {said})") from error
-        if "refused" in report:
-            raise ConfigError(*report["refused"])
         return report
 
 

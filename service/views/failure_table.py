@@ -219,9 +219,8 @@ def failure_table(
 
 def _row(run: StoredRun, record: EpisodeRecord, worst: Collision | Violation) -> dict[str, Any]:
     """A failure's entries of most columns, by the violation that names it."""
-    judged = worst.judgement if isinstance(worst, Collision) else worst
     repetition = run.repetitions.get(record.index)
-    row = {name: getattr(judged, name, None) for name in OF_JUDGEMENT}
+    row = {name: getattr(worst.judged, name, None) for name in OF_JUDGEMENT}
     if isinstance(worst, Violation):  # whose offences are the ego's own
         row |= {"broke": [], "ego_broke": worst.broke, "min_ttc_s": None, "min_robustness": worst.robustness}
     else:

@@ -22,7 +22,7 @@ from risk_sac.failures.bundle import code_digest
 from risk_sac.failures.studied import Regression
 from risk_sac.rates.record import METHOD, rates_of
 from risk_sac.records import Record, State, TriageState, wire
-from risk_sac.records.coverage import CoverageMatrix
+from risk_sac.records.assessment import CoverageMatrix
 from risk_sac.records.rates import Rates
 from risk_sac.report import (
     Comparison,

@@ -31,11 +31,10 @@ from service.settings import ServiceSettings
 from service.store.reading import Store
 from service.store.stored import StoredCampaign, StoredRecord, StoredRun
 from service.views import reports
-from service.views.curves import curves
+from service.views.curves import curves, scene_effects
 from service.views.failure_table import failure_table
 from service.views.on_demand import Helper, OnDemandCache
 from service.views.reports import CampaignReport, Reports, unknown_figure
-from service.views.scenes import scene_effects
 
 GridFormat = Literal["json", "csv", "xml", "png"]
 

@@ -9,7 +9,7 @@ from typing import get_args
 import pytest
 
 from risk_sac import __version__
-from risk_sac.cli.campaigns.output import COUNTS, RATES
+from risk_sac.cli.campaigns.watch import COUNTS, RATES
 from risk_sac.config import Requirement, RunSpec
 from risk_sac.env.problem import Problem
 from risk_sac.failures.from_above import MARKS

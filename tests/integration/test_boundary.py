@@ -6,11 +6,11 @@ import pytest
 from pydantic import ValidationError
 
 from risk_sac.config import Budget, CampaignSpec, EgoConfig, RunSpec
-from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.campaign import BoundaryConfig
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.execution.evaluate import run
-from risk_sac.records.boundary import BoundaryMap
+from risk_sac.records.rates import BoundaryMap
 from risk_sac.run_folder.results import BOUNDARY, BOUNDARY_PICTURE
 from risk_sac.scenario.library import VARIABLE, keep
 from risk_sac.scenario.reading import document_from

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from risk_sac import cli
-from risk_sac.records.boundary import BoundaryMap
+from risk_sac.records.rates import BoundaryMap
 
 OVER = ("ego_speed_mps", "cutter_ahead_m")
 

@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from risk_sac import cli
-from risk_sac.records.coverage import CellState, CoverageMatrix
+from risk_sac.records.assessment import CellState, CoverageMatrix
 from risk_sac.report.document import CampaignEvidence
 from risk_sac.run_folder.results import read_results
 

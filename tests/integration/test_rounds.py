@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from risk_sac import cli
 from risk_sac.config import METHODS, Budget, CampaignSpec, EgoConfig, LearnerConfig, RunMethod, RunSpec, method_of
-from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.campaign import BoundaryConfig
 from risk_sac.config.learner import AgentConfig, WarmStartConfig
 from risk_sac.config.methods import IID_METHODS
 from risk_sac.env.problem import checked_campaign

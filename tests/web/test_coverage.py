@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from risk_sac.records import wire
-from risk_sac.records.coverage import CellPower, CellState, CoverageMatrix, CoveredCampaign, CoveredPair
+from risk_sac.records.assessment import CellPower, CellState, CoverageMatrix, CoveredCampaign, CoveredPair
 from risk_sac.report.matrix import merged
 from tests.server import Service
 from tests.web.conftest import PHONE

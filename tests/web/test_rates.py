@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, Route, expect
 
-from risk_sac.rates.estimate import with_exposure
+from risk_sac.rates.record import with_exposure
 from risk_sac.records import wire
 from risk_sac.records.rates import DeclaredParameter, RateEstimate, Rates
 from service.views.reports import CampaignRates

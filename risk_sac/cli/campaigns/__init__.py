@@ -3,20 +3,40 @@
 import argparse
 import itertools
 import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any, get_args
 
-from risk_sac.cli.campaigns import failures, watch
-from risk_sac.cli.campaigns.output import add_campaign_command, add_newest_command, campaigns_table, chosen_id, line
-from risk_sac.cli.campaigns.watch import shown
-from risk_sac.cli.console import ABOVE, COULD_NOT_RUN, EGO, OK, print_answer, write_out
+from rich.box import SIMPLE_HEAD
+from rich.markup import escape
+from rich.table import Table
+
+from risk_sac.cli.campaigns.watch import add_campaign_command, add_watch, chosen_id, line, shown
+from risk_sac.cli.console import (
+    ABOVE,
+    COULD_NOT_RUN,
+    EGO,
+    OK,
+    OUTCOME,
+    in_words,
+    offences,
+    on_one_line,
+    or_dash,
+    outcome,
+    print_answer,
+    write_out,
+)
 from risk_sac.cli.flags import add_limit, named_ego
-from risk_sac.cli.parser import Commands, add_command, add_group, add_json_flag
-from risk_sac.cli.replay import cases_table, junit
+from risk_sac.cli.parser import FAILURE_HELP, Commands, Parser, add_command, add_group, add_json_flag
+from risk_sac.cli.regress import cases_table, junit
 from risk_sac.cli.report import OUT, format_of
-from risk_sac.client import Client
-from risk_sac.failures.studied import Regression
+from risk_sac.cli.show import WEIGHT, add_filter_flags, listed, wanted
+from risk_sac.client import CampaignSummary, Client, Episode
+from risk_sac.errors import ConfigError
+from risk_sac.failures.question import Twin
+from risk_sac.failures.studied import Aim, Regression
 from risk_sac.host.terminal import complain, notes
-from risk_sac.records import State
+from risk_sac.records import Collision, EpisodeId, State, Violation
 
 POLL_S = 0.5
 FILTERS = ("state", "family", "method", "label")
@@ -47,11 +67,12 @@ def add_management(commands: Commands) -> None:
         example="campaigns delete ID",
     )
 
-    parser = add_newest_command(
+    parser = add_campaign_command(
         commands,
         "report",
         _report,
         "write one file on what a campaign found, with bounds, coverage and limits",
+        newest=True,
         example="campaigns report --out report.html",
     )
     output = parser.group("output")
@@ -76,6 +97,27 @@ def _list(options: argparse.Namespace) -> int:
         found = list(itertools.islice(client.campaigns(**filters), options.limit))
     print_answer(options, found, campaigns_table(found))
     return OK
+
+
+def campaigns_table(campaigns: Sequence[CampaignSummary]) -> Table:
+    """One row per campaign."""
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    for name in ("id", "state", "head-\nline", "epi-\nsodes", "fail-\nures", "posted"):
+        words = name in ("id", "state", "posted")
+        table.add_column(name, no_wrap=True, justify="left" if words else "right")
+    table.add_column("label")
+    for campaign in campaigns:
+        progress = campaign.progress
+        table.add_row(
+            campaign.id,
+            campaign.state,
+            or_dash(progress.headline, "d"),
+            f"{progress.episodes_done}/{progress.episodes_total}",
+            str(progress.failures),
+            f"{campaign.created_at.astimezone():%Y-%m-%d %H:%M}",
+            escape(on_one_line(campaign.label)),
+        )
+    return table
 
 
 def _cancel(options: argparse.Namespace) -> int:
@@ -151,15 +193,175 @@ def add(commands: Commands) -> None:
         epilog=EPILOG,
     )
     campaigns = group.add_subparsers(required=True, metavar="COMMAND")
-    watch.add(campaigns)
+    add_watch(campaigns)
     add_management(campaigns)
     leaves = list(campaigns.choices.values())
     of_failures = add_group(
         campaigns, "failures", "list, draw and fetch the failures of a campaign", example="campaigns failures list"
     )
     each = of_failures.add_subparsers(required=True, metavar="COMMAND")
-    failures.add(each)
+    add_failures(each)
     for parser in (*leaves, *each.choices.values()):
         parser.set_defaults(on_error=COULD_NOT_RUN)
         parser.group("service").add_argument("--url", metavar="URL", help="address of the service")
         add_json_flag(parser)
+
+
+def add_failures(commands: Commands) -> None:
+    """Adds the commands."""
+    parser = add_campaign_command(
+        commands,
+        "list",
+        _list_failures,
+        "list the failures of a campaign",
+        newest=True,
+        example="campaigns failures list --preventable --distinct --sort severity",
+    )
+    add_filter_flags(parser)
+    parser.group("choice of failures").add_argument("--run", metavar="RUN", help="only those of this run")
+
+    parser = add_campaign_command(
+        commands,
+        "show",
+        _show,
+        "print one failure in words and draw it",
+        example="campaigns failures show ID low-risk-sac-0-search-39 --out failure.png",
+    )
+    _add_failure(parser)
+    twins = get_args(Twin)
+    twin = f"draw beside it the same scene without an attack (idle), or with another ego: {', '.join(twins)}"
+    picture = parser.group("picture")
+    picture.add_argument("--twin", choices=twins, metavar="TWIN", help=twin)
+    picture.add_argument("--out", type=Path, metavar="FILE.png", help="(default: FAILURE.png)")
+
+    parser = add_campaign_command(
+        commands,
+        "bundle",
+        _bundle,
+        "fetch one failure as a file that can be replayed alone",
+        example="campaigns failures bundle ID low-risk-sac-0-search-39 --out failure.npz",
+    )
+    _add_failure(parser)
+    output = parser.group("output")
+    output.add_argument(
+        "--minimise",
+        choices=get_args(Aim),
+        metavar="AIM",
+        help="smallest: only what makes the ego fail, which takes the service 10 s; most-plausible: the least unlikely "
+        "motion that still fails, which takes 20 s",
+    )
+    output.add_argument("--out", type=Path, metavar="FILE.npz", help="(default: FAILURE.npz)")
+
+
+def _add_failure(parser: Parser) -> None:
+    parser.add_argument("failure", metavar="FAILURE", help=FAILURE_HELP)
+
+
+def _id_of(client: Client, campaign_id: str, named: str) -> str:
+    """Returns the id of the failure that an id, or the end of one, names.
+
+    Raises:
+      ConfigError: no failure has this number, or those of several runs have.
+    """
+    wanted = EpisodeId.parse(named)
+    if not named.isdecimal() and (wanted is None or wanted.run_id):
+        return named
+    ids = [failure.id for failure in client.failures(campaign_id, tier="raw")]
+    matches = [id_ for id_ in ids if id_.rpartition("-")[2] == named or id_.endswith(str(wanted))]
+    if len(matches) != 1:
+        listing = f"`risk-sac campaigns failures list {campaign_id} --raw` lists them"
+        got = f"{named}, which is the number of {len(matches) or 'no'} failure{'s' * (len(matches) > 1)}"
+        raise ConfigError("FAILURE", got, f"one of {', '.join(matches)}" if matches else "the id of one", listing)
+    return matches[0]
+
+
+def _list_failures(options: argparse.Namespace) -> int:
+    filters: dict[str, Any] = wanted(options) | {"order": "weight" if options.sort == WEIGHT else "arrival"}
+    with Client.from_environment(options.url) as client:
+        found = client.failures(
+            chosen_id(client, options), tier="raw" if options.raw else "valid", run=options.run, **filters
+        )
+        failures = listed(options, found)
+    print_answer(options, failures, failures_table(failures) if failures else "No failures to list.")
+    return OK
+
+
+def _bundle(options: argparse.Namespace) -> int:
+    with Client.from_environment(options.url) as client:
+        failure_id = _id_of(client, options.id, options.failure)
+        content = client.bundle(options.id, failure_id, aim=options.minimise)
+    file = options.out or Path(f"{failure_id}.npz")
+    write_out(file, content, "Bundle", notes)
+    return OK
+
+
+def _show(options: argparse.Namespace) -> int:
+    if options.out is not None and options.out.suffix != ".png":
+        raise ConfigError("--out", f"{str(options.out)!r}", "a name that ends in .png")
+    with Client.from_environment(options.url) as client:
+        failure = client.failure(options.id, _id_of(client, options.id, options.failure))
+        drawn = client.picture(options.id, failure.id, options.twin)
+    picture = options.out or Path(f"{failure.id}.png")
+    print_answer(options, failure, "\n".join(_lines(failure)))
+    write_out(picture, drawn, "Drawn", notes)
+    return OK
+
+
+def failures_table(failures: Sequence[Episode]) -> Table:
+    """At most four lines per failure; 80 columns hold it."""
+    table = Table(box=SIMPLE_HEAD, padding=0)
+    table.add_column("id, what it violates,\nand its kind", overflow="fold")
+    table.add_column(OUTCOME, no_wrap=True)
+    table.add_column("speed of ego,\nother, m/s", no_wrap=True, justify="right")
+    table.add_column("failed rules,\nor offences")
+    for failure in failures:
+        worst = failure.worst_violation
+        if worst is None:
+            continue
+        speeds = [worst.ego_speed_mps, *([worst.other_speed_mps] if isinstance(worst, Collision) else [])]
+        table.add_row(
+            escape(f"{failure.id}\n{', '.join(failure.failed or [worst.requirement])}\n{worst.kind}"),
+            outcome(failure, worst),
+            ", ".join(or_dash(speed, ".1f") for speed in speeds),
+            escape("\n".join([in_words([failure.reason])] if failure.reason else offences(worst))),
+        )
+    return table
+
+
+def _lines(failure: Episode) -> Iterator[str]:
+    yield f"{failure.id}: {failure.outcome}{f' ({in_words([failure.reason])})' if failure.reason else ''}"
+    if failure.driven_by is not None:
+        yield f"  driven by  {failure.driven_by}"
+    contact = () if failure.collision is None else (failure.collision,)
+    for violation in (*contact, *failure.violations):
+        yield from (f"  {name:10} {said}" for name, said in _told(violation).items() if said)
+
+
+def _told(violation: Collision | Violation) -> dict[str, str | None]:
+    if isinstance(violation, Violation):
+        broken, severity = {"the ego": violation.broke}, None
+    else:
+        judgement, severity = violation.judgement, violation.severity_in_words
+        broken = {"the ego": judgement.ego_broke, "the other": judgement.broke}
+    return {
+        **dict([_event(violation)]),
+        "kind": violation.kind,
+        "variant": violation.variant,
+        "grade": violation.graded or "none: it is not valid",
+        "plausible": None if violation.behaviour is None else violation.behaviour.in_words,
+        "severity": severity,
+        "fault": violation.blamed,
+        **{who: f"broke {in_words(broke) or 'nothing'}" for who, broke in broken.items()},
+    }
+
+
+def _event(violation: Collision | Violation) -> tuple[str, str]:
+    speed = or_dash(violation.ego_speed_mps, ".1f")
+    time = f"{or_dash(violation.time_s, '.1f')} s after the adversaries' release"
+    actor = f"{violation.other_role} {violation.other_id!r}"
+    if isinstance(violation, Violation):
+        robustness = f"least robustness {or_dash(violation.robustness, '.2f')} scales"
+        following = f"; the {actor} is next" if violation.other_id else ""
+        return "violation", f"of {violation.requirement} from {time}, at {speed} m/s; {robustness}{following}"
+    other = f"the {violation.other_zone} of {actor} at {or_dash(violation.other_speed_mps, '.1f')} m/s"
+    return "contact", f"{time}: the ego's {violation.ego_zone} at {speed} m/s, {other}"

@@ -7,29 +7,53 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from rich.box import SIMPLE_HEAD
+from rich.console import Group
 from rich.progress import BarColumn, Progress
+from rich.table import Table
 
-from risk_sac.cli.campaigns.gate import JUDGED_BY, GateBounds, named_rate, verdict
-from risk_sac.cli.campaigns.junit import junit
-from risk_sac.cli.campaigns.output import add_newest_command, chosen_id, figures, line, results_tables
-from risk_sac.cli.console import OK, Board, columns, number, print_answer, say_adjustments
+from risk_sac.cli.campaigns.gate import (
+    JUDGED_BY,
+    BoundCheck,
+    GateBounds,
+    comparisons,
+    junit,
+    measured,
+    named_rate,
+    verdict,
+)
+from risk_sac.cli.console import (
+    OK,
+    Board,
+    columns,
+    counted,
+    headline,
+    number,
+    on_one_line,
+    or_dash,
+    print_answer,
+    requirements_table,
+    say_adjustments,
+)
 from risk_sac.cli.flags import (
     add_campaign_flags,
     add_place_flags,
     add_prior_flag,
     add_scene_flags,
     campaign_flags,
+    document_at,
+    is_file,
     scene_flags,
 )
 from risk_sac.cli.parser import Commands, Parser, add_command
-from risk_sac.cli.scenarios import document_at, is_file
-from risk_sac.client import Campaign, Client, Episode, Results
-from risk_sac.config import CampaignSpec
+from risk_sac.client import Campaign, CampaignSummary, Client, Episode, Results
+from risk_sac.config import IID_METHODS, CampaignSpec
 from risk_sac.config.spec_file import read_posted
 from risk_sac.env.problem import adjustments
 from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import complain, notes
-from risk_sac.records import Grade
+from risk_sac.metrics import pooled_requirements, with_published
+from risk_sac.records import DrivenBy, Grade, Total
 from risk_sac.scenario import library
 from risk_sac.scenario.reading import nets_of
 
@@ -39,7 +63,7 @@ MAP_UPLOADED = "in place of families: id or label of an uploaded map"
 NAMED_FAILURES = 5  # most failures that a JUnit report names per run
 
 
-def add(commands: Commands) -> None:
+def add_watch(commands: Commands) -> None:
     """Adds the commands."""
     parser = add_command(
         commands,
@@ -61,13 +85,15 @@ def add(commands: Commands) -> None:
     _add_watch_flags(parser)
 
     example = "campaigns watch --max-ecr 0.2 --junit junit.xml"
-    parser = add_newest_command(
-        commands, "watch", _watch, "follow a campaign to its end and judge its results", example=example
+    parser = add_campaign_command(
+        commands, "watch", _watch, "follow a campaign to its end and judge its results", newest=True, example=example
     )
     _add_watch_flags(parser)
 
     example = "campaigns results --max-ecr 0.2"
-    parser = add_newest_command(commands, "results", _results, "show the results of a campaign so far", example=example)
+    parser = add_campaign_command(
+        commands, "results", _results, "show the results of a campaign so far", newest=True, example=example
+    )
     _add_gate_flags(parser)
 
 
@@ -94,7 +120,6 @@ def _check_names(bounds: GateBounds, spec: CampaignSpec) -> None:
 
 
 def _follow(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
-    """Follows a campaign to its end, shows what it found and judges it."""
     try:
         with shown() as show:
             client.wait(campaign_id, show, timeout_s=options.timeout)
@@ -146,6 +171,7 @@ def _report(client: Client, results: Results, bounds: GateBounds, file: Path) ->
 
 
 def _first_failures(client: Client, campaign_id: str, run_id: str) -> list[Episode]:
+    """Of a run, the preventable ones first."""
     found: dict[str, Episode] = {}
     for grade in (Grade.PREVENTABLE, None):
         failures = client.failures(campaign_id, run=run_id, grade=grade, page=NAMED_FAILURES)
@@ -243,3 +269,138 @@ def _submit(options: argparse.Namespace) -> int:
             return _follow(client, campaign.id, options)
     print_answer(options, campaign, line(campaign))
     return OK
+
+
+COUNTS = ("head-\nline", "epi-\nsodes", "fail-\nures", "dis-\ntinct", "preven-\ntable")
+RATES = ("ECR\n95 %", "PCR\n95 %")
+
+
+def add_campaign_command(
+    commands: Commands,
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    summary: str,
+    *,
+    example: str,
+    newest: bool = False,
+) -> Parser:
+    """Adds a command on one campaign, by default the newest where that is allowed; returns its parser."""
+    parser = add_command(commands, name, run, summary, example=example)
+    default = " (default: the newest)" if newest else ""
+    parser.add_argument("id", nargs="?" if newest else None, metavar="ID", help=f"id of the campaign{default}")
+    return parser
+
+
+def chosen_id(client: Client, options: argparse.Namespace) -> str:
+    """Returns the id of the campaign that the command line names, or of the newest.
+
+    Raises:
+      ConfigError: the service has no campaign.
+    """
+    if options.id is not None:
+        return str(options.id)
+    newest = next(client.campaigns(page=1), None)
+    if newest is None:
+        raise ConfigError("ID", "nothing", "the id of a campaign", "the service has none yet")
+    notes.print(f"Newest campaign: {newest.id}", markup=False, soft_wrap=True)
+    return newest.id
+
+
+def line(campaign: CampaignSummary) -> str:
+    """Returns the state and the findings of a campaign as one line."""
+    episodes = f"{campaign.progress.episodes_done}/{counted(campaign.progress.episodes_total, 'episode')}"
+    return f"{campaign.id} {campaign.state}: {episodes}, {figures(campaign)}"
+
+
+def figures(campaign: CampaignSummary) -> str:
+    """Returns the findings of a campaign in words, and the reason of its state."""
+    progress = campaign.progress
+    eta = "?" if progress.eta_s is None else f"{progress.eta_s:.0f} s"
+    reason = f"; {campaign.state}, {on_one_line(campaign.reason)}" if campaign.reason else ""
+    failures = f"{counted(progress.failures, 'failure')}{_by_requirement(campaign)}"
+    first = (
+        f"headline failures: {headline(progress.headline, progress.headline_candidates, progress.headline_published)}"
+    )
+    preventable = f"{progress.distinct_preventable} distinct and preventable"
+    found = f"{first}; {failures}, {preventable} ({progress.distinct_published} by R157, FSM or RSS)"
+    rates = f"ECR {or_dash(progress.window_ecr, '.2f')}, PCR {or_dash(progress.window_pcr, '.2f')}"
+    return f"{found}, {rates}, ETA {eta}{reason}"
+
+
+def _by_requirement(campaign: CampaignSummary) -> str:
+    """In brackets, how many failures of the searches violate each requirement; empty without any."""
+    runs = campaign.runs if isinstance(campaign, Campaign) else []
+    searches = [run.metrics for run in runs if run.metrics is not None and run.method not in IID_METHODS]
+    found = pooled_requirements(searches)
+    counts = ", ".join(f"{name} {each.valid}" for name, each in found.items() if each.valid)
+    return f" ({counts})" if counts else ""
+
+
+def results_tables(results: Results, bounds: GateBounds) -> Group:
+    """Returns the funnel and the requirements of each family and method; broken bounds are red."""
+    groups = {f"{group.family} {group.method}": group for group in measured(results)}
+    said = {
+        (name, each.name): f"above {each.bound:g}" if each.verdict == "above" else f"may be above {each.bound:g}"
+        for name, group in groups.items()
+        for each in group.comparisons(bounds)
+        if each.verdict != "within"
+    }
+    requirements = requirements_table({name: group.requirements for name, group in groups.items()}, said)
+    tables = (results_table(results, bounds), driven_by_table(results), requirements)
+    return Group(*(table for table in tables if table is not None))
+
+
+def results_table(results: Results, bounds: GateBounds) -> Table:
+    """Per family and method the funnel, and ECR and PCR over their intervals; 80 columns hold it.
+
+    The title has the headline failures of the campaign: what several methods found alike counts once there.
+    Failures, distinct and preventable ones are of every requirement that counts. In brackets are those that R157, FSM
+    or RSS prevents.
+    """
+    partial = "" if results.complete else ", so far"
+    candidates = sum(total.headline_candidates for total in results.totals)
+    found = headline(results.headline, candidates, results.headline_published)
+    title = f"headline failures: {found}\n{results.campaign_id} {results.state}{partial}"
+    table = Table(title=title, box=SIMPLE_HEAD, padding=0)
+    table.add_column("family", overflow="fold")  # of a place on a map it is long
+    table.add_column("method", no_wrap=True)
+    for name in (*COUNTS, *RATES):
+        table.add_column(name, no_wrap=True, justify="right")
+    for total in results.totals:
+        broken = {each.name: each for each in comparisons(total, bounds) if each.verdict != "within"}
+        table.add_row(
+            total.family,
+            f"{total.method}\n{counted(total.runs, 'run')}",
+            "-" if total.headline is None else with_published(total.headline, total.headline_published),
+            *map(str, (total.episodes, total.failures, total.distinct_failures)),
+            with_published(total.distinct_preventable, total.distinct_published),
+            _rate_cell(total.ecr, total.ecr_low, total.ecr_high, broken.get("ECR")),
+            _rate_cell(total.pcr, total.pcr_low, total.pcr_high, broken.get("PCR")),
+            style="red" if broken else None,
+        )
+    return table
+
+
+def driven_by_table(results: Results) -> Table | None:
+    """A line for each family and method: episodes and headline failures by what drove them; None where unknown."""
+    if not any(total.episodes_driven_by for total in results.totals):
+        return None
+    table = Table(title="episodes driven by (of them headline failures)", box=SIMPLE_HEAD, padding=0)
+    table.add_column("family", overflow="fold")
+    table.add_column("method", no_wrap=True)
+    for each in DrivenBy:
+        table.add_column(each, no_wrap=True, justify="right")
+    for total in results.totals:
+        table.add_row(total.family, total.method, *(_driven_by(total, each) for each in DrivenBy))
+    return table
+
+
+def _driven_by(total: Total, what: DrivenBy) -> str:
+    headline = "" if total.headline is None else f" ({total.headline_driven_by.get(what, 0)})"
+    return f"{total.episodes_driven_by.get(what, 0)}{headline}"
+
+
+def _rate_cell(rate: float | None, low: float | None, high: float | None, broken: BoundCheck | None) -> str:
+    interval = f"{or_dash(low, '.2f')}-{or_dash(high, '.2f')}"
+    said = "" if broken is None else "\nabove" if broken.verdict == "above" else f"\nup to {broken.upper:.2f}"
+    return f"{or_dash(rate, '.2f')}\n{interval}{said}"

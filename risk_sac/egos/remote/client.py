@@ -12,8 +12,15 @@ from google.protobuf.message import DecodeError
 
 from risk_sac.egos.guard import CRASH, DEADLINE, MALFORMED
 from risk_sac.egos.remote import ego_pb2
-from risk_sac.egos.remote.local_steps import LocalStream
-from risk_sac.egos.remote.messages import METHODS, PROTOCOL, SERVICE, command_of, observation, start_request
+from risk_sac.egos.remote.messages import (
+    METHODS,
+    PROTOCOL,
+    SERVICE,
+    LocalStream,
+    command_of,
+    observation,
+    start_request,
+)
 from risk_sac.egos.seam import Command, EpisodeStart, Perceived
 from risk_sac.errors import EgoFailed
 from risk_sac.host.machine import is_loopback

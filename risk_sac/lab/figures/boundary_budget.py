@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from risk_sac.config import RunSpec, SceneOptimizerConfig
-from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.campaign import BoundaryConfig
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.env.problem import Problem

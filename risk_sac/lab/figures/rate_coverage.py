@@ -25,9 +25,8 @@ from risk_sac.config import EgoConfig, RunSpec, SceneOptimizerConfig
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
 from risk_sac.metrics import wilson_interval
-from risk_sac.rates.estimate import estimated
-from risk_sac.rates.record import stages_of
-from risk_sac.rates.stages import Stages, draws_of
+from risk_sac.rates.proposal import Stages, draws_of
+from risk_sac.rates.record import estimated, stages_of
 from risk_sac.records.rates import RateEstimate
 from risk_sac.run_folder.durable import replace_file
 from risk_sac.scenario import library

@@ -6,8 +6,8 @@ See `risk_sac.rates`.
 import numpy as np
 
 from risk_sac.config import RateStart, SceneOptimizerConfig
+from risk_sac.rates.proposal import Draws, draws_of
 from risk_sac.rates.record import stages_of
-from risk_sac.rates.stages import Draws, draws_of
 from risk_sac.scenario.declared import SceneLaw
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
 from risk_sac.search.scene_optimizer.base import SceneOptimizer, State

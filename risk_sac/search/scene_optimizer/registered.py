@@ -6,7 +6,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.config.samplers import GROUP, sampler_of
+from risk_sac.config.methods import GROUP, sampler_of
 from risk_sac.errors import ConfigError
 from risk_sac.records import Collision, DrivenBy
 from risk_sac.search.encounter import Encounter

@@ -5,9 +5,17 @@ Source: ASAM OpenSCENARIO XML 1.3, "Storyboard and entities": states and transit
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from risk_sac.config.story import Maneuver, ManeuverGroup, NamedAction, Story, StoryAct, StoryEvent
+from risk_sac.config.story import (
+    ElementKind,
+    Maneuver,
+    ManeuverGroup,
+    NamedAction,
+    StateCondition,
+    Story,
+    StoryAct,
+    StoryEvent,
+)
 from risk_sac.config.story_actions import DeleteAction, VariableAction
-from risk_sac.config.story_conditions import ElementKind, StateCondition
 from risk_sac.sim.story.actions import doing_of, set_variable
 from risk_sac.sim.story.doing import ALONG, Doing
 from risk_sac.sim.story.shift import EventStart

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from risk_sac.config.story_actions import Coordinates, LaneTarget
-from risk_sac.config.story_conditions import Along
-from risk_sac.config.story_places import LanePosition, Position
+from risk_sac.config.story import Along
+from risk_sac.config.story_actions import Coordinates, LanePosition, LaneTarget, Position
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.lane_places import LanePlace
 from risk_sac.scenario.layout import Reach, StoryPlan

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import shapely
 
-from risk_sac.config.story_conditions import (
+from risk_sac.config.story import (
     AccelerationCondition,
     AngleCondition,
     CollisionCondition,

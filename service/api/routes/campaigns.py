@@ -12,7 +12,7 @@ from risk_sac import __version__
 from risk_sac.config import CampaignSpec, FamilyName, MethodName
 from risk_sac.env.problem import adjustments
 from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Power, Record, Results, State, wire
-from risk_sac.records.boundary import BoundaryMap
+from risk_sac.records.rates import BoundaryMap
 from risk_sac.report.grid import PlayedGrid, Standard
 from risk_sac.report.statistics import power_of
 from risk_sac.run_folder.results import BOUNDARY, BOUNDARY_PICTURE
@@ -42,11 +42,10 @@ from service.api.posted import ON_MAP, PostedCampaign, documented
 from service.errors import ConflictError, NotFoundError
 from service.runs.manager import LOG
 from service.store.stored import StoredCampaign, StoredRun
-from service.views.curves import Curves, played, results
+from service.views.curves import Curves, SceneEffects, played, results
 from service.views.failure_table import FailureTable
 from service.views.progress import campaign_body, log_tail, retry_after_s, summary_body
 from service.views.reports import MEDIA_TYPES
-from service.views.scenes import SceneEffects
 from service.views.whole import CampaignView, GridFormat, ViewName, run_of
 
 LISTED = "campaigns"

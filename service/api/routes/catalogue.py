@@ -19,7 +19,7 @@ from risk_sac.config import (
     method_of,
 )
 from risk_sac.config.ego import EgoName
-from risk_sac.config.samplers import named_methods
+from risk_sac.config.methods import named_methods
 from risk_sac.egos.defects.catalogue import DEFECTS, DefectKind
 from risk_sac.egos.registry import cards
 from risk_sac.failures.export.formats import FORMATS, FormatName

@@ -47,13 +47,13 @@ from service.views.series import (
     FailureOfARun,
     Picture,
     RoadsBody,
+    Study,
     TwinBody,
     failure_body,
     roads_body,
     thumbnail_of,
     twin_body,
 )
-from service.views.studies import Study
 
 # Text of any language, with tabs and new lines; other control characters could hide or reorder what is shown.
 TEXT = r"^[^\x00-\x08\x0b\x0c\x0e-\x1f\x7f]*$"

@@ -15,7 +15,7 @@ from service.api.pages import INVALID, UNKNOWN, problem
 from service.api.problems import ProblemError, Reason
 from service.api.routes.episodes import PLAYED, Asked, Headers, made
 from service.errors import ConflictError
-from service.views.studies import EpisodeTable, Study
+from service.views.series import EpisodeTable, Study
 
 LACKING = problem(501, "The service lacks a package that makes this format")
 NOTHING_YET = problem(409, "No run has played an episode yet")

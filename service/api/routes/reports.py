@@ -14,7 +14,7 @@ from risk_sac.config.spec_file import campaign_yaml
 from risk_sac.failures.studied import CampaignRegression, Regression
 from risk_sac.rates.record import MOST_PER_HOUR
 from risk_sac.records import State
-from risk_sac.records.coverage import CoverageMatrix
+from risk_sac.records.assessment import CoverageMatrix
 from risk_sac.report.document import CampaignEvidence
 from risk_sac.report.figures import FORMATS, Format
 from risk_sac.report.files import Table

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
-from risk_sac.records.scenario import ScenarioCheck, ScenarioDetails, ScenarioList
+from risk_sac.records.campaign import ScenarioCheck, ScenarioDetails, ScenarioList
 from risk_sac.scenario.reading import MOST_BYTES
 from service.api.context import CurrentCaller, Service
 from service.api.pages import INVALID, UNKNOWN, Responses, header, link, problem

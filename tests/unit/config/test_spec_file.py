@@ -10,7 +10,7 @@ import pytest
 from pydantic import ValidationError
 
 from risk_sac.cli.campaigns.gate import GateBounds
-from risk_sac.cli.replay import read_baseline
+from risk_sac.cli.regress import read_baseline
 from risk_sac.client.transport import api_key
 from risk_sac.config import Budget, CampaignSpec, EgoConfig, Interval
 from risk_sac.config.spec_file import campaign_yaml, read_campaign, read_ego, read_spec

@@ -3,8 +3,7 @@
 import pytest
 
 from risk_sac.config import EgoConfig
-from risk_sac.egos.registry import card_of, instances_of
-from risk_sac.egos.remote.addresses import addresses_of
+from risk_sac.egos.registry import addresses_of, card_of, instances_of
 from risk_sac.errors import ConfigError
 
 

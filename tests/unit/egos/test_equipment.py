@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from risk_sac.config import EgoConfig, field_errors
-from risk_sac.config.equipment import ActuatorConfig, BodyErrors, SensorErrors
+from risk_sac.config.ego import ActuatorConfig, BodyErrors, SensorErrors
 from risk_sac.config.spec_file import read_ego
 from risk_sac.egos.equipment import Actuation, Sensing, limited
 from risk_sac.egos.registry import pinned

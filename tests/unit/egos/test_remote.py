@@ -18,8 +18,7 @@ import pytest
 from risk_sac.egos import Control, EpisodeStart, Perceived, Trajectory
 from risk_sac.egos.remote.client import RemoteEgo
 from risk_sac.egos.remote.ego_pb2 import CloseReply, Command, Observation, StartReply
-from risk_sac.egos.remote.local_steps import listen
-from risk_sac.egos.remote.messages import METHODS, SERVICE, command_message
+from risk_sac.egos.remote.messages import METHODS, SERVICE, command_message, listen
 from risk_sac.egos.seam import Vehicle
 from risk_sac.egos.serve import Sessions, serve
 from risk_sac.errors import EgoFailed

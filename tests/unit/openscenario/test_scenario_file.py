@@ -6,8 +6,7 @@ import pytest
 
 from risk_sac.config.base import Chosen
 from risk_sac.config.scenario import AllOf, AnyOf
-from risk_sac.config.story_actions import FollowTrajectoryAction
-from risk_sac.config.story_places import LanePosition, Polyline, RelativeLanePosition
+from risk_sac.config.story_actions import FollowTrajectoryAction, LanePosition, Polyline, RelativeLanePosition
 from risk_sac.openscenario.scenario_file import Imported, import_scenario
 from risk_sac.scenario.check import check_document
 from risk_sac.scenario.interpret import Interpreter

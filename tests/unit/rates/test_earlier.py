@@ -11,10 +11,8 @@ from risk_sac import cli
 from risk_sac.config import CampaignSpec, RateStart, RunSpec
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
-from risk_sac.rates.earlier import MOST, start_in
-from risk_sac.rates.estimate import estimated
-from risk_sac.rates.proposal import DECLARED, around, defensive, log_normal
-from risk_sac.rates.stages import Stages, draws_of
+from risk_sac.rates.proposal import DECLARED, Stages, around, defensive, draws_of, log_normal
+from risk_sac.rates.record import MOST, estimated, start_in
 from risk_sac.run_folder.results import EPISODES, RecordedFailure, read_results, records_from_lines, write_results
 from risk_sac.verdicts.judge import DEFINITIONS
 from tests.earlier_runs import FAILURES, run_folder

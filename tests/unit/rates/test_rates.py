@@ -7,9 +7,19 @@ import numpy as np
 import pytest
 
 from risk_sac.lab.figures.rate_coverage import ANALYTIC, repeated
-from risk_sac.rates.estimate import LEAST_EFFECTIVE, estimated, with_exposure
-from risk_sac.rates.proposal import DECLARED, Gaussians, defensive, elite, fit, log_normal
-from risk_sac.rates.stages import Draws, Stages, draws_of, stage_sizes
+from risk_sac.rates.proposal import (
+    DECLARED,
+    Draws,
+    Gaussians,
+    Stages,
+    defensive,
+    draws_of,
+    elite,
+    fit,
+    log_normal,
+    stage_sizes,
+)
+from risk_sac.rates.record import LEAST_EFFECTIVE, estimated, with_exposure
 
 ALL, ONES = np.ones(4000, dtype=bool), np.ones(4000)
 

@@ -4,7 +4,7 @@ import pytest
 
 from risk_sac.config import CampaignSpec, Odd
 from risk_sac.records import Outcome, RequirementResult
-from risk_sac.records.coverage import CellState
+from risk_sac.records.assessment import CellState
 from risk_sac.report import compare
 from risk_sac.report.matrix import coverage_matrix, merged
 from risk_sac.report.runs import FinishedRun

@@ -3,11 +3,11 @@
 import pytest
 
 from risk_sac.config import CampaignSpec, EgoConfig
-from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.campaign import BoundaryConfig
 from risk_sac.errors import ConfigError
 from risk_sac.metrics import wilson_interval
 from risk_sac.records import RequirementCounts
-from risk_sac.records.boundary import BoundaryAxis, BoundaryMap, BoxShare, DriverMap
+from risk_sac.records.rates import BoundaryAxis, BoundaryMap, BoxShare, DriverMap
 from risk_sac.report.trend import check_scenarios, trend
 from tests.builders import run_metrics
 from tests.versions import SOFTWARE, ended_campaign

@@ -8,7 +8,7 @@ import pytest
 from pydantic import TypeAdapter
 
 from risk_sac.config.story import Story
-from risk_sac.config.story_places import Position
+from risk_sac.config.story_actions import Position
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.places import OnRoad, StoryPlaces, lanes_beside
 from risk_sac.scenario.space import Value

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from risk_sac.config import RunSpec
-from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.campaign import BoundaryConfig
 from risk_sac.env.problem import Problem
 from risk_sac.records import Outcome
 from risk_sac.report import parameter_plots as drawing

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from risk_sac.config import SceneOptimizerConfig
-from risk_sac.config.boundary import BoundaryConfig
+from risk_sac.config.campaign import BoundaryConfig
 from risk_sac.scenario.declared import Slice
 from risk_sac.scenario.space import Parameter, SceneSpace
 from risk_sac.search.encounter import Encounter

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from risk_sac.config import Budget, EgoConfig, RunSpec, SceneOptimizerConfig, method_of
-from risk_sac.config.samplers import SHIPPED, named_methods, sampler_of
+from risk_sac.config.methods import SHIPPED, named_methods, sampler_of
 from risk_sac.errors import ConfigError
 from risk_sac.lab.peers import CrossEntropy
 from risk_sac.records import Grade

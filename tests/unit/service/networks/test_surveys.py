@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from service.errors import StorageError
-from service.networks import surveys
+from service.networks import scenarios, surveys
 from service.networks.network_store import NetworkStore
 from service.networks.schemas import PLACES, Places
 from service.networks.surveys import Surveys
@@ -72,8 +72,8 @@ time.sleep(600)
 
 
 def test_a_search_ends_when_the_service_stops(store, network, tmp_path, monkeypatch):
-    (tmp_path / "surveyor.py").write_text(SLEEPS)
-    monkeypatch.setattr(surveys, "SURVEYOR", str(tmp_path / "surveyor.py"))
+    (tmp_path / "helper.py").write_text(SLEEPS)
+    monkeypatch.setattr(scenarios, "HELPER", str(tmp_path / "helper.py"))
     begun = store.folder(network.id, None) / "begun"
     with pytest.raises(StorageError, match="places cannot be looked for"):
         Surveys(store, tmp_path / "places", begun.exists).places(network.id, None)

@@ -13,10 +13,9 @@ from risk_sac.config import CampaignSpec
 from risk_sac.metrics import MetricsAccumulator
 from risk_sac.records import Grade, Outcome, Repetition, Severity, State, wire
 from service.store.stored import StoredRecord
-from service.views.curves import curves, results, spread
+from service.views.curves import curves, results, scene_effects, spread
 from service.views.failure_table import failure_table
 from service.views.progress import progress
-from service.views.scenes import scene_effects
 from tests.begun import BEGUN as RUN
 from tests.builders import LOW_SCENE, collision, episode_record, judgement, violation
 

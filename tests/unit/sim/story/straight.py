@@ -5,8 +5,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from risk_sac.config.story import Story, StoryAct
-from risk_sac.config.story_conditions import Condition
+from risk_sac.config.story import Condition, Story, StoryAct
 from risk_sac.scenario.layout import Reach, StoryActor, StoryPlan
 from risk_sac.scenario.places import StoryPlaces
 from risk_sac.scenario.space import Value

@@ -1,27 +1,37 @@
-"""Checks, keeps and draws scenarios in a process of its own.
+"""Checks, keeps and draws scenarios, and finds and keeps places of a network, in a process of its own.
 
-`service.networks.scenarios` starts `service.networks.scenario_helper QUESTION ANSWER ACTION`:
+It is started as `service.networks.helper QUESTION ANSWER ACTION`, with limits on time and memory, by
+`service.networks.scenarios`:
 
     add EGO        checks the document, or the archive, that the question holds, keeps it, and answers with its name
     check EGO      checks it, plays 20 scenes of it, and answers with a `ScenarioCheck`
     picture NAME   answers with a PNG
 
-EGO is the ego among the entities of OpenSCENARIO, or empty.
+EGO is the ego among the entities of OpenSCENARIO, or empty. `service.networks.surveys` starts it in the folder of a
+checked network, since a search takes seconds that would block the server:
+
+    survey                 writes `places.json` and `places.png` beside the net
+    keep PATTERN [PLACE]   keeps that place, or all of the pattern, and answers with the families that they are
 """
 
 import io
 import json
 import sys
 import tempfile
+import time
 import zipfile
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
+from risk_sac.maps.finder import FINDERS, Map, survey
+from risk_sac.maps.found import Pattern
 from risk_sac.openscenario.scenario_file import Imported, import_scenario
 from risk_sac.openscenario.sources import holds_scenario, unpack
+from risk_sac.run_folder.durable import replace_file, write_sealed
 from risk_sac.scenario import library
 from risk_sac.scenario.check import check_document
 from risk_sac.scenario.reading import (
@@ -33,26 +43,41 @@ from risk_sac.scenario.reading import (
     shipped_names,
     too_long,
 )
-from service.networks.schemas import SCENARIO_MEMORY_BYTES
+from risk_sac.world.read_net import read_net
+from service.networks.schemas import (
+    MAX_PLACES,
+    MEMORY_BYTES,
+    PICTURE,
+    PLACES,
+    PROGRESS,
+    Elsewhere,
+    FoundPlace,
+    Places,
+)
 
 DOCUMENT_ENDS = (".yaml", ".yml", ".json")
 WANTED = "one document (.yaml or .json) and the nets that it names, or an OpenSCENARIO file with what it names"
+
+
+NET = Path("net.xml")
+TOLD_EVERY_S = 1.0
 
 
 def main() -> None:
     """Does what the arguments say, and writes the answer."""
     question, answer, action, *arguments = sys.argv[1:]
     try:
-        content = (
-            _picture(*arguments) if action == "picture" else _posted(Path(question).read_bytes(), action, *arguments)
-        )
+        if action in ACTIONS:
+            content = ACTIONS[action](*arguments)
+        else:
+            content = _posted(Path(question).read_bytes(), action, *arguments)
     except ConfigError as error:
         faults = [(fault.field, fault.got, fault.expected, fault.remedy) for fault in (error, *error.others)]
         content = json.dumps({"faults": faults}).encode()
     except DamagedError as error:
         content = json.dumps({"damaged": str(error)}).encode()
     except MemoryError:
-        got = f"a scenario whose check needs more than {SCENARIO_MEMORY_BYTES >> 20} MiB"
+        got = f"a network or scenario that needs more than {MEMORY_BYTES >> 20} MiB"
         content = json.dumps({"faults": [("network", got, "a smaller network", "")]}).encode()
     Path(answer).write_bytes(content)
 
@@ -142,6 +167,45 @@ def _picture(name: str) -> bytes:
     document, folder = (shipped_document(name), None) if name in shipped_names() else library.kept(name)
     return scenario_png(document, nets_of(document, folder))
 
+
+def _survey() -> bytes:
+    from risk_sac.failures.from_above import map_png  # here, because loading matplotlib takes a second
+
+    net = read_net(NET)
+    map_survey = survey(net, tell=SurveyProgress())
+    places = Places(
+        items=[FoundPlace.model_validate(fit.told()) for fit in map_survey.fits],
+        elsewhere=[Elsewhere.model_validate(misfit.told()) for misfit in map_survey.misfits],
+        nowhere=dict(map_survey.nowhere),
+    )
+    replace_file(Path(PICTURE), map_png(net, map_survey))
+    write_sealed(Path(PLACES), places)
+    return b"{}"
+
+
+class SurveyProgress:
+    """Writes the share of spots that were looked at, now and then."""
+
+    def __init__(self) -> None:
+        self._told = time.monotonic()
+
+    def __call__(self, share: float) -> None:
+        """Writes the share if the last one was written long ago."""
+        if time.monotonic() - self._told >= TOLD_EVERY_S:
+            Path(PROGRESS).write_text(f"{share:.3f}")
+            self._told = time.monotonic()
+
+
+def _keep_places(name: str, place: str | None = None) -> bytes:
+    pattern: Pattern = next(pattern for pattern in FINDERS if pattern == name)
+    chosen = Map(NET)
+    fits = chosen.fits(pattern, place)
+    if len(fits) > MAX_PLACES:
+        raise ConfigError("places", f"{len(fits)} places where {pattern} fits", f"at most {MAX_PLACES}", "name one")
+    return json.dumps({"families": [chosen.keep(fit) for fit in fits]}).encode()
+
+
+ACTIONS: Mapping[str, Callable[..., bytes]] = {"picture": _picture, "survey": _survey, "keep": _keep_places}
 
 if __name__ == "__main__":
     main()
