@@ -188,8 +188,6 @@ def add_pretrain(commands: Commands) -> None:
     scripts.add_argument("--chunks", type=number(int, 1, 10_000), default=50, metavar="N", help=chunks)
     episodes = "episodes of the policy for each family; 0: no policy (default: %(default)s)"
     policy.add_argument("--policy-episodes", type=number(int, 0, 1_000_000), default=10_000, metavar="N", help=episodes)
-    kinds = "ask the policy for one kind of failure in each episode"
-    policy.add_argument("--kinds", action="store_true", help=kinds)
     execution.add_argument("--seed", type=number(int, 0), default=0, metavar="S", help="(default: %(default)s)")
     device = "where policies are trained; episodes are played on the CPU (default: %(default)s)"
     execution.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help=device)
@@ -240,7 +238,7 @@ def _train_policy(options: argparse.Namespace, pool: Executor, family: FamilyNam
     from risk_sac.lab.pretraining.policy import PolicyTraining
     from risk_sac.search.prior.policy import write_policy
 
-    training = PolicyTraining(family, options.seed, options.policy_episodes, options.device, kinds=options.kinds)
+    training = PolicyTraining(family, options.seed, options.policy_episodes, options.device)
 
     def write() -> None:
         write_policy(options.out / f"{family}-policy.npz", training.pretrained())

@@ -19,8 +19,6 @@ from risk_sac.errors import ConfigError
 from risk_sac.lab.pretraining import episodes, policy
 from risk_sac.lab.pretraining.episodes import EpisodeStream
 from risk_sac.lab.pretraining.policy import PolicyTraining
-from risk_sac.lab.pretraining.rollouts import PolicyEpisode
-from risk_sac.search.agents.transition import Transition
 from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import PolicyLayout
 from risk_sac.world.types import Scene, Vector
@@ -93,41 +91,6 @@ def test_a_thousand_episodes_give_the_same_weights_again(tmp_path):
     once, again = (trained(tmp_path / name, 1000, jobs) for name, jobs in (("once", 2), ("again", 1)))
     assert digest(once) == digest(again)
     assert once.curve == again.curve
-
-
-def test_a_failure_of_another_kind_is_stored_as_asked_and_as_reached():
-    training = PolicyTraining("mixed", 5, 100, kinds=True)
-    size = training.pretrained().layout
-    step = Transition(
-        observation=np.zeros(size.observation_size, np.float32),
-        action=np.zeros(size.action_size, np.float32),
-        risk_reward=20.0,
-        cost=0.0,
-        robustness=0.0,
-        next_robustness=0.0,
-        next_observation=np.ones(size.observation_size, np.float32),
-        terminated=True,
-        accumulated_reward=0.0,
-    )
-    goals = [training.goals.add(name) for name in ("one", "other")]
-    episode = PolicyEpisode(
-        ego="default", asked=goals[1], decisions=[step], goal="one", kind="a", candidate=True, bonus=20.0, steps=5
-    )
-    training.learn([episode])
-    stored = training.replay.gather(np.arange(2), np.ones(2))
-    asked = stored.observation[:, size.observation_size :].argmax(1).tolist()
-    rewards = dict(zip(asked, stored.risk_reward.tolist(), strict=True))
-    assert rewards == pytest.approx({goals[0]: 20.0, goals[1]: 20.0 * (1.0 - policy.MISSED)})
-
-
-def test_kinds_are_asked_for_where_wanted_only():
-    for kinds in (False, True):
-        training = PolicyTraining("low", 5, 100, kinds=kinds)
-        for name in ("one", "other"):
-            training.goals.add(name)
-        random = np.random.default_rng(3)
-        assert {training.goals.draw(random) for _ in range(40)} == ({0, 1, 2} if kinds else {0})
-        assert training.pretrained().goals == (("one", "other") if kinds else ())
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="has the GPU that it must lack")

@@ -3,12 +3,11 @@
     python -m risk_sac.lab.figures.pretrained_policy [--scenario low] [--policy FILE] [--seed 301] [--episodes 60] EGO …
 
 FILE is what `risk-sac pretrain` has written; without it, the shipped policy plays. An ego is `default`, a driver, or a
-driver and a defect such as `idm-aeb+latency`. The policy is asked for any failure, and for each kind that it knows in
-turn.
+driver and a defect such as `idm-aeb+latency`.
 """
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 from risk_sac.config import EgoConfig, RewardConfig
@@ -27,15 +26,11 @@ def ego_of(name: str) -> EgoConfig:
     return pinned(EgoConfig() if name == "default" else EgoConfig(driver=driver, defects=tuple(defects)))
 
 
-def episodes(
-    name: str, layers: Layers | None, asked: Sequence[int], options: argparse.Namespace
-) -> Iterator[PolicyEpisode]:
-    """Plays an episode per goal before an ego, whole turns only; None as layers stands for random actions."""
-    for turn in range(len(asked) // EPISODES):
-        goals = tuple(asked[EPISODES * turn : EPISODES * (turn + 1)])
-        yield from play_turn(
-            Turn(options.family, ego_of(name), name, (options.seed, turn), goals, layers, RewardConfig())
-        )
+def episodes(name: str, layers: Layers | None, options: argparse.Namespace) -> Iterator[PolicyEpisode]:
+    """Plays whole turns before an ego; None as layers stands for random actions."""
+    for turn in range(options.episodes // EPISODES):
+        key = (options.seed, turn)
+        yield from play_turn(Turn(options.family, ego_of(name), name, key, EPISODES, layers, RewardConfig()))
 
 
 def main() -> None:
@@ -50,12 +45,11 @@ def main() -> None:
     pretrained = read_policy(options.policy) if options.policy else shipped_policy(options.family)
     if pretrained is None:
         parser.error(f"--scenario: {options.family} has no shipped policy")
-    asked = [k % (len(pretrained.goals) + 1) for k in range(options.episodes)]
     layers = [layer[0] if layer.shape[1] > 1 else layer[0, 0] for layer in pretrained.policy]
     print("| ego | driven by | failures | distinct | candidates, distinct | steps |\n|---|---|---|---|---|---|")
     for name in options.egos:
         for driver, network in (("policy", layers), ("random", None)):
-            played = list(episodes(name, network, asked, options))
+            played = list(episodes(name, network, options))
             failed = [each for each in played if each.kind]
             kinds, candidates = {each.kind for each in failed}, {each.kind for each in failed if each.candidate}
             steps = sum(each.steps for each in played)

@@ -2,15 +2,12 @@
 
 Rounds: several turns are played at once, each by the policy as it was after the round before last, while the learner
 trains on the last round. So the result does not depend on the number of processes.
-
-Source: hindsight relabelling after Andrychowicz et al., "Hindsight experience replay", 2017.
 """
 
 import math
-from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,15 +26,12 @@ from risk_sac.search.agents.replay import Batch, UniformReplay
 from risk_sac.search.agents.sac import GraphedUpdate, SacAgent
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.prior.mirror import Mirror
-from risk_sac.search.prior.policy import GOALS, PolicyLayout, PretrainedPolicy, with_goal
+from risk_sac.search.prior.policy import PolicyLayout, PretrainedPolicy
 
 TURNS, EPISODES = 4, 5  # of a round, and of a turn
 INITIAL_DEVIATION = 1.0  # of the policy; from 0.2 it failed the egos a third as often after 1,200 episodes
 UPDATES_PER_DECISION = 0.7
 FAILING = 0.25  # share of a batch that comes from failing episodes
-MISSED = 0.85  # share of the bonus that a failure of another kind than asked for loses
-ANY = 0.15  # share of episodes that are asked for any failure
-RECENT = 600  # failures that tell which goals are rare
 EVALUATED_EVERY, EVALUATION_TURNS = 50, 8  # rounds; turns of held-out egos
 AGENT = AgentConfig(
     hidden_sizes=(256, 256),
@@ -97,33 +91,6 @@ class FailureReplay(UniformReplay):
         self._failing[: len(self)] = state["failing"].numpy()
 
 
-@dataclass(slots=True)
-class Goals:
-    """Kinds of failures that the policy can be asked for, as first seen."""
-
-    asked: bool = False  # the policy is asked for kinds; else always for any failure
-    names: list[str] = field(default_factory=list)
-    recent: deque[int] = field(default_factory=lambda: deque(maxlen=RECENT))
-
-    def add(self, name: str) -> int:
-        """Counts a failure; returns its goal, 0 if there is no place for another one."""
-        if name not in self.names:
-            if len(self.names) == GOALS:
-                return 0
-            self.names.append(name)
-        goal = 1 + self.names.index(name)
-        self.recent.append(goal)
-        return goal
-
-    def draw(self, random: np.random.Generator) -> int:
-        """Draws a goal to ask for: any failure, or a kind, the rarer the more often."""
-        if not self.asked or not self.names or random.random() < ANY:
-            return 0
-        counts = Counter(self.recent)
-        weights = 1.0 / np.sqrt([1.0 + counts[1 + i] for i in range(len(self.names))])
-        return 1 + int(random.choice(len(weights), p=weights / weights.sum()))
-
-
 class PolicyTraining:
     """Training of one family's policy; see `run`."""
 
@@ -134,7 +101,6 @@ class PolicyTraining:
         episodes: int,
         device: str = "cpu",
         *,
-        kinds: bool = False,
         agent: AgentConfig = AGENT,
         stages: Sequence[TrainingStage] = STAGES,
     ) -> None:
@@ -145,7 +111,6 @@ class PolicyTraining:
           seed: of all random numbers.
           episodes: to play in all, rounded up to whole rounds.
           device: where the networks are trained, `cpu` or `cuda`; episodes are played on the CPU.
-          kinds: it is asked for kinds of failures; else always for any failure.
           agent: settings of the networks and of learning.
           stages: in order; the first begins at 0.
         """
@@ -158,12 +123,11 @@ class PolicyTraining:
         egos = {name: pinned(ego) for name, ego in training_egos(family).items()}
         self._egos = {name: ego for name, ego in egos.items() if name not in HELD_OUT}
         self._unseen = {name: ego for name, ego in egos.items() if name in HELD_OUT}
-        observation_size, action_size = self._layout.observation_size + GOALS + 1, self._layout.action_size
+        observation_size, action_size = self._layout.observation_size, self._layout.action_size
         self.agent = SacAgent(observation_size, action_size, agent, SAC, seed, device, normalised=True)
         self.agent.spread(INITIAL_DEVIATION)
         self._graphed = GraphedUpdate(self.agent) if device == "cuda" else None
         self.replay = FailureReplay(observation_size, action_size, REPLAY)
-        self.goals = Goals(asked=kinds)
         self._random = np.random.default_rng(seed)
         self._sizes, self._batch_size = (observation_size, action_size), agent.batch_size
         self._round, self._due = 0, 0.0
@@ -174,7 +138,7 @@ class PolicyTraining:
     def run(self, pool: Executor, folder: Path) -> Iterator[dict[str, Any]]:
         """Trains, or goes on from the folder's checkpoint; yields the curve."""
         path = folder / f"{self.family}.checkpoint"
-        digest = f"{self.family}-{self.seed}-{self._rounds}-{self.goals.asked}"
+        digest = f"{self.family}-{self.seed}-{self._rounds}"
         if checkpoint.exists(path) and (state := checkpoint.load_newest(path, digest)) is not None:
             self._load(state)
         played: list[PolicyEpisode] = []
@@ -199,8 +163,7 @@ class PolicyTraining:
         """Returns the policy as it is now."""
         policy, critics = (tuple(layers) for layers in self.agent.networks())
         card = {"episodes": self._round * TURNS * EPISODES, "seed": self.seed, "egos": sorted(self._egos)}
-        goals = tuple(self.goals.names) if self.goals.asked else ()
-        return PretrainedPolicy(self.family, self._layout, policy, critics, self.agent.temperature, goals, card)
+        return PretrainedPolicy(self.family, self._layout, policy, critics, self.agent.temperature, card)
 
     def _stage(self, place: int) -> TrainingStage:
         """Returns the stage of a round."""
@@ -213,15 +176,14 @@ class PolicyTraining:
         for stream in range(TURNS):
             random = np.random.default_rng((self.seed, self._round, stream))
             name = drawn_ego(self._egos, random, stage.sound)
-            asked = tuple(self.goals.draw(random) for _ in range(EPISODES))
             key = (self.seed, self._round, stream, 1)
-            yield Turn(self.family, self._egos[name], name, key, asked, layers, stage.reward)
+            yield Turn(self.family, self._egos[name], name, key, EPISODES, layers, stage.reward)
 
     def learn(self, episodes: list[PolicyEpisode]) -> None:
         """Stores episodes, and makes the updates that they call for."""
         before = self._decisions
         for episode in episodes:
-            self._store(episode)
+            self._store(episode.decisions, failing=bool(episode.kind))
             self._decisions += len(episode.decisions)
         if before >= self._stage(self._round - 1).decisions:
             self._due += UPDATES_PER_DECISION * (self._decisions - before)
@@ -233,46 +195,31 @@ class PolicyTraining:
                 self._graphed(batch)
             self._due -= 1.0
 
-    def _store(self, episode: PolicyEpisode) -> None:
-        """Stores an episode as asked for, and once more as what it has reached."""
-        reached = self.goals.add(episode.goal) if episode.goal else None
-        as_asked = episode.decisions
-        if reached is not None and episode.asked not in (0, reached):
-            last = as_asked[-1]
-            missed = replace(last, risk_reward=last.risk_reward - MISSED * episode.bonus)
-            as_asked = [*as_asked[:-1], missed]
-            self._extend(episode.decisions, reached, failing=True)
-        self._extend(as_asked, episode.asked, failing=reached is not None and episode.asked in (0, reached))
-
-    def _extend(self, decisions: list[Transition], goal: int, *, failing: bool) -> None:
+    def _store(self, decisions: list[Transition], *, failing: bool) -> None:
         """Stores decisions, and their mirror image where the family has one."""
-        self.replay.extend(_asked(decisions, goal), failing=failing)
+        self.replay.extend(decisions, failing=failing)
         if self._mirror is not None:
-            mirrored = [self._mirror.transition(each) for each in decisions]
-            self.replay.extend(_asked(mirrored, goal), failing=failing)
+            self.replay.extend([self._mirror.transition(each) for each in decisions], failing=failing)
 
     def _point(self, episodes: list[PolicyEpisode]) -> dict[str, Any]:
         """Returns a point of the training curve."""
         return {"episodes": self._round * TURNS * EPISODES, "temperature": self.agent.temperature, **_shares(episodes)}
 
     def _evaluated(self, pool: Executor) -> dict[str, Any]:
-        """Plays held-out egos with goals in turn; the scenes are the same each time."""
+        """Plays held-out egos in turn; the scenes are the same each time."""
         layers = list(self.agent.frozen().layers)
         names = list(self._unseen)
-        goals = [0, *range(1, 1 + len(self.goals.names))] if self.goals.asked else [0]
         turns = []
         for i in range(EVALUATION_TURNS):
-            asked = tuple(goals[(i * EPISODES + k) % len(goals)] for k in range(EPISODES))
             name = names[i % len(names)]
-            turns.append(Turn(self.family, self._unseen[name], name, (self.seed, i, 2), asked, layers, RewardConfig()))
+            key = (self.seed, i, 2)
+            turns.append(Turn(self.family, self._unseen[name], name, key, EPISODES, layers, RewardConfig()))
         return _shares(_in_order([pool.submit(play_turn, turn) for turn in turns]))
 
     def _state(self) -> dict[str, Any]:
         return {
             "agent": self.agent.state(),
             "replay": self.replay.state(),
-            "goals": list(self.goals.names),
-            "recent": list(self.goals.recent),
             "random": self._random.bit_generator.state,
             "round": self._round,
             "due": self._due,
@@ -285,8 +232,6 @@ class PolicyTraining:
         self.agent.load(state["agent"])
         self._graphed = self._graphed and GraphedUpdate(self.agent)
         self.replay.load(state["replay"])
-        self.goals.names = list(state["goals"])
-        self.goals.recent.extend(state["recent"])
         self._random.bit_generator.state = state["random"]
         self._round, self._due, self.curve = state["round"], state["due"], state["curve"]
         self._decisions = state["decisions"]
@@ -298,17 +243,6 @@ class PolicyTraining:
 
 def _in_order(futures: list["Future[list[PolicyEpisode]]"]) -> list[PolicyEpisode]:
     return [episode for future in futures for episode in future.result()]
-
-
-def _asked(decisions: list[Transition], goal: int) -> list[Transition]:
-    return [
-        replace(
-            each,
-            observation=with_goal(each.observation, goal),
-            next_observation=with_goal(each.next_observation, goal),
-        )
-        for each in decisions
-    ]
 
 
 def _shares(episodes: list[PolicyEpisode]) -> dict[str, Any]:

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from risk_sac.config import AgentConfig, EgoConfig, FamilyName, LearnerConfig, RewardConfig, RunSpec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
-from risk_sac.records import Collision
 from risk_sac.search.agents.controls import Decision, Held
 from risk_sac.search.agents.networks import LOG_STD_HALF, LOG_STD_MIDDLE
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.encounter import Encounter
 from risk_sac.search.frozen_policy import Layers, respond
-from risk_sac.search.prior.policy import goal_of, with_goal
 from risk_sac.verdicts.distinct import variant_name
 from risk_sac.world.types import Vector
 
@@ -35,7 +33,7 @@ class Turn(NamedTuple):
     ego: EgoConfig
     name: str  # of the ego
     key: tuple[int, ...]
-    asked: tuple[int, ...]  # the goal of each episode; 0: any failure
+    episodes: int
     layers: Layers | None  # of the policy; None: uniformly random actions
     reward: RewardConfig
 
@@ -45,12 +43,9 @@ class PolicyEpisode:
     """One episode of a policy."""
 
     ego: str
-    asked: int
-    decisions: list[Transition]  # the reward in `risk_reward`, the goal not in the observations
-    goal: str  # that it reached; empty without a failure
-    kind: str  # of its worst failure
+    decisions: list[Transition]  # the reward in `risk_reward`
+    kind: str  # of its worst failure; empty without one
     candidate: bool  # for the headline
-    bonus: float  # what the failure has paid in the last decision
     steps: int
 
 
@@ -82,25 +77,25 @@ class Player:
             self._envs[key] = RiskSacEnv.of(spec)
         played: list[PolicyEpisode] = []
         with closing(self._envs[key]) as env:
-            while len(played) < len(turn.asked):
-                episode = _episode(env, turn, turn.asked[len(played)], random)
+            while len(played) < turn.episodes:
+                episode = _episode(env, turn, random)
                 if episode is not None:
                     played.append(episode)
         return played
 
 
-def _episode(env: RiskSacEnv, turn: Turn, asked: int, random: np.random.Generator) -> PolicyEpisode | None:
+def _episode(env: RiskSacEnv, turn: Turn, random: np.random.Generator) -> PolicyEpisode | None:
     """Plays an episode in a random scene; None if it cannot be played."""
     space = env.problem.space
     scene, seed = space.from_unit(random.random(space.dimension)), int(random.integers(1 << 30))
     held, decision = Held(DECISION_STEPS), Decision(DECISION_STEPS, DISCOUNT)
     decisions: list[Transition] = []
     size = env.action_size
-    steps, ended, within, paid = 0, False, 0, 0.0
+    steps, ended = 0, False
     try:
         observation, info = env.reset(seed=seed, options={"scene": scene})
         while not ended and steps < env.problem.family.horizon_steps:
-            action = held.act(partial(_decided, turn.layers, observation, asked, size, random))
+            action = held.act(partial(_decided, turn.layers, observation, size, random))
             before = observation
             observation, risk_reward, terminated, truncated, info = env.step(action)
             steps += 1
@@ -108,8 +103,6 @@ def _episode(env: RiskSacEnv, turn: Turn, asked: int, random: np.random.Generato
             reward = risk_reward - COST_WEIGHT * info["cost"]
             step = _transition(before, action, reward, observation, terminated=terminated)
             decided = decision.add(step)
-            paid = DISCOUNT**within * max(0.0, risk_reward) if terminated else 0.0
-            within = 0 if decided is not None else within + 1
             if decided is not None:
                 decisions.append(decided)
     except (InfeasibleScene, EgoFailed):
@@ -119,21 +112,18 @@ def _episode(env: RiskSacEnv, turn: Turn, asked: int, random: np.random.Generato
     worst = met.worst
     return PolicyEpisode(
         ego=turn.name,
-        asked=asked,
         decisions=decisions,
-        goal="" if worst is None else goal_of(worst),
         kind="" if worst is None else variant_name(worst),
         candidate=worst is not None and worst.headline_candidate,
-        bonus=paid if isinstance(worst, Collision) else 0.0,
         steps=steps,
     )
 
 
-def _decided(layers: Layers | None, observation: Vector, asked: int, size: int, random: np.random.Generator) -> Vector:
+def _decided(layers: Layers | None, observation: Vector, size: int, random: np.random.Generator) -> Vector:
     """Draws an action of a tanh-Gaussian policy; uniform without one."""
     if layers is None:
         return random.uniform(-1.0, 1.0, size).astype(np.float32)
-    mean, raw = np.split(respond(layers, with_goal(observation, asked), normalised=True), 2)
+    mean, raw = np.split(respond(layers, observation, normalised=True), 2)
     deviation = np.exp(LOG_STD_HALF * np.tanh(raw) + LOG_STD_MIDDLE)
     return np.tanh(mean + deviation * random.standard_normal(size)).astype(np.float32)
 

@@ -82,17 +82,13 @@ class Mlp(nn.Module):
         """Sets the outputs' biases from the `first` on."""
         self._layers[-1][1][..., first:] = value
 
-    def respond(self, inputs: Vector, shift: Vector | None = None) -> Tensor:
+    def respond(self, inputs: Vector) -> Tensor:
         """Evaluates the first network for one input, `out`; numpy, which is faster than torch for one row.
 
         Args:
           inputs: `in`.
-          shift: added to the first bias.
         """
-        layers = list(self.layers())
-        if shift is not None:
-            layers[1] = layers[1] + shift
-        return torch.from_numpy(respond(layers, inputs, normalised=self.normalised))
+        return torch.from_numpy(respond(list(self.layers()), inputs, normalised=self.normalised))
 
 
 def bounded_log_std(raw: Tensor) -> Tensor:

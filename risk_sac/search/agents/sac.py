@@ -173,9 +173,9 @@ class SacAgent(Agent):
         self._temperature.log.fill_(math.log(temperature))
 
     @torch.no_grad()
-    def act(self, observation: Vector, explore: bool, shift: Vector | None = None) -> Vector:
-        """See `Agent.act`: a draw from the policy, or tanh of its mean; for `shift` see `Mlp.respond`."""
-        mean, raw = self._policy.respond(observation, shift).chunk(2)
+    def act(self, observation: Vector, explore: bool) -> Vector:
+        """See `Agent.act`: a draw from the policy, or tanh of its mean."""
+        mean, raw = self._policy.respond(observation).chunk(2)
         if explore:
             mean = mean + bounded_log_std(raw).exp() * self._noise(self._action_size).cpu()
         return torch.tanh(mean).numpy()

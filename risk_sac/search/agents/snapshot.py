@@ -5,11 +5,10 @@ from functools import partial
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from risk_sac.search.agents.controls import Held
 from risk_sac.search.agents.transition import Transition
-from risk_sac.search.frozen_policy import LOG_STD_HALF, LOG_STD_MIDDLE, FrozenPolicy, Layers, respond
+from risk_sac.search.frozen_policy import LOG_STD_HALF, LOG_STD_MIDDLE, FrozenPolicy, respond
 from risk_sac.world.types import Floats, Vector
 
 Exploration = float | Literal["squashed", "clipped"]
@@ -37,7 +36,6 @@ class PolicySnapshot:
       decision_steps: environment steps for which an action is held.
       random_steps: steps that are left of the warm-up, in which actions are uniformly random.
       dual_variable: λ.
-      shifts: `goals x first hidden layer`, see `risk_sac.search.prior.policy.Folded`; None without goals.
       mirror: of a policy that sees every other episode mirrored.
     """
 
@@ -46,7 +44,6 @@ class PolicySnapshot:
     decision_steps: int
     random_steps: int
     dual_variable: float
-    shifts: NDArray[np.float32] | None = None
     mirror: Reflection | None = None
 
     def state(self) -> dict[str, Any]:
@@ -63,10 +60,9 @@ class PolicySnapshot:
         return replace(self, policy=policy, random_steps=state["random_steps"], dual_variable=state["dual_variable"])
 
 
-def drawn_course(random: np.random.Generator, goals: int, *, mirrored: bool) -> tuple[int, bool]:
-    """Draws the goal of an episode (0: any failure), and whether it is mirrored."""
-    goal = int(random.integers(goals + 1))
-    return goal, mirrored and bool(random.integers(2))
+def drawn_mirrored(random: np.random.Generator, mirror: Reflection | None) -> bool:
+    """Draws whether an episode is mirrored; never without a mirror."""
+    return mirror is not None and bool(random.integers(2))
 
 
 def explored(outputs: Vector, exploration: Exploration, random: np.random.Generator) -> Vector:
@@ -93,13 +89,7 @@ class SnapshotActor:
         """Begins an episode; the seed is of all that it draws."""
         self._snapshot, self._held = snapshot, Held(snapshot.decision_steps)
         self._random = np.random.default_rng(seed)
-        shifts = () if snapshot.shifts is None else snapshot.shifts
-        goal, reflected = drawn_course(self._random, len(shifts), mirrored=snapshot.mirror is not None)
-        self._mirror = snapshot.mirror if reflected else None
-        layers = list(snapshot.policy.layers)
-        if goal:
-            layers[1] = layers[1] + shifts[goal - 1]
-        self._exploring: Layers = layers
+        self._mirror = snapshot.mirror if drawn_mirrored(self._random, snapshot.mirror) else None
         self.transitions: list[Transition] = []
 
     @property
@@ -127,7 +117,7 @@ class SnapshotActor:
             return self._random.uniform(-1.0, 1.0, policy.action_size).astype(np.float32)
         seen = observation if self._mirror is None else self._mirror.observation(observation)
         if explore:
-            outputs = respond(self._exploring, seen, normalised=policy.normalised)
+            outputs = respond(list(policy.layers), seen, normalised=policy.normalised)
             action = explored(outputs, exploration, self._random)
         else:
             action = policy(seen)

@@ -9,6 +9,7 @@ Choice: C_soft stands for the negative log-likelihood, and the soft minimum of r
 """
 
 import copy
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -31,7 +32,7 @@ SAC_ARRAYS = ("observations", "next_observations", "actions", "rewards", "dones"
 PPO_ARRAYS = ("observations", "actions", "rewards", "episode_starts", "values", "log_probs")
 
 
-class StressAgent(NonLearner):
+class StressAgent(NonLearner, ABC):
     """Policy of all adversaries that minimises the least margin of an episode."""
 
     driven_by = DrivenBy.POLICY
@@ -134,17 +135,21 @@ class StressAgent(NonLearner):
         return getattr(self._model, "log_ent_coef", torch.zeros(1))
 
     @property
+    @abstractmethod
     def _buffer(self) -> Any:
-        raise NotImplementedError
+        """SB3's memory."""
 
+    @abstractmethod
     def _make(self, spaces: SpacesOnly) -> Any:
-        raise NotImplementedError
+        """Returns a new model."""
 
+    @abstractmethod
     def _decide(self, observation: Vector, explore: bool) -> tuple[Floats | Vector, Any]:
-        raise NotImplementedError
+        """Returns an action, and what `_learn` is told beside it."""
 
+    @abstractmethod
     def _learn(self, transition: Transition, told: Any, reward: float, ended: bool) -> None:
-        raise NotImplementedError
+        """Takes a step with its reward."""
 
 
 class StressSac(StressAgent):

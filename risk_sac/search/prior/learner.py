@@ -8,7 +8,7 @@ import numpy as np
 from risk_sac.config.learner import LearnerConfig
 from risk_sac.config.methods import Method
 from risk_sac.search.agents.learner import Learner
-from risk_sac.search.agents.snapshot import PolicySnapshot, drawn_course
+from risk_sac.search.agents.snapshot import PolicySnapshot, drawn_mirrored
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.prior.mirror import Mirror
 from risk_sac.search.prior.policy import Folded, PolicyLayout, PretrainedPolicy
@@ -29,9 +29,6 @@ FINE_TUNING = {
 class PretrainedLearner(Learner):
     """Learner with pretrained networks.
 
-    Choice: what it learns is to reach any failure. If the policy knows kinds, one of them is asked for in each episode
-    to explore: a shift of its first bias. Its memory takes these actions like those of any other driver.
-
     Choice: where the ego has a neighbour on either side, the networks see every other episode in the mirror, by a
     coin. They act there and learn from it there, because what they were trained on favours one side.
     """
@@ -47,22 +44,19 @@ class PretrainedLearner(Learner):
         agent = config.agent.model_copy(update={**changed, "hidden_sizes": hidden})
         config = config.model_copy(update={"agent": agent})
         self._start = start
-        self._shift: Vector | None = None
         self._mirror, self._reflected = Mirror.of(layout), False
         super().__init__(layout.observation_size, layout.action_size, method, config, seed)
 
     def _begin(self, random: np.random.Generator) -> None:
-        """See `Learner._begin`; draws what to ask for, any failure or one kind."""
+        """See `Learner._begin`; draws whether the episode is mirrored."""
         super()._begin(random)
-        shifts = self._start.shifts
-        goal, self._reflected = drawn_course(random, len(shifts), mirrored=self._mirror is not None)
-        self._shift = shifts[goal - 1] if goal else None
+        self._reflected = drawn_mirrored(random, self._mirror)
 
     def _seen(self, transition: Transition) -> Transition:
         return self._mirror.transition(transition) if self._mirror and self._reflected else transition
 
     def _taken(self) -> PolicySnapshot:
-        return replace(super()._taken(), shifts=self._start.shifts, mirror=self._mirror)
+        return replace(super()._taken(), mirror=self._mirror)
 
     def _make_agent(self, observation_size: int, action_size: int, seed: int) -> "SacAgent":
         from risk_sac.search.agents.sac import SacAgent  # here, because of torch
@@ -76,5 +70,5 @@ class PretrainedLearner(Learner):
         agent = cast("SacAgent", self._agent)
         mirror = self._mirror if self._reflected else None
         seen = observation if mirror is None else mirror.observation(observation)
-        action = agent.act(seen, explore, self._shift if explore else None)
+        action = agent.act(seen, explore)
         return action if mirror is None else mirror.action(action)

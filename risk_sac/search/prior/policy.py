@@ -1,6 +1,6 @@
-"""The pretrained policy: a SAC that can be asked for a kind of failure.
+"""The pretrained policy: a SAC that was trained before many egos.
 
-It was trained before many egos. Its networks read the observation of a shipped family with a goal behind it. `Folded`
+Its networks read the observation of a shipped family. `Folded`
 rewrites their first layers, so that they read the observation of a problem whose actors, scene parameters and
 requirements may be others.
 
@@ -19,12 +19,9 @@ from risk_sac.config import FamilyName, RunMethod, method_of
 from risk_sac.env.observation_layout import MOTION_PER_ADVERSARY, PER_ADVERSARY, PER_EGO, observation_size
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
-from risk_sac.records import Collision, Violation
 from risk_sac.scenario.families import Family, family_named
 from risk_sac.search.prior.files import DATA, arrays_of, write_arrays
-from risk_sac.world.types import Vector
 
-GOALS = 15  # kinds of failures that can be asked for, at most
 ABSENT_SCENE, ABSENT_REQUIREMENT = 0.5, 1.0  # entries of an observation for what a problem lacks; 0 for an adversary's
 HIDDEN_LAYERS = 2
 Arrays = tuple[NDArray[np.float32], ...]
@@ -69,23 +66,10 @@ class PretrainedPolicy:
 
     family: str
     layout: PolicyLayout
-    policy: Arrays  # from observation and goal to mean and log σ; count 1
-    critics: Arrays  # from observation, goal and action to values; count 2
+    policy: Arrays  # from observation to mean and log σ; count 1
+    critics: Arrays  # from observation and action to values; count 2
     temperature: float
-    goals: tuple[str, ...]  # a policy is asked for the i-th by the one-hot entry 1 + i, for any failure by entry 0
     card: Mapping[str, object]
-
-
-def goal_of(violation: Collision | Violation) -> str:
-    """Returns the goal that a violation reaches: its requirement and the striker's part of its kind."""
-    return f"{violation.requirement}: {violation.kind.split(';')[0]}"
-
-
-def with_goal(observation: Vector, goal: int) -> NDArray[np.float32]:
-    """Appends a goal to an observation, one-hot; 0 asks for any failure."""
-    asked = np.zeros(GOALS + 1, np.float32)
-    asked[goal] = 1.0
-    return np.concatenate((observation, asked))
 
 
 def write_policy(path: Path, pretrained: PretrainedPolicy) -> None:
@@ -97,7 +81,6 @@ def write_policy(path: Path, pretrained: PretrainedPolicy) -> None:
         "scene": layout.scene,
         "requirements": layout.requirements,
         "per_adversary": layout.per_adversary,
-        "goals": pretrained.goals,
         "temperature": pretrained.temperature,
         **pretrained.card,
     }
@@ -120,13 +103,13 @@ def read_policy(path: Path) -> PretrainedPolicy:
         scene = tuple((str(name), float(low), float(high)) for name, low, high in meta.pop("scene"))
         per_adversary = int(meta.pop("per_adversary", MOTION_PER_ADVERSARY))  # the shipped ones know motion alone
         layout = PolicyLayout(tuple(meta.pop("adversaries")), scene, tuple(meta.pop("requirements")), per_adversary)
-        family, goals, temperature = meta.pop("family"), tuple(meta.pop("goals")), float(meta.pop("temperature"))
-        seen, acted = layout.observation_size + GOALS + 1, layout.action_size
+        family, temperature = meta.pop("family"), float(meta.pop("temperature"))
+        seen, acted = layout.observation_size, layout.action_size
         _check(policy, (1, seen, 2 * acted))
         _check(critics, (2, seen + acted, 1))
-        if len(goals) > GOALS or not temperature > 0.0:
-            raise ValueError(f"{len(goals)} goals, of at most {GOALS}, and a temperature of {temperature}")
-    return PretrainedPolicy(family, layout, policy, critics, temperature, goals, meta)
+        if not temperature > 0.0:
+            raise ValueError(f"a temperature of {temperature}")
+    return PretrainedPolicy(family, layout, policy, critics, temperature, meta)
 
 
 def _check(layers: Arrays, wanted: tuple[int, int, int]) -> None:
@@ -171,14 +154,10 @@ def check_prior(name: RunMethod, family: FamilyName, prior: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Folded:
-    """Networks that read a problem's own observation and return its own action.
-
-    They ask for any failure. With row i of `shifts` added to the policy's first bias, they ask for goal 1 + i.
-    """
+    """Networks that read a problem's own observation and return its own action."""
 
     policy: Arrays
     critics: Arrays
-    shifts: NDArray[np.float32]  # goals x first hidden layer
     temperature: float
 
     @classmethod
@@ -194,19 +173,18 @@ class Folded:
 
         def folded(weight: NDArray[np.float32], bias: NDArray[np.float32]) -> Arrays:
             """Args: `count x in x out`, the rows of the observation first, and the first bias."""
-            seen, goals = weight[:, :size], weight[:, size : size + GOALS + 1]
-            return matrix.T @ seen, bias + (constant @ seen)[:, None] + goals[:, :1]
+            seen = weight[:, :size]
+            return matrix.T @ seen, bias + (constant @ seen)[:, None]
 
         weight, bias, *rest = pretrained.policy
         first, out = folded(weight, bias), len(pretrained.layout.adversaries) * 2
         halves = [slice(0, out), slice(out, 2 * out)]
         last = tuple(np.concatenate([_taken(layer[..., half], columns) for half in halves], -1) for layer in rest[-2:])
-        shifts = weight[0, size + 1 : size + 1 + len(pretrained.goals)] - weight[0, size]
         critic_weight, critic_bias, *critic_rest = pretrained.critics
         critic_seen, critic_bias = folded(critic_weight, critic_bias)
-        acted = np.swapaxes(_taken(np.swapaxes(critic_weight[:, size + GOALS + 1 :], 1, 2), columns), 1, 2)
+        acted = np.swapaxes(_taken(np.swapaxes(critic_weight[:, size:], 1, 2), columns), 1, 2)
         critics = (np.concatenate([critic_seen, acted], 1), critic_bias, *critic_rest)
-        return cls((*first, *rest[:-2], *last), critics, shifts, pretrained.temperature)
+        return cls((*first, *rest[:-2], *last), critics, pretrained.temperature)
 
 
 def _translation(shipped: PolicyLayout, own: PolicyLayout) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -10,11 +10,9 @@ from risk_sac.env.observation_layout import MOTION_PER_ADVERSARY, PER_ADVERSARY,
 from risk_sac.env.problem import Problem
 from risk_sac.errors import ConfigError
 from risk_sac.search.frozen_policy import respond
-from risk_sac.search.prior.policy import Folded, PolicyLayout, read_policy, with_goal, write_policy
+from risk_sac.search.prior.policy import Folded, PolicyLayout, read_policy, write_policy
 from risk_sac.world.types import Vector
 from tests.builders import pretrained_policy
-
-GOAL_NAMES = ("no_contact: cut-in, ahead, in a lane", "no_contact: leader, ahead, in a lane")
 
 
 @pytest.fixture
@@ -24,7 +22,7 @@ def layout():
 
 @pytest.fixture
 def pretrained(layout):
-    return pretrained_policy(layout, GOAL_NAMES)
+    return pretrained_policy(layout)
 
 
 def plain(layers: tuple[np.ndarray, ...], member: int = 0) -> list[np.ndarray]:
@@ -40,7 +38,7 @@ def test_a_file_gives_back_what_was_written(tmp_path, pretrained):
     path = tmp_path / "low-policy.npz"
     write_policy(path, pretrained)
     known = read_policy(path)
-    assert (known.family, known.layout, known.goals) == ("low", pretrained.layout, GOAL_NAMES)
+    assert (known.family, known.layout) == ("low", pretrained.layout)
     assert known.card == {"episodes": 12}
     for own, other in zip((*known.policy, *known.critics), (*pretrained.policy, *pretrained.critics), strict=True):
         np.testing.assert_array_equal(own, other)
@@ -67,27 +65,21 @@ def test_other_files_are_refused_in_one_line(tmp_path, pretrained, damage):
 
 def test_a_policy_that_knows_motion_alone_does_the_same_whatever_else_is_observed(layout):
     known = replace(layout, per_adversary=MOTION_PER_ADVERSARY)
-    pretrained = pretrained_policy(known, GOAL_NAMES)
+    pretrained = pretrained_policy(known)
     seen, rest = observed(layout), PER_ADVERSARY * len(layout.adversaries)
     rows = seen[:rest].reshape(-1, PER_ADVERSARY)
     motion = np.concatenate((rows[:, :MOTION_PER_ADVERSARY].ravel(), seen[rest:]))
     got = respond(plain(Folded.of(pretrained, layout).policy), seen)
-    np.testing.assert_allclose(got, respond(plain(pretrained.policy), with_goal(motion, 0)), atol=1e-4)
+    np.testing.assert_allclose(got, respond(plain(pretrained.policy), motion), atol=1e-4)
 
 
 def test_networks_folded_into_their_own_layout_do_the_same(pretrained, layout):
     folded, seen = Folded.of(pretrained, layout), observed(layout)
-    for goal in range(len(GOAL_NAMES) + 1):
-        layers = plain(folded.policy)
-        if goal:
-            layers[1] = layers[1] + folded.shifts[goal - 1]
-        np.testing.assert_allclose(
-            respond(layers, seen), respond(plain(pretrained.policy), with_goal(seen, goal)), atol=1e-4
-        )
+    np.testing.assert_allclose(respond(plain(folded.policy), seen), respond(plain(pretrained.policy), seen), atol=1e-4)
     action = np.linspace(-1, 1, layout.action_size, dtype=np.float32)
     for member in range(2):
         value = respond(plain(folded.critics, member), np.concatenate((seen, action)))
-        wanted = respond(plain(pretrained.critics, member), np.concatenate((with_goal(seen, 0), action)))
+        wanted = respond(plain(pretrained.critics, member), np.concatenate((seen, action)))
         np.testing.assert_allclose(value, wanted, atol=1e-4)
 
 
@@ -115,7 +107,7 @@ def test_another_layout_is_read_by_names_and_values(pretrained, layout):
     ).astype(np.float32)
 
     mean, log_std = np.split(respond(plain(Folded.of(pretrained, own).policy), seen), 2)
-    wanted = np.split(respond(plain(pretrained.policy), with_goal(known, 0)), 2)
+    wanted = np.split(respond(plain(pretrained.policy), known), 2)
     for got, expected in zip((mean, log_std), wanted, strict=True):
         assert not got[:2].any()  # the stranger does as it likes
         by_name = {a: expected[2 * i : 2 * i + 2] for i, a in enumerate(layout.adversaries)}

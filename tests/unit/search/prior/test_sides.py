@@ -100,7 +100,7 @@ def test_the_policy_acts_in_the_mirror_in_every_other_episode():
     layout = PolicyLayout.of(problem())
     mirror = Mirror.of(layout)
     assert mirror is not None
-    pretrained = replace(pretrained_policy(layout, ("no_contact: cut-in",)), family="low")
+    pretrained = replace(pretrained_policy(layout), family="low")
     learner = PretrainedLearner(pretrained, layout, method_of("risk-sac-pretrained"), LearnerConfig(), 5)
     seen = np.random.default_rng(2).random(layout.observation_size).astype(np.float32)
 
