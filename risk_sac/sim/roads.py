@@ -140,6 +140,14 @@ class LateralRoom(NamedTuple):
     right_m: float
 
 
+class RouteLane(NamedTuple):
+    """A lane as a vehicle's route sees it; see `Roads.lane`."""
+
+    way: Way  # from the start of the lane on
+    room: LateralRoom  # from its middle to the edges of the lanes that lead on
+    stretch: float  # length of its line / its length
+
+
 class Placed(Protocol):
     """Place of a vehicle that SUMO does not drive, by lane and path."""
 
@@ -169,19 +177,18 @@ class Roads:
         self.moved = {}
         if (layout.net, layout.set_speed_mps) != (self._net, self._set_speed_mps):  # of the same names, or other limits
             self._net, self._set_speed_mps = layout.net, layout.set_speed_mps
-            self._way, self._room, self._stretch = cache(way_of), cache(_room), cache(_stretch)
-            self._oncoming_m = cache(_oncoming_m)
+            self._lane, self._oncoming_m = cache(_route_lane), cache(_oncoming_m)
 
     def along(self, vehicle: str) -> Along:
         """Locates a vehicle on its path."""
         if (moved := self.moved.get(vehicle)) is not None:
             return moved.along
-        lane = libsumo.vehicle.getLaneID(vehicle)
-        return self._along(vehicle, lane, libsumo.vehicle.getLateralLanePosition(vehicle))
+        _, (path, *_, ends_m), _, station_m = self._on_lane(vehicle)
+        return Along(path, station_m, libsumo.vehicle.getLateralLanePosition(vehicle), ends_m)
 
-    def way(self, vehicle: str, lane: str) -> Way:
-        """Returns the way from the start of a lane along a vehicle's route."""
-        return self._way(self._routes[vehicle], lane)
+    def lane(self, vehicle: str, lane: str) -> RouteLane:
+        """Returns a lane as a vehicle's route sees it."""
+        return self._lane(self._routes[vehicle], lane)
 
     def way_ahead(self, vehicle: str, x_m: float, y_m: float) -> tuple[Floats, Floats]:
         """Points x and y of the way ahead of a vehicle, its centre first."""
@@ -200,39 +207,33 @@ class Roads:
         positive to the left.
         """
         if (moved := self.moved.get(vehicle)) is None:
-            lane = libsumo.vehicle.getLaneID(vehicle)
-            along = self._along(vehicle, lane, offset_m)
+            lane, (path, *_, ends_m), room, station_m = self._on_lane(vehicle)
+            along = Along(path, station_m, offset_m, ends_m)
         else:
-            lane, along = moved.lane, moved.along
-        left_m, right_m = self.room_beside(vehicle, lane, offset_m, width_m)
+            lane, along, room = moved.lane, moved.along, self.lane(vehicle, moved.lane).room
+        left_m, right_m = beside(room, offset_m, width_m)
         if vehicle in self._uses_oncoming:
             left_m += self._oncoming_m(self._routes[vehicle], lane)
         return LateralRoom(left_m, right_m), along
 
-    def room_beside(self, vehicle: str, lane: str, offset_m: float, width_m: float) -> LateralRoom:
-        """Returns the room beside a vehicle's body up to the edges of its own lanes, negative beyond them."""
-        left_m, right_m = self._room(self._routes[vehicle], lane)
-        spare = -width_m / 2 - EDGE_M
-        return LateralRoom(left_m + spare - offset_m, right_m + spare + offset_m)
-
-    def room(self, vehicle: str, lane: str) -> LateralRoom:
-        """Returns the room from a lane's middle along a vehicle's route.
-
-        It reaches to the edges of the lanes that lead on along the route.
-        """
-        return self._room(self._routes[vehicle], lane)
-
-    def _along(self, vehicle: str, lane: str, offset_m: float) -> Along:
-        """Locates a vehicle on its path, given its lane."""
-        way = self._way(self._routes[vehicle], lane)
-        return Along(way.path, self.station_m(vehicle, lane), offset_m, way.ends_m)
-
-    def station_m(self, vehicle: str, lane: str) -> float:
-        """Returns how far a vehicle is along its lane, m.
+    def _on_lane(self, vehicle: str) -> tuple[str, Way, LateralRoom, float]:
+        """The lane of a vehicle that SUMO drives, its way and room, and how far along it the vehicle is.
 
         SUMO counts in lengths of the lane, which are those of its edge; on a bend the outer lanes are drawn longer.
         """
-        return float(libsumo.vehicle.getLanePosition(vehicle) * self._stretch(lane))
+        lane = libsumo.vehicle.getLaneID(vehicle)
+        way, room, stretch = self._lane(self._routes[vehicle], lane)
+        return lane, way, room, libsumo.vehicle.getLanePosition(vehicle) * stretch
+
+
+def beside(room: LateralRoom, offset_m: float, width_m: float) -> LateralRoom:
+    """Returns the room beside a vehicle's body up to the edges of its own lanes, negative beyond them."""
+    spare = -width_m / 2 - EDGE_M
+    return LateralRoom(room.left_m + spare - offset_m, room.right_m + spare + offset_m)
+
+
+def _route_lane(route: tuple[str, ...], lane: str) -> RouteLane:
+    return RouteLane(way_of(route, lane), _room(route, lane), _stretch(lane))
 
 
 def _stretch(lane: str) -> float:
