@@ -9,6 +9,7 @@ Source: RISK-SAC, Sec. III-C; Nickovic, Yamaguchi, "RTAMT: online robustness mon
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -38,8 +39,19 @@ _OPERATORS = {
     "once": rtamt.OnceOperation,
     "since": rtamt.SinceOperation,
 }
+
+
+class _HistoricallyTimed(rtamt.HistoricallyTimedOperation):  # type: ignore[misc]
+    """rtamt's operator, whose update compares in C."""
+
+    def update(self, sample: float) -> float:
+        """The least of the window's samples, the newest included."""
+        self.buffer.append(sample)
+        return min(islice(self.buffer, self.end - self.begin + 1))
+
+
 _TIMED_OPERATORS = {
-    "historically": rtamt.HistoricallyTimedOperation,
+    "historically": _HistoricallyTimed,
     "once": rtamt.OnceTimedOperation,
     "since": rtamt.SinceTimedOperation,
 }
@@ -91,7 +103,10 @@ class Monitor:
         # One check for all: the signals are far too small to overflow together.
         if not math.isfinite(sum([signals[name] for name in self.signals])):
             raise NotFinite(f"the signals are {dict(signals)}; wanted finite numbers")
-        return np.array([min(max(value, -ROBUSTNESS_CLIP), ROBUSTNESS_CLIP) for value in self._evaluate(signals)])
+        most = ROBUSTNESS_CLIP
+        return np.array(
+            [value if -most <= value <= most else math.copysign(most, value) for value in self._evaluate(signals)]
+        )
 
     def _source(self, node: Node) -> str:
         """Python source of a sub-formula; called, it updates the operators in it, each with a state of its own."""

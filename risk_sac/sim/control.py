@@ -111,7 +111,7 @@ def shares_of(action: object, size: int) -> list[float]:
     shares: list[float] = values.tolist()
     if not all(map(math.isfinite, shares)):
         raise ValueError(f"action: got {shares}; wanted {wanted}")
-    return [min(max(share, -1.0), 1.0) for share in shares]
+    return [share if -1.0 <= share <= 1.0 else math.copysign(1.0, share) for share in shares]
 
 
 class Adversaries:

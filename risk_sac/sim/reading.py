@@ -37,7 +37,12 @@ from risk_sac.world.types import (
 
 SIDEWALK_M = 1.0  # a pedestrian so near a crossing looks at its signal
 CROSSING_LANE = re.compile(r":.*_c\d+_\d+")
-COLOURS = {"r": Signal.RED, "u": Signal.RED, "y": Signal.YELLOW, "g": Signal.GREEN}
+COLOURS = {
+    letter: colour
+    for letters, colour in (("rRuU", Signal.RED), ("yY", Signal.YELLOW), ("gG", Signal.GREEN))
+    for letter in letters
+}
+NONE = Signal.NONE  # to look it up in the class takes longer than to read a signal
 
 
 class Told(NamedTuple):
@@ -144,7 +149,7 @@ class Reader:
             body=self._codes,
             role=self._role,
             state=_state(self._told, before, self._sizes, len(self._vehicles)),
-            signal=COLOURS.get(letter.lower(), Signal.NONE),
+            signal=COLOURS.get(letter, NONE),
             stop_line_m=stop_line_m,
             link=self._links(letter, walkers, moved) if self._signals else self._no_links,
             teleported=libsumo.simulation.getStartingTeleportIDList(),

@@ -29,15 +29,13 @@ from risk_sac.sim.paths import (
     needs_lane_change,
     way_of,
 )
-from risk_sac.sim.reading import COLOURS
+from risk_sac.sim.reading import COLOURS, NONE
 from risk_sac.world.types import Floats, Lane, Road, Role, Signal, StopLine
 
 KEEP_ROUTE = 1  # of SUMO's `moveToXY`: the nearest place on the route
 REACH_M = 600.0  # of the route; no episode drives farther
 LEFT, RIGHT = 1, -1
 ANYWHERE = "ignoring"  # class that SUMO refuses on no lane
-NONE = Signal.NONE  # to look it up in the class takes longer than all else in `signals_at`
-SHOWN = COLOURS | {letter.upper(): colour for letter, colour in COLOURS.items()}
 
 
 def road_around(route: Sequence[str]) -> Road:
@@ -65,7 +63,7 @@ def signals_at(stop_lines: Sequence[StopLine]) -> tuple[Signal, ...]:
     """Returns what the signal of each stop line shows now."""
     signals = {line.signal for line in stop_lines}
     states = {signal: libsumo.trafficlight.getRedYellowGreenState(signal) for signal in signals}
-    return tuple([SHOWN.get(states[signal][link], NONE) for _, _, signal, link in stop_lines])
+    return tuple([COLOURS.get(states[signal][link], NONE) for _, _, signal, link in stop_lines])
 
 
 def _edges_near(route: Sequence[str]) -> Iterable[str]:
@@ -183,8 +181,8 @@ class Roads:
         """Locates a vehicle on its path."""
         if (moved := self.moved.get(vehicle)) is not None:
             return moved.along
-        _, (path, *_, ends_m), _, station_m = self._on_lane(vehicle)
-        return Along(path, station_m, libsumo.vehicle.getLateralLanePosition(vehicle), ends_m)
+        _, way, _, station_m = self._on_lane(vehicle)
+        return Along(way.path, station_m, libsumo.vehicle.getLateralLanePosition(vehicle), way.ends_m)
 
     def lane(self, vehicle: str, lane: str) -> RouteLane:
         """Returns a lane as a vehicle's route sees it."""
@@ -207,14 +205,14 @@ class Roads:
         positive to the left.
         """
         if (moved := self.moved.get(vehicle)) is None:
-            lane, (path, *_, ends_m), room, station_m = self._on_lane(vehicle)
-            along = Along(path, station_m, offset_m, ends_m)
+            lane, way, room, station_m = self._on_lane(vehicle)
+            along = Along(way.path, station_m, offset_m, way.ends_m)
         else:
             lane, along, room = moved.lane, moved.along, self.lane(vehicle, moved.lane).room
-        left_m, right_m = beside(room, offset_m, width_m)
-        if vehicle in self._uses_oncoming:
-            left_m += self._oncoming_m(self._routes[vehicle], lane)
-        return LateralRoom(left_m, right_m), along
+        own = beside(room, offset_m, width_m)
+        if vehicle not in self._uses_oncoming:
+            return own, along
+        return LateralRoom(own.left_m + self._oncoming_m(self._routes[vehicle], lane), own.right_m), along
 
     def _on_lane(self, vehicle: str) -> tuple[str, Way, LateralRoom, float]:
         """The lane of a vehicle that SUMO drives, its way and room, and how far along it the vehicle is.
