@@ -239,7 +239,9 @@ def load(ego: EgoConfig, server: int = 0) -> Guarded | None:
 
     try:
         return Guarded(
-            lambda: Planted(point.load(), defects) if defects else point.load()(), card.deadline_s, foreign=True
+            lambda: Planted(point.load(), defects) if defects else point.load()(),
+            card.deadline_s,
+            foreign=point.value not in SHIPPED.values(),
         )
     except EgoFailed as failed:
         raise _wrong(point, str(failed)) from failed

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from risk_sac.maps.carriageway import Carriageway, square_of
+from risk_sac.maps.carriageway import SQUARE_M, Carriageway, square_of
 from risk_sac.risk.driving import FEATURES
 from risk_sac.risk.publish import nearest_lane
 from risk_sac.scenario.layout import Layout
@@ -148,18 +148,29 @@ class ConductRoad:
         self._junctions = np.array(sides).reshape(-1, 4)
         self._usual = float(layout.lane_width_m), float(limit_mps)
         self._carriageway = carriageway
-        self._squares: list[tuple[int, int]] | None = None
+        self._squares = np.empty((0, 2), dtype=np.intp)  # of the adversaries
         self._near = LanesNear(np.empty((0, 7)), np.zeros(1, dtype=np.intp), self._usual, self._junctions)
 
     def near(self, rows: NDArray[np.intp], state: Floats) -> LanesNear:
         """Looks up the road around the adversaries; arguments as of `conduct_terms`."""
-        xs, ys = state[X].tolist(), state[Y].tolist()
-        squares = [square_of(xs[row], ys[row]) for row in rows.tolist()]
-        if squares != self._squares:  # seldom: a vehicle drives for seconds in the same square
-            self._squares, around = squares, [self._carriageway.lanes(square) for square in squares]
+        if not _in_squares(self._squares, rows, state):  # seldom: a vehicle drives for seconds in the same square
+            squares = [square_of(state.item(X, row), state.item(Y, row)) for row in rows.tolist()]
+            around = [self._carriageway.lanes(square) for square in squares]
+            self._squares = np.array(squares, dtype=np.intp).reshape(-1, 2)
             first = np.cumsum([0, *map(len, around)], dtype=np.intp)
             self._near = LanesNear(np.concatenate([np.empty((0, 7)), *around]), first, self._usual, self._junctions)
         return self._near
+
+
+@compiled
+def _in_squares(squares: NDArray[np.intp], rows: NDArray[np.intp], state: Floats) -> bool:
+    """Whether each of `rows` is in its square."""
+    if len(squares) != len(rows):
+        return False
+    for k in range(len(rows)):
+        if state[X, rows[k]] // SQUARE_M != squares[k, 0] or state[Y, rows[k]] // SQUARE_M != squares[k, 1]:
+            return False
+    return True
 
 
 @compiled

@@ -337,7 +337,7 @@ def publish(frame: Frame, before: Frame | None, least: LeastMargins, own: OwnMot
         "red_light_m": red_light_margin(frame, before),
         "red_light_braking_mps2": red_light_braking(frame, before),
         "ego_speed_mps": frame.ego_speed_mps,
-        "ego_braking_mps2": max(0.0, -float(frame.accel_mps2[0])),
+        "ego_braking_mps2": max(0.0, -frame.state.item(ACCEL, 0)),
         "ego_jerk_mps3": own.ego_jerk_mps3,
         "ego_lateral_accel_mps2": own.ego_lateral_accel_mps2,
         "lane_offset_m": own.lane_offset_m,

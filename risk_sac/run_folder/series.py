@@ -37,7 +37,7 @@ class Trace:
     requirements: tuple[str, ...]
     frames: list[Frame] = field(default_factory=list)
     measures: list[Measures] = field(default_factory=list)
-    actions: list[NDArray[np.float32]] = field(default_factory=list)  # one for each frame after the release
+    actions: list[Sequence[float]] = field(default_factory=list)  # one for each frame after the release
 
     @property
     def released(self) -> int:
@@ -79,7 +79,7 @@ class Trace:
         self.frames.append(frame)
         self.measures.append(measures)
         if action is not None:
-            self.actions.append(np.array(action, dtype=np.float32))
+            self.actions.append(action)
 
     def series(self) -> dict[str, NDArray[np.generic]]:
         """Arrays by name: `T` frames, `n` actors of the first frame, NaN where one has left.
@@ -117,8 +117,9 @@ class Trace:
                 values[t, columns[t][1:]] = measures.assessment.others[row]
             result[name] = values
         size = len(self.actions[0]) if self.actions else 0
-        none = np.full((self.released + 1, size), np.nan, dtype=np.float32)
-        result["actions"] = np.vstack((none, *self.actions))
+        actions = np.full((steps, size), np.nan, dtype=np.float32)
+        actions[self.released + 1 :] = self.actions
+        result["actions"] = actions
         return result
 
     def _roles(self, column: Mapping[str, int]) -> NDArray[np.int8]:

@@ -142,7 +142,10 @@ class Area:
 
     def contains(self, x_m: float, y_m: float) -> bool:
         """Whether the point lies in the area."""
-        return all(nx * x_m + ny * y_m <= c for nx, ny, c in self.sides)
+        for nx, ny, c in self.sides:  # noqa: SIM110  # `all` takes twice as long, in each step
+            if nx * x_m + ny * y_m > c:
+                return False
+        return True
 
     def grown(self, by_m: float) -> "Area":
         """The area with a border added on every side."""

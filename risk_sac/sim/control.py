@@ -18,14 +18,11 @@ from risk_sac.scenario.bodies import body_of
 from risk_sac.scenario.families import Family
 from risk_sac.scenario.layout import StoryPlan
 from risk_sac.scenario.limits import Limits
-from risk_sac.sim.solid import Others, VehicleCommand, Walker, clip, taper, walks_into
+from risk_sac.sim.solid import ALONE, Others, VehicleCommand, Walker, clip, taper, walks_into
 from risk_sac.sim.story.deviation import DeviationControl, Lead
 from risk_sac.sim.sumo import SumoSimulation
-from risk_sac.sim.vehicle_control import VehicleControl
-from risk_sac.world.types import LATERAL, SPEED, STEP_S, VX, VY, Frame, Role
-
-TOLERANCE_MPS = 0.02  # SUMO's rounding, divided by the step
-LEAP_MPS = 4.0  # at a corner of a coarsely drawn lane, a body off its middle moves up to 0.3 m more or less in a step
+from risk_sac.sim.vehicle_control import VehicleControl, drove_as_commanded
+from risk_sac.world.types import STEP_S, Frame, Role
 
 
 @dataclass(slots=True)
@@ -45,16 +42,16 @@ class PedestrianControl:
         limits = self.limits
         return limits.walk_brake_mps2, limits.walk_jerk_mps3, limits.walk_disc_mps2 / limits.heading_rate_radps
 
-    def step(self, drive: float, turn: float, others: Others | None = None) -> Walker:
+    def step(self, drive: float, turn: float, others: Others = ALONE) -> Walker:
         """Moves the pedestrian by one step.
 
         Acceleration and heading rate (clockwise below 0) are shares of what is allowed, -1 to 1. It keeps clear of
-        `others` if they are given.
+        `others`.
         """
         for wanted in ((drive, turn), (-1.0, 0.0)):
             walker, across_mps2 = self._walk(*wanted)
             walk = (walker.x_m, walker.y_m, walker.heading_rad, walker.speed_mps, walker.accel_mps2, across_mps2)
-            if others is None or not walks_into(*others, walk, self._stopping):
+            if not walks_into(*others, walk, self._stopping):
                 break
         self.state, self.across_mps2 = walker, across_mps2
         return walker
@@ -114,7 +111,7 @@ def shares_of(action: object, size: int) -> list[float]:
     shares: list[float] = values.tolist()
     if not all(map(math.isfinite, shares)):
         raise ValueError(f"action: got {shares}; wanted {wanted}")
-    return [min(max(share, -1.0), 1.0) for share in shares]
+    return [share if -1.0 <= share <= 1.0 else math.copysign(1.0, share) for share in shares]
 
 
 class Adversaries:
@@ -138,6 +135,9 @@ class Adversaries:
             for id_ in family.vehicles
             if id_ in there
         }
+        self._motions = np.array([control.motion for control in self._vehicles.values()]).reshape(-1, 3)
+        for control, motion in zip(self._vehicles.values(), self._motions, strict=True):
+            control.motion = motion
         self._pedestrians = {}
         for id_ in (id_ for id_ in family.pedestrians if id_ in there):
             walker = Walker(*(float(a[rows[id_]]) for a in (f.x_m, f.y_m, f.heading_rad, f.speed_mps)))
@@ -181,7 +181,7 @@ class Adversaries:
             self._row_of = {id_: row for row, id_ in enumerate(frame.ids)}
             present = [id_ for id_ in self._order if id_ in self._row_of]
             self._rows = np.array([self._row_of[id_] for id_ in present], dtype=np.intp)
-            self._driven = [(self._row_of[id_], self._vehicles[id_]) for id_ in present if id_ in self._vehicles]
+            self._driven = np.array([self._row_of.get(id_, 0) for id_ in self._vehicles], dtype=np.intp)
             self.slots = np.array([self._slot[id_] for id_ in present], dtype=np.intp)
         return self._rows
 
@@ -192,16 +192,7 @@ class Adversaries:
         Pedestrians move by our own dynamics and cannot deviate. The controls continue from what was driven.
         """
         self.rows(frame)
-        kept = True
-        for row, control in self._driven:
-            driven = frame.state[:, row].tolist()
-            speed, lateral = driven[SPEED], driven[LATERAL]
-            kept &= abs(speed - control.speed_mps) <= TOLERANCE_MPS
-            kept &= abs(lateral) <= abs(control.lateral_mps) + TOLERANCE_MPS
-            moved = math.hypot(driven[VX], driven[VY])
-            kept &= abs(moved - math.hypot(speed, lateral)) <= LEAP_MPS
-            control.speed_mps, control.lateral_mps = speed, lateral
-        return kept
+        return drove_as_commanded(frame.state, self._driven, self._motions)
 
 
 WALK = ("x_m", "y_m", "heading_rad", "speed_mps", "accel_mps2")

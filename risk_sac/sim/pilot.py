@@ -72,7 +72,7 @@ class MovedVehicle:
         self.motion, self._stop_line = motion, None
         libsumo.vehicle.setLaneChangeMode(vehicle, NO_LANE_CHANGE)
         self.lane = libsumo.vehicle.getLaneID(vehicle)
-        self._find(roads.station_m(vehicle, self.lane))
+        self._find(roads.along(vehicle).station_m)
 
     def move(self, motion: Motion) -> None:
         """Has SUMO put it there in its next step."""
@@ -91,18 +91,17 @@ class MovedVehicle:
 
     def _find(self, near_m: float) -> None:
         """Finds the vehicle on its path near a station."""
-        way = self._roads.way(self._vehicle, self.lane)
+        way, room, _ = self._roads.lane(self._vehicle, self.lane)
         while way.following is not None and near_m >= way.lane_m:  # stations count from the start of the lane
             near_m, self.lane = near_m - way.lane_m, way.following
             if self._stop_line is not None:
                 self._stop_line = self._stop_line._replace(station_m=self._stop_line.station_m - way.lane_m)
-            way = self._roads.way(self._vehicle, self.lane)
+            way, room, _ = self._roads.lane(self._vehicle, self.lane)
         path, (x, y, heading, speed, accel, _, slip) = way.path, self.motion
         station_m, offset_m, front_x, front_y, lateral, left_m, right_m = _placed(
             path, near_m, x, y, heading, speed, slip, *self._size_m
         )
         self.along = Along(path, station_m, offset_m)
-        room = self._roads.room(self._vehicle, self.lane)
         self.inside = left_m < room.left_m + HANGS_OVER_M and right_m < room.right_m + HANGS_OVER_M
         passes = abs(offset_m) < PASSES_M
         self.arrived = passes and way.complete and station_m >= path[STATION, -1]

@@ -29,15 +29,13 @@ from risk_sac.sim.paths import (
     needs_lane_change,
     way_of,
 )
-from risk_sac.sim.reading import COLOURS
+from risk_sac.sim.reading import COLOURS, NONE
 from risk_sac.world.types import Floats, Lane, Road, Role, Signal, StopLine
 
 KEEP_ROUTE = 1  # of SUMO's `moveToXY`: the nearest place on the route
 REACH_M = 600.0  # of the route; no episode drives farther
 LEFT, RIGHT = 1, -1
 ANYWHERE = "ignoring"  # class that SUMO refuses on no lane
-NONE = Signal.NONE  # to look it up in the class takes longer than all else in `signals_at`
-SHOWN = COLOURS | {letter.upper(): colour for letter, colour in COLOURS.items()}
 
 
 def road_around(route: Sequence[str]) -> Road:
@@ -65,7 +63,7 @@ def signals_at(stop_lines: Sequence[StopLine]) -> tuple[Signal, ...]:
     """Returns what the signal of each stop line shows now."""
     signals = {line.signal for line in stop_lines}
     states = {signal: libsumo.trafficlight.getRedYellowGreenState(signal) for signal in signals}
-    return tuple([SHOWN.get(states[signal][link], NONE) for _, _, signal, link in stop_lines])
+    return tuple([COLOURS.get(states[signal][link], NONE) for _, _, signal, link in stop_lines])
 
 
 def _edges_near(route: Sequence[str]) -> Iterable[str]:
@@ -140,6 +138,14 @@ class LateralRoom(NamedTuple):
     right_m: float
 
 
+class RouteLane(NamedTuple):
+    """A lane as a vehicle's route sees it; see `Roads.lane`."""
+
+    way: Way  # from the start of the lane on
+    room: LateralRoom  # from its middle to the edges of the lanes that lead on
+    stretch: float  # length of its line / its length
+
+
 class Placed(Protocol):
     """Place of a vehicle that SUMO does not drive, by lane and path."""
 
@@ -169,19 +175,18 @@ class Roads:
         self.moved = {}
         if (layout.net, layout.set_speed_mps) != (self._net, self._set_speed_mps):  # of the same names, or other limits
             self._net, self._set_speed_mps = layout.net, layout.set_speed_mps
-            self._way, self._room, self._stretch = cache(way_of), cache(_room), cache(_stretch)
-            self._oncoming_m = cache(_oncoming_m)
+            self._lane, self._oncoming_m = cache(_route_lane), cache(_oncoming_m)
 
     def along(self, vehicle: str) -> Along:
         """Locates a vehicle on its path."""
         if (moved := self.moved.get(vehicle)) is not None:
             return moved.along
-        lane = libsumo.vehicle.getLaneID(vehicle)
-        return self._along(vehicle, lane, libsumo.vehicle.getLateralLanePosition(vehicle))
+        _, way, _, station_m = self._on_lane(vehicle)
+        return Along(way.path, station_m, libsumo.vehicle.getLateralLanePosition(vehicle), way.ends_m)
 
-    def way(self, vehicle: str, lane: str) -> Way:
-        """Returns the way from the start of a lane along a vehicle's route."""
-        return self._way(self._routes[vehicle], lane)
+    def lane(self, vehicle: str, lane: str) -> RouteLane:
+        """Returns a lane as a vehicle's route sees it."""
+        return self._lane(self._routes[vehicle], lane)
 
     def way_ahead(self, vehicle: str, x_m: float, y_m: float) -> tuple[Floats, Floats]:
         """Points x and y of the way ahead of a vehicle, its centre first."""
@@ -200,39 +205,33 @@ class Roads:
         positive to the left.
         """
         if (moved := self.moved.get(vehicle)) is None:
-            lane = libsumo.vehicle.getLaneID(vehicle)
-            along = self._along(vehicle, lane, offset_m)
+            lane, way, room, station_m = self._on_lane(vehicle)
+            along = Along(way.path, station_m, offset_m, way.ends_m)
         else:
-            lane, along = moved.lane, moved.along
-        left_m, right_m = self.room_beside(vehicle, lane, offset_m, width_m)
-        if vehicle in self._uses_oncoming:
-            left_m += self._oncoming_m(self._routes[vehicle], lane)
-        return LateralRoom(left_m, right_m), along
+            lane, along, room = moved.lane, moved.along, self.lane(vehicle, moved.lane).room
+        own = beside(room, offset_m, width_m)
+        if vehicle not in self._uses_oncoming:
+            return own, along
+        return LateralRoom(own.left_m + self._oncoming_m(self._routes[vehicle], lane), own.right_m), along
 
-    def room_beside(self, vehicle: str, lane: str, offset_m: float, width_m: float) -> LateralRoom:
-        """Returns the room beside a vehicle's body up to the edges of its own lanes, negative beyond them."""
-        left_m, right_m = self._room(self._routes[vehicle], lane)
-        spare = -width_m / 2 - EDGE_M
-        return LateralRoom(left_m + spare - offset_m, right_m + spare + offset_m)
-
-    def room(self, vehicle: str, lane: str) -> LateralRoom:
-        """Returns the room from a lane's middle along a vehicle's route.
-
-        It reaches to the edges of the lanes that lead on along the route.
-        """
-        return self._room(self._routes[vehicle], lane)
-
-    def _along(self, vehicle: str, lane: str, offset_m: float) -> Along:
-        """Locates a vehicle on its path, given its lane."""
-        way = self._way(self._routes[vehicle], lane)
-        return Along(way.path, self.station_m(vehicle, lane), offset_m, way.ends_m)
-
-    def station_m(self, vehicle: str, lane: str) -> float:
-        """Returns how far a vehicle is along its lane, m.
+    def _on_lane(self, vehicle: str) -> tuple[str, Way, LateralRoom, float]:
+        """The lane of a vehicle that SUMO drives, its way and room, and how far along it the vehicle is.
 
         SUMO counts in lengths of the lane, which are those of its edge; on a bend the outer lanes are drawn longer.
         """
-        return float(libsumo.vehicle.getLanePosition(vehicle) * self._stretch(lane))
+        lane = libsumo.vehicle.getLaneID(vehicle)
+        way, room, stretch = self._lane(self._routes[vehicle], lane)
+        return lane, way, room, libsumo.vehicle.getLanePosition(vehicle) * stretch
+
+
+def beside(room: LateralRoom, offset_m: float, width_m: float) -> LateralRoom:
+    """Returns the room beside a vehicle's body up to the edges of its own lanes, negative beyond them."""
+    spare = -width_m / 2 - EDGE_M
+    return LateralRoom(room.left_m + spare - offset_m, room.right_m + spare + offset_m)
+
+
+def _route_lane(route: tuple[str, ...], lane: str) -> RouteLane:
+    return RouteLane(way_of(route, lane), _room(route, lane), _stretch(lane))
 
 
 def _stretch(lane: str) -> float:

@@ -63,6 +63,7 @@ BUILD_UP_S = 0.5  # time in which a braking builds up, and a step
 LONGEST_STEPS = 130  # most steps of a braking: from 43 m/s with ordinary 4 m/s² and what the jerk takes
 
 Others = tuple[Floats, int]  # a frame's state, and the own column in it
+ALONE: Others = np.zeros((WIDTH + 1, 1)), 0
 CLEAR, AHEAD, LEFT, RIGHT = 0, 1, 2, 3
 # Rows of what is foreseen of the others.
 SPEED_MPS = 0  # speed; NaN of actors that need no look

@@ -24,13 +24,13 @@ from risk_sac.sim.oncoming import OncomingVehicle, leaves
 from risk_sac.sim.paths import STATION, Along
 from risk_sac.sim.pilot import MovedVehicle, Pilot
 from risk_sac.sim.reading import Reader, Reading
-from risk_sac.sim.roads import LateralRoom, Roads, hand_over, hurry, place
+from risk_sac.sim.roads import LateralRoom, Roads, beside, hand_over, hurry, place
 from risk_sac.sim.solid import VehicleCommand, Walker
 from risk_sac.sim.standing import stand_in_lanes
 from risk_sac.sim.story.cast import Drift
 from risk_sac.sim.story.deviation import NO_LEADS, Lead
 from risk_sac.sim.story.traffic import StoryTraffic
-from risk_sac.world.types import STEP_S, Floats, Frame, Role
+from risk_sac.world.types import STEP_S, WIDTH, Floats, Frame, Role
 
 
 class Holder:
@@ -222,15 +222,14 @@ class SumoSimulation:
           leads: what leads actors of the story away from it.
         """
         self._leads = leads
-        for id_, (speed_mps, lateral_mps) in vehicles.items():
+        for id_, command in vehicles.items():
             if id_ not in self._reading.row:
                 continue
-            command = VehicleCommand(speed_mps, lateral_mps)
             if id_ in self._uses_oncoming and self._is_beside_own_lanes(id_, command):
                 self._oncoming[id_].drive(command)
                 continue
-            libsumo.vehicle.setSpeed(id_, speed_mps)
-            libsumo.vehicle.changeSublane(id_, lateral_mps * STEP_S)
+            libsumo.vehicle.setSpeed(id_, command.speed_mps)
+            libsumo.vehicle.changeSublane(id_, command.lateral_mps * STEP_S)
         self._walkers.update(walkers)
 
     def _is_beside_own_lanes(self, vehicle: str, command: VehicleCommand) -> bool:
@@ -238,7 +237,7 @@ class SumoSimulation:
         row, moved = self._reading.row[vehicle], self._oncoming.get(vehicle)
         frame, offset_m = self._reading.frame, self._reading.offset_m[row]
         lane = libsumo.vehicle.getLaneID(vehicle) if moved is None else moved.lane
-        own = self._roads.room_beside(vehicle, lane, offset_m, float(frame.width_m[row]))
+        own = beside(self._roads.lane(vehicle, lane).room, offset_m, frame.state.item(WIDTH, row))
         if moved is None and leaves(own, command):
             self._oncoming[vehicle] = OncomingVehicle(vehicle, frame.state[:, row], self._roads)
         elif moved is not None and moved.is_back(own) and not leaves(own, command):
@@ -257,7 +256,7 @@ class SumoSimulation:
         if self._story is None:
             return False
         path, station_m, *_ = self._roads.along(self._layout.ego.id)
-        way = self._roads.way(self._layout.ego.id, libsumo.vehicle.getLaneID(self._layout.ego.id))
+        way = self._roads.lane(self._layout.ego.id, libsumo.vehicle.getLaneID(self._layout.ego.id)).way
         return way.complete and bool(path[STATION, -1] - station_m < END_S * self._reading.frame.ego_speed_mps)
 
     @property
@@ -385,7 +384,7 @@ class SumoSimulation:
         row = self._reading.row.get(vehicle)
         if row is None:
             return None
-        return self._roads.place(vehicle, self._reading.offset_m[row], float(self._reading.frame.width_m[row]))
+        return self._roads.place(vehicle, self._reading.offset_m[row], self._reading.frame.state.item(WIDTH, row))
 
     def lists_collision(self, other: str) -> bool | None:
         """Whether SUMO lists a collision of the ego with a vehicle, now or within `LISTED_WITHIN_S`.

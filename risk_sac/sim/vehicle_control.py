@@ -5,23 +5,25 @@ and top speed, speed before a bend, and lateral speed before the road's edge, so
 """
 
 import math
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from risk_sac.scenario.layout import CAR_LENGTH_M
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.paths import HEADING, STATION, Along, Path
 from risk_sac.sim.roads import LateralRoom
-from risk_sac.sim.solid import AHEAD, CLEAR, Others, VehicleCommand, clip, drives_into, taper
+from risk_sac.sim.solid import AHEAD, ALONE, CLEAR, Others, VehicleCommand, clip, drives_into, taper
 from risk_sac.world.jit import compiled
-from risk_sac.world.types import STEP_S, Floats
+from risk_sac.world.types import LATERAL, SPEED, STEP_S, VX, VY, Floats
 
 CORRECTION_PER_M = 0.05  # curvature left for steering in the tightest bend, and so before a road's edge
 TURNING_BACK = 0.85  # share of the heading that leaves just enough room; a step of 0.1 s resolves no more
 EDGE_M = 0.03  # width kept free at the road's edge, which a car overshoots that brakes while it straightens
 SKID = 0.98  # a vehicle too fast for a curve keeps a fifth of its grip for braking, or it would never slow down
+TOLERANCE_MPS = 0.02  # SUMO's rounding, divided by the step
+LEAP_MPS = 4.0  # at a corner of a coarsely drawn lane, a body off its middle moves up to 0.3 m more or less in a step
 
 GRID_M = 0.5
 BODY_M = CAR_LENGTH_M  # SUMO turns a body while it passes a corner of the lane, over the body's own length
@@ -59,30 +61,27 @@ class Bounds(NamedTuple):
         return cls(**{name: getattr(limits, name) for name in cls._fields[:-1]}, preview_s=preview_s)
 
 
-@dataclass(slots=True)
 class VehicleControl:
-    """Turns actions into bounded speed and lateral speed; remembers what it last commanded.
+    """Turns actions into bounded speed and lateral speed.
 
     The friction circle is shared in this order: the bend of the lane, a lane change, braking and accelerating.
+
+    Attributes:
+      motion: what it last commanded: speed, acceleration and lateral speed.
     """
 
-    limits: Limits
-    speed_mps: float
-    accel_mps2: float = 0.0
-    lateral_mps: float = 0.0
-    _bounds: tuple[float, ...] = field(init=False)
-    _stopping: tuple[Braking, Braking] = field(init=False)  # on a straight and in a bend
-    _path: Path | None = field(init=False, default=None)
-    _bends: Floats = field(init=False)  # of that path
-    _at_m: float = field(init=False, default=0.0)  # where on it
-    _behind_per_m: float = field(init=False, default=0.0)  # bend before that path, which the body has yet to leave
-
-    def __post_init__(self) -> None:
-        self._bounds = tuple(Bounds.of(self.limits))  # passing one by its name costs as much as a step
-        limits = self.limits
+    def __init__(self, limits: Limits, speed_mps: float, accel_mps2: float = 0.0, lateral_mps: float = 0.0) -> None:
+        """Starts from a motion."""
+        self.motion = np.array((speed_mps, accel_mps2, lateral_mps))
+        self._limits = limits
+        self._bounds = tuple(Bounds.of(limits))  # passing one by its name costs as much as a step
         straight = min(limits.brake_mps2, math.sqrt(limits.grip_mps2**2 - limits.lateral_accel_mps2**2))
         rest = limits.jerk_mps3, limits.lateral_accel_mps2
-        self._stopping = (straight, *rest), (limits.approach_mps2, *rest)
+        self._stopping = (straight, *rest), (limits.approach_mps2, *rest), limits.others_brake_mps2
+        self._path: Path | None = None
+        self._bends: Floats  # of that path
+        self._at_m = 0.0  # where on it
+        self._behind_per_m = 0.0  # bend before that path, which the body has yet to leave
 
     def step(
         self,
@@ -91,7 +90,7 @@ class VehicleControl:
         room: LateralRoom,
         along: Along,
         intended_mps2: float = 0.0,
-        others: Others | None = None,
+        others: Others = ALONE,
         statics: int = 0,
     ) -> VehicleCommand:
         """One step of 0.1 s.
@@ -109,18 +108,13 @@ class VehicleControl:
         if path is not self._path:
             if self._path is not None:
                 self._behind_per_m = float(self._bends[SOON, index(self._bends, self._at_m)])
-            self._path, self._bends = path, bends(path, self.limits, ends_m)
+            self._path, self._bends = path, bends(path, self._limits, ends_m)
         self._at_m = station_m
-        course = self._bounds, self._bends, station_m, self._behind_per_m
-        motion = self.speed_mps, self.accel_mps2, self.lateral_mps
+        course = self._bounds, self._bends, station_m, self._behind_per_m, self.motion
         wanted = float(drive), float(steer), float(intended_mps2)
-        if others is None:
-            motion = _drive(*course, motion, wanted, tuple(room))
-        else:
-            stop = *self._stopping, self.limits.others_brake_mps2
-            motion = _drive_clear(*course, motion, wanted, tuple(room), *others, path, offset_m, stop, statics)
-        self.speed_mps, self.accel_mps2, self.lateral_mps = motion
-        return VehicleCommand(self.speed_mps, self.lateral_mps)
+        return VehicleCommand(
+            *_drive_clear(*course, wanted, tuple(room), *others, path, offset_m, self._stopping, statics)
+        )
 
 
 @compiled
@@ -129,7 +123,7 @@ def _drive_clear(
     bends: Floats,
     station_m: float,
     behind_per_m: float,
-    motion: tuple[float, float, float],
+    motion: Floats,
     wanted: tuple[float, float, float],
     room: tuple[float, ...],
     state: Floats,
@@ -138,27 +132,53 @@ def _drive_clear(
     offset_m: float,
     stopping: tuple[Braking, Braking, float],
     statics: int,
-) -> tuple[float, float, float]:
+) -> tuple[float, float]:
     """`_drive` that keeps clear of others: it gives up steering, then driving, where it would meet one.
 
-    The arguments up to `room` are those of `_drive`; `state`, `own`, `path` and `offset_m` are those of `drives_into`;
-    `stopping` is how it brakes on a straight and in a bend, and how hard others brake.
+    The arguments up to `room` are those of `_drive`, but `motion` becomes that of the next step; `state`, `own`, `path`
+    and `offset_m` are those of `drives_into`; `stopping` is how it brakes on a straight and in a bend, and how hard
+    others brake.
+
+    Returns:
+      Speed and lateral speed of the next step.
     """
+    before = motion[0], motion[1], motion[2]
     drive, _, intended = wanted
     straight, bent, others_brake_mps2 = stopping
     in_bend = station_m < BODY_M or bends[SOON, index(bends, station_m)] > NO_BEND_PER_M
-    braking, lateral = bent if in_bend else straight, motion[2]
+    braking, lateral = bent if in_bend else straight, before[2]
     choices = (wanted, (drive, 0.0, intended), (0.0, math.copysign(1.0, lateral), 0.0), (-1.0, 0.0, 0.0))
-    after = motion
+    after = before
     for k, choice in enumerate(choices):
         if k == 2 and (statics == 0 or lateral == 0.0):  # else it may be too late to stop
             continue
-        after = _drive(bounds, bends, station_m, behind_per_m, motion, choice, room)
+        after = _drive(bounds, bends, station_m, behind_per_m, before, choice, room)
         room_m = room[0] if after[2] > 0.0 else room[1]
         met = drives_into(state, own, path, station_m, offset_m, after, braking, others_brake_mps2, statics, room_m)
         if met == CLEAR or (met != AHEAD and choice[1] == 0.0):
             break
-    return after
+    motion[0], motion[1], motion[2] = after
+    return after[0], after[2]
+
+
+@compiled
+def drove_as_commanded(state: Floats, rows: NDArray[np.intp], motions: Floats) -> bool:
+    """Whether vehicles drove as commanded, see `Adversaries.keep_limits`; they go on from what they drove.
+
+    Args:
+      state: of a frame, `rows x n`.
+      rows: `vehicles`; their columns in `state`, 0 of those that left the net.
+      motions: `vehicles x 3`; what was commanded, then what was driven.
+    """
+    kept = True
+    for row, motion in zip(rows, motions):  # noqa: B905  # compiled code knows no strict
+        if row > 0:
+            speed, lateral = state[SPEED, row], state[LATERAL, row]
+            leap = math.hypot(state[VX, row], state[VY, row]) - math.hypot(speed, lateral)
+            kept = kept and abs(speed - motion[0]) <= TOLERANCE_MPS and abs(leap) <= LEAP_MPS
+            kept = kept and abs(lateral) <= abs(motion[2]) + TOLERANCE_MPS
+            motion[0], motion[2] = speed, lateral
+    return kept
 
 
 @compiled
