@@ -213,7 +213,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     from risk_sac.report.files import table_of
 
     with progress_bar() as bar:
-        fill = cores() if options.executor == "local" else len(spec.runs())
+        fill = cores() if options.executor == "local" else len(spec.runs()) * spec.budget.batch
         jobs = options.jobs if options.jobs is not None else fill
         progress = partial(drawn, Board(bar))
         evaluation = evaluate(spec, options.out, options.typed, jobs, progress, options.executor, options.verify)

@@ -51,6 +51,8 @@ class WorkerProgram:
     """Reads a line of its words; a ValueError refuses it."""
     environment: Mapping[str, str] = field(default_factory=dict)
     """Variables that it has besides those of its starter."""
+    descriptors: tuple[int, ...] = ()
+    """File descriptors that it inherits."""
     lease_s: float = math.inf
     """It is killed once it neither says anything nor uses its processor for so long, s."""
     stall_s: float = math.inf
@@ -114,10 +116,6 @@ class Executor(Protocol):
     @property
     def slots(self) -> float:
         """Processes that play episodes, at least one per run; infinite if unknown."""
-
-    @property
-    def slots_per_run(self) -> float:
-        """Slots that one run may take."""
 
     @property
     def cluster(self) -> ClusterState | None:

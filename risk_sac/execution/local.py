@@ -55,7 +55,7 @@ class Subprocess:
                     stdout=log,
                     stderr=log,
                     env={**os.environ, **THREADS, **program.environment, ROLLOUTS: str(slots), WORDS: str(words)},
-                    pass_fds=(words,),
+                    pass_fds=(words, *program.descriptors),
                     bufsize=0,
                     start_new_session=True,  # Ctrl-C is for our starter; we ask the worker to stop
                 )
@@ -191,7 +191,7 @@ class LocalExecutor:
     overstays or has fallen silent.
     """
 
-    slots = slots_per_run = math.inf  # the caller knows this machine
+    slots = math.inf  # the caller knows this machine
     cluster = None
 
     def __init__(self, program: WorkerProgram) -> None:

@@ -125,7 +125,7 @@ class Scheduler:
         self._executor = executor
         self._store = store
         self._attempts = attempts
-        self._most_slots = min(executor.slots_per_run, rollout_limit() or math.inf)
+        self._most_slots = rollout_limit() or math.inf
         self._deaths: Counter[int] = Counter()
 
     def fill(self, most: float) -> None:

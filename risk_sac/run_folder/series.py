@@ -131,11 +131,15 @@ class Trace:
         return roles
 
 
-def write_series(path: Path, series: dict[str, NDArray[np.generic]]) -> SeriesFile:
-    """Writes an .npz that is either complete or absent; the same arrays give the same bytes."""
+def pack_series(series: dict[str, NDArray[np.generic]]) -> bytes:
+    """Returns an .npz; the same arrays give the same bytes."""
     archive = io.BytesIO()
     np.savez_compressed(archive, allow_pickle=False, **series)
-    content = archive.getbuffer()
+    return archive.getvalue()
+
+
+def write_series(path: Path, content: bytes) -> SeriesFile:
+    """Writes an .npz that is either complete or absent."""
     path.parent.mkdir(parents=True, exist_ok=True)
     replace_file(path, content)
     return SeriesFile(path.name, hashlib.sha256(content).hexdigest())

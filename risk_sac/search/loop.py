@@ -15,7 +15,7 @@ from risk_sac.records import Ending, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.crash_guard import CrashGuard
 from risk_sac.search.playing import GuardedEnv, PlayedEpisode, Proposal, play
 from risk_sac.search.processes import processes_of
-from risk_sac.search.rollouts import Rollouts
+from risk_sac.search.rollouts import Rollouts, Terms, processes_elsewhere
 from risk_sac.search.run import RunOutcome, RunState
 
 ROLLOUT_FOLDER = "rollouts"  # folder of what rollout processes note
@@ -98,7 +98,9 @@ def rounds(run: RunState, folder: Path, observer: Observer, processes: int) -> I
     an episode when it is told; a round is played with the policy of the moment in which it is asked for.
     """
     batch = run.spec.budget.batch
-    with closing(Rollouts(run.spec, folder / ROLLOUT_FOLDER, processes)) as rollouts:
+    elsewhere = processes_elsewhere()
+    here = max(1, processes - len(elsewhere))
+    with closing(Rollouts(Terms.of(run.spec), folder / ROLLOUT_FOLDER, here, elsewhere=elsewhere)) as rollouts:
         for proposal in run.proposed:  # an earlier process has asked for them
             rollouts.submit(proposal)
         while not observer.should_stop():

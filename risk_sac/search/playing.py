@@ -8,9 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from risk_sac.egos.guard import CRASH
 from risk_sac.env.env import Observation, RiskSacEnv
 from risk_sac.errors import EgoFailed, InfeasibleScene
@@ -19,6 +16,7 @@ from risk_sac.risk.reward import TrainingReward
 from risk_sac.risk.rss import TTC_CAP_S
 from risk_sac.risk.stl import ROBUSTNESS_CLIP
 from risk_sac.run_folder.crash_guard import CrashGuard
+from risk_sac.run_folder.series import pack_series
 from risk_sac.search.agents.snapshot import PolicySnapshot
 from risk_sac.search.agents.transition import Transition
 from risk_sac.search.encounter import NO_ENCOUNTER, Encounter
@@ -125,7 +123,7 @@ class PlayedEpisode:
     start_danger: str | None = None
     defect_reached_s: float | None = None
     deviations: Mapping[str, StoryDeviation] = field(default_factory=dict)
-    series: dict[str, NDArray[np.generic]] | None = None  # where a requirement that counts was violated
+    series: bytes | None = None  # an .npz, where a requirement that counts was violated
     cpu_s: float = 0.0  # of the process that played it, without compilation
     transitions: Sequence[Transition] = ()  # its steps, where another process has played it for a learner
 
@@ -240,7 +238,7 @@ def play(
         requirements=results,
         **_facts(env, sums),
         deviations=env.deviations,
-        series=env.trace.series() if encounter.collision or encounter.violations else None,
+        series=pack_series(env.trace.series()) if encounter.collision or encounter.violations else None,
         cpu_s=cpu_s() - began_s,
     )
 

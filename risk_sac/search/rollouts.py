@@ -2,26 +2,33 @@
 
     python -m risk_sac.search.rollouts CONNECTION FOLDER NUMBER
 
-is such a process: it reads the run's spec and then proposals from the connection, and writes what was played. Processes
-of a run are numbered from 0; each plays against the remote ego's server of its number.
+is such a process: it reads its terms and then proposals from the connection, and writes what was played. Processes of a
+run are numbered from 0; each plays against the remote ego's server of its number.
+
+Some of them may be elsewhere. Then the starter of the run has opened a connection for each, listed in
+`RISK_SAC_ROLLOUTS_ELSEWHERE`. Terms and proposals go into it; out of it come True once there is a process, what was
+played, and False if the process was lost with its proposal.
 """
 
 import logging
+import os
 import signal
 import subprocess
 import sys
 import threading
 from collections import deque
+from collections.abc import Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
+from typing import NamedTuple, Self
 
 from risk_sac.config import RunMethod, RunSpec, method_of
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import RiskSacError, SimulationError
-from risk_sac.host.memory import memory_limit_bytes, out_of_memory
+from risk_sac.host.memory import limit_memory, memory_limit_bytes, out_of_memory
 from risk_sac.host.process_state import collect_seldom
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder.crash_guard import PATIENCE, CrashGuard
@@ -32,6 +39,21 @@ from risk_sac.search.playing import GuardedEnv, PlayedEpisode, Proposal, play
 logger = logging.getLogger(__name__)
 
 LOST = (EOFError, ConnectionResetError, BrokenPipeError)  # errors of a connection whose other end has died
+ELSEWHERE = "RISK_SAC_ROLLOUTS_ELSEWHERE"
+"""Variable that lists the descriptors of connections to processes that others start."""
+
+
+class Terms(NamedTuple):
+    """What a process is told first."""
+
+    spec: str  # JSON
+    niceness: int
+    memory_bytes: int | None  # that it may take
+
+    @classmethod
+    def of(cls, spec: RunSpec) -> Self:
+        """Returns those of the process that calls this."""
+        return cls(spec.model_dump_json(), os.nice(0), memory_limit_bytes())
 
 
 @dataclass(slots=True)
@@ -39,8 +61,9 @@ class RolloutProcess:
     """A process, and the proposal that it plays."""
 
     number: int
-    process: subprocess.Popen[bytes]
+    process: subprocess.Popen[bytes] | None  # None: it is elsewhere
     connection: Connection
+    there: bool = True
     playing: Proposal | None = None
     deaths: int = 0  # since its last episode
 
@@ -51,10 +74,22 @@ class Rollouts:
     A thread receives what was played and sends what waits, so that no process idles while a learner learns.
     """
 
-    def __init__(self, spec: RunSpec, folder: Path, most: int) -> None:
-        """Starts no process yet; each gets a folder below `folder` for what its crash guard notes."""
-        self._spec, self._folder, self._most = spec.model_dump_json(), folder, most
-        self._processes: list[RolloutProcess] = []
+    def __init__(
+        self, terms: Terms, folder: Path, most: int, *, first: int = 0, elsewhere: Sequence[Connection] = ()
+    ) -> None:
+        """Starts no process yet.
+
+        Args:
+          terms: of all processes.
+          folder: each process here gets a folder in it, for what its crash guard notes.
+          most: number of processes here.
+          first: number of the first.
+          elsewhere: connections to others, numbered from `first + most`; they take part once they are there.
+        """
+        self._terms, self._folder, self._most, self._first = terms, folder, most, first
+        self._processes = [RolloutProcess(first + most + k, None, one, there=False) for k, one in enumerate(elsewhere)]
+        for one in elsewhere:
+            one.send(terms)
         self._waiting: deque[Proposal] = deque()
         self._played: dict[int, PlayedEpisode] = {}
         self._changed, self._closing = threading.Condition(), False
@@ -85,20 +120,22 @@ class Rollouts:
         self._closing = True
         self._wakes.close()
         for one in [*self._processes]:
-            one.process.kill()  # the thread may be sending to it
+            if one.process is not None:
+                one.process.kill()  # the thread may be sending to it
         self._thread.join()
         self._woken.close()
         for one in self._processes:
-            one.process.kill()
             one.connection.close()
-            one.process.wait()
+            if one.process is not None:
+                one.process.kill()
+                one.process.wait()
         self._processes.clear()
 
     def _exchange(self) -> None:
         """Receives and sends until `close`, or until a process fails."""
         try:
             while not self._closing:
-                busy = {one.connection: one for one in self._processes if one.playing is not None}
+                busy = {one.connection: one for one in self._processes if one.playing is not None or not one.there}
                 for connection in wait([self._woken, *busy]):
                     if connection is self._woken:
                         self._woken.recv_bytes()
@@ -115,9 +152,10 @@ class Rollouts:
     def _send(self) -> None:
         """Gives what waits to processes without an episode."""
         while self._waiting and not self._closing:
-            free = next((one for one in self._processes if one.playing is None), None)
-            if free is None and len(self._processes) < self._most:
-                number = len(self._processes)
+            free = next((one for one in self._processes if one.there and one.playing is None), None)
+            here = sum(one.process is not None for one in self._processes)
+            if free is None and here < self._most:
+                number = self._first + here
                 free = RolloutProcess(number, *self._started(number))
                 self._processes.append(free)
             if free is None:
@@ -132,7 +170,6 @@ class Rollouts:
             self._restart(one)
 
     def _receive(self, one: RolloutProcess) -> None:
-        assert one.playing is not None
         try:
             answer = one.connection.recv()
         except LOST:
@@ -140,14 +177,32 @@ class Rollouts:
             return
         if isinstance(answer, str):
             raise SimulationError(f"a rollout process failed: {answer}")
+        if isinstance(answer, SimulationError):
+            raise answer
+        if isinstance(answer, bool):
+            one.there = answer
+            self._give_up(one)
+            return
+        assert one.playing is not None
         with self._changed:
             self._played[one.playing.index] = answer
             self._changed.notify()
         one.playing, one.deaths = None, 0
 
+    def _give_up(self, one: RolloutProcess) -> None:
+        """Lets the next free process play what a process elsewhere has lost."""
+        if one.playing is not None:
+            logger.warning("a process elsewhere was lost in episode %d, which is played again", one.playing.index)
+            self._waiting.appendleft(one.playing)
+            one.playing = None
+
     def _restart(self, one: RolloutProcess) -> None:
         """Starts a process again in which the same episode is played; its crash guard leaves out what crashes."""
         if self._closing:
+            return
+        if one.process is None:
+            self._processes.remove(one)
+            self._give_up(one)
             return
         assert one.playing is not None
         one.connection.close()
@@ -166,13 +221,22 @@ class Rollouts:
         command = [sys.executable, "-m", "risk_sac.search.rollouts", str(descriptor), str(folder), str(number)]
         process = subprocess.Popen(command, pass_fds=[descriptor], stdin=subprocess.DEVNULL)
         other.close()
-        own.send(self._spec)
+        own.send(self._terms)
         return process, own
+
+
+def processes_elsewhere() -> list[Connection]:
+    """Takes the connections that the starter of this process has opened."""
+    return [Connection(int(descriptor)) for descriptor in os.environ.pop(ELSEWHERE, "").split()]
 
 
 def serve(connection: Connection, folder: Path, number: int) -> None:
     """Plays what the connection proposes until it is closed, as the run's process of that number."""
-    spec = RunSpec.model_validate_json(connection.recv())
+    terms: Terms = connection.recv()
+    os.nice(max(0, terms.niceness - os.nice(0)))
+    if terms.memory_bytes is not None:
+        limit_memory(terms.memory_bytes)
+    spec = RunSpec.model_validate_json(terms.spec)
     reward = TrainingReward(method_of(spec.method), spec.learner)
     with closing(RiskSacEnv.of(spec, ego_server=number)) as env, CrashGuard(folder) as guard:
         guarded = GuardedEnv(env, guard)

@@ -25,7 +25,7 @@ from risk_sac.failures.variants import VariantPlayer
 from risk_sac.report import read_run
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, VERIFIED, first_of_variants, read_results, read_verified, series_name
-from risk_sac.run_folder.series import write_series
+from risk_sac.run_folder.series import pack_series, write_series
 from risk_sac.search.frozen_policy import FrozenPolicy
 from tests.acceptance.conftest import Tell
 from tests.acceptance.test_bundle import changed, manifest, series
@@ -85,7 +85,7 @@ def tampered_with(run: Path) -> int:
     file = run / FAILURES / series_name(index)
     arrays = read_series(file)
     arrays["actions"][-5:] *= -1.0
-    write_series(file, arrays)
+    write_series(file, pack_series(arrays))
     return index
 
 

@@ -17,7 +17,7 @@ from risk_sac.execution.messages import EpisodeDone, Event, Failed, Finished, St
 from risk_sac.records import Repetition
 from risk_sac.run_folder.arrays import read_series
 from risk_sac.run_folder.results import FAILURES, first_of_variants, read_results, series_name
-from risk_sac.run_folder.series import write_series
+from risk_sac.run_folder.series import pack_series, write_series
 from service.runs.manager import worker_program
 from service.settings import ServiceSettings
 
@@ -103,7 +103,7 @@ def test_a_worker_that_finds_all_played_replays_what_nobody_has_and_refuses_what
     file = tmp_path / "run" / FAILURES / series_name(first)
     series = read_series(file)
     series["actions"][-5:] *= -1.0
-    write_series(file, series)
+    write_series(file, pack_series(series))
     said, exited, _ = Launcher(tmp_path / "run", spec, ServiceSettings(replays=1)).work()
     assert exited == Exited(None, Cause.ENDED, 0), exited
     after = said[-1]

@@ -27,7 +27,7 @@ from risk_sac.records import (
 )
 from risk_sac.report import FinishedRun
 from risk_sac.run_folder.results import EPISODES, FAILURES, RecordedFailure, RunResults, series_name, write_results
-from risk_sac.run_folder.series import PER_ACTOR, PER_OTHER, write_series
+from risk_sac.run_folder.series import PER_ACTOR, PER_OTHER, pack_series, write_series
 from risk_sac.scenario.bodies import CODES
 from service.settings import ServiceSettings
 from service.store.reading import Store
@@ -235,7 +235,7 @@ class Recorded:
             kept = (
                 None
                 if episode.worst_violation is None
-                else write_series(file, series_arrays() | {"released_s": np.array(0.0)})
+                else write_series(file, pack_series(series_arrays() | {"released_s": np.array(0.0)}))
             )
             metrics = finished(spec, done[:count]).metrics
             word = EpisodeDone(

@@ -19,7 +19,7 @@ from service.settings import ServiceSettings
 class IdleExecutor:
     """Accepts runs and leaves them waiting until they are cancelled."""
 
-    slots, slots_per_run, cluster = math.inf, math.inf, None
+    slots, cluster = math.inf, None
 
     def __init__(self) -> None:
         self._cancelled: list[int] = []

@@ -5,12 +5,13 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import psutil
 import pytest
 
+from risk_sac.execution.jobs import LOG
 from risk_sac.scenario import library
 from risk_sac.scenario.reading import shipped_document
 from tests.integration.scripted_worker import DIES, ONCE, WAITS, WELL_BEHAVED
@@ -33,9 +34,11 @@ def serve(cluster: Cluster, tmp_path: Path) -> Iterator[object]:
         yield start
 
 
-def evaluated(folder: Path, families: list[str], **environment: str) -> subprocess.CompletedProcess[str]:
+def evaluated(
+    folder: Path, families: list[str], arguments: Sequence[str] = TINY, **environment: str
+) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-m", "risk_sac", "evaluate", "--scenario", *families, *TINY, "--out", str(folder)],
+        [sys.executable, "-m", "risk_sac", "evaluate", "--scenario", *families, *arguments, "--out", str(folder)],
         env=os.environ | environment, cwd=ROOT, capture_output=True, text=True, timeout=LONG_S, check=False,
     )  # fmt: skip
 
@@ -44,10 +47,10 @@ def digests(folder: Path) -> dict[str, str]:
     return {path.parent.name: json.loads(path.read_text())["digest"] for path in folder.glob("runs/*/results.json")}
 
 
-def actors(cluster: Cluster) -> list[psutil.Process]:
-    """Processes of Ray that attend a run."""
+def actors(cluster: Cluster, kind: str = "Attendant") -> list[psutil.Process]:
+    """Processes of Ray that attend a run, or one of its rollout processes."""
     processes = [process for node in cluster.nodes for process in cluster.processes(node)]
-    return [process for process, name in processes if name.startswith("ray::Attendant")]
+    return [process for process, name in processes if name.startswith(f"ray::{kind}")]
 
 
 def folder_beside(cluster: Cluster, run: str, *others: Path) -> Path:
@@ -80,6 +83,34 @@ def test_a_comparison_comes_to_the_same_on_a_cluster_and_leaves_nothing_there(cl
     for name in digests(tmp_path / "local"):
         files = {path.name for path in (tmp_path / "local" / "runs" / name).iterdir()}
         assert {path.name for path in (tmp_path / "ray" / "runs" / name).iterdir()} >= files - {".lock"}
+    wait_until(lambda: not list(cluster.scratch.glob("*")))
+
+
+def test_rounds_are_played_on_several_nodes_and_a_killed_actor_is_replaced(cluster, tmp_path):
+    rounds = ["--methods", "archive", "--seeds", "1", "--episodes", "96", "--batch", "4", "--verify", "0"]
+    log, killed = tmp_path / "ray" / "runs" / "low-archive-0" / LOG, []
+
+    def lost() -> bool:
+        """Kills the actor that plays for the run, until it dies while it plays."""
+        for actor in actors(cluster, "RolloutAttendant"):
+            with contextlib.suppress(psutil.NoSuchProcess):
+                if actor not in killed and actor.children():
+                    actor.kill()
+                    killed.append(actor)
+        return log.exists() and b"a process elsewhere was lost in episode" in log.read_bytes()
+
+    command = [sys.executable, "-m", "risk_sac", "evaluate", "--scenario", "low", *rounds]
+    there = subprocess.Popen([*command, "--out", str(tmp_path / "ray")], cwd=ROOT)
+    try:
+        wait_until(lost)
+        wait_until(lambda: any(actor.children() for actor in actors(cluster, "RolloutAttendant")))
+        assert there.wait(LONG_S) == 0
+    finally:
+        there.kill()
+        there.wait()
+    here = evaluated(tmp_path / "local", ["low"], rounds, RISK_SAC_EXECUTOR="local", RISK_SAC_ROLLOUTS="1")
+    assert here.returncode == 0, here.stderr
+    assert digests(tmp_path / "ray") == digests(tmp_path / "local")
     wait_until(lambda: not list(cluster.scratch.glob("*")))
 
 

@@ -4,10 +4,12 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 import tomllib
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from multiprocessing import Pipe
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +30,7 @@ from risk_sac.records import DrivenBy, EpisodeRecord, RunMetrics, SeriesFile
 from risk_sac.run_folder.crash_guard import CURRENT
 from risk_sac.run_folder.results import FAILURES
 from risk_sac.search.loop import execute_run, propose
-from risk_sac.search.rollouts import Rollouts
+from risk_sac.search.rollouts import ELSEWHERE, Rollouts, Terms
 from risk_sac.search.run import RunState
 from tests.ego_processes import served
 from tests.listener import Listener
@@ -103,7 +105,10 @@ def test_neither_processes_nor_kills_change_a_method(tmp_path: Path, processes, 
 
 def test_a_process_plays_on_while_nothing_waits_for_it(tmp_path: Path) -> None:
     wanted = spec("archive", 3, batch=3)
-    with closing(RunState(wanted, tmp_path)) as run, closing(Rollouts(wanted, tmp_path / "rollouts", 1)) as rollouts:
+    with (
+        closing(RunState(wanted, tmp_path)) as run,
+        closing(Rollouts(Terms.of(wanted), tmp_path / "rollouts", 1)) as rollouts,
+    ):
         for _ in range(3):
             run.proposed.append(propose(run))
             rollouts.submit(run.proposed[-1])
@@ -133,6 +138,42 @@ def test_a_stopped_run_goes_on_as_if_it_had_not(tmp_path: Path, processes, metho
     stopped = execute_run(spec(method, 14), tmp_path / "stopped", Listener(limit=played))
     assert not stopped.finished
     assert execute_run(spec(method, 14), tmp_path / "stopped", Listener()).digest == whole.digest
+
+
+def play_elsewhere(connection: Connection, folder: Path, told: list[str]) -> None:
+    """Plays what the connection proposes, but loses the second proposal, and the process with it."""
+    terms = connection.recv()
+    with closing(Rollouts(terms, folder, 1, first=1)) as rollouts, suppress(EOFError):
+        connection.send(True)
+        while True:
+            proposal = connection.recv()
+            told.append("lost" if len(told) == 1 else "played")
+            if told[-1] == "lost":
+                connection.send(False)
+                connection.send(True)
+                continue
+            rollouts.submit(proposal)
+            connection.send(rollouts.wait_for(proposal.index, 60.0))
+
+
+def test_processes_elsewhere_change_nothing_nor_does_the_loss_of_one(
+    tmp_path: Path, processes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    processes(2)
+    wanted, told = spec("risk-sac", 14), []
+    here = execute_run(wanted, tmp_path / "here", Listener())
+    own, other = Pipe()
+    monkeypatch.setenv(ELSEWHERE, str(os.dup(other.fileno())))
+    other.close()
+    thread = threading.Thread(target=play_elsewhere, args=(own, tmp_path / "elsewhere", told))
+    thread.start()
+    listener = Listener()
+    there = execute_run(wanted, tmp_path / "there", listener)
+    thread.join()
+    assert there.digest == here.digest
+    assert [record.index for record in listener.records] == list(range(14))
+    assert told.count("lost") == 1
+    assert told.count("played") > 1
 
 
 def test_a_batch_of_one_is_played_in_this_process(tmp_path: Path) -> None:

@@ -24,9 +24,9 @@ class RaySettings(BaseSettings):
     ray_address: str = "auto"
     """Address of the Ray cluster's head, `HOST:PORT`; `auto`: the cluster that this machine is a part of."""
     ray_cpus_per_run: Annotated[float, Field(gt=0, le=1024)] = 1.0
-    """Processors that a run takes of its node."""
+    """Processors that each process of a run takes of its node."""
     ray_memory_bytes_per_run: Annotated[int, Field(ge=0)] = 1 << 30
-    """Memory that a run takes of its node, as Ray counts it, bytes; 0 leaves it uncounted."""
+    """Memory that each takes, as Ray counts it, bytes; 0 leaves it uncounted."""
     ray_scratch_dir: Path = Path("/tmp/risk-sac")
     """Folder of every node in which runs work."""
     ray_lease_s: Annotated[float, Field(ge=1, le=600)] = 15.0

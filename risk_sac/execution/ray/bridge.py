@@ -24,15 +24,15 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Cause, ClusterState, Exited
 from risk_sac.execution.messages import without_folders
 from risk_sac.execution.ray import RaySettings, read_settings
+from risk_sac.execution.ray.attendant import BEATS, Attendant, resources
 from risk_sac.execution.ray.cluster import connect, nodes
-from risk_sac.execution.ray.node import Attendant, Files, Order, read, versions, write
+from risk_sac.execution.ray.node import Files, Order, read, versions, write
 from risk_sac.host.terminal import log_to_stderr
 
 logger = logging.getLogger("risk_sac.execution.ray.bridge")
 
 HURRY_S = 2.0  # on top of the grace of a run that is to stop, until its actor is killed
 NODES_S = 2.0
-BEATS = 5  # reports within a lease
 LOOKS = 15  # within a lease
 
 
@@ -44,17 +44,15 @@ class Attempt:
       task: ends with the attempt.
     """
 
-    def __init__(self, order: Order, settings: RaySettings, say: Callable[..., None]) -> None:
+    def __init__(self, order: Order, say: Callable[..., None]) -> None:
         self.node: str | None = None
         self._order = order
-        self._settings = settings
         self._say = say
         self._writing = threading.Lock()
         self._over = False
         self._heard_at = time.monotonic()
-        memory = {"memory": settings.ray_memory_bytes_per_run} if settings.ray_memory_bytes_per_run else {}
         actor = ray.remote(Attendant).options(
-            num_cpus=settings.ray_cpus_per_run, max_concurrency=2, scheduling_strategy="SPREAD", **memory
+            max_concurrency=2, scheduling_strategy="SPREAD", **resources(order.settings)
         )
         self._actor: Any = actor.remote()
         self.task = asyncio.create_task(self._follow())
@@ -82,7 +80,7 @@ class Attempt:
         except RayError as error:
             exited = Exited(f"its actor or its node was lost ({type(error).__name__})", Cause.KILLED)
         except TimeoutError:
-            exited = Exited(f"nothing was heard of its node for {self._settings.ray_lease_s:g} s", Cause.STOPPED)
+            exited = Exited(f"nothing was heard of its node for {self._order.settings.ray_lease_s:g} s", Cause.STOPPED)
         except OSError as error:
             exited = Exited(_blamed(error), Cause.CRASHED)
         with self._writing:
@@ -111,7 +109,7 @@ class Attempt:
 
         The lease is divided into looks; a time for which this process stood still is one look.
         """
-        lease_s = self._settings.ray_lease_s
+        lease_s = self._order.settings.ray_lease_s
         report = asyncio.wrap_future(self._actor.poll.remote(lease_s / BEATS).future())
         try:
             for _ in range(LOOKS):
@@ -165,7 +163,7 @@ class Bridge:
             message = ("close",)
         match message:
             case "submit", Order() as order:
-                attempt = self._attempts[order.id] = Attempt(order, self._settings, self.say)
+                attempt = self._attempts[order.id] = Attempt(order, self.say)
                 attempt.task.add_done_callback(lambda _: self._attempts.pop(order.id))
             case "cancel", id_, grace_s if id_ in self._attempts:
                 self._attempts[id_].stop(grace_s)

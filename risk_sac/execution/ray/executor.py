@@ -24,7 +24,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.execution.executor import Cause, ClusterState, Exited, Messages, WorkerProgram, taken
 from risk_sac.execution.messages import Event
 from risk_sac.execution.ray import ADDRESS, read_settings
-from risk_sac.execution.ray.node import Order
+from risk_sac.execution.ray.node import EGOS, PLACES, Order
 from risk_sac.run_folder.durable import scratch_name
 from risk_sac.scenario import library
 from risk_sac.scenario.reading import shipped_names
@@ -59,15 +59,13 @@ class RayExecutor:
             )
         self.cluster = ClusterState()
         self._program = program
-        self._scratch = read_settings().ray_scratch_dir
+        self._settings = read_settings()
         self._messages: Messages = queue.SimpleQueue()
         self._orders: dict[int, Order] = {}  # those that have not ended, by run
         self._lock = threading.RLock()
         self._closed = threading.Event()
         self._bridge = _Bridge()
         threading.Thread(target=self._work, name="ray", daemon=True).start()
-
-    slots_per_run = 1  # its rounds are played by one process: the rest of them may not fit its node
 
     @property
     def slots(self) -> float:
@@ -85,22 +83,23 @@ class RayExecutor:
 
     def _order(self, number: int, spec: RunSpec, folder: Path, slots: int) -> Order:
         """An attempt, with the egos that the server's operator has registered and the run's scenario."""
-        scratch = self._scratch / scratch_name()
         beside: dict[str, Path] = {}
-        environment = {registry.FILE: ""}  # whatever a node registers by itself does not count
         if registered := os.environ.get(registry.FILE):
-            beside["egos.toml"] = Path(registered).resolve()
-            environment[registry.FILE] = str(scratch / "egos.toml")
+            beside[EGOS] = Path(registered).resolve()
         if spec.family not in shipped_names():
             kept = (library.library() / spec.family).resolve()
-            beside |= {f"places/{spec.family}/{file.name}": file for file in kept.iterdir()}
+            beside |= {f"{PLACES}/{spec.family}/{file.name}": file for file in kept.iterdir()}
         if spec.prior not in SHIPPED_OR_NONE:
-            beside[f"places/{file_of(spec.prior)}"] = (library.library() / file_of(spec.prior)).resolve()
-        if any(name.startswith("places/") for name in beside):
-            environment[library.VARIABLE] = str(scratch / "places")
-        program = replace(self._program, environment=environment)
+            beside[f"{PLACES}/{file_of(spec.prior)}"] = (library.library() / file_of(spec.prior)).resolve()
         return Order(
-            number=number, spec=spec, slots=slots, program=program, folder=folder, scratch=scratch, beside=beside
+            number=number,
+            spec=spec,
+            slots=slots,
+            program=self._program,
+            folder=folder,
+            scratch=self._settings.ray_scratch_dir / scratch_name(),
+            beside=beside,
+            settings=self._settings,
         )
 
     def events(self, timeout_s: float) -> list[tuple[int, Event | Exited]]:

@@ -82,7 +82,7 @@ def test_a_run_takes_the_slots_that_are_free_within_its_share(spec, free, taken,
 class Listing:
     """An executor that only lists what is submitted."""
 
-    slots, slots_per_run, cluster = math.inf, math.inf, None
+    slots, cluster = math.inf, None
 
     def __init__(self):
         self.submitted = []

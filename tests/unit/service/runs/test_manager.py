@@ -19,7 +19,7 @@ SPEC = CampaignSpec(families=("low",), methods=("random",))
 class Scripted:
     """An executor whose attempts do what the test says, one after the other."""
 
-    slots, slots_per_run, cluster = math.inf, math.inf, None
+    slots, cluster = math.inf, None
 
     def __init__(self, *attempts):
         self._attempts = list(attempts)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from risk_sac.config import CampaignSpec
 from risk_sac.records import State
-from risk_sac.run_folder.series import write_series
+from risk_sac.run_folder.series import pack_series, write_series
 from service.errors import StorageError
 from service.views.progress import MOST_BYTES, eta_s, log_tail, retry_after_s
 from service.views.series import load_series
@@ -21,7 +21,7 @@ def test_a_lost_or_damaged_series_is_a_storage_error_not_a_crash(tmp_path):
     path = tmp_path / "a.npz"
     with pytest.raises(StorageError, match=r"'a\.npz' is gone"):
         load_series(path, None)
-    write_series(path, series_arrays())
+    write_series(path, pack_series(series_arrays()))
     whole = path.read_bytes()
     for size in range(0, len(whole), 97):
         path.write_bytes(whole[:size])
@@ -38,21 +38,21 @@ def test_a_lost_or_damaged_series_is_a_storage_error_not_a_crash(tmp_path):
     ids=["too large", "unknown kind", "another shape", "no kind"],
 )
 def test_what_no_worker_writes_is_a_storage_error_not_a_crash(wrong, tmp_path):
-    write_series(tmp_path / "a.npz", series_arrays() | wrong)
+    write_series(tmp_path / "a.npz", pack_series(series_arrays() | wrong))
     with pytest.raises(StorageError, match=r"'a\.npz' is damaged"):
         load_series(tmp_path / "a.npz", None)
 
 
 def test_a_series_that_is_not_the_one_that_was_written_is_never_shown(tmp_path):
     path = tmp_path / "a.npz"
-    sha256 = write_series(path, series_arrays()).sha256
+    sha256 = write_series(path, pack_series(series_arrays())).sha256
     assert load_series(path, sha256) == load_series(path, None)
     whole = path.read_bytes()
     for bit in range(0, 8 * len(whole), 8 * len(whole) // 60):
         path.write_bytes(whole[: bit // 8] + bytes([whole[bit // 8] ^ 1 << bit % 8]) + whole[bit // 8 + 1 :])
         with pytest.raises(StorageError, match=f"'a.npz' is damaged: its SHA-256 is [0-9a-f]{{64}}, wanted {sha256}"):
             load_series(path, sha256)
-    write_series(path, series_arrays() | {"soft_min": np.ones(3)})  # undamaged, and another
+    write_series(path, pack_series(series_arrays() | {"soft_min": np.ones(3)}))  # undamaged, and another
     with pytest.raises(StorageError, match="damaged"):
         load_series(path, sha256)
 
