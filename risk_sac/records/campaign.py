@@ -140,6 +140,7 @@ class CampaignHead(Record):
 
     id: str
     label: str
+    tags: tuple[str, ...] = ()
     state: State
     reason: str | None
     """Why it failed, is paused, or waits."""

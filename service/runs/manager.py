@@ -186,6 +186,12 @@ class Manager:
         with self._lock:
             return self._ledger.triage(campaign_id, failure_id, state, comment, project)
 
+    def tag(self, campaign_id: str, tags: Sequence[str], project: str | None = None) -> StoredCampaign:
+        """Replaces the tags of a campaign."""
+        with self._lock:
+            self._ledger.tag(campaign_id, tags, project)
+            return self._store.campaign(campaign_id)
+
     def delete(self, campaign_id: str, project: str | None = None) -> None:
         """Deletes a campaign with its files; ConflictError if it has not ended."""
         with self._lock:

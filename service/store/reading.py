@@ -122,6 +122,7 @@ class Store:
         family: str | None = None,
         method: str | None = None,
         label: str | None = None,
+        tag: str | None = None,
         search: str | None = None,
     ) -> StoredPage[StoredCampaign]:
         """Newest first, from the campaign just older than number `before`.
@@ -134,6 +135,8 @@ class Store:
         run = {name: value for name, value in (("family", family), ("method", method)) if value is not None}
         if run:
             query = query.where(CampaignRow.number.in_(select(RunRow.campaign_number).filter_by(**run)))
+        if tag is not None:
+            query = query.where(CampaignRow.tags.contains(f",{tag},", autoescape=True))
         for word in (search or "").split():
             found = (column.icontains(word, autoescape=True) for column in (CampaignRow.label, CampaignRow.id))
             query = query.where(or_(*found))

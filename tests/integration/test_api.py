@@ -116,6 +116,23 @@ def listed(client, **query):
     return [item["id"] for item in client.get("/v1/campaigns", params=query).json()["items"]]
 
 
+def test_tags_are_posted_replaced_and_asked_for(shared):
+    campaign = shared.post(tags=["nightly", "release:2.1"], budget={"episodes": 1})
+    path = f"/v1/campaigns/{campaign}"
+    tag = poll(shared.client, path).headers["etag"]
+    assert listed(shared.client, tag="release:2.1") == [campaign]
+    answer = shared.client.put(f"{path}/tags", json={"tags": ["braking"]})
+    assert (answer.status_code, answer.json()["tags"]) == (200, ["braking"])
+    assert answer.json()["spec"]["tags"] == ["nightly", "release:2.1"]  # as it was posted
+    assert poll(shared.client, path).headers["etag"] != tag
+    assert (listed(shared.client, tag="nightly"), listed(shared.client, tag="braking")) == ([], [campaign])
+    for tags, field in ((["x", "x"], "tags"), (["a,b"], "tags[0]"), (["a"] * 11, "tags")):
+        refused = shared.client.put(f"{path}/tags", json={"tags": tags})
+        assert (refused.status_code, refused.json()["errors"][0]["field"]) == (422, field)
+    assert shared.client.get("/v1/campaigns", params={"tag": "a b"}).json()["errors"][0]["field"] == "tag"
+    assert shared.get(campaign)["tags"] == ["braking"]
+
+
 def test_what_a_client_does_shows_at_once_and_until_then_tags_stay(serve):
     service = serve()
     seen = []
