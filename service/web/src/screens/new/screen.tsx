@@ -129,6 +129,7 @@ function CampaignForm({ known: [description, known, methods, scenarios], from, g
           <More wrong={wrong} begun={from !== undefined}>
             <section class="card">
               <SchemaField field={field("label")} path={["label"]} />
+              <SchemaField field={field("tags")} path={["tags"]} />
               <Choices
                 field={field("methods")}
                 path={["methods"]}
@@ -184,7 +185,7 @@ function More({ wrong, begun, children }: { wrong: readonly Wrong[]; begun: bool
     <details class="more-settings" open={shown} onToggle={(event) => setOpened(event.currentTarget.open)}>
       <summary>
         <span class="group-title">More settings</span>
-        <span class="faint small">label, methods, seeds, budget, operational design domain, requirements, learner</span>
+        <span class="faint small">label, tags, methods, seeds, budget, operational design domain, requirements, learner</span>
         {broken > 0 && <span class="tag failed">{broken} wrong</span>}
       </summary>
       {shown && <div class="grid parts">{children}</div>}
