@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from pydantic_core import from_json
 from sqlalchemy import and_, func, or_, select
-from sqlalchemy.orm import Session, selectinload
+from sqlalchemy.orm import Session, joinedload, selectinload
 
 from risk_sac.records import FINAL, EndNotice, Episode, EpisodeRecord, Outcome, State, StateChange, Triage, TriageState
 from service.errors import StorageError
@@ -17,6 +17,7 @@ from service.store.database import connect, open_database, storage_errors
 from service.store.queries import (
     HOUR_S,
     Judged,
+    QueuedPlace,
     episode_page,
     event_page,
     find_campaign,
@@ -292,6 +293,21 @@ class Store:
             row = session.get_one(RunRow, number)
             campaign = row.campaign
             return StoredCampaign.from_row(campaign, self._shown_revision(campaign.revision), alone=row)
+
+    def campaigns_of(self, numbers: Collection[int]) -> dict[int, StoredCampaign]:
+        """Returns the campaign of each of these runs that exists, with this run alone."""
+        query = select(RunRow).options(joinedload(RunRow.campaign)).where(RunRow.number.in_(numbers))
+        with self._reading() as session:
+            return {
+                row.number: StoredCampaign.from_row(row.campaign, str(row.campaign.revision), alone=row)
+                for row in session.scalars(query)
+            }
+
+    def queued(self) -> list[QueuedPlace]:
+        """Returns all runs that wait, the oldest first."""
+        query = select(RunRow.number, CampaignRow.project).join(RunRow.campaign).where(RunRow.state == State.QUEUED)
+        with self._reading() as session:
+            return [QueuedPlace(*row) for row in session.execute(query.order_by(RunRow.number))]
 
     def usage(self, project: str) -> Usage:
         """Returns a project's current usage."""

@@ -142,6 +142,12 @@ def test_what_a_client_does_shows_at_once_and_until_then_tags_stay(serve):
             assert listed(service.client) == seen
             assert listed(service.client, label=label) == seen[:1]
     campaign = seen[0]
+    workers = poll(service.client, "/v1/workers").json()
+    at_work, waiting = ([run["campaign_id"] for run in workers[part]] for part in ("at_work", "waiting"))
+    assert at_work + waiting == seen[::-1]
+    assert workers["taken"] == sum(run["slots"] for run in workers["at_work"]) <= workers["slots"]
+    assert all(run["silent_s"] < 60 for run in workers["at_work"])
+    assert [run["place"] for run in workers["waiting"]] == list(range(1, workers["queued"] + 1))
     poll(service.client, f"/v1/campaigns/{campaign}")
     accepted = service.client.post(f"/v1/campaigns/{campaign}/cancel").json()["state"]
     assert accepted in ("cancelling", "cancelled")
