@@ -123,6 +123,7 @@ SCREENS: dict[str, tuple[str, Callable[[Page], None]]] = {
     "twin": ("campaigns/{campaign}/failures/{failure}/twin/idle", plots),
     "report": ("campaigns/{campaign}/compare", heading),
     "compare": ("compare?ids={campaign}", heading),
+    "workers": ("workers", heading),
     "maps": ("maps", heading),
     "map": ("maps/{network}", places),
     "coverage": ("campaigns/{campaign}/coverage", covered),

@@ -10,9 +10,9 @@ import "./tags.css";
 export function Tags({ tags, filters = {} }: { tags: readonly string[]; filters?: Record<string, string | undefined> }) {
   if (tags.length === 0) return null;
   return (
-    <span class="chips">
+    <span class="tag-links">
       {tags.map((tag) => (
-        <a key={tag} class="tag chip" href={address(["campaigns"], { ...filters, tag })} aria-label={`Campaigns with the tag ${tag}`}>
+        <a key={tag} class="tag tag-link" href={address(["campaigns"], { ...filters, tag })} aria-label={`Campaigns with the tag ${tag}`}>
           {tag}
         </a>
       ))}
