@@ -37,7 +37,7 @@ def rows(page: Page) -> Locator:
 
 
 def shown_ids(page: Page) -> list[str]:
-    links = page.locator("td.campaign-name a")
+    links = page.locator("td.campaign-name > a")
     return [str(link.get_attribute("href")).rsplit("/", 1)[1] for link in links.all()]
 
 
@@ -124,8 +124,8 @@ def test_words_of_a_label_or_an_id_find_a_campaign_while_they_are_typed(
     expect(rows(page)).to_have_count(3)
     for text, found in (("MORE one", small["one more"]), ("b>7", campaign), (campaign[3:12], campaign)):
         page.get_by_role("searchbox", name="Search").fill(text)
-        expect(page.locator("td.campaign-name a")).to_have_count(1)
-        expect(page.locator("td.campaign-name a")).to_have_attribute("href", f"#/campaigns/{found}")
+        expect(page.locator("td.campaign-name > a")).to_have_count(1)
+        expect(page.locator("td.campaign-name > a")).to_have_attribute("href", f"#/campaigns/{found}")
     page.get_by_role("searchbox", name="Search").fill("100% more")  # no wildcard
     expect(page.get_by_text("No campaign matches.")).to_be_visible()
     page.reload()
