@@ -3,7 +3,7 @@
 `service.networks.surveys` starts `service.networks.surveyor REPORT survey|keep …` in the folder of a checked network,
 with limits on time and memory, since a search takes seconds that would block the server.
 
-    survey                 writes `places.json` and `places.png` beside the net
+    survey                 writes `places.json`, `places.png` and `roads.json` beside the net
     keep PATTERN [PLACE]   keeps that place, or all of the pattern, and reports the names of the families that they are
 """
 
@@ -14,15 +14,18 @@ from pathlib import Path
 
 from risk_sac.errors import ConfigError
 from risk_sac.failures.from_above import map_png
+from risk_sac.failures.net import surfaces
 from risk_sac.maps.finder import FINDERS, Map, survey
 from risk_sac.maps.found import Pattern
 from risk_sac.run_folder.durable import replace_file, write_sealed
+from risk_sac.world.net import Net
 from risk_sac.world.read_net import read_net
 from service.networks.schemas import (
     MAX_PLACES,
     PICTURE,
     PLACES,
     PROGRESS,
+    ROADS,
     SURVEY_MEMORY_BYTES,
     Elsewhere,
     FoundPlace,
@@ -55,8 +58,15 @@ def _survey() -> dict[str, object]:
         nowhere=dict(map_survey.nowhere),
     )
     replace_file(Path(PICTURE), map_png(net, map_survey))
+    replace_file(Path(ROADS), _roads(net))
     write_sealed(Path(PLACES), places)
     return {}
+
+
+def _roads(net: Net) -> bytes:
+    """Returns the ground of a net as `RoadsBody` has it, to 0.1 m, without signals."""
+    ground = [{"use": each.use, "outline": each.outline.round(1).tolist()} for each in surfaces(net)]
+    return json.dumps({"surfaces": ground, "signals": []}, separators=(",", ":")).encode()
 
 
 class SurveyProgress:

@@ -20,8 +20,8 @@ from risk_sac.records import Record
 from service.api.context import CurrentCaller, Service, require_admin
 from service.api.pages import STOPPED, UNREADY, Responses, link
 from service.api.problems import ProblemError, Reason
+from service.runs.workers import Workers, workers_body
 from service.store.queries import check_readable
-from service.views.workers import Workers, workers_body
 
 
 class Health(Record):

@@ -1,5 +1,5 @@
+from service.runs.workers import start_order
 from service.store.queries import QueuedPlace
-from service.views.workers import start_order
 
 QUEUED = [QueuedPlace(number, project) for number, project in enumerate("aaabbc")]
 
