@@ -51,7 +51,8 @@ def question(page: Page) -> None:
 
 
 def places(page: Page) -> None:
-    page.get_by_alt_text("The map from above").wait_for()
+    page.get_by_role("group", name="The map from above").wait_for()
+    page.locator("button.spot").first.click()
     page.get_by_text("Where no pattern fits").click()
 
 
