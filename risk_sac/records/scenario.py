@@ -56,6 +56,8 @@ class ScenarioSummary(Record):
     """A number, or arithmetic over parameters."""
     like: str | None
     """Shipped family whose prior fits."""
+    episode_s: Mapping[str, float] = {}
+    """Method → seconds that an episode takes a slot: median over newest runs of this server."""
 
 
 class ScenarioList(Record):

@@ -5,6 +5,7 @@ import time
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from statistics import median
 from typing import NamedTuple
 
 from pydantic_core import from_json
@@ -31,6 +32,7 @@ from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, NoticeRow, R
 
 DAY_HOURS = 24
 BATCH = 1000  # rows in memory at once
+NEWEST_RUNS = 1000  # that tell how long an episode takes
 NOTICES = 20  # messages that are read at once
 DRIVERS = ("driver", "profile")  # fields of an ego that name it
 
@@ -341,6 +343,16 @@ class Store:
         """All that any campaign names."""
         with self._reading() as session:
             return set(session.scalars(select(RunRow.family).distinct()))
+
+    def episode_times(self) -> dict[str, dict[str, float]]:
+        """Returns family → method → seconds that an episode takes a slot, the median over the newest runs."""
+        query = select(RunRow.family, RunRow.method, RunRow.pace_s * func.coalesce(RunRow.processes, 1))
+        query = query.where(RunRow.pace_s.is_not(None)).order_by(RunRow.number.desc()).limit(NEWEST_RUNS)
+        times: dict[str, dict[str, list[float]]] = {}
+        with self._reading() as session:
+            for family, method, slot_s in session.execute(query):
+                times.setdefault(family, {}).setdefault(method, []).append(slot_s)
+        return {family: {method: median(each) for method, each in methods.items()} for family, methods in times.items()}
 
     def priors(self) -> set[str]:
         """All copies of earlier scripts that any campaign names."""
