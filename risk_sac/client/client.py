@@ -4,7 +4,7 @@ import io
 import json
 import os
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Literal, Self, TypeVar
 from urllib.parse import quote
 from uuid import uuid4
@@ -139,11 +139,17 @@ class Client:
         family: str | None = None,
         method: str | None = None,
         label: str | None = None,
+        tag: str | None = None,
         page: int = PAGE,
     ) -> Iterator[CampaignSummary]:
         """Campaigns, newest first; read page by page as far as they are asked for."""
-        query: Query = {"state": state, "family": family, "method": method, "label": label, "limit": page}
-        return self._items(CampaignPage, "v1/campaigns", query)
+        query: Query = {"state": state, "family": family, "method": method, "label": label, "tag": tag}
+        return self._items(CampaignPage, "v1/campaigns", query | {"limit": page})
+
+    def tag(self, campaign_id: str, tags: Sequence[str]) -> Campaign:
+        """Replaces the tags of a campaign."""
+        body = json.dumps({"tags": list(tags)})
+        return read(Campaign, self._transport.ask("PUT", f"{_path(campaign_id)}/tags", body=body))
 
     def networks(self) -> Iterator[NetworkName]:
         """Uploaded networks, newest first."""

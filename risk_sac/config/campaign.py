@@ -5,8 +5,10 @@ The same `CampaignSpec` is the REST body, the CLI's YAML and the stored record.
 
 import hashlib
 import math
+import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from operator import not_
 from typing import Annotated, Any, Literal, Self
 from urllib.parse import unquote, urlsplit
 
@@ -48,6 +50,17 @@ class BoundaryConfig(Settings):
 
 FamilyName = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,59}$")]
 """A scenario that ships, or one that a library of scenarios keeps; its last digits are of its document and nets."""
+
+
+def _tag(text: str) -> str:
+    if not re.fullmatch(TAG, text):
+        raise ConfigError("", shown(text), "1 to 30 lowercase letters, digits or ._:-, a letter or digit first")
+    return text
+
+
+TAG = "[a-z0-9][a-z0-9._:-]{0,29}"
+Tag = Annotated[str, AfterValidator(_tag), Field(json_schema_extra={"pattern": f"^{TAG}$"})]
+Tags = Annotated[tuple[Tag, ...], Field(max_length=10)]
 Seed = Annotated[int, Field(ge=0, le=2**31 - 1)]
 MOST_EPISODES = 2_000_000  # of a campaign; the database takes about 1.2 KB for each
 MOST_FAMILIES = 100  # of a campaign
@@ -209,10 +222,18 @@ def plain_url(text: str) -> str:
     return text
 
 
+def check_once(field: str, values: Sequence[object]) -> None:
+    """Refuses values with repeats."""
+    if len(set(values)) < len(values):
+        raise ConfigError(field, f"{list(values)}", "each value once")
+
+
 class CampaignSpec(Settings):
     """Families × methods × seeds on one equal budget."""
 
     label: Annotated[str, Field(max_length=200)] = ""
+    tags: Tags = Field(default=(), exclude_if=not_)
+    """Words to find it by."""
     families: Annotated[tuple[FamilyName, ...], Field(min_length=1, max_length=MOST_FAMILIES)]
     methods: Annotated[tuple[MethodName, ...], Field(min_length=1, max_length=20)] = ("risk-sac",)
     seeds: Annotated[tuple[Seed, ...], Field(min_length=1, max_length=100)] = (0,)
@@ -268,10 +289,8 @@ class CampaignSpec(Settings):
 
     @model_validator(mode="after")
     def _no_repeats(self) -> Self:
-        for name in ("families", "methods", "seeds"):
-            values = getattr(self, name)
-            if len(set(values)) < len(values):
-                raise ConfigError(name, f"{list(values)}", "each value once")
+        for name in ("families", "methods", "seeds", "tags"):
+            check_once(name, getattr(self, name))
         names = [requirement.name for requirement in self.requirements]
         if len(set(names)) < len(names):
             raise ConfigError("requirements", f"the names {names}", "each name once")

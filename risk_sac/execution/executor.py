@@ -69,8 +69,12 @@ class ClusterNode:
     address: str
     alive: bool
     slots: int  # runs that it has room for
-    runs: int = 0  # of this server's, at work on it
-    silent_s: float = 0.0  # since the last report of any of them; 0 without any
+    silences: Mapping[int, float] = field(default_factory=dict)  # this server's run on it -> s since its last report
+
+    @property
+    def silent_s(self) -> float:
+        """Time since the last report of any of its runs; 0 without any."""
+        return min(self.silences.values(), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +113,9 @@ class Executor(Protocol):
 
         Of several calls the earliest deadline counts.
         """
+
+    def silent_s(self, number: int) -> float | None:
+        """Returns the time since the last sign of life of a run's worker; None without a worker."""
 
     def wake(self) -> None:
         """Lets a waiting `events` return early."""

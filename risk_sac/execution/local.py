@@ -161,13 +161,16 @@ class Lease:
 
     A worker sends heartbeats. One whose interpreter is held up, by a long compilation say, cannot, but it uses its
     processor; one that was stopped does neither. Only time during which this process watched counts.
+
+    Attributes:
+      silent_s: time since the last sign of life.
     """
 
     def __init__(self, lease_s: float, stall_s: float) -> None:
         self._lease_s = lease_s
         self._stall_s = stall_s
         self._signs = Signs()
-        self._silent_s = self._stalled_s = 0.0
+        self.silent_s = self._stalled_s = 0.0
 
     def passed(self, watched_s: float, signs: Signs) -> str | None:
         """Adds `watched_s`, the time since the last call, s.
@@ -175,9 +178,9 @@ class Lease:
         Returns the reason why the worker is lost, if it is.
         """
         before, self._signs = self._signs, signs
-        self._silent_s = 0.0 if signs != before else self._silent_s + watched_s
+        self.silent_s = 0.0 if signs != before else self.silent_s + watched_s
         self._stalled_s = 0.0 if signs.episodes != before.episodes else self._stalled_s + watched_s
-        if self._silent_s >= self._lease_s:
+        if self.silent_s >= self._lease_s:
             return f"worker gave no sign of life for {self._lease_s:g} s"
         if self._stalled_s >= self._stall_s:
             return f"worker finished no episode for {self._stall_s:g} s"
@@ -214,6 +217,12 @@ class LocalExecutor:
     def wake(self) -> None:
         """See `Executor.wake`."""
         self._messages.put(None)
+
+    def silent_s(self, number: int) -> float | None:
+        """See `Executor.silent_s`."""
+        with self._lock:
+            worker = self._workers.get(number)
+        return None if worker is None else worker.silent_s
 
     def close(self) -> None:
         """Holds nothing."""
@@ -253,6 +262,11 @@ class _Worker:
         self._stop_by = self._leave_by = math.inf  # monotonic times: after the order to stop; after its silence
         self._given_up: Exited | None = None
         self._looked_at = time.monotonic()
+
+    @property
+    def silent_s(self) -> float:
+        """Time since its last sign of life."""
+        return self._lease.silent_s
 
     def stop(self, grace_s: float) -> None:
         """SIGTERM the first time; SIGKILL once the shortest grace time is over."""

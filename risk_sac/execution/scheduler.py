@@ -98,6 +98,7 @@ class Active:
     cancelled: bool = False
     abandoned: bool = False  # what it still says is not wanted, since another worker will say it again
     last: Finished | Failed | None = None
+    since: float = field(default_factory=time.time)
 
 
 class Scheduler:

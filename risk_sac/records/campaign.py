@@ -140,6 +140,7 @@ class CampaignHead(Record):
 
     id: str
     label: str
+    tags: tuple[str, ...] = ()
     state: State
     reason: str | None
     """Why it failed, is paused, or waits."""
@@ -323,6 +324,8 @@ class ScenarioSummary(Record):
     """A number, or arithmetic over parameters."""
     like: str | None
     """Shipped family whose prior fits."""
+    episode_s: Mapping[str, float] = {}
+    """Method → seconds that an episode takes a slot: median over newest runs of this server."""
 
 
 class ScenarioList(Record):

@@ -22,10 +22,11 @@ from service.api.gate import PUBLIC
 from service.api.pages import header
 from service.api.posted import campaign_schemas, input_schemas
 from service.api.problems import ProblemDetails
+from service.api.routes.campaigns import PostedTags
 from service.api.routes.episodes import PostedTriage
 from service.api.routes.reports import PostedRegression
 
-SERVER = "http://127.0.0.1:8000"
+SERVER = "localhost:8000"
 TITLES = {
     "put_triage": "Set triage",
     "get_log": "Get run log",
@@ -54,7 +55,7 @@ PARAMETERS: Mapping[str, str] = {
 }
 """Of what a path has to name."""
 QUERIES: Mapping[str, Mapping[str, str]] = {
-    "list_campaigns": {"state": "running", "search": "nightly"},
+    "list_campaigns": {"state": "running", "tag": "nightly"},
     "list_episodes": {"outcome": "failure", "limit": "10"},
     "list_failures": {"grade": "preventable", "severity": "severe"},
     "get_curves": {"points": "50"},
@@ -96,6 +97,7 @@ BODIES: Mapping[str, Mapping[str, Any]] = {
     "check_scenario": SCENARIOS,
     "post_campaign": CAMPAIGNS,
     "check_campaign": CAMPAIGNS,
+    "put_tags": {"Two tags": {"tags": ["nightly", "release:2.1"]}},
     "put_triage": {"A confirmed failure": {"state": "confirmed", "comment": "late braking, see ticket 12"}},
     "post_regression": {
         "Another ego": {"campaign_id": PARAMETERS["campaign_id"], "ego": {"profile": "careful"}},
@@ -189,7 +191,13 @@ def openapi(app: FastAPI) -> dict[str, Any]:
 def _document(app: FastAPI) -> dict[str, Any]:
     document = get_openapi(title=app.title, version=app.version, description=app.description, routes=app.routes)
     schemas = document["components"]["schemas"]
-    schemas |= campaign_schemas() | input_schemas(PostedRegression) | input_schemas(PostedTriage) | _event_schemas()
+    schemas |= (
+        campaign_schemas()
+        | input_schemas(PostedRegression)
+        | input_schemas(PostedTriage)
+        | input_schemas(PostedTags)
+        | _event_schemas()
+    )
     for operations in document["paths"].values():
         for operation in operations.values():
             for status, response in operation["responses"].items():

@@ -70,7 +70,7 @@ OF_REQUIREMENTS = {
 NODE_GAUGES: tuple[tuple[str, str, Callable[[ClusterNode], float]], ...] = (
     ("alive", "Whether the cluster counts the node as alive.", lambda node: node.alive),
     ("slots", "Runs that the node has room for.", lambda node: node.slots),
-    ("runs", "Runs at work on the node.", lambda node: node.runs),
+    ("runs", "Runs at work on the node.", lambda node: len(node.silences)),
     ("silent_seconds", "Since a run on the node was heard of, at least.", lambda node: node.silent_s),
 )
 RATES = {"ecr": "Valid contacts", "pcr": "Preventable contacts"}

@@ -10,7 +10,7 @@ It is started as `service.networks.helper QUESTION ANSWER ACTION`, with limits o
 EGO is the ego among the entities of OpenSCENARIO, or empty. `service.networks.surveys` starts it in the folder of a
 checked network, since a search takes seconds that would block the server:
 
-    survey                 writes `places.json` and `places.png` beside the net
+    survey                 writes `places.json`, `places.png` and `roads.json` beside the net
     keep PATTERN [PLACE]   keeps that place, or all of the pattern, and answers with the families that they are
 """
 
@@ -25,6 +25,7 @@ from pathlib import Path
 
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError
+from risk_sac.failures.net import surfaces
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
 from risk_sac.maps.finder import FINDERS, Map, survey
@@ -43,6 +44,7 @@ from risk_sac.scenario.reading import (
     shipped_names,
     too_long,
 )
+from risk_sac.world.net import Net
 from risk_sac.world.read_net import read_net
 from service.networks.schemas import (
     MAX_PLACES,
@@ -50,6 +52,7 @@ from service.networks.schemas import (
     PICTURE,
     PLACES,
     PROGRESS,
+    ROADS,
     Elsewhere,
     FoundPlace,
     Places,
@@ -179,8 +182,15 @@ def _survey() -> bytes:
         nowhere=dict(map_survey.nowhere),
     )
     replace_file(Path(PICTURE), map_png(net, map_survey))
+    replace_file(Path(ROADS), _roads(net))
     write_sealed(Path(PLACES), places)
     return b"{}"
+
+
+def _roads(net: Net) -> bytes:
+    """Returns the ground of a net as `RoadsBody` has it, to 0.1 m, without signals."""
+    ground = [{"use": each.use, "outline": each.outline.round(1).tolist()} for each in surfaces(net)]
+    return json.dumps({"surfaces": ground, "signals": []}, separators=(",", ":")).encode()
 
 
 class SurveyProgress:

@@ -21,7 +21,7 @@ MAX_PLACES = 100  # of a campaign
 STEPS, STEP_S = 3, 0.1  # that the simulator runs
 
 MEDIA_TYPES = ("application/xml", "text/xml", "application/gzip", "application/x-gzip", "application/zip")
-PLACES, PICTURE = "places.json", "places.png"  # what a search for places leaves beside the net
+PLACES, PICTURE, ROADS = "places.json", "places.png", "roads.json"  # what a search for places leaves beside the net
 PROGRESS = "progress"  # of the search, as long as it goes on
 
 

@@ -13,7 +13,7 @@ from risk_sac.run_folder.durable import read_sealed
 from service.errors import BusyError, disk_refusals
 from service.networks.network_store import NetworkStore
 from service.networks.scenarios import ask_helper
-from service.networks.schemas import PICTURE, PLACES, PROGRESS, SURVEY_S, Places
+from service.networks.schemas import PICTURE, PLACES, PROGRESS, ROADS, SURVEY_S, Places
 
 AT_ONCE = 2
 MOST_WAITING = 16
@@ -62,10 +62,21 @@ class Surveys:
 
     def picture(self, network_id: str, project: str | None) -> bytes:
         """Returns a PNG of the network with its places; raises as `places`, or `BusyError` until drawn."""
+        return self._left(network_id, project, PICTURE)
+
+    def roads(self, network_id: str, project: str | None) -> bytes:
+        """Returns the ground of the network as JSON; raises as `picture`."""
+        return self._left(network_id, project, ROADS)
+
+    def _left(self, network_id: str, project: str | None, name: str) -> bytes:
+        """Reads a file that the search for places leaves."""
         if (places := self.places(network_id, project)).progress < 1:
             said = f"the places are searched for ({places.progress:.0%}); try again in {RETRY_AFTER_S} s"
             raise BusyError(said, RETRY_AFTER_S)
-        return (self._networks.folder(network_id, project) / PICTURE).read_bytes()
+        folder = self._networks.folder(network_id, project)
+        if not (folder / name).exists():  # an earlier version searched
+            _result(self._job((network_id,), folder, ["survey"]))
+        return (folder / name).read_bytes()
 
     def keep(self, network_id: str, project: str | None, pattern: str, place: str | None) -> list[str]:
         """Stores a place, or all places of a pattern, as families; returns their names."""

@@ -15,7 +15,7 @@ from risk_sac.config import CampaignSpec
 from risk_sac.env.problem import checked_campaign
 from risk_sac.execution.executor import FOLDER, ClusterState, Executor, WorkerProgram
 from risk_sac.execution.messages import EpisodeDone, Finished
-from risk_sac.execution.scheduler import MOST_AT_ONCE, QueuedRun, Scheduler, SlotUse
+from risk_sac.execution.scheduler import MOST_AT_ONCE, Active, QueuedRun, Scheduler, SlotUse
 from risk_sac.records import State, Triage, TriageState
 from risk_sac.run_folder.durable import remove_abandoned, remove_temporaries
 from risk_sac.search.prior.earlier import PriorContent, keep
@@ -77,6 +77,20 @@ class Manager:
     def cluster(self) -> ClusterState | None:
         """Cluster that runs execute on; None on this machine."""
         return self._executor.cluster
+
+    def at_work(self) -> list[Active]:
+        """Returns the runs that have a worker, the oldest first."""
+        with self._lock:
+            return [self._scheduler.active[number] for number in sorted(self._scheduler.active)]
+
+    def silent_s(self, number: int) -> float | None:
+        """Returns the time since the last sign of life of a run's worker; None without a worker."""
+        return self._executor.silent_s(number)
+
+    def node_of(self, number: int) -> str | None:
+        """Returns the address of the cluster's node that executes a run; None on this machine."""
+        nodes = () if self._executor.cluster is None else self._executor.cluster.nodes
+        return next((node.address for node in nodes if number in node.silences), None)
 
     @property
     def workers(self) -> int:
@@ -185,6 +199,12 @@ class Manager:
         """Stores the triage of a failure."""
         with self._lock:
             return self._ledger.triage(campaign_id, failure_id, state, comment, project)
+
+    def tag(self, campaign_id: str, tags: Sequence[str], project: str | None = None) -> StoredCampaign:
+        """Replaces the tags of a campaign."""
+        with self._lock:
+            self._ledger.tag(campaign_id, tags, project)
+            return self._store.campaign(campaign_id)
 
     def delete(self, campaign_id: str, project: str | None = None) -> None:
         """Deletes a campaign with its files; ConflictError if it has not ended."""

@@ -7,7 +7,7 @@ from heapq import merge
 from itertools import islice
 from operator import attrgetter, itemgetter
 from statistics import fmean, median_low
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic_core import from_json
 from sqlalchemy import ColumnElement, Engine, Row, Select, and_, func, or_, select
@@ -77,6 +77,13 @@ class Judged:
             yield EpisodeRow.broke.contains(f",{self.broke},", autoescape=True)
         if not self.iid:
             yield EpisodeRow.phase != "iid"
+
+
+class QueuedPlace(NamedTuple):
+    """A run that waits, and its project."""
+
+    number: int
+    project: str
 
 
 def find_campaign(session: Session, campaign_id: str, project: str | None = None) -> CampaignRow:

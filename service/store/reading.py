@@ -5,11 +5,12 @@ import time
 import zlib
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from statistics import median
 from typing import NamedTuple
 
 from pydantic_core import from_json
 from sqlalchemy import and_, func, or_, select
-from sqlalchemy.orm import Session, selectinload
+from sqlalchemy.orm import Session, joinedload, selectinload
 
 from risk_sac.records import FINAL, EndNotice, Episode, EpisodeRecord, Outcome, State, StateChange, Triage, TriageState
 from service.errors import StorageError
@@ -17,6 +18,7 @@ from service.store.database import connect, open_database, storage_errors
 from service.store.queries import (
     HOUR_S,
     Judged,
+    QueuedPlace,
     episode_page,
     event_page,
     find_campaign,
@@ -30,6 +32,7 @@ from service.store.tables import IMPORTED, CampaignRow, EpisodeRow, NoticeRow, R
 
 DAY_HOURS = 24
 BATCH = 1000  # rows in memory at once
+NEWEST_RUNS = 1000  # that tell how long an episode takes
 NOTICES = 20  # messages that are read at once
 DRIVERS = ("driver", "profile")  # fields of an ego that name it
 
@@ -122,6 +125,7 @@ class Store:
         family: str | None = None,
         method: str | None = None,
         label: str | None = None,
+        tag: str | None = None,
         search: str | None = None,
     ) -> StoredPage[StoredCampaign]:
         """Newest first, from the campaign just older than number `before`.
@@ -134,6 +138,8 @@ class Store:
         run = {name: value for name, value in (("family", family), ("method", method)) if value is not None}
         if run:
             query = query.where(CampaignRow.number.in_(select(RunRow.campaign_number).filter_by(**run)))
+        if tag is not None:
+            query = query.where(CampaignRow.tags.contains(f",{tag},", autoescape=True))
         for word in (search or "").split():
             found = (column.icontains(word, autoescape=True) for column in (CampaignRow.label, CampaignRow.id))
             query = query.where(or_(*found))
@@ -290,6 +296,21 @@ class Store:
             campaign = row.campaign
             return StoredCampaign.from_row(campaign, self._shown_revision(campaign.revision), alone=row)
 
+    def campaigns_of(self, numbers: Collection[int]) -> dict[int, StoredCampaign]:
+        """Returns the campaign of each of these runs that exists, with this run alone."""
+        query = select(RunRow).options(joinedload(RunRow.campaign)).where(RunRow.number.in_(numbers))
+        with self._reading() as session:
+            return {
+                row.number: StoredCampaign.from_row(row.campaign, str(row.campaign.revision), alone=row)
+                for row in session.scalars(query)
+            }
+
+    def queued(self) -> list[QueuedPlace]:
+        """Returns all runs that wait, the oldest first."""
+        query = select(RunRow.number, CampaignRow.project).join(RunRow.campaign).where(RunRow.state == State.QUEUED)
+        with self._reading() as session:
+            return [QueuedPlace(*row) for row in session.execute(query.order_by(RunRow.number))]
+
     def usage(self, project: str) -> Usage:
         """Returns a project's current usage."""
         queued = (
@@ -322,6 +343,16 @@ class Store:
         """All that any campaign names."""
         with self._reading() as session:
             return set(session.scalars(select(RunRow.family).distinct()))
+
+    def episode_times(self) -> dict[str, dict[str, float]]:
+        """Returns family → method → seconds that an episode takes a slot, the median over the newest runs."""
+        query = select(RunRow.family, RunRow.method, RunRow.pace_s * func.coalesce(RunRow.processes, 1))
+        query = query.where(RunRow.pace_s.is_not(None)).order_by(RunRow.number.desc()).limit(NEWEST_RUNS)
+        times: dict[str, dict[str, list[float]]] = {}
+        with self._reading() as session:
+            for family, method, slot_s in session.execute(query):
+                times.setdefault(family, {}).setdefault(method, []).append(slot_s)
+        return {family: {method: median(each) for method, each in methods.items()} for family, methods in times.items()}
 
     def priors(self) -> set[str]:
         """All copies of earlier scripts that any campaign names."""

@@ -118,7 +118,9 @@ class StoredCampaign(CampaignHead):
     def from_row(cls, row: CampaignRow, revision: str, alone: RunRow | None = None) -> Self:
         """The campaign and its runs, or one of them alone."""
         runs = tuple(StoredRun.from_row(run, row.id) for run in (row.runs if alone is None else (alone,)))
-        return cls.model_validate(_columns(row) | {"spec_json": row.spec, "revision": revision, "runs": runs})
+        tags = tuple(filter(None, (row.tags or "").split(",")))
+        read = {"spec_json": row.spec, "revision": revision, "runs": runs, "tags": tags}
+        return cls.model_validate(_columns(row) | read)
 
     @property
     def families(self) -> list[str]:

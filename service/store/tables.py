@@ -53,6 +53,7 @@ class CampaignRow(Base):
     id: Mapped[str] = mapped_column(unique=True)
     project: Mapped[str]
     label: Mapped[str]
+    tags: Mapped[str | None]  # between commas: ",nightly,braking,"
     idempotency_key: Mapped[str | None]
     spec: Mapped[str] = mapped_column(Text)
     state: Mapped[str]

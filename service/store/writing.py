@@ -24,6 +24,7 @@ from service.store.queries import (
     find_failure,
     find_triage,
     hold_campaigns,
+    listed,
     next_sequence,
     pace_s,
     tally,
@@ -68,6 +69,7 @@ class Ledger:
     ) -> StoredCampaign:
         """Stores a new campaign with its runs, all queued; the message to its end links below the base URL."""
         row = CampaignRow(id=f"c{secrets.token_hex(8)}", project=project, idempotency_key=key, label=spec.label)
+        row.tags = listed(spec.tags)
         row.spec, row.state, row.created_at = spec.model_dump_json(), State.QUEUED, time.time()
         row.runs = [
             RunRow(
@@ -231,6 +233,14 @@ class Ledger:
             row.state, row.comment, row.changed_at = state, comment, time.time()
             campaign.revision += 1
             return Triage.model_validate(row, from_attributes=True)
+
+    def tag(self, campaign_id: str, tags: Sequence[str], project: str | None = None) -> None:
+        """Replaces the tags of a campaign; storing the same again changes nothing."""
+        with self._writing("tagging a campaign") as session:
+            campaign = find_campaign(session, campaign_id, project)
+            session.refresh(campaign, with_for_update=True)  # held, as by `hold_campaigns`
+            campaign.revision += campaign.tags != listed(tags)
+            campaign.tags = listed(tags)
 
     def note_try(self, campaign_id: str, reason: str | None, due_at: float | None = None) -> None:
         """Notes a try to deliver the message to a campaign's end.

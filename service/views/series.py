@@ -203,11 +203,12 @@ class SignalHeadBody(Record):
 
 
 class RoadsBody(Record):
-    """The ground of a failure, and its signals."""
+    """The ground of a failure or a network, and its signals."""
 
     surfaces: list[SurfaceBody]
     """In the order in which they are to be drawn; none where the scene's family had other roads then."""
     signals: list[SignalHeadBody]
+    """Of a failure."""
 
 
 class TwinBody(Record):

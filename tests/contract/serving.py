@@ -41,6 +41,9 @@ class IdleExecutor:
     def wake(self) -> None:
         self._wake.set()
 
+    def silent_s(self, number: int) -> None:
+        pass
+
     def close(self) -> None:
         pass
 

@@ -116,6 +116,23 @@ def listed(client, **query):
     return [item["id"] for item in client.get("/v1/campaigns", params=query).json()["items"]]
 
 
+def test_tags_are_posted_replaced_and_asked_for(shared):
+    campaign = shared.post(tags=["nightly", "release:2.1"], budget={"episodes": 1})
+    path = f"/v1/campaigns/{campaign}"
+    tag = poll(shared.client, path).headers["etag"]
+    assert listed(shared.client, tag="release:2.1") == [campaign]
+    answer = shared.client.put(f"{path}/tags", json={"tags": ["braking"]})
+    assert (answer.status_code, answer.json()["tags"]) == (200, ["braking"])
+    assert answer.json()["spec"]["tags"] == ["nightly", "release:2.1"]  # as it was posted
+    assert poll(shared.client, path).headers["etag"] != tag
+    assert (listed(shared.client, tag="nightly"), listed(shared.client, tag="braking")) == ([], [campaign])
+    for tags, field in ((["x", "x"], "tags"), (["a,b"], "tags[0]"), (["a"] * 11, "tags")):
+        refused = shared.client.put(f"{path}/tags", json={"tags": tags})
+        assert (refused.status_code, refused.json()["errors"][0]["field"]) == (422, field)
+    assert shared.client.get("/v1/campaigns", params={"tag": "a b"}).json()["errors"][0]["field"] == "tag"
+    assert shared.get(campaign)["tags"] == ["braking"]
+
+
 def test_what_a_client_does_shows_at_once_and_until_then_tags_stay(serve):
     service = serve()
     seen = []
@@ -125,6 +142,12 @@ def test_what_a_client_does_shows_at_once_and_until_then_tags_stay(serve):
             assert listed(service.client) == seen
             assert listed(service.client, label=label) == seen[:1]
     campaign = seen[0]
+    workers = poll(service.client, "/v1/workers").json()
+    at_work, waiting = ([run["campaign_id"] for run in workers[part]] for part in ("at_work", "waiting"))
+    assert at_work + waiting == seen[::-1]
+    assert workers["taken"] == sum(run["slots"] for run in workers["at_work"]) <= workers["slots"]
+    assert all(run["silent_s"] < 60 for run in workers["at_work"])
+    assert [run["place"] for run in workers["waiting"]] == list(range(1, workers["queued"] + 1))
     poll(service.client, f"/v1/campaigns/{campaign}")
     accepted = service.client.post(f"/v1/campaigns/{campaign}/cancel").json()["state"]
     assert accepted in ("cancelling", "cancelled")

@@ -43,6 +43,8 @@ def requirement(formula):
         (low(seeds=[-1]), "seeds[0]", "-1", ">= 0"),
         (low(label="x" * 201), "label", '"xxx', "at most 200 characters"),
         (low(label="a\x00b"), "label", '"a\\u0000b"', "text without NUL"),
+        (low(tags=["Nightly run"]), "tags[0]", '"Nightly run"', "lowercase letters, digits"),
+        (low(tags=["a"] * 2), "tags", "['a', 'a']", "each value once"),
         (low(odd={"environment": {"friction": {"low": 2, "high": 1}}}), "odd.environment.friction", "2", "low <= high"),
         (low(odd={"dynamic": {"ego_speed_mps": {"low": 60, "high": 70}}}), "odd.dynamic.ego_speed_mps", "", ""),
         (requirement("ttc_s >="), "requirements[0].formula", "'the end'", "a signal, a number or '('"),

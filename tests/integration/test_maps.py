@@ -70,6 +70,10 @@ def test_from_an_extract_of_a_town_to_the_results_of_a_campaign_on_it(shared):
     assert {place["pattern"] for place in places["items"]} == {"car_following", "crossing", "junction"}
     assert all(each["why"] for each in places["elsewhere"])
     assert service.client.get(f"{home}/places.png").content.startswith(b"\x89PNG")
+    ground_m = service.client.get(f"{home}/roads").raise_for_status().json()["surfaces"]
+    corners = np.array([corner for surface in ground_m for corner in surface["outline"]])
+    for place in places["items"] + places["elsewhere"]:  # each lies on the roads that are drawn
+        assert np.linalg.norm(corners - (place["x_m"], place["y_m"]), axis=1).min() < 150
     place = next(place for place in places["items"] if place["pattern"] == "junction")
     ground = {"network": taken.json()["id"], "pattern": "junction"}
     body = ground | {"place": place["place"], "methods": ["random"], "budget": {"episodes": 3}}

@@ -37,7 +37,7 @@ def rows(page: Page) -> Locator:
 
 
 def shown_ids(page: Page) -> list[str]:
-    links = page.locator("td.campaign-name a")
+    links = page.locator("td.campaign-name > a")
     return [str(link.get_attribute("href")).rsplit("/", 1)[1] for link in links.all()]
 
 
@@ -97,6 +97,26 @@ def test_filters_are_the_apis_and_stay_in_the_address(
     assert shown_ids(page) == [small[HOSTILE]]
 
 
+def test_a_tag_is_added_to_a_campaign_and_a_click_on_it_filters_the_list(
+    page_at: Callable[..., Page], service: Service, small: dict[str, str]
+) -> None:
+    page = page_at(f"campaigns/{small['one more']}", allowed=("422",))
+    page.get_by_role("button", name="Add tags").click()
+    field = page.get_by_role("textbox", name="Tags")
+    field.fill("Nightly, wrong!")
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("alert")).to_contain_text("tags[1]")
+    field.fill("Nightly, release:2.1")
+    page.get_by_role("button", name="Save").click()
+    expect(page.get_by_role("button", name="Change tags")).to_be_visible()
+    assert service.get(small["one more"])["tags"] == ["nightly", "release:2.1"]
+    page.goto(f"{service.client.base_url}/page/#/campaigns?state=succeeded")
+    row(page, small["one more"]).get_by_role("link", name="nightly").click()
+    expect(page).to_have_url(re.compile(r"state=succeeded&tag=nightly$"))
+    expect(rows(page)).to_have_count(1)
+    assert shown_ids(page) == [small["one more"]]
+
+
 def test_words_of_a_label_or_an_id_find_a_campaign_while_they_are_typed(
     page_at: Callable[..., Page], campaign: str, small: dict[str, str]
 ) -> None:
@@ -104,8 +124,8 @@ def test_words_of_a_label_or_an_id_find_a_campaign_while_they_are_typed(
     expect(rows(page)).to_have_count(3)
     for text, found in (("MORE one", small["one more"]), ("b>7", campaign), (campaign[3:12], campaign)):
         page.get_by_role("searchbox", name="Search").fill(text)
-        expect(page.locator("td.campaign-name a")).to_have_count(1)
-        expect(page.locator("td.campaign-name a")).to_have_attribute("href", f"#/campaigns/{found}")
+        expect(page.locator("td.campaign-name > a")).to_have_count(1)
+        expect(page.locator("td.campaign-name > a")).to_have_attribute("href", f"#/campaigns/{found}")
     page.get_by_role("searchbox", name="Search").fill("100% more")  # no wildcard
     expect(page.get_by_text("No campaign matches.")).to_be_visible()
     page.reload()

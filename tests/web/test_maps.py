@@ -37,10 +37,6 @@ def test_from_a_file_to_a_campaign_at_one_of_its_places(
     found = service.client.get(f"/v1/networks/{network}/places").raise_for_status().json()["items"]
     places = page.get_by_role("region", name="Places")
     expect(places.get_by_role("heading")).to_have_text(f"{len(found)} places")
-    picture = page.get_by_alt_text("The map from above")
-    expect(picture).to_be_visible()
-    page.emulate_media(color_scheme="dark")
-    expect(picture).to_have_css("filter", "invert(1) hue-rotate(180deg)")
     page.get_by_label("Pattern").select_option("junction")
     page.get_by_label("Search").fill("from_north")
     wanted = [each for each in found if each["pattern"] == "junction" and "from_north" in json.dumps(each)]
@@ -66,6 +62,37 @@ def test_from_a_file_to_a_campaign_at_one_of_its_places(
     page.goto(f"{service.client.base_url}/page/#/new?from={campaign['id']}")
     expect(page.get_by_role("checkbox", name=campaign["families"][0])).to_be_checked()  # a clone keeps its place
     service.client.post(f"/v1/campaigns/{campaign['id']}/cancel")
+
+
+def test_a_click_on_the_map_highlights_the_line_of_a_place_and_the_other_way_round(
+    page_at: Callable[..., Page], service: Service, network: str
+) -> None:
+    page = page_at(f"maps/{network}")
+    plan = page.get_by_role("group", name="The map from above")
+    expect(page.locator("button.spot")).not_to_have_count(0)
+    page.get_by_label("Pattern").select_option("junction")
+    found = service.client.get(f"/v1/networks/{network}/places").json()
+    shown = [each for each in found["items"] + found["elsewhere"] if each["pattern"] == "junction"]
+    expect(plan).to_have_attribute("data-places", str(len(shown)))
+    surfaces = service.client.get(f"/v1/networks/{network}/roads").json()["surfaces"]
+    x, y = zip(*(corner for surface in surfaces for corner in surface["outline"]), strict=True)
+    box = plan.evaluate("each => [each.clientWidth, each.clientHeight]")
+    scale = min((box[0] - 48) / (max(x) - min(x)), (box[1] - 48) / (max(y) - min(y)))  # 24 px around the whole map
+    place = found["items"][-1]
+    assert place["pattern"] == "junction"
+    across = box[0] / 2 + (place["x_m"] - (min(x) + max(x)) / 2) * scale
+    down = box[1] / 2 - (place["y_m"] - (min(y) + max(y)) / 2) * scale
+    plan.click(position={"x": across + 1, "y": down + 1})
+    chosen = page.locator(".spot-on")
+    expect(chosen).to_contain_text(place["place"])
+    chosen.get_by_role("button").click()
+    expect(chosen).to_have_count(0)
+    length = page.locator(".map-scale").inner_text()
+    for _ in range(4):
+        page.get_by_role("button", name="Nearer").click()
+    expect(page.locator(".map-scale")).not_to_have_text(length)
+    page.get_by_role("button", name="Whole map").click()
+    expect(page.locator(".map-scale")).to_have_text(length)
 
 
 def test_all_places_of_a_pattern_are_counted_before_they_are_started(

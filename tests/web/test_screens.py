@@ -51,7 +51,8 @@ def question(page: Page) -> None:
 
 
 def places(page: Page) -> None:
-    page.get_by_alt_text("The map from above").wait_for()
+    page.get_by_role("group", name="The map from above").wait_for()
+    page.locator("button.spot").first.click()
     page.get_by_text("Where no pattern fits").click()
 
 
@@ -123,6 +124,7 @@ SCREENS: dict[str, tuple[str, Callable[[Page], None]]] = {
     "twin": ("campaigns/{campaign}/failures/{failure}/twin/idle", plots),
     "report": ("campaigns/{campaign}/compare", heading),
     "compare": ("compare?ids={campaign}", heading),
+    "workers": ("workers", heading),
     "maps": ("maps", heading),
     "map": ("maps/{network}", places),
     "coverage": ("campaigns/{campaign}/coverage", covered),

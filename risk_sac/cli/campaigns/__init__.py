@@ -39,7 +39,7 @@ from risk_sac.host.terminal import complain, notes
 from risk_sac.records import Collision, EpisodeId, State, Violation
 
 POLL_S = 0.5
-FILTERS = ("state", "family", "method", "label")
+FILTERS = ("state", "family", "method", "label", "tag")
 
 
 def add_management(commands: Commands) -> None:

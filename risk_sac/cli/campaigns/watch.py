@@ -60,6 +60,7 @@ from risk_sac.scenario.reading import nets_of
 SEEDS = 1  # number of seeds if neither the file nor a flag names any
 RATE = number(float, 0, 1)
 MAP_UPLOADED = "in place of families: id or label of an uploaded map"
+TAG = "word to find the campaign by; may be repeated"
 NAMED_FAILURES = 5  # most failures that a JUnit report names per run
 
 
@@ -79,6 +80,7 @@ def add_watch(commands: Commands) -> None:
     add_place_flags(parser, MAP_UPLOADED)
     service = parser.group("service")
     service.add_argument("--label", metavar="TEXT", help="text to find the campaign by")
+    service.add_argument("--tag", dest="tags", action="append", metavar="WORD", help=TAG)
     key = "the same key gives the same campaign, however often it is submitted"
     service.add_argument("--idempotency-key", metavar="KEY", help=key)
     service.add_argument("--watch", action="store_true", help="go on as `watch` does")
@@ -254,7 +256,7 @@ def _submit(options: argparse.Namespace) -> int:
     bounds = _prepare(options)
     options.families = options.families and [_uploaded(name, options.url) for name in options.families]
     flags = campaign_flags(options, SEEDS) | scene_flags(options)
-    flags |= {name: getattr(options, name) for name in ("label", "network", "pattern", "place", "places")}
+    flags |= {name: getattr(options, name) for name in ("label", "tags", "network", "pattern", "place", "places")}
     spec = read_posted(options.spec, flags)
     if isinstance(spec, CampaignSpec):
         _check_names(bounds, spec)

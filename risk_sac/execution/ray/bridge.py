@@ -58,6 +58,11 @@ class Attempt:
         self.task = asyncio.create_task(self._follow())
 
     @property
+    def number(self) -> int:
+        """Its run."""
+        return self._order.number
+
+    @property
     def silent_s(self) -> float:
         """Since its last report, s."""
         return time.monotonic() - self._heard_at
@@ -150,8 +155,8 @@ class Bridge:
             found = await asyncio.wait_for(asyncio.to_thread(nodes, self._settings), self._settings.ray_lease_s)
             listed = []
             for node in found:
-                silences = [each.silent_s for each in self._attempts.values() if each.node == node.id]
-                listed.append(replace(node, runs=len(silences), silent_s=min(silences, default=0.0)))
+                here = [each for each in self._attempts.values() if each.node == node.id]
+                listed.append(replace(node, silences={each.number: each.silent_s for each in here}))
             self.say("cluster", ClusterState(tuple(listed)))
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._over.wait(), NODES_S)

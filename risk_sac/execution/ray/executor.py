@@ -117,6 +117,10 @@ class RayExecutor:
                 order.told_to_stop = True
                 self._bridge.say("cancel", order.id, grace_s)
 
+    def silent_s(self, number: int) -> float | None:
+        """See `Executor.silent_s`."""
+        return next((node.silences[number] for node in self.cluster.nodes if number in node.silences), None)
+
     def close(self) -> None:
         """Leaves the cluster; actors that are still there end."""
         self._closed.set()

@@ -4,12 +4,14 @@ from collections.abc import Callable
 from hashlib import blake2b
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.responses import PlainTextResponse
+from pydantic import field_validator
 from starlette.concurrency import run_in_threadpool
 
 from risk_sac import __version__
-from risk_sac.config import CampaignSpec, FamilyName, MethodName
+from risk_sac.config import CampaignSpec, FamilyName, MethodName, Settings
+from risk_sac.config.campaign import Tag, Tags, check_once
 from risk_sac.env.problem import adjustments
 from risk_sac.records import Campaign, CampaignCheck, CampaignPage, Power, Record, Results, State, wire
 from risk_sac.records.rates import BoundaryMap
@@ -33,12 +35,13 @@ from service.api.pages import (
     Cursor,
     Limit,
     Tier,
+    as_json,
     cacheable,
     entity_tag,
     link,
     problem,
 )
-from service.api.posted import ON_MAP, PostedCampaign, documented
+from service.api.posted import ON_MAP, PostedCampaign, documented, read_posted
 from service.errors import ConflictError, NotFoundError
 from service.runs.manager import LOG
 from service.store.stored import StoredCampaign, StoredRun
@@ -113,6 +116,7 @@ def list_campaigns(
     label: Annotated[
         str | None, Query(max_length=200, pattern=r"^[^\x00]*$", description="Only campaigns with exactly this label.")
     ] = None,
+    tag: Annotated[Tag | None, Query(description="Only campaigns with this tag.")] = None,
     search: Annotated[
         str | None,
         Query(
@@ -134,6 +138,7 @@ def list_campaigns(
         family=family,
         method=method,
         label=label,
+        tag=tag,
         search=search,
     )
     items = [summary_body(campaign, service.manager.workers) for campaign in page.items]
@@ -148,6 +153,36 @@ def cancel_campaign(campaign_id: str, request: Request, service: Service, caller
     """Stop a campaign and keep its results; no effect once it has ended. An `admin` key may stop any project's."""
     campaign = service.manager.cancel(campaign_id, caller.sees)
     return _accepted(request, campaign, service)
+
+
+class PostedTags(Settings):
+    """Tags that a campaign gets in place of its present ones."""
+
+    tags: Tags
+
+    @field_validator("tags")
+    @classmethod
+    def _once(cls, tags: Tags) -> Tags:
+        check_once("", tags)
+        return tags
+
+
+async def _posted_tags(request: Request) -> PostedTags:
+    return await read_posted(request, PostedTags)
+
+
+@router.put(
+    "/{campaign_id}/tags",
+    response_model=Campaign,
+    responses=UNKNOWN | MALFORMED | NOT_JSON,
+    openapi_extra=documented(PostedTags.__name__),
+)
+def put_tags(
+    campaign_id: str, posted: Annotated[PostedTags, Depends(_posted_tags)], service: Service, caller: CurrentCaller
+) -> Response:
+    """Replace the tags of a campaign."""
+    campaign = service.manager.tag(campaign_id, posted.tags, caller.sees)
+    return as_json(_body(campaign, service))
 
 
 @router.delete("/{campaign_id}", status_code=204, responses=UNKNOWN | NOT_ENDED)

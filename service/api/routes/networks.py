@@ -14,6 +14,7 @@ from service.api.posted import media_type
 from service.api.problems import ProblemError, Reason
 from service.networks.schemas import MEDIA_TYPES, WALL_S, Network, NetworkPage, Places
 from service.networks.surveys import RETRY_AFTER_S
+from service.views.series import RoadsBody
 
 LISTED = "networks"
 RECEIVE_S = 60  # a sender that is slower would keep others out
@@ -114,6 +115,12 @@ def get_places(network_id: str, response: Response, service: Service, caller: Cu
 def get_places_picture(network_id: str, service: Service, caller: CurrentCaller) -> Response:
     """Picture of the network with its places."""
     return Response(service.surveys.picture(network_id, caller.sees), media_type="image/png")
+
+
+@router.get("/{network_id}/roads", response_model=RoadsBody, responses=UNKNOWN | FINDING)
+def get_network_roads(network_id: str, service: Service, caller: CurrentCaller) -> Response:
+    """Ground of the network as polygons, in its own coordinates."""
+    return Response(service.surveys.roads(network_id, caller.sees), media_type="application/json")
 
 
 @router.delete("/{network_id}", status_code=204, responses=UNKNOWN)

@@ -99,7 +99,9 @@ async def check_scenario(
 @router.get("")
 def list_scenarios(service: Service, caller: CurrentCaller) -> ScenarioList:
     """Scenarios that ship, then the project's own, newest first."""
-    return ScenarioList(items=service.scenarios.list(caller.sees))
+    times = service.store.episode_times()
+    items = service.scenarios.list(caller.sees)
+    return ScenarioList(items=[row.model_copy(update={"episode_s": times.get(row.name, {})}) for row in items])
 
 
 @router.get("/{scenario}", responses=UNKNOWN)

@@ -1,4 +1,4 @@
-"""The server itself: entry point, API description, web page, health and metrics; none but metrics needs a key."""
+"""The server itself: entry point, API description, web page, health, and with a key metrics, workers and queue."""
 
 import json
 from functools import lru_cache
@@ -17,9 +17,10 @@ from starlette.types import Scope
 
 from risk_sac import __version__
 from risk_sac.records import Record
-from service.api.context import Service, require_admin
+from service.api.context import CurrentCaller, Service, require_admin
 from service.api.pages import STOPPED, UNREADY, Responses, link
 from service.api.problems import ProblemError, Reason
+from service.runs.workers import Workers, workers_body
 from service.store.queries import check_readable
 
 
@@ -71,6 +72,12 @@ def get_readiness(service: Service) -> Ready:
 def get_metrics(service: Service) -> Response:
     """Metrics in the text format of Prometheus."""
     return Response(generate_latest(service.metrics), media_type=CONTENT_TYPE_LATEST)
+
+
+@router.get("/v1/workers", tags=["operations"])
+def get_workers(service: Service, caller: CurrentCaller) -> Workers:
+    """What runs where, and what waits in which order."""
+    return workers_body(service.manager, service.store, service.settings, caller.sees)
 
 
 class Entrance(Record):

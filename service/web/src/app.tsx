@@ -20,6 +20,7 @@ import { EditorScreen } from "./screens/scenarios/editor";
 import { ScenarioScreen } from "./screens/scenarios/one";
 import { ScenariosScreen } from "./screens/scenarios/screen";
 import { TrendScreen } from "./screens/trend/screen";
+import { WorkersScreen } from "./screens/workers/screen";
 import { useSignal } from "./signal";
 import { Login } from "./ui/login";
 import { Empty } from "./ui/states";
@@ -50,6 +51,7 @@ export function App() {
           <Tab to="#/compare">Compare</Tab>
           <Tab to="#/trend">Versions</Tab>
           <Tab to="#/coverage">Coverage</Tab>
+          <Tab to="#/workers">Workers</Tab>
           <a href={absolute("docs")}>API</a>
         </nav>
         <span class="bar-end">
@@ -92,6 +94,7 @@ function screen({ parts, query }: Place): ComponentChildren {
   }
   if (room === "maps" && part === undefined) return id === undefined ? <MapsScreen /> : <MapScreen id={id} query={query} key={id} />;
   if (room === "trend") return <TrendScreen query={query} />;
+  if (room === "workers") return <WorkersScreen />;
   if (room === "coverage") return <CoverageScreen query={query} />;
   if (room === "compare") return <CompareScreen query={query} />;
   if (room === "campaigns" && id !== undefined) {

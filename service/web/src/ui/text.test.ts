@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { egoWords, headlineWords, setting } from "./text";
+import { egoWords, headlineWords, setting, tagsOf } from "./text";
 
 it.each<[number, string]>([
   [2 * Math.PI, "6.283"],
@@ -29,4 +29,9 @@ it.each<[string | null, string | null, string[], string]>([
   ["idm-aeb", "1.4", ["latency", "blind-right"], "idm-aeb 1.4 + latency + blind-right"],
 ])("ego of driver %j, version %j, with defects %j", (driver, label, defects, wanted) => {
   expect(egoWords({ profile: "default", car_following: "Krauss", driver, label, defects })).toBe(wanted);
+});
+
+it("reads tags as the words of a text, each once", () => {
+  expect(tagsOf(" Nightly,release:2.1  nightly ,")).toEqual(["nightly", "release:2.1"]);
+  expect(tagsOf(" , ")).toEqual([]);
 });

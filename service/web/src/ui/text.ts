@@ -67,3 +67,8 @@ export function percent(value: number | null | undefined): string {
 export function capital(text: string): string {
   return /^\w*_/.test(text) ? text : text.charAt(0).toUpperCase() + text.slice(1);
 }
+
+/** `nightly, release:2.1` -> its words; none twice. */
+export function tagsOf(text: string): string[] {
+  return [...new Set(text.toLowerCase().split(/[\s,]+/).filter(Boolean))];
+}

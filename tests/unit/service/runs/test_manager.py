@@ -43,6 +43,9 @@ class Scripted:
     def wake(self):
         pass
 
+    def silent_s(self, number):
+        pass
+
     def close(self):
         pass
 

@@ -54,6 +54,7 @@ def test_runs_of_the_version_before_are_kept(tmp_path):
     with sqlite3.connect(tmp_path / "test.db") as older:
         older.execute("ALTER TABLE runs DROP COLUMN processes")
         older.execute("DROP TABLE notices")
+        older.execute("ALTER TABLE campaigns DROP COLUMN tags")
         older.execute("UPDATE alembic_version SET version_num = '0002'")
     older.close()
     store = Store(f"sqlite:///{tmp_path}/test.db")
@@ -104,6 +105,7 @@ def test_failures_of_an_older_database_get_their_weight(tmp_path, episode):
         connection.exec_driver_sql("ALTER TABLE episodes DROP COLUMN weight")
         connection.exec_driver_sql("ALTER TABLE runs DROP COLUMN processes")
         connection.exec_driver_sql("DROP TABLE notices")
+        connection.exec_driver_sql("ALTER TABLE campaigns DROP COLUMN tags")
         connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0001'")
     store.close()
     opened = Store(url)

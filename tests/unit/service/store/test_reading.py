@@ -112,3 +112,14 @@ def test_an_id_with_a_nul_is_unknown_on_every_database(store, ledger):
             store.episodes(campaign.id, limit=1, run_id=wrong)
         with pytest.raises(NotFoundError):
             store.failure(campaign.id, f"{wrong}-search-0")
+
+
+def test_an_episode_takes_a_slot_the_median_over_runs_times_their_processes(store, ledger, episode):
+    ledger.create(SPEC.model_copy(update={"methods": ("random",), "seeds": (1, 2, 3)}))
+    for processes, wall_s in ((1, 0.2), (4, 0.25), (None, 0.5)):
+        number = start(store, ledger)
+        ledger.requeue_run(number)
+        ledger.start_run(number, processes)
+        ledger.add_episodes([(number, episode(k).model_copy(update={"wall_s": wall_s})) for k in range(3)])
+    ledger.create(SPEC.model_copy(update={"families": ("mixed",)}))  # waits
+    assert store.episode_times() == {"low": {"random": 0.5}}

@@ -106,3 +106,20 @@ def test_a_run_at_import_never_waits_for_a_worker(store, ledger):
     assert ledger.resume() == len(posted.runs)
     assert store.campaign(at_import.id).state is State.RUNNING
     assert store.begun_imports() == [at_import.id]
+
+
+def test_tags_are_set_with_a_campaign_and_replaced_later(store, ledger):
+    campaign = ledger.create(SPEC.model_copy(update={"tags": ("nightly", "a_b")}))
+    ledger.create(SPEC.model_copy(update={"tags": ("nightly-2", "axb")}))
+
+    def tagged(tag):
+        return [found.id for found in store.campaigns(10, tag=tag).items]
+
+    assert store.campaign(campaign.id).tags == ("nightly", "a_b")
+    assert tagged("nightly") == tagged("a_b") == [campaign.id]
+    before = store.revision(campaign.id)
+    ledger.tag(campaign.id, ["nightly", "a_b"])
+    assert store.revision(campaign.id) == before
+    ledger.tag(campaign.id, [])
+    assert store.campaign(campaign.id).tags == tuple(tagged("nightly")) == ()
+    assert store.revision(campaign.id) != before

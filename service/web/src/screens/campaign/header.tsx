@@ -7,6 +7,7 @@ import type { Body } from "../../api/types";
 import { address, go } from "../../router";
 import { ScenarioNames } from "../../ui/scenario";
 import { count, egoWords, moment, seconds } from "../../ui/text";
+import { TagsEditor } from "../../ui/tags";
 import { Confirm } from "../../ui/confirm";
 
 type Campaign = Body<"Campaign">;
@@ -34,6 +35,9 @@ export function Header({ campaign, again }: { campaign: Campaign; again: () => v
         <Fact name="Behaviour">{spec.odd?.dynamic?.behaviour ?? "ordinary"}</Fact>
         <Fact name={spec.seeds.length > 1 ? "Seeds" : "Seed"}>{spec.seeds.join(", ")}</Fact>
         <Fact name="Posted">{moment(campaign.created_at)}</Fact>
+        <Fact name="Tags">
+          <TagsEditor id={campaign.id} tags={campaign.tags} again={again} />
+        </Fact>
       </dl>
       <Advance campaign={campaign} />
     </>

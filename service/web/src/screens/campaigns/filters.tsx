@@ -5,7 +5,7 @@ import { useEffect, useState } from "preact/hooks";
 import type { Body } from "../../api/types";
 
 const STATES: readonly Body<"State">[] = ["queued", "running", "paused", "cancelling", "cancelled", "succeeded", "failed"];
-export const FILTERS = ["state", "family", "method", "search"] as const;
+export const FILTERS = ["state", "family", "method", "tag", "search"] as const;
 export type Filters = Partial<Record<(typeof FILTERS)[number], string>>;
 
 export function filtersOf(query: URLSearchParams): Filters {
@@ -16,10 +16,12 @@ interface Choices {
   filters: Filters;
   families: readonly string[];
   methods: readonly string[];
+  /** Of the campaigns that are shown. */
+  tags: readonly string[];
   change: (changed: Filters) => void;
 }
 
-export function FilterBar({ filters, families, methods, change }: Choices) {
+export function FilterBar({ filters, families, methods, tags, change }: Choices) {
   const choice = (name: keyof Filters, title: string, options: readonly string[]) => (
     <Choice title={title} value={filters[name] ?? ""} options={options} choose={(value) => change({ ...filters, [name]: value })} />
   );
@@ -28,6 +30,7 @@ export function FilterBar({ filters, families, methods, change }: Choices) {
       {choice("state", "State", STATES)}
       {choice("family", "Family", families)}
       {choice("method", "Method", methods)}
+      {(tags.length > 0 || filters.tag) && choice("tag", "Tag", tags)}
       <Search text={filters.search ?? ""} search={(text) => change({ ...filters, search: text })} />
       {Object.keys(filters).length > 0 && <button onClick={() => change({})}>All campaigns</button>}
     </search>

@@ -48,6 +48,7 @@ export function CampaignsScreen({ query }: { query: URLSearchParams }) {
         filters={filters}
         families={families.map((family) => family.name)}
         methods={methods.map((method) => method.name)}
+        tags={[...new Set(listed.value?.items.flatMap(({ tags }) => tags))].sort()}
         change={(changed) => {
           setPages(1);
           show(changed, order);
@@ -68,6 +69,7 @@ export function CampaignsScreen({ query }: { query: URLSearchParams }) {
                 campaigns={sorted(items, order)}
                 learners={methods.filter((method) => LEARNING.includes(method.agent)).map((method) => method.name)}
                 order={order}
+                filters={{ ...filters, sort: textOf(order) }}
                 sort={(by) => show(filters, by)}
                 chosen={chosen}
                 choose={setChosen}

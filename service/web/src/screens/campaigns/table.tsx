@@ -4,6 +4,7 @@ import { Fragment, type ComponentChildren } from "preact";
 import { ended } from "../../api/ended";
 import { address } from "../../router";
 import { ScenarioNames } from "../../ui/scenario";
+import { Tags } from "../../ui/tags";
 import { count, egoWords, headlineWords, moment, percent, seconds } from "../../ui/text";
 import type { Listed } from "./listed";
 import { clicked, type Column, type Order } from "./order";
@@ -38,13 +39,15 @@ interface Shown {
   campaigns: readonly Listed[];
   learners: readonly string[];
   order: Order;
+  /** Of the list, which a click on a tag keeps. */
+  filters: Record<string, string | undefined>;
   sort: (order: Order) => void;
   chosen: ReadonlySet<string>;
   choose: (ids: ReadonlySet<string>) => void;
   ask: (verb: "cancel" | "delete", campaigns: readonly Listed[]) => void;
 }
 
-export function CampaignTable({ campaigns, learners, order, sort, chosen, choose, ask }: Shown) {
+export function CampaignTable({ campaigns, learners, order, filters, sort, chosen, choose, ask }: Shown) {
   const all = campaigns.length > 0 && campaigns.every((each) => chosen.has(each.id));
   return (
     <div class="scroll card campaigns-card" tabIndex={0} role="region" aria-label="Campaigns">
@@ -78,7 +81,7 @@ export function CampaignTable({ campaigns, learners, order, sort, chosen, choose
                   onChange={() => choose(toggled(chosen, campaign.id))}
                 />
               </td>
-              <Cells campaign={campaign} learners={learners} />
+              <Cells campaign={campaign} learners={learners} filters={filters} />
               <td class="row-actions">
                 <a class="button" href={address(["new"], { from: campaign.id })} aria-label={`Clone ${nameOf(campaign)}`}>
                   Clone
@@ -126,7 +129,7 @@ function Act({ verb, name, act }: { verb: string; name: string; act: () => void 
   );
 }
 
-function Cells({ campaign, learners }: { campaign: Listed; learners: readonly string[] }) {
+function Cells({ campaign, learners, filters }: { campaign: Listed } & Pick<Shown, "learners" | "filters">) {
   const { progress, ego } = campaign;
   return (
     <>
@@ -135,6 +138,7 @@ function Cells({ campaign, learners }: { campaign: Listed; learners: readonly st
           <bdi>{nameOf(campaign)}</bdi>
         </a>
         {campaign.label && <code class="faint">{campaign.id}</code>}
+        <Tags tags={campaign.tags} filters={filters} />
       </td>
       <td data-head="State">
         <span class={`tag ${campaign.state}`} title={campaign.reason ?? undefined}>

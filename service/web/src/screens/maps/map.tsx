@@ -1,14 +1,14 @@
 /** One map: where the patterns fit on it, why elsewhere they do not, and a way to a campaign there. */
 
 import type { ComponentChildren } from "preact";
-import { useState } from "preact/hooks";
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { useAsked } from "../../api/asked";
 import type { Body } from "../../api/types";
-import { usePicture } from "../../ui/picture";
 import { Shown } from "../../ui/states";
 import { count, moment } from "../../ui/text";
 import { useTitle } from "../../ui/title";
 import { again, begin, matching, MOST_PLACES, PATTERNS, type Pattern, type Places, type Spot } from "./places";
+import { Plan, Sign } from "./plan";
 import { nameOf } from "./screen";
 import "./maps.css";
 
@@ -44,10 +44,7 @@ export function MapScreen({ id, query }: { id: string; query: URLSearchParams })
               ) : (
                 <>
                   <Patterns id={id} found={found} />
-                  <div class="map-parts">
-                    <Picture id={id} />
-                    <Listed id={id} found={found} />
-                  </div>
+                  <Found id={id} found={found} />
                 </>
               )
             }
@@ -101,71 +98,89 @@ function Patterns({ id, found }: { id: string; found: Places }) {
   );
 }
 
-function Picture({ id }: { id: string }) {
-  const { url, error } = usePicture(`v1/networks/${id}/places.png`);
+/** The places as a list and on the map: what is chosen in one is shown in both. */
+function Found({ id, found }: { id: string; found: Places }) {
+  const [pattern, setPattern] = useState<Pattern | "">("");
+  const [text, setText] = useState("");
+  const [chosen, setChosen] = useState<Spot>();
+  const fits = useMemo(() => matching(found.items, pattern, text), [found, pattern, text]);
+  const misfits = useMemo(() => matching(found.elsewhere, pattern, text), [found, pattern, text]);
+  const spots = useMemo<Spot[]>(() => [...fits, ...misfits], [fits, misfits]);
+  const shown = chosen && spots.includes(chosen) ? chosen : undefined;
+  const start = (spot: Spot) => (
+    <a class="button" href={begin(id, spot.pattern, spot.place)} aria-label={`Start a campaign: ${titled(spot)} at ${spot.place}`}>
+      Start
+    </a>
+  );
   return (
-    <figure class="card map-picture">
-      {url ? <img src={url} alt="The map from above with the places that were found" /> : <span class="faint">{error ?? "Loading …"}</span>}
-    </figure>
+    <div class="map-parts">
+      <Plan id={id} spots={spots} chosen={shown} choose={setChosen} />
+      <section class="card map-places" aria-label="Places">
+        <div class="row">
+          <label>
+            Pattern{" "}
+            <select value={pattern} onChange={(event) => setPattern(event.currentTarget.value as Pattern | "")}>
+              <option value="">all</option>
+              {PATTERNS.map(({ name, title }) => (
+                <option key={name} value={name}>
+                  {title}
+                </option>
+              ))}
+            </select>
+          </label>
+          <label>
+            Search <input type="search" value={text} placeholder="a road or a word" onInput={(event) => setText(event.currentTarget.value)} />
+          </label>
+        </div>
+        <h2>
+          {count(fits.length)} {fits.length === 1 ? "place" : "places"}
+        </h2>
+        <Spots spots={fits} chosen={shown} choose={setChosen} beside={start} />
+        <details class="map-elsewhere" open={shown && "why" in shown}>
+          <summary>Where no pattern fits ({count(misfits.length)})</summary>
+          <Spots spots={misfits} chosen={shown} choose={setChosen} />
+        </details>
+      </section>
+    </div>
   );
 }
 
-function Listed({ id, found }: { id: string; found: Places }) {
-  const [pattern, setPattern] = useState<Pattern | "">("");
-  const [text, setText] = useState("");
-  const [most, setMost] = useState(SHOWN);
-  const fits = matching(found.items, pattern, text);
-  const misfits = matching(found.elsewhere, pattern, text);
+interface Lines {
+  spots: readonly Spot[];
+  chosen: Spot | undefined;
+  choose: (spot: Spot | undefined) => void;
+  beside?: (spot: Spot) => ComponentChildren;
+}
+
+function Spots({ spots, chosen, choose, beside }: Lines) {
+  const [wanted, setWanted] = useState(SHOWN);
+  const most = Math.max(wanted, chosen ? spots.indexOf(chosen) + 1 : 0);
   return (
-    <section class="card map-places" aria-label="Places">
-      <div class="row">
-        <label>
-          Pattern{" "}
-          <select value={pattern} onChange={(event) => setPattern(event.currentTarget.value as Pattern | "")}>
-            <option value="">all</option>
-            {PATTERNS.map(({ name, title }) => (
-              <option key={name} value={name}>
-                {title}
-              </option>
-            ))}
-          </select>
-        </label>
-        <label>
-          Search <input value={text} placeholder="a road or a word" onInput={(event) => setText(event.currentTarget.value)} />
-        </label>
-      </div>
-      <h2>
-        {count(fits.length)} {fits.length === 1 ? "place" : "places"}
-      </h2>
+    <>
       <ul class="spots">
-        {fits.slice(0, most).map((spot) => (
-          <Row key={spot.pattern + spot.place} spot={spot} said={spot.summary}>
-            <a class="button" href={begin(id, spot.pattern, spot.place)} aria-label={`Start a campaign: ${titled(spot)} at ${spot.place}`}>
-              Start
-            </a>
+        {spots.slice(0, most).map((spot) => (
+          <Row key={spot.pattern + spot.place} spot={spot} on={spot === chosen} choose={() => choose(spot === chosen ? undefined : spot)}>
+            {beside?.(spot)}
           </Row>
         ))}
       </ul>
-      {fits.length > most && <button onClick={() => setMost(most + SHOWN)}>Show more</button>}
-      <details class="map-elsewhere">
-        <summary>Where no pattern fits ({count(misfits.length)})</summary>
-        <ul class="spots">
-          {misfits.slice(0, most).map((spot) => (
-            <Row key={spot.pattern + spot.place} spot={spot} said={spot.why} />
-          ))}
-        </ul>
-        {misfits.length > most && <button onClick={() => setMost(most + SHOWN)}>Show more</button>}
-      </details>
-    </section>
+      {spots.length > most && <button onClick={() => setWanted(most + SHOWN)}>Show more</button>}
+    </>
   );
 }
 
-function Row({ spot, said, children }: { spot: Spot; said: string; children?: ComponentChildren }) {
+function Row({ spot, on, choose, children }: { spot: Spot; on: boolean; choose: () => void; children: ComponentChildren }) {
+  const line = useRef<HTMLLIElement>(null);
+  useEffect(() => {
+    if (on) line.current!.scrollIntoView({ block: "nearest" });
+  }, [on]);
   return (
-    <li>
+    <li ref={line} class={on ? "spot-on" : undefined} aria-current={on}>
       <span>
-        <span class="tag">{titled(spot)}</span> <code class="breaking">{spot.place}</code>
-        <span class="small faint said breaking">{said}</span>
+        <button class="spot" title="Show it on the map" onClick={choose}>
+          <Sign pattern={"summary" in spot ? spot.pattern : null} /> {titled(spot)} <code class="breaking">{spot.place}</code>
+        </button>
+        <span class="small faint said breaking">{"summary" in spot ? spot.summary : spot.why}</span>
       </span>
       {children}
     </li>

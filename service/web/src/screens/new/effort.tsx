@@ -4,15 +4,16 @@ import type { Body } from "../../api/types";
 import { count } from "../../ui/text";
 import { bodyOf, textOf } from "./body";
 import { useChecked } from "./checked";
-import { applied, costOf, EFFORTS, isOf, type Effort, type EpisodeCosts } from "./presets";
+import { applied, costOf, EFFORTS, isOf, type Effort } from "./presets";
 import type { Shape, Values } from "./schema";
+import type { TimeOf } from "./times";
 
 interface Efforts {
   shape: Shape;
   spec: Values;
-  /** How many scenarios or places. */
-  families: number;
-  costs: EpisodeCosts;
+  /** As `applied` takes them. */
+  scenarios: readonly string[];
+  time: TimeOf;
   /** Makes what is posted of a body, such as one at places of a map. */
   located: (body: Values) => Values;
   choose: (spec: Values) => void;
@@ -28,13 +29,13 @@ export function Efforts(props: Efforts) {
   );
 }
 
-function EffortCard({ effort, shape, spec, families, costs, located, choose }: Efforts & { effort: Effort }) {
-  const made = applied(effort, spec, families, costs);
-  const cost = costOf(made, families, costs);
+function EffortCard({ effort, shape, spec, scenarios, time, located, choose }: Efforts & { effort: Effort }) {
+  const made = applied(effort, spec, scenarios, time);
+  const cost = costOf(made, scenarios, time);
   const { episodes } = made.budget as { episodes: number };
   const checked = useChecked(textOf(located(bodyOf(shape, made))));
   return (
-    <button type="button" class="effort" aria-pressed={isOf(effort, spec, families, costs)} onClick={() => choose(made)}>
+    <button type="button" class="effort" aria-pressed={isOf(effort, spec, scenarios, time)} onClick={() => choose(made)}>
       <b>{effort.title}</b>
       <span class="small">{effort.about}</span>
       <span>

@@ -2,7 +2,7 @@
 
 import type { ComponentChildren } from "preact";
 import { useContext, useEffect, useState } from "preact/hooks";
-import { setting } from "../../ui/text";
+import { setting, tagsOf } from "../../ui/text";
 import { FormContext, isWithin, useField, type Wrong } from "./form";
 import { numbersOf, numbersText } from "./numbers";
 import type { Field, Json, Shape, Values } from "./schema";
@@ -151,7 +151,10 @@ interface Controlled {
 
 function Control({ shape, id, value, change, more }: Controlled) {
   if (shape.kind === "number") return <NumberInput id={id} shape={shape} value={value as number | null} change={change} more={more} />;
-  if (shape.kind === "list") return <NumbersInput id={id} value={value as number[]} change={change} more={more} />;
+  if (shape.kind === "list") {
+    const written = shape.item.kind === "text" ? (value as string[]).join(", ") : numbersText(value as number[]);
+    return <ListInput id={id} value={written} read={shape.item.kind === "text" ? tagsOf : numbersOf} change={change} more={more} />;
+  }
   if (shape.kind === "choice") {
     return (
       <select id={id} value={value as string} onChange={(event) => change(event.currentTarget.value)} {...more}>
@@ -188,18 +191,20 @@ export function NumberInput({ id, shape, value, change, more }: Numbered) {
   );
 }
 
-/** Numbers as one line of text; what is none of them counts for nothing. */
-export function NumbersInput({ id, value, change, more }: Omit<Controlled, "shape" | "value"> & { value: number[] }) {
+type Listed = Omit<Controlled, "shape" | "value"> & { value: string; read: (text: string) => Json[] | null };
+
+/** Numbers or words as one line of text; what cannot be read counts for nothing. */
+function ListInput({ id, value, read, change, more }: Listed) {
   const [typed, setTyped] = useState<string>(); // while it is written, since `0-` is on the way to `0-4`
   return (
     <input
       id={id}
-      value={typed ?? numbersText(value)}
+      value={typed ?? value}
       onInput={(event) => {
         const text = event.currentTarget.value;
-        const numbers = numbersOf(text);
+        const values = read(text);
         setTyped(text);
-        if (numbers !== null) change(numbers);
+        if (values !== null) change(values);
       }}
       onBlur={() => setTyped(undefined)}
       {...more}

@@ -16,12 +16,13 @@ import { Choices, Fields, Group, SchemaField } from "./field";
 import { FormContext, isWithin, type Wrong } from "./form";
 import { grounded, groundOf, OnMap, useExtent, type Ground } from "./ground";
 import { OddFields } from "./odd";
-import { applied, EFFORTS, isOf, type EpisodeCosts } from "./presets";
+import { applied, EFFORTS, isOf } from "./presets";
 import { Preview } from "./preview";
 import { Requirements } from "./requirements";
 import { posted, type Description, type Field, type Json, type Shape, type Values } from "./schema";
 import { Scenarios } from "./scenarios";
 import { Submit } from "./submit";
+import { LIKE, timesOf } from "./times";
 import { filled, leaves, put, type Path } from "./values";
 import "./new.css";
 
@@ -82,12 +83,12 @@ interface Begun {
 
 function CampaignForm({ known: [description, known, methods, scenarios], from, ground, scenario }: Begun) {
   const shape = useMemo(() => posted(description, "/v1/campaigns"), [description]);
-  const episodeCosts: EpisodeCosts = useMemo(() => Object.fromEntries(methods.items.map(({ name, episode_cost }) => [name, episode_cost])), [methods]);
+  const time = useMemo(() => timesOf(scenarios.items, Object.fromEntries(methods.items.map(({ name, episode_cost }) => [name, episode_cost]))), [scenarios, methods]);
   const extent = useExtent(ground);
-  const sizeOf = (values: Values) => (ground ? (extent ?? 1) : (values.families as string[]).length);
+  const searchedBy = (values: Values) => (ground ? Array<string>(extent ?? 1).fill(LIKE[ground.pattern]) : (values.families as string[]));
   const [spec, setSpec] = useState<Values>(() => {
     const empty = filled(shape, from?.spec ?? {}) as Values;
-    return from ? empty : applied(EFFORTS[0]!, { ...empty, families: [scenario ?? "low"] }, 1, episodeCosts);
+    return from ? empty : applied(EFFORTS[0]!, { ...empty, families: [scenario ?? "low"] }, [scenario ?? "low"], time);
   });
   const located = (values: Values) => (ground ? grounded(ground, values) : values);
   const body = useMemo(() => located(bodyOf(shape, spec)), [shape, spec]);
@@ -99,11 +100,11 @@ function CampaignForm({ known: [description, known, methods, scenarios], from, g
   const change = (path: Path, value: Json) =>
     setSpec((before) => {
       const next = put(before, path, value) as Values;
-      const effort = path[0] === "families" && EFFORTS.find((each) => isOf(each, before, sizeOf(before), episodeCosts));
-      return effort ? applied(effort, next, sizeOf(next), episodeCosts) : next;
+      const effort = path[0] === "families" && EFFORTS.find((each) => isOf(each, before, searchedBy(before), time));
+      return effort ? applied(effort, next, searchedBy(next), time) : next;
     });
   const form = useMemo(() => ({ spec, wrong, change }), [spec, wrong, extent]);
-  const families = sizeOf(spec);
+  const searched = searchedBy(spec);
   const chosen = ground ? [] : known.items.filter(({ name }) => (spec.families as string[]).includes(name));
   const field = fieldsOf(shape);
   const tally = (name: string) => leaves(body[name]);
@@ -124,11 +125,12 @@ function CampaignForm({ known: [description, known, methods, scenarios], from, g
           </section>
           <section class="card">
             <h2>3. Effort</h2>
-            <Efforts shape={shape} spec={spec} families={families} costs={episodeCosts} located={located} choose={setSpec} />
+            <Efforts shape={shape} spec={spec} scenarios={searched} time={time} located={located} choose={setSpec} />
           </section>
           <More wrong={wrong} begun={from !== undefined}>
             <section class="card">
               <SchemaField field={field("label")} path={["label"]} />
+              <SchemaField field={field("tags")} path={["tags"]} />
               <Choices
                 field={field("methods")}
                 path={["methods"]}
@@ -165,7 +167,7 @@ function CampaignForm({ known: [description, known, methods, scenarios], from, g
           </More>
         </div>
         <aside class="grid beside" aria-label="What it comes to">
-          <Submit spec={spec} families={families} costs={episodeCosts} onMap={ground !== null} verdict={verdict} wrong={wrong} refused={why} busy={busy} />
+          <Submit spec={spec} scenarios={searched} time={time} onMap={ground !== null} verdict={verdict} wrong={wrong} refused={why} busy={busy} />
           <Preview body={body} />
         </aside>
       </form>
@@ -184,7 +186,7 @@ function More({ wrong, begun, children }: { wrong: readonly Wrong[]; begun: bool
     <details class="more-settings" open={shown} onToggle={(event) => setOpened(event.currentTarget.open)}>
       <summary>
         <span class="group-title">More settings</span>
-        <span class="faint small">label, methods, seeds, budget, operational design domain, requirements, learner</span>
+        <span class="faint small">label, tags, methods, seeds, budget, operational design domain, requirements, learner</span>
         {broken > 0 && <span class="tag failed">{broken} wrong</span>}
       </summary>
       {shown && <div class="grid parts">{children}</div>}

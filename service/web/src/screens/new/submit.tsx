@@ -4,14 +4,15 @@ import type { Verdict } from "./checked";
 import { count } from "../../ui/text";
 import { detects, roughly } from "./effort";
 import type { Wrong } from "./form";
-import { costOf, type EpisodeCosts } from "./presets";
+import { costOf } from "./presets";
 import type { Values } from "./schema";
+import { timeWords, type TimeOf } from "./times";
 
 interface Ready {
   spec: Values;
-  /** How many scenarios, or places of a map. */
-  families: number;
-  costs: EpisodeCosts;
+  /** As `applied` takes them. */
+  scenarios: readonly string[];
+  time: TimeOf;
   onMap: boolean;
   verdict: Verdict;
   wrong: readonly Wrong[];
@@ -20,9 +21,9 @@ interface Ready {
   busy: boolean;
 }
 
-export function Submit({ spec, families, costs, onMap, verdict, wrong, refused, busy }: Ready) {
+export function Submit({ spec, scenarios, time, onMap, verdict, wrong, refused, busy }: Ready) {
   const length = (name: string) => (spec[name] as unknown[]).length;
-  const { runs, episodes, seconds: cost_s } = costOf(spec, families, costs);
+  const { runs, episodes, seconds: cost_s } = costOf(spec, scenarios, time);
   return (
     <section class="card submit" aria-label="Start">
       <div class="tiles">
@@ -34,16 +35,17 @@ export function Submit({ spec, families, costs, onMap, verdict, wrong, refused, 
           <b>{count(runs)}</b>
           <span>{runs === 1 ? "run" : "runs"}</span>
         </span>
-        <span class="tile" title="By the measured processor time of an episode of each method; with several workers it takes less, in dense three times as much.">
+        <span class="tile">
           <b>{roughly(cost_s)}</b>
-          <span>of one processor, about</span>
+          <span>of one slot, about</span>
         </span>
       </div>
       <p class="help">
-        {onMap ? plural(families, "place", "places") : plural(families, "scenario", "scenarios")} × {plural(length("methods"), "method", "methods")} ×{" "}
+        {onMap ? plural(scenarios.length, "place", "places") : plural(scenarios.length, "scenario", "scenarios")} × {plural(length("methods"), "method", "methods")} ×{" "}
         {plural(length("seeds"), "seed", "seeds")}
         {spec.iid && ", and the i.i.d. phase"}
       </p>
+      <p class="help">{timeWords(time, scenarios, spec.methods as string[])}</p>
       <button class="primary start" disabled={busy}>
         {busy ? "Starting …" : "Start the campaign"}
       </button>

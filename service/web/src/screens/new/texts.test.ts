@@ -5,6 +5,9 @@ import { numbersOf, numbersText } from "./numbers";
 import { applied, costOf, EFFORTS, isOf } from "./presets";
 import type { Shape } from "./schema";
 import { curl, quoted } from "./shell";
+import { timesOf, timeWords } from "./times";
+
+const measured = (name: string, episode_s: Record<string, number>, like: string | null = null) => ({ name, episode_s, like });
 
 describe("numbers", () => {
   it.each<[string, number[] | null]>([
@@ -58,17 +61,21 @@ it("a shell takes any text for one word", () => {
 
 it("a campaign costs what all its runs do", () => {
   const spec = { methods: ["random", "archive"], seeds: [0, 1, 2], budget: { episodes: 10, evaluation_episodes: 5 } };
-  expect(costOf(spec, 2, { random: 1, archive: 0.5 })).toMatchObject({ runs: 12, episodes: 180, seconds: 12 * 6 + 0.1 * 90 * 1.5 });
+  const time = timesOf([measured("low", { random: 0.1, archive: 0.05 }), measured("dense", { random: 0.4, archive: 0.2 })], {});
+  const cost = costOf(spec, ["low", "dense"], time);
+  expect(cost).toMatchObject({ runs: 12, episodes: 180 });
+  expect(cost.seconds).toBeCloseTo(12 * 6 + 45 * (0.1 + 0.05 + 0.4 + 0.2));
 });
 
 it("an effort fills its time, whatever the number of scenarios", () => {
   const hour = EFFORTS.find(({ title }) => title === "An hour")!;
   const spec = { label: "kept", budget: { episodes: 1, cpu_s: null } };
-  for (const families of [10, 17]) {
-    const made = applied(hour, spec, families, {});
-    expect(costOf(made, families, {}).seconds).toBeGreaterThan(3000);
-    expect(costOf(made, families, {}).seconds).toBeLessThanOrEqual(3600);
-    expect(isOf(hour, made, families, {})).toBe(true);
+  const time = timesOf([], {});
+  for (const scenarios of [["dense"], Array<string>(10).fill("low"), Array<string>(17).fill("low")]) {
+    const made = applied(hour, spec, scenarios, time);
+    expect(costOf(made, scenarios, time).seconds).toBeGreaterThan(3000);
+    expect(costOf(made, scenarios, time).seconds).toBeLessThanOrEqual(3600);
+    expect(isOf(hour, made, scenarios, time)).toBe(true);
     expect(made.label).toBe("kept");
   }
 });
@@ -85,4 +92,31 @@ it("an ego is sent without what it has no use for", () => {
   expect(bodyOf(shape, { ego: { profile: "perfect", reaction_time_s: "0.1" } })).toEqual({ ego: { profile: "perfect" } });
   expect(bodyOf(shape, { ego: { profile: "careful", reaction_time_s: "0.1", driver: "rss" } })).toEqual({});
   expect(bodyOf(shape, { ego: { profile: "careful", reaction_time_s: "0.1" } })).toEqual({ ego: { profile: "careful", reaction_time_s: "0.1" } });
+});
+
+describe("the time of an episode", () => {
+  const costs = { random: 1, archive: 0.5, sac: 9, unknown: null };
+  const time = timesOf([measured("low", { random: 0.2 }), measured("dense", { archive: 0.5 }), measured("mixed", {}), measured("mine", {}, "dense"), measured("other", {}, "mixed")], costs);
+
+  it.each([
+    ["low", "random", 0.2, "measured"],
+    ["low", "archive", 0.1, "derived"],
+    ["low", "sac", 0.2 + 8 * 0.2, "derived"],
+    ["dense", "archive", 0.5, "measured"],
+    ["dense", "random", 1, "derived"],
+    ["dense", "sac", 1 + 8 * 0.2, "derived"],
+    ["mine", "random", 1, "derived"],
+    ["mixed", "unknown", 0.09, "reference"],
+    ["other", "random", 0.09, "reference"],
+    ["nowhere", "random", 0.1, "reference"],
+  ] as const)("in %s of %s", (scenario, method, seconds, source) => {
+    expect(time(scenario, method)).toEqual({ seconds: expect.closeTo(seconds) as number, source });
+  });
+
+  it("is told with where it comes from", () => {
+    expect(timeWords(time, ["low", "low", "dense", "mixed"], ["random"])).toBe(
+      "An episode takes 0.2 s in low, as measured on this server. An episode takes 1.0 s in dense, from other runs of this server. " +
+        "An episode takes 0.09 s in mixed, as on a processor of ours; nothing like it has run here yet.",
+    );
+  });
 });
