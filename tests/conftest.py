@@ -22,6 +22,11 @@ def pytest_collection() -> Iterator[object]:  # None of the thousands of tests i
         gc.enable()
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Puts the unit tests last: their many short files let all processes end together."""
+    items.sort(key=lambda item: item.nodeid.startswith("tests/unit/"))
+
+
 @pytest.fixture(scope="session", autouse=True)
 def every_failure_is_clean(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """Looks into all run folders of the session: before no valid contact may two bodies overlap."""

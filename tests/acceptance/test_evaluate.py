@@ -133,7 +133,13 @@ def wait_for(process: subprocess.Popen[str], condition: Callable[[], bool]) -> N
 
 
 @pytest.fixture
-def crash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leaves figures out of reports, which take most of their time."""
+    monkeypatch.setattr("risk_sac.report.files.figure_names", lambda comparison: ())
+
+
+@pytest.fixture
+def crash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, without_figures: None) -> Callable[[int], None]:
     """Lets the first so many processes of a comparison die as libsumo does."""
 
     def arrange(times: int) -> None:
@@ -166,7 +172,7 @@ def test_a_run_that_crashes_every_time_has_failed(crash, tmp_path, capsys):
     assert (tmp_path / "out" / "table.md").exists()
 
 
-def test_what_fails_is_named_and_the_others_go_on(tmp_path, monkeypatch, capsys):
+def test_what_fails_is_named_and_the_others_go_on(tmp_path, monkeypatch, capsys, without_figures):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "spec.yaml").write_text(SPEC)
     runs = tmp_path / "out" / "runs"

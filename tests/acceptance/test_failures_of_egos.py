@@ -14,7 +14,6 @@ from risk_sac.failures.bundle import read_bundle
 from risk_sac.failures.studied import Regression, Verdict
 from risk_sac.failures.variants import VariantPlayer
 from risk_sac.run_folder.results import first_of_variants, read_results, read_verified
-from tests.acceptance.conftest import Tell
 from tests.ego_processes import served
 
 RUN = ["--scenario", "low", "--method", "archive", "--seed", "41", "--episodes", "30", "--behaviour", "emergency"]
@@ -55,16 +54,7 @@ def far(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Found, str]]
         yield found(folder, "far"), table
 
 
-def check_repeats(run: Path, tell: Tell) -> None:
-    assert tell("verify", run)[0] == 0
-    verified = read_verified(run, read_results(run).digest)
-    assert verified is not None
-    assert verified.episodes
-    assert not verified.flaky
-
-
-def test_failures_of_an_ego_in_our_process_repeat(near, tell):
-    check_repeats(near.run, tell)
+def test_a_failure_of_an_ego_in_our_process_repeats(near, tell):
     status, out, _ = tell("replay", near.bundle)
     assert status == 0
     assert "every array is as recorded" in out
@@ -92,7 +82,11 @@ def test_failures_of_an_ego_in_another_process_repeat(far, near, tell, monkeypat
     failure, table = far
     register(monkeypatch, tmp_path, table)
     assert read_results(failure.run).digest == read_results(near.run).digest
-    check_repeats(failure.run, tell)
+    assert tell("verify", failure.run)[0] == 0
+    verified = read_verified(failure.run, read_results(failure.run).digest)
+    assert verified is not None
+    assert verified.episodes
+    assert not verified.flaky
     assert tell("replay", failure.bundle)[0] == 0
     with closing(VariantPlayer(read_bundle(failure.bundle)).env):
         pass  # it happens again

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import httpx
 import pytest
@@ -44,6 +45,20 @@ def real(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     """The same with real workers."""
     with servers(tmp_path_factory.mktemp("real")) as start:
         yield start("risk_sac.execution.worker", grace_s=30)
+
+
+@pytest.fixture(scope="module")
+def service(real: Service) -> Service:
+    """The server of a module that names no other."""
+    return real
+
+
+@pytest.fixture(scope="module")
+def campaign(request: pytest.FixtureRequest, service: Service) -> dict[str, Any]:
+    """The campaign of the module's `SPEC`, once it has succeeded."""
+    ended = service.wait(service.post(**request.module.SPEC))
+    assert ended["state"] == "succeeded", ended["reason"]
+    return ended
 
 
 @pytest.fixture(scope="module")

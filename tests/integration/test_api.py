@@ -33,7 +33,7 @@ async def post_at_once(port, keys, spec=SPEC):
     return await asyncio.gather(*posts)
 
 
-@pytest.mark.parametrize(("posts", "keys"), [pytest.param(1000, 1, marks=pytest.mark.torture), (500, 50)])
+@pytest.mark.parametrize(("posts", "keys"), [pytest.param(1000, 1, marks=pytest.mark.torture), (100, 10)])
 def test_duplicates_at_once_make_one_campaign_for_each_key(serve, posts, keys):
     service = serve(rate_limit=100_000)
     answers = asyncio.run(post_at_once(service.port, [f"retry-{index % keys}" for index in range(posts)]))
@@ -68,29 +68,33 @@ def test_a_key_of_another_shape_is_refused(client, key):
     assert [error["field"] for error in response.json()["errors"]] == ["Idempotency-Key"]
 
 
-@pytest.mark.parametrize("part", ["", "/results"])
-def test_a_tag_changes_exactly_when_the_body_does(shared, part):
-    path = f"/v1/campaigns/{shared.post(budget={'episodes': 20})}{part}"
-    bodies: dict[str, set[bytes]] = {}
-    states = []
-    while states[-1:] != ["succeeded"]:
-        response = shared.client.get(path)
-        bodies.setdefault(response.headers["etag"], set()).add(response.content)
-        states.append(response.json()["state"])
-        assert ("retry-after" in response.headers) is (states[-1] != "succeeded")
+def test_a_tag_changes_exactly_when_the_body_does(shared):
+    campaign = f"/v1/campaigns/{shared.post(budget={'episodes': 20})}"
+    bodies: dict[str, dict[str, set[bytes]]] = {campaign: {}, f"{campaign}/results": {}}
+    final = {}
+    while len(final) < len(bodies):
+        for path in bodies.keys() - final.keys():
+            response = shared.client.get(path)
+            bodies[path].setdefault(response.headers["etag"], set()).add(response.content)
+            ended = response.json()["state"] == "succeeded"
+            assert ("retry-after" in response.headers) is not ended
+            if ended:
+                final[path] = response
         time.sleep(0.01)  # there is a limit to the rate of requests
-    assert len(bodies) > 1
-    assert all(len(same) == 1 for same in bodies.values())
-    final = response.headers["etag"]
-    for sent, status in ((final, 304), (f'"x", {final}', 304), ("*", 304), (next(iter(bodies)), 200)):
-        answer = shared.client.get(path, headers={"If-None-Match": sent})
-        assert answer.status_code == status, sent
-        assert answer.headers["etag"] == final
-        assert answer.content == (b"" if status == 304 else response.content)
+    for path, response in final.items():
+        assert len(bodies[path]) > 1
+        assert all(len(same) == 1 for same in bodies[path].values())
+        tag = response.headers["etag"]
+        for sent, status in ((tag, 304), (f'"x", {tag}', 304), ("*", 304), (next(iter(bodies[path])), 200)):
+            answer = shared.client.get(path, headers={"If-None-Match": sent})
+            assert answer.status_code == status, sent
+            assert answer.headers["etag"] == tag
+            assert answer.content == (b"" if status == 304 else response.content)
     shared.stop()
     shared.start()
-    after = shared.client.get(path, headers={"If-None-Match": final})
-    assert after.status_code == 304
+    for path, response in final.items():
+        after = shared.client.get(path, headers={"If-None-Match": response.headers["etag"]})
+        assert after.status_code == 304
 
 
 def test_a_project_that_has_queued_enough_is_told_when_to_come_back(serve_inside):

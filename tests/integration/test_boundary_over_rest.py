@@ -8,19 +8,8 @@ from risk_sac import cli
 from risk_sac.records.rates import BoundaryMap
 
 OVER = ("ego_speed_mps", "cutter_ahead_m")
-
-
-@pytest.fixture(scope="module")
-def service(real):
-    return real
-
-
-@pytest.fixture(scope="module")
-def campaign(service):
-    spec = {"families": ["motorway_cut_in"], "methods": ["boundary", "random"], "seeds": [0], "budget": {"episodes": 6}}
-    ended = service.wait(service.post(**spec, boundary={"over": OVER}))
-    assert ended["state"] == "succeeded", ended["reason"]
-    return ended
+SPEC = {"families": ["motorway_cut_in"], "methods": ["boundary", "random"], "seeds": [0], "budget": {"episodes": 6}}
+SPEC |= {"boundary": {"over": OVER}}
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ import pytest
 from tests.server import LONG_S
 
 DATABASES = ["sqlite", "postgresql"]
-EACH_DATABASE = pytest.mark.parametrize("serve", DATABASES, indirect=True)
 FIRST = ["sqlite", pytest.param("postgresql", marks=pytest.mark.torture)]
 SQLITE_FIRST = pytest.mark.parametrize("serve", FIRST, indirect=True)
 EACH_DATABASE_SHARED = pytest.mark.parametrize("serve_shared", DATABASES, indirect=True)
@@ -24,59 +23,63 @@ def shared(serve_shared):
     return serve_shared(attempts=3)
 
 
-@EACH_DATABASE
-def test_a_campaign_runs_to_its_end_and_can_be_read(serve):
-    service = serve()
-    first = service.post(label="first", seeds=[0, 1], budget={"episodes": 50})
+@EACH_DATABASE_SHARED
+def test_a_campaign_runs_to_its_end_and_can_be_read(shared):
+    service = shared
+    first = service.post(label="first", seeds=[0, 1], budget={"episodes": 30})
     second = service.post(label="second", budget={"episodes": 4})
     moving = {service.get(first)["progress"]["episodes_done"]}
     while service.get(first)["state"] in ("queued", "running"):
         time.sleep(0.05)
         moving.add(service.get(first)["progress"]["episodes_done"])
-    assert moving - {0, 100}, "no progress was seen"
+    assert moving - {0, 60}, "no progress was seen"
     campaign = service.wait(first)
     assert campaign["state"] == "succeeded"
-    assert campaign["progress"]["episodes_done"] == campaign["progress"]["episodes_total"] == 100
+    assert campaign["progress"]["episodes_done"] == campaign["progress"]["episodes_total"] == 60
     assert campaign["progress"]["eta_s"] == 0
     assert service.wait(second)["state"] == "succeeded"
-    assert [item["label"] for item in service.client.get("/v1/campaigns").json()["items"]] == ["second", "first"]
+    assert [item["label"] for item in service.client.get("/v1/campaigns").json()["items"][:2]] == ["second", "first"]
     results = service.get(first, "/results")
     assert results["complete"]
     assert [run["digest"] for run in results["runs"]] == ["d", "d"]
-    assert results["totals"][0]["episodes"] == 100
-    page = service.get(first, "/episodes", limit=60)
-    rest = service.get(first, "/episodes", limit=60, cursor=page["next"])
-    assert len({item["id"] for item in page["items"] + rest["items"]}) == 100
+    assert results["totals"][0]["episodes"] == 60
+    page = service.get(first, "/episodes", limit=35)
+    rest = service.get(first, "/episodes", limit=35, cursor=page["next"])
+    assert len({item["id"] for item in page["items"] + rest["items"]}) == 60
     assert rest["next"] is None
     assert service.get(first, "/failures", tier="raw")["items"] == []
 
 
+@pytest.fixture(scope="module")
+def broken(shared, scripted):
+    """A campaign with runs whose workers break in a row, each in its way, and one that nothing is wrong with."""
+    faults = [scripted.DIES, scripted.BABBLES, scripted.EXITS]
+    return shared.wait(shared.post(seeds=[*faults, scripted.WELL_BEHAVED], budget={"episodes": 8}))
+
+
 @SQLITE_FIRST_SHARED
-@pytest.mark.parametrize(
-    ("fault", "reason"),
-    [
-        ("DIES", "worker was killed by SIGKILL"),
-        (
-            "BABBLES",
-            "worker wrote b\"Loading net-file from 'low.net.xml' ... done (3ms).\\n\" where an event was wanted",
-        ),
-        ("EXITS", "worker exited with status 1: Traceback: the policy is NaN"),
-    ],
-)
-def test_a_run_whose_workers_break_in_a_row_fails_and_nothing_else(shared, scripted, fault, reason):
-    campaign = shared.wait(shared.post(seeds=[getattr(scripted, fault), scripted.WELL_BEHAVED], budget={"episodes": 8}))
-    broken, sibling = campaign["runs"]
-    reason += "; 3 workers in a row finished no episode"
-    assert (broken["state"], broken["reason"], broken["attempts"]) == ("failed", reason, 3)
-    assert broken["episodes_done"] == 2
+def test_a_run_whose_workers_break_in_a_row_fails_and_nothing_else(shared, broken):
+    *failed, sibling = broken["runs"]
+    babble = "Loading net-file from 'low.net.xml' ... done (3ms).\\n"
+    reasons = [
+        "worker was killed by SIGKILL",
+        f'worker wrote b"{babble}" where an event was wanted',
+        "worker exited with status 1: Traceback: the policy is NaN",
+    ]
+    reasons = [f"{reason}; 3 workers in a row finished no episode" for reason in reasons]
+    assert [(run["state"], run["reason"], run["attempts"]) for run in failed] == [
+        ("failed", each, 3) for each in reasons
+    ]
+    assert [run["episodes_done"] for run in failed] == [2, 2, 2]
     assert (sibling["state"], sibling["episodes_done"], sibling["attempts"]) == ("succeeded", 8, 1)
-    assert (campaign["state"], campaign["reason"]) == ("failed", f"run {broken['id']}: {reason}")
+    assert broken["state"] == "failed"
+    assert broken["reason"] in [f"run {run['id']}: {reason}" for run, reason in zip(failed, reasons, strict=True)]
     assert shared.wait(shared.post(budget={"episodes": 1}))["state"] == "succeeded"
 
 
 @SQLITE_FIRST_SHARED
-def test_what_the_workers_of_a_run_printed_can_be_read_and_need_not_be_sent_twice(shared, scripted):
-    campaign = shared.wait(shared.post(seeds=[scripted.EXITS, scripted.WELL_BEHAVED], budget={"episodes": 8}))
+def test_what_the_workers_of_a_run_printed_can_be_read_and_need_not_be_sent_twice(shared, broken):
+    campaign = broken | {"runs": broken["runs"][2:]}
     path, silent = (f"/v1/campaigns/{campaign['id']}/runs/{run['id']}/log" for run in campaign["runs"])
     log = shared.client.get(path)
     assert (log.status_code, log.headers["content-type"]) == (200, "text/plain; charset=utf-8")
@@ -94,7 +97,7 @@ def test_what_the_workers_of_a_run_printed_can_be_read_and_need_not_be_sent_twic
 
 @EACH_DATABASE_SHARED
 def test_a_lost_worker_is_replaced_and_no_episode_is_lost_or_told_twice(shared, scripted):
-    campaign_id = shared.post(seeds=[scripted.WAITS], budget={"episodes": 80})
+    campaign_id = shared.post(seeds=[scripted.WAITS], budget={"episodes": 44})
     folder = shared.data_dir / "campaigns" / campaign_id / f"low-random-{scripted.WAITS}"
     for count in scripted.WAITS_AT:  # it waits there: a server that is slow to write would find a worker that is done
         shared.wait_for(campaign_id, lambda seen, count=count: seen["progress"]["episodes_done"] == count)
@@ -103,8 +106,8 @@ def test_a_lost_worker_is_replaced_and_no_episode_is_lost_or_told_twice(shared, 
         (folder / f"go-{count}").touch()
     campaign = shared.wait(campaign_id)
     (run,) = campaign["runs"]
-    assert (run["state"], run["attempts"], run["episodes_done"]) == ("succeeded", 3, 80)
-    assert sorted(shared.episodes(campaign_id, run["id"])) == list(range(80))
+    assert (run["state"], run["attempts"], run["episodes_done"]) == ("succeeded", 3, 44)
+    assert sorted(shared.episodes(campaign_id, run["id"])) == list(range(44))
 
 
 @SQLITE_FIRST_SHARED
@@ -160,12 +163,11 @@ def test_a_restarted_server_goes_on_without_losing_or_repeating_an_episode(serve
         assert sorted(service.episodes(campaign_id, run["id"])) == list(range(20))
 
 
-@SQLITE_FIRST
-def test_two_servers_never_share_a_data_folder(serve):
-    service = serve()
+@SQLITE_FIRST_SHARED
+def test_two_servers_never_share_a_data_folder(shared):
     second = subprocess.run(
         [sys.executable, "-m", "service"],
-        env=os.environ | {"RISK_SAC_DATA_DIR": str(service.data_dir), "RISK_SAC_PORT": "8999"},
+        env=os.environ | {"RISK_SAC_DATA_DIR": str(shared.data_dir), "RISK_SAC_PORT": "8999"},
         capture_output=True,
         text=True,
         timeout=LONG_S,
@@ -175,9 +177,9 @@ def test_two_servers_never_share_a_data_folder(serve):
     assert "is in use by another process" in second.stderr
 
 
-@SQLITE_FIRST
-def test_a_campaign_that_has_ended_can_be_deleted_with_its_files(serve):
-    service = serve()
+@SQLITE_FIRST_SHARED
+def test_a_campaign_that_has_ended_can_be_deleted_with_its_files(shared):
+    service = shared
     kept, gone = service.post(budget={"episodes": 2}), service.post(budget={"episodes": 300})
     service.wait(kept)
     service.wait_for(gone, lambda seen: seen["state"] == "running")
@@ -185,10 +187,12 @@ def test_a_campaign_that_has_ended_can_be_deleted_with_its_files(serve):
     service.client.post(f"/v1/campaigns/{gone}/cancel")
     service.wait(gone)
     folder = service.data_dir / "campaigns"
-    assert {path.name for path in folder.iterdir()} == {kept, gone}
+    assert {path.name for path in folder.iterdir()} >= {kept, gone}
     service.wait_until(lambda: service.client.delete(f"/v1/campaigns/{gone}").status_code == 204)
     assert service.client.get(f"/v1/campaigns/{gone}").status_code == 404
-    assert [path.name for path in folder.iterdir()] == [kept]
+    names = {path.name for path in folder.iterdir()}
+    assert kept in names
+    assert gone not in names
     assert service.get(kept, "/episodes")["items"]
 
 

@@ -11,7 +11,8 @@ def test_the_end_of_a_campaign_is_posted_and_shown_in_it(tmp_path):
         server = start(on_end=f'["{receiver.url}"]')
         refused = server.client.post("/v1/campaigns", json={"families": ["low"], "on_end": "http://127.0.0.1:1/hooks"})
         assert (refused.status_code, refused.json()["errors"][0]["field"]) == (422, "on_end")
-        plain, told = server.post(), server.post(on_end=f"{receiver.url}/ci")
+        short = {"budget": {"episodes": 3}}
+        plain, told = server.post(**short), server.post(**short, on_end=f"{receiver.url}/ci")
         seen = server.wait_for(told, lambda seen: seen["notice"]["state"] != "waiting")
         assert seen["notice"] == {"state": "delivered", "tries": 1, "reason": None}
         assert server.wait(plain)["notice"] is None

@@ -23,18 +23,6 @@ SPEC = {
 RUNS = ["mixed-archive-601", "mixed-iid-undisturbed-3", "mixed-iid-random-3"]
 
 
-@pytest.fixture(scope="module")
-def service(real):
-    return real
-
-
-@pytest.fixture(scope="module")
-def campaign(service):
-    ended = service.wait(service.post(**SPEC))
-    assert ended["state"] == "succeeded", ended["reason"]
-    return ended
-
-
 @pytest.fixture
 def folders(service, campaign):
     return [str(service.data_dir / "campaigns" / campaign["id"] / run) for run in RUNS]

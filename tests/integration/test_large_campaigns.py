@@ -66,10 +66,12 @@ def asked(service: Service, method: str, path: str, **options: Any) -> tuple[htt
 @pytest.mark.parametrize(
     ("path", "fields"),
     [
-        ("/scenes", {"name": "scenes"}),
         ("/failure-table", {"name": "failure_table", "outcomes": (Outcome.FAILURE,)}),
         ("/table?format=csv", {"name": "table", "format": "csv", "address": "{base}"}),
-        ("/report?format=md", {"name": "report", "format": "md", "address": "{base}"}),
+        pytest.param("/scenes", {"name": "scenes"}, marks=pytest.mark.torture),
+        pytest.param(
+            "/report?format=md", {"name": "report", "format": "md", "address": "{base}"}, marks=pytest.mark.torture
+        ),
     ],
 )
 def test_a_view_of_a_large_campaign_is_made_in_a_bounded_helper_process(service, campaign, here, path, fields):

@@ -11,7 +11,6 @@ import httpx
 import pytest
 
 from service.keys import KeyFile, Scope
-from service.keys.__main__ import main
 from service.settings import ServiceSettings
 from tests.contract.serving import serving
 from tests.server import LONG_S
@@ -185,49 +184,3 @@ def test_server_refuses_to_start_where_it_could_not_keep_anybody_out(tmp_path):
     assert started.returncode == 2
     assert started.stderr.startswith("host: got '0.0.0.0'; ")
     assert list(tmp_path.iterdir()) == []
-
-
-NEEDS_KEY = (
-    ("GET", "/v1/campaigns"),
-    ("GET", "/metrics"),
-    ("GET", "/v1/families"),
-    ("GET", "/v1/networks"),
-    ("POST", "/v1/campaigns"),
-)
-
-
-def create(service, capsys, *arguments):
-    """A client with a new key."""
-    assert main(["create", "--project", "maps", *arguments]) == 0
-    headers = {"authorization": f"Bearer {capsys.readouterr().out.strip()}"}
-    return httpx.Client(base_url=service.client.base_url, headers=headers, timeout=120)
-
-
-def statuses(client, campaign):
-    asked = (*NEEDS_KEY, ("DELETE", f"/v1/campaigns/{campaign}"))
-    answers = [client.request(method, path) for method, path in asked]
-    assert all(answer.json()["reason"] == "keys_unavailable" for answer in answers if answer.status_code == 503)
-    return {answer.status_code for answer in answers}
-
-
-def test_lost_keys_open_nothing(serve, monkeypatch, capsys):
-    service = serve()
-    monkeypatch.setenv("RISK_SAC_DATA_DIR", str(service.data_dir))
-    campaign = service.wait(service.post(budget={"episodes": 1}))["id"]
-    with create(service, capsys) as holder:
-        assert holder.get("/v1/campaigns").status_code == 200
-        (service.data_dir / "keys.json").unlink()
-        for restarted in (False, True):
-            if restarted:
-                service.stop()
-                service.start()
-            for client in (service.client, holder):
-                assert statuses(client, campaign) == {503}
-            assert service.client.get("/healthz").status_code == 200
-            assert service.client.get("/openapi.json").status_code == 200
-        with create(service, capsys) as new:
-            assert new.get("/v1/campaigns").status_code == 200
-            assert holder.get("/v1/campaigns").status_code == 401
-            assert service.client.get("/v1/campaigns").status_code == 401
-    forget(service)
-    assert [item["id"] for item in service.client.get("/v1/campaigns").json()["items"]] == [campaign]

@@ -9,18 +9,6 @@ from junitparser import JUnitXml
 SPEC = {"families": ["motorway_cut_in"], "methods": ["story-sweep", "random"], "seeds": [0], "budget": {"episodes": 4}}
 
 
-@pytest.fixture(scope="module")
-def service(real):
-    return real
-
-
-@pytest.fixture(scope="module")
-def campaign(service):
-    ended = service.wait(service.post(**SPEC))
-    assert ended["state"] == "succeeded", ended["reason"]
-    return ended
-
-
 @pytest.fixture
 def get(service, campaign):
     path = f"/v1/campaigns/{campaign['id']}/runs"

@@ -17,23 +17,10 @@ from risk_sac.report.figures import FORMATS
 SPEC = {
     "methods": ["random", "no-adversary"],
     "seeds": [0, 1],
-    "budget": {"episodes": 12, "evaluation_episodes": 1},
+    "budget": {"episodes": 6, "evaluation_episodes": 1},
     "learner": {"agent": {"actor_learning_rate": 1e-7}},  # which YAML reads as a string where JSON wrote it
 }
 TYPES = {"json": "application/json", "md": "text/markdown; charset=utf-8", "csv": "text/csv; charset=utf-8"}
-
-
-@pytest.fixture(scope="module")
-def service(real):
-    return real
-
-
-@pytest.fixture(scope="module")
-def campaign(service):
-    """A campaign that has succeeded."""
-    ended = service.wait(service.post(**SPEC))
-    assert ended["state"] == "succeeded", ended["reason"]
-    return ended
 
 
 @pytest.fixture

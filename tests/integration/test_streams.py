@@ -104,7 +104,8 @@ def test_a_stream_of_what_comes_tells_all_that_comes(shared):
 def test_streams_through_killed_servers_tell_everything_once(serve, kills):
     """Each client comes back with the last id it has; the server is killed under them again and again."""
     service = serve("striking_worker")
-    campaign_id = service.post(seeds=[0, 1], budget={"episodes": 120})
+    episodes = 40 * kills
+    campaign_id = service.post(seeds=[0, 1], budget={"episodes": episodes})
     seen = [[] for _ in range(4)]
 
     def follow(mine):
@@ -128,7 +129,7 @@ def test_streams_through_killed_servers_tell_everything_once(serve, kills):
         follower.join(LONG_S)
         assert not follower.is_alive()
     listed = [item["id"] for item in service.get(campaign_id, "/episodes", limit=500)["items"]]
-    assert len(listed) == 240
+    assert len(listed) == 2 * episodes
     for mine in seen:
         assert [event["data"]["id"] for event in mine if event["event"] != "state"] == listed
         assert len({event["id"] for event in mine}) == len(mine)

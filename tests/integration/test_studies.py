@@ -50,17 +50,13 @@ print(len(content) > 1000, "torch" in sys.modules)
     assert done.stdout == "True False\n"
 
 
-def test_a_failure_comes_as_a_bundle_with_its_core_region_and_twins(campaign, tmp_path, monkeypatch):
+def test_a_failure_comes_as_a_bundle_with_its_region_and_twins(campaign, tmp_path, monkeypatch):
     service, campaign_id, failure = campaign
     url, id_ = f"http://127.0.0.1:{service.port}", failure["id"]
     monkeypatch.setenv("RISK_SAC_URL", url)
     asked = ["campaigns", "failures", "bundle", campaign_id, str(failure["index"]), "--out"]
     assert cli.main([*asked, str(tmp_path / "failure.npz")]) == 0
     assert cli.main(["replay", str(tmp_path / "failure.npz")]) == 0
-    assert cli.main([*asked, str(tmp_path / "core.npz"), "--minimise", "smallest"]) == 0
-    core = read_bundle(tmp_path / "core.npz").manifest.core
-    assert core is not None
-    assert core.after.segments <= core.before.segments
     assert cli.main([*asked, str(tmp_path / "likelier.npz"), "--minimise", "most-plausible"]) == 0
     likelier = read_bundle(tmp_path / "likelier.npz")
     assert likelier.manifest.plausible.after <= likelier.manifest.plausible.before

@@ -32,6 +32,7 @@ UNROUNDED = """() => {
     const shown = [document.body.innerText, ...[...document.querySelectorAll("input")].map(({ value }) => value)];
     return shown.flatMap((text) => text.match(/\\d+\\.\\d{6,}/g) ?? []);
 }"""
+COLOURS = ["color-contrast", "link-in-text-block"]  # the rules of axe that a theme can break
 HOSTILE = "<img src=x onerror=alert(1)> a very long label " + "x" * 100
 CAMPAIGN = {
     "label": "night <b>7</b>",
@@ -163,6 +164,28 @@ def check_axe() -> Callable[..., None]:
         )
 
     return check
+
+
+@pytest.fixture
+def check_fits(check_axe: Callable[..., None]) -> Callable[["Page"], None]:
+    """Checks a page at its width in both themes, and that it needs no scrolling to the side, at a desk either."""
+
+    def check(page: "Page") -> None:
+        show_in(page, "light")
+        check_axe(page)
+        show_in(page, "dark")
+        check_axe(page, rules=COLOURS)
+        for width in (PHONE["width"], 1440):
+            page.set_viewport_size({"width": width, "height": 900})
+            page.wait_for_function("width => document.documentElement.scrollWidth <= width", arg=width)
+
+    return check
+
+
+def show_in(page: "Page", scheme: str) -> None:
+    """Changes the system's theme, and waits until the page follows."""
+    page.emulate_media(color_scheme=scheme)
+    expect(page.locator("html")).to_have_attribute("data-theme", scheme)
 
 
 def count(value: int | None) -> str:

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.server import Service, servers
-from tests.web.conftest import CAMPAIGN, PHONE, count
+from tests.web.conftest import CAMPAIGN, COLOURS, PHONE, count
 
 
 @pytest.fixture(scope="session")
@@ -22,8 +22,8 @@ def methods(service: Service) -> str:
         label="<img src=x onerror=alert(1)> night",
         families=["low"],
         methods=["archive", "random"],
-        seeds=[601, 602],
-        budget={"episodes": 40},
+        seeds=[0, 5],  # whose first failures come early
+        budget={"episodes": 12},
     )
     assert service.wait(posted)["state"] == "succeeded"
     return posted
@@ -216,7 +216,7 @@ def test_it_is_read_looked_at_and_printed(
         assert page.locator(link.get_attribute("href") or "").count() == 1
     check_axe(page)
     page.emulate_media(color_scheme="dark")
-    check_axe(page)
+    check_axe(page, rules=COLOURS)
     printed = page.pdf(format="A4")
     assert printed.startswith(b"%PDF")
     page.emulate_media(media="print", color_scheme="dark")

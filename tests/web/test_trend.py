@@ -1,5 +1,6 @@
 """An ego over its versions: the table to choose from, the charts, and the marker where unlike would be compared."""
 
+import json
 from collections.abc import Callable
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -124,21 +125,16 @@ def test_other_terms_have_a_row_of_their_own(page: Callable[..., Page]) -> None:
     expect(shown.get_by_text("1 campaign is left out")).to_be_visible()
 
 
-def test_a_mix_of_scenarios_is_refused_in_one_line(
-    page_at: Callable[..., Page], service: Service, campaign: str
-) -> None:
-    other = service.post(families=["dense"], budget={"episodes": 1})
-    assert service.wait(other)["state"] == "succeeded"
-    shown = page_at(f"trend?ego=default&campaigns={campaign},{other}", allowed=("422",))
-    expect(shown.get_by_role("alert")).to_contain_text("campaigns of the same scenarios")
+def test_a_refusal_is_told_in_one_line(new_page: Callable[..., Page], service: Service) -> None:
+    shown, detail = new_page(allowed=("422",)), "wanted campaigns of the same scenarios"
+    problem = {"status": 422, "title": "x", "detail": detail, "reason": "invalid_field"}
+    refused = {"status": 422, "content_type": "application/problem+json", "body": json.dumps(problem)}
+    shown.route("**/v1/egos/default/trend*", lambda route: route.fulfill(**refused))
+    shown.goto(f"{service.client.base_url}/page/#/trend?ego=default&campaigns=c1,c2")
+    expect(shown.get_by_role("alert")).to_contain_text(detail)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("viewport", [{"width": 1440, "height": 900}, PHONE], ids=["desk", "phone"])
-def test_the_charts_are_accessible_and_fit(
-    page: Callable[..., Page], viewport: dict[str, int], scheme: str, check_axe: Callable[[Page], None]
-) -> None:
-    shown = page(viewport=viewport, color_scheme=scheme)
+def test_the_charts_are_accessible_and_fit(page: Callable[..., Page], check_fits: Callable[[Page], None]) -> None:
+    shown = page(viewport=PHONE)
     expect(shown.get_by_role("img", name="Headline kinds", exact=True)).to_be_visible()
-    check_axe(shown)
-    assert shown.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
+    check_fits(shown)

@@ -1,4 +1,4 @@
-"""`risk-sac scenarios import`, and other commands that take an OpenSCENARIO file."""
+"""`risk-sac scenarios import`; the gate page runs an OpenSCENARIO file itself."""
 
 import json
 from pathlib import Path
@@ -47,10 +47,3 @@ def test_a_written_document_is_not_overwritten(tmp_path: Path) -> None:
     out.write_text("mine")
     assert cli.main(["scenarios", "import", str(copied(tmp_path) / SCENARIO), "--out", str(out)]) == 2
     assert out.read_text() == "mine"
-
-
-def test_a_run_takes_the_file_itself(tmp_path: Path) -> None:
-    file = copied(tmp_path) / VARIATION
-    arguments = ["--method", "random", "--episodes", "1", "--out", str(tmp_path / "run")]
-    assert cli.main(["run", "--scenario", str(file), *arguments]) == 0
-    assert library.listed()

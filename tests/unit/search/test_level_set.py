@@ -52,8 +52,15 @@ def balanced(guessed, truth):
     return (guessed[truth].mean() + (~guessed[~truth]).mean()) / 2
 
 
-@pytest.mark.parametrize(("out", "least"), [(0, 0.95), (15, 0.9)])
-@pytest.mark.parametrize("fails", [circle, plane])
+@pytest.mark.parametrize(
+    ("fails", "out", "least"),
+    [
+        (circle, 0, 0.95),
+        (plane, 15, 0.9),
+        pytest.param(plane, 0, 0.95, marks=pytest.mark.torture),
+        pytest.param(circle, 15, 0.9, marks=pytest.mark.torture),
+    ],
+)
 def test_40_points_tell_a_grid_of_400(fails, out, least):
     asked, _ = searched(fails, 40, out=out)
     classifier = FailureClassifier(asked, fails(asked))
