@@ -10,14 +10,15 @@ import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from tests.server import ROOT, Service, servers
 from tests.web.conftest import EXECUTABLE, NET, PHONE, WIDE
-from tests.web.test_screens import SCREENS, Scheme, heading
+from tests.web.test_screens import SCREENS, heading
 
+Scheme = Literal["dark", "light"]
 FOLDER = ROOT / "results" / "screenshots"
 README_PICTURE = ROOT / "service" / "web" / "replay.png"
 BEFORE_CONTACT_S = 1.7  # what README's picture shows
