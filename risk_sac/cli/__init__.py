@@ -22,11 +22,7 @@ ARENAS = {"MALLOC_ARENA_MAX": "2"}  # glibc gives each thread an arena otherwise
 def add_service_commands(commands: Commands) -> None:
     """Adds the commands."""
     serve = add_command(
-        commands,
-        "serve",
-        _serve,
-        "run the service and its web page in the foreground",
-        example="serve --runs runs",
+        commands, "serve", _serve, "run the service and its web page in the foreground", example="serve --runs runs"
     )
     network = serve.group("network")
     network.add_argument("--host", metavar="ADDRESS", help="(default: 127.0.0.1)")

@@ -41,11 +41,7 @@ def add(commands: Commands) -> None:
         commands, "egos", "list and compare egos, the vehicles under test", example="egos list"
     ).add_subparsers(required=True, metavar="COMMAND")
     add_command(
-        egos,
-        "list",
-        _list,
-        "list SUMO's driver models, the shipped egos and the registered ones",
-        example="egos list",
+        egos, "list", _list, "list SUMO's driver models, the shipped egos and the registered ones", example="egos list"
     )
     add_command(
         egos,
@@ -184,7 +180,6 @@ def _rows(family: str, found: "dict[str, Sequence[FinishedRun]]") -> list[list[s
 
 
 def _requirements(family: str, found: "dict[str, Sequence[FinishedRun]]") -> Iterator[list[str]]:
-    """The funnel of each requirement of each ego."""
     for name, runs in found.items():
         pooled = pooled_requirements([run.metrics["search"] for run in runs if run.spec.family == family])
         yield from ([family, name, *requirement_cells(each, counts)] for each, counts in pooled.items())

@@ -100,7 +100,6 @@ def _hourly(rate: HourlyRate | None) -> str:
 
 
 def _drawn(answer: Rates) -> str:
-    """Says which parameters have a distribution, and from where."""
     told = [
         f"{name}: {drawn.kind}, {drawn.source or 'choice'}"
         for name, drawn in answer.distributions.items()

@@ -88,7 +88,6 @@ def cases_table(regression: Regression) -> Table:
 
 
 def _export(folder: Path, formats: list[FormatName], bundles: list["Bundle"]) -> None:
-    """Bundles, and beside each the formats."""
     from risk_sac.failures.bundle import write_bundle
     from risk_sac.failures.export.formats import write
     from risk_sac.failures.export.recorded import Recorded

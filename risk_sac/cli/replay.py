@@ -176,7 +176,6 @@ def _failure(name: FormatName, bundle: Path) -> Files:
 
 
 def _runs(folders: list[Path]) -> Iterator[Path]:
-    """Finds the folders of runs among the given ones and directly below them."""
     for folder in folders:
         runs = [folder] if (folder / RESULTS).exists() else sorted(file.parent for file in folder.glob(f"*/{RESULTS}"))
         if not runs:
@@ -196,11 +195,7 @@ def add_understand(commands: Commands) -> None:
         example="minimise runs/low 42 --out core.npz",
     )
     region = add_command(
-        commands,
-        "region",
-        _region,
-        "measure how many neighbours of a failure fail too",
-        example="region runs/low 42",
+        commands, "region", _region, "measure how many neighbours of a failure fail too", example="region runs/low 42"
     )
     for parser, metavar, out in (
         (minimise, "FILE.npz", "write the core there, as a bundle"),
@@ -230,8 +225,6 @@ def add_understand(commands: Commands) -> None:
 
 
 class _Asked(NamedTuple):
-    """The failure that the command line names."""
-
     bundle: "Bundle"
     folder: Path | None = None  # of its run; None of a bundle's
     digest: str = ""  # of the run's results
@@ -255,7 +248,6 @@ def _asked(path: Path, failure: str | None) -> _Asked:
 
 
 def _note(asked: _Asked, studied: Studied) -> None:
-    """Leaves beside the results of a run what was found out."""
     if asked.folder is not None:
         note(asked.folder, asked.digest, asked.bundle.manifest.episode.index, studied)
 

@@ -20,16 +20,7 @@ from risk_sac.errors import ConfigError
 from risk_sac.host.terminal import complain, console, notes
 from risk_sac.records.assessment import CellState
 from risk_sac.report.grid import STANDARDS, PlayedGrid, StandardVerdict, grid_csv, grid_junit, played_grids, varied_axes
-from risk_sac.report.trend import (
-    EndedCampaign,
-    EndedRun,
-    LeftOut,
-    Trend,
-    TrendRate,
-    TrendRow,
-    check_scenarios,
-    trend,
-)
+from risk_sac.report.trend import EndedCampaign, EndedRun, LeftOut, Trend, TrendRate, TrendRow, check_scenarios, trend
 from risk_sac.run_folder.results import read_boundary_map, read_rates, read_verified, with_headline
 
 if TYPE_CHECKING:
@@ -159,7 +150,6 @@ def _facts(inputs: "Inputs", runs: Sequence[Path], regression: Path | None) -> "
 
 
 def _verify(words: Sequence[Path], regression: Path | None) -> int:
-    """Compares the inputs of a report with those that lie there now."""
     from risk_sac.failures.bundle import code_digest
     from risk_sac.report.files import SPEC, campaign_in, run_folders
     from risk_sac.report.signing import changes, input_digests, inputs_in, signed
@@ -187,7 +177,6 @@ def _verify(words: Sequence[Path], regression: Path | None) -> int:
 
 
 def _regress_command(inputs: "Inputs") -> str:
-    """Returns the command that plays the failures of all finished searches."""
     runs = [str(inputs.folders[run.spec.digest]) for run in inputs.comparison.runs]
     return shlex.join(["risk-sac", "regress", "--failures", *runs, "--ego", "EGO", "--out", "cases.json"])
 

@@ -163,7 +163,6 @@ def _found(metrics: RunMetrics) -> str:
 
 
 def _summary(spec: RunSpec, results: RunResults, phases: Mapping[str, RunMetrics]) -> Table:
-    """One column per phase."""
     columns = {name: _figures(metrics) for name, metrics in phases.items()}
     behaviour = wider_behaviour(family_named(spec.family).odd, spec.odd)
     setting = f"{spec.family} · {behaviour} behaviour"
@@ -197,7 +196,6 @@ def _figures(metrics: RunMetrics) -> dict[str, str]:
 
 
 def _figure(metric: Metric, metrics: RunMetrics) -> tuple[str, str]:
-    """Name and value of a metric, with its interval if it has one."""
     name, value = f"{metric.words} {metric.symbol}".strip(), metric.value(metrics)
     interval = None if value is None else metric.interval(value, metrics)
     text = or_dash(value, ".3f")

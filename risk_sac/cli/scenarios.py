@@ -21,14 +21,7 @@ from risk_sac.maps.finder import FINDERS, Map, survey
 from risk_sac.maps.found import TITLES, Pattern, Survey
 from risk_sac.run_folder.durable import scratch_folder
 from risk_sac.scenario import library
-from risk_sac.scenario.shipped import (
-    FOLDER,
-    nets_of,
-    networks,
-    roads,
-    scenario_file,
-    shipped_names,
-)
+from risk_sac.scenario.shipped import FOLDER, nets_of, networks, roads, scenario_file, shipped_names
 from risk_sac.world.net import net_remarks
 
 if TYPE_CHECKING:
@@ -70,10 +63,7 @@ def add(commands: Commands) -> None:
     )
     importing.add_argument("file", type=Path, metavar="FILE.xosc", help="a scenario, or a variation file that names it")
     importing.add_argument(
-        "--out",
-        type=Path,
-        metavar="DOC.yaml",
-        help="write the document and its roads (default: keep it by name)",
+        "--out", type=Path, metavar="DOC.yaml", help="write the document and its roads (default: keep it by name)"
     )
     importing.add_argument(
         "--ego-entity", metavar="NAME", help="the ego (default: the entity named Ego, or the one with a controller)"
@@ -125,7 +115,6 @@ def _text(name: str) -> str:
 
 
 def _check(options: argparse.Namespace) -> int:
-    """Fails if the ego is touched without an attack, or if nothing could be played."""
     document, folder = document_at(options.file)
     nets = nets_of(document, folder)
     from risk_sac.failures.scenario_trial import try_document  # here, because loading the simulator takes a second

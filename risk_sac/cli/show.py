@@ -95,7 +95,6 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _bundled(file: Path) -> tuple[RunSpec, Recording]:
-    """Returns the failure in a bundle, with the spec of its run."""
     from risk_sac.failures.bundle import read_bundle  # here, because loading the simulator takes a second
 
     bundle = read_bundle(file)
@@ -207,7 +206,6 @@ def _table(run: str, failures: Sequence[RecordedFailure]) -> Table:
 
 
 def _of_contact(collision: Collision) -> tuple[str, ...]:
-    """Returns speeds, zones and the begin of the conflict."""
     return (
         f"{collision.ego_speed_mps:.1f}\n{collision.other_speed_mps:.1f}",
         f"{collision.ego_zone}\n{collision.other_zone}",
@@ -222,7 +220,6 @@ def _without_contact(violation: Violation) -> tuple[str, ...]:
 
 
 def _conflict(judgement: Judgement) -> str:
-    """Returns the type of a conflict, and its time after the release and place on the map."""
     began = f"{judgement.conflict_s:.1f}, {judgement.conflict_x_m:.0f} {judgement.conflict_y_m:.0f}"
     return f"{judgement.conflict_type.replace('_', ' ')}\n{began}"
 
@@ -278,10 +275,7 @@ def _gravest(worst: Worst) -> tuple[bool, int, bool, bool]:
 
 
 WEIGHT = "weight"
-SORTS: Mapping[str, Callable[[Worst], Any]] = {
-    "severity": _gravest,
-    "speed": lambda worst: -worst.ego_speed_mps,
-}
+SORTS: Mapping[str, Callable[[Worst], Any]] = {"severity": _gravest, "speed": lambda worst: -worst.ego_speed_mps}
 SORTED_BY = (
     "found (the order of the search), weight (severity times plausibility, times the scene's density where a "
     "distribution is declared), severity (plausible and worst first) or speed (the fastest ego first)"

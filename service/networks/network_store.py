@@ -112,13 +112,7 @@ _RANDOM_BITS = 19  # with the time in ms, an id has 63 bits: enough for a cursor
 class NetworkStore:
     """Adds, lists, finds and deletes networks; used by many threads."""
 
-    def __init__(
-        self,
-        folder: Path,
-        *,
-        most: int = MOST,
-        at_once: int = UPLOADS_AT_ONCE,
-    ) -> None:
+    def __init__(self, folder: Path, *, most: int = MOST, at_once: int = UPLOADS_AT_ONCE) -> None:
         """Removes unfinished uploads; allows `most` networks per project and `at_once` uploads."""
         self._folder = folder
         self._most = most

@@ -11,13 +11,7 @@ from rich.box import SIMPLE_HEAD
 from rich.markup import escape
 from rich.table import Table
 
-from risk_sac.cli.campaigns.watch import (
-    add_campaign_command,
-    add_watch,
-    chosen_id,
-    line,
-    shown,
-)
+from risk_sac.cli.campaigns.watch import add_campaign_command, add_watch, chosen_id, line, shown
 from risk_sac.cli.console import (
     ABOVE,
     COULD_NOT_RUN,
@@ -336,7 +330,6 @@ def failures_table(failures: Sequence[Episode]) -> Table:
 
 
 def _lines(failure: Episode) -> Iterator[str]:
-    """A failure in words."""
     yield f"{failure.id}: {failure.outcome}{f' ({in_words([failure.reason])})' if failure.reason else ''}"
     if failure.driven_by is not None:
         yield f"  driven by  {failure.driven_by}"
@@ -346,7 +339,6 @@ def _lines(failure: Episode) -> Iterator[str]:
 
 
 def _told(violation: Collision | Violation) -> dict[str, str | None]:
-    """What is said of a violation; nothing of what has no words."""
     if isinstance(violation, Violation):
         broken, severity = {"the ego": violation.broke}, None
     else:

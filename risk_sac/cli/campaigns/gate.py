@@ -218,7 +218,6 @@ def verdict(results: Results, bounds: GateBounds) -> tuple[int, str]:
 
 
 def _read_known(file: Path) -> Mapping[str, frozenset[str]]:
-    """The kinds of failures of an earlier campaign, by family."""
     try:
         earlier = Results.model_validate_json(read_text(file, "--no-new-failures"))
     except ValidationError as error:

@@ -120,7 +120,6 @@ def _check_names(bounds: GateBounds, spec: CampaignSpec) -> None:
 
 
 def _follow(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
-    """Follows a campaign to its end, shows what it found and judges it."""
     try:
         with shown() as show:
             client.wait(campaign_id, show, timeout_s=options.timeout)
