@@ -177,7 +177,7 @@ class NetworkStore:
     def list(self, limit: int, before: int | None, project: str | None) -> StoredPage[Network]:
         """Lists networks, newest first, before the `last` of an earlier page; skips damaged ones."""
         with disk_refusals("the networks cannot be read"):
-            found = sorted((_number(path), path) for path in self._paths(project))
+            found = sorted((int(path.name[1:], 16), path) for path in self._paths(project))
             older = [(number, path) for number, path in reversed(found) if before is None or number < before]
             page = older[:limit]
             items = [network for _, path in page if (network := _readable(path)) is not None]
@@ -241,10 +241,6 @@ def _network(report: CheckReport, label: str, sha256: str, size: int) -> Network
     box = dict(zip(BoundingBox.model_fields, report.summary.bounding_box, strict=True))
     found = asdict(report.summary) | {"files": report.files, "warnings": report.warnings, "bounding_box": box}
     return Network.model_validate({"id": f"n{number:016x}"} | sent | found)
-
-
-def _number(path: Path) -> int:
-    return int(path.name[1:], 16)
 
 
 def _read(folder: Path) -> Network:

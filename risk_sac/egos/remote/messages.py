@@ -163,7 +163,7 @@ def command_of(message: Any) -> Command | None:
 
 logger = logging.getLogger(__name__)
 
-LENGTH = struct.Struct("<I")
+PREFIX = struct.Struct("<I")
 LONGEST = 1 << 22  # bytes of an observation
 BACKLOG = 64
 Serve = Callable[[Iterator[Any], Any], Iterator[Any]]  # observations and a context to commands, as for gRPC's Act
@@ -179,7 +179,7 @@ class Framed:
 
     def send(self, message: bytes) -> None:
         """Sends a message; raises OSError if the connection is broken."""
-        self._connection.sendall(LENGTH.pack(len(message)) + message)
+        self._connection.sendall(PREFIX.pack(len(message)) + message)
 
     def receive(self, until: float | None = None) -> bytes:
         """Returns the next message; `until` is the latest monotonic time to wait for it.
@@ -189,7 +189,7 @@ class Framed:
           EOFError: the connection ends without one.
           DecodeError: it is too long.
         """
-        (length,) = LENGTH.unpack(self._read(LENGTH.size, until))
+        (length,) = PREFIX.unpack(self._read(PREFIX.size, until))
         if length > self._longest:
             raise DecodeError(f"a message of {length} bytes, larger than max {self._longest}")
         return self._read(length, until)
