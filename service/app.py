@@ -18,17 +18,7 @@ from service.api.metrics import registry, request_latencies
 from service.api.middleware import add_middleware
 from service.api.pages import Cursors
 from service.api.problems import add_problem_handlers
-from service.api.routes import (
-    campaigns,
-    catalogue,
-    episodes,
-    events,
-    exports,
-    networks,
-    reports,
-    scenarios,
-    server,
-)
+from service.api.routes import campaigns, catalogue, episodes, events, exports, networks, reports, scenarios, server
 from service.api.stream import Streams
 from service.host import hold_data_folder
 from service.keys import check_exposure
@@ -98,11 +88,7 @@ def opened(settings: ServiceSettings, executor: Executor, latencies: Histogram) 
       KeysError: the API keys cannot be read.
     """
     check_exposure(settings)
-    with (
-        hold_data_folder(settings.data_dir),
-        closing(Store(settings.url)) as store,
-        held(store.engine),
-    ):
+    with hold_data_folder(settings.data_dir), closing(Store(settings.url)) as store, held(store.engine):
         # Everything that plays or draws an episode, here or in a helper process, finds its place in our library.
         os.environ[VARIABLE] = str(settings.places_dir.absolute())
         manager = Manager(settings, store, executor)

@@ -150,7 +150,6 @@ def _wait_until_up(url: str, process: subprocess.Popen[bytes], log: Path) -> Non
 
 
 def _write(out: Path, campaign: Campaign, results: Results, failures: Sequence[Episode]) -> None:
-    """Writes everything that was found as JSON; `series` is a failure's file below the data folder."""
     document = {
         "campaign": campaign.model_dump(mode="json"),
         "results": results.model_dump(mode="json"),

@@ -14,8 +14,6 @@ LONGEST = 800  # characters of what stands on one line
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes short mappings and lists of plain values on one line."""
-
     def ignore_aliases(self, data: object) -> bool:
         return True
 

@@ -24,7 +24,6 @@ SECRETS = os.environ.get("RISK_SAC_SECRETS_DIR")
 
 
 def _parsed(value: object) -> object:
-    """Parses JSON in a variable."""
     return from_json(value) if isinstance(value, str) else value
 
 
@@ -194,7 +193,6 @@ def _check_secrets() -> None:
 
 
 def _line(error: ErrorDetails) -> str:
-    """Describes one wrong setting, or the wrong entry of its list."""
     name, *item = error["loc"]
     field = ServiceSettings.model_json_schema()["properties"][name]
     text = repr(error["input"])

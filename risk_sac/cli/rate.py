@@ -16,7 +16,7 @@ from risk_sac.env.problem import Problem, adjustments
 from risk_sac.errors import ConfigError, did_you_mean
 from risk_sac.host.terminal import notes
 from risk_sac.rates.record import METHOD, check_exposure, rated, rates_of, start_in
-from risk_sac.records.rates import BoundaryMap, HourlyRate, RateEstimate, Rates
+from risk_sac.records.rates import BoundaryMap, RateEstimate, Rates
 from risk_sac.report.runs import read_records
 from risk_sac.run_folder.results import BOUNDARY_PICTURE, EPISODES
 
@@ -84,7 +84,9 @@ def _rate_table(answer: Rates) -> Table:
     table = Table(*(Column(name, overflow="fold") for name in names), box=SIMPLE_HEAD, padding=0, title=title)
     for name, estimate in answer.rates.items():
         shares = (f"{share:.0%}" for share in (estimate.largest_share, estimate.declared_share))
-        told = (*_said(estimate), _hourly(estimate.per_hour), f"{estimate.effective_failures:.0f}", *shares)
+        hour = estimate.per_hour
+        hourly = "" if hour is None else f"{hour.rate:.3g} ({hour.low:.3g} to {hour.high:.3g})"
+        told = (*_said(estimate), hourly, f"{estimate.effective_failures:.0f}", *shares)
         table.add_row(name, str(estimate.failures), *told)
     return table
 
@@ -93,10 +95,6 @@ def _said(estimate: RateEstimate) -> tuple[str, str]:
     if estimate.rate is None:
         return "-", f"below {estimate.at_most:.2g}"
     return f"{estimate.rate:.3g}", f"{estimate.low:.3g} to {estimate.high:.3g}"
-
-
-def _hourly(rate: HourlyRate | None) -> str:
-    return "" if rate is None else f"{rate.rate:.3g} ({rate.low:.3g} to {rate.high:.3g})"
 
 
 def _drawn(answer: Rates) -> str:

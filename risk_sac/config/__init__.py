@@ -1,16 +1,7 @@
 """Every setting of the system, as frozen pydantic models with unit and meaning by each field."""
 
 from risk_sac.config.base import Interval, Settings, field_errors
-from risk_sac.config.campaign import (
-    Budget,
-    CampaignSpec,
-    FamilyName,
-    Iid,
-    JudgeConfig,
-    RateStart,
-    Requirement,
-    RunSpec,
-)
+from risk_sac.config.campaign import Budget, CampaignSpec, FamilyName, Iid, JudgeConfig, RateStart, Requirement, RunSpec
 from risk_sac.config.ego import CarFollowing, EgoConfig, SensorConfig
 from risk_sac.config.learner import (
     AgentConfig,

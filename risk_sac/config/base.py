@@ -112,7 +112,6 @@ def read_fields(file: Path, field: str) -> dict[str, Any]:
 
 
 def _place_of(error: Exception) -> str:
-    """Returns where a text stops being YAML, and why."""
     if not isinstance(error, yaml.MarkedYAMLError) or error.problem_mark is None:
         return f": {error or 'it is nested too deep'}"
     mark = error.problem_mark
@@ -211,7 +210,6 @@ def shown(value: object) -> str:
 
 
 def _fields_at(location: Location, model: type[BaseModel]) -> list[str]:
-    """Names of the fields at a location of a model's JSON schema."""
     schema = _schema(model)
     node = schema
     for part in location:

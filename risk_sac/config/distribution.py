@@ -60,7 +60,6 @@ class _Law(Settings):
         return self.inverse(TAIL), self.inverse(1.0 - TAIL)
 
     def _below(self, value: float) -> float:
-        """P(X < value)."""
         return self.cumulative(value)
 
 

@@ -108,30 +108,23 @@ class Method(Settings):
 
 
 # Choice: all learners search scenes with BoTorch, so that their rows differ in the learner alone.
+_RISK_SAC: dict[str, Any] = {"agent": "sac", "lagrangian": True, "shaping": True, "replay": "rper"}
+_STORY: dict[str, Any] = {"agent": "none", "story": True}
 METHODS: dict[OwnMethod, Method] = {
     "risk-sac": Method(
-        agent="sac",
-        lagrangian=True,
-        shaping=True,
-        replay="rper",
+        **_RISK_SAC,
         scenes="botorch",
         summary="The paper's method: SAC with λ, robustness shaping, RPER and BoTorch scenes.",
     ),
     "risk-sac-diverse": Method(
-        agent="sac",
-        lagrangian=True,
-        shaping=True,
-        replay="rper",
+        **_RISK_SAC,
         scenes="archive",
         takes_turns=True,
         prior="all",
         summary="RISK-SAC and archive search in one loop, from the shipped policy, script model and library on.",
     ),
     "risk-sac-pretrained": Method(
-        agent="sac",
-        lagrangian=True,
-        shaping=True,
-        replay="rper",
+        **_RISK_SAC,
         scenes="botorch",
         prior="policy",
         summary="The paper's method, starting from the shipped policy instead of from nothing.",
@@ -179,17 +172,13 @@ METHODS: dict[OwnMethod, Method] = {
     "random": Method(agent="random", summary="Control: Sobol scenes and random actions, held for a second on average."),
     "no-adversary": Method(agent="none", summary="Control without an attack; what remains is the artefact rate."),
     "story-sweep": Method(
-        agent="none",
-        story=True,
+        **_STORY,
         scenes="grid",
         summary="The grid of the scenario's parameters, without an attack: all points, or a stratified sample.",
     ),
-    "story-random": Method(
-        agent="none", story=True, summary="Sobol scenes of the scenario as it is written, without an attack."
-    ),
+    "story-random": Method(**_STORY, summary="Sobol scenes of the scenario as it is written, without an attack."),
     "story-bo": Method(
-        agent="none",
-        story=True,
+        **_STORY,
         scenes="botorch",
         summary="BoTorch searches the scenario's parameters; others follow its story, without an attack.",
     ),
@@ -199,8 +188,7 @@ METHODS: dict[OwnMethod, Method] = {
         summary="How often the ego fails under the declared distributions, without an attack, by importance sampling.",
     ),
     "boundary": Method(
-        agent="none",
-        story=True,
+        **_STORY,
         scenes="boundary",
         summary="Seeks where the ego goes from passing to failing over two to four parameters, without an attack.",
     ),

@@ -74,7 +74,6 @@ def read_ego(text: str) -> EgoConfig:
 
 
 def _equipment(presets: Sequence[str]) -> dict[str, str]:
-    """Returns the fields that presets belong to."""
     chosen = dict[str, str]()
     for preset in presets:
         field, known = "sensors" if preset in SENSOR_PRESETS else "actuators", [*SENSOR_PRESETS, *ACTUATOR_PRESETS]

@@ -48,10 +48,6 @@ def _remainder(a: float, b: float) -> float:
     return math.fmod(a, b)
 
 
-def _power(a: float, b: float) -> float:
-    return math.pow(a, b)
-
-
 _BINARY: Mapping[str, Callable[[float, float], float]] = {
     "+": lambda a, b: a + b,
     "-": lambda a, b: a - b,
@@ -64,7 +60,7 @@ _BINARY: Mapping[str, Callable[[float, float], float]] = {
     ">": lambda a, b: float(a > b),
 }
 FUNCTIONS: Mapping[str, tuple[int | None, Callable[..., float]]] = {  # number of arguments; None: two or more
-    "pow": (2, _power),
+    "pow": (2, math.pow),
     "sqrt": (1, math.sqrt),
     "sin": (1, math.sin),
     "cos": (1, math.cos),
@@ -80,6 +76,7 @@ FUNCTIONS: Mapping[str, tuple[int | None, Callable[..., float]]] = {  # number o
     "min": (None, min),
     "max": (None, max),
 }
+DOMAINS = {"sqrt": (0.0, math.inf), "asin": (-1.0, 1.0), "acos": (-1.0, 1.0)}  # of what has no value elsewhere
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +124,8 @@ class Term:
         if self.op in "/%" and ranges[1].low <= 0.0 <= ranges[1].high:
             low, high = ranges[1].low, ranges[1].high
             raise ConfigError("", f"a division by {low:g} to {high:g}", "a divisor that is never 0 within the ranges")
-        if self.op in ("sqrt", "asin", "acos") and (ranges[0].low < 0.0 if self.op == "sqrt" else not _unit(ranges[0])):
+        least, greatest = DOMAINS.get(self.op, (-math.inf, math.inf))
+        if not least <= ranges[0].low <= ranges[0].high <= greatest:
             wanted = "0 or more" if self.op == "sqrt" else "-1 to 1"
             raise ConfigError("", f"{self.op} of {ranges[0].low:g} to {ranges[0].high:g}", wanted)
         if self.op in ("sin", "cos"):
@@ -147,10 +145,6 @@ class Term:
         if self.op == "abs" and ranges[0].low <= 0.0 <= ranges[0].high:
             values.append(0.0)
         return Interval(low=min(values), high=max(values))
-
-
-def _unit(bounds: Interval) -> bool:
-    return bounds.low >= -1.0 and bounds.high <= 1.0
 
 
 def _shown(names: Collection[str], of: Mapping[str, float]) -> str:

@@ -59,7 +59,6 @@ def _advanced(
     limits: tuple[float, float, float, float, float, float],
     step_s: float,
 ) -> tuple[float, float, float, float, float, float, float]:
-    """Returns the fields of the next motion."""
     x_m, y_m, heading_rad, speed, before_mps2, steered_rad, _ = motion
     wanted_mps2, wanted_rad = command
     most_accel_mps2, most_brake_mps2, brake_jerk_mps3, most_steering_rad, steering_rate_rad_s, grip_mps2 = limits

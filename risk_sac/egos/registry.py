@@ -318,7 +318,6 @@ def _source(point: EntryPoint) -> Path:
 
 
 def _declared(source: bytes, name: str) -> dict[str, Any]:
-    """The literals that a class declares of itself."""
     names = "version", "response_time_s", "deadline_s", "instances"
     for node in ast.parse(source).body:
         if isinstance(node, ast.ClassDef) and node.name == name:

@@ -180,11 +180,7 @@ METRICS = (
 )
 
 MetricName = Annotated[
-    str,
-    Field(
-        description="Such as `ecr`; the markdown table lists and defines them.",
-        examples=[METRICS[0].name],
-    ),
+    str, Field(description="Such as `ecr`; the markdown table lists and defines them.", examples=[METRICS[0].name])
 ]
 
 RATIOS = (

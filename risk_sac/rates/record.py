@@ -90,7 +90,6 @@ def _hourly(estimate: RateEstimate, scenes: float) -> RateEstimate:
 
 
 def _objection(weights: Floats, effective: float, largest: float, declared: float) -> str:
-    """Why an estimate is not to be trusted; empty if it is."""
     error = float(weights.std()) / math.sqrt(len(weights))
     if abs(float(weights.mean()) - 1.0) > MOST_ERRORS * error + 1e-9:
         return f"the mean weight is {weights.mean():.2f}, not 1"
@@ -118,7 +117,6 @@ def _unestimated(why: str, bound: float, count: int) -> RateEstimate:
 
 
 def _student(freedom: float) -> float:
-    """Two-sided 95 % quantile of Student's t distribution."""
     from scipy.special import stdtrit  # here, because few ask for it, and every process of a server loads this
 
     return float(stdtrit(max(freedom, 1.0), 1.0 - (1.0 - CONFIDENCE) / 2.0))

@@ -40,18 +40,10 @@ def wire(record: BaseModel) -> bytes:
     return to_json(record.model_dump(), inf_nan_mode="null")
 
 
-def _null_is_nan(value: Any) -> Any:
-    return math.nan if value is None else value
-
-
-def _null_is_infinite(value: Any) -> Any:
-    return math.inf if value is None else value
-
-
 _NULLABLE = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "null"}]})
-Real = Annotated[float, BeforeValidator(_null_is_nan), _NULLABLE]
+Real = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value), _NULLABLE]
 """A number; null on the wire where it is not finite."""
-Least = Annotated[float, BeforeValidator(_null_is_infinite), _NULLABLE]
+Least = Annotated[float, BeforeValidator(lambda value: math.inf if value is None else value), _NULLABLE]
 """The least of some values, infinite without any; null on the wire."""
 
 T = TypeVar("T")

@@ -136,7 +136,6 @@ def _unpacked(upload: bytes, folder: Path) -> Scenario:
 
 
 def _imported(upload: bytes, folder: Path, ego: str | None) -> Imported:
-    """Imports an archive of OpenSCENARIO, and puts its nets and roads into a folder."""
     with tempfile.TemporaryDirectory() as scratch:
         inside = Path(scratch).resolve()
         imported = import_scenario(unpack(upload, inside), within=inside, ego=ego)

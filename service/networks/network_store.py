@@ -112,13 +112,7 @@ _RANDOM_BITS = 19  # with the time in ms, an id has 63 bits: enough for a cursor
 class NetworkStore:
     """Adds, lists, finds and deletes networks; used by many threads."""
 
-    def __init__(
-        self,
-        folder: Path,
-        *,
-        most: int = MOST,
-        at_once: int = UPLOADS_AT_ONCE,
-    ) -> None:
+    def __init__(self, folder: Path, *, most: int = MOST, at_once: int = UPLOADS_AT_ONCE) -> None:
         """Removes unfinished uploads; allows `most` networks per project and `at_once` uploads."""
         self._folder = folder
         self._most = most
@@ -183,7 +177,7 @@ class NetworkStore:
     def list(self, limit: int, before: int | None, project: str | None) -> StoredPage[Network]:
         """Lists networks, newest first, before the `last` of an earlier page; skips damaged ones."""
         with disk_refusals("the networks cannot be read"):
-            found = sorted((_number(path), path) for path in self._paths(project))
+            found = sorted((int(path.name[1:], 16), path) for path in self._paths(project))
             older = [(number, path) for number, path in reversed(found) if before is None or number < before]
             page = older[:limit]
             items = [network for _, path in page if (network := _readable(path)) is not None]
@@ -247,10 +241,6 @@ def _network(report: CheckReport, label: str, sha256: str, size: int) -> Network
     box = dict(zip(BoundingBox.model_fields, report.summary.bounding_box, strict=True))
     found = asdict(report.summary) | {"files": report.files, "warnings": report.warnings, "bounding_box": box}
     return Network.model_validate({"id": f"n{number:016x}"} | sent | found)
-
-
-def _number(path: Path) -> int:
-    return int(path.name[1:], 16)
 
 
 def _read(folder: Path) -> Network:

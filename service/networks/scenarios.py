@@ -153,7 +153,6 @@ class Scenarios:
         raise NotFoundError(f"there is no scenario {name!r}", field="scenario", got=name)
 
     def _run(self, action: str, upload: bytes, *arguments: str) -> bytes:
-        """Runs the helper in turn; returns its answer."""
         with self._lock:
             if self._waiting >= MOST_WAITING:
                 said = f"{MOST_WAITING} scenarios are checked or drawn; wanted fewer: try again in {RETRY_AFTER_S} s"
@@ -220,7 +219,6 @@ def ask_helper(
 
 
 def _accepted(content: bytes) -> bytes:
-    """Returns a report, or raises the error that it tells."""
     report = json.loads(content)
     if not report.keys() & {"faults", "damaged"}:
         return content

@@ -87,7 +87,6 @@ class EndNotices:
         logger.info("message to its end: %s", reason or "delivered", extra={"campaign": notice.campaign_id})
 
     def _refusal(self, notice: DueNotice) -> str | None:
-        """Posts a message; returns why it was not taken."""
         campaign = self._store.campaign(notice.campaign_id)
         message = {
             "campaign": campaign.id,

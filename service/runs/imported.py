@@ -44,7 +44,7 @@ SPECIAL = {
 
 
 class _Stopped(Exception):
-    """The server stops."""
+    pass
 
 
 class Imports:
@@ -97,7 +97,6 @@ class Imports:
                 logger.warning("%s is not imported: %s", folder, error, exc_info=bug)
 
     def _import(self, folder: Path) -> None:
-        """Imports the finished runs of a campaign; the other runs are cancelled."""
         check_plain(folder)
         spec, results = campaign_in([folder])
         spec = spec.model_copy(update={"label": spec.label or folder.name})
@@ -157,7 +156,6 @@ class Imports:
             self._ledger.end_run(run.number, State.SUCCEEDED, result=result)
 
     def _cancelled(self, run: StoredRun) -> bool:
-        """Ends the run if its campaign was cancelled; returns whether it was."""
         with self._lock:
             cancelled = self._store.campaign_of(run.number).state is State.CANCELLING
             if cancelled:

@@ -105,7 +105,6 @@ def storage_errors(doing: str) -> Iterator[None]:
 
 
 def _keep_to_ourselves(file: Path | None) -> None:
-    """Makes a SQLite database readable by its owner alone."""
     if file is None:
         return
     create_private(file)

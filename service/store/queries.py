@@ -133,7 +133,6 @@ def episode_page(
 
 
 def _page(rows: Sequence[EpisodeRow], limit: int) -> StoredPage[Episode]:
-    """Returns the first rows, and whether there are more."""
     last = rows[limit - 1].number if len(rows) > limit else None
     return StoredPage(items=tuple(map(read_episode, rows[:limit])), last=last)
 

@@ -312,7 +312,6 @@ def _place(number: int, event: EpisodeDone) -> Place:
 
 
 def _known_episodes(session: Session, events: Sequence[tuple[int, EpisodeDone]]) -> dict[Place, EpisodeRow]:
-    """The rows of those that were stored before, by their places."""
     place = tuple_(EpisodeRow.run_number, EpisodeRow.phase, EpisodeRow.index)
     query = select(EpisodeRow).where(place.in_([_place(number, event) for number, event in events]))
     return {(row.run_number, row.phase, row.index): row for row in session.scalars(query)}

@@ -114,7 +114,6 @@ def _total(family: str, method: str, group: Sequence[RunMetrics]) -> Total:
 
 
 def _means(group: Sequence[RunMetrics]) -> dict[str, float | None]:
-    """Returns the mean metrics of a total, under the names of `RunMetrics`."""
     means: dict[str, float | None] = {}
     for metric in METRICS:
         if metric.field not in Total.model_fields:
@@ -174,8 +173,6 @@ def curves(campaign: StoredCampaign, episodes: Iterable[StoredRecord], points: i
 
 @dataclass(slots=True)
 class _RunningSums:
-    """Running sums of a run's search."""
-
     rated: list[int] = field(default_factory=list)  # so far: episodes in which the ego did not fail to drive
     contacts: list[bool] = field(default_factory=list)  # valid ones, of these episodes alone
     preventable_contacts: list[bool] = field(default_factory=list)

@@ -218,7 +218,6 @@ def failure_table(
 
 
 def _row(run: StoredRun, record: EpisodeRecord, worst: Collision | Violation) -> dict[str, Any]:
-    """A failure's entries of most columns, by the violation that names it."""
     repetition = run.repetitions.get(record.index)
     row = {name: getattr(worst.judged, name, None) for name in OF_JUDGEMENT}
     if isinstance(worst, Violation):  # whose offences are the ego's own

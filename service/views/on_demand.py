@@ -27,8 +27,6 @@ S = TypeVar("S", bound=Hashable)
 
 @dataclass
 class _Waiting(Generic[S]):
-    """Subjects that one key waits for."""
-
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
     requests: Counter[S] = field(default_factory=Counter)
 

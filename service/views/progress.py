@@ -71,7 +71,6 @@ def eta_s(runs: Sequence[StoredRun], spec: CampaignSpec, workers: int) -> float 
 
 
 def _pace_s(run: StoredRun, known: Sequence[StoredRun]) -> float:
-    """Returns the time of an episode, s, of the run or of those most like it."""
     if run.pace_s is not None:
         return run.pace_s
     of_method = [other for other in known if other.method == run.method]

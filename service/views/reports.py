@@ -149,7 +149,6 @@ def unknown_figure(campaign_id: str, name: str) -> NotFoundError:
 
 
 def _missing(run: StoredRun) -> str:
-    """Why a run that has not succeeded is not in the tables."""
     return f"{run.state}: {run.reason}" if run.reason else run.state
 
 
@@ -247,11 +246,7 @@ def drawn(made: CampaignReport, format_: Format) -> bytes:
 
 
 def evidence(
-    made: CampaignReport,
-    format_: str,
-    base_url: str,
-    regression: Regression | None,
-    people: Mapping[TriageState, int],
+    made: CampaignReport, format_: str, base_url: str, regression: Regression | None, people: Mapping[TriageState, int]
 ) -> str:
     """Returns all numbers of the report as JSON; as a page or Markdown with pictures, limits and commands."""
     comparison = _with_commands(made, base_url)
@@ -295,7 +290,6 @@ def _files(path: str) -> list[FigureFile]:
 
 
 def _with_commands(made: CampaignReport, base_url: str) -> Comparison:
-    """Adds the commands that queue the campaign again and that save its spec."""
     campaigns = f"{base_url}v1/campaigns"
     spec, post, as_yaml = map(
         shlex.quote,

@@ -286,8 +286,6 @@ def _large(campaign: StoredCampaign) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Question:
-    """A view, and where its helper finds the campaign."""
-
     view: CampaignView
     data_dir: Path
     database_url: str | None

@@ -59,7 +59,6 @@ from risk_sac.scenario.reading import nets_of
 
 SEEDS = 1  # number of seeds if neither the file nor a flag names any
 RATE = number(float, 0, 1)
-MAP_UPLOADED = "in place of families: id or label of an uploaded map"
 TAG = "word to find the campaign by; may be repeated"
 NAMED_FAILURES = 5  # most failures that a JUnit report names per run
 
@@ -77,7 +76,7 @@ def add_watch(commands: Commands) -> None:
     add_campaign_flags(parser, families="the file's", methods="risk-sac", seeds=SEEDS)
     add_scene_flags(parser)
     add_prior_flag(parser, "the id of an earlier campaign")
-    add_place_flags(parser, MAP_UPLOADED)
+    add_place_flags(parser, "in place of families: id or label of an uploaded map")
     service = parser.group("service")
     service.add_argument("--label", metavar="TEXT", help="text to find the campaign by")
     service.add_argument("--tag", dest="tags", action="append", metavar="WORD", help=TAG)
@@ -148,7 +147,10 @@ def _results(options: argparse.Namespace) -> int:
 def _conclude(client: Client, campaign_id: str, options: argparse.Namespace) -> int:
     results, bounds = client.results(campaign_id), GateBounds.of(options)
     if options.junit is not None:
-        _report(client, results, bounds, options.junit)
+        begun = [run for run in results.runs if run.metrics is not None and run.metrics.failures]
+        failures = {run.id: _first_failures(client, campaign_id, run.id) for run in begun}
+        report = junit(results, client.url, client.url_of(campaign_id), bounds, failures)
+        report.write(str(options.junit), pretty=True)
     print_answer(options, results, results_tables(results, bounds))
     say_adjustments(results.adjustments)
     for run in results.runs:
@@ -160,16 +162,6 @@ def _conclude(client: Client, campaign_id: str, options: argparse.Namespace) -> 
     elif reason:
         complain(reason)
     return status
-
-
-def _report(client: Client, results: Results, bounds: GateBounds, file: Path) -> None:
-    failures = {
-        run.id: _first_failures(client, results.campaign_id, run.id)
-        for run in results.runs
-        if run.metrics is not None and run.metrics.failures
-    }
-    url = client.url_of(results.campaign_id)
-    junit(results, client.url, url, bounds, failures).write(str(file), pretty=True)
 
 
 def _first_failures(client: Client, campaign_id: str, run_id: str) -> list[Episode]:

@@ -71,7 +71,6 @@ class FrenetPlanner:
         """Releases nothing."""
 
     def _start(self, ego: Any) -> None:
-        """Makes the planner, and routes it from the lane that the ego is on."""
         config = fp.LocalPlannerConfig()
         config.planner.type = fp.planner_type_from_string(self.kind)
         config.desired_speed = max(lane.limit_mps for lane in self._road.lanes)  # so that each lane's limit decides

@@ -243,7 +243,6 @@ def _moving(perceived: Perceived, column: int, number: int) -> Mapping[str, Any]
 
 
 def _light(perceived: Perceived) -> Mapping[str, Any]:
-    """The signal ahead, at its stop line."""
     x, y = point_at(perceived.path, perceived.station_m + perceived.stop_line_m)
     return {
         "id": {"value": SIGNAL_ID},
@@ -257,7 +256,6 @@ def _vector(x: float, y: float, z: float = 0.0) -> Mapping[str, float]:
 
 
 def _point(told: Any, rear_axle_m: float) -> tuple[float, float, float]:
-    """Returns the time, and where the middle of the body is to be then."""
     time_s = told.timestamp.seconds + told.timestamp.nanos / 1e9
     place, yaw = told.position, told.orientation.yaw
     return time_s, place.x + rear_axle_m * math.cos(yaw), place.y + rear_axle_m * math.sin(yaw)
