@@ -47,7 +47,8 @@ class _HistoricallyTimed(rtamt.HistoricallyTimedOperation):  # type: ignore[misc
     def update(self, sample: float) -> float:
         """The least of the window's samples, the newest included."""
         self.buffer.append(sample)
-        return min(islice(self.buffer, self.end - self.begin + 1))
+        least: float = min(islice(self.buffer, self.end - self.begin + 1))
+        return least
 
 
 _TIMED_OPERATORS = {
