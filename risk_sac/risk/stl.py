@@ -1,15 +1,15 @@
 """Online monitoring of STL requirements by rtamt's operators.
 
-rtamt supplies every operator that has a state. Its own walk over the tree is replaced, because it keys that state by
-the operator's text. So a sub-formula that occurs twice is updated twice per step and sees half its window. It also
-visits the operands of `+` and `not` twice, and nodes by name, which takes several times as long.
+rtamt supplies every operator with its state. Its own walk over the tree is replaced, because it keys an operator's
+state by its text. So a sub-formula that occurs twice is updated twice per step and sees half its window. It also visits
+the operands of `+` and `not` twice, and nodes by name, which takes several times as long.
 
 Source: RISK-SAC, Sec. III-C; Nickovic, Yamaguchi, "RTAMT: online robustness monitors from STL", ATVA 2020.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from itertools import islice
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -17,42 +17,29 @@ from rtamt.semantics.stl.discrete_time.online import ast_visitor as rtamt
 
 from risk_sac.config import Requirement
 from risk_sac.errors import FormulaError, NotFinite
-from risk_sac.risk.formula import Node, parse, signals_of
+from risk_sac.risk.formula import COMPARISONS, Node, parse, signals_of
 from risk_sac.world.types import Floats
 
 ROBUSTNESS_CLIP = 3.0  # in scales; a margin beyond it is as good as any, and rtamt's warm-up is infinite
 
 Signals = Mapping[str, float]
-_STATELESS = {  # in Python
-    **{operator: f"({{}} {operator} {{}})" for operator in "+-*/"},
-    **dict.fromkeys((">", ">="), "({0} - {1})"),
-    **dict.fromkeys(("<", "<="), "({1} - {0})"),
-    "abs": "abs({})",
-    "not": "(-{})",
-    "and": "min({}, {})",
-    "or": "max({}, {})",
-    "implies": "max(-{}, {})",
-}
 _OPERATORS = {
+    "+": rtamt.AdditionOperation,
+    "-": rtamt.SubtractionOperation,
+    "*": rtamt.MultiplicationOperation,
+    "/": rtamt.DivisionOperation,
+    "abs": rtamt.AbsOperation,
+    "not": rtamt.NotOperation,
+    "and": rtamt.AndOperation,
+    "or": rtamt.OrOperation,
+    "implies": rtamt.ImpliesOperation,
     "prev": rtamt.PreviousOperation,
     "historically": rtamt.HistoricallyOperation,
     "once": rtamt.OnceOperation,
     "since": rtamt.SinceOperation,
 }
-
-
-class _HistoricallyTimed(rtamt.HistoricallyTimedOperation):  # type: ignore[misc]
-    """rtamt's operator, whose update compares in C."""
-
-    def update(self, sample: float) -> float:
-        """The least of the window's samples, the newest included."""
-        self.buffer.append(sample)
-        least: float = min(islice(self.buffer, self.end - self.begin + 1))
-        return least
-
-
 _TIMED_OPERATORS = {
-    "historically": _HistoricallyTimed,
+    "historically": rtamt.HistoricallyTimedOperation,
     "once": rtamt.OnceTimedOperation,
     "since": rtamt.SinceTimedOperation,
 }
@@ -78,13 +65,11 @@ class Monitor:
         self.names = tuple(requirement.name for requirement in requirements)
         self.shapes = np.array([requirement.shapes for requirement in requirements])  # M; which are part of φ
         self._operators: list[Any] = []  # of rtamt, to be reset
-        self._known: dict[str, Any] = {"abs": abs, "min": min, "max": max}  # to the source of the formulas
         trees = [parsed(index, requirement, step_s, horizon_steps) for index, requirement in enumerate(requirements)]
         self.signals = sorted(set[str]().union(*map(signals_of, trees)))
-        outputs = [
-            f"{self._source(tree)} * {1.0 / each.scale!r}" for tree, each in zip(trees, requirements, strict=True)
+        self._outputs = [
+            (self._compile(tree), 1.0 / each.scale) for tree, each in zip(trees, requirements, strict=True)
         ]
-        self._evaluate: Callable[[Signals], list[float]] = eval(f"lambda signals: [{', '.join(outputs)}]", self._known)
 
     def reset(self) -> None:
         """Forgets the past, as before the first update."""
@@ -104,25 +89,27 @@ class Monitor:
         # One check for all: the signals are far too small to overflow together.
         if not math.isfinite(sum([signals[name] for name in self.signals])):
             raise NotFinite(f"the signals are {dict(signals)}; wanted finite numbers")
-        most = ROBUSTNESS_CLIP
-        return np.array(
-            [value if -most <= value <= most else math.copysign(most, value) for value in self._evaluate(signals)]
-        )
+        robustness = [evaluate(signals) * per_scale for evaluate, per_scale in self._outputs]
+        return np.array([min(max(value, -ROBUSTNESS_CLIP), ROBUSTNESS_CLIP) for value in robustness])
 
-    def _source(self, node: Node) -> str:
-        """Python source of a sub-formula; called, it updates the operators in it, each with a state of its own."""
+    def _compile(self, node: Node) -> Callable[[Signals], float]:
+        """A function that updates a sub-formula by one step; each operator has a state of its own."""
         if node.op == "signal":
-            return f"signals[{node.text!r}]"
+            return itemgetter(node.text)
         if node.op == "number":
-            return repr(float(node.text))
-        operands = [*map(self._source, node.children)]
-        if node.op in _STATELESS:
-            return _STATELESS[node.op].format(*operands)
+            number = float(node.text)
+            return lambda signals: number
+        left, *others = map(self._compile, node.children)
+        if node.op in COMPARISONS:  # rtamt's own compares enums in every step, which doubles the time of an update
+            larger, smaller = (left, others[0]) if node.op in (">", ">=") else (others[0], left)
+            return lambda signals: larger(signals) - smaller(signals)
         operator = _TIMED_OPERATORS[node.op](*node.window) if node.window else _OPERATORS[node.op]()
-        update = f"update_{len(self._operators)}"
-        self._known[update] = operator.update
         self._operators.append(operator)
-        return f"{update}({', '.join(operands)})"
+        update = operator.update
+        if not others:
+            return lambda signals: update(left(signals))
+        [right] = others
+        return lambda signals: update(left(signals), right(signals))
 
 
 def parsed(index: int, requirement: Requirement, step_s: float, horizon_steps: int) -> Node:
