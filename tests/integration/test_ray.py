@@ -1,4 +1,4 @@
-"""The command line and the service on a Ray cluster of two nodes."""
+"""The command line and the service on a Ray cluster of two nodes, and what is told of a wrong one at the start."""
 
 import contextlib
 import json
@@ -11,15 +11,26 @@ from pathlib import Path
 import psutil
 import pytest
 
-from risk_sac.execution.jobs import LOG
+from risk_sac.errors import ConfigError
+from risk_sac.execution.jobs import LOG, worker_program
+from risk_sac.execution.ray.executor import RayExecutor
 from risk_sac.scenario import library
 from risk_sac.scenario.reading import shipped_document
-from tests.integration.scripted_worker import DIES, ONCE, WAITS, WELL_BEHAVED
+from tests.integration.scripted_worker import DIES, ONCE, WAITS
 from tests.ray_cluster import LONG_S, ROOT, Cluster, needs_ray, running, wait_until
 from tests.server import servers
 
-pytestmark = needs_ray
 TINY = ["--methods", "random", "--seeds", "1", "--episodes", "3", "--verify", "0"]
+# As if Ray were not installed, wherever it is.
+WITHOUT_RAY = """
+import sys
+from importlib.machinery import PathFinder
+class Without(PathFinder):
+    @classmethod
+    def find_spec(cls, name, path=None, target=None):
+        return None if name.partition(".")[0] == "ray" else super().find_spec(name, path, target)
+sys.meta_path[sys.meta_path.index(PathFinder)] = Without
+"""
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +84,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return library.keep(document, {"net.xml": (ROOT / "sumo_nets" / "low" / "low.net.xml").read_bytes()})
 
 
+@needs_ray
 def test_a_comparison_comes_to_the_same_on_a_cluster_and_leaves_nothing_there(cluster, place, tmp_path):
     there = evaluated(tmp_path / "ray", [place])
     assert there.returncode == 0, there.stderr
@@ -86,6 +98,7 @@ def test_a_comparison_comes_to_the_same_on_a_cluster_and_leaves_nothing_there(cl
     wait_until(lambda: not list(cluster.scratch.glob("*")))
 
 
+@needs_ray
 def test_rounds_are_played_on_several_nodes_and_a_killed_actor_is_replaced(cluster, tmp_path):
     rounds = ["--methods", "archive", "--seeds", "1", "--episodes", "96", "--batch", "4", "--verify", "0"]
     log, killed = tmp_path / "ray" / "runs" / "low-archive-0" / LOG, []
@@ -114,15 +127,16 @@ def test_rounds_are_played_on_several_nodes_and_a_killed_actor_is_replaced(clust
     wait_until(lambda: not list(cluster.scratch.glob("*")))
 
 
+@needs_ray
 def test_a_worker_and_an_actor_that_are_killed_are_replaced_from_the_checkpoint(serve, cluster):
     service = serve()
-    campaign_id = service.post(seeds=[WELL_BEHAVED, ONCE + DIES, WAITS], budget={"episodes": 12})
+    campaign_id = service.post(seeds=[ONCE + DIES, WAITS], budget={"episodes": 12})
     run = f"low-random-{WAITS}"
     service.wait_for(campaign_id, lambda seen: service.episodes(campaign_id, run) == list(range(10)))
     metrics = service.client.get("/metrics").text
     assert "risk_sac_cluster_connected 1.0" in metrics
     assert sum(line.startswith("risk_sac_node_alive{") and line.endswith(" 1.0") for line in metrics.splitlines()) == 2
-    wait_until(lambda: len(actors(cluster)) == 1)  # on a busy machine the other runs are at work for longer
+    wait_until(lambda: len(actors(cluster)) == 1)  # on a busy machine the other run is at work for longer
     # The actor goes, and with it go its worker and the folder of that.
     (actor,) = actors(cluster)
     workers = [each for each in actor.children() if "scripted_worker" in each.cmdline()]
@@ -138,6 +152,7 @@ def test_a_worker_and_an_actor_that_are_killed_are_replaced_from_the_checkpoint(
     wait_until(lambda: not list(cluster.scratch.glob("*")))
 
 
+@needs_ray
 def test_what_a_hung_node_says_later_is_dropped(serve, cluster):
     service = serve(lease_s=600)
     campaign_id = service.post(seeds=[WAITS], budget={"episodes": 12})
@@ -160,3 +175,53 @@ def test_what_a_hung_node_says_later_is_dropped(serve, cluster):
     (folder / "go-10").touch()
     assert service.wait(campaign_id)["state"] == "succeeded"
     assert service.episodes(campaign_id, run) == list(range(12))
+
+
+def path_with(*folders: Path) -> dict[str, str]:
+    """An environment in which these folders come before what is installed."""
+    return {"PYTHONPATH": os.pathsep.join([*map(str, folders), str(ROOT), os.environ.get("PYTHONPATH", "")])}
+
+
+@pytest.mark.parametrize(
+    "command",
+    [["risk_sac", "evaluate", "--scenario", "low", *TINY, "--out", "out"], ["service"]],
+    ids=lambda command: command[0],
+)
+def test_without_ray_the_setting_that_wants_it_is_named(command, tmp_path):
+    (tmp_path / "sitecustomize.py").write_text(WITHOUT_RAY)
+    settings = {"RISK_SAC_EXECUTOR": "ray", "RISK_SAC_DATA_DIR": str(tmp_path / "data"), "RISK_SAC_PORT": "1"}
+    shown = subprocess.run(
+        [sys.executable, "-m", *command], env=os.environ | path_with(tmp_path) | settings, cwd=tmp_path,
+        capture_output=True, text=True, timeout=LONG_S, check=False,
+    )  # fmt: skip
+    assert shown.returncode != 0
+    text = " ".join(shown.stderr.split())
+    assert "RISK_SAC_EXECUTOR" in text
+    assert "pip install risk-sac[ray]" in text
+    assert not list(tmp_path.glob("out/runs/*"))
+
+
+def refusal() -> ConfigError:
+    with pytest.raises(ConfigError) as caught:
+        RayExecutor(worker_program()).close()
+    return caught.value
+
+
+@needs_ray
+@pytest.mark.parametrize(
+    ("environment", "field", "said"),
+    [
+        ({"RISK_SAC_RAY_ADDRESS": "127.0.0.1:1"}, "RISK_SAC_RAY_ADDRESS", "nothing answers"),
+        ({"RISK_SAC_RAY_ADDRESS": "somewhere"}, "RISK_SAC_RAY_ADDRESS", "wanted `auto` or HOST:PORT"),
+        ({"RISK_SAC_RAY_CPUS_PER_RUN": "3"}, "RISK_SAC_RAY_CPUS_PER_RUN", "no node of the cluster has as much"),
+        ({"RISK_SAC_RAY_CPUS_PER_RUN": "none"}, "RISK_SAC_RAY_CPUS_PER_RUN", 'got "none"'),
+        ({"RISK_SAC_RAY_SCRATCH_DIR": "/proc/runs"}, "RISK_SAC_RAY_SCRATCH_DIR", "cannot write to"),
+        ({"RAY_AUTH_TOKEN": "0" * 32}, "RISK_SAC_RAY_ADDRESS", "with its token"),
+    ],
+)
+def test_settings_that_cannot_work_are_named(cluster, monkeypatch, environment, field, said):
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    error = refusal()
+    assert error.field == field
+    assert said in str(error)
