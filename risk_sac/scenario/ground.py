@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import shapely
 
 from risk_sac.scenario import layout
 from risk_sac.world.net import Crossing, Link, Net, NetLane, once
@@ -50,11 +49,15 @@ def outlines(link: Link, length_m: float, width_m: float) -> Floats:
     return np.concatenate([each.reshape(2, -1) for each in sides], axis=1)
 
 
-def is_near(line: Sequence[Point], points: Sequence[Point] | Floats, within_m: float) -> bool:
-    """Whether a line comes so near to one of some points, `n x 2`, m."""
-    if len(line) < 2 or not len(points):
-        return False
-    return bool(shapely.dwithin(shapely.LineString(line), shapely.points(points), within_m).any())
+def is_near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> bool:
+    """Whether a line comes so near to a point."""
+    for (ax, ay), (bx, by) in pairwise(line):
+        dx, dy = bx - ax, by - ay
+        square = dx * dx + dy * dy
+        share = 0.0 if square == 0.0 else min(max(((x_m - ax) * dx + (y_m - ay) * dy) / square, 0.0), 1.0)
+        if math.hypot(ax + share * dx - x_m, ay + share * dy - y_m) <= within_m:
+            return True
+    return False
 
 
 @once
@@ -64,9 +67,7 @@ def too_near(net: Net, link: Link) -> Link | None:
     for lane in lanes[max(link.source.index - 1, 0) : link.source.index + 2]:
         for other in net.onward.get(lane.id, ()):
             beside = lane is not link.source and other.target.edge == link.target.edge
-            if not beside or other.target is link.target:
-                continue
-            if is_near(other.line, link.line, ROOM_M) or is_near(link.line, other.line, ROOM_M):
+            if beside and other.target is not link.target and _come_near(link.line, other.line):
                 return other
     return None
 
@@ -80,11 +81,17 @@ def truck_reaches(net: Net, beside: Link, own: Link) -> bool:
     points = np.concatenate(
         [outlines(each, layout.TRUCK_LENGTH_M, layout.TRUCK_WIDTH_M) for each in _forks(net, beside)], axis=1
     )
-    return any(is_near(way, points.T, layout.CAR_WIDTH_M / 2) for way in ways)
+    return any(is_near(way, x, y, layout.CAR_WIDTH_M / 2) for way in ways for x, y in points.T.tolist())
 
 
 def _forks(net: Net, link: Link) -> list[Link]:
     return [other for other in net.onward[link.source.id] if other.target.edge == link.target.edge]
+
+
+def _come_near(line: Sequence[Point], other: Sequence[Point]) -> bool:
+    return any(is_near(other, *point, ROOM_M) for point in line) or any(
+        is_near(line, *point, ROOM_M) for point in other
+    )
 
 
 def waits_in_the_way(net: Net, link: Link) -> NetLane | None:
@@ -190,19 +197,18 @@ def _around(net: Net, x_m: float, y_m: float, *, walked: bool) -> tuple[Polygons
     ]
     if not walked:
         return [], [], junctions
-    here = [(x_m, y_m)]
     crossings = [
         quad
         for crossing in net.crossings
-        if is_near(crossing.line, here, CROSSINGS_M)
+        if is_near(crossing.line, x_m, y_m, CROSSINGS_M)
         for quad in layout.ribbon(crossing.line, crossing.width_m)
     ]
-    lanes = [lane for edge in net.edges.values() for lane in edge.drivable if is_near(lane.line, here, WALKED_M)]
+    lanes = [lane for edge in net.edges.values() for lane in edge.drivable if is_near(lane.line, x_m, y_m, WALKED_M)]
     for junction in net.junctions.values():
         if math.hypot(junction.x_m - x_m, junction.y_m - y_m) <= 3 * WALKED_M:
-            lanes += [lane for lane in net.inside.get(junction.id, ()) if is_near(lane.line, here, WALKED_M)]
+            lanes += [lane for lane in net.inside.get(junction.id, ()) if is_near(lane.line, x_m, y_m, WALKED_M)]
     quads = (quad for lane in lanes for quad in layout.ribbon(lane.line, lane.width_m))
-    return crossings, [quad for quad in quads if is_near((*quad, quad[0]), here, WALKED_M)], junctions
+    return crossings, [quad for quad in quads if is_near((*quad, quad[0]), x_m, y_m, WALKED_M)], junctions
 
 
 def _rounded(polygons: Iterable[Sequence[Point]]) -> Iterator[tuple[Point, ...]]:
