@@ -17,11 +17,11 @@ class ScenarioCheck(Record):
     refused: Mapping[str, int]
     """Scenes by the rule that refused them: `constraint`, `scenario` or a rule of C_hard."""
     contacts: int
-    """Episodes in which the default ego touched something although no adversary attacked."""
+    """Episodes in which the default ego touched something."""
     invalid: tuple[str, ...]
-    """Why episodes could not be played to their end."""
+    """Why episodes did not end."""
     out_of_reach: tuple[str, ...]
-    """Adversaries that in no scene can come near the ego's way."""
+    """Adversaries that can never come near the ego's way."""
     without_effect: tuple[str, ...]
     """Parameters that change no start, whatever their value."""
     seconds: float
@@ -57,7 +57,7 @@ class ScenarioSummary(Record):
     like: str | None
     """Shipped family whose prior fits."""
     episode_s: Mapping[str, float] = {}
-    """Method → seconds that an episode takes a slot: median over newest runs of this server."""
+    """Method → slot seconds of an episode, in lists: median over the newest runs."""
 
 
 class ScenarioList(Record):

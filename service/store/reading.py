@@ -351,7 +351,7 @@ class Store:
         times: dict[str, dict[str, list[float]]] = {}
         with self._reading() as session:
             for family, method, slot_s in session.execute(query):
-                times.setdefault(family, {}).setdefault(method, []).append(slot_s)
+                times.setdefault(family, {}).setdefault(method, []).append(float(slot_s or 0.0))
         return {family: {method: median(each) for method, each in methods.items()} for family, methods in times.items()}
 
     def priors(self) -> set[str]:
