@@ -85,7 +85,7 @@ async def post_scenario(
 @router.post(
     "/check",
     responses=REFUSALS,
-    description="Check a document as `POST /v1/scenarios` does, and play 20 scenes of it without an attack. It is not kept.",
+    description="Check a document as `POST /v1/scenarios` does, and play 20 scenes without an attack. It is not kept.",
     openapi_extra=DOCUMENTED_BODY,
     dependencies=[Depends(_refuse_other_types)],
 )
