@@ -10,7 +10,7 @@ from service.api.description import openapi
 from service.app import create_app
 from service.settings import ServiceSettings
 
-LONGEST = 800  # characters of what stands on one line
+LONGEST = 1000  # characters of what stands on one line
 
 
 class _Dumper(yaml.SafeDumper):

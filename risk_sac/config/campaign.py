@@ -103,18 +103,17 @@ class Budget(Settings):
     evaluation_episodes: Annotated[int, Field(ge=0, le=10_000)] = 0
     """Episodes of the frozen policy after the search."""
     cpu_s: Annotated[float, Field(ge=0.1, le=1e7)] | None = None
-    """Processor time after which a search ends, s, without compilation; how many episodes it has played then depends
-    on the processor."""
+    """Processor time after which a search ends, s, without compilation."""
     least_episodes: Annotated[int, Field(ge=1, le=100_000)] = 1
     """Search episodes that are played whatever the processor time, so that one run serves two budgets."""
     all_points: bool = False
-    """Whether `story-sweep` has to play every point of the grid; it is refused if these are more than `episodes`.
-    False: where they are more, it plays a stratified sample of `episodes` points."""
+    """Whether `story-sweep` is refused where the grid has more than `episodes` points. False: it plays a stratified
+    sample of them."""
 
     batch: Batch = 1
     """Episodes that are asked for at a time, and played in parallel; at most 16 for each processor. `auto`: two for
-    each processor, as a number from then on. The results depend on it, and on nothing else of how they are played. A
-    policy plays a round as it was when the round was asked for."""
+    each processor, as a number from then on. The results depend on it. A policy plays a round as it was at its
+    beginning."""
 
     @model_validator(mode="after")
     def _least_is_affordable(self) -> Self:
@@ -245,7 +244,7 @@ class CampaignSpec(Settings):
     judge: JudgeConfig = JudgeConfig()
     prior: PriorName = "shipped"
     """What methods with a prior start from: `shipped`, `none`, or the scripts of an earlier campaign, by its id; on the
-    command line the folder of a run or campaign. They are copied, and the copy's name takes the place of this one."""
+    command line the folder of a run or campaign. They are copied."""
     deviation: DeviationBounds | None = None
     """Of actors from the stories of the scenarios; null: each scenario's own bounds."""
     iid: Iid | None = None
@@ -258,8 +257,7 @@ class CampaignSpec(Settings):
     on_end: Annotated[str, Field(max_length=500), AfterValidator(plain_url)] | None = Field(
         default=None, exclude_if=is_none
     )
-    """URL to which the service posts state and headline failures once the campaign has ended; the operator allows it by
-    `RISK_SAC_ON_END`."""
+    """URL to which the service posts state and headline failures at the end; `RISK_SAC_ON_END` allows it."""
 
     @model_validator(mode="after")
     def _within_reason(self) -> Self:

@@ -96,7 +96,7 @@ class Progress(Record):
     """All contacts of the ego."""
     rejected: int
     distinct_failures: int
-    """Kinds of failures: sum over the runs; what two runs found alike counts twice."""
+    """Kinds of failures: sum over the runs."""
     preventable: int
     """Failures that a reference driver would have prevented, repetitions included."""
     distinct_preventable: int
@@ -110,8 +110,7 @@ class Progress(Record):
     headline_waiting: int = 0
     """Candidates in runs that were not replayed yet."""
     window_ecr: OptionalReal
-    """ECR over each run's newest 100 episodes: mean over the runs at work, or all once none is; without
-    controls, unless there is nothing else."""
+    """ECR over each run's newest 100 episodes: mean over the runs at work, or all once none is, without controls."""
     window_pcr: OptionalReal
     """PCR, averaged the same way."""
     dual_variable: OptionalReal
@@ -172,7 +171,7 @@ class EndNotice(Record):
     """The message to `on_end` of a campaign's spec."""
 
     state: Literal["waiting", "delivered", "failed"]
-    """waiting: the campaign has not ended, or the next try is due later."""
+    """waiting: the campaign has not ended, or the next try is later."""
     tries: int
     reason: str | None
     """Why the latest try failed."""
@@ -325,7 +324,7 @@ class ScenarioSummary(Record):
     like: str | None
     """Shipped family whose prior fits."""
     episode_s: Mapping[str, float] = {}
-    """Method → seconds that an episode takes a slot: median over newest runs of this server."""
+    """Method → slot seconds of an episode, in lists: median over the newest runs."""
 
 
 class ScenarioList(Record):

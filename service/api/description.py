@@ -15,7 +15,7 @@ from fastapi import FastAPI
 from fastapi.openapi.utils import get_openapi
 from pydantic import TypeAdapter
 
-from risk_sac.config import FamilyName, MethodName
+from risk_sac.config import IID_METHODS, FamilyName, MethodName
 from risk_sac.config.methods import RunMethod
 from risk_sac.records import Record, StateChange
 from service.api.gate import PUBLIC
@@ -179,6 +179,7 @@ _CHOICES: dict[str, dict[str, Any]] = {
     "MethodName": TypeAdapter(MethodName).json_schema(),
     "RunMethod": TypeAdapter(RunMethod).json_schema(),
 }
+RUN_METHOD = {"anyOf": [{"$ref": "#/components/schemas/MethodName"}, {"enum": list(IID_METHODS), "type": "string"}]}
 
 
 def openapi(app: FastAPI) -> dict[str, Any]:
@@ -206,7 +207,7 @@ def _document(app: FastAPI) -> dict[str, Any]:
                 if int(status) >= 400:
                     response["content"] = {"application/problem+json": response["content"]["application/json"]}
     _describe_guards(document)
-    document["components"]["schemas"] = _inherited(_simplified(schemas)) | _CHOICES
+    document["components"]["schemas"] = _inherited(_simplified(schemas)) | _CHOICES | {"RunMethod": RUN_METHOD}
     document["paths"] = _simplified(document["paths"])
     describe_calls(document["paths"])
     _share(document)
@@ -254,6 +255,8 @@ def _simplified(node: Any) -> Any:
             node.pop("anyOf")
             node |= only | {"type": [kind, "null"]}
     for name, choice in _CHOICES.items():
+        if "anyOf" in choice and node.get("anyOf") == [*choice["anyOf"], {"type": "null"}]:
+            node["anyOf"] = [{"$ref": f"#/components/schemas/{name}"}, {"type": "null"}]
         if choice.items() <= node.items():
             reference = {"$ref": f"#/components/schemas/{name}"}
             return reference | {key: child for key, child in node.items() if key not in choice}
@@ -309,11 +312,11 @@ def _shared(kind: str, places: Sequence[Any], only: Sequence[str] = ()) -> dict[
     """Replaces repeated entries by references; returns the referenced components. `only` names keys, else all count."""
     entries = [(place, key) for place in places for key in (place if isinstance(place, dict) else range(len(place)))]
     entries = [(place, key) for place, key in entries if not only or key in only]
-    counts = Counter(json.dumps(place[key]) for place, key in entries)
+    counts = Counter(json.dumps(place[key], sort_keys=True) for place, key in entries)
     shared: dict[str, Any] = {}
     for place, key in entries:
         item = place[key]
-        if counts[json.dumps(item)] > 1:
+        if counts[json.dumps(item, sort_keys=True)] > 1:
             base = item.get("name") or str(key)
             names = itertools.chain([base], (f"{base}-{number}" for number in itertools.count(2)))
             name = next(name for name in names if shared.setdefault(name, item) == item)

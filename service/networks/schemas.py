@@ -74,20 +74,20 @@ class Network(Record):
     label: str
     created_at: datetime
     sha256: str
-    """Of the body that was sent."""
+    """Of the body."""
     bytes: int
-    """Of the body that was sent."""
+    """Of the body."""
     files: list[NetworkFile]
     edges: int
-    """Roads from junction to junction, one per direction; those inside junctions are not counted."""
+    """Roads, one per direction; those inside junctions are not counted."""
     junctions: int
     lanes: int
     """Of those edges, sidewalks included."""
     length_m: float
-    """Of those edges, each counted once however many lanes it has."""
+    """Of those edges, whatever their lanes."""
     bounding_box: BoundingBox
     warnings: list[str]
-    """What the simulator remarked when it loaded the network; at most 20."""
+    """Remarks of the simulator; at most 20."""
 
 
 class NetworkPage(Page[Network]):
@@ -95,11 +95,11 @@ class NetworkPage(Page[Network]):
 
 
 class SpotBody(Record):
-    """Somewhere on a network, m in its own coordinates."""
+    """Somewhere on a network."""
 
     pattern: Pattern
     place: str
-    """The edge on which it is, or that leads to it; how a campaign names it."""
+    """The edge on which it is, or that leads to it."""
     x_m: float
     y_m: float
 

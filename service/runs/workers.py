@@ -37,14 +37,14 @@ class RunAtWork(ScheduledRun):
     since: datetime
     """When its present worker was started."""
     silent_s: float | None
-    """Since the worker's last sign of life; null before it has begun."""
+    """Since the worker's last sign of life; null before its first."""
 
 
 class RunWaiting(ScheduledRun):
     """A run that waits."""
 
     place: int | None
-    """In the whole queue, 1 starts next; null: it does not start until the reason is gone."""
+    """In the whole queue; null: it does not start until the reason is gone."""
     reason: str | None
 
 
@@ -60,7 +60,7 @@ class Workers(Record):
     queued: int
     """All runs that wait."""
     waiting: list[RunWaiting]
-    """The first 100 in the order in which they start if no run ends meanwhile."""
+    """The first 100 in the order in which they start."""
 
 
 def workers_body(manager: Manager, store: Store, settings: ServiceSettings, project: str | None) -> Workers:

@@ -55,7 +55,7 @@ def test_every_call_has_a_readable_title_a_description_and_an_example_that_is_un
     assert len(about) > 20
     words = shlex.split(example.strip("`"))
     assert words[:2] == ["curl", "-s"]
-    address = next(word for word in words if word.startswith("http://")).replace("http://127.0.0.1:8000", base_url)
+    address = next(word for word in words if word.startswith("localhost:8000")).replace("localhost:8000", base_url)
     sent = (words.index("-X") + 1) if "-X" in words else None
     assert (words[sent].lower() if sent else "get") == method
     body = json.loads(words[words.index("-d") + 1]) if "-d" in words else None

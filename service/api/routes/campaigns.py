@@ -150,7 +150,7 @@ def list_campaigns(
 
 @router.post("/{campaign_id}/cancel", status_code=202, response_model=Campaign, responses=UNKNOWN | ACCEPTED)
 def cancel_campaign(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """Stop a campaign and keep its results; no effect once it has ended. An `admin` key may stop any project's."""
+    """Stop a campaign and keep its results; no effect once it has ended."""
     campaign = service.manager.cancel(campaign_id, caller.sees)
     return _accepted(request, campaign, service)
 
@@ -187,7 +187,7 @@ def put_tags(
 
 @router.delete("/{campaign_id}", status_code=204, responses=UNKNOWN | NOT_ENDED)
 def delete_campaign(campaign_id: str, service: Service, caller: CurrentCaller) -> None:
-    """Delete an ended campaign with its results and files. An `admin` key may delete any project's."""
+    """Delete an ended campaign with its results and files."""
     service.manager.delete(campaign_id, caller.sees)
 
 

@@ -147,8 +147,8 @@ class NamedMethod(Method):
     usual: bool
     """Whether most campaigns need it; the others are for comparisons."""
     episode_cost: float | None
-    """Processor time of an episode in `low`, as a multiple of what an episode of `random` takes, as measured; of a
-    learner, after its warm start. Null where it was not measured."""
+    """Processor time of an episode in `low`, as a multiple of one of `random`; of a learner, after its warm start. Null
+    where it was not measured."""
 
 
 class EgoDrivers(Record):
@@ -205,7 +205,7 @@ router = APIRouter(prefix="/v1", tags=["catalogue"])
 
 @router.get("/families")
 def list_families() -> Families:
-    """Scenario families with scene space, default ODD and requirements, and the signals that formulas speak of."""
+    """Scenario families, and the signals that formulas speak of."""
     items = [
         FamilyEntry(
             name=family.name,

@@ -37,10 +37,9 @@ DESCRIPTION = f"""Check a SUMO road network and keep it. Its `places` are where 
 
 The body is a net (`.net.xml`), an OpenStreetMap extract or OpenDRIVE, the same as gzip, or a zip archive of one map \
 and up to {MAX_FILES - 1} route and additional files. Its content tells what it is. What is no present net is \
-converted by SUMO's netconvert; `warnings` has its remarks, the side of traffic, and what is missing. At most \
-{MAX_BYTES >> 20} MiB once unpacked and {MAX_ROADS} edges outside junctions. What names a file or writes output is \
-refused. The rest is written again and loaded once, in at most {WALL_S} s; only that is kept. Uploading the same \
-bytes again gives the network that there is, under its old label."""
+converted by SUMO's netconvert; `warnings` has its remarks and the side of traffic. At most {MAX_BYTES >> 20} MiB \
+unpacked, {MAX_ROADS} edges and {WALL_S} s. What names a file or writes output is refused. The same bytes again give \
+the network that there is, under its old label."""
 DOCUMENTED_BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
@@ -125,5 +124,5 @@ def get_network_roads(network_id: str, service: Service, caller: CurrentCaller) 
 
 @router.delete("/{network_id}", status_code=204, responses=UNKNOWN)
 def delete_network(network_id: str, service: Service, caller: CurrentCaller) -> None:
-    """Delete a network and its files. An `admin` key may delete any project's."""
+    """Delete a network and its files."""
     service.networks.delete(network_id, caller.sees)

@@ -85,7 +85,7 @@ async def post_scenario(
 @router.post(
     "/check",
     responses=REFUSALS,
-    description=f"Check a scenario document, and play 20 scenes of it without an attack. Nothing is stored. {BODY}",
+    description="Check a document as `POST /v1/scenarios` does, and play 20 scenes without an attack. It is not kept.",
     openapi_extra=DOCUMENTED_BODY,
     dependencies=[Depends(_refuse_other_types)],
 )
@@ -119,5 +119,5 @@ async def get_scenario_picture(scenario: str, service: Service, caller: CurrentC
 
 @router.delete("/{scenario}", status_code=204, responses=UNKNOWN | IN_USE)
 def delete_scenario(scenario: str, service: Service, caller: CurrentCaller) -> None:
-    """Delete a scenario that no campaign names. An `admin` key may delete any project's."""
+    """Delete a scenario that no campaign names."""
     service.scenarios.delete(scenario, caller.sees, service.store.families)
