@@ -46,10 +46,10 @@ checkers: $(CHECKERS) ## make .venv/checkers: ASAM's checkers and CommonRoad's, 
 examples: $(STAMP) ## write tests/exports/examples: one example for each export format
 	$(PYTHON) -m tests.exports.make_examples
 
-# By file: two processes would each make what the tests of a file share. In order: the long ones come first. By three
-# processes, on two cores too: a fifth of the tests' time they wait for servers.
+# By file: two processes would each make what the tests of a file share. In order: the long ones come first. By four
+# processes, on two cores too: half of the time tests wait for servers.
 test: lint $(CHECKERS) ## check the code and run the whole suite
-	$(PYTHON) -m pytest -n 3 --dist loadscope --no-loadscope-reorder
+	$(PYTHON) -m pytest -n 4 --dist loadscope --no-loadscope-reorder
 
 serve: $(STAMP) ## run the service on RISK_SAC_HOST and RISK_SAC_PORT; by default its page is at http://127.0.0.1:8000/page/
 	$(PYTHON) -m service
