@@ -116,6 +116,8 @@ def ask(world, method, path, key=None, known=True, **headers):
         content, headers["content-type"] = json.dumps(SPEC).encode(), "application/json"
     elif path == TRIAGE:
         content, headers["content-type"] = b'{"state": "confirmed"}', "application/json"
+    elif path == f"{CAMPAIGN}/tags":
+        content, headers["content-type"] = b'{"tags": ["nightly"]}', "application/json"
     elif (method, path) == ("POST", REGRESSIONS):
         content = json.dumps({"campaign_id": ids[0], "ego": {}}).encode()
         headers["content-type"] = "application/json"
