@@ -56,6 +56,12 @@ describe("a shape", () => {
     const content = { "application/json": { schema: { $ref: "#/components/schemas/Spec" } } };
     const description: Description = { paths: { "/v1/campaigns": { post: { requestBody: { content } } } }, components: { schemas: SCHEMAS } };
     expect(posted(description, "/v1/campaigns")).toEqual(shape);
+    const requestBodies = { shared: { content } };
+    const referring: Description = {
+      paths: { "/v1/campaigns": { post: { requestBody: { $ref: "#/components/requestBodies/shared" } } } },
+      components: { schemas: SCHEMAS, requestBodies },
+    };
+    expect(posted(referring, "/v1/campaigns")).toEqual(shape);
     expect(() => posted(description, "/v1/other")).toThrow("/v1/other");
   });
 });

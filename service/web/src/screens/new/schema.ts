@@ -24,9 +24,14 @@ export interface Schema {
   pattern?: string;
 }
 
+interface RequestBody {
+  $ref?: string;
+  content?: Record<string, { schema: Schema }>;
+}
+
 export interface Description {
-  paths: Record<string, Record<string, { requestBody?: { content: Record<string, { schema: Schema }> } }>>;
-  components: { schemas: Record<string, Schema> };
+  paths: Record<string, Record<string, { requestBody?: RequestBody }>>;
+  components: { schemas: Record<string, Schema>; requestBodies?: Record<string, RequestBody> };
 }
 
 export type Shape =
@@ -51,7 +56,9 @@ export interface Field {
 
 /** The shape of what is posted to a path. */
 export function posted(description: Description, path: string): Shape {
-  const schema = description.paths[path]?.post?.requestBody?.content["application/json"]?.schema;
+  const body = description.paths[path]?.post?.requestBody;
+  const shared = description.components.requestBodies?.[body?.$ref?.split("/").at(-1) ?? ""];
+  const schema = (shared ?? body)?.content?.["application/json"]?.schema;
   if (!schema) throw new Error(`the service's description tells of no POST ${path}`);
   return shapeOf(schema, description.components.schemas);
 }
