@@ -87,7 +87,7 @@ def test_an_ego_leaves_a_lane_that_ends(sim, scene, dead_lane_y_m):
 
 def test_the_path_leaves_an_acceleration_lane_in_three_seconds_at_the_limit(sim):
     play(sim, "merged before", 1)
-    path = sim._roads.lane(RAMP, "weave_0").way.path
+    path = sim._roads._lane(RAMP, "weave_0").way.path
     turned = np.flatnonzero(np.abs(path[HEADING]) > 1e-3)
     assert len(turned) == 1
     begins, ends = path[STATION, turned[0]], path[STATION, turned[0] + 1]
