@@ -9,7 +9,7 @@ import pytest
 from risk_sac.sim.control import PedestrianControl
 from risk_sac.sim.paths import Along
 from risk_sac.sim.roads import LateralRoom
-from risk_sac.sim.solid import Walker
+from risk_sac.sim.solid import ALONE, Walker
 from risk_sac.sim.vehicle_control import VehicleControl
 from risk_sac.world.types import HEADING, LENGTH, SPEED, STEP_S, VX, VY, WIDTH, Floats, X, Y
 from tests.roads import road
@@ -44,11 +44,11 @@ def driven(
     station, offset, poses = 0.0, 0.0, [(-HALF_M, 0.0, 0.0, speed)]
     for step in range(60):
         state = frame_of(ego, poses[-1], *(moved(other, step * STEP_S) for other in others))
-        before = control.speed_mps
-        control.step(*action, wide, Along(path, station, offset), others=(state, 1) if keeps_clear else None)
-        station += (before + control.speed_mps) / 2 * STEP_S
-        offset += control.lateral_mps * STEP_S
-        poses.append((station - HALF_M, offset, 0.0, control.speed_mps))
+        others_there = (state, 1) if keeps_clear else ALONE
+        command = control.step(*action, wide, Along(path, station, offset), others=others_there)
+        station += (poses[-1][3] + command.speed_mps) / 2 * STEP_S
+        offset += command.lateral_mps * STEP_S
+        poses.append((station - HALF_M, offset, 0.0, command.speed_mps))
     return poses
 
 
@@ -105,13 +105,13 @@ def leaves_late(side: int, at_m: float, *, statics: int = 1, beside: Pose | None
     standing = (100.0, 0.0, 0.0, 0.0)
     for step in range(80):
         others = [poses[-1], *([moved(beside, step * STEP_S)] if beside else []), standing]
-        before, near = control.speed_mps, 100.0 - HALF_M - station < at_m
+        near = 100.0 - HALF_M - station < at_m
         action = (0.0, float(side) if near else 0.0)
         state = frame_of(EGO, *others)
-        control.step(*action, wide, Along(path, station, offset), others=(state, 1), statics=statics)
-        station += (before + control.speed_mps) / 2 * STEP_S
-        offset += control.lateral_mps * STEP_S
-        poses.append((station - HALF_M, offset, 0.0, control.speed_mps))
+        command = control.step(*action, wide, Along(path, station, offset), others=(state, 1), statics=statics)
+        station += (poses[-1][3] + command.speed_mps) / 2 * STEP_S
+        offset += command.lateral_mps * STEP_S
+        poses.append((station - HALF_M, offset, 0.0, command.speed_mps))
     return poses
 
 
