@@ -1,6 +1,7 @@
 """The real app on a real socket, with an executor that starts nothing."""
 
 import math
+import os
 import socket
 import threading
 import time
@@ -11,6 +12,7 @@ from pathlib import Path
 from risk_sac.config import RunSpec
 from risk_sac.execution.executor import Exited
 from risk_sac.execution.messages import Event
+from risk_sac.scenario.library import VARIABLE
 from service.api.connections import Server
 from service.app import create_app
 from service.settings import ServiceSettings
@@ -51,6 +53,7 @@ class IdleExecutor:
 @contextmanager
 def serving(settings: ServiceSettings) -> Iterator[str]:
     """Where the app answers."""
+    library_before = os.environ.get(VARIABLE)  # another server of this process may be in use when this one ends
     server = Server(create_app(settings, IdleExecutor()), settings, log_level="warning")
     # Of a named protocol: asyncio sets TCP_NODELAY on no other, and each answer would take 40 ms.
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
@@ -66,3 +69,5 @@ def serving(settings: ServiceSettings) -> Iterator[str]:
         server.should_exit = True
         thread.join()
         listener.close()
+        if library_before is not None:
+            os.environ[VARIABLE] = library_before
