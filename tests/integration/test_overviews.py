@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import pytest
 
 from risk_sac.client import Client
-from risk_sac.report.statistics import NOT_MEASURED
 
 EPISODES = 24
 
@@ -22,10 +21,11 @@ def campaign(service):
     return campaign_id
 
 
-def test_power_says_that_nothing_was_measured_under_these_definitions(service, campaign):
+def test_power_tells_what_the_campaigns_methods_were_measured_with(service, campaign):
     with Client(str(service.client.base_url)) as client:
         power = client.power(campaign)
-    assert (power.note, power.methods, power.comparison) == (NOT_MEASURED, (), "")
+    assert {each.method for each in power.methods} == {run["method"] for run in service.get(campaign)["runs"]}
+    assert all(each.sentences for each in power.methods)
     assert service.get(campaign, "/power") == power.model_dump(mode="json")
 
 
