@@ -141,7 +141,10 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def play_run(spec: RunSpec, folder: Path, name: str, found: Callable[[RunMetrics], str]) -> RunResults:
-    """Plays a run, or continues it, behind a bar with a name and with what was found so far."""
+    """Plays or continues a run, and shows its progress.
+
+    `found` puts the metrics into the words beside the bar.
+    """
     from risk_sac.execution.evaluate import run  # here, because loading torch takes seconds
 
     with progress_bar() as bar:

@@ -1,4 +1,4 @@
-"""Both ends of a connection: the seam's records as messages of the protocol, and an episode's steps over a socket.
+"""Converts the seam's records to messages, and carries steps over a socket.
 
 A socket of this machine costs a tenth of a stream of gRPC. Each message is its length, four bytes with the lowest
 first, and then its bytes. The socket has a name of Linux's abstract namespace: it leaves no file, and a client in

@@ -1,6 +1,6 @@
-"""Ray's actors for an attempt at a run: one that starts its worker, and others that play its episodes elsewhere.
+"""Ray's actors for an attempt at a run.
 
-The first hands on the worker's words and files. The worker is a process of the local executor, so one that falls
+One starts its worker, and others play its episodes on other nodes. The first hands on the worker's words and files. The worker is a process of the local executor, so one that falls
 silent, lingers or dies is treated as on one machine. It works in a folder of its node, which begins with the files of
 the run's folder on the server's machine.
 

@@ -119,7 +119,10 @@ def reference_line(
 
 
 def _cubic(start: Stop, end: Stop) -> Floats:
-    """Returns Hermite's cubic between two stops, in the frame of the first: factors of p, p², p³, `3 x 2`."""
+    """Returns Hermite's cubic between two stops, in the frame of the first.
+
+    Its rows are the factors of p, p², p³, `3 x 2`.
+    """
     cos, sin = start.direction
     frame = np.array([(cos, -sin), (sin, cos)])
     chord, leaves = (end.place - start.place) @ frame, end.direction @ frame
