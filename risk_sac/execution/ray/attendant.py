@@ -1,8 +1,8 @@
 """Ray's actors for an attempt at a run.
 
-One starts its worker, and others play its episodes on other nodes. The first hands on the worker's words and files. The worker is a process of the local executor, so one that falls
-silent, lingers or dies is treated as on one machine. It works in a folder of its node, which begins with the files of
-the run's folder on the server's machine.
+One starts the worker and hands on its words and files; others play its episodes on other nodes. The worker is a
+process of the local executor, so one that falls silent, lingers or dies is treated as on one machine. It works in a
+folder of its node, which begins with the files of the run's folder on the server's machine.
 
 A run of rounds has one rollout process beside its worker, and an actor for each further slot. Ray places the actors
 where it has room. A thread of the first actor passes proposals to an actor; a lost one is replaced.
