@@ -4,4 +4,4 @@ Importing this package is cheap on purpose: the service reads its configuration 
 loading torch or libsumo. The method starts at :mod:`risk_sac.search.loop`.
 """
 
-__version__ = "0.2.1"
+__version__ = "0.3.0"
