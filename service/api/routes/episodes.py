@@ -7,6 +7,7 @@ from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
 from risk_sac.config.base import Settings
+from risk_sac.failures.net import RoadsBody
 from risk_sac.failures.question import Twin
 from risk_sac.failures.studied import Region
 from risk_sac.records import (
@@ -46,7 +47,6 @@ from service.store.stored import StoredPage
 from service.views.series import (
     FailureOfARun,
     Picture,
-    RoadsBody,
     Study,
     TwinBody,
     failure_body,

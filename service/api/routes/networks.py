@@ -7,6 +7,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from risk_sac.failures.net import RoadsBody
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES, MAX_ROADS
 from service.api.context import CurrentCaller, Service
 from service.api.pages import INVALID, UNKNOWN, WAIT, Cursor, Limit, Responses, header, link, problem
@@ -14,7 +15,6 @@ from service.api.posted import media_type
 from service.api.problems import ProblemError, Reason
 from service.networks.schemas import MEDIA_TYPES, WALL_S, Network, NetworkPage, Places
 from service.networks.surveys import RETRY_AFTER_S
-from service.views.series import RoadsBody
 
 LISTED = "networks"
 RECEIVE_S = 60  # a sender that is slower would keep others out
