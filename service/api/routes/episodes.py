@@ -29,10 +29,10 @@ from service.api.context import CurrentCaller, Service
 from service.api.pages import (
     INVALID,
     MALFORMED,
-    NOT_JSON,
     TAGGED,
     TIERS,
     UNKNOWN,
+    WRONG_TYPE,
     Cursor,
     Limit,
     Responses,
@@ -165,7 +165,7 @@ def get_failure(campaign_id: str, failure_id: str, service: Service, caller: Cur
     return as_json(failure_body(campaign_id, failure, triage, service.settings))
 
 
-@router.put("/failures/{failure_id}/triage", responses=MALFORMED | NOT_JSON, openapi_extra=documented("PostedTriage"))
+@router.put("/failures/{failure_id}/triage", responses=MALFORMED | WRONG_TYPE, openapi_extra=documented("PostedTriage"))
 def put_triage(
     campaign_id: str,
     failure_id: str,
