@@ -25,8 +25,7 @@ from risk_sac.sim.pilot import MovedVehicle, OncomingVehicle, Pilot, leaves
 from risk_sac.sim.reading import Reader, Reading
 from risk_sac.sim.roads import LateralRoom, Roads, beside, hand_over, hurry, place
 from risk_sac.sim.solid import VehicleCommand, Walker
-from risk_sac.sim.story.cast import Drift
-from risk_sac.sim.story.deviation import NO_LEADS, Lead
+from risk_sac.sim.story.cast import NO_LEADS, Drift, Lead
 from risk_sac.sim.story.traffic import StoryTraffic
 from risk_sac.world.types import STEP_S, WIDTH, Floats, Frame, Role
 

@@ -15,8 +15,7 @@ from risk_sac.scenario.lane_places import LanePlace
 from risk_sac.scenario.layout import Reach, StoryPlan
 from risk_sac.scenario.places import OnRoad, StoryPlaces
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of
-from risk_sac.sim.story.cast import STANDS_MPS, Mover, Present
-from risk_sac.sim.story.deviation import ANYWHERE, DeviationRoom
+from risk_sac.sim.story.cast import ANYWHERE, STANDS_MPS, DeviationRoom, Mover, Present
 from risk_sac.world.types import STEP_S
 
 LINE_M = 3000.0  # of the way ahead of a lane's beginning; an actor at its end gets the next piece

@@ -17,8 +17,7 @@ from risk_sac.sim.reading import Told
 from risk_sac.sim.solid import Walker
 from risk_sac.sim.story.actions import doing_of, set_variable
 from risk_sac.sim.story.board import Running, Storyboard
-from risk_sac.sim.story.cast import ON_STORY, Drift, Mover, Present
-from risk_sac.sim.story.deviation import NO_LEADS, Lead
+from risk_sac.sim.story.cast import NO_LEADS, ON_STORY, Drift, Lead, Mover, Present
 from risk_sac.sim.story.stage import Stage
 from risk_sac.world.types import ACCEL, HEADING, SPEED, STEP_S, Frame, X, Y
 
