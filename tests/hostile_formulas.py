@@ -3,7 +3,7 @@
 import itertools
 from collections.abc import Iterator
 
-from risk_sac.risk.signals import SIGNALS
+from risk_sac.risk.requirements import SIGNALS
 
 LONGEST = 500  # characters that a requirement may have
 P, Q = "ttc_s >= 1", "vehicle_gap_m <= 10"

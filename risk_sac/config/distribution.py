@@ -4,6 +4,7 @@ They are those of OpenSCENARIO XML 1.3: uniform, normal, log-normal, Poisson, hi
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from itertools import accumulate, pairwise
 from statistics import NormalDist
@@ -25,19 +26,16 @@ Finite = Annotated[float, Field(ge=-1e9, le=1e9)]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
-class _Law(Settings):
-    """A distribution of a number.
+class _Law(Settings, ABC):
+    """A distribution of a number."""
 
-    Subclasses give `cumulative`, F(x), and `inverse`, the least x with F(x) >= p, for 0 < p < 1.
-    """
-
+    @abstractmethod
     def cumulative(self, value: float) -> float:
-        """P(X <= value)."""
-        raise NotImplementedError
+        """F(x) = P(X <= value)."""
 
+    @abstractmethod
     def inverse(self, share: float) -> float:
-        """The least value of which P(X <= value) is a share in (0, 1)."""
-        raise NotImplementedError
+        """The least x with F(x) >= share, for a share in (0, 1)."""
 
     def mass(self, low: float, high: float) -> float:
         """P(low <= X <= high)."""

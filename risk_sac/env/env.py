@@ -30,8 +30,7 @@ from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.records import Collision, RequirementResult, StoryDeviation, Violation
 from risk_sac.risk.conduct import CONDUCT_ROWS, ConductRoad, conduct_cost, see_signals
 from risk_sac.risk.measures import Gauge, Measures
-from risk_sac.risk.realism import HardRule, danger_of, refuse_danger, refuse_overlap
-from risk_sac.risk.reward import ViolationDepth, risk_reward, worth
+from risk_sac.risk.reward import HardRule, ViolationDepth, danger_of, refuse_danger, refuse_overlap, risk_reward, worth
 from risk_sac.run_folder.series import Trace
 from risk_sac.scenario.layout import LEAD_IN_S, Layout
 from risk_sac.scenario.limits import conditions, limits_from_odd

@@ -35,7 +35,7 @@ from risk_sac.execution.messages import (
     encode,
     without_folders,
 )
-from risk_sac.host.memory import limit_memory, out_of_memory
+from risk_sac.host.machine import limit_memory, out_of_memory
 from risk_sac.host.process_state import collect_seldom
 from risk_sac.host.terminal import log_to_stderr
 from risk_sac.records import REPEATS, EpisodeRecord, RunMetrics, SeriesFile

@@ -5,16 +5,17 @@ The SVG is written by hand, because a screen shows dozens of them and matplotlib
 
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
 import sumo_nets
 from risk_sac.config import FamilyName
 from risk_sac.failures.recording import BOX, Recording, on_body
+from risk_sac.records import Record
 from risk_sac.scenario.bodies import Shape, body_of
 from risk_sac.scenario.families import family_named
 from risk_sac.world.net import Head, Net, NetLane, Program
@@ -164,6 +165,43 @@ def _changes(program: Program, head: Head, offset_s: float) -> Changes:
                 changes.append((time_s, colour))
             time_s += duration_s
     return changes
+
+
+class SurfaceBody(Record):
+    """A piece of ground that one drives or walks on."""
+
+    use: SurfaceUse
+    outline: list[tuple[float, float]]
+    """Its corners, m, on the map that the series is on; the last one is joined to the first."""
+
+
+class SignalHeadBody(Record):
+    """The signal at the end of a lane, or at one end of a crossing."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    """Along the lane."""
+    width_m: float
+    changes: list[tuple[float, SignalColour]]
+    """When it begins to show a colour, s, by the clock of the series."""
+
+
+class RoadsBody(Record):
+    """The ground of a failure or a network, and its signals."""
+
+    surfaces: list[SurfaceBody]
+    """In the order in which they are to be drawn; none where the scene's family had other roads then."""
+    signals: list[SignalHeadBody]
+    """Of a failure."""
+
+    @classmethod
+    def of(cls, surfaces: Sequence[Surface], decimals: int, heads: Sequence[SignalHead] = ()) -> Self:
+        """Describes surfaces, their corners rounded to so many decimals, and signals."""
+        return cls(
+            surfaces=[SurfaceBody(use=each.use, outline=each.outline.round(decimals).tolist()) for each in surfaces],
+            signals=[SignalHeadBody.model_validate(asdict(head)) for head in heads],
+        )
 
 
 WIDTH, HEIGHT = 240, 150  # px

@@ -1,14 +1,14 @@
 """Settings that a process has once, such as its locale, kept apart for us and for foreign code.
 
     state = Preserved()
-    with state:             # while it is imported, made, begun, closed
+    with state:  # which takes some microseconds
         ego = make_ego()
-    with state.quick:       # while it answers: some microseconds, and the rarer settings are not looked at
+    with state:
         ego.act(perceived)
 
 What foreign code changes holds again when it runs next, and never for us. A process that it forks ends where it would
-come back to us, since it would write the same files. Random state is not kept, because nothing of
-ours draws from a generator that is shared.
+come back to us, since it would write the same files. Those settings are kept that change what we compute, write or
+import. Random state is not, because nothing of ours draws from a generator that is shared.
 """
 
 import contextlib
@@ -17,7 +17,6 @@ import locale
 import logging
 import os
 import signal
-import socket
 import sys
 import threading
 import warnings
@@ -38,7 +37,7 @@ Arguments = ParamSpec("Arguments")
 Answer = TypeVar("Answer")
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 TINY = 5e-324  # is 0 where a library has told the processor to flush such numbers
-_INITIAL_TORCH = ("float32", True, 1, False)
+_INITIAL_TORCH = ("float32", True, 1, False, None)
 
 
 class Setting(NamedTuple):
@@ -81,25 +80,19 @@ def c_numbers(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answ
     return in_c_locale
 
 
-def preserved() -> "Preserved":
-    """State of foreign code that has changed nothing yet."""
-    return Preserved()
+class Preserved:
+    """Exchanges settings for those of the foreign code, for the time of a block."""
 
-
-class _Swap:
-    """Exchanges some settings for those of the foreign code, for the time of a block."""
-
-    def __init__(self, settings: Sequence[Setting], theirs: dict[Setting, Any]) -> None:
-        self._settings, self._theirs = settings, theirs
+    def __init__(self) -> None:
+        self._theirs: dict[Setting, Any] = {}
         self._ours: list[Any] = []
         self._process = 0
 
     def __enter__(self) -> Self:
         self._process = os.getpid()
-        self._ours = [setting.read() for setting in self._settings]
+        self._ours = [setting.read() for setting in SETTINGS]
         for setting, value in self._theirs.items():
-            if setting in self._settings:
-                setting.set(value)
+            setting.set(value)
         return self
 
     def __exit__(
@@ -107,42 +100,15 @@ class _Swap:
     ) -> None:
         if os.getpid() != self._process:
             os._exit(1)
-        now = [setting.read() for setting in self._settings]
+        now = [setting.read() for setting in SETTINGS]
         if now == self._ours and not self._theirs:
             return
-        for setting, ours, left in zip(self._settings, self._ours, now, strict=True):
+        for setting, ours, left in zip(SETTINGS, self._ours, now, strict=True):
             if left != ours:
                 self._theirs[setting] = left
                 setting.set(ours)
             elif setting in self._theirs:
                 del self._theirs[setting]
-
-
-class Preserved(_Swap):
-    """Exchanges all settings; `quick` those that cost little to read, which foreign code changes most.
-
-    What a `quick` block has changed of the others is put right when the next block of all begins.
-    """
-
-    def __init__(self) -> None:
-        theirs: dict[Setting, Any] = {}
-        super().__init__((*QUICK, *OTHERS), theirs)
-        self.quick = _Swap(QUICK, theirs)
-        self._left: dict[Setting, Any] = {}  # the others' values after the latest block of all
-
-    def __enter__(self) -> Self:
-        for setting, ours in self._left.items():
-            now = setting.read()
-            if now != ours:
-                self._theirs[setting] = now
-                setting.set(ours)
-        return super().__enter__()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        super().__exit__(kind, error, trace)
-        self._left = {setting: setting.read() for setting in OTHERS}
 
 
 def _folder() -> str | None:
@@ -183,21 +149,18 @@ def _torch() -> Any:
         torch.is_grad_enabled(),
         torch.get_num_threads(),
         torch.are_deterministic_algorithms_enabled(),
+        None if (device := torch.get_default_device()).type == "cpu" else device,
     )
 
 
 def _set_torch(values: Any) -> None:
     torch = sys.modules["torch"]
-    dtype, gradients, threads, deterministic = values or _INITIAL_TORCH
+    dtype, gradients, threads, deterministic, device = values or _INITIAL_TORCH
     torch.set_default_dtype(getattr(torch, dtype))
     torch.set_grad_enabled(gradients)
     torch.set_num_threads(threads)
     torch.use_deterministic_algorithms(deterministic)
-
-
-def _device() -> Any:
-    torch = sys.modules.get("torch")
-    return None if torch is None else torch.get_default_device()
+    torch.set_default_device(device)
 
 
 def _flush(flushed: bool) -> None:
@@ -217,19 +180,13 @@ def _set_path(folders: Sequence[str]) -> None:
     sys.path[:] = folders
 
 
-def _set_environment(wanted: dict[str, str]) -> None:
-    for name in os.environ.keys() - wanted.keys():
-        del os.environ[name]
-    os.environ.update(wanted)
-
-
 def _umask() -> int:
     umask = os.umask(0o77)
     os.umask(umask)
     return umask
 
 
-QUICK = (
+SETTINGS = (
     Setting(_folder, _enter),
     Setting(lambda: locale.setlocale(locale.LC_ALL), lambda name: locale.setlocale(locale.LC_ALL, name)),
     Setting(_handlers, _handle),
@@ -240,18 +197,5 @@ QUICK = (
     Setting(_streams, _set_streams),
     Setting(_umask, os.umask),
     Setting(lambda: tuple(sys.path), _set_path),
-    Setting(sys.getrecursionlimit, sys.setrecursionlimit),
-    Setting(gc.isenabled, lambda enabled: gc.enable() if enabled else gc.disable()),
-    Setting(socket.getdefaulttimeout, socket.setdefaulttimeout),
-    Setting(lambda: logging.root.level, logging.root.setLevel),
     Setting(lambda: logging.root.manager.disable, logging.disable),
-)
-OTHERS = (
-    Setting(lambda: dict(os.environ), _set_environment),
-    Setting(np.get_printoptions, lambda options: np.set_printoptions(**options)),
-    Setting(
-        lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()),
-        lambda mask: signal.pthread_sigmask(signal.SIG_SETMASK, mask),
-    ),
-    Setting(_device, lambda device: sys.modules["torch"].set_default_device(device)),
 )

@@ -14,7 +14,7 @@ from lark import Lark, Token, Transformer, v_args
 from lark.exceptions import UnexpectedCharacters, UnexpectedToken
 
 from risk_sac.errors import FormulaError
-from risk_sac.risk.signals import SIGNALS
+from risk_sac.risk.requirements import SIGNALS
 
 MAX_DEPTH = 40  # nested operators
 MAX_COMPARISONS = 4000  # by the windows of one formula in one step, about 1 ms

@@ -28,7 +28,7 @@ from typing import NamedTuple, Self
 from risk_sac.config import RunMethod, RunSpec, method_of
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.errors import RiskSacError, SimulationError
-from risk_sac.host.memory import limit_memory, memory_limit_bytes, out_of_memory
+from risk_sac.host.machine import limit_memory, memory_limit_bytes, out_of_memory
 from risk_sac.host.process_state import collect_seldom
 from risk_sac.risk.reward import TrainingReward
 from risk_sac.run_folder.crash_guard import PATIENCE, CrashGuard

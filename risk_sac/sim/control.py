@@ -19,7 +19,7 @@ from risk_sac.scenario.families import Family
 from risk_sac.scenario.layout import StoryPlan
 from risk_sac.scenario.limits import Limits
 from risk_sac.sim.solid import ALONE, Others, VehicleCommand, Walker, clip, taper, walks_into
-from risk_sac.sim.story.deviation import DeviationControl, Lead
+from risk_sac.sim.story.cast import DeviationControl, Lead
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.sim.vehicle_control import VehicleControl, drove_as_commanded
 from risk_sac.world.types import STEP_S, Frame, Role

@@ -18,17 +18,14 @@ import numpy as np
 from risk_sac.config import EgoConfig
 from risk_sac.errors import SimulationError
 from risk_sac.scenario.layout import Layout
-from risk_sac.sim.drivers import Drivers
+from risk_sac.sim.drivers import Drivers, stand_in_lanes
 from risk_sac.sim.ego import EVERYTHING, Belief, Perception, Senses
-from risk_sac.sim.oncoming import OncomingVehicle, leaves
 from risk_sac.sim.paths import STATION, Along
-from risk_sac.sim.pilot import MovedVehicle, Pilot
+from risk_sac.sim.pilot import MovedVehicle, OncomingVehicle, Pilot, leaves
 from risk_sac.sim.reading import Reader, Reading
 from risk_sac.sim.roads import LateralRoom, Roads, beside, hand_over, hurry, place
 from risk_sac.sim.solid import VehicleCommand, Walker
-from risk_sac.sim.standing import stand_in_lanes
-from risk_sac.sim.story.cast import Drift
-from risk_sac.sim.story.deviation import NO_LEADS, Lead
+from risk_sac.sim.story.cast import NO_LEADS, Drift, Lead
 from risk_sac.sim.story.traffic import StoryTraffic
 from risk_sac.world.types import STEP_S, WIDTH, Floats, Frame, Role
 

@@ -116,7 +116,7 @@ MALFORMED = problem(400, "The body is no JSON")
 UNKNOWN = problem(404, "Nothing has this id")
 REUSED = problem(409, "The idempotency key has queued another campaign")
 NOT_ENDED = problem(409, "The campaign has not ended")
-NOT_JSON = problem(415, "The body is declared as something else than application/json, or carries a Content-Encoding")
+WRONG_TYPE = problem(415, "The body is declared as something else, or carries a Content-Encoding")
 INVALID = problem(422, "A field is wrong; `errors` names it")
 STOPPED = problem(503, "Campaigns make no progress")
 UNREADY = problem(503, "The disk or the database refuses")
@@ -127,8 +127,10 @@ _RETRY = {
     )
 }
 _TAGGED = {
-    "ETag": header("Changes whenever the body does."),
-    "Cache-Control": header("`no-cache`: keep it, and ask with If-None-Match."),
+    "ETag": header(
+        "Changes whenever the body does; ask with If-None-Match. Absent where a finished run's folder cannot be read.",
+        required=False,
+    )
 }
 
 

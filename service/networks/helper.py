@@ -25,7 +25,7 @@ from pathlib import Path
 
 from risk_sac.config import Scenario
 from risk_sac.errors import ConfigError, DamagedError
-from risk_sac.failures.net import surfaces
+from risk_sac.failures.net import RoadsBody, surfaces
 from risk_sac.maps.convert import present_net
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
 from risk_sac.maps.finder import FINDERS, Map, survey
@@ -44,7 +44,6 @@ from risk_sac.scenario.reading import (
     shipped_names,
     too_long,
 )
-from risk_sac.world.net import Net
 from risk_sac.world.read_net import read_net
 from service.networks.schemas import (
     MAX_PLACES,
@@ -64,6 +63,7 @@ WANTED = "one document (.yaml or .json) and the nets that it names, or an OpenSC
 
 NET = Path("net.xml")
 TOLD_EVERY_S = 1.0
+DECIMALS = 1  # of a metre, in the ground of a network
 
 
 def main() -> None:
@@ -181,15 +181,9 @@ def _survey() -> bytes:
         nowhere=dict(map_survey.nowhere),
     )
     replace_file(Path(PICTURE), map_png(net, map_survey))
-    replace_file(Path(ROADS), _roads(net))
+    replace_file(Path(ROADS), RoadsBody.of(surfaces(net), DECIMALS).model_dump_json().encode())
     write_sealed(Path(PLACES), places)
     return b"{}"
-
-
-def _roads(net: Net) -> bytes:
-    """Returns the ground of a net as `RoadsBody` has it, to 0.1 m, without signals."""
-    ground = [{"use": each.use, "outline": each.outline.round(1).tolist()} for each in surfaces(net)]
-    return json.dumps({"surfaces": ground, "signals": []}, separators=(",", ":")).encode()
 
 
 class SurveyProgress:

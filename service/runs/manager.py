@@ -5,7 +5,7 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
@@ -267,9 +267,10 @@ class Manager:
         while True:
             waiting = self._store.waiting()
             able = [project for project in waiting if not exhausted(self._store.usage(project), self._settings)]
-            number = min(((use.taken.get(project, 0), waiting[project]) for project in able), default=(0, None))[1]
-            if number is None:
+            project = next_project({project: waiting[project] for project in able}, use.taken)
+            if project is None:
                 return None
+            number = waiting[project]
             campaign = self._store.campaign_of(number)
             (run,) = campaign.runs
             try:
@@ -306,6 +307,11 @@ class Manager:
     def storage_refused(self, run: QueuedRun, reason: str) -> None:
         """See `RunStore`."""
         self._pause(reason, run)
+
+
+def next_project(oldest: Mapping[str, int], taken: Mapping[str, int]) -> str | None:
+    """Returns the project whose oldest run starts next: that with the fewest slots, then that with the oldest run."""
+    return min(oldest, key=lambda project: (taken.get(project, 0), oldest[project]), default=None)
 
 
 def _tidy(data_dir: Path, before: float) -> None:

@@ -1,12 +1,12 @@
 """What runs where, and what waits in which order."""
 
-import heapq
+from collections import Counter, deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from datetime import datetime
 
 from risk_sac.records import Record, State
 from service.runs.cleanup import exhausted
-from service.runs.manager import Manager
+from service.runs.manager import Manager, next_project
 from service.settings import ServiceSettings
 from service.store.queries import QueuedPlace
 from service.store.reading import Store
@@ -114,23 +114,20 @@ def _scheduled(campaign: StoredCampaign) -> Mapping[str, str | int]:
 
 
 def start_order(queued: Sequence[QueuedPlace], taken: Mapping[str, int], out: Collection[str] = ()) -> Iterator[int]:
-    """Yields the numbers of runs in the order of `Manager.start_next`, if each takes one slot and none ends.
-
-    The project with the fewest slots comes first, and of several the one with the oldest run.
+    """Yields the numbers of runs in the order in which they start, if each takes one slot and none ends.
 
     Args:
       queued: runs that wait, the oldest first.
       taken: project → slots that it has.
       out: projects whose runs do not start.
     """
-    of_project: dict[str, list[int]] = {}
+    waiting: dict[str, deque[int]] = {}
     for each in queued:
         if each.project not in out:
-            of_project.setdefault(each.project, []).append(each.number)
-    heap = [(taken.get(project, 0), numbers[0], project, 0) for project, numbers in of_project.items()]
-    heapq.heapify(heap)
-    while heap:
-        slots, number, project, at = heapq.heappop(heap)
-        yield number
-        if at + 1 < len(of_project[project]):
-            heapq.heappush(heap, (slots + 1, of_project[project][at + 1], project, at + 1))
+            waiting.setdefault(each.project, deque()).append(each.number)
+    slots = Counter(taken)
+    while (project := next_project({name: numbers[0] for name, numbers in waiting.items()}, slots)) is not None:
+        yield waiting[project].popleft()
+        slots[project] += 1
+        if not waiting[project]:
+            del waiting[project]

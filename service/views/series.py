@@ -7,7 +7,7 @@ import contextlib
 import hashlib
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ from risk_sac.errors import ConfigError, DamagedError
 from risk_sac.execution.helper import ANSWER, QUESTION
 from risk_sac.execution.messages import without_folders
 from risk_sac.failures.export.formats import FormatName
-from risk_sac.failures.net import SignalColour, SurfaceUse, roads_of, signal_heads, thumbnail
+from risk_sac.failures.net import RoadsBody, roads_of, signal_heads, thumbnail
 from risk_sac.failures.question import IDLE, REFUSED, Question, Subject, Twin, read_twin
 from risk_sac.failures.recording import Recording
 from risk_sac.failures.studied import valid_failure
@@ -182,35 +182,6 @@ def pictures(settings: ServiceSettings) -> OnDemandCache[Picture]:
     return OnDemandCache(draw, "pictures")
 
 
-class SurfaceBody(Record):
-    """A piece of ground that one drives or walks on."""
-
-    use: SurfaceUse
-    outline: list[tuple[float, float]]
-    """Its corners, m, on the map that the series is on; the last one is joined to the first."""
-
-
-class SignalHeadBody(Record):
-    """The signal at the end of a lane, or at one end of a crossing."""
-
-    x_m: float
-    y_m: float
-    heading_rad: float
-    """Along the lane."""
-    width_m: float
-    changes: list[tuple[float, SignalColour]]
-    """When it begins to show a colour, s, by the clock of the series."""
-
-
-class RoadsBody(Record):
-    """The ground of a failure or a network, and its signals."""
-
-    surfaces: list[SurfaceBody]
-    """In the order in which they are to be drawn; none where the scene's family had other roads then."""
-    signals: list[SignalHeadBody]
-    """Of a failure."""
-
-
 class TwinBody(Record):
     """The scene of a failure, played with one thing changed."""
 
@@ -227,10 +198,7 @@ class TwinBody(Record):
 def roads_body(failure: FailureOfARun) -> RoadsBody:
     """Returns the surfaces and signals of a failure's scene."""
     place = failure.run.family, failure.episode.scene
-    surfaces = [SurfaceBody(use=road.use, outline=road.outline.round(MM).tolist()) for road in roads_of(*place)]
-    return RoadsBody(
-        surfaces=surfaces, signals=[SignalHeadBody.model_validate(asdict(head)) for head in signal_heads(*place)]
-    )
+    return RoadsBody.of(roads_of(*place), MM, signal_heads(*place))
 
 
 def thumbnail_of(failure: FailureOfARun, settings: ServiceSettings) -> str:

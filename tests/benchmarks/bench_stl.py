@@ -9,8 +9,7 @@ from pydantic import ValidationError
 
 from risk_sac.config import DynamicElements, Environment, Interval, Odd, Requirement, Scenery
 from risk_sac.errors import FormulaError
-from risk_sac.risk.requirements import requirements_from_odd
-from risk_sac.risk.signals import SIGNALS
+from risk_sac.risk.requirements import SIGNALS, requirements_from_odd
 from risk_sac.risk.stl import Monitor
 from tests.hostile_formulas import formulas
 

@@ -14,7 +14,7 @@ from risk_sac.config import Requirement, RunSpec
 from risk_sac.env.problem import Problem
 from risk_sac.failures.from_above import MARKS
 from risk_sac.maps.found import TITLES, Pattern
-from risk_sac.risk.signals import SIGNALS
+from risk_sac.risk.requirements import SIGNALS
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.reading import PAPER_FAMILIES
 from service.api.routes.catalogue import list_families

@@ -17,9 +17,8 @@ from risk_sac.scenario.limits import limits_from_odd
 from risk_sac.sim.collision import Contact, find_contact
 from risk_sac.sim.control import Adversaries
 from risk_sac.sim.ego import Belief
-from risk_sac.sim.oncoming import driven
 from risk_sac.sim.paths import Along, path_along
-from risk_sac.sim.pilot import Motion
+from risk_sac.sim.pilot import Motion, driven
 from risk_sac.sim.solid import VehicleCommand
 from risk_sac.sim.sumo import SumoSimulation
 from risk_sac.world.types import HEADING, LATERAL, SPEED, STEP_S, VX, VY, Floats, Frame, Role, X, Y

@@ -291,7 +291,7 @@ def test_a_process_that_needs_too_much_memory_says_what_it_may_take() -> None:
     code = f"""
 import sys
 import risk_sac.search.rollouts as rollouts
-from risk_sac.host.memory import limit_memory
+from risk_sac.host.machine import limit_memory
 limit_memory(1 << 30)
 rollouts.serve = lambda *_: bytearray(1 << 31)
 sys.argv = ["", "{other.fileno()}", "", "0"]

@@ -14,8 +14,7 @@ from risk_sac.config.story_actions import (
 from risk_sac.scenario.travel_line import TravelLine
 from risk_sac.sim.story.cast import Mover
 from risk_sac.sim.story.course import Course, lateral_time_s, length_of
-from risk_sac.sim.story.doing import ACROSS, ALONG, NEITHER
-from risk_sac.sim.story.stage import Stage, extent, straight
+from risk_sac.sim.story.stage import ACROSS, ALONG, NEITHER, Stage, extent, straight
 from risk_sac.world.types import STEP_S
 
 NEAR_M = 0.02  # of a place across, within which it is reached; choice

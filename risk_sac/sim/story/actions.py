@@ -12,11 +12,9 @@ from risk_sac.sim.story.across import (
     FollowTrajectory,
     KeepBeside,
 )
-from risk_sac.sim.story.along import ChangeSpeed, FollowProfile, KeepAhead
+from risk_sac.sim.story.along import ChangeSpeed, FollowProfile, KeepAhead, Synchronise
 from risk_sac.sim.story.cast import Mover
-from risk_sac.sim.story.doing import ACROSS, ALONG, NEITHER, Doing
-from risk_sac.sim.story.stage import Stage
-from risk_sac.sim.story.synchronise import Synchronise
+from risk_sac.sim.story.stage import ACROSS, ALONG, NEITHER, Doing, Stage
 
 
 class Once:

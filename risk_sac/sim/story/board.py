@@ -17,10 +17,8 @@ from risk_sac.config.story import (
 )
 from risk_sac.config.story_actions import DeleteAction, VariableAction
 from risk_sac.sim.story.actions import doing_of, set_variable
-from risk_sac.sim.story.doing import ALONG, Doing
-from risk_sac.sim.story.shift import EventStart
-from risk_sac.sim.story.stage import Stage
-from risk_sac.sim.story.triggers import TriggerWatch
+from risk_sac.sim.story.stage import ALONG, Doing, Stage
+from risk_sac.sim.story.triggers import EventStart, TriggerWatch
 
 PATH = "::"  # between the names of nested elements
 

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from copy import copy
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import shapely
@@ -15,8 +15,7 @@ from risk_sac.scenario.lane_places import LanePlace
 from risk_sac.scenario.layout import Reach, StoryPlan
 from risk_sac.scenario.places import OnRoad, StoryPlaces
 from risk_sac.scenario.travel_line import Pose, TravelLine, line_of
-from risk_sac.sim.story.cast import STANDS_MPS, Mover, Present
-from risk_sac.sim.story.deviation import ANYWHERE, DeviationRoom
+from risk_sac.sim.story.cast import ANYWHERE, STANDS_MPS, DeviationRoom, Mover, Present
 from risk_sac.world.types import STEP_S
 
 LINE_M = 3000.0  # of the way ahead of a lane's beginning; an actor at its end gets the next piece
@@ -334,3 +333,23 @@ def _lane_beside(lane: int, left: int) -> int:
     """OpenDRIVE id of the lane some lanes to the left of another, without lane 0."""
     wanted = lane + left if lane < 0 else lane - left
     return wanted - int(math.copysign(1, lane)) if wanted == 0 or (wanted > 0) != (lane > 0) else wanted
+
+
+ALONG, ACROSS = frozenset({"along"}), frozenset({"across"})
+NEITHER: frozenset[str] = frozenset()
+
+
+class Doing(Protocol):
+    """An action of one actor while it runs.
+
+    Attributes:
+      controls: "along", "across" or both; an action ends another one of the same actor that controls the same.
+    """
+
+    controls: frozenset[str]
+
+    def begin(self, mover: Mover, stage: Stage) -> bool:
+        """Starts now; returns whether it is over already."""
+
+    def step(self, mover: Mover, stage: Stage) -> bool:
+        """Says what the actor does in the next step; returns whether the action is over then."""

@@ -27,11 +27,11 @@ from service.api.pages import (
     LIVE,
     MALFORMED,
     NOT_ENDED,
-    NOT_JSON,
     REUSED,
     TAGGED,
     TIERS,
     UNKNOWN,
+    WRONG_TYPE,
     Cursor,
     Limit,
     Tier,
@@ -53,7 +53,7 @@ from service.views.whole import CampaignView, GridFormat, ViewName, run_of
 
 LISTED = "campaigns"
 EITHER_KIND = documented(CampaignSpec.__name__, ON_MAP)
-POSTING = ACCEPTED | MALFORMED | REUSED | NOT_JSON
+POSTING = ACCEPTED | MALFORMED | REUSED | WRONG_TYPE
 IdempotencyKey = Annotated[
     str | None,
     Header(
@@ -97,7 +97,7 @@ async def post_campaign(
     return await run_in_threadpool(_submit, request, spec, prior, service, caller, idempotency_key)
 
 
-@router.post("/check", responses=MALFORMED | NOT_JSON, openapi_extra=EITHER_KIND)
+@router.post("/check", responses=MALFORMED | WRONG_TYPE, openapi_extra=EITHER_KIND)
 async def check_campaign(spec: PostedCampaign, service: Service, caller: CurrentCaller) -> CampaignCheck:
     """Validate a campaign and change nothing; says which values its episodes would use, and what its budget detects."""
     checked = await run_in_threadpool(service.manager.checked, spec)
@@ -174,7 +174,7 @@ async def _posted_tags(request: Request) -> PostedTags:
 @router.put(
     "/{campaign_id}/tags",
     response_model=Campaign,
-    responses=UNKNOWN | MALFORMED | NOT_JSON,
+    responses=UNKNOWN | MALFORMED | WRONG_TYPE,
     openapi_extra=documented(PostedTags.__name__),
 )
 def put_tags(

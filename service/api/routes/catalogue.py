@@ -25,8 +25,7 @@ from risk_sac.egos.registry import cards
 from risk_sac.failures.export.formats import FORMATS, FormatName
 from risk_sac.records import Record, wire
 from risk_sac.report.trend import Trend
-from risk_sac.risk.requirements import requirements_from_odd
-from risk_sac.risk.signals import SIGNALS
+from risk_sac.risk.requirements import SIGNALS, requirements_from_odd
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.limits import behaving
 from risk_sac.scenario.odd import widest

@@ -7,6 +7,7 @@ from pydantic import Field
 from starlette.concurrency import run_in_threadpool
 
 from risk_sac.config.base import Settings
+from risk_sac.failures.net import RoadsBody
 from risk_sac.failures.question import Twin
 from risk_sac.failures.studied import Region
 from risk_sac.records import (
@@ -28,10 +29,10 @@ from service.api.context import CurrentCaller, Service
 from service.api.pages import (
     INVALID,
     MALFORMED,
-    NOT_JSON,
     TAGGED,
     TIERS,
     UNKNOWN,
+    WRONG_TYPE,
     Cursor,
     Limit,
     Responses,
@@ -46,7 +47,6 @@ from service.store.stored import StoredPage
 from service.views.series import (
     FailureOfARun,
     Picture,
-    RoadsBody,
     Study,
     TwinBody,
     failure_body,
@@ -165,7 +165,7 @@ def get_failure(campaign_id: str, failure_id: str, service: Service, caller: Cur
     return as_json(failure_body(campaign_id, failure, triage, service.settings))
 
 
-@router.put("/failures/{failure_id}/triage", responses=MALFORMED | NOT_JSON, openapi_extra=documented("PostedTriage"))
+@router.put("/failures/{failure_id}/triage", responses=MALFORMED | WRONG_TYPE, openapi_extra=documented("PostedTriage"))
 def put_triage(
     campaign_id: str,
     failure_id: str,

@@ -7,14 +7,14 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from risk_sac.failures.net import RoadsBody
 from risk_sac.maps.documents import MAX_BYTES, MAX_FILES, MAX_ROADS
 from service.api.context import CurrentCaller, Service
-from service.api.pages import INVALID, UNKNOWN, WAIT, Cursor, Limit, Responses, header, link, problem
+from service.api.pages import INVALID, UNKNOWN, WAIT, WRONG_TYPE, Cursor, Limit, Responses, header, link, problem
 from service.api.posted import media_type
 from service.api.problems import ProblemError, Reason
 from service.networks.schemas import MEDIA_TYPES, WALL_S, Network, NetworkPage, Places
 from service.networks.surveys import RETRY_AFTER_S
-from service.views.series import RoadsBody
 
 LISTED = "networks"
 RECEIVE_S = 60  # a sender that is slower would keep others out
@@ -25,7 +25,7 @@ CREATED: Responses = {
 }
 REFUSALS: Responses = (
     problem(409, "The project has as many networks as it may")
-    | problem(415, "The body is declared as something else, or carries a Content-Encoding")
+    | WRONG_TYPE
     | problem(422, "The upload is refused, and `detail` says why; or a query parameter is wrong")
 )
 FINDING = problem(422, "Nothing can be found on the network, and `detail` says why")

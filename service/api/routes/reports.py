@@ -24,9 +24,9 @@ from service.api.context import AskedCampaign, Context, CurrentCaller, Service, 
 from service.api.pages import (
     INVALID,
     MALFORMED,
-    NOT_JSON,
     TAGGED,
     UNKNOWN,
+    WRONG_TYPE,
     Responses,
     as_json,
     cacheable,
@@ -45,23 +45,14 @@ TableFormat = Literal["json", "md", "csv"]
 SpecFormat = Literal["json", "yaml"]
 SPECS: dict[str, Callable[[CampaignSpec], str]] = {"json": CampaignSpec.model_dump_json, "yaml": campaign_yaml}
 
-CACHED = {
-    "ETag": {
-        "description": "Changes whenever the body does; absent where the folder of a finished run cannot be read.",
-        "schema": {"type": "string"},
-    },
-    "Cache-Control": TAGGED[200]["headers"]["Cache-Control"],
-}
-UNCHANGED: Responses = {304: {"description": "What If-None-Match names still holds", "headers": CACHED}}
-
 
 def text(**examples: str) -> dict[str, Any]:
     """An answer in several formats of text, with an example of each."""
     content = {MEDIA_TYPES[name]: {"schema": {"type": "string"}, "example": text} for name, text in examples.items()}
-    return {"headers": CACHED, "content": content}
+    return TAGGED[200] | {"content": content}
 
 
-TABLE: Responses = {
+TABLE: Responses = TAGGED | {
     200: text(
         md="# Comparison of methods\n\n…\n\n## low, search\n\n| method | seeds | ECR | …",
         csv="family,method,phase,runs,episodes,failures,…\nlow,random,search,2,80,3,…",
@@ -77,15 +68,14 @@ SPEC: Responses = {
         }
     }
 }
-FIGURES: Responses = {200: {"headers": CACHED}}
-FIGURE: Responses = {200: {"headers": CACHED, "content": {MEDIA_TYPES[each]: {} for each in FORMATS}}}
+FIGURE: Responses = TAGGED | {200: TAGGED[200] | {"content": {MEDIA_TYPES[each]: {} for each in FORMATS}}}
 
 MOST_MERGED = 100  # campaigns: each takes up to seconds the first time
 coverage_router = APIRouter(prefix="/v1/coverage", tags=["reports"], responses=INVALID)
 router = APIRouter(prefix="/v1/campaigns/{campaign_id}", tags=["reports"], responses=INVALID | UNKNOWN)
 
 
-@router.get("/table", response_model=Table, responses=TABLE | UNCHANGED)
+@router.get("/table", response_model=Table, responses=TABLE)
 async def get_table(
     request: Request,
     service: Service,
@@ -97,7 +87,7 @@ async def get_table(
     return await reported(request, service, campaign, "table", format_, format=format_, address=address)
 
 
-@router.get("/rates", response_model=CampaignRates, responses=FIGURES | UNCHANGED)
+@router.get("/rates", response_model=CampaignRates, responses=TAGGED)
 async def get_rates(
     request: Request,
     service: Service,
@@ -113,25 +103,25 @@ async def get_rates(
     return await reported(request, service, campaign, "rates", "rates", str(exposure), scenes_per_hour=exposure)
 
 
-@router.get("/clusters", response_model=Clusters, responses=FIGURES | UNCHANGED)
+@router.get("/clusters", response_model=Clusters, responses=TAGGED)
 async def get_clusters(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """Kinds of failures that the finished runs found, in words, with an example of each."""
     return await reported(request, service, campaign, "clusters", "clusters")
 
 
-@router.get("/coverage", response_model=CoverageMatrix, responses=FIGURES | UNCHANGED)
+@router.get("/coverage", response_model=CoverageMatrix, responses=TAGGED)
 async def get_coverage(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """What the finished runs have covered: ODD, functional scenarios, requirements, parameters and bodies."""
     return await reported(request, service, campaign, "coverage", "coverage")
 
 
-@router.get("/figures", response_model=Figures, responses=FIGURES | UNCHANGED)
+@router.get("/figures", response_model=Figures, responses=TAGGED)
 async def list_figures(request: Request, service: Service, campaign: AskedCampaign) -> Response:
     """Figures of the finished runs: search, results, λ and α."""
     return await reported(request, service, campaign, "figures", "figures", address=link(request, ""))
 
 
-@router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE | UNCHANGED)
+@router.get("/figures/{name}.{format}", response_class=Response, responses=FIGURE)
 async def get_figure(
     name: str, format: Format, request: Request, service: Service, campaign: AskedCampaign
 ) -> Response:
@@ -170,11 +160,11 @@ async def reported(
 
 
 ReportFormat = Literal["json", "html", "md"]
-REPORT: Responses = {200: text(html="<!doctype html>…", md="# Failures of an ego: low\n\n> **Search…")}
+REPORT: Responses = TAGGED | {200: text(html="<!doctype html>…", md="# Failures of an ego: low\n\n> **Search…")}
 NOT_PLAYED = problem(409, "The regression has not ended, or has failed")
 
 
-@router.get("/report", response_model=CampaignEvidence, responses=REPORT | UNCHANGED | NOT_PLAYED)
+@router.get("/report", response_model=CampaignEvidence, responses=REPORT | NOT_PLAYED)
 async def get_report(
     request: Request,
     service: Service,
@@ -260,7 +250,7 @@ class PostedRegression(Settings):
 POSTING: Responses = (
     {202: {"headers": {"Location": header("Where to follow it.")}}}
     | MALFORMED
-    | NOT_JSON
+    | WRONG_TYPE
     | UNKNOWN
     | problem(409, "The campaign has not ended, or none of its runs has succeeded")
 )

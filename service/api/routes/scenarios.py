@@ -11,7 +11,7 @@ from risk_sac.maps.documents import MAX_BYTES, MAX_FILES
 from risk_sac.records.campaign import ScenarioCheck, ScenarioDetails, ScenarioList
 from risk_sac.scenario.reading import MOST_BYTES
 from service.api.context import CurrentCaller, Service
-from service.api.pages import INVALID, UNKNOWN, Responses, header, link, problem
+from service.api.pages import INVALID, UNKNOWN, WRONG_TYPE, Responses, header, link, problem
 from service.api.posted import media_type
 from service.api.problems import ProblemError, Reason
 
@@ -22,7 +22,7 @@ CREATED: Responses = {
     200: {"model": ScenarioDetails, "description": "The same was posted before", "headers": LOCATED},
     201: {"headers": LOCATED},
 }
-REFUSALS: Responses = problem(415, "The body is declared as something else, or carries a Content-Encoding") | problem(
+REFUSALS: Responses = WRONG_TYPE | problem(
     422, "The document has faults; each is one of `errors`, whose `field` is its path in the document"
 )
 FULL = problem(409, "The project has as many scenarios as it may")

@@ -13,9 +13,9 @@ from risk_sac.errors import FormulaError
 from risk_sac.maps.carriageway import Carriageway
 from risk_sac.risk.measures import Gauge, Measures, soft_min
 from risk_sac.risk.publish import OwnMotionGauge, assess, publish
+from risk_sac.risk.requirements import SIGNALS
 from risk_sac.risk.rss import BEHIND_S_PER_M, DRIFT_MPS, SPEED_SHARE, WALK_MPS, time_to_encounter
 from risk_sac.risk.rss_parameters import RssParameters
-from risk_sac.risk.signals import SIGNALS
 from risk_sac.risk.stl import ROBUSTNESS_CLIP, Monitor
 from risk_sac.world.geometry import RelativeView, relative_view
 from risk_sac.world.types import Frame

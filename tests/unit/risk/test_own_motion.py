@@ -9,7 +9,7 @@ from risk_sac.config import RunSpec
 from risk_sac.env.env import RiskSacEnv
 from risk_sac.maps.carriageway import carriageway_of
 from risk_sac.risk.publish import HEADWAY_CAP_S, OwnMotion, OwnMotionGauge
-from risk_sac.risk.signals import SIGNALS
+from risk_sac.risk.requirements import SIGNALS
 from risk_sac.world.types import Frame, Kind
 from tests.builders import frame_of
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from risk_sac.config import METHODS, LearnerConfig, Requirement, RewardConfig
 from risk_sac.records import Grade, Severity
 from risk_sac.risk import reward
-from risk_sac.risk.realism import (
+from risk_sac.risk.reward import (
     broken_hard_rule,
 )
 from tests.builders import collision, judgement

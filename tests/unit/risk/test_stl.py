@@ -13,8 +13,7 @@ from risk_sac.config import DynamicElements, Environment, Interval, Odd, Require
 from risk_sac.errors import FormulaError, NotFinite
 from risk_sac.risk.formula import parse
 from risk_sac.risk.measures import soft_min
-from risk_sac.risk.requirements import requirements_from_odd
-from risk_sac.risk.signals import SIGNALS
+from risk_sac.risk.requirements import SIGNALS, requirements_from_odd
 from risk_sac.risk.stl import Monitor
 
 STEP_S, HORIZON = 0.1, 150

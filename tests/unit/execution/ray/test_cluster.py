@@ -9,7 +9,7 @@ pytestmark = needs_ray
 
 @pytest.mark.parametrize("host", ["192.0.2.7", "0.0.0.0", "[2001:db8::1]", "no-such-host.invalid"])
 def test_one_that_others_reach_or_that_nobody_knows_is_refused_without(monkeypatch, host):
-    from risk_sac.execution.ray.cluster import check_token
+    from risk_sac.execution.ray.bridge import check_token
 
     for mode in ("disabled", "k8s", ""):
         monkeypatch.setenv("RAY_AUTH_MODE", mode)

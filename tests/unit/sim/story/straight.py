@@ -10,9 +10,8 @@ from risk_sac.scenario.layout import Reach, StoryActor, StoryPlan
 from risk_sac.scenario.places import StoryPlaces
 from risk_sac.scenario.space import Value
 from risk_sac.scenario.travel_line import Pose
-from risk_sac.sim.story.cast import Present
-from risk_sac.sim.story.deviation import NO_LEADS, Lead
-from risk_sac.sim.story.engine import StoryEngine, StoryMotion
+from risk_sac.sim.story.cast import NO_LEADS, Lead, Present
+from risk_sac.sim.story.traffic import StoryEngine, StoryMotion
 from risk_sac.world.net import Edge, Net, NetLane
 from risk_sac.world.types import STEP_S
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from risk_sac.sim.story.deviation import DeviationRoom
+from risk_sac.sim.story.cast import DeviationRoom
 from tests.unit.sim.story.straight import Drive, after, car, one_event, story_of
 
 

@@ -9,7 +9,7 @@ from risk_sac.scenario.bodies import BODIES
 from risk_sac.scenario.families import FAMILIES
 from risk_sac.scenario.layout import Deviation
 from risk_sac.scenario.limits import Limits, limits_from_odd
-from risk_sac.sim.story.deviation import DeviationControl, Lead
+from risk_sac.sim.story.cast import DeviationControl, Lead
 from tests.unit.sim.story.straight import Drive, car, one_event, story_of
 
 BOUNDS = Deviation(1.5, 0.5)
