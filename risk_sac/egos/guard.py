@@ -20,7 +20,7 @@ import numpy as np
 
 from risk_sac.egos.seam import Command, Control, Ego, EpisodeStart, Perceived, Trajectory
 from risk_sac.errors import EgoFailed
-from risk_sac.host.process_state import Preserved, handler_of
+from risk_sac.host.process_state import handler_of, preserved
 from risk_sac.world.types import Floats
 
 DEADLINE, MALFORMED, CRASH = "ego_deadline", "ego_malformed", "ego_crash"  # reasons of an invalid episode
@@ -57,7 +57,7 @@ class Guarded:
           EgoFailed: it cannot be made.
         """
         self.took_s = 0.0
-        self._deadline_s, self._foreign, self._state = deadline_s, foreign, Preserved()
+        self._deadline_s, self._foreign, self._state = deadline_s, foreign, preserved()
         with self._state if foreign else contextlib.nullcontext():
             self._ego = self._asked(make)
 
@@ -82,7 +82,7 @@ class Guarded:
         Raises:
           EgoFailed: it crashed, took too long, or answered nonsense.
         """
-        with self._state if self._foreign else contextlib.nullcontext():
+        with self._state.quick if self._foreign else contextlib.nullcontext():
             return self._asked(lambda: sound(self._ego.act(perceived)))
 
     def close(self) -> None:

@@ -1,14 +1,14 @@
 """Settings that a process has once, such as its locale, kept apart for us and for foreign code.
 
     state = Preserved()
-    with state:  # which takes some microseconds
+    with state:             # while it is imported, made, begun, closed
         ego = make_ego()
-    with state:
+    with state.quick:       # while it answers: some microseconds, and the rarer settings are not looked at
         ego.act(perceived)
 
 What foreign code changes holds again when it runs next, and never for us. A process that it forks ends where it would
-come back to us, since it would write the same files. Those settings are kept that change what we compute, write or
-import. Random state is not, because nothing of ours draws from a generator that is shared.
+come back to us, since it would write the same files. Random state is not kept, because nothing of
+ours draws from a generator that is shared.
 """
 
 import contextlib
@@ -17,6 +17,7 @@ import locale
 import logging
 import os
 import signal
+import socket
 import sys
 import threading
 import warnings
@@ -37,7 +38,7 @@ Arguments = ParamSpec("Arguments")
 Answer = TypeVar("Answer")
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 TINY = 5e-324  # is 0 where a library has told the processor to flush such numbers
-_INITIAL_TORCH = ("float32", True, 1, False, None)
+_INITIAL_TORCH = ("float32", True, 1, False)
 
 
 class Setting(NamedTuple):
@@ -80,19 +81,25 @@ def c_numbers(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answ
     return in_c_locale
 
 
-class Preserved:
-    """Exchanges settings for those of the foreign code, for the time of a block."""
+def preserved() -> "Preserved":
+    """State of foreign code that has changed nothing yet."""
+    return Preserved()
 
-    def __init__(self) -> None:
-        self._theirs: dict[Setting, Any] = {}
+
+class _Swap:
+    """Exchanges some settings for those of the foreign code, for the time of a block."""
+
+    def __init__(self, settings: Sequence[Setting], theirs: dict[Setting, Any]) -> None:
+        self._settings, self._theirs = settings, theirs
         self._ours: list[Any] = []
         self._process = 0
 
     def __enter__(self) -> Self:
         self._process = os.getpid()
-        self._ours = [setting.read() for setting in SETTINGS]
+        self._ours = [setting.read() for setting in self._settings]
         for setting, value in self._theirs.items():
-            setting.set(value)
+            if setting in self._settings:
+                setting.set(value)
         return self
 
     def __exit__(
@@ -100,15 +107,42 @@ class Preserved:
     ) -> None:
         if os.getpid() != self._process:
             os._exit(1)
-        now = [setting.read() for setting in SETTINGS]
+        now = [setting.read() for setting in self._settings]
         if now == self._ours and not self._theirs:
             return
-        for setting, ours, left in zip(SETTINGS, self._ours, now, strict=True):
+        for setting, ours, left in zip(self._settings, self._ours, now, strict=True):
             if left != ours:
                 self._theirs[setting] = left
                 setting.set(ours)
             elif setting in self._theirs:
                 del self._theirs[setting]
+
+
+class Preserved(_Swap):
+    """Exchanges all settings; `quick` those that cost little to read, which foreign code changes most.
+
+    What a `quick` block has changed of the others is put right when the next block of all begins.
+    """
+
+    def __init__(self) -> None:
+        theirs: dict[Setting, Any] = {}
+        super().__init__((*QUICK, *OTHERS), theirs)
+        self.quick = _Swap(QUICK, theirs)
+        self._left: dict[Setting, Any] = {}  # the others' values after the latest block of all
+
+    def __enter__(self) -> Self:
+        for setting, ours in self._left.items():
+            now = setting.read()
+            if now != ours:
+                self._theirs[setting] = now
+                setting.set(ours)
+        return super().__enter__()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        super().__exit__(kind, error, trace)
+        self._left = {setting: setting.read() for setting in OTHERS}
 
 
 def _folder() -> str | None:
@@ -149,18 +183,21 @@ def _torch() -> Any:
         torch.is_grad_enabled(),
         torch.get_num_threads(),
         torch.are_deterministic_algorithms_enabled(),
-        None if (device := torch.get_default_device()).type == "cpu" else device,
     )
 
 
 def _set_torch(values: Any) -> None:
     torch = sys.modules["torch"]
-    dtype, gradients, threads, deterministic, device = values or _INITIAL_TORCH
+    dtype, gradients, threads, deterministic = values or _INITIAL_TORCH
     torch.set_default_dtype(getattr(torch, dtype))
     torch.set_grad_enabled(gradients)
     torch.set_num_threads(threads)
     torch.use_deterministic_algorithms(deterministic)
-    torch.set_default_device(device)
+
+
+def _device() -> Any:
+    torch = sys.modules.get("torch")
+    return None if torch is None else torch.get_default_device()
 
 
 def _flush(flushed: bool) -> None:
@@ -180,13 +217,19 @@ def _set_path(folders: Sequence[str]) -> None:
     sys.path[:] = folders
 
 
+def _set_environment(wanted: dict[str, str]) -> None:
+    for name in os.environ.keys() - wanted.keys():
+        del os.environ[name]
+    os.environ.update(wanted)
+
+
 def _umask() -> int:
     umask = os.umask(0o77)
     os.umask(umask)
     return umask
 
 
-SETTINGS = (
+QUICK = (
     Setting(_folder, _enter),
     Setting(lambda: locale.setlocale(locale.LC_ALL), lambda name: locale.setlocale(locale.LC_ALL, name)),
     Setting(_handlers, _handle),
@@ -197,5 +240,18 @@ SETTINGS = (
     Setting(_streams, _set_streams),
     Setting(_umask, os.umask),
     Setting(lambda: tuple(sys.path), _set_path),
+    Setting(sys.getrecursionlimit, sys.setrecursionlimit),
+    Setting(gc.isenabled, lambda enabled: gc.enable() if enabled else gc.disable()),
+    Setting(socket.getdefaulttimeout, socket.setdefaulttimeout),
+    Setting(lambda: logging.root.level, logging.root.setLevel),
     Setting(lambda: logging.root.manager.disable, logging.disable),
+)
+OTHERS = (
+    Setting(lambda: dict(os.environ), _set_environment),
+    Setting(np.get_printoptions, lambda options: np.set_printoptions(**options)),
+    Setting(
+        lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()),
+        lambda mask: signal.pthread_sigmask(signal.SIG_SETMASK, mask),
+    ),
+    Setting(_device, lambda device: sys.modules["torch"].set_default_device(device)),
 )

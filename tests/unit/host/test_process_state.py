@@ -1,10 +1,12 @@
 """What foreign code does to its process holds for it, and not for us."""
 
+import gc
 import io
 import locale
 import logging
 import os
 import signal
+import socket
 import subprocess
 import sys
 import warnings
@@ -16,7 +18,7 @@ import numpy as np
 import pytest
 import torch
 
-from risk_sac.host.process_state import TINY, Preserved
+from risk_sac.host.process_state import TINY, Preserved, preserved
 
 
 def reset_signal() -> None:
@@ -27,7 +29,7 @@ def replace_streams() -> None:
     sys.stdout = sys.stderr = io.StringIO()
 
 
-SETTINGS: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
+QUICK: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
     "folder": (lambda: os.chdir("/"), os.getcwd),
     "signals": (reset_signal, lambda: signal.getsignal(signal.SIGTERM)),
     "locale": (lambda: locale.setlocale(locale.LC_CTYPE, "C"), lambda: locale.setlocale(locale.LC_ALL)),
@@ -41,27 +43,54 @@ SETTINGS: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
     "umask": (lambda: os.umask(0o777), lambda: (os.umask(mask := os.umask(0o22)), mask)[1]),
     "modules": (sys.path.clear, lambda: list(sys.path)),
     "streams": (replace_streams, lambda: (sys.stdout, sys.stderr)),
-    "device": (lambda: torch.set_default_device("meta"), torch.get_default_device),
+    "recursion": (lambda: sys.setrecursionlimit(700), sys.getrecursionlimit),
+    "garbage": (gc.disable, gc.isenabled),
+    "timeout": (lambda: socket.setdefaulttimeout(0.001), socket.getdefaulttimeout),
     "logging": (lambda: logging.disable(), lambda: logging.root.manager.disable),
+}
+OTHERS: dict[str, tuple[Callable[[], Any], Callable[[], Any]]] = {
+    "environment": (lambda: os.environ.update(HOME="/nowhere", TZ="Mars"), lambda: dict(os.environ)),
+    "print options": (lambda: np.set_printoptions(precision=1), np.get_printoptions),
+    "blocked": (
+        lambda: signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGTERM]),
+        lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ()),
+    ),
+    "device": (lambda: torch.set_default_device("meta"), torch.get_default_device),
 }
 
 
-@pytest.mark.parametrize("name", SETTINGS)
+@pytest.mark.parametrize("name", [*QUICK, *OTHERS])
 def test_what_foreign_code_changes_holds_for_it_and_not_for_us(name):
-    change, read = SETTINGS[name]
-    state, before = Preserved(), read()
-    with state:
+    change, read = (QUICK | OTHERS)[name]
+    state: Preserved = preserved()
+    block = state.quick if name in QUICK else state
+    before = read()
+    with block:
         change()
         theirs = read()
     assert theirs != before
     assert read() == before
-    with state:
+    with block:
         assert read() == theirs
     assert read() == before
 
 
+@pytest.mark.parametrize("name", OTHERS)
+def test_what_a_quick_block_overlooks_is_put_right_at_the_next_block_of_all(name):
+    change, read = OTHERS[name]
+    state, before = preserved(), read()
+    with state:
+        pass
+    with state.quick:
+        change()
+    theirs = read()
+    with state:
+        assert read() == theirs != before
+    assert read() == before
+
+
 def test_what_it_puts_back_is_forgotten_and_an_error_passes(tmp_path):
-    state, here = Preserved(), os.getcwd()
+    state, here = preserved(), os.getcwd()
     with pytest.raises(SystemExit), state:
         sys.exit(os.chdir(tmp_path))
     assert os.getcwd() == here
@@ -76,7 +105,7 @@ def test_what_it_puts_back_is_forgotten_and_an_error_passes(tmp_path):
 
 
 def test_a_process_that_foreign_code_forks_does_not_come_back():
-    with Preserved():
+    with preserved().quick:
         child = os.fork()
     assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 1
 
@@ -106,9 +135,9 @@ def test_a_folder_that_is_gone_is_no_error(tmp_path):
     gone.mkdir()
     os.chdir(gone)
     try:
-        with Preserved():
+        with preserved():
             gone.rmdir()
-        with Preserved():
+        with preserved():
             os.chdir(here)
     finally:
         os.chdir(here)
