@@ -65,7 +65,7 @@ class ServiceSettings(RaySettings, BaseSettings):
     """Format of the log; `json` has one object per line with campaign and run ids as fields."""
 
     egos: FilePath | None = None
-    """TOML file that registers egos in processes of their own, see `risk_sac/egos/README.md`."""
+    """TOML file that registers egos in processes of their own, see `risk_sac/egos/remote/README.md`."""
 
     executor: ExecutorName = "local"
     """Executor of runs; `local`: processes of this machine; `ray`: a cluster."""

@@ -128,7 +128,8 @@ def python_card(point: EntryPoint) -> EgoCard:
     file = _source(point)
     try:
         declared = _declared(file.read_bytes(), point.attr)
-        declared["version"] = f"{declared.get('version', '')}+{_hash(file, '.' in point.module)}"
+        if declared.get("version"):
+            declared["version"] = f"{declared['version']}+{_hash(file, '.' in point.module)}"
         return EgoCard(name=point.name, kind="python", **{"deadline_s": PYTHON_DEADLINE_S} | declared)
     except (OSError, SyntaxError, UnicodeDecodeError) as error:
         raise _wrong(point, f"{file.name}: {error}") from error
@@ -256,8 +257,14 @@ def check(ego: EgoConfig) -> None:
 
 def refuse_class(source: str) -> NoReturn:
     """Raises a ConfigError: `module:Class` names no registered ego."""
-    got, remedy = f"the class {source}, which is not registered", f"register it as an entry point of {GROUP!r}"
-    raise ConfigError("ego.driver", got, "the name of a registered ego", f"{remedy}: see risk_sac/egos/README.md")
+    got, serve = (
+        f"the class {source}, which is not registered",
+        f"python -m risk_sac.egos.serve {source} --register NAME",
+    )
+    remedy = (
+        f"run `{serve}` and put what it prints into the file of RISK_SAC_EGOS, or make it an entry point of {GROUP!r}"
+    )
+    raise ConfigError("ego.driver", got, "the name of a registered ego", remedy)
 
 
 def make(source: str, name: str) -> tuple[Callable[[], Ego], EgoCard]:

@@ -314,7 +314,8 @@ class Collision(Violated):
         """
         if self.judgement.hidden:
             if self.visible_for_s > 0.0:
-                return f"which came into its view only {self.visible_for_s:.1f} s before"
+                before_s = min(self.visible_for_s, self.time_s - self.judgement.conflict_s)
+                return f"which came into its view only {before_s:.1f} s before"
             return "which was not in its view when the conflict began, nor then"
         if self.visible_for_s > 0.0:
             return f"which had been in its view for {self.visible_for_s:.1f} s"

@@ -116,7 +116,11 @@ def _check_parameters(document: Scenario) -> None:
             raise ConfigError(f"{path}.value", repr(later[0]), f"parameters before it: {known_before}", remedy)
         before |= {*parameter.names, name}
         if parameter.unit not in UNITS:
-            remedy = did_you_mean(parameter.unit, UNITS) or "values are in SI units; write `value * 3.6` for another"
+            squared = parameter.unit.replace("^", "").replace(
+                "2", "²"
+            )  # the closest name of m/s2 is m/s, of km/h it is km
+            si = "values are in SI units: divide km/h by 3.6 for m/s"
+            remedy = f"did you mean {squared}?" if squared in UNITS else si
             raise ConfigError(f"{path}.unit", repr(parameter.unit), f"one of {', '.join(UNITS)}", remedy)
         if parameter.odd is not None and parameter.odd not in known:
             remedy = did_you_mean(parameter.odd, known)

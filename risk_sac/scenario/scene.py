@@ -181,7 +181,7 @@ class SceneLayout:
         if start.position is not None:
             return self._vehicle_at(name, role, moving, path)
         self._placed[name] = place = self._place(name, moving, path)
-        self._refuse(start, ("heading_deg", "setback_m", "offset_m"), path, "let it move freely")
+        self._refuse(start, ("heading_deg", "setback_m", "offset_m"), path, "write `moves: freely`, or leave it out")
         left_m, width_m = self._value.of(start.left_m, f"{path}.start.left_m"), place.lane.width_m
         if not abs(left_m) <= width_m / 2:
             wanted = f"at most half of {place.lane.id!r}, {width_m / 2:g} m"

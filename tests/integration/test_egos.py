@@ -251,6 +251,12 @@ def test_an_ego_s_card_is_read_without_running_it(install):
     assert pinned(EgoConfig(driver="example")).response_s == 0.4
 
 
+def test_an_ego_without_a_version_is_refused(install):
+    install(version="")
+    with pytest.raises(ConfigError, match="version: "):
+        card_of("example")
+
+
 def test_an_ego_that_allows_two_instances_is_played_by_two_processes(install, monkeypatch, caplog):
     monkeypatch.setenv("RISK_SAC_ROLLOUTS", "3")
     rounds = spec_of("example").model_copy(update={"budget": Budget(episodes=8, batch=8)})

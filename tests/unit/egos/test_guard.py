@@ -137,6 +137,12 @@ def test_whatever_is_wrong_with_an_answer_has_a_reason(answer, reason):
     assert len(str(failed.value)) < 500
 
 
+def test_a_crash_names_the_file_and_line():
+    line = raising.__code__.co_firstlineno + 2
+    with pytest.raises(EgoFailed, match=rf"ZeroDivisionError: by me \(test_guard\.py, line {line}\)$"):
+        guarded(CRASHES[0]).act(None)
+
+
 @pytest.mark.parametrize("crash", CRASHES)
 def test_an_ego_that_fails_while_it_is_made_begun_or_closed_is_no_end_of_the_run(crash, caplog):
     ego = guarded(crash)

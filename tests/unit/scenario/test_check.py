@@ -115,6 +115,16 @@ def test_fault_names_its_path(kind: str) -> None:
     assert "\n" not in str(error)
 
 
+@pytest.mark.parametrize(("unit", "remedy"), [("km/h", "divide km/h by 3.6 for m/s"), ("m/s2", "did you mean m/s²?")])
+def test_remedy_of_an_unknown_unit(unit: str, remedy: str) -> None:
+    assert remedy in fault(changed("parameters.speed.unit", unit)).remedy
+
+
+def test_start_at_an_angle_names_what_allows_it() -> None:
+    start = {"lane": "road_1", "at_m": 300, "heading_deg": 90}
+    assert "`moves: freely`" in fault(changed("actors.truck.start", start)).remedy
+
+
 def test_cycle_of_relative_starts_is_named() -> None:
     actors = {
         "a": {"start": {"ahead_of": "b", "gap_m": 5}},

@@ -276,3 +276,9 @@ def test_a_pedestrian_that_turns_into_the_way():
 def test_a_vehicle_that_comes_over_and_brakes(ahead_m, expected):
     beside = sideways(straight(ahead_m, LANE_M, 0.0, 12.0, (2.5, -6.0)), 2.0, -1.2, LANE_M)
     assert named(stage(straight(0.0, 0.0, 0.0, 9.0), beside)) == expected
+
+
+def test_how_long_a_hidden_striker_was_in_view_agrees_with_its_conflict() -> None:
+    late = collision(time_s=4.348, visible_for_s=1.1, judgement=judgement(conflict_s=3.3, hidden=True))
+    assert late.view_in_words == "which came into its view only 1.0 s before"
+    assert late.conflict_in_words.endswith("came into sight 1.0 s before the contact")

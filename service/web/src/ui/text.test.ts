@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { egoWords, headlineWords, setting, tagsOf } from "./text";
+import { counted, egoWords, headlineWords, setting, tagsOf } from "./text";
 
 it.each<[number, string]>([
   [2 * Math.PI, "6.283"],
@@ -13,6 +13,10 @@ it.each<[number, string]>([
   [123456, "123456"],
   [0, "0"],
 ])("of %d as a setting a reader needs %s", (value, wanted) => expect(setting(value)).toBe(wanted));
+
+it("counts one road and many roads", () => {
+  expect([1, 0, 2000].map((roads) => counted(roads, "road"))).toEqual(["1 road", "0 roads", "2,000 roads"]);
+});
 
 it.each<[number | null, number, string]>([
   [null, 4, "4 candidates wait for verification"],

@@ -18,6 +18,11 @@ export function count(value: number): string {
   return value.toLocaleString("en");
 }
 
+/** `1 road`, `2,000 roads`. */
+export function counted(value: number, noun: string): string {
+  return `${count(value)} ${noun}${value === 1 ? "" : "s"}`;
+}
+
 interface Headline {
   headline: number | null;
   headline_waiting: number;

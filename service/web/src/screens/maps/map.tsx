@@ -5,7 +5,7 @@ import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { useAsked } from "../../api/asked";
 import type { Body } from "../../api/types";
 import { Shown } from "../../ui/states";
-import { count, moment } from "../../ui/text";
+import { count, counted, moment } from "../../ui/text";
 import { useTitle } from "../../ui/title";
 import { again, begin, matching, MOST_PLACES, PATTERNS, type Pattern, type Places, type Spot } from "./places";
 import { Plan, Sign } from "./plan";
@@ -28,7 +28,7 @@ export function MapScreen({ id, query }: { id: string; query: URLSearchParams })
             </span>
             <h1 title={nameOf(map)}>{nameOf(map)}</h1>
             <span class="faint">
-              {count(map.edges)} roads, {count(map.junctions)} junctions, {(map.length_m / 1000).toFixed(1)} km
+              {counted(map.edges, "road")}, {counted(map.junctions, "junction")}, {(map.length_m / 1000).toFixed(1)} km
             </span>
           </div>
           {query.has("known") && (

@@ -49,10 +49,10 @@ function EffortCard({ effort, shape, spec, scenarios, time, located, choose }: E
   );
 }
 
-/** `risk-sac-diverse detects 7.2 of 18 known defects`; that nothing was measured where that is so. */
+/** `risk-sac-diverse detects 7.2 of 18 known defects on average`; that nothing was measured where that is so. */
 export function detects({ methods }: Body<"Power">): string {
   const told = methods.flatMap(({ method, expected, at_least, defects }) =>
-    expected !== null && defects.length ? [`${method} detects ${at_least ? "at least " : ""}${Number(expected.toPrecision(2))} of ${defects.length} known defects`] : [],
+    expected !== null && defects.length ? [`${method} detects ${at_least ? "at least " : ""}${Number(expected.toPrecision(2))} of ${defects.length} known defects on average`] : [],
   );
   return told.length ? `${told.join("; ")}.` : "What it detects is not measured yet.";
 }
