@@ -176,7 +176,7 @@ def _text(value: object) -> str:
 
 
 def _place(error: BaseException) -> str:
-    """Names the file and line that raised, as " (mine.py, line 12)"; empty where Python's own code did."""
+    """Names the file and line that raised, as " (mine.py, line 12)"; empty where the guard itself did."""
     *_, last = traceback.extract_tb(error.__traceback__) or [None]
     return f" ({Path(last.filename).name}, line {last.lineno})" if last and last.filename != __file__ else ""
 

@@ -257,13 +257,9 @@ def check(ego: EgoConfig) -> None:
 
 def refuse_class(source: str) -> NoReturn:
     """Raises a ConfigError: `module:Class` names no registered ego."""
-    got, serve = (
-        f"the class {source}, which is not registered",
-        f"python -m risk_sac.egos.serve {source} --register NAME",
-    )
-    remedy = (
-        f"run `{serve}` and put what it prints into the file of RISK_SAC_EGOS, or make it an entry point of {GROUP!r}"
-    )
+    got = f"the class {source}, which is not registered"
+    serve = f"run `python -m risk_sac.egos.serve {source} --register NAME`"
+    remedy = f"{serve} and put what it prints into the file of RISK_SAC_EGOS, or make it an entry point of {GROUP!r}"
     raise ConfigError("ego.driver", got, "the name of a registered ego", remedy)
 
 

@@ -83,7 +83,7 @@ class Violated(Record, ABC):
     @property
     @abstractmethod
     def judged(self) -> "Violation | Judgement":
-        """What has the grade, the fault, the plausibility and the drivers."""
+        """Holder of the grade, the fault, the plausibility and the drivers."""
 
     @property
     def graded(self) -> Grade | None:
@@ -112,7 +112,7 @@ class Violated(Record, ABC):
 
     @property
     def behaviour(self) -> Plausibility | None:
-        """How plausible its adversaries' behaviour is; None where it is not valid."""
+        """Plausibility of its adversaries' behaviour; None where it is not valid."""
         return self.judged.plausibility
 
     @property

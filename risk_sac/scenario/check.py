@@ -116,9 +116,8 @@ def _check_parameters(document: Scenario) -> None:
             raise ConfigError(f"{path}.value", repr(later[0]), f"parameters before it: {known_before}", remedy)
         before |= {*parameter.names, name}
         if parameter.unit not in UNITS:
-            squared = parameter.unit.replace("^", "").replace(
-                "2", "²"
-            )  # the closest name of m/s2 is m/s, of km/h it is km
+            # Not the closest name: that of m/s2 is m/s, that of km/h is km.
+            squared = parameter.unit.replace("^", "").replace("2", "²")
             si = "values are in SI units: divide km/h by 3.6 for m/s"
             remedy = f"did you mean {squared}?" if squared in UNITS else si
             raise ConfigError(f"{path}.unit", repr(parameter.unit), f"one of {', '.join(UNITS)}", remedy)
