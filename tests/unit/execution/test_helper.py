@@ -77,7 +77,7 @@ def test_a_helper_that_signals_end_again_and_again_is_given_up(run):
 
 
 def test_a_helper_is_nicer_and_has_the_memory_that_it_is_given(run):
-    result = run("import os; print(os.nice(0)); bytearray(1 << 30)", niceness=3, memory_bytes=1 << 29)
+    result = run("import os; print(os.nice(0), flush=True); bytearray(1 << 30)", niceness=3, memory_bytes=1 << 29)
     assert result.log.startswith(f"{os.nice(0) + 3}\n")
     assert result.log.endswith("MemoryError")
 
