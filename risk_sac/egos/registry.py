@@ -9,6 +9,7 @@ import ast
 import hashlib
 import os
 import re
+import threading
 import tomllib
 from collections.abc import Callable, Mapping
 from importlib.metadata import EntryPoint, entry_points
@@ -32,6 +33,7 @@ ADDRESSES = "host:port, host:first-last or unix:path, or several of them with co
 EXAMPLE = "write for example 127.0.0.1:7000-7015"
 _PORTS = re.compile(r"(?P<host>[\w.-]+|\[[0-9A-Fa-f:.%\w]+\]):(?P<first>\d{1,5})(?:-(?P<last>\d{1,5}))?", re.ASCII)
 _UNIX = re.compile(r"unix:[^,\s]+")
+_parsing = threading.Lock()  # CPython counts the depth of all threads' syntax trees together, and may find it wrong
 
 
 def addresses_of(text: str) -> tuple[str, ...]:
@@ -322,7 +324,9 @@ def _source(point: EntryPoint) -> Path:
 
 def _declared(source: bytes, name: str) -> dict[str, Any]:
     names = "version", "response_time_s", "deadline_s", "instances"
-    for node in ast.parse(source).body:
+    with _parsing:
+        tree = ast.parse(source)
+    for node in tree.body:
         if isinstance(node, ast.ClassDef) and node.name == name:
             return {"summary": (ast.get_docstring(node) or "").partition("\n")[0]} | {
                 target.id: each.value.value

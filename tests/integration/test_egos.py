@@ -1,7 +1,10 @@
 """Egos that drive themselves, in real episodes: in our process, in another one, and when they fail."""
 
+import gc
 import json
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -249,6 +252,27 @@ def test_an_ego_s_card_is_read_without_running_it(install):
     assert (card.kind, card.response_time_s, card.summary) == ("python", 0.4, "Runs nowhere.")
     assert card in cards()
     assert pinned(EgoConfig(driver="example")).response_s == 0.4
+
+
+class Yielding:
+    """Garbage in a circle; its collection hands the interpreter to another thread."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+    def __del__(self) -> None:
+        time.sleep(0)
+
+
+def test_cards_are_read_in_many_threads():
+    before = gc.get_threshold()
+    gc.set_threshold(50)  # so that collections fall into the reading of syntax trees
+    try:
+        with ThreadPoolExecutor(8) as pool:
+            read = list(pool.map(lambda _: (Yielding(), cards())[1], range(60)))
+    finally:
+        gc.set_threshold(*before)
+    assert read == [cards()] * 60
 
 
 def test_an_ego_without_a_version_is_refused(install):

@@ -18,7 +18,7 @@ EXECUTABLE = os.environ.get("RISK_SAC_CHROMIUM") or next(filter(None, map(shutil
 collect_ignore_glob = [] if EXECUTABLE else ["test_[!t]*.py", "test_t[!h]*.py"]
 
 if EXECUTABLE:
-    from playwright.sync_api import Browser, Page, expect, sync_playwright
+    from playwright.sync_api import Browser, ConsoleMessage, Page, expect, sync_playwright
 
 WIDE = {"width": 1280, "height": 720}
 PHONE = {"width": 390, "height": 844}
@@ -123,7 +123,7 @@ def new_page(browser: "Browser", service: Service) -> Iterator[Callable[..., "Pa
             if not any(each in text for each in allowed):
                 said.append(text)
 
-        page.on("console", lambda message: tell(message.text) if message.type == "error" else None)
+        page.on("console", lambda message: tell(_located(message)) if message.type == "error" else None)
         page.on("pageerror", lambda error: tell(str(error)))
         page.on("request", lambda request: tell(f"asked {request.url}") if _leaves(request.url) else None)
         return page
@@ -132,6 +132,10 @@ def new_page(browser: "Browser", service: Service) -> Iterator[Callable[..., "Pa
     for context in contexts:
         context.close()
     assert not said
+
+
+def _located(message: "ConsoleMessage") -> str:
+    return f"{message.text} at {message.location.get('url')}"
 
 
 def _leaves(url: str) -> bool:
