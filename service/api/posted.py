@@ -96,14 +96,14 @@ def _validated(content: bytes, model: type[Model]) -> Model:
         raise RequestValidationError(found, body=model) from error  # the model: it knows which fields there are
 
 
-def media_type(request: Request, wanted: Collection[str]) -> str:
-    """Returns the media type of a body; 415 for others and for compressed bodies."""
+def media_type(request: Request, wanted: Collection[str], hint: str = "") -> str:
+    """Returns the media type of a body; 415, which ends with `hint`, for others and for compressed bodies."""
     given = request.headers.get("content-type", "")
     declared = given.partition(";")[0].strip().lower()
     if declared not in wanted:
         example = f"curl -H 'content-type: {next(iter(wanted))}' --data-binary @FILE"
         remedy = f"wanted {' or '.join(wanted)}: send the file alone, as in `{example}`"
-        raise _unsupported(f"content-type is {given[:100]!r}; {remedy}")
+        raise _unsupported(f"content-type is {given[:100]!r}; {remedy}{hint}")
     encoding = request.headers.get("content-encoding", "identity")
     if encoding.strip().lower() != "identity":
         raise _unsupported(f"content-encoding is {encoding[:100]!r}; wanted none: send the body as it is")

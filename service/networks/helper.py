@@ -52,6 +52,7 @@ from service.networks.schemas import (
     PLACES,
     PROGRESS,
     ROADS,
+    ZIPPED,
     Elsewhere,
     FoundPlace,
     Places,
@@ -113,6 +114,8 @@ def _unpacked(upload: bytes, folder: Path) -> Scenario:
     Raises:
       ConfigError: the upload is neither a document nor an archive of one, or a net cannot be read.
     """
+    if upload.lstrip(b"\xef\xbb\xbf").startswith(b"<"):
+        raise ConfigError("", "an XML file", WANTED, ZIPPED)
     if not upload.startswith(b"PK"):
         return document_from(_text(upload))
     try:

@@ -21,6 +21,7 @@ MAX_PLACES = 100  # of a campaign
 STEPS, STEP_S = 3, 0.1  # that the simulator runs
 
 MEDIA_TYPES = ("application/xml", "text/xml", "application/gzip", "application/x-gzip", "application/zip")
+ZIPPED = "An OpenSCENARIO file goes into a zip archive, with the roads and catalogs that it names"
 PLACES, PICTURE, ROADS = "places.json", "places.png", "roads.json"  # what a search for places leaves beside the net
 PROGRESS = "progress"  # of the search, as long as it goes on
 

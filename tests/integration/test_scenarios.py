@@ -98,6 +98,14 @@ def test_openscenario_comes_in_an_archive(shared):
     assert answer.json()["actors"] == ["Cutting_in", "Walker", "Box"]
 
 
+@pytest.mark.parametrize(("declared", "status"), [("application/xml", 415), ("application/yaml", 422)])
+def test_openscenario_without_its_archive_is_told_to_be_zipped(shared, declared, status):
+    headers = {"content-type": declared}
+    answer = shared.client.post("/v1/scenarios", content=b"<?xml version='1.0'?><OpenSCENARIO/>", headers=headers)
+    assert answer.status_code == status
+    assert "goes into a zip archive" in answer.json()["detail"]
+
+
 def test_ego_of_openscenario_is_chosen_by_name(shared):
     answer = shared.client.post(
         "/v1/scenarios/check",

@@ -14,6 +14,7 @@ from service.api.context import CurrentCaller, Service
 from service.api.pages import INVALID, UNKNOWN, WRONG_TYPE, Responses, header, link, problem
 from service.api.posted import media_type
 from service.api.problems import ProblemError, Reason
+from service.networks.schemas import ZIPPED
 
 MEDIA_TYPES = ("application/json", "application/yaml", "application/zip")
 RECEIVE_S = 60
@@ -51,7 +52,7 @@ router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"], responses=INVALID
 
 
 def _refuse_other_types(request: Request) -> None:
-    media_type(request, MEDIA_TYPES)
+    media_type(request, MEDIA_TYPES, hint=f". {ZIPPED}")
 
 
 async def _received(request: Request) -> bytes:
