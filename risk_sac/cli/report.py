@@ -1,4 +1,4 @@
-"""`risk-sac report`, `coverage`, `grid` and `trend`: what finished runs say, alone and together."""
+"""`risk-sac report`, `coverage`, `grid` and `trend`, of finished runs."""
 
 import argparse
 import json

@@ -102,7 +102,7 @@ logger = logging.getLogger(__name__)
 def verify(
     folders: Sequence[Path], times: int = TIMES, jobs: int = 1, stopping: Callable[[], bool] = lambda: False
 ) -> Mapping[Path, Verified]:
-    """Replays the first failures of each variant of finished runs, and notes what came of it.
+    """Replays the first failures of each variant, and notes which repeat.
 
     Each is replayed in `times` processes.
 

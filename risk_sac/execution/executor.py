@@ -90,7 +90,7 @@ class ClusterState:
 
 
 class Executor(Protocol):
-    """Executes runs and reports what becomes of them; any thread may call it.
+    """Executes runs and reports their events; any thread may call it.
 
     A run is known by its number. It is submitted again only after its end was reported.
     """

@@ -192,7 +192,7 @@ class Scheduler:
             self._executor.cancel(number, grace_s)
 
     def abandon(self, grace_s: float) -> None:
-        """Stops the runs at work and hears nothing more of them; their store says what becomes of them."""
+        """Stops the runs at work and ignores their ends; their store decides their state."""
         for number, active in self.active.items():
             active.abandoned = True
             self._executor.cancel(number, grace_s)
@@ -203,7 +203,7 @@ class Scheduler:
             self._deaths.pop(number, None)
 
     def _end(self, active: Active, exited: Exited) -> None:
-        """Decides what becomes of a run; a worker's own account goes before its exit status."""
+        """Stores a run's end; the worker's last message goes before its exit status."""
         run, last = active.run, active.last
         if active.abandoned:
             return

@@ -217,7 +217,10 @@ def _body(recording: Recording, actor: int, time_s: float) -> Floats:
 
 
 def _draw_signals(axis: Axes, family: FamilyName, recording: Recording) -> None:
-    """Draws a bar across each lane that ends at a signal, as it is at the violation; a green one is open."""
+    """Draws signals as bars across their lanes, as at the violation.
+
+    A green one is open.
+    """
     time_s = float(recording["released_s"]) + recording.violation.time_s
     for head in signal_heads(family, recording.failure.episode.scene):
         for mark in head.marks(time_s):

@@ -291,7 +291,10 @@ def least_clearance_m(series: Series) -> float:
 
 
 def _surroundings(series: Series) -> tuple[Floats, Bools, Bools]:
-    """Returns gap, whether behind the ego's rear, and whether there in its track, of other actors, `t x (n - 1)`."""
+    """Returns gap, whether behind the ego, and whether in its track.
+
+    Each is of the other actors, `t x (n - 1)`. Behind is behind the ego's rear; one in its track is behind it, too.
+    """
     time_s = _times(series)
     bodies = np.zeros((len(time_s), ROWS, len(series["ids"])))
     for actor in range(bodies.shape[2]):

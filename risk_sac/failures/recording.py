@@ -74,7 +74,10 @@ class Recording:
 
     @property
     def conflict_s(self) -> float | None:
-        """Time when the conflict began; None in a twin, without a contact, or if it was before the recording."""
+        """Time when the conflict began; None where it is not recorded.
+
+        It is not in a twin, without a contact, or if it began before the recording.
+        """
         if self.twin or self.collision is None:
             return None
         began_s = self.collision.judgement.conflict_s - self.collision.time_s

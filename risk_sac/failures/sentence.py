@@ -64,7 +64,10 @@ def _broke(offences: tuple[str, ...]) -> str:
 
 
 def _who(series: Series, striker: int, at: int, more: str, *, leads: bool = False) -> str:
-    """Names striker and place in the ego's frame; one that `leads` is the leader wherever the ego swerves to."""
+    """Names striker and place in the ego's frame.
+
+    One that `leads` is the leader wherever the ego swerves to.
+    """
     x, y = (series[name][at, striker] - series[name][at, 0] for name in ("x_m", "y_m"))
     heading = series["heading_rad"][at, 0]
     turn = series["heading_rad"][at, striker] - heading
@@ -89,7 +92,10 @@ def _who(series: Series, striker: int, at: int, more: str, *, leads: bool = Fals
 
 
 def _does(series: Series, striker: int, begins: int) -> tuple[int, str] | None:
-    """Describes a striker's own action and the frame of its start; None if it goes on as it did."""
+    """Describes a striker's own action and when it starts; None without.
+
+    A striker that goes on as it did has none.
+    """
     accel, across = series["accel_mps2"][begins:, striker], series["lateral_mps"][begins:, striker]
     vehicle = series["kind"][striker] == Kind.VEHICLE
     acts = ACTS_MPS2 if vehicle else ACTS_MPS2 / 3

@@ -205,7 +205,10 @@ def recording_bytes(family: FamilyName, recording: Recording, format_: str, twin
 
 
 def draw_recording(family: FamilyName, recording: Recording, twin: Recording | None = None) -> Figure:
-    """Draws the view from above, and a panel per kind of measurement; a twin beside it, on the same scales."""
+    """Draws the view from above, and a panel per kind of measurement.
+
+    A twin stands beside it, on the same scales.
+    """
     columns = [recording] if twin is None else [recording, twin]
     low, high = _extent(recording)
     view_in = PANEL_WIDTH_IN * (high - low)[1] / (high - low)[0]

@@ -1,4 +1,7 @@
-"""Plays without an attack: with a registered ego, and at a place of a map. Tells whether they are fit for a search."""
+"""Plays an ego or a place without an attack, to check them.
+
+It tells whether a registered ego, or a place of a map, is fit for a search.
+"""
 
 import math
 from collections import Counter
@@ -41,7 +44,7 @@ METHOD: Literal["no-adversary"] = "no-adversary"
 
 
 class EgoTrial(Record):
-    """How an ego drove one scene in which nothing attacks."""
+    """An ego's drive through a scene in which nothing attacks."""
 
     scenario: str
     failed: str = ""
@@ -78,7 +81,9 @@ def unusable(trials: Sequence[EgoTrial]) -> list[str]:
 
 
 def try_ego(ego: EgoConfig, scenario: str) -> tuple[EgoTrial, bytes | None]:
-    """Plays the middle of a scenario's space, or the first safe scene at random; returns its picture as a PNG too.
+    """Plays the middle of a scenario's space, or a safe scene.
+
+    The safe one is the first at random. Returns the scene's picture as a PNG, too.
 
     Raises:
       ConfigError: the ego is SUMO's driver or cannot be loaded, or there is no such scenario or no safe scene.

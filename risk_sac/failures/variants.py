@@ -125,7 +125,10 @@ def _alike(violation: Collision | Violation, wanted: Collision | Violation) -> b
 
 
 def _up_to(failure: Collision | Violation, actions: Floats, horizon_steps: int) -> Floats:
-    """Cuts or pads actions to a failure's end: after a contact none for a while, else none up to the horizon."""
+    """Cuts or pads actions to a failure's end.
+
+    After a contact there are none for a while, else none up to the horizon.
+    """
     if isinstance(failure, Collision):
         steps = min(round(TAIL_S / STEP_S), horizon_steps - len(actions))
     else:

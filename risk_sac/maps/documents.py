@@ -126,7 +126,9 @@ class Document:
 
 
 def rewritten(upload: Path, folder: Path, name: str) -> list[Document]:
-    """Writes the documents of a file, plain or packed by gzip or zip, again into a folder under names of ours.
+    """Writes a file's documents again into a folder, under our names.
+
+    The file is plain, or packed by gzip or zip.
 
     Raises:
       MapError: with the line, if the file holds what no map needs.

@@ -62,7 +62,11 @@ def junction_spots(net: Net) -> Iterator[Spot]:
 
 
 def fit_junction(net: Net, spot: Spot) -> Fit:
-    """Writes the scenario of the junction at the end of a road; raises `NoFit` if nothing crosses, or without room."""
+    """Writes the scenario of the junction at a road's end.
+
+    Raises:
+      NoFit: nothing crosses there, or there is no room.
+    """
     edge = net.edges[spot.id]
     at = net.junctions[edge.end]
     own = approach(net, edge)
@@ -257,7 +261,10 @@ def stream(net: Net, road: Approach) -> Track | None:
 
 
 def _others(net: Net, own: Approach) -> Mapping[str, Approach]:
-    """Finds roads with a way that is a foe of the ego's; of several from one side the one most square to it."""
+    """Finds roads with a way that is a foe of the ego's.
+
+    Of several from one side it takes the one most square to it.
+    """
     best: dict[str, tuple[float, Approach]] = {}
     for edge in net.arriving[own.edge.end]:
         links = [link for lane in edge.drivable for link in net.onward.get(lane.id, ())]

@@ -136,7 +136,10 @@ def _room_wanted_m(limit_mps: float) -> float:
 
 
 def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[NetLane, Track, Track, Link]:
-    """Finds the leftmost lane for the ego that leads on for an episode, beside and clear of the occluder's."""
+    """Finds the ego's lane, beside and clear of the occluder's.
+
+    It is the leftmost one that leads on for an episode.
+    """
     whys = []
     for right, own in reversed(list(pairwise(edge.drivable))):
         try:
@@ -236,7 +239,10 @@ CANDIDATES: dict[Pattern, str] = {  # what their spots are
 def survey(
     net: Net, patterns: Collection[Pattern] = tuple(FINDERS), tell: Callable[[float], None] = lambda share: None
 ) -> Survey:
-    """All places where patterns fit, and why elsewhere they do not; `tell` gets the share that was looked at."""
+    """Finds all places where patterns fit, and why elsewhere not.
+
+    `tell` gets the share of the map that was searched.
+    """
     fits, misfits = [], []
     spots = list(_spots(net, patterns))
     for done, spot in enumerate(spots):
@@ -297,7 +303,11 @@ class Map:
         self.net: Net = read_net(file, self._root)
 
     def fits(self, pattern: Pattern, place: str | None) -> Sequence[Fit]:
-        """Makes one place, or all that a pattern fits; raises `MapError` if it does not fit there, or nowhere."""
+        """Makes one place, or all that a pattern fits.
+
+        Raises:
+          MapError: the pattern does not fit there, or fits nowhere.
+        """
         if place is not None:
             return [place_at(self.net, pattern, place)]
         places = survey(self.net, (pattern,))

@@ -1,4 +1,4 @@
-"""Results of a search for places on a map, and the documents and nets that finders write of them."""
+"""Places found on a map, and the scenarios made of them."""
 
 import math
 import re
@@ -139,7 +139,10 @@ def friction() -> Fields:
 
 
 def initial_speed(name: str, low: float, limit_mps: float, meaning: str) -> Fields:
-    """States a vehicle's initial speed, which begins at `low`, or at half the road's limit if that is lower."""
+    """States the range of a vehicle's initial speed.
+
+    It begins at `low`, or at half the road's limit if that is lower.
+    """
     odd = "dynamic.ego_speed_mps" if name.startswith("ego") else "dynamic.vehicle_speed_mps"
     high = top_speed(limit_mps)
     return {name: number((at_most(low, high / 2), at_most(high, high)), "m/s", meaning, odd)}

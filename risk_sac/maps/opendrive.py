@@ -249,7 +249,10 @@ def _of_type(kind: ET.Element, lost: Counter[str]) -> float | None:
 def _pieces(
     section: ET.Element, types: Limits, cuts: Set[float], length_m: float, lost: Counter[str]
 ) -> list[tuple[float, list[float | None]]]:
-    """Returns where a section is cut, m, and each lane's limit from there on; its own is ahead of the road's."""
+    """Returns a section's cuts, m, and each lane's limit after them.
+
+    A lane's own limit is ahead of the road's.
+    """
     lanes = section.findall("*/lane")
     own = [_sorted((float(s.attrib["sOffset"]), _mps(s, lost)) for s in lane.iterfind("speed")) for lane in lanes]
     begins = [0.0]

@@ -140,7 +140,10 @@ def _reach(net: Net, lane: NetLane, following: Sequence[str]) -> int:
 
 
 def check_lengths(net: Net, tracks: Iterable[Track]) -> None:
-    """Raises `NoFit` if a lane on tracks, which SUMO drives by its `length`, is longer or shorter than its shape."""
+    """Raises `NoFit` if a lane's `length` is not that of its shape.
+
+    SUMO drives by the `length`, the tracks follow the shape.
+    """
     for each in tracks:
         edges = [*(piece.edge for piece in each.pieces), *each.onward]
         for edge, following in zip(edges, [*edges[1:], ""], strict=True):

@@ -1,4 +1,6 @@
-"""Finds and reads the files of a scenario: XML elements that know their line, and whether they were used.
+"""Reads a scenario's files as XML elements that know their line.
+
+An element also knows whether it was used.
 
 Document types, and so entities, are refused; nothing outside the files is opened.
 """
@@ -170,13 +172,18 @@ class SourceFiles:
     """Files of one import."""
 
     def __init__(self, within: Path | None = None) -> None:
-        """Prepares to read within a folder that no file may lie outside of; None: any that the user may read."""
+        """Prepares to read files within a folder, and none outside.
+
+        With None it reads any that the user may read.
+        """
         self._within = within.resolve() if within is not None else None
         self._roots: dict[Path, XmlElement] = {}  # of files that were read
         self._count = 0
 
     def find(self, name: str, beside: Path, place: XmlElement) -> Path:
-        """Returns the path of a file or folder that an element names, with either kind of slash, beside its file.
+        """Returns the path of a file or folder that an element names.
+
+        It is relative to the element's file, and has either kind of slash.
 
         Raises:
           ConfigError: it is not there, or outside the upload.

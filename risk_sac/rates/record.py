@@ -1,4 +1,6 @@
-"""Failure rates of a run of the method `rate`, from its records alone; and where a run looks first.
+"""Failure rates of a run of the method `rate`, from its records.
+
+Also the points that such a run plays first.
 
 Source of the interval: the delta method on a ratio of weighted sums, on the logarithm of the rate.
 """

@@ -189,7 +189,7 @@ class Campaign(CampaignSummary):
 
 
 class CampaignCheck(Record):
-    """What a campaign would use and detect."""
+    """Adjustments of a campaign, and its detections."""
 
     adjustments: tuple[Adjustment, ...]
     """Changes from the requested settings."""

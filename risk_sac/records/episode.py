@@ -48,7 +48,7 @@ class EpisodeId:
 
 
 class StoryDeviation(Record):
-    """How far an actor was from the scenario's story at most."""
+    """Largest distance of an actor from the scenario's story."""
 
     speed_mps: Real
     lateral_mps: Real

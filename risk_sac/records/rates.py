@@ -1,4 +1,4 @@
-"""What scenes without an attack tell of an ego: failure rates, and its boundary over a few parameters."""
+"""Failure rates of an ego without an attack, and its boundary."""
 
 from collections.abc import Mapping
 
@@ -20,7 +20,10 @@ class HourlyRate(Record):
 
 
 class RateEstimate(Record):
-    """How often the ego violates a requirement in scenes of the declared distribution that can be played."""
+    """Rate of a requirement's violations under the declared distribution.
+
+    Scenes that cannot be played are left out.
+    """
 
     failures: int
     """Among the draws, of which the proposal has many more than the declared distribution."""
@@ -44,7 +47,7 @@ class RateEstimate(Record):
 
 
 class DeclaredParameter(Record):
-    """How a parameter is drawn."""
+    """Distribution of a parameter."""
 
     kind: str
     """Of its distribution; `uniform` also where none is declared."""
@@ -110,7 +113,7 @@ class BoxShare(Record):
 
 
 class DriverMap(Record):
-    """Where one driver fails."""
+    """One driver's map of failures."""
 
     name: str
     """`ego`, a reference driver, or another ego as it was named."""

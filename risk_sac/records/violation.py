@@ -142,7 +142,7 @@ class Violated(Record, ABC):
     @property
     @abstractmethod
     def severity(self) -> Severity | None:
-        """How severe the contact is; None without one, and where it is not valid."""
+        """Severity of the contact; None without one, or if invalid."""
 
     def weight(self, density: float = 1.0) -> float:
         """See `ranking_weight`; 0 where it is not valid.
@@ -308,7 +308,7 @@ class Collision(Violated):
 
     @property
     def view_in_words(self) -> str:
-        """How long the striker had been in view: "which had been in its view for 1.0 s"; it follows the name.
+        """Time of the striker in view, as a clause: "which had been in its view for 1.0 s".
 
         What a defect keeps from the ego counts too.
         """
@@ -323,7 +323,10 @@ class Collision(Violated):
 
     @property
     def conflict_in_words(self) -> str:
-        """When the conflict began; one that began hidden counts from when the ego could know of it."""
+        """Start of the conflict before the contact, as a clause.
+
+        One that began hidden counts from when the ego could know of it.
+        """
         before_s = self.time_s - self.judgement.conflict_s
         if not self.judgement.hidden:
             return f"the conflict began {before_s:.1f} s before the contact"

@@ -1,4 +1,6 @@
-"""The report of a campaign: gathers funnel, bounds, coverage and digests of inputs, and writes them as a document.
+"""Gathers a campaign's evidence, and writes it as a report.
+
+That is funnel, bounds, coverage and digests of inputs.
 
 Coverage of the search and of the i.i.d. phase are kept apart, but for the matrix, which says what was played at all.
 """

@@ -34,7 +34,10 @@ class Curve:
     timed: bool = False  # over processor time
 
     def over(self, runs: Sequence[FinishedRun]) -> tuple[Floats, Floats]:
-        """Computes places to draw at, `n`, and the runs' values, `runs x n`, as far as the shortest run goes."""
+        """Computes places to draw at, `n`, and values, `runs x n`.
+
+        They go as far as the shortest run.
+        """
         if not self.timed:
             each = [self.values(run) for run in runs]
             shortest = min(map(len, each))  # in processor time, runs play as many episodes as they can

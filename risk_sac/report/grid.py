@@ -208,7 +208,10 @@ SAID = {
 
 
 def grid_junit(grids: Sequence[PlayedGrid]) -> bytes:
-    """Writes a suite for each run and a case for each scene, grouped by the first parameter that varies."""
+    """Writes a suite for each run and a case for each scene.
+
+    Cases are grouped by the first parameter that varies.
+    """
     report = JUnitXml("risk-sac grid")
     for grid in grids:
         suite = TestSuite(printable(f"{grid.spec.family}.{grid.ego}"))

@@ -156,7 +156,10 @@ LIMITS = (Limit("10 CPU s", cpu_s, 10.0), TESTED, Limit("300 episodes", episodes
 
 
 def found_within(run: FinishedRun, limit: Limit) -> Found | None:
-    """Counts what the search found in episodes that ended within the limit; None if it ended before the limit."""
+    """Counts the findings of episodes that ended within the limit.
+
+    None if the search ended before the limit.
+    """
     spent = limit.spent(run)
     if not spent or spent[-1] < limit.most:
         return None
@@ -165,7 +168,10 @@ def found_within(run: FinishedRun, limit: Limit) -> Found | None:
 
 
 class PlayedAs(StrEnum):
-    """What a run changes of a scenario; each begins where the one before ends."""
+    """Parts of a scenario that a run changes.
+
+    Each begins where the one before ends.
+    """
 
     AS_WRITTEN = "the grid as written"
     SEARCHED = "its parameters searched"
@@ -173,7 +179,7 @@ class PlayedAs(StrEnum):
 
 
 class FailureOrigin(Record):
-    """Failures of one scenario that begin with one way to play it. Those count that may be headline failures."""
+    """A scenario's headline candidates that begin with one way to play it."""
 
     family: FamilyName
     played: PlayedAs

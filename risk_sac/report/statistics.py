@@ -301,7 +301,10 @@ def _shared_steps(family: str, methods: Sequence[MethodPower], runs: Sequence[Be
 
 
 def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequence[BenchmarkRun]) -> MethodPower:
-    """Returns how many known defects a method detects in its budgets by family: steps of a run, and runs."""
+    """Returns how many known defects a method's budgets detect.
+
+    Budgets are by family: steps of a run, and runs.
+    """
     defects, at_least = [], False
     of_method = [run for run in runs if run.method == method and run.family in budgets]
     for defect, family in dict.fromkeys((run.defect, run.family) for run in of_method):
@@ -335,7 +338,10 @@ def method_power(method: str, budgets: Mapping[str, tuple[int, int]], runs: Sequ
 
 
 def _chance(defect: DefectPower, seeds: int) -> float:
-    """Returns the share of all choices of so many measured runs in which at least one detects the defect."""
+    """Returns the share of choices of runs in which one detects.
+
+    Each choice has so many of the measured runs.
+    """
     chosen = min(seeds, defect.runs)
     return 1 - comb(defect.runs - defect.detected, chosen) / comb(defect.runs, chosen)
 

@@ -47,7 +47,10 @@ class EndedCampaign:
 
 
 class TrendRate(Record):
-    """How often the ego fails in freshly drawn scenes, in one scenario and kind of traffic."""
+    """Rate of an ego's failures in freshly drawn scenes.
+
+    It is of one scenario and one kind of traffic.
+    """
 
     family: str
     method: str

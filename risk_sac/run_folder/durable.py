@@ -233,7 +233,10 @@ def seal(document: Any) -> bytes:
 
 
 def sealed_pieces(document: Any, rows: Iterable[Any]) -> Iterator[bytes]:
-    """Yields what `seal` returns of a document with these rows in its last field, which is empty, one row at a time."""
+    """Yields a sealed document with these rows, one at a time.
+
+    The document's last field, which is empty, gets the rows; all together is what `seal` returns.
+    """
     kind: Any = type(document)
     piece = _adapter(kind).dump_json(document, indent=2).removesuffix(b"[]" + _END)
     digest, before = hashlib.sha256(piece), b"["

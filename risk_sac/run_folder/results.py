@@ -87,7 +87,10 @@ class RunResults:
 
 
 def write_results(folder: Path, results: RunResults, failures: Iterable[RecordedFailure] | None = None) -> None:
-    """Replaces results.json in one step; `failures` stand in for those of the results, one in memory at a time."""
+    """Replaces results.json in one step.
+
+    `failures` stand in for those of the results, with one in memory at a time.
+    """
     rows = results.failures if failures is None else failures
     replace_file(folder / RESULTS, sealed_pieces(replace(results, failures=()), rows))
 

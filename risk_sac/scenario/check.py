@@ -68,7 +68,10 @@ def scenes(of: Interpreter, count: int = SCENES) -> Iterator[Scene]:
 
 
 def bodies_of(layout: Layout, net: Net, after_s: float = 0.0) -> dict[str, Floats]:
-    """Corners of each actor, `4 x 2`, m, so long after the start if all go on straight at their initial speeds."""
+    """Corners of each actor, `4 x 2`, m, after so long.
+
+    All go on straight at their initial speeds.
+    """
     boxes = {start.id: _in_lane(start, net) for start in (layout.ego, *layout.vehicles)}
     boxes |= {start.id: _box(start.x_m, start.y_m, start.heading_rad, start.shape) for start in layout.pedestrians}
     speeds_mps = {start.id: start.speed_mps for start in (layout.ego, *layout.vehicles)}

@@ -116,7 +116,9 @@ SAMPLED = 64  # scenes whose layouts say which roads a scenario has
 
 
 def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Family:
-    """Returns the family of a document, whose nets lie below `sumo_nets/` or anywhere, by its own name or another.
+    """Returns the family of a document, by its own name or another.
+
+    Its nets lie below `sumo_nets/` or anywhere.
 
     Raises:
       ConfigError: the document does not fit its nets.

@@ -1,4 +1,4 @@
-"""The ground of a net as convex polygons, the kerbs of its crossings, and the room that vehicles leave each other.
+"""Ground of a net: convex polygons, kerbs, and room between vehicles.
 
 A vehicle lies along the chord from its front to where its rear passes. Round a bend the chord is shorter than the
 way, so its tail swings out; and between the two the chord cuts the corner.
@@ -105,7 +105,10 @@ def waits_in_the_way(net: Net, link: Link) -> NetLane | None:
 
 
 def _off_m(waiting: NetLane, other: NetLane) -> float:
-    """Computes a lane's distance from a car that waits at another's end; 0 if it comes within the car."""
+    """Computes a lane's distance from a car at another lane's end.
+
+    It is 0 if the lane comes within the waiting car.
+    """
     (x, y), heading = waiting.line[-1], waiting.way_out_rad
     cos, sin = math.cos(heading), math.sin(heading)
     dx, dy = _sampled(np.array(other.line)) - np.array([[x], [y]])

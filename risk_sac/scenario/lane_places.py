@@ -274,7 +274,9 @@ def _links_to(net: Net, lane: NetLane, edge: str) -> list[Link]:
 
 
 def routed(net: Net, lane: NetLane, reference_m: float, route: Sequence[str], field: str) -> Track:
-    """The track of a route of edges or lanes, with the lane of the reference, m from its beginning, on it.
+    """Track of a route of edges or lanes, through the reference.
+
+    The reference is a lane and m from its beginning.
 
     Raises:
       ConfigError: an edge is not there, two do not meet, or the lane is not on it.
@@ -300,7 +302,9 @@ def routed(net: Net, lane: NetLane, reference_m: float, route: Sequence[str], fi
 
 
 def straight_on(net: Net, lane: NetLane, reference_m: float, metres: float, turn: str | None, field: str) -> Track:
-    """The track that goes straight on from a lane, after a turn at its end if one is given.
+    """Track straight on from a lane, after a turn if one is given.
+
+    The turn is at the lane's end.
 
     The reference lies `reference_m` from the lane's beginning; the way may end after so many metres.
 
@@ -362,7 +366,10 @@ def _track(
 
 
 def pieces_of(lanes: Sequence[NetLane], links: Sequence[Link], own: int, reference_m: float) -> tuple[Piece, ...]:
-    """Returns the pieces of lanes and the links between them; the reference is on lane `own`, m from its beginning."""
+    """Returns the pieces of lanes and the links between them.
+
+    The reference is on lane `own`, m from its beginning.
+    """
     reach_m = [0.0] * len(lanes)
     reach_m[own] = reference_m
     for i in reversed(range(own)):

@@ -82,7 +82,9 @@ def shifted_groups(story: Story) -> Iterator[tuple[str, ...]]:
 
 
 def settled(part: Any, of: Callable[[Any, str], float], choose: Callable[[Any], Any], path: str = "") -> Any:
-    """Replaces expressions by their values, and choices by what is chosen, in settings, or mappings or tuples of some.
+    """Replaces expressions and choices by their values.
+
+    It does so in settings, and in mappings and tuples of settings.
 
     `path` is the part's in its document.
     """

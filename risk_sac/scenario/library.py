@@ -205,7 +205,10 @@ def _digest(files: Mapping[str, bytes]) -> str:
 
 
 def _canonical(net: bytes) -> bytes:
-    """A net without comments, such as netconvert's date, white space and schema; what is no XML stays as it is."""
+    """A net without comments, white space and schema.
+
+    netconvert writes the date into a comment. A file that is no XML stays as it is.
+    """
     try:
         return ET.canonicalize(from_file=io.BytesIO(net), strip_text=True, exclude_attrs=[_SCHEMA]).encode()
     except (ET.ParseError, LookupError, ValueError):  # the latter two: an encoding that Python lacks

@@ -53,7 +53,9 @@ class StoryPlaces:
     # Positions
 
     def pose(self, position: Position, of: Of) -> Pose:
-        """Returns the pose of a position of the road file in the net's coordinates; `of` has actors' present poses.
+        """Returns the pose of a road file's position in the net.
+
+        `of` has actors' present poses.
 
         Raises:
           ConfigError: there is no such place; `field` is that of the position.
@@ -184,7 +186,10 @@ class StoryPlaces:
     # Places of poses
 
     def spot(self, pose: Pose, on: OnRoad | None = None) -> lane_places.LanePlace | None:
-        """Returns the place on the nearest lane within 30 m, or None; the lanes of the net at `on` are preferred."""
+        """Returns the place on the nearest lane within 30 m, or None.
+
+        The lanes of the net at `on` are preferred.
+        """
         among = (f"{on.road}_{on.lane}",) if on is not None else ()
         return lane_places.nearest_lane(self._net, pose.x_m, pose.y_m, pose.heading_rad, among)
 
@@ -223,7 +228,9 @@ class StoryPlaces:
     # Lines
 
     def trajectory(self, name: str, of: Of, start: Pose | None = None) -> TravelLine:
-        """Returns the line of one of the story's trajectories; `start` is for one that does not say where it begins.
+        """Returns the line of one of the story's trajectories.
+
+        `start` is for one that does not say where it begins.
 
         Raises:
           ConfigError: there is none of this name, it names itself, or its times go back.

@@ -198,7 +198,9 @@ def alternatives(document: Scenario, name: str | Chosen[str]) -> tuple[str, ...]
 
 
 def nets_of(document: Scenario, folder: Path | None = None) -> Mapping[str, str]:
-    """Finds the file of each network that a document names, its own beside a folder, if there is one.
+    """Finds the file of each network that a document names.
+
+    Its own lie beside a folder, if there is one.
 
     Raises:
       ConfigError: a net or a road file is not there.

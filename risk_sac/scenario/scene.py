@@ -349,7 +349,10 @@ class SceneLayout:
         return x_m, y_m, *_unit(along_rad + turned)
 
     def _stream(self, name: str, stream: Stream) -> Iterator[VehicleStart]:
-        """Its vehicles; one too close to another on its lane starts behind that, or is left out without room."""
+        """Its vehicles, which start clear of each other.
+
+        One too close to another on its lane starts behind that, or is left out without room.
+        """
         value, path = self._value, f"streams.{name}"
         body = body_named(value.word(stream.body), f"{path}.body")
         gap_m, speed_mps = value.of(stream.gap_m, f"{path}.gap_m"), value.of(stream.speed, f"{path}.speed")

@@ -1,4 +1,7 @@
-"""The scene space of a family: the named, bounded parameters ξ of its episodes, and the grid of their steps."""
+"""Scene space of a family: its named, bounded parameters ξ.
+
+Also the grid of their steps.
+"""
 
 import math
 from collections.abc import Callable, Mapping
@@ -244,7 +247,9 @@ class Grid:
 
 
 def grid_of(space: SceneSpace, parameters: Mapping[str, ScenarioParameter]) -> Grid:
-    """Makes the grid of a scene space that an ODD narrowed; what the document lacks has a range without step.
+    """Makes the grid of a scene space that an ODD narrowed.
+
+    A parameter that the document lacks has a range without step.
 
     Raises:
       ConfigError: the ODD leaves none of a parameter's values.

@@ -55,7 +55,10 @@ class TravelLine:
         return Pose(float(x), float(y), float(heading))
 
     def project(self, x_m: float, y_m: float) -> tuple[float, float]:
-        """Returns a point's station and how far left of the line it is; both ends of the line go straight on."""
+        """Returns a point's station and distance left of the line.
+
+        Both ends of the line go straight on.
+        """
         begins, steps = self.points[:-1], np.diff(self.points, axis=0)
         lengths = np.diff(self.station_m)
         safe = np.maximum(lengths, SAME_M)
@@ -114,7 +117,10 @@ def _side(left: float, beyond: float) -> float:
 
 
 def line_of(points: Floats, heading: Floats | None = None, times_s: Floats | None = None) -> TravelLine:
-    """Returns the line through points, `n x 2`, of which two differ; without headings, in the direction of travel."""
+    """Returns the line through points, `n x 2`, of which two differ.
+
+    Without headings it has those of travel.
+    """
     keep = np.concatenate(([True], np.hypot(*np.diff(points, axis=0).T) > SAME_M))
     if heading is None:
         points, times_s = points[keep], None if times_s is None else times_s[keep]

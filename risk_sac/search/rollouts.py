@@ -44,7 +44,7 @@ ELSEWHERE = "RISK_SAC_ROLLOUTS_ELSEWHERE"
 
 
 class Terms(NamedTuple):
-    """What a process is told first."""
+    """First message to a process."""
 
     spec: str  # JSON
     niceness: int

@@ -136,7 +136,9 @@ def is_over(genes: Genes, since_cue_s: float) -> bool:
 
 
 def alongside(genes: Genes, seen: Seen, since_cue_s: float) -> Act:
-    """A vehicle that drives the ego's way: keeps a place beside or ahead of it, then comes over, brakes or both.
+    """Drives a vehicle that goes the ego's way.
+
+    It keeps a place beside or ahead of the ego, then comes over, brakes or both.
 
     `place` is where along the ego it waits and `aside` how far from the ego's axis; a leader keeps its lane. `drive`
     and `steer`, towards the ego, are those of the strike, `after` is the drive that follows.
@@ -177,7 +179,9 @@ def _taking_place(genes: Genes, seen: Seen) -> Act:
 
 
 def crossing(genes: Genes, seen: Seen, since_cue_s: float, pedestrian: bool) -> Act:
-    """A vehicle from across or opposite, or a pedestrian: keeps its time to where the ways cross, then goes for it.
+    """Drives a crossing or opposing vehicle, or a pedestrian.
+
+    It keeps its time to where the ways cross, then goes for it.
 
     `place` is how much earlier than the ego it means to be there, 2 s at most, or how it moves where the ways do not
     cross; `aside` is how hard it works at that, against what a driver would do at a red light. So it waits for the ego,
@@ -218,7 +222,10 @@ def _driving_on_time(genes: Genes, seen: Seen) -> float:
 
 
 def _to_crossing(seen: Seen) -> tuple[float, float]:
-    """Computes how far an adversary has to go to the ego's axis, and in what time the ego is there."""
+    """Computes an adversary's way to the ego's axis, and the ego's time.
+
+    The time is the ego's until it is there.
+    """
     own_m = -seen.y_m / seen.sin
     ego_m = seen.x_m + own_m * seen.cos
     return own_m, ego_m / max(seen.ego_mps, 1.0)

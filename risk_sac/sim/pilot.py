@@ -1,4 +1,6 @@
-"""Drives vehicles in place of SUMO's models, and has SUMO put them there: the ego of a pilot, and oncoming adversaries.
+"""Drives vehicles in place of SUMO's models.
+
+They are the ego of a pilot, and oncoming adversaries; SUMO puts them where they are.
 
 SUMO maps such a vehicle onto the nearest lane along its route, so that its drivers follow it and yield to it. Where the
 whole body is beside these lanes, on an oncoming lane or off the road, SUMO keeps it where it is, on no lane.

@@ -215,7 +215,7 @@ class Roads:
         return LateralRoom(own.left_m + self._oncoming_m(self._routes[vehicle], lane), own.right_m), along
 
     def _on_lane(self, vehicle: str) -> tuple[str, Way, LateralRoom, float]:
-        """The lane of a vehicle that SUMO drives, its way and room, and how far along it the vehicle is.
+        """Lane, way, room and position of a vehicle that SUMO drives.
 
         SUMO counts in lengths of the lane, which are those of its edge; on a bend the outer lanes are drawn longer.
         """

@@ -81,7 +81,10 @@ def _vehicle(e: Evidence, actor: int, frames: NDArray[np.intp]) -> Iterator[Obse
 
 
 def _around(e: Evidence, actor: int, frames: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
-    """Computes metres ahead of one actor and to its left, and the cosine of the headings; each `F x n`."""
+    """Computes m ahead of and left of an actor, and headings' cosine.
+
+    Each is `F x n`.
+    """
     heading = e.heading_rad[frames, actor][:, None]
     dx, dy = e.x_m[frames] - e.x_m[frames, actor][:, None], e.y_m[frames] - e.y_m[frames, actor][:, None]
     cos, sin = np.cos(heading), np.sin(heading)
@@ -188,7 +191,10 @@ def _junctions(
 
 
 def _arrives_after(e: Evidence, actor: int, frame: int) -> float | None:
-    """Finds when a vehicle with priority reaches the actor's way since `frame`, s from then; None if none does."""
+    """Finds when a vehicle with priority reaches the actor's way.
+
+    In s since `frame`; None if none does.
+    """
     x, y = e.x_m[frame:, actor], e.y_m[frame:, actor]
     soonest = None
     for other in np.flatnonzero(e.kind == Kind.VEHICLE).tolist():
@@ -239,7 +245,10 @@ def _walker(e: Evidence, actor: int, frames: NDArray[np.intp], seen: BodyOnPath[
 def _steps_out(
     e: Evidence, actor: int, frames: NDArray[np.intp], on_road: Bools, on_crossing: Bools, seen: BodyOnPath[Floats]
 ) -> Iterator[Observed]:
-    """Measures how a pedestrian steps onto the road on red, or before a gap where it has no priority."""
+    """Measures a pedestrian's step onto the road without priority.
+
+    That is on red, or into a gap.
+    """
     for t in (np.flatnonzero(on_road[1:] & ~on_road[:-1]) + 1).tolist():
         frame, link = int(frames[t]), int(e.link[frames[t], actor])
         time_s = float(e.time_s[frame])
@@ -255,7 +264,10 @@ def _steps_out(
 
 
 def pedal_changes(held: Floats, time_s: Floats) -> tuple[float, float]:
-    """Counts changes between gas and brake in the 5 s with most; returns the time of the last as well."""
+    """Counts changes between gas and brake in the 5 s with most.
+
+    Returns the time of the last as well.
+    """
     touched = np.flatnonzero(np.abs(held) > TOUCHED_MPS2)
     changed = touched[1:][np.diff(np.sign(held[touched])) != 0]
     if not len(changed):

@@ -92,7 +92,11 @@ class Evidence:
         return replace(self, **{name: getattr(self, name)[: frame + 1] for name in over_time})
 
     def column(self, id_: str) -> int:
-        """Column of an actor that is there in the last frame; raises `ValueError` if it is not, or is the ego."""
+        """Column of an actor that is there in the last frame.
+
+        Raises:
+          ValueError: it is not there, or is the ego.
+        """
         if id_ not in self.ids[1:]:
             raise ValueError(f"striker {id_!r} is not among the recorded {self.ids[1:]}")
         column = self.ids.index(id_)
@@ -223,7 +227,10 @@ def front_moved_across(evidence: Evidence) -> Floats:
 
 
 def keeps_lane(evidence: Evidence, first: int) -> bool:
-    """Whether the ego kept its lane from frame `first` on. Choice: its front moved across by 0.375 m at most."""
+    """Whether the ego kept its lane from frame `first` on.
+
+    Choice: its front moved across by 0.375 m at most.
+    """
     moved = front_moved_across(evidence)[first:]
     return bool(np.abs(moved - moved[0]).max() <= WANDER_M)
 

@@ -164,7 +164,10 @@ def ego_part(evidence: Evidence, striker: int, conflict: Conflict, yields: str |
 
 
 def in_view_from(evidence: Evidence, striker: int) -> int | None:
-    """Finds the frame since which the striker was in view, but for breaks of 0.5 s; None if it ends unseen."""
+    """Finds the frame since which the striker was in view.
+
+    Breaks of up to 0.5 s do not count. None if it ends unseen.
+    """
     frames = np.flatnonzero(evidence.known[:, striker])
     flicker = round(FLICKER_S / evidence.step_s)
     if len(frames) == 0 or len(evidence.time_s) - 1 - frames[-1] > flicker:

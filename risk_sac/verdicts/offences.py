@@ -364,7 +364,10 @@ def turns_into_path(evidence: Evidence, striker: int) -> bool:
 
 
 def intrusion(evidence: Evidence, actor: int, owner: int, seen: BodyOnPath[Floats]) -> int:
-    """Finds when an actor last came 0.3 m into the path owner's lane; the frame of the contact if it did not."""
+    """Finds when an actor last came 0.3 m into the owner's lane.
+
+    The owner is that of the path. It is the frame of the contact if the actor did not.
+    """
     e = evidence
     reach = (np.abs(np.sin(seen.turn_rad)) * e.length_m[actor] + np.abs(np.cos(seen.turn_rad)) * e.width_m[actor]) / 2
     intrudes = np.abs(seen.across_m) - reach <= lanes_of(e, owner).width_m / 2 - INTRUSION_M
@@ -373,7 +376,10 @@ def intrusion(evidence: Evidence, actor: int, owner: int, seen: BodyOnPath[Float
 
 
 def _any_ahead(evidence: Evidence, vehicle: int, frames: NDArray[np.int64]) -> Bools:
-    """Tells whether a road user is, or soon will be, within 30 m ahead and in the vehicle's way."""
+    """Tells whether a road user is, or soon will be, in the way.
+
+    That is within 30 m ahead of the vehicle.
+    """
     e = evidence
     others = np.delete(np.arange(len(e.ids)), vehicle)
     dx, dy = (each[np.ix_(frames, others)] - each[frames, vehicle, None] for each in (e.x_m, e.y_m))

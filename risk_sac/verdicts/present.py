@@ -121,7 +121,10 @@ def concealing(codes: Iterable[int]) -> Bools:
 
 @compiled
 def walls_of(state: Floats, hides: Bools) -> Floats:
-    """Lists the bodies that hide what is behind them, `w x 6`: centre, cos and sin of the heading, half sizes."""
+    """Lists the bodies that hide others behind them, `w x 6`.
+
+    Columns are centre, cos and sin of the heading, and half sizes.
+    """
     found, count = np.empty((len(hides), 6)), 0
     for i in range(len(hides)):
         if hides[i] and not math.isnan(state[X, i]):  # it has left
@@ -146,7 +149,10 @@ def is_in_view(walls: Floats, eye_x: float, eye_y: float, body: MovingBox[float]
 
 @compiled
 def is_hidden(walls: Floats, eye_x: float, eye_y: float, x: float, y: float) -> bool:
-    """Tells whether a body lies between the eye and a place; one that stands on the place hides nothing."""
+    """Tells whether a body lies between the eye and a place.
+
+    One that stands on the place hides nothing.
+    """
     for k in range(len(walls)):
         cos, sin, half_length, half_width = walls[k, 2], walls[k, 3], walls[k, 4], walls[k, 5]
         ex, ey = eye_x - walls[k, 0], eye_y - walls[k, 1]

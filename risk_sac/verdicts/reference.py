@@ -156,7 +156,10 @@ def _track(evidence: Evidence, other: int) -> MovingBox[Floats]:
 
 
 def _outcome(evidence: Evidence, other: int, ending: RolloutEnd | None, *, kept: bool) -> ReferenceOutcome:
-    """Converts an ending into an outcome; None takes the ego's own. `kept`: on a path that the ego did not take."""
+    """Converts an ending into an outcome; None takes the ego's own.
+
+    `kept`: on a path that the ego did not take.
+    """
     if ending is None:
         return AVOIDED if kept else ReferenceOutcome(avoids=False, impact_speed_mps=float(evidence.speed_mps[-1, 0]))
     size, other_size = recorded_size(evidence, 0), recorded_size(evidence, other)

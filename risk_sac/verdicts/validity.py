@@ -37,7 +37,10 @@ def overlaps_before_contact(evidence: Evidence) -> list[Overlap]:
 
 @compiled
 def _overlaps(x: Floats, y: Floats, heading: Floats, length: Floats, width: Floats) -> list[tuple[int, int, int]]:
-    """Finds frame and columns of each overlap; `x`, `y` and `heading` are `T x n`, NaN where an actor has left."""
+    """Finds frame and columns of each overlap.
+
+    `x`, `y` and `heading` are `T x n`, NaN where an actor has left.
+    """
     steps, n = x.shape
     found = [(0, 0, 0) for _ in range(0)]  # an empty list with a type that the compiler infers
     state = np.zeros((WIDTH + 1, n))

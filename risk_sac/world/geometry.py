@@ -119,7 +119,10 @@ def _outside(x: float, y: float, half_length: float, half_width: float) -> float
 
 @compiled
 def along_axes(vx: float, vy: float, cos: float, sin: float) -> tuple[float, float, float, float]:
-    """A velocity along each of the separating axes; compiled code copies a whole view slowly, so it takes numbers."""
+    """Velocity along each of the separating axes.
+
+    Compiled code copies a whole view slowly, so it takes numbers.
+    """
     return vx, vy, vx * cos + vy * sin, vy * cos - vx * sin
 
 

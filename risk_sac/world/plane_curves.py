@@ -43,7 +43,10 @@ class Clothoid:
     length_m: float
 
     def at(self, s_m: Floats) -> Floats:
-        """Returns x, y, heading and curvature at arc lengths, `n` → `n x 4`; beyond its ends the shape goes on."""
+        """Returns x, y, heading and curvature at arc lengths, `n x 4`.
+
+        Beyond its ends the shape goes on.
+        """
         x_m, y_m, heading_rad = self.begin
         k0, rate = self.curvature_start, (self.curvature_end - self.curvature_start) / max(self.length_m, 1e-9)
         heading = heading_rad + k0 * s_m + rate * s_m**2 / 2
@@ -114,7 +117,10 @@ class CubicCurve:
         return p, np.concatenate(([0.0], np.cumsum(pieces)))
 
     def at(self, s_m: Floats) -> Floats:
-        """Returns x, y, heading and curvature at arc lengths, `n` → `n x 4`; beyond its ends the tangent goes on."""
+        """Returns x, y, heading and curvature at arc lengths, `n x 4`.
+
+        Beyond its ends the tangent goes on.
+        """
         parameters, lengths = self._table
         scaled = s_m * (lengths[-1] / max(self.length_m, 1e-9))
         p = np.interp(scaled, lengths, parameters)

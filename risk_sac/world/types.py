@@ -105,7 +105,10 @@ class Row:
 
 
 class FrameFields(NamedTuple):
-    """What a frame is made of. One is made in every step, and a frozen dataclass takes three times as long to make."""
+    """Fields of a frame.
+
+    One is made in every step, and a frozen dataclass takes three times as long to make.
+    """
 
     time_s: float
     ids: tuple[str, ...]

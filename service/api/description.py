@@ -27,21 +27,6 @@ from service.api.routes.episodes import PostedTriage
 from service.api.routes.reports import PostedRegression
 
 SERVER = "localhost:8000"
-TITLES = {
-    "put_triage": "Set triage",
-    "get_log": "Get run log",
-    "get_grid": "Get verdicts on scenes",
-    "get_scenes": "Get scene effects",
-    "get_bundle": "Get replay bundle",
-    "get_core": "Get minimal failure",
-    "get_most_plausible": "Get most plausible failure",
-    "get_region": "Get failing region",
-    "get_twin": "Get twin picture",
-    "get_twin_play": "Get twin recording",
-    "get_export": "Export failure",
-    "get_episodes_export": "Export episodes",
-}
-"""Of operations whose name would say too little; see `title`."""
 PARAMETERS: Mapping[str, str] = {
     "campaign_id": "c197f3a52d8e06b4c",
     "failure_id": "low-archive-0-search-17",
@@ -110,7 +95,7 @@ def describe_calls(paths: dict[str, dict[str, Any]]) -> None:
     for path, operations in paths.items():
         for method, operation in operations.items():
             name = operation["operationId"]
-            operation["summary"] = title(name)
+            operation["summary"] = title(operation["description"])
             for parameter in operation.get("parameters", []):
                 if parameter.get("required"):
                     parameter["example"] = example_of(name, parameter["name"])
@@ -121,9 +106,9 @@ def describe_calls(paths: dict[str, dict[str, Any]]) -> None:
             operation["description"] += f"\n\nExample: `{command(method, path, name)}`"
 
 
-def title(name: str) -> str:
-    """`list_campaigns` -> `List campaigns`."""
-    return TITLES.get(name, name.replace("_", " ").capitalize())
+def title(description: str) -> str:
+    """First clause of a description: what the call does or returns."""
+    return re.split(r"[.;:](?:\s|$)", description, maxsplit=1)[0]
 
 
 def example_of(operation: str, parameter: str) -> str:

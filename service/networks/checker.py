@@ -116,7 +116,7 @@ def _moved(file: Path, name: str, kind: DocumentKind, elements: int) -> NetworkF
 
 
 def main() -> None:
-    """Check the upload and say what came of it."""
+    """Check the upload and write the report."""
     gc.disable()  # no cycles arise, and looking for them takes a sixth of the time
     bind()
     try:

@@ -1,4 +1,4 @@
-"""Checks, keeps and draws scenarios, and finds and keeps places of a network, in a process of its own.
+"""Checks, keeps and draws scenarios and places, in its own process.
 
 It is started as `service.networks.helper QUESTION ANSWER ACTION`, with limits on time and memory, by
 `service.networks.scenarios`:

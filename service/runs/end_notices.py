@@ -1,4 +1,7 @@
-"""Posts a message to `on_end` of each campaign that has ended, at least once, in a thread of its own."""
+"""Posts a message to `on_end` of each ended campaign.
+
+At least once, in a thread of its own.
+"""
 
 import logging
 import threading

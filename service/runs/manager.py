@@ -310,7 +310,10 @@ class Manager:
 
 
 def next_project(oldest: Mapping[str, int], taken: Mapping[str, int]) -> str | None:
-    """Returns the project whose oldest run starts next: that with the fewest slots, then that with the oldest run."""
+    """Returns the project whose oldest run starts next.
+
+    It has the fewest slots or, of several, the oldest run.
+    """
     return min(oldest, key=lambda project: (taken.get(project, 0), oldest[project]), default=None)
 
 

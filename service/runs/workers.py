@@ -1,4 +1,4 @@
-"""What runs where, and what waits in which order."""
+"""Running runs by worker, and the queue in its order."""
 
 from collections import Counter, deque
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -114,7 +114,9 @@ def _scheduled(campaign: StoredCampaign) -> Mapping[str, str | int]:
 
 
 def start_order(queued: Sequence[QueuedPlace], taken: Mapping[str, int], out: Collection[str] = ()) -> Iterator[int]:
-    """Yields the numbers of runs in the order in which they start, if each takes one slot and none ends.
+    """Yields the numbers of runs in the order of their start.
+
+    Each takes one slot, and none ends.
 
     Args:
       queued: runs that wait, the oldest first.

@@ -67,7 +67,10 @@ class Ledger:
     def create(
         self, spec: CampaignSpec, project: str = "default", key: str | None = None, base_url: str = ""
     ) -> StoredCampaign:
-        """Stores a new campaign with its runs, all queued; the message to its end links below the base URL."""
+        """Stores a new campaign with its runs, all queued.
+
+        The message to its end links below the base URL.
+        """
         row = CampaignRow(id=f"c{secrets.token_hex(8)}", project=project, idempotency_key=key, label=spec.label)
         row.tags = listed(spec.tags)
         row.spec, row.state, row.created_at = spec.model_dump_json(), State.QUEUED, time.time()
@@ -220,7 +223,7 @@ class Ledger:
         self, campaign_id: str, failure_id: str, state: TriageState, comment: str, project: str | None = None
     ) -> Triage:
         """Stores the triage of a failure; storing the same again changes nothing."""
-        with self._writing("noting what people make of a failure") as session:
+        with self._writing("storing a triage") as session:
             campaign = find_campaign(session, campaign_id, project)
             session.refresh(campaign, with_for_update=True)  # held, as by `hold_campaigns`
             episode = find_failure(session, campaign, failure_id)

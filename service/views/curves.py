@@ -1,4 +1,4 @@
-"""Results of a campaign so far per family and method, curves of its searches, and effects of scene parameters.
+"""Results so far, curves of searches, and effects of parameters.
 
 Live figures of runs that go on; `service.views.reports` compares those that have finished. Mean ECR and PCR and their
 intervals are those of the report. Pure.

@@ -72,7 +72,10 @@ def played_grid(
 
 
 def written_grid(grid: PlayedGrid, format_: GridFormat, over: Sequence[str]) -> bytes:
-    """A played grid as a file; `over` names the two parameters of a picture, the first two that vary without it."""
+    """A played grid as a file.
+
+    `over` names the two parameters of a picture; without it they are the first two that vary.
+    """
     if format_ == "csv":
         return grid_csv([grid]).encode()
     if format_ == "xml":

@@ -62,7 +62,11 @@ class Recorded:
 
     @classmethod
     def of(cls, bundle: Bundle) -> "Recorded":
-        """Reads a bundle; raises `ConfigError` if its net is gone or another, or an array or a violation is missing."""
+        """Reads a bundle.
+
+        Raises:
+          ConfigError: its net is gone or another, or an array or a violation is missing.
+        """
         manifest, series = bundle.manifest, bundle.series
         check_world(manifest)
         _check(manifest, series)
@@ -104,7 +108,7 @@ class Recorded:
 
     @property
     def striker(self) -> int | None:
-        """Column of the actor that the ego touched, or else of the one that mattered most; None without one."""
+        """Column of the touched actor, else of the most important; None without."""
         ids = [actor.id for actor in self.actors]
         return None if self.violation.other_id is None else ids.index(self.violation.other_id)
 
@@ -143,7 +147,10 @@ class Recorded:
         return letters
 
     def offset_s(self, signal: str, frame: int) -> float:
-        """Computes a signal's position in its program at a frame, s; the frame may be one after the last."""
+        """Computes a signal's position in its program at a frame, s.
+
+        The frame may be one after the last.
+        """
         begins_s = self.layout.signal_offset_s if signal == self.layout.signal else 0.0
         return begins_s + float(self.series["time_s"][0]) + frame * STEP_S
 
@@ -177,7 +184,7 @@ def _check(manifest: Manifest, series: Series) -> None:
 
 
 def goal(failure: Recorded) -> tuple[NetLane, Floats]:
-    """Returns the goal of a free ego: a lane of its last road, and x, y and heading on it."""
+    """Returns a free ego's goal: lane, x, y and heading on its last road."""
     start = failure.layout.ego
     lanes, last = failure.net.lanes, start.route[-1]
     reached, ahead = None, [lanes[f"{start.route[0]}_{start.lane}"]]

@@ -43,7 +43,7 @@ HELD_OUT = ("r157", "latency", "late-tracks", "tailgates")
 
 
 def training_egos(family: str) -> dict[str, EgoConfig]:
-    """Returns the egos of a family by name: the sound ones, and those with a defect of the training part.
+    """Returns a family's egos by name: sound, and with training defects.
 
     The catalogue says which defects matter in the paper's families; in any other family all may.
     """

@@ -31,7 +31,10 @@ EVERY = 3  # documents by name, of which one is held out
 
 
 def held_out_documents() -> tuple[str, ...]:
-    """Names of the shipped documents that no model is fitted to: every third by name, the paper's families apart."""
+    """Names of the held-out documents: every third by name.
+
+    No model is fitted to them. The paper's families are not among them.
+    """
     return tuple(sorted(set(shipped_names()) - set(PAPER_FAMILIES))[EVERY - 1 :: EVERY])
 
 

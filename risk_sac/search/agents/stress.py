@@ -145,7 +145,7 @@ class StressAgent(NonLearner, ABC):
 
     @abstractmethod
     def _decide(self, observation: Vector, explore: bool) -> tuple[Floats | Vector, Any]:
-        """Returns an action, and what `_learn` is told beside it."""
+        """Returns an action, and what else `_learn` takes."""
 
     @abstractmethod
     def _learn(self, transition: Transition, told: Any, reward: float, ended: bool) -> None:

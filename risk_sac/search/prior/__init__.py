@@ -1,1 +1,1 @@
-"""What is shipped trained: script models, script libraries, and what proposes points from them."""
+"""Shipped prior: script models, script libraries and samplers."""

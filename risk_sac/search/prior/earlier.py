@@ -90,7 +90,10 @@ class EarlierScripts:
     families: Mapping[str, FamilyScripts]
 
     def alike(self, family: str) -> tuple[FamilyScripts, ...]:
-        """Returns the scripts of this family or, without any, those of all that are like the same shipped one."""
+        """Returns the scripts of this family, or else of those like it.
+
+        Families are alike that are like the same shipped one.
+        """
         if family in self.families:
             return (self.families[family],)
         like = family_named(family).like
@@ -132,7 +135,10 @@ class PriorContent:
         return cls(families=families, sealed=seal(scripts).decode())
 
     def checked(self, prior: str, families: Sequence[str]) -> Self:
-        """Raises ConfigError for a family that none of the scripts is of, nor of one that is like the same one."""
+        """Raises ConfigError for a family without scripts.
+
+        Scripts of a family that is like the same shipped one will do.
+        """
         for family in families:
             like = None if family in self.families else family_named(family).like
             if family not in self.families and (like is None or like.family not in self.families.values()):
@@ -216,7 +222,10 @@ def _readable(prior: str, run: Path) -> Iterator[None]:
 
 
 def _runs(folder: Path) -> Iterator[Path]:
-    """Yields the folders of runs: this one, or those of a campaign by the command line or the service."""
+    """Yields the folders of runs: this one, or a campaign's.
+
+    The campaign is by the command line or the service.
+    """
     for file in (folder / RESULTS, *sorted(folder.glob(f"runs/*/{RESULTS}")), *sorted(folder.glob(f"*/{RESULTS}"))):
         if file.is_file() and (file.parent / EPISODES).is_file():
             yield file.parent

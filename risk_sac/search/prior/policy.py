@@ -133,12 +133,17 @@ def shipped_policy(family: str) -> PretrainedPolicy | None:
 
 
 def pretrained_for(family: Family) -> PretrainedPolicy | None:
-    """Returns the pretrained policy of the family that one is like; None without one, and if it is mirrored."""
+    """Returns the pretrained policy of the family that one is like.
+
+    None without one, and if the family is mirrored.
+    """
     return None if family.like is None or family.like.mirrored else shipped_policy(family.like.family)
 
 
 def check_prior(name: RunMethod, family: FamilyName, prior: str) -> None:
-    """Refuses a method that starts from what is not there; a family that is like no other one needs no prior.
+    """Refuses a method whose prior is missing.
+
+    A family that is like no other one needs none.
 
     Raises:
       ConfigError: the method starts from a prior, and none is wanted or there is none of this family.

@@ -31,7 +31,7 @@ UNTRIED = 0.5, 1.0, 1.0  # worth per episode that arms are credited with at firs
 
 
 class Arm(IntEnum):
-    """What proposes a point."""
+    """A source of proposed points."""
 
     ARCHIVE = 0
     LIBRARY = 1
@@ -114,7 +114,9 @@ class PriorOptimizer(ArchiveOptimizer):
         self._parent, self._arm = self._elites.at(origin["parent"]), Arm(origin["arm"])
 
     def _from_library(self) -> Floats:
-        """Draws a row that was not played yet, the more likely the rarer its variant is so far; then all over again.
+        """Draws a row that was not played yet.
+
+        A row is the more likely the rarer its variant is so far. After the last row all can be drawn again.
 
         Some of the draws are from what an earlier run found, while some of that was not played.
         """

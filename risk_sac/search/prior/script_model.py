@@ -1,4 +1,6 @@
-"""Script model: predicts from the tokens of a point and a belief about the ego how the episode ends.
+"""Script model: predicts an episode's end from the point's tokens.
+
+It takes a belief about the ego, too.
 
 Its members share their weights over the actors, which are a set: any number of any bodies, in any order. The second
 round of a member sees what the first has pooled over all actors. Each has logits for: the episode fails; a reference

@@ -20,7 +20,7 @@ DOUBT = 0.5  # share of the uniform belief beside an earlier run's, whose ego ma
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PriorStart:
-    """What a search starts from; points are the problem's own.
+    """A search's prior; points are the problem's own.
 
     Attributes:
       earlier: rows of the library, the first ones, that an earlier run has found.
@@ -51,7 +51,10 @@ def start_of(problem: Problem, prior: str) -> PriorStart:
 
 
 def _shipped(problem: Problem) -> PriorStart:
-    """What ships: the script model, and the library of the family that the problem is like."""
+    """The shipped script model and library.
+
+    The library is of the family that the problem is like.
+    """
     # Here, because the model needs torch.
     from risk_sac.search.prior.script_model import PlacedModel
     from risk_sac.search.prior.shipped import shipped_library, shipped_model

@@ -1,4 +1,6 @@
-"""Tokens of a scene: each actor as seen from the ego at the release, without names and without a simulation.
+"""Tokens of a scene: each actor as seen from the ego.
+
+They are of the release, have no names, and need no simulation.
 
 The first entries of a token are the same in a mirror that lies along the ego's way; the last ones change their sign.
 """
@@ -218,7 +220,7 @@ def _way(file: str, lane: str, route: tuple[str, ...]) -> tuple[TravelLine, tupl
 
 
 def _letters(net: Net, layout: Layout, lane: NetLane, following: NetLane) -> tuple[float, ...]:
-    """How green the signal at a lane's end is for a way, at `AHEAD_S`."""
+    """State of the signal at a lane's end for a way, at `AHEAD_S`."""
     turn_rad = math.remainder(following.way_out_rad - lane.way_out_rad, math.tau)
     wanted = "l" if turn_rad > TURNS_RAD else "r" if turn_rad < -TURNS_RAD else "s"
     head = next((head for head in lane.heads if head.turn.lower() == wanted), lane.heads[0])
@@ -230,7 +232,7 @@ def _letters(net: Net, layout: Layout, lane: NetLane, following: NetLane) -> tup
 
 
 def _meeting(ego: PlacedActor, actor: PlacedActor) -> tuple[bool, float, float, float, float]:
-    """Where the ego's way first comes near an actor's.
+    """The first point at which the ego's way comes near an actor's.
 
     Returns:
       Whether it does; how far the ego and the actor have to go, m; the actor's direction there in the ego's frame.

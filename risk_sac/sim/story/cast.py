@@ -1,4 +1,4 @@
-"""Actors of a story: where each is at present, how the engine moves its own, and how far it may deviate.
+"""Actors of a story: their poses, motion and deviation.
 
 Choice: a deviation fades. The less an action says, the more the actor returns to the story's speed and to its place
 across; the way that it lost or gained along the road stays. An action of zeros is the story from the start on.

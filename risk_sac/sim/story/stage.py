@@ -210,12 +210,12 @@ class Stage:
         return pose.heading_rad if spot is None else line_of(spot.lane.centre).pose(spot.at_m).heading_rad
 
     def off_road_s(self, name: str) -> float | None:
-        """How long an actor has been beside all lanes; None if it is on one."""
+        """Time of an actor beside all lanes, s; None if on one."""
         spot = self.places.spot(self.of(name))
         return self._since(self._off_s, name, spot is None or abs(spot.left_m) > spot.lane.width_m / 2)
 
     def at_end_s(self, name: str) -> float | None:
-        """How long an actor of the story has been at the end of its way; None if it is not."""
+        """Time of a story's actor at its way's end, s; None if not there."""
         mover = self.movers.get(name)
         return self._since(self._end_s, name, mover is not None and mover.station_m >= mover.line.length_m)
 
@@ -256,7 +256,10 @@ class Stage:
         return Apart(*(sign * value for value in both))
 
     def _along_lanes(self, one: Present, other: Present) -> Apart | None:
-        """The same along the lane that leads from the one behind to the other; None if neither lane does."""
+        """The same along the lane from the one behind to the other.
+
+        None if neither lane leads there.
+        """
         for first, second, sign in ((one, other, 1.0), (other, one, -1.0)):
             spot = self.places.spot(first.pose)
             if spot is None:
@@ -314,7 +317,10 @@ def box(actor: Present) -> shapely.Polygon:
 
 
 def extent(reach: Reach, turned_rad: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """How far a turned box reaches behind and ahead, and to the right and the left, of its reference point."""
+    """Reach of a turned box behind, ahead, right and left.
+
+    It is from the box's reference point.
+    """
     cos, sin = math.cos(turned_rad), math.sin(turned_rad)
     half_length, half_width = reach.length_m / 2, reach.width_m / 2
     along = abs(cos) * half_length + abs(sin) * half_width

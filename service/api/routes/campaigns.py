@@ -205,7 +205,7 @@ def get_results(campaign_id: str, request: Request, service: Service, caller: Cu
 
 @router.get("/{campaign_id}/power", response_model=Power, responses=UNKNOWN | LIVE)
 def get_power(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """What finding nothing is worth: how many known defects this budget detects, by stored runs of a benchmark."""
+    """Number of known defects that this budget detects, by stored runs of a benchmark."""
     return _live(campaign_id, request, service, caller, lambda found: power_of(found.spec, played(found)))
 
 
@@ -227,7 +227,7 @@ async def get_curves(
 
 @router.get("/{campaign_id}/scenes", response_model=SceneEffects, responses=UNKNOWN | LIVE)
 async def get_scenes(campaign_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """Which scene parameters set failing episodes apart, and which parts of the ODD were played."""
+    """Scene parameters that set failing episodes apart, and parts of the ODD that were played."""
     return await _viewed(campaign_id, request, service, caller, name="scenes")
 
 
@@ -274,7 +274,7 @@ def get_log(
     "/{campaign_id}/runs/{run_id}/boundary", response_model=BoundaryMap, responses=UNKNOWN | TAGGED | NO_BOUNDARY
 )
 def get_boundary(campaign_id: str, run_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """Where the ego of a run of the method `boundary` goes from passing to failing."""
+    """Boundary between passing and failing that a run of the method `boundary` found."""
     content = _boundary(run_of(service.store.campaign(campaign_id, caller.sees), run_id), BOUNDARY, service)
     return Response(content, headers=cacheable(request, _digest(content)), media_type="application/json")
 
@@ -287,7 +287,7 @@ def get_boundary(campaign_id: str, run_id: str, request: Request, service: Servi
 def get_boundary_picture(
     campaign_id: str, run_id: str, request: Request, service: Service, caller: CurrentCaller
 ) -> Response:
-    """The same as a picture over the first two parameters."""
+    """The same boundary as a picture over the first two parameters."""
     content = _boundary(run_of(service.store.campaign(campaign_id, caller.sees), run_id), BOUNDARY_PICTURE, service)
     return Response(content, headers=cacheable(request, _digest(content)), media_type="image/png")
 

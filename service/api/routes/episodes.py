@@ -131,7 +131,7 @@ def list_failures(
     limit: Limit = 50,
     cursor: Cursor = None,
 ) -> Response:
-    """Failures: violations of requirements that count, contacts included."""
+    """Failures of a campaign: violations of requirements that count, contacts included."""
     listed = campaign_id if order == "arrival" else f"{campaign_id} by {order}"
     page = service.store.episodes(
         campaign_id,

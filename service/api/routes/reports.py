@@ -96,7 +96,7 @@ async def get_rates(
         float | None, Query(ge=0, le=MOST_PER_HOUR, description="Scenes in an hour, for rates per hour.")
     ] = None,
 ) -> Response:
-    """How often the ego fails under the declared distributions: of finished runs of the method `rate`.
+    """Failure rates under the declared distributions, of finished runs of the method `rate`.
 
     Each rate is one of its scenario, not of the road. One that fails a check is null, and says why.
     """
@@ -111,7 +111,7 @@ async def get_clusters(request: Request, service: Service, campaign: AskedCampai
 
 @router.get("/coverage", response_model=CoverageMatrix, responses=TAGGED)
 async def get_coverage(request: Request, service: Service, campaign: AskedCampaign) -> Response:
-    """What the finished runs have covered: ODD, functional scenarios, requirements, parameters and bodies."""
+    """Coverage by the finished runs: ODD, functional scenarios, requirements, parameters, bodies."""
     return await reported(request, service, campaign, "coverage", "coverage")
 
 

@@ -36,6 +36,8 @@ VALUES: tuple[Any, ...] = (
     [float("nan"), 1], [-1e9, 1e9], ["gap", "gap"], {"kind": "normal"}, {"range": [0, 0]}, {"words": []}, *LAWS,
 )  # fmt: skip
 
+INSERTED = ("", "&a [*a]", "*a", "{", "- " * 99, "\x00", "\t", "!!python/object:os.system x", "'")
+
 
 def _places(node: Any) -> Iterator[tuple[Any, Any]]:
     """Each container of a document with one of its keys or positions."""
@@ -103,8 +105,7 @@ def mutant(draw: random.Random) -> str:
         text = yaml.safe_dump(fields, allow_unicode=True)
         for _ in range(draw.randint(1, 4)):
             at = draw.randrange(len(text) + 1)
-            inserted = draw.choice(("", "&a [*a]", "*a", "{", "- " * 99, "\x00", "\t", "!!python/object:os.system x", "'"))
-            text = text[:at] + inserted + text[at + draw.choice((0, 1, 40, 4_000)) :]
+            text = text[:at] + draw.choice(INSERTED) + text[at + draw.choice((0, 1, 40, 4_000)) :]
         return text
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
         draw.choice(MUTATIONS)(fields, draw)
