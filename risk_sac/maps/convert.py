@@ -70,8 +70,8 @@ def present_net(file: Path, folder: Path, name: str = "") -> Converted:
     net = folder / "converted.net.xml"
     if map_.root == "OpenDRIVE":
         return Converted(net, (*left_out, *_from_opendrive(map_, net, name)), others)
-    said = _convert(map_, net, name)
-    return Converted(net, (*left_out, *remarks(said, "Warning")), others)
+    output = _convert(map_, net, name)
+    return Converted(net, (*left_out, *remarks(output, "Warning")), others)
 
 
 def _from_opendrive(map_: Document, net: Path, name: str) -> list[str]:
@@ -84,15 +84,15 @@ def _from_opendrive(map_: Document, net: Path, name: str) -> list[str]:
     options = sidewalk_options(Path(netconvert()[1]["SUMO_HOME"]) / "data" / "typemap", folder)
     _convert(readied, net, name, options)
     options += crossing_options(walks, parse_net(read_tree(net)), folder)
-    said = _convert(readied, net, name, [*options, "--geometry.remove"])
+    output = _convert(readied, net, name, [*options, "--geometry.remove"])
     if missing := walks.count - len(parse_net(read_tree(net)).crossings):
         lost.append(f"left out, because netconvert builds no crossings there: crosswalks ({missing})")
-    return [*lost, *remarks(said, "Warning")]
+    return [*lost, *remarks(output, "Warning")]
 
 
-def remarks(said: str, severity: str) -> list[str]:
+def remarks(output: str, severity: str) -> list[str]:
     """Messages of SUMO's programs of a severity, `Error` or `Warning`; the first ones, shortened."""
-    found = re.findall(rf"^{severity}: (.*)$", said, re.MULTILINE)
+    found = re.findall(rf"^{severity}: (.*)$", output, re.MULTILINE)
     return ["".join(filter(str.isprintable, line))[:_LONGEST] for line in found[:MOST_REMARKS]]
 
 
@@ -120,8 +120,8 @@ def _environment(home: str) -> dict[str, str]:
 
 
 def _version(attributes: Mapping[str, str]) -> tuple[int, ...]:
-    told = re.match(r"(\d+)\.(\d+)", attributes.get("version", ""))
-    return (int(told[1]), int(told[2])) if told else (0,)
+    version = re.match(r"(\d+)\.(\d+)", attributes.get("version", ""))
+    return (int(version[1]), int(version[2])) if version else (0,)
 
 
 def _convert(map_: Document, net: Path, name: str, options: Sequence[str] = ()) -> str:
@@ -133,8 +133,8 @@ def _convert(map_: Document, net: Path, name: str, options: Sequence[str] = ()) 
     files = [map_.file.name, "--output-file", net.name, "--xml-validation", "never"]
     command = [program, *options, *OPTIONS[map_.root], *files]
     log = net.with_suffix(".log")
-    with log.open("wb") as output:
-        process = subprocess.Popen(command, cwd=net.parent, env=environment, stdout=subprocess.DEVNULL, stderr=output)
+    with log.open("wb") as stream:
+        process = subprocess.Popen(command, cwd=net.parent, env=environment, stdout=subprocess.DEVNULL, stderr=stream)
     with process:
         try:
             _bind(process.pid)
@@ -143,13 +143,13 @@ def _convert(map_: Document, net: Path, name: str, options: Sequence[str] = ()) 
             raise MapError("network", f"{name}, which takes more than {WALL_S} s to convert", remedy=SMALLER) from None
         finally:
             process.kill()  # whatever ended the wait
-    said = log.read_text("utf-8", "replace")
-    if status < 0 or "bad_alloc" in said:
-        raise _crash(status, said, name)
+    output = log.read_text("utf-8", "replace")
+    if status < 0 or "bad_alloc" in output:
+        raise _crash(status, output, name)
     if status != 0:
-        why = "; ".join(remarks(said, "Error")[:5]) or f"status {status}"
+        why = "; ".join(remarks(output, "Error")[:5]) or f"status {status}"
         raise MapError("network", f"netconvert cannot convert {name}: {why}")
-    return said
+    return output
 
 
 def _bind(pid: int) -> None:
@@ -159,11 +159,11 @@ def _bind(pid: int) -> None:
     limit(resource.RLIMIT_FSIZE, FILE_BYTES, pid)
 
 
-def _crash(status: int, said: str, name: str) -> MapError:
-    if "bad_alloc" in said or -status in (signal.SIGXCPU, signal.SIGXFSZ, signal.SIGKILL):
+def _crash(status: int, output: str, name: str) -> MapError:
+    if "bad_alloc" in output or -status in (signal.SIGXCPU, signal.SIGXFSZ, signal.SIGKILL):
         got = f"{name}, for which netconvert has too little time or memory"
         return MapError("network", got, f"one that takes at most {WALL_S} s and {MEMORY_BYTES >> 20} MiB", SMALLER)
-    last = next(iter(remarks(said, "Error") or remarks(said, "Warning")[::-1]), "nothing")
+    last = next(iter(remarks(output, "Error") or remarks(output, "Warning")[::-1]), "nothing")
     return MapError(
         "network",
         f"SUMO's netconvert crashes on {name} ({signal.Signals(-status).name}); it said last: {last}",

@@ -68,21 +68,21 @@ def _map_figure(found: BoundaryMap) -> Figure:
 
 def _map_panel(axes: Axes, found: BoundaryMap, cut: tuple[int, ...]) -> None:
     x, y = (np.array(axis.levels) for axis in found.axes[:2])
-    ego = next((told for told in found.maps if told.name == "ego"), None)
+    ego = next((driver for driver in found.maps if driver.name == "ego"), None)
     if ego is not None and ego.probability:
         axes.pcolormesh(
             x, y, _values(found, ego, cut).T, cmap="RdBu_r", vmin=0.0, vmax=1.0, shading="nearest", alpha=0.45
         )
     others = iter(OTHERS * len(found.maps))
-    for told in found.maps:
-        words, colour, dashes = LINES.get(told.name) or (told.name, *next(others))
-        if not told.probability:
-            axes.plot([], [], " ", label=f"{words}: {'fails' if told.always else 'passes'} everywhere")
+    for driver in found.maps:
+        words, colour, dashes = LINES.get(driver.name) or (driver.name, *next(others))
+        if not driver.probability:
+            axes.plot([], [], " ", label=f"{words}: {'fails' if driver.always else 'passes'} everywhere")
             continue
-        axes.plot([], [], color=colour, linestyle=dashes, label=f"{words}: fails in {in_words(told.fails)}")
-        values = _values(found, told, cut)
+        axes.plot([], [], color=colour, linestyle=dashes, label=f"{words}: fails in {in_words(driver.fails)}")
+        values = _values(found, driver, cut)
         if values.min() < 0.5 < values.max():
-            width = 2.0 if told.name == "ego" else 1.4
+            width = 2.0 if driver.name == "ego" else 1.4
             axes.contour(x, y, values.T, levels=[0.5], colors=[colour], linestyles=[dashes], linewidths=width, zorder=4)
     _scatter(axes, found, cut)
     for set_label, axis in ((axes.set_xlabel, found.axes[0]), (axes.set_ylabel, found.axes[1])):
@@ -100,8 +100,8 @@ def _slice_words(axis: BoundaryAxis, level: int) -> str:
     return f"{axis.name} = {axis.levels[level]:.4g} (points: {low:.4g} to {high:.4g})"
 
 
-def _values(found: BoundaryMap, told: DriverMap, cut: tuple[int, ...]) -> Floats:
-    values = np.array(told.probability).reshape([len(axis.levels) for axis in found.axes])
+def _values(found: BoundaryMap, driver: DriverMap, cut: tuple[int, ...]) -> Floats:
+    values = np.array(driver.probability).reshape([len(axis.levels) for axis in found.axes])
     for level in reversed(cut):
         values = values[..., level]
     return np.asarray(values)
@@ -122,8 +122,8 @@ def _scatter(axes: Axes, found: BoundaryMap, cut: tuple[int, ...]) -> None:
 
 
 def _nearest(found: BoundaryMap, values: tuple[float, ...]) -> tuple[int, ...]:
-    told = zip(found.axes[2:], values, strict=True)
-    return tuple(int(np.abs(np.array(axis.levels) - value).argmin()) for axis, value in told)
+    axis_values = zip(found.axes[2:], values, strict=True)
+    return tuple(int(np.abs(np.array(axis.levels) - value).argmin()) for axis, value in axis_values)
 
 
 PANEL_IN, DPI = (4.0, 3.6), 130
@@ -240,7 +240,7 @@ def _shares(places: Mapping[tuple[float, float], Sequence[PlayedPoint]], driver:
     """Places and the share of their scenes that a driver avoids, `n x 3`."""
     rows = []
     for (x, y), here in places.items():
-        avoided = [told for point in here if (told := getattr(point, driver)) is not None]
+        avoided = [outcome for point in here if (outcome := getattr(point, driver)) is not None]
         if avoided:
             rows.append((x, y, sum(avoided) / len(avoided)))
     return np.array(rows).reshape(-1, 3)

@@ -183,8 +183,8 @@ def check_scenarios(campaigns: Sequence[EndedCampaign]) -> None:
     """Raises a ConfigError for campaigns that were chosen to be compared and are of different scenarios."""
     for campaign in campaigns[1:]:
         if set(campaign.spec.families) != set(campaigns[0].spec.families):
-            said = (f"{', '.join(sorted(each.spec.families))} in {each.id}" for each in (campaigns[0], campaign))
-            raise ConfigError("campaign", " and ".join(said), "campaigns of the same scenarios")
+            differing = (f"{', '.join(sorted(each.spec.families))} in {each.id}" for each in (campaigns[0], campaign))
+            raise ConfigError("campaign", " and ".join(differing), "campaigns of the same scenarios")
 
 
 def _terms(spec: CampaignSpec) -> CampaignSpec:
@@ -266,17 +266,17 @@ def _compared(points: Sequence[TrendPoint]) -> Iterator[TrendPoint]:
         )  # `before` is empty at the first point alone
         if changed:
             before = []
-        told: dict[str, Any] = {"changed": changed}
+        changes: dict[str, Any] = {"changed": changed}
         if before and point.kinds is not None and before[-1].kinds is not None:
             now, last = set(point.kinds), set(before[-1].kinds)
             ever = {kind for earlier in before for kind in earlier.kinds or ()}
-            told |= {
+            changes |= {
                 "new": tuple(sorted(now - ever)),
                 "gone": tuple(sorted(last - now)),
                 "returned": tuple(sorted((now & ever) - last)),
             }
         before.append(point)
-        yield point.model_copy(update=told)
+        yield point.model_copy(update=changes)
 
 
 def _rates(run: EndedRun, phase: RunMetrics) -> Iterator[TrendRate]:
@@ -298,17 +298,17 @@ def _rates(run: EndedRun, phase: RunMetrics) -> Iterator[TrendRate]:
 
 def _weighted(run: EndedRun, rates: Rates) -> Iterator[TrendRate]:
     """Rates from weighted draws, without those that were not estimated."""
-    for name, told in rates.rates.items():
-        if told.rate is not None and told.low is not None and told.high is not None:
+    for name, estimate in rates.rates.items():
+        if estimate.rate is not None and estimate.low is not None and estimate.high is not None:
             yield TrendRate(
                 family=run.family,
                 method=run.method,
                 requirement=None if name == ANY else name,
-                count=told.failures,
+                count=estimate.failures,
                 played=rates.played,
-                rate=told.rate,
-                low=told.low,
-                high=told.high,
+                rate=estimate.rate,
+                low=estimate.low,
+                high=estimate.high,
             )
 
 

@@ -15,7 +15,7 @@ from risk_sac.scenario.layout import Layout
 from risk_sac.sim.ego import Belief
 from risk_sac.sim.lookout import project, stretch
 from risk_sac.sim.paths import COS, HEADING, SIN, STATION, Along, PathStopLine
-from risk_sac.sim.reading import Told
+from risk_sac.sim.reading import PlacedState
 from risk_sac.sim.roads import LateralRoom, Roads
 from risk_sac.sim.solid import VehicleCommand
 from risk_sac.world.jit import compiled
@@ -60,14 +60,14 @@ class MovedVehicle:
       along: where it is on its path, that of its first lane along its route, whichever lane it is on.
       inside: whether its body is on lanes that lead along its route. SUMO's drivers see what is on these lanes.
       arrived: whether it reached its route's end. SUMO, which removes its own vehicles there, keeps one that is moved.
-      told: what SUMO would tell of it.
+      placed: what SUMO would tell of it.
     """
 
     lane: str
     along: Along
     inside: bool
     arrived: bool
-    told: Told
+    placed: PlacedState
     _stop_line: PathStopLine | None
 
     def __init__(self, vehicle: str, motion: Motion, size_m: tuple[float, float], roads: Roads) -> None:
@@ -112,7 +112,7 @@ class MovedVehicle:
         if passes:
             self._stop_line = next((line for line in way.stop_lines if line.station_m >= station_m), None)
         angle = 90.0 - math.degrees(heading)
-        self.told = Told(front_x, front_y, angle, speed, lateral, accel, offset_m, self._ahead(station_m))
+        self.placed = PlacedState(front_x, front_y, angle, speed, lateral, accel, offset_m, self._ahead(station_m))
 
     def _ahead(self, station_m: float) -> tuple[str, float] | None:
         if self._stop_line is None:
@@ -177,7 +177,7 @@ class OncomingVehicle(MovedVehicle):
     def settle(self) -> None:
         """Finds it after a step of SUMO; its lateral speed is the commanded one."""
         super().settle()
-        self.told = self.told._replace(lateral_mps=self._command.lateral_mps)
+        self.placed = self.placed._replace(lateral_mps=self._command.lateral_mps)
 
     def is_back(self, own: LateralRoom) -> bool:
         """Whether its body is straight and within its own lanes, given its room there."""

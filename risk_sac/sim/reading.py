@@ -45,7 +45,7 @@ COLOURS = {
 NONE = Signal.NONE  # to look it up in the class takes longer than to read a signal
 
 
-class Told(NamedTuple):
+class PlacedState(NamedTuple):
     """State of a vehicle that SUMO does not drive, in SUMO's terms."""
 
     front_x_m: float
@@ -90,7 +90,7 @@ class Reader:
         self._walk_signals = [place for signal in self._signals for place in _walk_signals(signal, layout.crossings)]
         self._vehicles = tuple(start.id for start in starts)
         self._describe()
-        self._told = np.full((len(self._ids), 7), np.nan)
+        self._raw = np.full((len(self._ids), 7), np.nan)
 
     def _describe(self) -> None:
         """Computes what stays the same until a vehicle leaves the net."""
@@ -110,7 +110,7 @@ class Reader:
 
     def forget(self, gone: Collection[str]) -> None:
         """Leaves out actors that have left."""
-        self._told = self._told[[id_ not in gone for id_ in self._ids]]
+        self._raw = self._raw[[id_ not in gone for id_ in self._ids]]
         self._vehicles = tuple(id_ for id_ in self._vehicles if id_ not in gone)
         self._walkers = tuple(id_ for id_ in self._walkers if id_ not in gone)
         self._describe()
@@ -121,26 +121,26 @@ class Reader:
             self._roles |= dict.fromkeys(turned, Role.ADVERSARY)
             self._describe()
 
-    def read(self, walkers: Mapping[str, Walker], moved: Mapping[str, Told]) -> Reading:
+    def read(self, walkers: Mapping[str, Walker], moved: Mapping[str, PlacedState]) -> Reading:
         """Reads all actors; `moved` is what SUMO would tell of the vehicles that it does not drive."""
         get_position, get_angle = libsumo.vehicle.getPosition, libsumo.vehicle.getAngle
         get_speed, get_lateral = libsumo.vehicle.getSpeed, libsumo.vehicle.getLateralSpeed
         get_accel = libsumo.vehicle.getAcceleration
         get_offset = libsumo.vehicle.getLateralLanePosition
-        told: list[float] = []  # flat: numpy converts nested sequences at half the speed
+        raw: list[float] = []  # flat: numpy converts nested sequences at half the speed
         for id_ in self._vehicles:
             if moved and id_ in moved:
-                told += moved[id_][:7]
+                raw += moved[id_][:7]
             else:
-                told += get_position(id_)
-                told += (get_angle(id_), get_speed(id_), get_lateral(id_), get_accel(id_), get_offset(id_))
-        speed_and_accel, offsets = [*zip(told[3::7], told[5::7], strict=True)], told[6::7]
+                raw += get_position(id_)
+                raw += (get_angle(id_), get_speed(id_), get_lateral(id_), get_accel(id_), get_offset(id_))
+        speed_and_accel, offsets = [*zip(raw[3::7], raw[5::7], strict=True)], raw[6::7]
         for w in walkers.values():
-            told += (w.x_m, w.y_m, w.heading_rad, w.speed_mps, 0.0, w.accel_mps2, 0.0)
+            raw += (w.x_m, w.y_m, w.heading_rad, w.speed_mps, 0.0, w.accel_mps2, 0.0)
         for start in self._statics:
-            told += (start.x_m, start.y_m, start.heading_rad, 0.0, 0.0, 0.0, 0.0)
+            raw += (start.x_m, start.y_m, start.heading_rad, 0.0, 0.0, 0.0, 0.0)
         # Much faster than `np.array`, which looks at the type of each number.
-        before, self._told = self._told, np.fromiter(told, np.float64, len(told)).reshape(-1, 7)
+        before, self._raw = self._raw, np.fromiter(raw, np.float64, len(raw)).reshape(-1, 7)
         letter, stop_line_m = self._ahead(moved) if self._signals else ("", math.inf)
         frame = Frame(
             time_s=libsumo.simulation.getTime(),
@@ -148,7 +148,7 @@ class Reader:
             kind=self._kind,
             body=self._codes,
             role=self._role,
-            state=_state(self._told, before, self._sizes, len(self._vehicles)),
+            state=_state(self._raw, before, self._sizes, len(self._vehicles)),
             signal=COLOURS.get(letter, NONE),
             stop_line_m=stop_line_m,
             link=self._links(letter, walkers, moved) if self._signals else self._no_links,
@@ -159,7 +159,7 @@ class Reader:
             near = near_outsiders(frame.state, self._outside).tolist()
         return Reading(frame, self._vehicles, self._row, speed_and_accel, offsets, self._drives, self._outside, near)
 
-    def _ahead(self, moved: Mapping[str, Told]) -> tuple[str, float]:
+    def _ahead(self, moved: Mapping[str, PlacedState]) -> tuple[str, float]:
         """Returns the letter of the ego's signal and the distance to it.
 
         The distance is to its stop line; "" and inf without a signal.
@@ -169,7 +169,7 @@ class Reader:
         ahead = libsumo.vehicle.getNextTLS(self._vehicles[0])
         return (ahead[0][3], ahead[0][2]) if ahead else ("", math.inf)
 
-    def _links(self, ego: str, walkers: Mapping[str, Walker], moved: Mapping[str, Told]) -> NDArray[np.uint8]:
+    def _links(self, ego: str, walkers: Mapping[str, Walker], moved: Mapping[str, PlacedState]) -> NDArray[np.uint8]:
         """Reads the signal letters ahead of the ego and of each adversary.
 
         A pedestrian's letter is that of its crossing.
@@ -177,8 +177,8 @@ class Reader:
         links = self._no_links.copy()
         letters = [(0, ego)] if ego else []
         for row, id_ in self._attackers:
-            if (told := moved.get(id_)) is not None:
-                letters += [(row, told.ahead[0])] if told.ahead else []
+            if (placed := moved.get(id_)) is not None:
+                letters += [(row, placed.ahead[0])] if placed.ahead else []
             elif ahead := libsumo.vehicle.getNextTLS(id_):
                 letters.append((row, ahead[0][3]))
         for row, walker in enumerate(walkers.values(), start=len(self._vehicles)):
@@ -191,20 +191,20 @@ class Reader:
 
 
 @compiled
-def _state(told: Floats, before: Floats, bodies: Floats, vehicles: int) -> Floats:
+def _state(raw: Floats, before: Floats, bodies: Floats, vehicles: int) -> Floats:
     """The state of a frame.
 
     Args:
-      told: `n x 7`, of each actor x, y, angle, speed, lateral speed, acceleration, and offset from its lane. SUMO's own
+      raw: `n x 7`, of each actor x, y, angle, speed, lateral speed, acceleration, and offset from its lane. SUMO's own
         of vehicles: front bumpers and compass degrees.
       before: the same in the step before, NaN where there was none.
       bodies: `2 x n`, length and width.
       vehicles: how many actors, the first of them, are vehicles.
     """
-    n = len(told)
+    n = len(raw)
     state = np.empty((WIDTH + 1, n))
     for i in range(n):
-        x, y, heading, speed, half = told[i, 0], told[i, 1], told[i, 2], told[i, 3], 0.0
+        x, y, heading, speed, half = raw[i, 0], raw[i, 1], raw[i, 2], raw[i, 3], 0.0
         if i < vehicles:
             heading, half = math.radians(90.0 - heading), bodies[0, i] / 2
         cos, sin = math.cos(heading), math.sin(heading)
@@ -214,7 +214,7 @@ def _state(told: Floats, before: Floats, bodies: Floats, vehicles: int) -> Float
             state[VX, i], state[VY, i] = (x - before[i, 0]) / STEP_S, (y - before[i, 1]) / STEP_S
         state[X, i], state[Y, i], state[HEADING, i] = x - half * cos, y - half * sin, heading
         for k, row in enumerate((SPEED, LATERAL, ACCEL, OFFSET)):
-            state[row, i] = told[i, 3 + k]
+            state[row, i] = raw[i, 3 + k]
         state[LENGTH, i], state[WIDTH, i] = bodies[0, i], bodies[1, i]
     return state
 

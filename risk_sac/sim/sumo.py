@@ -325,11 +325,11 @@ class SumoSimulation:
 
     def _look(self) -> Belief:
         """Reads a frame, and lets the ego perceive it."""
-        moved = {id_: vehicle.told for id_, vehicle in self._oncoming.items()}
+        moved = {id_: vehicle.placed for id_, vehicle in self._oncoming.items()}
         if self._moved is not None:
-            moved[self._layout.ego.id] = self._moved.told
+            moved[self._layout.ego.id] = self._moved.placed
         if self._story is not None:
-            moved |= self._story.told
+            moved |= self._story.placed
         self._reading = self._reader.read(self._walkers, moved)
         frame = self._reading.frame
         belief = self._senses.look(frame)
@@ -390,8 +390,8 @@ class SumoSimulation:
         is a little late or early where a body is turned. None of static bodies, and if we tell SUMO the place of
         either.
         """
-        told = self._story is not None and other in self._story.told
-        if self._moved is not None or told or other in self._oncoming or other not in self._reading.row:
+        in_story = self._story is not None and other in self._story.placed
+        if self._moved is not None or in_story or other in self._oncoming or other not in self._reading.row:
             return None
         for _ in range(round(LISTED_WITHIN_S / STEP_S)):
             if self._listed(other):

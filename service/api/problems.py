@@ -179,7 +179,7 @@ async def _answer(request: Request, error: Exception) -> JSONResponse:
 
 def _problem(request: Request, error: Exception) -> ProblemError:
     """Returns the problem of an error."""
-    said = str(error)
+    detail = str(error)
     match error:
         case RequestValidationError():
             return _invalid_request(error)
@@ -189,27 +189,27 @@ def _problem(request: Request, error: Exception) -> ProblemError:
             faults = (error, *error.others)
             return invalid("; ".join(map(str, faults)), *(_field_problem(fault, str(fault)) for fault in faults))
         case NotFoundError():
-            item = FieldProblem(field=error.field, message=said, got=shown(error.got), wanted="an existing id")
-            return ProblemError(HTTPStatus.NOT_FOUND, Reason.UNKNOWN_ID, said, item)
+            item = FieldProblem(field=error.field, message=detail, got=shown(error.got), wanted="an existing id")
+            return ProblemError(HTTPStatus.NOT_FOUND, Reason.UNKNOWN_ID, detail, item)
         case ConflictError():
-            return ProblemError(HTTPStatus.CONFLICT, Reason(error.reason), said)
+            return ProblemError(HTTPStatus.CONFLICT, Reason(error.reason), detail)
         case QuotaError():
             status = HTTPStatus.TOO_MANY_REQUESTS
-            return ProblemError(status, Reason.QUOTA_EXCEEDED, said, retry_s=error.retry_after_s)
+            return ProblemError(status, Reason.QUOTA_EXCEEDED, detail, retry_s=error.retry_after_s)
         case BusyError():
             status = HTTPStatus.SERVICE_UNAVAILABLE
-            return ProblemError(status, Reason(error.reason), said, retry_s=error.retry_after_s)
+            return ProblemError(status, Reason(error.reason), detail, retry_s=error.retry_after_s)
         case SeriesLost():
-            said = f"{request.path_params['failure_id']!r} cannot be shown: {said}"
-            return ProblemError(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, said)
+            detail = f"{request.path_params['failure_id']!r} cannot be shown: {detail}"
+            return ProblemError(HTTPStatus.NOT_FOUND, Reason.SERIES_LOST, detail)
         case NotPlayable():
-            said = f"{request.path_params['failure_id']!r}: {said}"
-            return ProblemError(HTTPStatus.CONFLICT, Reason.NOT_PLAYABLE, said)
+            detail = f"{request.path_params['failure_id']!r}: {detail}"
+            return ProblemError(HTTPStatus.CONFLICT, Reason.NOT_PLAYABLE, detail)
         case UploadError():
-            return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.UPLOAD_REFUSED, said)
+            return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, Reason.UPLOAD_REFUSED, detail)
         case StorageError() | DamagedError():
-            logger.error("%s %s: %s", request.method, request.url.path, said)
-            return ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.STORAGE_UNAVAILABLE, said)
+            logger.error("%s %s: %s", request.method, request.url.path, detail)
+            return ProblemError(HTTPStatus.SERVICE_UNAVAILABLE, Reason.STORAGE_UNAVAILABLE, detail)
     detail = f"the service has a bug ({type(error).__name__}); its log has the traceback"
     return ProblemError(HTTPStatus.INTERNAL_SERVER_ERROR, Reason.INTERNAL_ERROR, detail)
 

@@ -22,7 +22,7 @@ if "SUMO_HOME" in os.environ:
     sys.path.append(str(Path(os.environ["SUMO_HOME"]) / "tools"))
 import traci
 
-Told = dict[str, Any]
+Commands = dict[str, Any]
 
 HERE = Path(__file__).resolve().parent
 BLUE, ORANGE = (0, 114, 178, 255), (213, 94, 0, 255)
@@ -47,13 +47,13 @@ def main() -> int:
     binary = options.sumo or shutil.which(name) or shutil.which(name, path=os.pathsep.join(homes))
     if binary is None:
         parser.error(f"there is no {name} on the PATH; name it by --sumo")
-    told = json.loads((HERE / "commands.json").read_bytes())
+    replayed = json.loads((HERE / "commands.json").read_bytes())
     steps = list(ET.parse(HERE / "fcd.xml").getroot())
     os.chdir(HERE)  # SUMO splits paths at commas
     command = [binary, "--configuration-file", "failure.sumocfg"]
     traci.start([*command, "--start", "--quit-on-end"] if options.gui else command)
     try:
-        difference, missed = replay(told, steps, options.gui)
+        difference, missed = replay(replayed, steps, options.gui)
     finally:
         traci.close()
     compared = sum(len(step.findall("vehicle")) for step in steps)
@@ -62,10 +62,10 @@ def main() -> int:
     return int(difference > 0 or missed > 0)
 
 
-def replay(told: Told, steps: list[ET.Element], gui: bool) -> tuple[float, int]:
+def replay(replayed: Commands, steps: list[ET.Element], gui: bool) -> tuple[float, int]:
     """The largest difference of any number, and how many vehicles were elsewhere than in the recording."""
     difference, missed = 0.0, 0
-    for commands, recorded in zip(told["commands"], steps, strict=True):
+    for commands, recorded in zip(replayed["commands"], steps, strict=True):
         for domain, function, arguments, named in commands:
             getattr(getattr(traci, domain), function)(*arguments, **named)
         traci.simulationStep()
@@ -76,20 +76,20 @@ def replay(told: Told, steps: list[ET.Element], gui: bool) -> tuple[float, int]:
             off = (abs(get(id_) - float(wanted[id_].attrib[name])) for name, get in GETTERS.items())
             difference = max(difference, *off)
         if gui:
-            show(told, recorded)
+            show(replayed, recorded)
     return difference, missed
 
 
-def show(told: Told, recorded: ET.Element) -> None:
+def show(replayed: Commands, recorded: ET.Element) -> None:
     """Colours, and the pedestrians of a step as octagons on the ground."""
     view = traci.gui.getIDList()[0]
     vehicles = traci.vehicle.getIDList()
-    if told["ego"] in vehicles:
-        traci.vehicle.setColor(told["ego"], BLUE)
-        traci.gui.setOffset(view, *traci.vehicle.getPosition(told["ego"]))
-        traci.gui.setZoom(view, told["zoom"])
-    if told["striker"] in vehicles:
-        traci.vehicle.setColor(told["striker"], ORANGE)
+    if replayed["ego"] in vehicles:
+        traci.vehicle.setColor(replayed["ego"], BLUE)
+        traci.gui.setOffset(view, *traci.vehicle.getPosition(replayed["ego"]))
+        traci.gui.setZoom(view, replayed["zoom"])
+    if replayed["striker"] in vehicles:
+        traci.vehicle.setColor(replayed["striker"], ORANGE)
     for person in recorded.findall("person"):
         x, y, id_ = float(person.attrib["x"]), float(person.attrib["y"]), person.attrib["id"]
         ring = [(0.4, 0.15), (0.15, 0.4), (-0.15, 0.4), (-0.4, 0.15), (-0.4, -0.15), (-0.15, -0.4), (0.15, -0.4)]
@@ -97,7 +97,7 @@ def show(told: Told, recorded: ET.Element) -> None:
         if id_ in traci.polygon.getIDList():
             traci.polygon.setShape(id_, outline)
         else:
-            traci.polygon.add(id_, outline, ORANGE if id_ == told["striker"] else BLUE, fill=True, layer=100)
+            traci.polygon.add(id_, outline, ORANGE if id_ == replayed["striker"] else BLUE, fill=True, layer=100)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ import libsumo
 from risk_sac.scenario.bodies import body_of
 from risk_sac.scenario.layout import Layout, Reach, StoryActor, StoryPlan
 from risk_sac.scenario.travel_line import Pose
-from risk_sac.sim.reading import Told
+from risk_sac.sim.reading import PlacedState
 from risk_sac.sim.solid import Walker
 from risk_sac.sim.story.actions import doing_of, set_variable
 from risk_sac.sim.story.board import Running, Storyboard
@@ -136,7 +136,7 @@ class StoryTraffic:
     """The actors of one episode's story.
 
     Attributes:
-      told: what SUMO would tell of the story's vehicles.
+      placed: states of the story's vehicles, in SUMO's terms.
       walkers: the story's free actors.
       beside: its vehicles that SUMO has on no lane.
     """
@@ -158,33 +158,33 @@ class StoryTraffic:
             for name, p in played.items()
             if name in self._free
         }
-        self.told = {name: self._tell(name, p) for name, p in played.items() if name not in self._free}
+        self.placed = {name: self._placed(name, p) for name, p in played.items() if name not in self._free}
 
-    def _tell(self, name: str, p: StoryMotion) -> Told:
+    def _placed(self, name: str, p: StoryMotion) -> PlacedState:
         half_m = self._lengths_m[name] / 2
         x_m, y_m = p.x_m + half_m * math.cos(p.heading_rad), p.y_m + half_m * math.sin(p.heading_rad)
         angle = 90.0 - math.degrees(p.heading_rad)
-        return Told(x_m, y_m, angle, p.speed_mps, p.lateral_mps, p.accel_mps2, p.left_m, None)
+        return PlacedState(x_m, y_m, angle, p.speed_mps, p.lateral_mps, p.accel_mps2, p.left_m, None)
 
     def insert(self) -> None:
         """Has SUMO insert the vehicles, which it was given, where the story has them."""
-        for name in self.told:
+        for name in self.placed:
             self._put(name)
 
     def take_over(self) -> None:
         """Takes the vehicles from SUMO's drivers, once they are inserted."""
-        for name in self.told:
+        for name in self.placed:
             libsumo.vehicle.setSpeedMode(name, NO_CHECKS)
             libsumo.vehicle.setLaneChangeMode(name, NO_LANE_CHANGE)
             self._correct_speed(name)
 
     def _put(self, name: str) -> None:
-        told = self.told[name]
-        libsumo.vehicle.moveToXY(name, "", -1, told.front_x_m, told.front_y_m, told.angle_deg, ANYWHERE)
+        placed = self.placed[name]
+        libsumo.vehicle.moveToXY(name, "", -1, placed.front_x_m, placed.front_y_m, placed.angle_deg, ANYWHERE)
 
     def _correct_speed(self, name: str) -> None:
         """Tells SUMO the speed, which it derives from the way along the lane."""
-        speed_mps = max(self.told[name].speed_mps, 0.0)
+        speed_mps = max(self.placed[name].speed_mps, 0.0)
         libsumo.vehicle.setPreviousSpeed(name, speed_mps)
         libsumo.vehicle.setSpeed(name, speed_mps)
 
@@ -199,14 +199,14 @@ class StoryTraffic:
         gone = frozenset(before - self._played.keys())
         for name in gone & self._lengths_m.keys():
             libsumo.vehicle.remove(name)
-        for name in self.told:
+        for name in self.placed:
             self._put(name)
         return gone
 
     def settle(self) -> None:
         """Corrects what SUMO made of the vehicles in its step."""
         self.beside = []
-        for name in self.told:
+        for name in self.placed:
             self._correct_speed(name)
             if not libsumo.vehicle.getLaneID(name):
                 self.beside.append(name)
