@@ -9,6 +9,7 @@ from pydantic import Field
 
 from risk_sac.config.base import Fraction, Settings, Weight
 
+CriticLoss = Literal["squared", "huber"]
 Width = Annotated[int, Field(ge=1, le=4096)]
 LearningRate = Annotated[float, Field(ge=1e-7, le=0.01)]
 MOST_TEMPERATURE = 100.0  # α
@@ -32,6 +33,10 @@ class AgentConfig(Settings):
     """Environment steps for which the policy holds an action; they make one transition of the memory."""
     updates_per_step: Annotated[float, Field(ge=0, le=20)] = 0.2
     """Updates in an environment step; 0.2 is one per decision. An update costs about as much as five steps."""
+    critic_loss: CriticLoss = "squared"
+    """`huber` is linear in TD errors above 1."""
+    weighted_actor: bool = True
+    """Importance weights scale the policy's loss, too; false: the critics' alone."""
     device: Literal["auto", "cpu", "cuda"] = "auto"
     """`auto` is the CPU; `cuda` has to be asked for. Results are reproducible on equal devices only."""
 

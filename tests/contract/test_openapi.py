@@ -38,7 +38,7 @@ def test_served_document_is_the_committed_one(base_url):
 
 
 def test_the_document_is_small():
-    assert COMMITTED.stat().st_size <= 231_000
+    assert COMMITTED.stat().st_size <= 231_500
 
 
 def operations():

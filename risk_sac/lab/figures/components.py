@@ -32,7 +32,7 @@ WITH: Mapping[MethodName, str] = {
 FIRST_SEED, RESAMPLING_SEED = 801, 1
 COLD = {"warm_start": {"episodes": 0}}
 SPARSE = {"reward": {"ttc_weight": 0.0, "rss_weight": 0.0}}
-SETTINGS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
+SETTINGS: Mapping[str, Mapping[str, Mapping[str, float | str]]] = {
     "as shipped": {},
     "no warm start": COLD,
     "sparse reward": SPARSE,
@@ -44,6 +44,8 @@ SETTINGS: Mapping[str, Mapping[str, Mapping[str, float]]] = {
         "replay": {"td_weight": 0.2, "return_weight": 1.0, "robustness_weight": 1.0, "priority_floor": 0.001}
     },
     "no importance weights": {"replay": {"correction": 0.0}},
+    "weights for critics only": {"agent": {"weighted_actor": False}},
+    "LAP's loss": {"agent": {"critic_loss": "huber"}, "replay": {"correction": 0.0}},
     "limit that binds": {"lagrangian": {"cost_limit": 0.05}},
 }
 

@@ -10,8 +10,10 @@ from typing import Any
 
 import torch
 from torch import Tensor, nn
+from torch.nn import functional
 from torch.optim import Adam
 
+from risk_sac.config.learner import CriticLoss
 from risk_sac.errors import CheckpointError, ConfigError, NotFinite
 from risk_sac.search.agents.networks import Mlp
 from risk_sac.search.agents.replay import Batch
@@ -128,18 +130,30 @@ def td_target(reward: Tensor, terminated: Tensor, next_value: Tensor, discount: 
     return reward + discount * (1.0 - terminated) * next_value
 
 
-def critic_loss(td_errors: Tensor, weight: Tensor) -> Tensor:
-    """Importance-weighted squared error of all critics.
+def critic_loss(td_errors: Tensor, weight: Tensor, kind: CriticLoss = "squared") -> Tensor:
+    """Importance-weighted error of all critics.
 
-    J_Q = Σ_i E[w · ½ (y - Q_ψi(s, a))²]
+    squared: J_Q = Σ_i E[w · ½ δ²],  δ = y - Q_ψi(s, a)
+    huber:   the same where |δ| <= 1, else Σ_i E[w (|δ| - ½)]
 
     Args:
-      td_errors: `critics x batch`, y - Q_ψi.
+      td_errors: `critics x batch`, δ.
       weight: `batch`, importance weights of (10).
+      kind: of the error.
 
-    Source: Haarnoja et al. 2018, Eq. 5, times w of RISK-SAC, Eq. 10.
+    Source: Haarnoja et al. 2018, Eq. 5, times w of RISK-SAC, Eq. 10; Fujimoto et al., "An equivalence between loss
+    functions and non-uniform sampling in experience replay", 2020, Sec. 5, without weights.
     """
-    return 0.5 * (weight * td_errors.square()).mean(dim=1).sum()
+    if kind == "huber":
+        errors = functional.huber_loss(td_errors, torch.zeros_like(td_errors), reduction="none")
+    else:
+        errors = 0.5 * td_errors.square()
+    return (weight * errors).mean(dim=1).sum()
+
+
+def actor_weights(batch: Batch, *, weighted: bool) -> Tensor:
+    """Weights of the policy's loss, `batch`, 1 on average."""
+    return batch.weight / batch.weight.mean() if weighted else torch.ones_like(batch.weight)
 
 
 def mean_magnitude(td_errors: Tensor) -> Floats:

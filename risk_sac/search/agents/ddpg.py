@@ -13,6 +13,7 @@ from risk_sac.config.learner import AgentConfig, DdpgConfig
 from risk_sac.search.agents.agent import (
     Agent,
     UpdateResult,
+    actor_weights,
     all_finite,
     critic_loss,
     follow,
@@ -73,12 +74,13 @@ class DdpgAgent(Agent):
     def update(self, batch: Batch, reward: Tensor) -> UpdateResult:
         """See `Agent.update`."""
         td_errors = self._td_errors(batch, reward)
-        loss_q = critic_loss(td_errors, batch.weight)
+        loss_q = critic_loss(td_errors, batch.weight, self._config.critic_loss)
         minimise(loss_q, self._critic_optimizer)
 
         action = torch.tanh(self._policy(batch.observation)[0])
         value = values(self._critic, batch.observation, action)[0]
-        loss_mu = actor_loss(value, batch.weight / batch.weight.mean())  # -E[w Q_ψ(s, μ_θ(s))], Eq. 6
+        weight = actor_weights(batch, weighted=self._config.weighted_actor)
+        loss_mu = actor_loss(value, weight)  # -E[w Q_ψ(s, μ_θ(s))], Eq. 6
         minimise(loss_mu, self._policy_optimizer)
         follow(self._target_critic, self._critic, self._config.target_rate)
         follow(self._target_policy, self._policy, self._config.target_rate)

@@ -16,6 +16,7 @@ from risk_sac.config.learner import MOST_TEMPERATURE, AgentConfig, SacConfig
 from risk_sac.search.agents.agent import (
     Agent,
     UpdateResult,
+    actor_weights,
     all_finite,
     critic_loss,
     follow,
@@ -187,13 +188,13 @@ class SacAgent(Agent):
     def advance(self, batch: Batch, reward: Tensor) -> tuple[Tensor, Tensor]:
         """Makes one step of all networks; returns what `result` reads, without waiting for the device."""
         td_errors = self._td_errors(batch, reward)
-        loss_q = critic_loss(td_errors, batch.weight)
+        loss_q = critic_loss(td_errors, batch.weight, self._config.critic_loss)
         minimise(loss_q, self._critic_optimizer)
 
         action, log_prob = self._sample(batch.observation)
         temperature, entropy = self._temperature(), -log_prob.detach().mean()
         value = soft_value(values(self._critics, batch.observation, action), log_prob, temperature.detach())
-        loss_pi = actor_loss(value, batch.weight / batch.weight.mean())
+        loss_pi = actor_loss(value, actor_weights(batch, weighted=self._config.weighted_actor))
         loss_alpha = temperature_loss(temperature, entropy, self._target_entropy)
         minimise(loss_pi + loss_alpha, self._policy_optimizer)
         self._temperature.clamp()

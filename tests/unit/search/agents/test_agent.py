@@ -1,6 +1,7 @@
 """What every agent must do, whichever algorithm it runs."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,6 +69,23 @@ def test_the_temperature_has_a_bound_where_the_policy_cannot_reach_its_entropy()
     batch = random_batch(np.random.default_rng(0))
     found = [agent.update(batch, batch.risk_reward).temperature for _ in range(5)]
     assert found == pytest.approx([MOST_TEMPERATURE] * 5)
+
+
+@both
+def test_importance_weights_scale_the_losses_that_they_are_meant_for(make):
+    batch = random_batch(np.random.default_rng(0))
+    alike = replace(batch, weight=torch.full_like(batch.weight, 0.2))
+
+    def losses(given: Batch, *, weighted_actor: bool) -> tuple[float, float]:
+        agent = make(CONFIG.model_copy(update={"weighted_actor": weighted_actor, "critic_learning_rate": 1e-7}))
+        update = agent.update(given, given.risk_reward)
+        return update.critic_loss, update.actor_loss
+
+    critic, actor = losses(batch, weighted_actor=True)
+    critic_alike, actor_alike = losses(alike, weighted_actor=True)
+    assert abs(critic - critic_alike) > 1e-2
+    assert abs(actor - actor_alike) > 5e-3
+    assert losses(batch, weighted_actor=False) == pytest.approx((critic, actor_alike), abs=1e-5)
 
 
 @both

@@ -97,6 +97,12 @@ def test_critic_loss_of_a_hand_computed_case():
     assert critic_loss(torch.tensor([[2.0, 0.0], [1.0, 4.0]]), torch.tensor([1.0, 0.5])).item() == 3.25
 
 
+def test_a_huber_loss_is_linear_in_errors_above_1():
+    # First critic: mean(1·1.5, ½·0) = 0.75; second: mean(1·½, ½·3.5) = 1.125.
+    td_errors, weight = torch.tensor([[2.0, 0.0], [1.0, -4.0]]), torch.tensor([1.0, 0.5])
+    assert critic_loss(td_errors, weight, "huber").item() == 0.75 + 1.125
+
+
 def test_actor_loss_of_a_hand_computed_case():
     loss = actor_loss(torch.tensor([1.5, -0.5]), torch.tensor([1.5, 0.5]))
     assert loss.item() == pytest.approx((1.5 * -1.5 + 0.5 * 0.5) / 2)
