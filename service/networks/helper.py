@@ -6,6 +6,7 @@ It is started as `service.networks.helper QUESTION ANSWER ACTION`, with limits o
     add EGO        checks the document, or the archive, that the question holds, keeps it, and answers with its name
     check EGO      checks it, plays 20 scenes of it, and answers with a `ScenarioCheck`
     picture NAME   answers with a PNG
+    pictures       answers with the PNGs of all that ship, by name, in base64
 
 EGO is the ego among the entities of OpenSCENARIO, or empty. `service.networks.surveys` starts it in the folder of a
 checked network, since a search takes seconds that would block the server:
@@ -14,6 +15,7 @@ checked network, since a search takes seconds that would block the server:
     keep PATTERN [PLACE]   keeps that place, or all of the pattern, and answers with the families that they are
 """
 
+import base64
 import io
 import json
 import sys
@@ -173,6 +175,10 @@ def _picture(name: str) -> bytes:
     return scenario_png(document, nets_of(document, folder))
 
 
+def _pictures() -> bytes:
+    return json.dumps({name: base64.b64encode(_picture(name)).decode() for name in shipped_names()}).encode()
+
+
 def _survey() -> bytes:
     from risk_sac.failures.from_above import map_png  # here, because loading matplotlib takes a second
 
@@ -211,7 +217,12 @@ def _keep_places(name: str, place: str | None = None) -> bytes:
     return json.dumps({"families": [chosen.keep(fit) for fit in fits]}).encode()
 
 
-ACTIONS: Mapping[str, Callable[..., bytes]] = {"picture": _picture, "survey": _survey, "keep": _keep_places}
+ACTIONS: Mapping[str, Callable[..., bytes]] = {
+    "picture": _picture,
+    "pictures": _pictures,
+    "survey": _survey,
+    "keep": _keep_places,
+}
 
 if __name__ == "__main__":
     main()

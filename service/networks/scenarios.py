@@ -4,6 +4,7 @@ Documents and nets lie in the library, under names that hold their digest. Besid
 posted one. What reads a net runs in a process of its own.
 """
 
+import base64
 import json
 import logging
 import os
@@ -49,6 +50,7 @@ class Scenarios:
         """
         self._folder, self._places, self._stopping = folder, places, stopping
         self._turn, self._lock, self._waiting = threading.BoundedSemaphore(AT_ONCE), threading.Lock(), 0
+        self._drawing, self._shipped = threading.Lock(), dict[str, bytes]()  # pictures of those that ship
 
     def list(self, project: str | None) -> list[ScenarioSummary]:
         """Returns the shipped scenarios, then a project's own, newest first; None: those of all projects."""
@@ -104,7 +106,13 @@ class Scenarios:
 
     def picture(self, name: str) -> bytes:
         """Draws a scenario that `get` has returned."""
-        return self._run("picture", b"", name)
+        if name not in shipped_names():
+            return self._run("picture", b"", name)
+        with self._drawing:  # all at once: a process starts in three seconds, and draws one in a fifth of a second
+            if not self._shipped:
+                drawn = json.loads(self._run("pictures", b""))
+                self._shipped = {each: base64.b64decode(content) for each, content in drawn.items()}
+        return self._shipped[name]
 
     def delete(self, name: str, project: str | None, in_use: Callable[[], set[str]]) -> None:
         """Removes a project's scenario.

@@ -9,7 +9,8 @@ import pytest
 import yaml
 
 from risk_sac.client import Client, Refused
-from risk_sac.scenario.reading import document_from
+from risk_sac.failures.scenario_trial import scenario_png
+from risk_sac.scenario.reading import document_from, nets_of, shipped_document
 from tests.hostile_networks import zipped
 from tests.openscenario_samples import FILES, SCENARIO, VARIATION, copied
 
@@ -167,6 +168,13 @@ def test_check_plays_scenes(shared):
 def test_several_faults_are_all_named(shared):
     answer = post(shared, DOCUMENT | {"colour": 1, "parameters": {"gap": {"range": [9, 1]}}})
     assert {error["field"] for error in answer.json()["errors"]} == {"colour", "parameters.gap.range"}
+
+
+def test_shipped_scenarios_are_drawn_as_each_is_alone(shared):
+    names = ("low", "dense")
+    drawn = [shared.client.get(f"/v1/scenarios/{name}/picture.png", timeout=120).content for name in names]
+    documents = [shipped_document(name) for name in names]
+    assert drawn == [scenario_png(document, nets_of(document)) for document in documents]
 
 
 def test_shipped_scenario_is_not_deleted(shared):
