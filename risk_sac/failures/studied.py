@@ -4,8 +4,8 @@ Studies of a run's failures are files beside its results.
 """
 
 import re
-from collections import Counter
-from collections.abc import Mapping
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
@@ -222,12 +222,29 @@ class Regression(Record):
         return ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items()))
 
     def beside(self, baseline: "Regression") -> "Regression":
-        """Marks the cases that the baseline has with the same verdict and the same failure instead as known."""
-        known = {(case.digest, case.verdict, case.found) for case in baseline.cases}
-        cases = tuple(
-            case.model_copy(update={"known": (case.digest, case.verdict, case.found) in known}) for case in self.cases
-        )
-        return self.model_copy(update={"cases": cases})
+        """Marks the cases that the baseline has with the same verdict and the same failure instead as known.
+
+        The reason of another case that does not pass tells why it is not known.
+        """
+        before = defaultdict[str, list[Case]](list)
+        for case in baseline.cases:
+            before[case.digest].append(case)
+        return self.model_copy(update={"cases": tuple(_compared(case, before[case.digest]) for case in self.cases)})
+
+
+def _compared(case: Case, before: Sequence[Case]) -> Case:
+    if any((each.verdict, each.found) == (case.verdict, case.found) for each in before):
+        return case.model_copy(update={"known": True})
+    if case.passed:
+        return case
+    verdicts = sorted({_words(each.verdict) for each in before})
+    if not verdicts:
+        why = "the baseline does not have it"
+    elif verdicts == [_words(case.verdict)]:
+        why = "the baseline has another failure instead"
+    else:
+        why = f"in the baseline it is {' and '.join(verdicts)}"
+    return case.model_copy(update={"reason": f"{case.reason}; {why}"})
 
 
 class CampaignRegression(Record):

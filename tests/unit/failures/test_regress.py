@@ -41,6 +41,12 @@ def test_a_baseline_makes_the_same_verdict_of_the_same_failure_known_and_no_othe
         case(Verdict.STILL_FAILING), case(Verdict.STILL_FAILING, "b"), case(Verdict.NEW_KIND, "d", found="leader")
     )
     assert [each.known for each in now.beside(before).cases] == [True, False, False, False]
+    assert [each.reason.partition("; ")[2] for each in now.beside(before).cases] == [
+        "",
+        "in the baseline it is still failing",
+        "the baseline does not have it",
+        "the baseline has another failure instead",
+    ]
     assert not now.beside(before).passed
     assert now.beside(now).passed
 
