@@ -189,7 +189,7 @@ class Campaign(CampaignSummary):
 
 
 class CampaignCheck(Record):
-    """Adjustments of a campaign, and its detections."""
+    """Adjusted settings of a campaign, and its known detections."""
 
     adjustments: tuple[Adjustment, ...]
     """Changes from the requested settings."""
