@@ -147,7 +147,10 @@ _EXPECTED = {
     "int_type": "an integer",
     "model_type": "a JSON object",
     "tuple_type": "a JSON array",
+    "union_tag_invalid": "{discriminator} one of {expected_tags}",
+    "union_tag_not_found": "{discriminator}, which says what it is",
 }
+_CHOSEN = ("literal_error", "enum", "union_tag_invalid")
 
 Location = tuple[int | str, ...]
 
@@ -192,9 +195,10 @@ def field_error(item: Mapping[str, Any], model: type[BaseModel] | None = None) -
         return ConfigError(field, got, f"a JSON object of {', '.join(_fields_at(location, model))}")
     template = _EXPECTED.get(item["type"])
     if template:
-        expected = template.format(**item.get("ctx", {}))
-        choices = re.findall(r"'([^']+)'", expected) if item["type"] in ("literal_error", "enum") else []
-        return ConfigError(field, got, expected, did_you_mean(str(item.get("input")), choices))
+        context = item.get("ctx", {})
+        expected = template.format(**context)
+        choices = re.findall(r"'([^']+)'", expected) if item["type"] in _CHOSEN else []
+        return ConfigError(field, got, expected, did_you_mean(str(context.get("tag", item.get("input"))), choices))
     return ConfigError(field, got, str(item["msg"]).removeprefix("Input should be ").partition(",")[0])
 
 

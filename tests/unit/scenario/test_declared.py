@@ -1,13 +1,17 @@
 """Declared distributions of scenes: samples by scipy's estimators, and the way back from a scene to its shares."""
 
+import re
+
 import numpy as np
 import pytest
+import yaml
 from scipy import stats
 
 from risk_sac.config.distribution import RankCorrelation
 from risk_sac.config.scenario import ScenarioParameter
 from risk_sac.errors import ConfigError
 from risk_sac.scenario.declared import SceneLaw
+from risk_sac.scenario.reading import document_from
 from risk_sac.scenario.space import Parameter, SceneSpace
 
 PARAMETERS = {
@@ -84,3 +88,21 @@ def test_density_is_that_of_the_samples(samples):
     pair = SceneLaw(declared.axes, RankCorrelation(parameters=("speed", "gap"), spearman=((1, -0.6), (-0.6, 1))))
     density = np.mean([pair.density(one) for one in grid]) / pair.axes[2].density(0.9)
     assert inside.mean() == pytest.approx(density * 0.04, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("law", "wanted"),
+    [
+        ({"kind": "norml"}, r"'uniform', 'normal', .*; did you mean normal\?$"),
+        ({"kind": "\0" + "x" * 5000}, r"'uniform', 'normal', "),
+        ({"mean": 1}, r"wanted 'kind'"),
+    ],
+)
+def test_an_unknown_kind_of_distribution_is_refused_in_one_line_with_those_that_exist(law, wanted):
+    text = yaml.safe_dump({"parameters": {"gap": {"range": [0, 10], "distribution": law}}})
+    with pytest.raises(ConfigError) as refusal:
+        document_from(text)
+    line = next(line for line in map(str, (refusal.value, *refusal.value.others)) if "distribution" in line)
+    assert re.search(wanted, line)
+    assert line.isprintable()
+    assert len(line) < 500

@@ -74,7 +74,7 @@ def _number(fields: dict[str, Any], draw: random.Random) -> None:
     numbers = [(at, key) for at, key in _places(fields) if isinstance(at[key], int | float)]
     if numbers:
         container, key = draw.choice(numbers)
-        container[key] *= draw.choice((-1, 0, 0.5, 0.9, 0.99, 1.01, 1.1, 2, 1e6))
+        container[key] = min(container[key], 1e300) * draw.choice((-1, 0, 0.5, 0.9, 0.99, 1.01, 1.1, 2, 1e6))
 
 
 def _distribution(fields: dict[str, Any], draw: random.Random) -> None:
