@@ -147,8 +147,8 @@ _EXPECTED = {
     "int_type": "an integer",
     "model_type": "a JSON object",
     "tuple_type": "a JSON array",
-    "union_tag_invalid": "{discriminator} one of {expected_tags}",
-    "union_tag_not_found": "{discriminator}, which says what it is",
+    "union_tag_invalid": "a {discriminator} of {expected_tags}",
+    "union_tag_not_found": "a {discriminator}",
 }
 _CHOSEN = ("literal_error", "enum", "union_tag_invalid")
 
@@ -197,7 +197,8 @@ def field_error(item: Mapping[str, Any], model: type[BaseModel] | None = None) -
     if template:
         context = item.get("ctx", {})
         expected = template.format(**context)
-        choices = re.findall(r"'([^']+)'", expected) if item["type"] in _CHOSEN else []
+        named = context.get("expected_tags", expected) if item["type"] in _CHOSEN else ""
+        choices = re.findall(r"'([^']+)'", named)
         return ConfigError(field, got, expected, did_you_mean(str(context.get("tag", item.get("input"))), choices))
     return ConfigError(field, got, str(item["msg"]).removeprefix("Input should be ").partition(",")[0])
 

@@ -189,7 +189,7 @@ class Campaign(CampaignSummary):
 
 
 class CampaignCheck(Record):
-    """Adjusted settings of a campaign, and its known detections."""
+    """Adjustments of a campaign, and the known defects that it detects."""
 
     adjustments: tuple[Adjustment, ...]
     """Changes from the requested settings."""

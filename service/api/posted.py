@@ -103,7 +103,7 @@ def media_type(request: Request, wanted: Collection[str], hint: str = "") -> str
     if declared not in wanted:
         example = f"curl -H 'content-type: {next(iter(wanted))}' --data-binary @FILE"
         remedy = f"wanted {' or '.join(wanted)}: send the file alone, as in `{example}`"
-        raise _unsupported(f"content-type is {given[:100]!r}; {remedy}{hint}")
+        raise _unsupported(f"content-type is {given[:100]!r}; {remedy}{hint and f'. {hint}'}")
     encoding = request.headers.get("content-encoding", "identity")
     if encoding.strip().lower() != "identity":
         raise _unsupported(f"content-encoding is {encoding[:100]!r}; wanted none: send the body as it is")

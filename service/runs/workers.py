@@ -1,4 +1,4 @@
-"""Running runs by worker, and the queue in its order."""
+"""Runs by worker, and the queue in its order."""
 
 from collections import Counter, deque
 from collections.abc import Collection, Iterator, Mapping, Sequence

@@ -119,11 +119,15 @@ def new_page(browser: "Browser", service: Service) -> Iterator[Callable[..., "Pa
         page = context.new_page()
         page.set_default_timeout(LONG_MS)
 
-        def tell(text: str) -> None:
+        def tell(text: str, url: str = "") -> None:
             if not any(each in text for each in allowed):
-                said.append(text)
+                said.append(f"{text} {url}")
 
-        page.on("console", lambda message: tell(_located(message)) if message.type == "error" else None)
+        def tell_error(message: "ConsoleMessage") -> None:
+            if message.type == "error":
+                tell(message.text, message.location.get("url", ""))
+
+        page.on("console", tell_error)
         page.on("pageerror", lambda error: tell(str(error)))
         page.on("request", lambda request: tell(f"asked {request.url}") if _leaves(request.url) else None)
         return page
@@ -132,10 +136,6 @@ def new_page(browser: "Browser", service: Service) -> Iterator[Callable[..., "Pa
     for context in contexts:
         context.close()
     assert not said
-
-
-def _located(message: "ConsoleMessage") -> str:
-    return f"{message.text} at {message.location.get('url')}"
 
 
 def _leaves(url: str) -> bool:

@@ -52,7 +52,7 @@ router = APIRouter(prefix="/v1/scenarios", tags=["scenarios"], responses=INVALID
 
 
 def _refuse_other_types(request: Request) -> None:
-    media_type(request, MEDIA_TYPES, hint=f". {ZIPPED}")
+    media_type(request, MEDIA_TYPES, hint=ZIPPED)
 
 
 async def _received(request: Request) -> bytes:

@@ -76,7 +76,7 @@ def get_metrics(service: Service) -> Response:
 
 @router.get("/v1/workers", tags=["operations"])
 def get_workers(service: Service, caller: CurrentCaller) -> Workers:
-    """Running runs by worker, and the queue in its order."""
+    """Runs by worker, and the queue in its order."""
     return workers_body(service.manager, service.store, service.settings, caller.sees)
 
 

@@ -95,7 +95,7 @@ def test_density_is_that_of_the_samples(samples):
     [
         ({"kind": "norml"}, r"'uniform', 'normal', .*; did you mean normal\?$"),
         ({"kind": "\0" + "x" * 5000}, r"'uniform', 'normal', "),
-        ({"mean": 1}, r"wanted 'kind'"),
+        ({"mean": 1}, r"wanted a 'kind'"),
     ],
 )
 def test_an_unknown_kind_of_distribution_is_refused_in_one_line_with_those_that_exist(law, wanted):
