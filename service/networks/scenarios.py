@@ -12,6 +12,7 @@ import secrets
 import shutil
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -69,8 +70,9 @@ class Scenarios:
             row, text = summary_of(name, shipped_document(name)), scenario_file(name).read_text()
         else:
             record = self._record(name, project)
-            document = self._document(name)
-            row, text = summary_of(name, document, _time(record)), library.written(document)
+            with self._unless_deleted(name, project):
+                document = self._document(name)
+                row, text = summary_of(name, document, _time(record)), library.written(document)
         return ScenarioDetails(**row.model_dump(), document=text)
 
     def add(self, upload: bytes, project: str, ego_entity: str = "") -> tuple[ScenarioDetails, bool]:
@@ -105,9 +107,10 @@ class Scenarios:
         return ScenarioCheck.model_validate_json(self._run("check", upload, ego_entity))
 
     def picture(self, name: str) -> bytes:
-        """Draws a scenario that `get` has returned."""
+        """Draws a scenario that `get` has returned; raises `NotFoundError` if it is deleted meanwhile."""
         if name not in shipped_names():
-            return self._run("picture", b"", name)
+            with self._unless_deleted(name, None):
+                return self._run("picture", b"", name)
         with self._drawing:  # all at once: a process starts in three seconds, and draws one in a fifth of a second
             if not self._shipped:
                 drawn = json.loads(self._run("pictures", b""))
@@ -159,6 +162,15 @@ class Scenarios:
             if record.name == name:
                 return record
         raise NotFoundError(f"there is no scenario {name!r}", field="scenario", got=name)
+
+    @contextmanager
+    def _unless_deleted(self, name: str, project: str | None) -> Iterator[None]:
+        """Turns an error of reading a scenario into `NotFoundError` if it is gone; another request may delete it."""
+        try:
+            yield
+        except (ConfigError, DamagedError, StorageError, OSError):
+            self._record(name, project)
+            raise
 
     def _run(self, action: str, upload: bytes, *arguments: str) -> bytes:
         with self._lock:

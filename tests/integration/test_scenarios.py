@@ -1,7 +1,9 @@
 """Scenarios of a user's own on a real server."""
 
 import io
+import time
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +60,27 @@ def test_posted_scenario_is_listed_drawn_searched_and_deleted(shared):
     assert shared.client.delete(f"/v1/scenarios/{other}").status_code == 204
     assert shared.client.get(f"/v1/scenarios/{other}").status_code == 404
     assert shared.client.post("/v1/campaigns", json=CAMPAIGN | {"scenarios": [other]}).status_code == 422
+
+
+def test_a_scenario_deleted_while_it_is_read_or_drawn_is_unknown(shared):
+    for attempt in range(8):
+        name = post(shared, DOCUMENT | {"name": f"gone_{attempt}"}).json()["name"]
+        paths = [f"/v1/scenarios/{name}"] * 3 + [f"/v1/scenarios/{name}/picture.png"]
+        statuses = set[int]()
+
+        def read_until_gone(path: str, statuses: set[int] = statuses) -> None:
+            status = 0
+            while status != 404:
+                status = shared.client.get(path, timeout=120).status_code
+                statuses.add(status)
+
+        with ThreadPoolExecutor(len(paths)) as readers:
+            reads = [readers.submit(read_until_gone, path) for path in paths]
+            time.sleep(0.1 * attempt)
+            assert shared.client.delete(f"/v1/scenarios/{name}").status_code == 204
+            for read in reads:
+                read.result()
+        assert statuses <= {200, 404}, statuses
 
 
 def test_net_comes_in_an_archive(shared):

@@ -60,7 +60,7 @@ def test_a_document_is_checked_saved_chosen_and_deleted(page_at: Callable[..., P
     expect(page.get_by_role("status").filter(has_text="The service would take it")).to_be_visible()
     page.go_back()
     expect(page.get_by_role("button", name="Delete", exact=True)).to_be_visible()
-    page.wait_for_function("[...document.images].every((image) => image.complete)")  # else its picture is gone, a 404
+    expect(page.get_by_alt_text("The scenario from above")).to_be_visible()  # else its picture is gone, a 404
     page.get_by_role("button", name="Delete", exact=True).click()
     page.get_by_role("button", name="Delete for good").click()
     expect(page).to_have_url(re.compile("#/scenarios$"))
