@@ -63,7 +63,7 @@ def test_posted_scenario_is_listed_drawn_searched_and_deleted(shared):
 
 
 def test_a_scenario_deleted_while_it_is_read_or_drawn_is_unknown(shared):
-    for attempt in range(8):
+    for attempt in range(3):
         name = post(shared, DOCUMENT | {"name": f"gone_{attempt}"}).json()["name"]
         paths = [f"/v1/scenarios/{name}"] * 3 + [f"/v1/scenarios/{name}/picture.png"]
         statuses = set[int]()
@@ -76,7 +76,7 @@ def test_a_scenario_deleted_while_it_is_read_or_drawn_is_unknown(shared):
 
         with ThreadPoolExecutor(len(paths)) as readers:
             reads = [readers.submit(read_until_gone, path) for path in paths]
-            time.sleep(0.1 * attempt)
+            time.sleep(0.2 * attempt)
             assert shared.client.delete(f"/v1/scenarios/{name}").status_code == 204
             for read in reads:
                 read.result()
