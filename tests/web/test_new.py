@@ -56,7 +56,7 @@ def test_what_is_shown_is_what_is_sent_and_what_the_api_then_has(
 ) -> None:
     page = page_at("new")
     small(page, HOSTILE)
-    wanted = {"label": HOSTILE, "families": ["low"], "methods": ["random"], "budget": {"episodes": 3}}
+    wanted = {"label": HOSTILE, "families": ["mixed"], "methods": ["random"], "budget": {"episodes": 3}}
     assert curl_body(page) == wanted  # and nothing that is the default anyway
     assert yaml.safe_load(source(page, "YAML")) == wanted
     shown = shlex.split(source(page, "curl"))[-1]
@@ -92,7 +92,7 @@ def test_a_refusal_stands_beside_its_field(page_at: Callable[..., Page], service
     before = len(service.client.get("/v1/campaigns").json()["items"])
     more(page)
     page.get_by_label("Episodes", exact=True).fill("0")
-    page.get_by_role("checkbox", name="low", exact=True).uncheck()
+    page.get_by_role("checkbox", name="mixed", exact=True).uncheck()
     page.get_by_role("button", name="Start the campaign").click()
     episodes = page.locator(".field", has=page.get_by_label("Episodes", exact=True))
     expect(episodes.get_by_role("alert")).to_contain_text("greater than or equal to 1")
@@ -101,7 +101,7 @@ def test_a_refusal_stands_beside_its_field(page_at: Callable[..., Page], service
     page.get_by_role("button", name="budget.episodes").click()
     expect(page.get_by_label("Episodes", exact=True)).to_be_focused()
     page.get_by_label("Episodes", exact=True).fill("3")
-    page.get_by_role("checkbox", name="low", exact=True).check()
+    page.get_by_role("checkbox", name="mixed", exact=True).check()
     expect(page.locator(".is-wrong")).to_have_count(0)
     assert len(service.client.get("/v1/campaigns").json()["items"]) == before
 
@@ -160,7 +160,7 @@ def test_what_an_earlier_campaign_set_deep_down_is_cloned_too(page_at: Callable[
 
 
 def test_a_range_of_the_odd_is_moved_by_keys_and_by_numbers(page_at: Callable[..., Page], service: Service) -> None:
-    page = page_at("new")
+    page = page_at("new?scenario=low")
     more(page)
     odd = opened(page, "Operational design domain")
     friction = service.client.get("/v1/families").json()["items"][0]["odd"]["environment"]["friction"]
@@ -183,7 +183,7 @@ def test_what_a_family_does_not_support_is_said_before_the_campaign_starts(page_
     page = page_at("new")
     more(page)
     odd = opened(page, "Operational design domain")
-    page.get_by_role("checkbox", name="mixed").check()
+    page.get_by_role("checkbox", name="low", exact=True).check()
     odd.get_by_label("night", exact=True).check()
     assert curl_body(page)["odd"] == {"environment": {"time_of_day": ["day", "night"]}}
     expect(page.locator(".adjustments")).to_contain_text("odd.environment.time_of_day low: asked for {day, night}")
@@ -249,7 +249,7 @@ def test_each_effort_says_what_it_costs_and_follows_the_scenarios(page_at: Calla
     hour = page.get_by_role("button", name="An hour")
     hour.click()
     alone = curl_body(page)
-    for scenario in ("mixed", "dense", "cyclist_ahead", "child_between_cars"):
+    for scenario in ("low", "dense", "cyclist_ahead", "child_between_cars"):
         page.get_by_role("checkbox", name=scenario).check()
     expect(hour).to_have_attribute("aria-pressed", "true")
     chosen = curl_body(page)

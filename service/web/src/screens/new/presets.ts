@@ -17,6 +17,7 @@ export interface Effort {
   most: number;
 }
 
+export const FIRST = "mixed"; // scenario of a form that names none; in low a sound ego fails in minor contacts only
 const START_S = 6; // of a run
 const FIND_MOST = ["risk-sac-diverse", "archive"] as const;
 
@@ -32,7 +33,7 @@ export const EFFORTS: readonly Effort[] = [
  * @param scenarios what is searched; of each place of a map the scenario that it is most like.
  */
 export function applied({ methods, seeds, seconds, most }: Effort, spec: Values, scenarios: readonly string[], time: TimeOf): Values {
-  const searched = scenarios.length ? scenarios : ["low"];
+  const searched = scenarios.length ? scenarios : [FIRST];
   const round_s = seeds.length * roundOf(searched, methods, time);
   const starts_s = START_S * searched.length * seeds.length * methods.length;
   const episodes = seconds === null ? most : Math.max(60, Math.min(most, 100 * Math.floor((seconds - starts_s) / round_s / 100)));

@@ -16,7 +16,7 @@ import { Choices, Fields, Group, SchemaField } from "./field";
 import { FormContext, isWithin, type Wrong } from "./form";
 import { grounded, groundOf, OnMap, useExtent, type Ground } from "./ground";
 import { OddFields } from "./odd";
-import { applied, EFFORTS, isOf } from "./presets";
+import { applied, EFFORTS, FIRST, isOf } from "./presets";
 import { Preview } from "./preview";
 import { Requirements } from "./requirements";
 import { posted, type Description, type Field, type Json, type Shape, type Values } from "./schema";
@@ -88,7 +88,8 @@ function CampaignForm({ known: [description, known, methods, scenarios], from, g
   const searchedBy = (values: Values) => (ground ? Array<string>(extent ?? 1).fill(LIKE[ground.pattern]) : (values.families as string[]));
   const [spec, setSpec] = useState<Values>(() => {
     const empty = filled(shape, from?.spec ?? {}) as Values;
-    return from ? empty : applied(EFFORTS[0]!, { ...empty, families: [scenario ?? "low"] }, [scenario ?? "low"], time);
+    const families = [scenario ?? FIRST];
+    return from ? empty : applied(EFFORTS[0]!, { ...empty, families }, families, time);
   });
   const located = (values: Values) => (ground ? grounded(ground, values) : values);
   const body = useMemo(() => located(bodyOf(shape, spec)), [shape, spec]);
