@@ -45,7 +45,7 @@ class Measures(NamedTuple):
 
 
 class Gauge:
-    """Measures the frames of an episode one after the other, since requirements have a memory.
+    """Measures of an episode's frames in order, since requirements have a memory.
 
     Attributes:
       names: of the requirements, in the order of their robustness.
@@ -63,7 +63,7 @@ class Gauge:
         self.names = self._monitor.names
 
     def reset(self, carriageway: Carriageway) -> None:
-        """Forgets the previous episode; the next is on the net of this carriageway."""
+        """Forgets the previous episode; the next is on this carriageway's net."""
         self._monitor.reset()
         self._own.reset(carriageway)
 
