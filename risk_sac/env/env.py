@@ -208,7 +208,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     @property
     def defect_reached_s(self) -> float | None:
-        """Time from the release at which a planted defect first changed a command, s; None if none has."""
+        """Time from release to a defect's first changed command, s, or None."""
         return self.pilot.defect_reached_s if self.pilot and self.problem.ego.defects else None
 
     def signal_heads(self) -> bytes:

@@ -1,4 +1,4 @@
-"""Poses the problem of a run, and names its settings that are not supported as written."""
+"""Poses a run's problem, and names its settings not supported as written."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

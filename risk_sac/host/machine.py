@@ -156,7 +156,7 @@ def limit_memory(most_bytes: int) -> None:
 
 
 def memory_limit_bytes() -> int | None:
-    """Returns the memory that this process may write to; None where it is not limited."""
+    """Returns how much memory this process may write to, None if unlimited."""
     most, _ = resource.getrlimit(resource.RLIMIT_DATA)
     return None if most == resource.RLIM_INFINITY else most
 

@@ -259,7 +259,7 @@ class Stages:
         return np.array([self._stage(number) for number in range(count)], dtype=int)
 
     def _stage(self, number: int) -> int:
-        """The stage of a draw, from 0; draws beyond the last one belong to the last stage."""
+        """Returns a draw's stage, from 0, at most the last one."""
         return next((stage for stage, end in enumerate(self._ends) if number < end), len(self.sizes) - 1)
 
     def _fit(self, stage: int, known: Draws) -> None:

@@ -78,7 +78,7 @@ def estimated(ratios: Floats, trust: Floats, failed: Flags, played: Flags) -> Ra
 
 
 def with_exposure(estimates: Mapping[str, RateEstimate], scenes_per_hour: float | None) -> dict[str, RateEstimate]:
-    """Adds the rates in an hour that has so many scenes; None adds none."""
+    """Adds rates per hour, given scenes per hour; None adds none."""
     if scenes_per_hour is None:
         return dict(estimates)
     return {name: _hourly(estimate, scenes_per_hour) for name, estimate in estimates.items()}

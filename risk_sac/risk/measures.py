@@ -83,7 +83,7 @@ class Gauge:
         self._monitor.update(signals)
 
     def of(self, requirement: Requirement) -> "Gauge":
-        """A gauge of one requirement on the same net, with a memory of its own."""
+        """Returns a gauge of one requirement here, with its own memory."""
         alone = requirement.model_copy(update={"shapes": True})  # the soft minimum needs one that does
         gauge = Gauge((alone,), self._horizon_steps, self._rss, self._sharpness)
         gauge.reset(self.carriageway)

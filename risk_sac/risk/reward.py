@@ -95,7 +95,7 @@ class ViolationDepth:
 
 
 def worth(collision: Collision, config: RewardConfig) -> float:
-    """The share of the bonus for valid collisions that one is paid, in [0, 1].
+    """Share of the valid-collision bonus that a collision earns, in [0, 1].
 
     Choice: a minor one is paid less, since no headline counts it.
     """
@@ -196,7 +196,7 @@ def refuse_overlap(frame: Frame, scene: Scene) -> None:
 
 
 def danger_of(assessment: Assessment, *, in_conflict: bool) -> HardRule | None:
-    """C_hard of (5) for the frame of the release: the rule that it breaks, or None."""
+    """Finds the C_hard rule of (5) that the release frame breaks."""
     least_gap_m, margin_m = float(assessment.gap_m.min(initial=math.inf)), worst_rss_margin(assessment)
     return broken_hard_rule(least_gap_m, assessment.least.ttc_s, margin_m, in_conflict=in_conflict)
 

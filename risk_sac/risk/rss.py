@@ -219,7 +219,7 @@ def time_to_encounter(view: RelativeView, walks: Bools) -> Floats:
 
 @compiled
 def _least(slope: Floats, start: Floats) -> float:
-    """Computes min_{t ≥ 0} [ t + max_l (start_l + slope_l t) ] over lines.
+    """Computes min_{t ≥ 0} [t + max_l (start_l + slope_l t)].
 
     Every steepest line has a rising opposite.
     """
