@@ -218,7 +218,7 @@ def _common(ours: Any, theirs: Any) -> Any:
 
 
 def _no_scene(path: str, got: Any, space: SceneSpace) -> OddError:
-    """Makes the error of a field that leaves a scene parameter valueless."""
+    """Returns the error of a field that leaves a parameter no value."""
     names: dict[str, list[str]] = {}
     for parameter in space.parameters:
         if parameter.odd == path:
