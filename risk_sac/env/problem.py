@@ -33,7 +33,7 @@ from risk_sac.world.types import STEP_S
 
 
 def adjustments(spec: RunSpec | CampaignSpec) -> tuple[Adjustment, ...]:
-    """Compares the settings that a spec asks for with those episodes use.
+    """Compares what a spec asks of families with what their episodes use.
 
     A family that cannot be read any more, such as a place that the library has lost, is left out.
     """

@@ -65,7 +65,7 @@ def leave(status: int) -> NoReturn:
 
 
 def c_numbers(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
-    """Makes a function read and write numbers as libsumo must: C locale."""
+    """Makes a function read and write numbers in libsumo's C locale."""
 
     @wraps(function)
     def in_c_locale(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:

@@ -33,7 +33,7 @@ _ENCRYPTED = 0x1
 
 
 def unpacked(upload: Path) -> Iterator[bytes]:
-    """Yields the content of a file or archive; counts bytes while unpacking.
+    """Yields a file's content, or each archived file's; counts bytes while unpacking.
 
     Raises:
       MapError: it is too large, or an archive that could harm.

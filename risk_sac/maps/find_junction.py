@@ -169,7 +169,7 @@ def _moving(net: Net, leg: Leg) -> Fields:
 
 
 def approach(net: Net, edge: Edge) -> Approach:
-    """Finds ways on from a road's leftmost lanes; raises `NoFit` without any."""
+    """Finds a road's ways on, each from its leftmost lane; raises `NoFit`."""
     by_target: dict[str, Link] = {}
     for lane in edge.drivable:  # from right to left, so that the leftmost stays
         for link in net.onward.get(lane.id, ()):
@@ -200,7 +200,7 @@ def leg(net: Net, road: Approach, name: str, onward_s: float) -> Leg:
 
 
 def _words(links: Sequence[Link]) -> tuple[str, ...]:
-    """Names ways left, straight and right if distinct, else by numbers."""
+    """Names ways left to right: left, straight, right if distinct, else numbers."""
     turns_rad = [0.0 if abs(link.turn_rad) <= STRAIGHT_RAD else link.turn_rad for link in links]
     words = tuple("left" if turn_rad > 0.0 else "right" if turn_rad < 0.0 else "straight" for turn_rad in turns_rad)
     return words if len(set(words)) == len(words) else tuple(f"way_{i + 1}" for i in range(len(links)))

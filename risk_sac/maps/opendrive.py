@@ -88,7 +88,7 @@ def add_sidewalks(section: ET.Element) -> None:
 
 
 def sidewalk_options(types: Path, folder: Path) -> list[str]:
-    """Returns netconvert's options for sidewalks by types, and edges named by begin.
+    """Returns netconvert's options for sidewalks and for edges named by their begin.
 
     The types are copied into the folder that netconvert runs in, for a comma in a path would make a list.
     """

@@ -118,7 +118,7 @@ def track(net: Net, on: LaneWay, reference_m: float, beyond_m: float = 0.0) -> T
 
 
 def _is_taken(net: Net, link: Link, following: Sequence[str]) -> bool:
-    """Whether SUMO's drivers take a link among its lane's to that road.
+    """Whether SUMO's drivers take a link among alternatives to the same road.
 
     They take the one to the lane from which they come farthest along their route without a lane change, and of equals
     the one to the right.

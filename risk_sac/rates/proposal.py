@@ -100,7 +100,7 @@ def elite(margins: Floats, failed: np.typing.NDArray[np.bool_], latest: int) -> 
 
 
 def around(points: Floats, random: np.random.Generator) -> Gaussians | None:
-    """Fits Gaussians to points, `n x d`, without weights; None without points.
+    """Fits Gaussians to bare points, `n x d`; None without any.
 
     The likelier a point, the more it weighs. Up to `d` points have a Gaussian of unit covariance each.
     """

@@ -130,7 +130,7 @@ MOST_PER_HOUR = 1e9
 
 
 def stages_of(declared: SceneLaw, draws: int, seed: int, start: RateStart | None = None) -> Stages:
-    """Returns the stages of a run, over the axes that affect outcomes."""
+    """Returns a run's stages; axes without telling values are drawn as declared."""
     earlier = None if start is None else declared.normals(start.scenes)
     return Stages(int(declared.telling.sum()), draws, seed, earlier)
 

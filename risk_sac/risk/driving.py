@@ -392,7 +392,7 @@ FEATURES: Mapping[str, RoadUserFeature] = {feature.name: feature for feature in 
 
 
 def tail_probability(feature: RoadUserFeature, spread: HasTails, value: float) -> float:
-    """Computes how probable a value at least as unlikely is, from `LEAST`.
+    """Computes the probability of values at least as unlikely, [`LEAST`, 1].
 
     Args:
       feature: tells the side of the unlikely values.

@@ -45,7 +45,7 @@ class Measures(NamedTuple):
 
 
 class Gauge:
-    """Measures of an episode's frames in order, since requirements have a memory.
+    """Gauge that measures an episode's frames in order, as requirements have memory.
 
     Attributes:
       names: of the requirements, in the order of their robustness.

@@ -110,7 +110,7 @@ class Interpreter:
 
     @property
     def adversaries(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Names of adversaries that drive in lanes, and that move freely."""
+        """Names of adversaries in lanes, and of those that move freely."""
         driven, walking = list[str](), list[str]()
         for name, actor in self.document.actors.items():
             if actor.role == "adversary" or (actor.role == "story" and self._deviates(name)):

@@ -39,7 +39,7 @@ _SCHEMA = "{http://www.w3.org/2001/XMLSchema-instance}noNamespaceSchemaLocation"
 
 
 def library() -> Path:
-    """Returns the folder, which may not exist; raises `ConfigError` if unknown."""
+    """Returns the library's folder, which may not exist; raises `ConfigError` if unknown."""
     told = os.environ.get(VARIABLE)
     if told:
         return Path(told)

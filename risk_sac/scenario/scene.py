@@ -373,7 +373,7 @@ class SceneLayout:
                 yield _started(f"{name}_{i}", Role.BACKGROUND, place, speed_mps, body)
 
     def _on(self, track: Track) -> Iterator[tuple[float, float]]:
-        """Yields each vehicle's distance before the track's reference, and its speed."""
+        """Yields the distance before reference, and speed, of vehicles on a track."""
         reach_m = {(piece.edge, piece.lane): piece.reach_m for piece in track.pieces}
         for name, place in self._placed.items():
             _, piece, _ = place.track.start(place.before_m)

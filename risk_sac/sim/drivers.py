@@ -268,7 +268,7 @@ def _stand_in(start: StaticStart) -> bool:
 
 
 def _inside(edge: str, index: int, offset_m: float, half_m: float) -> tuple[float, float]:
-    """Returns right and left ends of a body across its lane's carriageway."""
+    """Clips a body's lateral ends, right and left, to the carriageway."""
     lane_m, lanes = libsumo.lane.getWidth(f"{edge}_{index}") / 2, libsumo.edge.getLaneNumber(edge)
     drivable = [0 <= beside < lanes and car_may_use(f"{edge}_{beside}") for beside in (index - 1, index + 1)]
     right_m, left_m = offset_m - half_m, offset_m + half_m

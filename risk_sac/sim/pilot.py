@@ -45,7 +45,7 @@ class Pilot(Protocol):
     """Drives the ego from the adversaries' release on."""
 
     def begin(self, layout: Layout, seed: int, frame: Frame) -> Motion:
-        """Takes over the ego's motion of the latest frame; raises `EgoFailed`."""
+        """Takes over the ego as the latest frame has it; raises `EgoFailed`."""
 
     def drive(self, frame: Frame, belief: Belief, along: Along) -> Motion:
         """Returns the ego's motion after the next step; raises `EgoFailed`."""

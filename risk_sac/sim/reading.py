@@ -1,4 +1,4 @@
-"""Reads SUMO's frames; its front bumpers and compass degrees end here."""
+"""Reads SUMO's frames; converts its front bumpers and compass degrees."""
 
 import math
 import re

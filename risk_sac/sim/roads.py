@@ -235,7 +235,7 @@ def _route_lane(route: tuple[str, ...], lane: str) -> RouteLane:
 
 
 def _stretch(lane: str) -> float:
-    """Returns a lane's drawn over its stated length; 1 within rounding."""
+    """Returns a lane's drawn length over its stated one; 1 within rounding."""
     drawn_m = float(np.hypot(*np.diff(libsumo.lane.getShape(lane), axis=0).T).sum())
     length_m: float = libsumo.lane.getLength(lane)
     return drawn_m / length_m if abs(drawn_m - length_m) > ROUNDED_M else 1.0

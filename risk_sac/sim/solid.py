@@ -84,7 +84,7 @@ def drives_into(
     statics: int = 0,
     room_m: float = 0.0,
 ) -> int:
-    """Finds where a vehicle's step and stop hit bodies but the ego's.
+    """Finds where a vehicle, stepping then braking, meets bodies except the ego's.
 
     A static body that it passes by moving on across at this speed is not in its way: it may leave the lane too late to
     stop. Others may move or brake, so it stays able to stop for them.
@@ -146,7 +146,7 @@ def drives_into(
 
 @compiled
 def walks_into(state: Floats, own: int, walk: tuple[float, ...], braking: tuple[float, float, float]) -> bool:
-    """Whether a pedestrian's step and stop hit bodies but the ego's.
+    """Whether a pedestrian, stepping then stopping, meets bodies except the ego's.
 
     Args:
       state: of a frame, `rows x n`.

@@ -189,7 +189,7 @@ class SumoSimulation:
         return self._reading.frame
 
     def hand_over_ego(self) -> None:
-        """Hands the ego to any pilot; raises `EgoFailed` if that cannot drive."""
+        """Hands the ego to its pilot, if any; raises `EgoFailed` on failure."""
         if self._pilot is None:
             return
         frame = self._reading.frame

@@ -277,7 +277,7 @@ def summary(net: Net) -> NetSummary:
 
 
 def net_remarks(net: Net) -> list[str]:
-    """Lists reasons why no pattern, or few places, fit on a net."""
+    """Lists reasons why a net fits no pattern or few places."""
     remarks = []
     driven = {edge.id for edge in net.edges.values() if edge.drivable}
     if not driven:

@@ -59,7 +59,7 @@ class Clothoid:
         return np.column_stack((x_m + dx, y_m + dy, heading, k0 + rate * s_m))
 
     def _integrals(self, s_m: Floats, rate: float) -> tuple[Floats, Floats]:
-        """Integrals of cos θ and sin θ from 0 to each arc length, by Gauss's quadrature."""
+        """Integrates cos θ and sin θ to arc lengths by Gauss's quadrature."""
         k0 = self.curvature_start
         turned = float(np.max(np.abs(s_m) * (abs(k0) + np.abs(rate * s_m)), initial=0.0))
         parts = max(1, math.ceil(turned / TURN_RAD))
@@ -95,7 +95,7 @@ def _row(rows: Floats) -> tuple[float, float, float, float]:
 
 @dataclass(frozen=True)
 class CubicCurve:
-    """Cubic curve u(p), v(p) from its begin's heading, by arc length.
+    """Cubic u(p), v(p) along and across the begin's heading, by arc length.
 
     The table of arc lengths is scaled to the stated length, so that a rounded length does not move the end.
     """

@@ -106,7 +106,7 @@ class Roadway:
 
     @cached_property
     def breaks_m(self) -> tuple[float, ...]:
-        """Places where a geometry, lane section, width or offset begins."""
+        """Places where a reference piece, lane section, width or offset begins."""
         lanes = [(section.start_m, lane) for section in self.sections for lane in section.lanes.values()]
         widths = [start + cubic.start_m for start, lane in lanes for cubic in (*lane.widths, *lane.borders)]
         starts = [cubic.start_m for cubic in self.offsets] + [section.start_m for section in self.sections]

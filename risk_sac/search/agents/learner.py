@@ -133,7 +133,7 @@ class Learner:
         return self._agent.frozen()
 
     def snapshot(self) -> PolicySnapshot:
-        """Current policy for another process; the same object until `learn` or `load`."""
+        """Returns the current policy for other processes; unchanged until `learn` or `load`."""
         if self._snapshot is None:
             self._snapshot = self._taken()
         return self._snapshot

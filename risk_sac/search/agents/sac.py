@@ -98,7 +98,7 @@ class Temperature(nn.Module):
 
 
 class SacAgent(Agent):
-    """Policy, twin critics with targets and learned temperature, with one generator.
+    """Policy, twin critics with targets and learned temperature, with one noise generator.
 
     Choice: the critics' hidden layers are normalised. Otherwise a memory of a few thousand transitions, replayed at the
     pace of the steps, makes them overrate untried actions. Source: Ball et al., "Efficient online reinforcement

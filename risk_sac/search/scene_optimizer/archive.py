@@ -61,7 +61,7 @@ class DiscountedBandit:
         return min(max(second / (first + second), low), high)
 
     def tell(self, arm: int, worth: float, effort: float = 1.0) -> None:
-        """Counts a pull of an arm, 0 or 1, with its effort."""
+        """Counts a pull of arm 0 or 1, with worth and effort."""
         self._worth[arm] = self._discount * self._worth[arm] + worth
         self._spent[arm] = self._discount * self._spent[arm] + self._unit_costs[arm] * effort
 

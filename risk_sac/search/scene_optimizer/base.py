@@ -152,7 +152,7 @@ class SceneOptimizer(ABC):
         """Learns from an episode; arguments as for `tell`, and its result."""
 
     def state(self) -> State:
-        """Returns all that continuing exactly here takes, between two episodes."""
+        """Returns all that an exact continuation needs; taken between two episodes."""
         return {**self._identity(), "maximum": self._maximum.state()}
 
     def load(self, state: State) -> None:

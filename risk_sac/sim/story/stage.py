@@ -121,7 +121,7 @@ class Stage:
         mover.follow(line, *line.project(pose.x_m, pose.y_m))
 
     def onto_way(self, mover: Mover) -> None:
-        """Puts an actor beyond its line's end on the way from there."""
+        """Puts an actor beyond either line end on the way from there."""
         if not mover.guided and not 0.0 <= mover.station_m < mover.line.length_m:
             self.onto_road(mover, mover.line.pose(mover.station_m, mover.left_m))
 
@@ -278,7 +278,7 @@ class Stage:
     def distance(
         self, one: Present, other: Present, along: Along, coordinates: Coordinates, *, freespace: bool
     ) -> tuple[float, float]:
-        """Computes two actors' distance, m, and its fall, m/s; never negative.
+        """Computes two actors' distance, m, at least 0, and closing speed, m/s.
 
         Without `freespace` it is that of their reference points, else that of their boxes.
         """
