@@ -1,1 +1,1 @@
-"""The closed loop as a Gymnasium environment, and the problem that it poses."""
+"""Gymnasium environment of the closed loop, and the problem that it poses."""

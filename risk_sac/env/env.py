@@ -1,4 +1,4 @@
-"""The closed loop as a Gymnasium environment: adversaries act, SUMO and its ego answer.
+"""Gymnasium environment: adversaries act, SUMO and its ego answer in closed loop.
 
 Importing this module registers RiskSAC/Low-v0, RiskSAC/MotorwayCutIn-v0 and so on for each shipped scenario, and
 `gymnasium.make("risk_sac.env.env:RiskSAC/Low-v0", ego="careful")` imports it first; see `risk_sac.gym_env`.
@@ -208,11 +208,11 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     @property
     def defect_reached_s(self) -> float | None:
-        """Time from the release at which a planted defect first changed a command, s; None if none has."""
+        """Time from release to a defect's first changed command, s, or None."""
         return self.pilot.defect_reached_s if self.pilot and self.problem.ego.defects else None
 
     def signal_heads(self) -> bytes:
-        """SUMO's letter of each link of each signal now, the signals in the order of their names."""
+        """SUMO's letter of each link, signal by signal, in order of name."""
         return self._sim.signal_heads()
 
     @c_numbers
@@ -263,7 +263,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         return self._observe(), {"robustness": self._measures.soft_min}
 
     def _lead_in(self, start: Frame, scene: Scene, lead_in_s: float) -> None:
-        """Traffic before the release: SUMO drives all vehicles, and pedestrians go on as the scene says."""
+        """Plays the traffic before the release, in which SUMO drives all vehicles."""
         self._frame = start
         self._measures = self._measure(None)
         self.trace.append(start, self._measures, None)
@@ -289,7 +289,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
         return np.concatenate(([True], self._measures.assessment.seen))
 
     def _cost(self) -> float:
-        """C_soft of Eq. 5 over the adversaries; updates what it remembers of them."""
+        """Computes C_soft of Eq. 5 over the adversaries; updates their memory."""
         frame, adversaries = self._frame, self._adversaries
         rows = adversaries.rows(frame)
         near = self._road.near(rows, frame.state)
@@ -330,7 +330,7 @@ class RiskSacEnv(gym.Env[Observation, Observation]):
 
     @property
     def deviations(self) -> Mapping[str, StoryDeviation]:
-        """Largest deviation of each actor from the scenario's story, if it left it."""
+        """Largest deviation of each actor that left the scenario's story."""
         return {
             name: StoryDeviation(
                 speed_mps=drift.mps,

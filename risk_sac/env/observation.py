@@ -1,4 +1,4 @@
-"""Encodes the joint policy's observation, in the ego's frame, scaled to about [-1, 1].
+"""Joint policy's observation, in the ego's frame, scaled to about ±1.
 
 Per adversary its motion relative to the ego and what C_soft remembers of it; then the ego itself, its signal and the
 scene ξ; then the robustness of every requirement, places of static bodies and the time left. Robustness and that memory

@@ -1,4 +1,4 @@
-"""Poses the problem of a run, and names its settings that are not supported as written."""
+"""Poses a run's problem, and names its settings not supported as written."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ from risk_sac.world.types import STEP_S
 
 
 def adjustments(spec: RunSpec | CampaignSpec) -> tuple[Adjustment, ...]:
-    """Compares what a spec asks of each family with what its episodes use.
+    """Compares what a spec asks of families with what their episodes use.
 
     A family that cannot be read any more, such as a place that the library has lost, is left out.
     """
@@ -182,7 +182,7 @@ class Problem:
         check_demand(spec, self.observation_size, self.action_size, self.family.horizon_steps)
 
     def check_grid(self, spec: RunSpec) -> None:
-        """Refuses a sweep of all points if the grid has more than the budget's episodes.
+        """Refuses a sweep of all points if the grid exceeds the budget.
 
         Raises:
           ConfigError: with the size of the grid.
@@ -196,7 +196,7 @@ class Problem:
             raise ConfigError("budget.all_points", got, wanted, "leave it out, and a stratified sample is played")
 
     def check_distributions(self, spec: RunSpec) -> None:
-        """Refuses a run that draws by the declared distributions if one has no mass in the ODD.
+        """Refuses a run whose declared distribution has no mass in the ODD.
 
         Raises:
           ConfigError: naming its parameter, or that no scene which it starts from is in the ODD.
@@ -214,7 +214,7 @@ class Problem:
         return SceneLaw.of(self.space, self.family.parameters, self.family.rank_correlation)
 
     def slice_of(self, spec: RunSpec) -> Slice:
-        """The slice of the scene space in which a run seeks the ego's boundary."""
+        """Returns the slice of scene space whose boundary a run seeks."""
         if spec.boundary is None:
             raise ConfigError("boundary", "nothing", "the parameters `over` which the method boundary searches")
         return Slice(self.space, spec.boundary, self.family.parameters)
@@ -289,7 +289,7 @@ def requirements_of(spec: CampaignSpec) -> Mapping[str, tuple[Requirement, ...]]
 
 
 def _requirements(spec: RunSpec | CampaignSpec, family: Family, odd: Odd, ego: EgoConfig) -> tuple[Requirement, ...]:
-    """Joins the requirements of an ODD, a scenario and a user; raises `ConfigError`."""
+    """Joins requirements of an ODD, a scenario and a user; raises `ConfigError`."""
     shipped = {each.name: each for each in requirements_from_odd(odd, ego.response_s)}
     own = {}
     for source, requirements in (("scenario.", family.requirements), ("", spec.requirements)):
@@ -341,7 +341,7 @@ def _rss_parameters(odd: Odd) -> RssParameters:
 
 
 def checked_campaign(spec: CampaignSpec) -> CampaignSpec:
-    """The campaign as it is to be kept, with the version of its ego.
+    """Returns a campaign to store, with the version of its ego.
 
     Refuses one that could not run; see `Problem.from_spec` and `check_installed` for the errors.
     """

@@ -35,7 +35,7 @@ MOST_EACH = 16  # episodes of a round for each process; more would only be chose
 
 
 def rollout_limit() -> int | None:
-    """Returns how many processes RISK_SAC_ROLLOUTS lets play one run; None where it is not set.
+    """Returns the most processes of a run by RISK_SAC_ROLLOUTS, or None.
 
     Raises:
       ConfigError: it is no positive integer.
@@ -49,12 +49,12 @@ def rollout_limit() -> int | None:
 
 
 def rollout_processes() -> int:
-    """Returns how many processes may play the episodes of one run; raises as `rollout_limit` does."""
+    """Returns how many processes may play a run; raises as `rollout_limit` does."""
     return rollout_limit() or cores()
 
 
 def check_batch(batch: int) -> None:
-    """Refuses rounds of more episodes than a search on this machine gains from.
+    """Refuses rounds of more episodes than a search here gains from.
 
     Raises:
       ConfigError: naming the batch.
@@ -66,7 +66,7 @@ def check_batch(batch: int) -> None:
 
 
 def _quotas(process: Path) -> Iterator[float]:
-    """CPU quotas of this process's control groups and of all around them, in processors; v1 and v2."""
+    """CPU quotas of this process's control groups and their ancestors, in processors."""
     try:
         groups = [line.split(":", 2)[1:] for line in (process / "cgroup").read_text("utf-8", "replace").splitlines()]
         mounts = [line.split(" - ") for line in (process / "mountinfo").read_text("utf-8", "replace").splitlines()]
@@ -91,7 +91,7 @@ def _quotas(process: Path) -> Iterator[float]:
 
 
 def _quota(group: Path) -> Iterator[float]:
-    """The CPU quota of one control group, if it has one, in processors."""
+    """The CPU quota of one control group, if any, in processors."""
     try:
         if (group / "cpu.max").exists():
             quota, period = (group / "cpu.max").read_text().split()
@@ -120,7 +120,7 @@ def user_cache() -> Path | None:
 
 
 def is_loopback(host: str) -> bool:
-    """Returns whether a host is a loopback address, such as `127.8.9.1`, `[::1]` or `localhost`."""
+    """Returns whether a host is loopback, such as `127.8.9.1` or `localhost`."""
     host = host.lower().removeprefix("[").removesuffix("]")
     try:
         address = ipaddress.ip_address(host)
@@ -141,7 +141,7 @@ _OUT_OF_MEMORY = (
 
 
 def limit_memory(most_bytes: int) -> None:
-    """Limits the memory that this process, and each that it starts, may write to.
+    """Limits the memory that this process and its children may write to.
 
     Libraries reserve far more address space than they use.
 
@@ -156,7 +156,7 @@ def limit_memory(most_bytes: int) -> None:
 
 
 def memory_limit_bytes() -> int | None:
-    """Returns the memory that this process may write to; None where it is not limited."""
+    """Returns how much memory this process may write to, None if unlimited."""
     most, _ = resource.getrlimit(resource.RLIMIT_DATA)
     return None if most == resource.RLIM_INFINITY else most
 

@@ -1,4 +1,4 @@
-"""Settings that a process has once, such as its locale, kept apart for us and for foreign code.
+"""Process-wide settings, such as the locale, kept apart for foreign code.
 
     state = Preserved()
     with state:             # while it is imported, made, begun, closed
@@ -49,7 +49,7 @@ class Setting(NamedTuple):
 
 
 def collect_seldom() -> None:
-    """Searches for garbage seldom: modules and episodes are lasting objects, with hardly a cycle among them."""
+    """Collects garbage seldom, as modules and episodes last and have few cycles."""
     gc.set_threshold(50_000)
 
 
@@ -65,7 +65,7 @@ def leave(status: int) -> NoReturn:
 
 
 def c_numbers(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
-    """Has a function read and write numbers in the C locale, as libsumo must."""
+    """Makes a function read and write numbers in libsumo's C locale."""
 
     @wraps(function)
     def in_c_locale(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Answer:
@@ -87,7 +87,7 @@ def preserved() -> "Preserved":
 
 
 class _Swap:
-    """Exchanges some settings for those of the foreign code, for the time of a block."""
+    """Context manager that exchanges some settings for those of the foreign code."""
 
     def __init__(self, settings: Sequence[Setting], theirs: dict[Setting, Any]) -> None:
         self._settings, self._theirs = settings, theirs
@@ -119,8 +119,9 @@ class _Swap:
 
 
 class Preserved(_Swap):
-    """Exchanges all settings; `quick` those that cost little to read, which foreign code changes most.
+    """Exchange of all settings; `quick` exchanges those that cost little to read.
 
+    Foreign code changes the quick ones most.
     What a `quick` block has changed of the others is put right when the next block of all begins.
     """
 

@@ -48,7 +48,7 @@ class Output(Console):
         return super().render_str(printable(text), **style)
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Renders text that was made elsewhere with its control and direction characters escaped, too."""
+        """Renders foreign text with its control and direction characters escaped."""
         if isinstance(renderable, Text) and (shown := printable(renderable.plain)) != renderable.plain:
             renderable = Text(shown, style=renderable.style)
         return super().render(renderable, options)
@@ -73,7 +73,7 @@ def discard(stream: IO[str]) -> None:
 
 
 def prepare_streams() -> None:
-    """Let output take any character, and keep the descriptors of closed streams from files that are opened later."""
+    """Lets output take any character, and reserves the descriptors of closed streams."""
     while (null := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(null)
@@ -89,7 +89,7 @@ def _as_ascii(error: UnicodeError) -> tuple[str, int]:
 
 
 def flush() -> bool:
-    """Write the rest of the output; returns False, and drops it, if that is not possible."""
+    """Writes the rest of the output; returns False if it dropped any."""
     written = True
     for stream in filter(None, (sys.stdout, sys.stderr)):
         try:
@@ -103,7 +103,7 @@ def flush() -> bool:
 
 
 def printable(text: str) -> str:
-    r"""Escapes control, format and direction characters as `\u202e`; tabs, line feeds and spaces stay.
+    r"""Escapes control, format and direction characters as `\u202e`, except tabs and newlines.
 
     The escapes are those of JSON, and so a JSON document stays the same document.
     """
@@ -122,7 +122,7 @@ def complain(message: str) -> None:
 
 
 def run_command(command: Callable[[], int]) -> int:
-    """Run a command; returns its exit status, or 1 where the system refuses."""
+    """Runs a command; returns its exit status, or 1 on an `OSError`."""
     prepare_streams()
     try:
         status = command()
@@ -135,7 +135,7 @@ def run_command(command: Callable[[], int]) -> int:
 
 
 class LogFormatter(logging.Formatter):
-    """Formatter of lines that begin with their time in UTC, as ISO 8601."""
+    """Formatter of log lines that begin with their UTC time (ISO 8601)."""
 
     converter = staticmethod(time.gmtime)
     default_time_format = "%Y-%m-%dT%H:%M:%S"

@@ -32,17 +32,17 @@ EXACT_M = 0.01
 
 
 class Surroundings(NamedTuple):
-    """The carriageway around a square of the net, for one sector of headings."""
+    """Carriageway around a square of the net, for a sector of headings."""
 
     edges: Floats  # `k x 5`: x, y of both ends of a piece of the outline; 1 / length², 0 for a mere cut
     lanes: Floats  # `l x 7`: x, y, cos, sin, length of a segment of a lane's middle, any direction; speed limit; width
 
 
 class Carriageway:
-    """Carriageway of one net; surroundings are computed when an ego first reaches them."""
+    """Carriageway of a net, computed for surroundings that egos reach."""
 
     def __init__(self, net: Net | None = None) -> None:
-        """Reads the lanes and junctions of a net; without a net, the carriageway is empty."""
+        """Reads a net's lanes and junctions; without a net it is empty."""
         pieces, ways, segments = [], [], []
         for lane, limit_mps in () if net is None else _lanes(net):
             for i, (a, b) in enumerate(pairwise(lane.line)):
@@ -62,14 +62,14 @@ class Carriageway:
         self._lanes: dict[tuple[int, int], Floats] = {}
 
     def around(self, x_m: float, y_m: float, sector: int) -> Surroundings:
-        """Returns the surroundings of a point for a sector of headings, see `sector_of`, or `ANY_WAY`."""
+        """Returns a point's surroundings for a sector (see `sector_of`) or `ANY_WAY`."""
         key = *square_of(x_m, y_m), sector
         if (known := self._known.get(key)) is None:
             known = self._known[key] = self._surroundings(*key)
         return known
 
     def lanes(self, square: tuple[int, int]) -> Floats:
-        """Returns the lanes around a square, see `square_of`, as in `Surroundings`, without the outline."""
+        """Returns `Surroundings.lanes` around a square, see `square_of`."""
         if (known := self._lanes.get(square)) is None:
             near = self._near(_square(*square))
             known = self._lanes[square] = self._segments[near[near < len(self._segments)]]
@@ -91,7 +91,7 @@ class Carriageway:
 
 
 def square_of(x_m: float, y_m: float) -> tuple[int, int]:
-    """Returns the column and the row of the square that a point is in."""
+    """Returns column and row of the square that a point is in."""
     return int(x_m // SQUARE_M), int(y_m // SQUARE_M)
 
 
@@ -102,7 +102,7 @@ def _square(column: int, row: int) -> shapely.Polygon:
 
 @lru_cache(maxsize=8)
 def carriageway_of(net: str) -> Carriageway:
-    """Returns the carriageway of a net, a file below `sumo_nets/` or an absolute path."""
+    """Returns a net's carriageway; the file is below `sumo_nets/` or absolute."""
     return Carriageway(parse_net(read_tree(Path(str(files("sumo_nets"))) / net)))
 
 
@@ -112,7 +112,10 @@ def sector_of(heading_rad: float) -> int:
 
 
 def _lanes(net: Net) -> Iterator[tuple[NetLane, float]]:
-    """Finds lanes for cars and their speed limits; SUMO's limits inside junctions are turning speeds."""
+    """Yields lanes for cars and limits; junctions take those of entering lanes.
+
+    SUMO's limits inside junctions are turning speeds.
+    """
     entered: dict[str, float] = {}
     for link in (link for links in net.onward.values() for link in links):
         for lane in link.inside:
@@ -124,7 +127,7 @@ def _lanes(net: Net) -> Iterator[tuple[NetLane, float]]:
 
 
 def _crossed_junctions(net: Net) -> Iterator[shapely.Geometry]:
-    """Yields areas of junctions where links from different roads cross or meet, without walkways."""
+    """Yields junction areas where links of different roads meet, without walkways."""
     links: dict[str, list[Link]] = {}
     for leading in net.onward.values():
         for link in leading:
@@ -140,7 +143,7 @@ def _polygon(outline: Sequence[Point]) -> shapely.Geometry:
 
 
 def _outline(ground: shapely.Geometry, bounds: tuple[float, float, float, float]) -> Floats:
-    """Returns the rings of polygons as rows of `Surroundings.edges`; an edge on the bounds is a cut."""
+    """Returns polygons' rings as rows of `Surroundings.edges`; edges on bounds are cuts."""
     rows = []
     for polygon in shapely.get_parts(ground):
         for ring in (polygon.exterior, *polygon.interiors) if polygon.geom_type == "Polygon" else ():

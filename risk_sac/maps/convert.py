@@ -1,4 +1,4 @@
-"""Maps in other formats, and SUMO's from earlier versions, become nets by SUMO's own netconvert.
+"""Converts maps of other formats and older SUMO nets by SUMO's netconvert.
 
 netconvert comes with the package `eclipse-sumo`, not with `libsumo`; on a machine without it, only nets of the present
 format can be read.
@@ -91,19 +91,19 @@ def _from_opendrive(map_: Document, net: Path, name: str) -> list[str]:
 
 
 def remarks(output: str, severity: str) -> list[str]:
-    """Messages of SUMO's programs of a severity, `Error` or `Warning`; the first ones, shortened."""
+    """Returns SUMO's first messages of severity `Error` or `Warning`, shortened."""
     found = re.findall(rf"^{severity}: (.*)$", output, re.MULTILINE)
     return ["".join(filter(str.isprintable, line))[:_LONGEST] for line in found[:MOST_REMARKS]]
 
 
 def limit(resource_: int, most: int, pid: int = 0) -> None:
-    """Lowers a limit of a process for good, by default of this one."""
+    """Lowers a process's limit for good, by default this process's."""
     most = min([most, *(bound for bound in resource.prlimit(pid, resource_) if bound != resource.RLIM_INFINITY)])
     resource.prlimit(pid, resource_, (most, most))
 
 
 def netconvert() -> tuple[str, dict[str, str]]:
-    """Finds the netconvert program and its environment; raises `MapError` if it is not installed."""
+    """Finds the netconvert program and its environment; raises `MapError` if missing."""
     package = importlib.util.find_spec("sumo")
     for home in package.submodule_search_locations or () if package else ():
         if program := shutil.which("netconvert", path=str(Path(home) / "bin")):
@@ -125,7 +125,7 @@ def _version(attributes: Mapping[str, str]) -> tuple[int, ...]:
 
 
 def _convert(map_: Document, net: Path, name: str, options: Sequence[str] = ()) -> str:
-    """Runs netconvert, with limits, in the folder of its files; returns its messages.
+    """Runs netconvert within limits in its files' folder; returns its messages.
 
     A comma in a path would make a list.
     """

@@ -1,4 +1,4 @@
-"""Reads the XML documents of a map and writes them again without what could do harm.
+"""Reads a map's XML documents and rewrites them without harmful content.
 
 SUMO never sees the bytes that a user sent. Refused are document types, names of files, and whatever is beyond the
 limits; elements that no map needs are left out.
@@ -33,7 +33,7 @@ _ENCRYPTED = 0x1
 
 
 def unpacked(upload: Path) -> Iterator[bytes]:
-    """The file's content, or that of each file in it; every byte is counted while it is unpacked.
+    """Yields a file's content, or each archived file's; counts bytes while unpacking.
 
     Raises:
       MapError: it is too large, or an archive that could harm.
@@ -70,7 +70,7 @@ def _read(stream: IO[bytes] | BufferedIOBase, most: int) -> bytes:
 
 
 def _members(entries: list[zipfile.ZipInfo]) -> Iterable[zipfile.ZipInfo]:
-    """Files of an archive; their names and sizes decide nothing, and those of no honest archive are refused."""
+    """Yields an archive's files regardless of stated sizes; refuses dishonest archives."""
     if len(entries) > MAX_FILES:
         raise MapError("network", f"an archive with {len(entries)} entries", f"at most {MAX_FILES}")
     for entry in entries:
@@ -168,7 +168,7 @@ def _copied(content: bytes, file: Path, name: str) -> Document:
 
 
 class _Copy:
-    """Handlers of a parser that write what they are given, unless it is refused or left out."""
+    """Parser handlers that write their input, unless refused or left out."""
 
     def __init__(self, output: IO[str], name: str) -> None:
         self.root = ""
@@ -226,7 +226,7 @@ class _Copy:
                 raise self._refusal(f"{len(value)} characters in {key[:80]!r} of <{tag[:80]}>", f"at most {MAX_VALUE}")
 
     def _count_road(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """Counts roads, so that a map that is too large is refused before SUMO works on it."""
+        """Counts roads; refuses a map with too many before SUMO reads it."""
         if tag == "tag" and attributes.get("k") == "type" and attributes.get("v") == "lanelet":
             raise MapError("network", f"{self._name}, a Lanelet2 map", "another format", "export it as OpenDRIVE")
         is_way = tag == "tag" and self._path[-1] == "way" and attributes.get("k") == "highway"
@@ -236,7 +236,7 @@ class _Copy:
             raise self._refusal(f"more than {MAX_ROADS} roads", "at most that", SMALLER)
 
     def _note_side(self, tag: str, attributes: Mapping[str, str]) -> None:
-        """Counts the sides of traffic that `driving_side` in OpenStreetMap, or a road's `rule` in OpenDRIVE, states.
+        """Counts stated sides of traffic: OpenStreetMap's `driving_side` or OpenDRIVE's `rule`.
 
         Choice: where they contradict each other, the more frequent one decides.
         """
@@ -280,6 +280,6 @@ def _is_plain(key: str) -> bool:
 
 
 def _harmless(value: str) -> str:
-    """The value without what SUMO takes for an environment variable, and without characters that turn text."""
+    """Replaces a value's environment variables and text-direction characters."""
     value = value.replace("${", "_{")
     return value if value.isprintable() else "".join(char if char.isprintable() else "_" for char in value)

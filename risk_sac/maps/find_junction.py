@@ -100,7 +100,7 @@ def fit_junction(net: Net, spot: Spot) -> Fit:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A road that leads to a junction, with the tracks of a vehicle across it."""
+    """Road to a junction, with a vehicle's tracks across it."""
 
     name: str  # of the vehicle
     limit_mps: float
@@ -110,7 +110,7 @@ class Leg:
 
 
 def _fields(net: Net, own: Approach, legs: Sequence[Leg], streams: Mapping[str, Track], *, walked: bool) -> Fields:
-    """States what the document of a junction has; the first leg is the ego's."""
+    """States a junction's document fields; the first leg is the ego's."""
     offset, signal = parts.signal_parts(net, [link.signal for link in own.links])
     parameters: Fields = {}
     for one in legs:
@@ -155,7 +155,7 @@ def _parameters(leg: Leg) -> Fields:
 
 
 def _moving(net: Net, leg: Leg) -> Fields:
-    """States the vehicle of a leg; the word of its turn chooses lane and route."""
+    """States a leg's vehicle; its turn's word chooses lane and route."""
 
     def chosen(values: Sequence[Any]) -> Any:
         if all(value == values[0] for value in values):
@@ -169,7 +169,7 @@ def _moving(net: Net, leg: Leg) -> Fields:
 
 
 def approach(net: Net, edge: Edge) -> Approach:
-    """Finds the ways on from a road, each from its leftmost lane; raises `NoFit` for a dead end."""
+    """Finds a road's ways on, each from its leftmost lane; raises `NoFit`."""
     by_target: dict[str, Link] = {}
     for lane in edge.drivable:  # from right to left, so that the leftmost stays
         for link in net.onward.get(lane.id, ()):
@@ -183,7 +183,7 @@ def approach(net: Net, edge: Edge) -> Approach:
 
 
 def leg(net: Net, road: Approach, name: str, onward_s: float) -> Leg:
-    """Finds a vehicle's tracks from a road across the junction; raises `NoFit` if no way has room."""
+    """Finds a vehicle's tracks across the junction; raises `NoFit` without room."""
     links, tracks, whys = list[Link](), list[Track](), list[NoFit]()
     check_limit(road.links[0].source)
     limit_mps = road.links[0].source.limit_mps
@@ -200,7 +200,7 @@ def leg(net: Net, road: Approach, name: str, onward_s: float) -> Leg:
 
 
 def _words(links: Sequence[Link]) -> tuple[str, ...]:
-    """Names ways from left to right: left, straight and right where these tell them apart, else numbers."""
+    """Names ways left to right: left, straight, right if distinct, else numbers."""
     turns_rad = [0.0 if abs(link.turn_rad) <= STRAIGHT_RAD else link.turn_rad for link in links]
     words = tuple("left" if turn_rad > 0.0 else "right" if turn_rad < 0.0 else "straight" for turn_rad in turns_rad)
     return words if len(set(words)) == len(words) else tuple(f"way_{i + 1}" for i in range(len(links)))
@@ -219,7 +219,7 @@ def roomy(track: Track, edge: str, wanted_m: float) -> Track:
 
 
 def turn(net: Net, link: Link, onward_s: float) -> Track:
-    """The track over a link; raises `NoFit` if something is in the way."""
+    """Returns the track over a link; raises `NoFit` if it is obstructed."""
     found = _turn(net, link, onward_s)
     if isinstance(found, str):
         raise NoFit(found)
@@ -248,7 +248,7 @@ def _turn(net: Net, link: Link, onward_s: float) -> Track | str:
 
 
 def stream(net: Net, road: Approach) -> Track | None:
-    """Straight on from the rightmost lane, where a lane is left beside it."""
+    """Returns the rightmost lane's straight track if other lanes remain."""
     if len(road.edge.drivable) < 2:
         return None
     links = net.onward.get(road.edge.drivable[0].id)
@@ -278,7 +278,7 @@ def _others(net: Net, own: Approach) -> Mapping[str, Approach]:
 
 
 def _side(own: Approach, other: Approach) -> tuple[str, float]:
-    """From where another road comes, and by how much not quite from there."""
+    """Returns another road's side, and its angle off that side, rad."""
     relative = math.remainder(other.driven_rad - own.driven_rad, math.tau)
     if abs(relative) > ONCOMING_RAD:
         return "oncoming", math.pi - abs(relative)

@@ -42,7 +42,7 @@ def crossing_spots(net: Net) -> Iterator[Spot]:
 
 
 def fit_crossing(net: Net, spot: Spot) -> Fit:
-    """Writes the scenario of the crossing at the end of a road; raises `NoFit` without cover or room."""
+    """Writes a crossing's scenario; raises `NoFit` without cover or room."""
     edge = net.edges[spot.id]
     crossing = net.crossings_of[edge.end, edge.id][0]
     ways.check_limit(edge.drivable[0])
@@ -161,7 +161,7 @@ def _with_neighbour(net: Net, edge: Edge, _: Crossing) -> tuple[NetLane, Track, 
 
 
 def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[NetLane, Track, Track, Link]:
-    """The one lane, and the lane beside it on which others leave the crossing the other way."""
+    """Returns the only lane, the ego's and oncoming tracks, and the link."""
     (own,) = edge.drivable
     lanes = [net.edges[id_].drivable[-1] for id_ in crossing.edges if id_ in net.edges and net.edges[id_].drivable]
     beside = [lane for lane in lanes if net.edges[lane.edge].start == edge.end and _is_beside(own, lane)]
@@ -181,7 +181,7 @@ def _with_oncoming(net: Net, edge: Edge, crossing: Crossing) -> tuple[NetLane, T
 
 
 def _is_beside(own: NetLane, other: NetLane) -> bool:
-    """Whether a lane begins beside the end of another, on its left, and leads back."""
+    """Whether a lane begins left of another's end and leads back."""
     (x, y), (to_x, to_y) = own.line[-1], other.line[0]
     cos, sin = math.cos(own.way_out_rad), math.sin(own.way_out_rad)
     left_m = (to_y - y) * cos - (to_x - x) * sin
@@ -191,13 +191,13 @@ def _is_beside(own: NetLane, other: NetLane) -> bool:
 
 
 def _ego(net: Net, own: NetLane) -> tuple[Track, Link]:
-    """The ego's track, if there is room, and the link it begins with."""
+    """Returns the ego's track and first link; raises `NoFit` without room."""
     found, link = _straight(net, own, ways.AFTER_S)
     return roomy(found, own.edge, _room_wanted_m(own.limit_mps)), link
 
 
 def _straight(net: Net, lane: NetLane, onward_s: float) -> tuple[Track, Link]:
-    """The track over the straightest link of a lane that leads on so far, and that link."""
+    """Returns the straightest long enough track from a lane, and its link."""
     why = NoFit(f"lane {lane.id!r} leads nowhere, or nowhere that its signal ever lets anybody go")
     for link in sorted(net.onward.get(lane.id, ()), key=lambda link: abs(link.turn_rad)):
         try:
@@ -208,7 +208,7 @@ def _straight(net: Net, lane: NetLane, onward_s: float) -> tuple[Track, Link]:
 
 
 def _oncoming(net: Net, own: str, crossed: tuple[str, ...]) -> tuple[Track, ...]:
-    """Over the same crossing the other way: the lanes that lead to the other road that it crosses."""
+    """Returns opposite tracks over a crossing, to the other road it crosses."""
     links = [
         link
         for id_ in crossed

@@ -74,14 +74,14 @@ class NoFit(Exception):
 
 
 def lacking(got: float, unit: str, wanted: float) -> str:
-    """Says a number and the larger one that was wanted, to one digit that tells them apart."""
+    """States a number and the larger one wanted, with distinguishing digits."""
     below, above = math.floor(got * 10.0) / 10.0, math.ceil(round(wanted * 10.0, 6)) / 10.0
     return f"{below:g} {unit}; wanted {above:g} {unit}"
 
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """All places of a map, and why elsewhere there is none; in the order of the net."""
+    """All places of a map in net order, and reasons for misfits."""
 
     fits: tuple[Fit, ...]
     misfits: tuple[Misfit, ...]
@@ -100,7 +100,7 @@ Fields = dict[str, Any]
 
 
 def scenario_of(spot: Spot, summary: str, tags: Sequence[str], like: Mapping[str, Any], fields: Fields) -> Scenario:
-    """Makes the document of a place; `like` is the shipped family whose prior fits.
+    """Makes a place's document; `like` is the shipped family whose prior fits.
 
     Raises:
       NoFit: a document may not have the net's names.
@@ -127,7 +127,7 @@ def _name_of(spot: Spot) -> str:
 
 
 def number(range_: tuple[float, float], unit: str, meaning: str, odd: str | None = None) -> Fields:
-    """States a parameter of the scene space; raises `NoFit` if its range is empty."""
+    """States a scene parameter; raises `NoFit` if its range is empty."""
     if range_[0] > range_[1]:
         raise NoFit(f"there is no room for the {meaning}: it would be {range_[0]:g} to {range_[1]:g} {unit}")
     return {"unit": unit, "range": range_, "meaning": meaning} | ({"odd": odd} if odd else {})
@@ -149,7 +149,7 @@ def initial_speed(name: str, low: float, limit_mps: float, meaning: str) -> Fiel
 
 
 def walking(offset: str) -> Fields:
-    """States the parameters of a pedestrian: along the road, from the kerb, and how fast."""
+    """States a pedestrian's parameters: offset along the road, setback and speed."""
     speed = number((0.0, 2.0), "m/s", "initial walking speed", "dynamic.pedestrian_speed_mps")
     return {
         "pedestrian_offset_m": number((-WALK_OFFSET_M, WALK_OFFSET_M), "m", offset),
@@ -159,7 +159,7 @@ def walking(offset: str) -> Fields:
 
 
 def pedestrian(edge: str, side: str = "right") -> Fields:
-    """States the actor that is about to walk over the crossing at the end of an edge."""
+    """States a pedestrian about to cross at an edge's end."""
     return {
         "body": "pedestrian",
         "start": {
@@ -183,7 +183,7 @@ def signal_parts(net: Net, ids: Iterable[str | None]) -> tuple[Fields, Fields]:
 
 
 def at_most(usual: float, room: float) -> float:
-    """Computes the usual bound, or what a place has room for, to a tenth."""
+    """Returns the usual bound or a place's room, rounded down to tenths."""
     return usual if usual <= room else math.floor(room * 10 + 1e-9) / 10
 
 
@@ -193,12 +193,12 @@ def top_speed(limit_mps: float) -> float:
 
 
 def lane_of(net: Net, track: Track) -> str:
-    """Names the lane with the track's reference; raises `NoFit` if an edge has that name."""
+    """Names the track's reference lane; raises `NoFit` if it names an edge."""
     return _lane(net, next(piece for piece in reversed(track.pieces) if piece.reach_m >= 0.0))
 
 
 def route_of(net: Net, track: Track) -> list[str]:
-    """Writes a track as a route: its lanes, and the edges after these; raises as `lane_of`."""
+    """Returns a track's lanes, then edges, as a route; raises as `lane_of`."""
     return [*(_lane(net, piece) for piece in track.pieces), *track.onward]
 
 
@@ -213,7 +213,7 @@ AROUND_M = 100.0  # unused roads up to this far from a place stay: a picture sho
 
 
 def cut(net: Net, root: ET.Element, fit: Fit) -> bytes:
-    """The file of the piece around a place; `root` stays as it is."""
+    """Returns the file of the piece around a place; `root` stays unchanged."""
     driven = {edge for track in fit.tracks for edge in track.edges}
     crossed = {net.edges[id_].end for id_ in driven} | {net.edges[id_].start for id_ in driven}
     near = {
@@ -229,7 +229,7 @@ def cut(net: Net, root: ET.Element, fit: Fit) -> bytes:
 
 def _written(root: ET.Element, edges: Set[str], touched: Set[str], whole: Set[str], net: Net) -> bytes:
     def at(edge: str) -> str:
-        """The junction at the end of an edge, or the one that it is inside of."""
+        """Returns the junction at an edge's end, or the one around it."""
         return _inside_of(edge) if edge.startswith(":") else net.edges[edge].end if edge in net.edges else ""
 
     links = [link for link in root.iter("connection") if at(link.attrib["from"]) in whole]
@@ -255,7 +255,7 @@ def _written(root: ET.Element, edges: Set[str], touched: Set[str], whole: Set[st
 
 
 def _inside_of(id_: str, colon: str = ":") -> str:
-    """The junction that something is inside of, such as "J" of ":J_3" or ":J_w0"."""
+    """Returns the surrounding junction, such as "J" of ":J_3" or ":J_w0"."""
     return id_.removeprefix(colon).rpartition("_")[0]
 
 

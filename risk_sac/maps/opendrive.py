@@ -1,4 +1,4 @@
-"""Rewrites the roads of an OpenDRIVE map so that netconvert reads what it would drop or draw wrongly.
+"""Rewrites OpenDRIVE roads that netconvert would drop or draw wrongly.
 
 netconvert reads limits in lanes alone, mixes up lanes where a limit changes within a lane section, and draws a spiral
 of constant curvature as its chord. What it does not read at all is counted.
@@ -40,7 +40,7 @@ class Crosswalks:
 
 
 def find_crosswalks(file: Path) -> Crosswalks:
-    """Finds the crosswalks of a map, each with its nearest road; raises `MapError` if one lacks its place."""
+    """Finds crosswalks with their nearest roads; raises `MapError` for unplaced ones."""
     at, links = defaultdict[str, set[float]](set), dict[str, set[tuple[str, str]]]()
     for _, road in ET.iterparse(file):
         if road.tag == "road":
@@ -75,7 +75,7 @@ def _of(road: ET.Element) -> Iterator[tuple[str, float]]:
 
 
 def add_sidewalks(section: ET.Element) -> None:
-    """Adds sidewalks to a lane section where it has none; lanes stay in order from left to right."""
+    """Adds missing sidewalks to a lane section; lanes stay left to right."""
     for name, step in (("left", 1), ("right", -1)):
         side = section.find(name)
         lanes = [] if side is None else side.findall("lane")
@@ -88,7 +88,7 @@ def add_sidewalks(section: ET.Element) -> None:
 
 
 def sidewalk_options(types: Path, folder: Path) -> list[str]:
-    """Options of netconvert for sidewalks, by SUMO's types, and for edges named after where they begin.
+    """Returns netconvert's options for sidewalks and for edges named by their begin.
 
     The types are copied into the folder that netconvert runs in, for a comma in a path would make a list.
     """
@@ -123,7 +123,7 @@ def crossing_options(walks: Crosswalks, net: Net, folder: Path) -> list[str]:
 
 
 def _ends(right: Edge | None, left: Edge | None) -> tuple[str, str]:
-    """Junctions where a road begins and ends, of which one direction at least is there."""
+    """Returns a road's first and last junctions from one or both directions."""
     if right is not None:
         return right.start, right.end
     assert left is not None
@@ -143,7 +143,7 @@ Limits = Sequence[tuple[float, float | None]]  # m at which one begins, and m/s;
 
 
 def ready(file: Path, target: Path, walks: Crosswalks) -> list[str]:
-    """Writes a map for netconvert; returns remarks on what it lacks and what is lost.
+    """Writes a map for netconvert; returns remarks on its gaps and losses.
 
     Lane sections begin at the crosswalks, and their roads get sidewalks.
 
@@ -212,7 +212,7 @@ def _draw(geometry: ET.Element) -> None:
 
 
 def _cut(road: ET.Element, cuts: Set[float], lost: Counter[str]) -> None:
-    """Writes limits into the lanes of a road; begins a lane section where one changes, and at cuts."""
+    """Writes limits into lanes; begins lane sections at changes and cuts."""
     types = _sorted((float(kind.attrib["s"]), _of_type(kind, lost)) for kind in road.iterfind("type"))
     lanes = road.find("lanes")
     sections = [] if lanes is None else lanes.findall("laneSection")
@@ -241,7 +241,7 @@ def _cut(road: ET.Element, cuts: Set[float], lost: Counter[str]) -> None:
 
 
 def _of_type(kind: ET.Element, lost: Counter[str]) -> float | None:
-    """The limit of a road type; a motorway that states none has none."""
+    """Returns a road type's limit; motorways without one have no limit."""
     speed = kind.find("speed")
     return NO_LIMIT_MPS if speed is None and kind.get("type") == "motorway" else _mps(speed, lost)
 

@@ -34,7 +34,7 @@ class LaneWay:
 
 
 def way_on(net: Net, first: NetLane, seconds: float, through: Link | None = None, from_m: float = 0.0) -> LaneWay:
-    """Finds the straightest way on that takes `seconds` at the speed limits and uses no edge twice.
+    """Finds the straightest way of `seconds` at the limits without repeated edges.
 
     The seconds count from `from_m` along the first lane; `through` is the link that the way takes first.
 
@@ -74,11 +74,11 @@ def _onward(net: Net, lane: NetLane) -> list[Link]:
 
 
 def way_back(net: Net, last: NetLane, metres: float, onward: Sequence[str] = ()) -> LaneWay:
-    """The straightest way to a lane, `metres` of it before that lane; shorter where the map ends.
+    """Returns the straightest way to a lane, `metres` long at most.
 
-    It also ends where a lane forks into several of the next road, and SUMO would drive into another of them than the
-    one on the way; and at a signal, since a vehicle that starts before it may stand at its red light until the end.
-    `onward` are the edges that are driven after the lane's.
+    It ends earlier where the map ends; where a lane forks into several of the next road, and SUMO would drive into
+    another of them than the one on the way; and at a signal, since a vehicle that starts before it may stand at its red
+    light until the end. `onward` are the edges that are driven after the lane's.
     """
     lanes, links, length_m = [last], list[Link](), 0.0
     while length_m < metres:
@@ -118,7 +118,7 @@ def track(net: Net, on: LaneWay, reference_m: float, beyond_m: float = 0.0) -> T
 
 
 def _is_taken(net: Net, link: Link, following: Sequence[str]) -> bool:
-    """Whether SUMO's drivers take a link, of those that lead from its lane to the same road.
+    """Whether SUMO's drivers take a link among alternatives to the same road.
 
     They take the one to the lane from which they come farthest along their route without a lane change, and of equals
     the one to the right.
@@ -156,7 +156,7 @@ def check_lengths(net: Net, tracks: Iterable[Track]) -> None:
 
 @once
 def _off_length(net: Net, edge: str, following: str) -> NetLane | None:
-    """A lane of an edge, or from there to the following one, whose shape has another length."""
+    """Finds a lane of an edge, or onward, whose stated length differs."""
     lanes = net.edges[edge].drivable
     links = (link for lane in lanes for link in net.onward.get(lane.id, ()) if link.target.edge == following)
     used = (*lanes, *(lane for link in links for lane in link.inside))
@@ -197,7 +197,7 @@ def stretch_spots(net: Net) -> Iterator[Spot]:
 
 
 def fit_stretch(net: Net, spot: Spot) -> Fit:
-    """Writes car following on a road; raises `NoFit` where it has no room."""
+    """Writes car following on a road; raises `NoFit` without room."""
     edge = net.edges[spot.id]
     check_limit(edge.drivable[0])
     reference_m = round(edge.drivable[0].length_m / 2, 2)

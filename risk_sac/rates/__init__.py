@@ -1,1 +1,1 @@
-"""Failure rates under a declared distribution, from fewer episodes than plain draws take."""
+"""Failure rates under a declared distribution, by fewer episodes than plain draws."""

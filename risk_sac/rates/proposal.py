@@ -1,6 +1,6 @@
-"""Mixture that importance sampling draws from, in standard normal space, and how it follows earlier draws.
+"""Mixture that importance sampling draws from, fitted to earlier draws.
 
-q(z) = 0.1 N(0, I) + 0.2 N(0, 2² I) + 0.7 Σ_k π_k N(μ_k, Σ_k)
+q(z) = 0.1 N(0, I) + 0.2 N(0, 2² I) + 0.7 Σ_k π_k N(μ_k, Σ_k), in standard normal space
 
 The first term is the declared distribution itself, so that no weight p/q exceeds 10.
 
@@ -63,13 +63,13 @@ class Gaussians:
 
 
 def log_normal(points: Floats) -> Floats:
-    """Log density of the standard normal distribution, `n`, at points, `n x d`."""
+    """Log density, `n`, of the standard normal at points, `n x d`."""
     density: Floats = -0.5 * ((points**2).sum(axis=-1) + points.shape[-1] * _LOG_2PI)
     return density
 
 
 def defensive(dimension: int, fitted: Gaussians | None = None) -> Gaussians:
-    """The proposal; without fitted components the declared and the wide one share it in their proportion."""
+    """Returns the proposal; the declared and wide components alone without fitted ones."""
     shares = np.array([DECLARED, WIDE])
     means = np.zeros((2, dimension))
     factors = np.stack([np.eye(dimension), WIDE_DEVIATION * np.eye(dimension)])
@@ -83,7 +83,7 @@ def defensive(dimension: int, fitted: Gaussians | None = None) -> Gaussians:
 
 
 def elite(margins: Floats, failed: np.typing.NDArray[np.bool_], latest: int) -> np.typing.NDArray[np.bool_]:
-    """Selects the draws to fit, `n`: failures and, until these are many, the nearest.
+    """Selects the draws to fit, `n`: failures, and the nearest while few.
 
     Args:
       margins: `n x r`, of all draws and each requirement; inf where nothing is known.
@@ -100,7 +100,7 @@ def elite(margins: Floats, failed: np.typing.NDArray[np.bool_], latest: int) -> 
 
 
 def around(points: Floats, random: np.random.Generator) -> Gaussians | None:
-    """Fits Gaussians to points, `n x d`, of which nothing else is known; None without any.
+    """Fits Gaussians to bare points, `n x d`; None without any.
 
     The likelier a point, the more it weighs. Up to `d` points have a Gaussian of unit covariance each.
     """
@@ -113,7 +113,7 @@ def around(points: Floats, random: np.random.Generator) -> Gaussians | None:
 
 
 def fit(points: Floats, weights: Floats, random: np.random.Generator) -> Gaussians | None:
-    """Fits Gaussians to weighted points by expectation maximisation; None if there are at most `d`.
+    """Fits Gaussians to weighted points by EM; None if at most `d`.
 
     Args:
       points: `n x d`.
@@ -192,13 +192,13 @@ class Draws:
 
 
 def stage_sizes(draws: int) -> tuple[int, ...]:
-    """Number of draws of each stage; fewer than ten draws are one stage."""
+    """Returns the number of draws per stage; fewer than ten are one."""
     early = int(draws * EARLY_SHARE)
     return (*[early] * EARLY, draws - EARLY * early) if early else (draws,)
 
 
 class Stages:
-    """Proposals of the stages, each fitted once the draws before it are there.
+    """Proposals of the stages, each fitted to the draws before it.
 
     Attributes:
       sizes: draws of each stage.
@@ -221,7 +221,7 @@ class Stages:
         self._proposals = [defensive(dimension, first)]
 
     def draw(self, number: int, known: Callable[[], Draws]) -> Floats:
-        """The point of a draw, `d`; the same seed and earlier draws give the same one.
+        """Draws a point, `d`; the same for equal seed and earlier draws.
 
         Args:
           number: of the draw, from 0.
@@ -233,12 +233,12 @@ class Stages:
         return self._proposals[stage].draw(np.random.default_rng((self._seed, number)))
 
     def start(self, number: int) -> int:
-        """Returns the number of the first draw in the stage of a draw."""
+        """Returns the first draw of the stage that a draw belongs to."""
         stage = self._stage(number)
         return self._ends[stage - 1] if stage else 0
 
     def ratios(self, known: Draws) -> Floats:
-        """p(z) / q_s(z) of the draws so far, `n`, each with the proposal of its own stage."""
+        """Computes p(z) / q_s(z), `n`, of the draws by their stages' proposals."""
         ratios, stages = np.empty(len(known)), self._stages(len(known))
         for stage in np.unique(stages):
             drawn = known.points[stages == stage]
@@ -259,7 +259,7 @@ class Stages:
         return np.array([self._stage(number) for number in range(count)], dtype=int)
 
     def _stage(self, number: int) -> int:
-        """The stage of a draw, from 0; draws beyond the last one belong to the last stage."""
+        """Returns a draw's stage, from 0, at most the last one."""
         return next((stage for stage, end in enumerate(self._ends) if number < end), len(self.sizes) - 1)
 
     def _fit(self, stage: int, known: Draws) -> None:

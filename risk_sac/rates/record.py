@@ -78,7 +78,7 @@ def estimated(ratios: Floats, trust: Floats, failed: Flags, played: Flags) -> Ra
 
 
 def with_exposure(estimates: Mapping[str, RateEstimate], scenes_per_hour: float | None) -> dict[str, RateEstimate]:
-    """Adds the rates in an hour that has so many scenes; None adds none."""
+    """Adds rates per hour, given scenes per hour; None adds none."""
     if scenes_per_hour is None:
         return dict(estimates)
     return {name: _hourly(estimate, scenes_per_hour) for name, estimate in estimates.items()}
@@ -130,13 +130,13 @@ MOST_PER_HOUR = 1e9
 
 
 def stages_of(declared: SceneLaw, draws: int, seed: int, start: RateStart | None = None) -> Stages:
-    """Returns the stages of a run; axes that do not tell are drawn as declared."""
+    """Returns a run's stages; axes without telling values are drawn as declared."""
     earlier = None if start is None else declared.normals(start.scenes)
     return Stages(int(declared.telling.sum()), draws, seed, earlier)
 
 
 def rates_of(spec: RunSpec, records: Sequence[EpisodeRecord], scenes_per_hour: float | None = None) -> Rates:
-    """Estimates the rates of a run, finished or not; a pure function of its records.
+    """Estimates a run's rates, finished or not, from its records alone.
 
     Args:
       spec: of a run of the method `rate`.
@@ -174,12 +174,12 @@ def rates_of(spec: RunSpec, records: Sequence[EpisodeRecord], scenes_per_hour: f
 
 
 def write_rates(folder: Path, spec: RunSpec, records: Sequence[EpisodeRecord]) -> None:
-    """Writes the rates of a run that has ended to its folder; see `rates_of`."""
+    """Writes an ended run's rates to its folder; see `rates_of`."""
     replace_file(folder / RATES, wire(rates_of(spec, records)))
 
 
 def rated(problem: Problem) -> tuple[str, ...]:
-    """Lists the events with a rate: any failure, and each requirement that counts."""
+    """Lists the events with a rate: any failure, and each counting requirement."""
     return ANY, *(requirement.name for requirement in problem.requirements if requirement.counts == "failure")
 
 
@@ -205,7 +205,7 @@ def _draws(problem: Problem, declared: SceneLaw, records: Sequence[EpisodeRecord
 
 
 def _failed_as_played(record: EpisodeRecord) -> bool:
-    """Whether the sampler saw a failure; a replay that went another way came later."""
+    """Whether the sampler saw a failure, before any replay that went differently."""
     violations = (record.collision, *record.violations)
     return any(not set(violation.broken) - {REPEATS} for violation in violations if violation is not None)
 

@@ -1,4 +1,4 @@
-"""Soft realism cost: how unlikely it is that people behave as the adversaries do, step by step.
+"""Soft realism cost: how unlikely the adversaries' behaviour is, step by step.
 
 Every scale is absolute, so that the same motion costs the same under every preset of limits. A scale with a published
 distribution in `risk_sac.risk.driving` runs from 0 at a value that 1 of 100 road users exceeds to 1 at one that 1 of
@@ -65,7 +65,7 @@ FORGET = 2.0  # choice: timers run back twice as fast as they ran up, so that a 
 
 
 def _quantile(name: str, probability: float) -> float:
-    """Finds by bisection the value of a published feature that has this tail probability."""
+    """Finds the value at which a published feature has this tail probability."""
     feature = FEATURES[name]
     assert feature.spread is not None
     tail = feature.spread.above if feature.unlikely == "above" else feature.spread.below
@@ -143,7 +143,7 @@ class ConductRoad:
     """Road of an episode."""
 
     def __init__(self, layout: Layout, limit_mps: float, carriageway: Carriageway) -> None:
-        """Takes a layout, the limit where no lane is near, and the carriageway of the layout's net."""
+        """Takes a layout, the limit off its lanes, and its net's carriageway."""
         sides = [(*side, float(k)) for k, area in enumerate(layout.junctions) for side in area.sides]
         self._junctions = np.array(sides).reshape(-1, 4)
         self._usual = float(layout.lane_width_m), float(limit_mps)
@@ -182,7 +182,7 @@ def road_facts(
     usual: tuple[float, float],
     junctions: Floats,
 ) -> RoadFacts:
-    """Finds the lane of each adversary, given the fields of `LanesNear`; arguments as of `conduct_terms`."""
+    """Finds each adversary's lane by `LanesNear`; arguments as of `conduct_terms`."""
     width_m, limit_mps = np.empty(len(rows)), np.empty(len(rows))
     for k in range(len(rows)):
         row = rows[k]
@@ -205,7 +205,7 @@ def conduct_cost(
     usual: tuple[float, float],
     junctions: Floats,
 ) -> float:
-    """Computes the soft realism cost of a step; arguments as of `conduct_terms`, then the fields of `LanesNear`."""
+    """Computes a step's soft realism cost; arguments as of `conduct_terms` and `LanesNear`."""
     road = road_facts(rows, state, lanes, first, usual, junctions)
     return soft_cost(conduct_terms(rows, slots, kind, link, state, memory, road), rows, state)
 
@@ -227,7 +227,7 @@ def _in_junction(row: int, state: Floats, junctions: Floats) -> bool:
 
 @compiled
 def ramp(value: float, free: float, full: float) -> float:
-    """Computes (value - free) / (full - free), between 0 and 1; `full` may be the smaller one."""
+    """Clips (value - free) / (full - free) to [0, 1]."""
     return min(max((value - free) / (full - free), 0.0), 1.0)
 
 
@@ -246,7 +246,7 @@ def conduct_terms(
     memory: Floats,
     road: RoadFacts,
 ) -> Floats:
-    """Computes the terms of a step's soft realism cost, `adversaries x TERMS`, each in [0, 1].
+    """Computes a step's cost terms, `adversaries x TERMS`, each in [0, 1].
 
     Args:
       rows: columns of the adversaries in `state`.
@@ -271,7 +271,7 @@ def conduct_terms(
 
 @compiled
 def soft_cost(terms: Floats, rows: NDArray[np.intp], state: Floats) -> float:
-    """Computes the soft realism cost of a step from its terms, in [0, 1].
+    """Computes a step's soft realism cost from its terms, in [0, 1].
 
     C_soft(s, a) = min(1, Σ_k exp(-d_k / NEAR_M) · min(1, Σ_i c_ki))                    (5)
 
@@ -292,7 +292,7 @@ def soft_cost(terms: Floats, rows: NDArray[np.intp], state: Floats) -> float:
 
 @compiled
 def see_signals(rows: NDArray[np.intp], slots: NDArray[np.intp], link: NDArray[np.uint8], memory: Floats) -> None:
-    """Notes the signals ahead of the adversaries, before a step is judged; arguments as of `conduct_terms`."""
+    """Notes the signals ahead before a step; arguments as of `conduct_terms`."""
     for k in range(len(rows)):
         _see(link[rows[k]], memory[:, slots[k]])
 
@@ -307,7 +307,7 @@ def _see(letter: int, memory: Floats) -> None:
 def _enter(
     row: int, kind: NDArray[np.int8], link: NDArray[np.uint8], state: Floats, memory: Floats, terms: Floats
 ) -> None:
-    """Judges an entry into a junction, at a signal: on red, or before a vehicle that has priority."""
+    """Judges an entry into a junction: on red, or against priority."""
     if memory[LINK] != 0.0 and link[row] == 0 and state[SPEED, row] > STANDING_MPS:
         badly = 0.0
         if memory[LINK] in (STOP, WAIT):
@@ -321,7 +321,7 @@ def _enter(
 
 @compiled
 def _priority_s(row: int, kind: NDArray[np.int8], link: NDArray[np.uint8], state: Floats) -> float:
-    """Computes when the first vehicle with priority reaches the middle of a junction that another enters, s.
+    """Computes when the first vehicle with priority reaches a junction's middle, s.
 
     It keeps its speed and direction; infinite if none comes.
     """

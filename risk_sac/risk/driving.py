@@ -81,7 +81,7 @@ class LogisticSpread:
 
 @dataclass(frozen=True, slots=True)
 class UpperTail:
-    """An upper tail by points, log-linear between them; beyond the last it falls as before it."""
+    """Upper tail by points, log-linear between them and beyond the last."""
 
     values: tuple[float, ...]  # ascending
     probabilities: tuple[float, ...]  # descending, of at least that value
@@ -91,7 +91,7 @@ class UpperTail:
         return 1.0 - self.above(value)
 
     def above(self, value: float) -> float:
-        """Probability of a value of at least this; that of the first point before it."""
+        """Probability of at least this value; constant before the first point."""
         if value <= self.values[0] or len(self.values) == 1:
             return self.probabilities[0]
         k = 1
@@ -392,7 +392,7 @@ FEATURES: Mapping[str, RoadUserFeature] = {feature.name: feature for feature in 
 
 
 def tail_probability(feature: RoadUserFeature, spread: HasTails, value: float) -> float:
-    """Computes how probable a value at least as unlikely is, in [`LEAST`, 1].
+    """Computes the probability of values at least as unlikely, [`LEAST`, 1].
 
     Args:
       feature: tells the side of the unlikely values.

@@ -140,7 +140,10 @@ def parse(formula: str, step_s: float, horizon_steps: int) -> Node:
 
 
 def memory(node: Node) -> int:
-    """Samples back that a formula depends on; nested windows add up, unbounded ones count none."""
+    """Counts the past samples that a formula needs; unbounded windows count none.
+
+    Nested windows add up.
+    """
     own = node.window[1] if node.window else int(node.op == "prev")
     return own + max((memory(child) for child in node.children), default=0)
 
@@ -206,7 +209,7 @@ def _unexpected(error: UnexpectedToken, formula: str) -> FormulaError:
 
 @v_args(inline=True)
 class _Nodes(Transformer[Token, Node]):
-    """Builds the tree while lark parses, and checks the type and range of each node."""
+    """Transformer that builds the tree and checks type and range of nodes."""
 
     def __init__(self, step_s: Fraction) -> None:
         super().__init__()

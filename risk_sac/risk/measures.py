@@ -45,7 +45,7 @@ class Measures(NamedTuple):
 
 
 class Gauge:
-    """Measures the frames of an episode one after the other, since requirements have a memory.
+    """Gauge that measures an episode's frames in order, as requirements have memory.
 
     Attributes:
       names: of the requirements, in the order of their robustness.
@@ -63,7 +63,7 @@ class Gauge:
         self.names = self._monitor.names
 
     def reset(self, carriageway: Carriageway) -> None:
-        """Forgets the previous episode; the next is on the net of this carriageway."""
+        """Forgets the previous episode; the next is on this carriageway's net."""
         self._monitor.reset()
         self._own.reset(carriageway)
 
@@ -83,7 +83,7 @@ class Gauge:
         self._monitor.update(signals)
 
     def of(self, requirement: Requirement) -> "Gauge":
-        """A gauge of one requirement on the same net, with a memory of its own."""
+        """Returns a gauge of one requirement here, with its own memory."""
         alone = requirement.model_copy(update={"shapes": True})  # the soft minimum needs one that does
         gauge = Gauge((alone,), self._horizon_steps, self._rss, self._sharpness)
         gauge.reset(self.carriageway)

@@ -80,7 +80,7 @@ class OwnMotionGauge:
 def _measured(
     state: Floats, kind: NDArray[np.int8], past: tuple[float, float, float], now_s: float, edges: Floats, lanes: Floats
 ) -> tuple[tuple[float, float, float, float, float, float, float], bool]:
-    """The fields of `OwnMotion`, and whether the ego overtakes beyond the edge of its own direction."""
+    """Returns `OwnMotion`'s fields, and whether the ego overtakes beyond its direction's edge."""
     past_s, past_heading, past_accel = past
     speed, span_s = state[SPEED, 0], now_s - past_s
     jerk, yaw_rate = 0.0, 0.0
@@ -105,7 +105,7 @@ def _measured(
 
 @compiled
 def nearest_lane(lanes: Floats, x: float, y: float, heading: float) -> tuple[float, float, float]:
-    """Finds the distance to the nearest lane of a heading's direction, its limit and its width.
+    """Finds the nearest lane of a heading's direction: distance, limit and width.
 
     The distance is to the lane's middle, inf without one; limit and width are then those of the nearest lane of any
     direction, inf without one.
@@ -129,7 +129,7 @@ def nearest_lane(lanes: Floats, x: float, y: float, heading: float) -> tuple[flo
 
 @compiled
 def depths(edges: Floats, state: Floats) -> tuple[float, float]:
-    """The least and the largest depth of the ego's body in the carriageway, over 15 points of it."""
+    """Least and largest carriageway depth over 15 points of the ego's body."""
     cos, sin = math.cos(state[HEADING, 0]), math.sin(state[HEADING, 0])
     least, largest = EDGE_CAP_M, BEYOND_CAP_M
     for i in range(-2, 3):
@@ -142,7 +142,7 @@ def depths(edges: Floats, state: Floats) -> tuple[float, float]:
 
 @compiled
 def depth(edges: Floats, x: float, y: float) -> float:
-    """Distance of a point from the edge of the carriageway, negative outside (even-odd rule)."""
+    """Distance of a point from the carriageway's edge, negative outside (even-odd rule)."""
     inside, least2 = False, math.inf
     for i in range(len(edges)):
         dx, dy = x - edges[i, 0], y - edges[i, 1]
@@ -219,7 +219,7 @@ TTC, ENCOUNTER, RSS_LONGITUDINAL, RSS_LATERAL, RSS_SCALED, CHARGED = range(8, 14
 
 
 class LeastMargins(NamedTuple):
-    """The smallest of each measure over the actors it concerns; its cap where there is none."""
+    """Smallest of each measure over its actors; its cap if none."""
 
     ttc_s: float
     encounter_s: float
@@ -229,7 +229,7 @@ class LeastMargins(NamedTuple):
 
 
 class Assessment(NamedTuple):
-    """Risk measures of one frame, for each of the `n` actors other than the ego."""
+    """Risk measures of one frame for each of the `n` other actors."""
 
     others: Floats  # the rows above x n
     least: LeastMargins
@@ -287,7 +287,7 @@ def _assess(
 
 @compiled
 def in_charge(view: RelativeView) -> Bools:
-    """Whether the ego answers for each of `n` actors: for those ahead or alongside.
+    """Whether the ego answers for each of `n` actors: ahead or alongside.
 
     Choice: an actor from behind must keep the distance (RSS, rule 1), so TTC and RSS do not count it.
     """
@@ -315,7 +315,7 @@ def least_margins(others: Floats, kind: NDArray[np.int8]) -> tuple[float, float,
 
 
 def worst_rss_margin(assessment: Assessment) -> float:
-    """Finds the smallest RSS margin of the actors that the ego answers for, m.
+    """Finds the smallest RSS margin of actors the ego answers for, m.
 
     An actor's margin is the larger of its longitudinal and its lateral one.
     """
@@ -349,7 +349,7 @@ def publish(frame: Frame, before: Frame | None, least: LeastMargins, own: OwnMot
 
 
 def red_light_margin(frame: Frame, before: Frame | None) -> float:
-    """Computes the distance to the stop line while the signal is red, m.
+    """Computes the distance to the stop line of a red signal, m.
 
     It is `CROSSED_ON_RED_M` in the step that crosses the line.
     """
@@ -361,7 +361,7 @@ def red_light_margin(frame: Frame, before: Frame | None) -> float:
 
 
 def red_light_braking(frame: Frame, before: Frame | None) -> float:
-    """Computes the braking that stops the ego at a red signal's line, m/s².
+    """Computes the braking to stop at a red signal's line, m/s².
 
     It is v² / (2 d), and its cap in the step that crosses the line.
     """

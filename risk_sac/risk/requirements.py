@@ -1,4 +1,4 @@
-"""STL requirements that an ODD implies for the ego, and the signals that requirements may speak about.
+"""STL requirements that an ODD implies for the ego, and their signals.
 
 Signals are published once per frame. All are finite: a quantity with nothing to measure takes its cap.
 

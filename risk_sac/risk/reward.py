@@ -1,4 +1,4 @@
-"""The rewards of RISK-SAC, one pure function per equation, and the rules of C_hard.
+"""Rewards of RISK-SAC, one pure function per equation, and rules of C_hard.
 
 Every function works elementwise on floats, numpy arrays and torch tensors alike. Masks are 0 or 1,
 in the same kind of container as the values beside them.
@@ -84,7 +84,7 @@ class ViolationDepth:
         self._least = [min(robustness.item(i), 0.0) for i in self._counting]
 
     def gained(self, robustness: Floats) -> float:
-        """Scales, summed over the requirements, by which this step is the deepest violation so far."""
+        """Computes by how many scales, in sum, this step deepens the violations."""
         gained = 0.0
         for k, i in enumerate(self._counting):
             now, least = max(robustness.item(i), -1.0), self._least[k]
@@ -95,7 +95,7 @@ class ViolationDepth:
 
 
 def worth(collision: Collision, config: RewardConfig) -> float:
-    """The share of the bonus for valid collisions that one is paid, in [0, 1].
+    """Share of the valid-collision bonus that a collision earns, in [0, 1].
 
     Choice: a minor one is paid less, since no headline counts it.
     """
@@ -123,7 +123,7 @@ def penalised_reward(risk_reward: Value, cost: Value, dual_variable: float) -> V
 def shaped_reward(
     reward: Value, robustness: Value, next_robustness: Value, discount: float, terminated: Value
 ) -> Value:
-    """Shaped reward, on which the policy is trained; the potential is φ(s) = -ρ(Φ, s).
+    """Computes the policy's shaped reward; the potential is φ(s) = -ρ(Φ, s).
 
     F(s, a, s') = γ φ(s') - φ(s)                                                     (6)
     R'(s, a) = R(s, a) + F(s, a, s') = R(s, a) - γ ρ(Φ, s') + ρ(Φ, s)                (8)
@@ -146,7 +146,7 @@ def shaped_reward(
 
 @dataclass(frozen=True, slots=True)
 class TrainingReward:
-    """Training reward: R of (3), and R' of (8) for methods with shaping.
+    """Training reward: R of (3), or R' of (8) with shaping.
 
     Alg. 1, l. 9-10.
     """
@@ -189,14 +189,14 @@ HardRule = Literal["initial_overlap", "initial_gap", "initial_ttc", "initial_rss
 
 
 def refuse_overlap(frame: Frame, scene: Scene) -> None:
-    """C_hard of (5) for every frame up to the release: no two bodies overlap; raises `InfeasibleScene`."""
+    """Applies C_hard of (5) up to the release; raises `InfeasibleScene` on overlap."""
     if pairs := overlapping_pairs(frame.state):
         first, second = (frame.ids[i] for i in pairs[0])
         _refuse(scene, "initial_overlap", f" by {first!r} and {second!r}")
 
 
 def danger_of(assessment: Assessment, *, in_conflict: bool) -> HardRule | None:
-    """C_hard of (5) for the frame of the release: the rule that it breaks, or None."""
+    """Finds the C_hard rule of (5) that the release frame breaks."""
     least_gap_m, margin_m = float(assessment.gap_m.min(initial=math.inf)), worst_rss_margin(assessment)
     return broken_hard_rule(least_gap_m, assessment.least.ttc_s, margin_m, in_conflict=in_conflict)
 
@@ -213,7 +213,7 @@ def _refuse(scene: Scene, rule: HardRule, details: str = "") -> Never:
 
 
 def broken_hard_rule(gap_m: float, ttc_s: float, rss_margin: float, *, in_conflict: bool) -> HardRule | None:
-    """C_hard of (5): the rule that the frame of the release breaks, or None.
+    """Finds the rule of C_hard (5) that a release breaks, if any.
 
     `in_conflict` holds for R157's driver in the ego's place; the rest are the ego's smallest measures. The rule
     of `initial_overlap` is asked of every frame up to the release.

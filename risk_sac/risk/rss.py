@@ -60,7 +60,10 @@ def behind(way_m: float, front_mps: float, parameters: RssParameters) -> float:
 
 @compiled
 def opposite_direction(ego_mps: float, other_mps: float, parameters: RssParameters) -> float:
-    """d_min: both respond after ρ and brake with b_min; speeds are magnitudes, m  (Def. 2)."""
+    """Computes d_min, m, of oncoming actors; speeds are magnitudes (Def. 2).
+
+    Both respond after ρ and brake with b_min.
+    """
     p = parameters
     return stopping(ego_mps, p.response_s, p.accel_mps2, p.brake_min_mps2) + stopping(
         other_mps, p.response_s, p.accel_mps2, p.brake_min_mps2
@@ -180,7 +183,7 @@ LINES = 9  # both sides of each of the 4 separating axes, and zero
 
 @compiled
 def time_to_encounter(view: RelativeView, walks: Bools) -> Floats:
-    """Time to encounter of the ego with each other actor, `n`, s; 0 where the bodies touch.
+    """Computes times to encounter with other actors, `n`, s; 0 on contact.
 
     τ = min_{t ≥ 0} [ t + max_k (|s_k + v_k t| − r_k)₊ / c_k ],   c_k = c + δ (u_e |n_k · h_e| + u_o |n_k · h_o|)
 
@@ -216,7 +219,7 @@ def time_to_encounter(view: RelativeView, walks: Bools) -> Floats:
 
 @compiled
 def _least(slope: Floats, start: Floats) -> float:
-    """Computes min_{t ≥ 0} [ t + max_l (start_l + slope_l t) ] over lines.
+    """Computes min_{t ≥ 0} [t + max_l (start_l + slope_l t)].
 
     Every steepest line has a rising opposite.
     """

@@ -93,7 +93,7 @@ class Monitor:
         return np.array([min(max(value, -ROBUSTNESS_CLIP), ROBUSTNESS_CLIP) for value in robustness])
 
     def _compile(self, node: Node) -> Callable[[Signals], float]:
-        """A function that updates a sub-formula by one step; each operator has a state of its own."""
+        """Builds a function that updates a sub-formula, with state per operator."""
         if node.op == "signal":
             return itemgetter(node.text)
         if node.op == "number":

@@ -1,6 +1,6 @@
-"""Table of road users' bodies: size, motion, injury, picture and exports, one row each.
+"""Table of road users' bodies: size, motion, injury, picture and exports.
 
-Adding a body is one row here. SUMO's types of car and truck are in `sumo_nets/vtypes.add.xml`; those of other bodies
+A new body is one row here. SUMO's types of car and truck are in `sumo_nets/vtypes.add.xml`; those of other bodies
 that move in lanes are copies of the car's with the row's size and driver. They are of the class passenger, so that
 lanes for cars refuse no body: which lanes a body uses is the scenario's. One that starts on a lane without cars gets
 its own class, and an adversary there one that SUMO refuses nowhere.
@@ -78,7 +78,7 @@ class Body:
     """Field of `Limits` → its bound; those of the ODD hold for the rest."""
 
     def sized(self, size_m: tuple[float, float] | None) -> "Body":
-        """Returns the body with a length and width of its own; None: its usual ones."""
+        """Returns the body with its own length and width; None: the usual."""
         return self if size_m is None else replace(self, length_m=size_m[0], width_m=size_m[1])
 
     @property

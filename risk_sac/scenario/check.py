@@ -1,4 +1,4 @@
-"""Static check of a scenario document against its nets: names, units, ranges, starts and routes."""
+"""Checks a scenario document statically: names, units, ranges, starts and routes."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -54,7 +54,7 @@ def check_document(document: Scenario, nets: Mapping[str, str]) -> None:
 
 
 def scenes(of: Interpreter, count: int = SCENES) -> Iterator[Scene]:
-    """Scenes of the whole space: the middle, each parameter at both ends, and so many at random."""
+    """Yields the middle scene, those at each parameter's ends, and random ones."""
     dimension = of.space.dimension
     middle = np.full(dimension, 0.5)
     yield of.space.from_unit(middle)
@@ -137,7 +137,7 @@ def _check_parameters(document: Scenario) -> None:
 
 
 def _check_range(of_term: Term, of: Interpreter, path: str, text: Expression) -> None:
-    """Refuses names that are no numbers of the document, and values that do not exist within the ranges."""
+    """Refuses unknown names, and values that do not exist within the ranges."""
     _check_names(of_term, of, path, text)
     try:
         of_term.range(of.ranges)
@@ -195,7 +195,7 @@ def _check_bodies(of: Interpreter) -> None:
 
 
 def _check_layouts(of: Interpreter) -> None:
-    """Refuses what sampled scenes show: bad places on the net, nothing left, and actors inside each other."""
+    """Refuses bad places, unsatisfiable constraints and overlapping actors in sampled scenes."""
     layouts, refused = list[Layout](), list[InfeasibleScene]()
     for scene in scenes(of):
         try:
@@ -234,7 +234,7 @@ def _check_apart(of: Interpreter, layouts: Sequence[Layout]) -> None:
 
 
 def without_effect(of: Interpreter, layouts: int = 5) -> list[str]:
-    """Names of parameters that change no layout when they alone go from low to high."""
+    """Lists parameters that change no layout when only they change."""
     draw, names = np.random.default_rng(1), list[str]()
     for axis, name in enumerate(of.space.names):
         points = draw.random((layouts * 4, of.space.dimension))

@@ -1,4 +1,4 @@
-"""The declared distribution of a scenario's parameters, over the unit cube of its scene space.
+"""Declared distribution of a scenario's parameters, over the scene space's unit cube.
 
 Independent standard normal numbers s become correlated ones, z = L s, and these shares, Φ(z). A value is where the
 parameter's distribution, truncated to the scene space, has that share. L Lᵀ is the copula's correlation matrix.
@@ -35,11 +35,11 @@ class DeclaredAxis:
 
     @property
     def tells(self) -> bool:
-        """Whether a value tells its share, so that a search may lean towards values."""
+        """Whether a value determines its share, so that searches may prefer values."""
         return self.low < self.high and not isinstance(self.law, PoissonLaw)
 
     def unit(self, share: float) -> float:
-        """The coordinate in [0, 1] at a share in [0, 1] of the distribution."""
+        """Returns the coordinate in [0, 1] at a share of the distribution."""
         if self.low == self.high:
             return 0.0
         if self.law is None:
@@ -48,7 +48,7 @@ class DeclaredAxis:
         return min(max((value - self.low) / (self.high - self.low), 0.0), 1.0)
 
     def density(self, unit: float) -> float:
-        """Density at a coordinate in [0, 1], as a multiple of the uniform one."""
+        """Returns the density at a coordinate, relative to the uniform one."""
         if not self.tells or self.law is None:
             return 1.0
         low = min(max(unit - WINDOW / 2.0, 0.0), 1.0 - WINDOW)
@@ -56,7 +56,7 @@ class DeclaredAxis:
         return self.law.mass(*ends) / self.law.mass(self.low, self.high) / WINDOW
 
     def share(self, unit: float) -> float:
-        """The share in [0, 1] at a coordinate in [0, 1]; the inverse of `unit`."""
+        """Returns the share at a coordinate in [0, 1]; inverts `unit`."""
         if self.law is None:
             return unit
         value = self.low + unit * (self.high - self.low)
@@ -104,14 +104,14 @@ class SceneLaw:
         return shares if self.alike else self.point(np.array([_normal(share) for share in shares]))
 
     def point(self, normal: Floats) -> Floats:
-        """The point of the unit cube, `d`, at independent standard normal numbers, `d`."""
+        """Returns the unit cube's point, `d`, of standard normal numbers, `d`."""
         correlated = np.empty_like(normal)
         correlated[self._order] = self._factor @ normal[self._order]
         pairs = zip(self.axes, correlated.tolist(), strict=True)
         return np.array([axis.unit(_STANDARD.cdf(z)) for axis, z in pairs])
 
     def normal(self, point: Floats) -> Floats:
-        """Independent standard normal numbers, `d`, of a point of the unit cube, `d`; the inverse of `point`.
+        """Returns standard normal numbers, `d`, of a point, `d`; inverts `point`.
 
         Those of axes that do not tell their share are 0.
         """
@@ -123,7 +123,7 @@ class SceneLaw:
         return normal
 
     def density(self, point: Floats) -> float:
-        """Density of a point of the unit cube, `d`, as a multiple of the uniform one.
+        """Returns the density at a unit point, `d`, relative to uniform.
 
         Π_i f_i(x_i) · N(z; 0, L Lᵀ) / Π_i N(z_i; 0, 1)
 
@@ -149,7 +149,7 @@ class SceneLaw:
         return self.density(np.clip(offsets / widths, 0.0, 1.0))
 
     def normals(self, scenes: Iterable[Mapping[str, float]]) -> Floats:
-        """Returns standard normal numbers, `n x t`, of the axes that tell their share."""
+        """Returns standard normal numbers, `n x t`, of axes that tell shares."""
         low, high = (np.array([getattr(axis, end) for axis in self.axes]) for end in ("low", "high"))
         values = np.array([[scene.get(axis.name, math.nan) for axis in self.axes] for scene in scenes])
         inside = values[((low <= values) & (values <= high)).all(axis=1)]
@@ -164,7 +164,7 @@ class SceneLaw:
 
     @cached_property
     def _order(self) -> np.typing.NDArray[np.intp]:
-        """Returns the axes in the factor's order: those that tell their share first."""
+        """Axes in the factor's order: those that tell their share first."""
         return np.argsort(~self.telling, kind="stable")
 
     @cached_property
@@ -204,14 +204,14 @@ class Slice:
 
     @cached_property
     def fixed(self) -> Mapping[str, float]:
-        """Value of each parameter that is the same in all scenes, in the space's units."""
+        """Values that are the same in all scenes, in the space's units."""
         chosen = {name: self._value(name) for name in self.config.at}
         if self.config.others == "fixed":
             chosen |= {name: self._drawn(name, 0.5) for name in self.space.names if name not in chosen}
         return {name: value for name, value in chosen.items() if name not in self.config.over}
 
     def whole(self, point: Floats, random: np.random.Generator) -> Floats:
-        """The point of the space's unit cube, `d`, at a point of the slice's, `k`."""
+        """Returns the space's unit point, `d`, at a slice's point, `k`."""
         values = {name: self._drawn(name, random.random()) for name in self.space.names} | dict(self.fixed)
         width = self.space.high - self.space.low
         offset = np.array([values[name] for name in self.space.names]) - self.space.low
@@ -248,7 +248,7 @@ class Slice:
             self._value(name)
 
     def _value(self, name: str) -> float:
-        """The number that `at` gives a parameter; a word's is the middle of its part of the axis."""
+        """Returns the number that `at` sets; a word's is its interval's middle."""
         given, parameter = self.config.at[name], self.space.parameters[self.space.names.index(name)]
         document = self.parameters.get(name)
         words = () if document is None else document.words or ()

@@ -1,4 +1,4 @@
-"""Scenario families by name: those shipped, and those at places that the library keeps."""
+"""Scenario families by name: the shipped ones, and those of the library."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -60,7 +60,7 @@ class Family:
 
     @property
     def undisturbed(self) -> "Family":
-        """The family without the scene parameters that disturb its story; its layouts have them at 0."""
+        """The family without scene parameters that disturb its story (then 0)."""
         kept = tuple(parameter for parameter in self.space.parameters if parameter.name not in self.shifts)
         return replace(self, space=replace(self.space, parameters=kept), shifts=()) if self.shifts else self
 
@@ -76,13 +76,13 @@ class Family:
 
     @property
     def stand_ins(self) -> tuple[str, ...]:
-        """For each adversary the one of the family `like` that it stands for; without `like` its own name."""
+        """Adversaries' names in the family `like`, or their own without it."""
         alike = {} if self.like is None else self.like.actors
         return tuple(alike.get(name, name) for name in self.adversaries)
 
     @property
     def mirrored(self) -> bool:
-        """Whether what is on the left at the family `like` is on the right here, or vice versa."""
+        """Whether left and right are swapped compared with the family `like`."""
         return self.like is not None and self.like.mirrored
 
 
@@ -94,7 +94,7 @@ def usual_odd(
     *,
     walked: bool,
 ) -> Odd:
-    """A family's default ODD: its own roads, and what drivers, pedestrians and the weather do anywhere."""
+    """Returns a default ODD: the family's roads, usual behaviour and weather."""
     return Odd(
         scenery=Scenery(lanes=lanes, speed_limit_mps=limit_mps, signal_types=signals, crossing_types=crossings),
         environment=Environment(
@@ -148,7 +148,7 @@ def family_of(document: Scenario, nets: Mapping[str, str], name: str = "") -> Fa
 
 
 def check_like(like: Like, vehicles: Sequence[str], pedestrians: Sequence[str]) -> None:
-    """Refuses a shipped family without a library, and adversaries that stand for none of its adversaries."""
+    """Refuses `like` families without a library, and adversaries without counterpart there."""
     if like.family not in PAPER_FAMILIES:
         remedy = did_you_mean(like.family, PAPER_FAMILIES) or "leave `like` out to search without a library"
         raise ConfigError("like.family", repr(like.family), f"one of {', '.join(PAPER_FAMILIES)}", remedy)
@@ -165,7 +165,7 @@ def check_like(like: Like, vehicles: Sequence[str], pedestrians: Sequence[str]) 
 
 
 def sampled(of: Interpreter, count: int = SAMPLED) -> Iterator[Layout | InfeasibleScene]:
-    """Layouts of scenes all over a scenario's space, and errors of those that are refused."""
+    """Yields layouts over a whole scene space, and errors of refused scenes."""
     for point in np.random.default_rng(0).random((count, of.space.dimension)):
         try:
             yield of.layout(of.space.from_unit(point).values)
@@ -229,7 +229,7 @@ def _shipped(name: str) -> Family:
 
 
 def family_named(name: str, deviation: DeviationBounds | None = None) -> Family:
-    """Returns a family, shipped or of the library; `deviation` takes the place of the bounds of its story.
+    """Returns a family, shipped or kept; `deviation` replaces its story's bounds.
 
     Raises:
       ConfigError: no family has this name.
@@ -247,7 +247,7 @@ def _kept(name: str, deviation: DeviationBounds | None) -> Family:
 
 
 def density_of(name: str) -> Callable[[Mapping[str, float]], float]:
-    """Returns the declared density of a family's scenes; 1 where none is declared or the family is gone."""
+    """Returns the declared density of a family's scenes, or 1 without one."""
     try:
         declared = family_named(name).declared
     except ConfigError:
@@ -256,12 +256,12 @@ def density_of(name: str) -> Callable[[Mapping[str, float]], float]:
 
 
 def document_named(name: str) -> Scenario:
-    """Returns the document of a family, shipped or of the library; raises `ConfigError` if none has this name."""
+    """Returns a family's document, shipped or kept; raises `ConfigError` if unknown."""
     return shipped_document(name) if name in shipped_names() else kept(name)[0]
 
 
 def sources_named(name: str) -> Mapping[str, bytes]:
-    """Reads the document of a family and its nets, by file name; raises what `document_named` does."""
+    """Reads a family's document and nets by file; raises as `document_named`."""
     if name in shipped_names():
         document, folder, file = shipped_document(name), None, scenario_file(name)
     else:

@@ -34,7 +34,7 @@ SPARE_M = layout.CAR_WIDTH_M / 2 + 0.1  # of the box of a waiting vehicle from t
 
 
 def outlines(link: Link, length_m: float, width_m: float) -> Floats:
-    """Samples points on both sides of a vehicle along its way; x and y in rows, m."""
+    """Samples a vehicle's sides along its way; x and y rows, m."""
     line = np.array([*link.source.line, *link.line, *link.target.line])
     station_m = _stations_m(line)
     stop_m = station_m[len(link.source.line) - 1]
@@ -62,7 +62,7 @@ def is_near(line: Sequence[Point], x_m: float, y_m: float, within_m: float) -> b
 
 @once
 def too_near(net: Net, link: Link) -> Link | None:
-    """The way beside one across a junction that leaves two cars no room, if there is one."""
+    """Finds a neighbouring way across a junction too near for two cars."""
     lanes = net.edges[link.source.edge].lanes
     for lane in lanes[max(link.source.index - 1, 0) : link.source.index + 2]:
         for other in net.onward.get(lane.id, ()):
@@ -73,9 +73,9 @@ def too_near(net: Net, link: Link) -> Link | None:
 
 
 def truck_reaches(net: Net, beside: Link, own: Link) -> bool:
-    """Tells whether a truck reaches into a car on the way beside it; both cross the junction.
+    """Whether a truck reaches into a car on the way beside it.
 
-    Where their lanes fork into several of the next road, SUMO's drivers may take any of them.
+    Both cross the junction. Where their lanes fork into several of the next road, SUMO's drivers may take any of them.
     """
     ways = [[*each.source.line, *each.line, *each.target.line] for each in _forks(net, own)]
     points = np.concatenate(
@@ -95,7 +95,7 @@ def _come_near(line: Sequence[Point], other: Sequence[Point]) -> bool:
 
 
 def waits_in_the_way(net: Net, link: Link) -> NetLane | None:
-    """Finds a priority lane that a car waiting for it reaches into; None if the way is clear."""
+    """Finds a priority lane that a waiting car reaches into, or None."""
     for before, behind in pairwise(link.inside):
         for lane in net.waits_for.get(behind.id, ()):
             joins = lane.line[-1] == link.inside[-1].line[-1]
@@ -118,7 +118,7 @@ def _off_m(waiting: NetLane, other: NetLane) -> float:
 
 
 def _sampled(line: Floats) -> Floats:
-    """Points along a line, its corners included; x and y in rows, m."""
+    """Returns points along a line, with corners; x and y rows, m."""
     station_m = _stations_m(line)
     return _points(line, station_m, np.union1d(station_m, np.arange(0.0, station_m[-1], SAMPLED_M)))
 
@@ -128,7 +128,7 @@ def _stations_m(line: Floats) -> Floats:
 
 
 def _points(line: Floats, station_m: Floats, at_m: Floats) -> Floats:
-    """The points of a line at distances along it; x and y in rows, m."""
+    """Returns a line's points at distances along it; x, y rows, m."""
     return np.array([np.interp(at_m, station_m, each) for each in line.T])
 
 
@@ -158,7 +158,7 @@ Polygons = Sequence[Sequence[Point]]
 
 @lru_cache(maxsize=64)
 def net_of(file: str) -> Net:
-    """Reads a net, a file below `sumo_nets/` or an absolute path; raises `MapError` if it is none."""
+    """Reads a net below `sumo_nets/` or at an absolute path; raises `MapError`."""
     return parse_net(read_tree(Path(str(files("sumo_nets"))) / file))
 
 
@@ -244,7 +244,7 @@ def kerb_of(net: Net, crossing: Crossing, driven_rad: float) -> Kerb:
 
 
 def _turned_over_m(net: Net, junction: str, kerb: Kerb) -> float:
-    """Computes how far a kerb moves back to be clear of turning cars."""
+    """Computes how far a kerb moves back clear of turning cars, m."""
     links = [link for edge in net.arriving[junction] for lane in edge.drivable for link in net.onward.get(lane.id, ())]
     if not links:
         return 0.0

@@ -1,4 +1,4 @@
-"""A scenario document as the search sees it: a scene space, and the layout of each scene."""
+"""Interprets a scenario document as a scene space and scenes' layouts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ class Interpreter:
 
     @cached_property
     def space(self) -> SceneSpace:
-        """The scene space: ranges as they are, words and rows as an axis from 0 to 1."""
+        """Scene space: ranges as they are, words and rows as [0, 1]."""
         parameters = []
         for name, parameter in self.document.parameters.items():
             if parameter.value is not None:
@@ -49,7 +49,7 @@ class Interpreter:
 
     @cached_property
     def shifts(self) -> Mapping[str, str]:
-        """Scene parameter → the actor whose triggers it shifts, the first of their group that may deviate."""
+        """Scene parameter → first deviating actor of the group that it shifts."""
         story = self.document.story
         if story is None or not story.deviation.trigger_s:
             return {}
@@ -85,7 +85,7 @@ class Interpreter:
         return Value(numbers, words)
 
     def layout(self, xi: Mapping[str, float]) -> Layout:
-        """The start of an episode; raises `InfeasibleScene` if a constraint fails, or a value does not exist."""
+        """Returns an episode's start; raises `InfeasibleScene` if constraints or values fail."""
         try:
             value = self.value(xi)
             for number, constraint in enumerate(self.document.constraints):
@@ -110,7 +110,7 @@ class Interpreter:
 
     @property
     def adversaries(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Names of the adversaries that drive in lanes, and of those that move freely."""
+        """Names of adversaries in lanes, and of those that move freely."""
         driven, walking = list[str](), list[str]()
         for name, actor in self.document.actors.items():
             if actor.role == "adversary" or (actor.role == "story" and self._deviates(name)):
@@ -130,7 +130,7 @@ class Interpreter:
         return all(motion_of(self.document, name, body_named(body, f"actors.{name}.body")) != "not" for body in bodies)
 
     def crossings(self, file: str) -> set[CrossingType]:
-        """Kinds of the crossings whose kerbs its actors start at, on one of its nets."""
+        """Kinds of crossings on a net at whose kerbs its actors start."""
         net, kinds = net_of(file), set[CrossingType]()
         for actor in self.document.actors.values():
             crossing = actor.start.crossing

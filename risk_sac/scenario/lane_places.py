@@ -1,4 +1,4 @@
-"""Places on the lanes of a SUMO net, and ways of vehicles through it, lane by lane."""
+"""Places on a SUMO net's lanes, and vehicles' ways, lane by lane."""
 
 import itertools
 import math
@@ -91,7 +91,7 @@ def spot_pose(spot: LanePlace) -> Pose:
 
 
 def beside(net: Net, spot: LanePlace, lanes: int) -> LanePlace | None:
-    """Returns the place lanes to the left, at the same height, or None."""
+    """Returns the place `lanes` to the left, at equal height, or None."""
     other = net.lanes.get(f"{spot.lane.edge}_{spot.lane.index + lanes}")
     if other is None or not other.drivable:
         return None
@@ -100,7 +100,7 @@ def beside(net: Net, spot: LanePlace, lanes: int) -> LanePlace | None:
 
 
 def lanes_ahead(net: Net, lane: NetLane, length_m: float, edges: Sequence[str] = ()) -> list[NetLane]:
-    """Returns a lane and those that follow it, along edges where it leads to them, else straight on."""
+    """Returns a lane and those after it, along `edges`, else straight on."""
     lanes, left_m = [lane], length_m
     while left_m > 0.0:
         links = _links(net, lanes[-1])
@@ -131,7 +131,7 @@ def _links(net: Net, lane: NetLane) -> list[Link]:
 
 
 def edge_path(net: Net, begin: str, end: str) -> list[str] | None:
-    """Returns the edges of the shortest way from one to another, with both; None if there is none."""
+    """Returns the edges of the shortest way, both ends included, or None."""
     order, queue, seen = itertools.count(1), [(0.0, 0, [begin])], set[str]()
     while queue:
         length_m, _, path = heappop(queue)
@@ -181,7 +181,7 @@ BACK_M = 400.0  # of road before a reference, where no route says more
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A lane on the way to a reference, such as a stop line, or beyond it."""
+    """Lane before or beyond a reference, such as a stop line."""
 
     edge: str
     lane: int  # index on its edge; 0 is the rightmost
@@ -208,9 +208,9 @@ class Track:
         return tuple(piece.edge for piece in self.pieces) + self.onward
 
     def start(self, before_m: float, lead_m: float = 0.0) -> tuple[tuple[str, ...], Piece, float]:
-        """Route, lane, and position on it of a front bumper `before_m`, and `lead_m` more, before the reference.
+        """Returns route, lane and position of a front bumper before the reference.
 
-        A vehicle that would start inside a junction starts at its entry.
+        It is `before_m` and `lead_m` before it; a start inside a junction moves to the junction's entry.
         """
         first = len(self.pieces) - 1
         while first > 0 and self.pieces[first].reach_m - before_m - lead_m < 0.0:
@@ -302,7 +302,7 @@ def routed(net: Net, lane: NetLane, reference_m: float, route: Sequence[str], fi
 
 
 def straight_on(net: Net, lane: NetLane, reference_m: float, metres: float, turn: str | None, field: str) -> Track:
-    """Track straight on from a lane, after a turn if one is given.
+    """Returns the track straight on from a lane, after an optional turn.
 
     The turn is at the lane's end.
 
@@ -339,7 +339,7 @@ def straight_on(net: Net, lane: NetLane, reference_m: float, metres: float, turn
 def _ahead(
     net: Net, lane: NetLane, edges: Sequence[str], route: Sequence[str]
 ) -> tuple[list[NetLane], list[Link], list[str]]:
-    """Lanes that follow a lane without a lane change, the links to them, and the edges after these.
+    """Follows lanes without lane changes; returns lanes, links and the edges left.
 
     `route` has each of the `edges` as an edge, or as the lane to take.
     """

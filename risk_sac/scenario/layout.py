@@ -1,4 +1,4 @@
-"""Start of an episode: vehicles, pedestrians, areas of the ground, and the document's story."""
+"""Start of an episode: vehicles, pedestrians, areas of ground, and story."""
 
 import math
 import operator
@@ -37,7 +37,7 @@ class StoryActor(NamedTuple):
 
 
 class Deviation(NamedTuple):
-    """Bounds of what an adversary adds to its story; all 0 leave the story as it is written."""
+    """Bounds of what an adversary adds to its story; 0 adds nothing."""
 
     accel_mps2: float = 0.0
     lateral_mps: float = 0.0
@@ -74,7 +74,7 @@ class StoryPlan:
 
 
 def shifted_groups(story: Story) -> Iterator[tuple[str, ...]]:
-    """Yields the actors of each group that has events whose start triggers a deviation may shift."""
+    """Yields actors of each group with triggers that a deviation may shift."""
     for acts in story.stories.values():
         for group in (group for act in acts for group in act.groups):
             if any(is_shifted(event) for maneuver in group.maneuvers for event in maneuver.events):
@@ -155,7 +155,7 @@ class Area:
 
 
 def ribbon(line: Sequence[Point], width_m: float) -> list[list[Point]]:
-    """The quadrangles, counter-clockwise, of a ribbon along a line; at bends they share a slanting side."""
+    """Returns a line's ribbon as counter-clockwise quadrangles with shared slanting sides."""
     points = np.array(_without_repeats(line), dtype=np.float64)
     if len(points) < 2:
         return []
@@ -174,7 +174,7 @@ def ribbon(line: Sequence[Point], width_m: float) -> list[list[Point]]:
 
 
 def triangles(outline: Sequence[Point]) -> list[list[Point]]:
-    """A polygon of any shape as triangles, counter-clockwise; none if it has no area.
+    """Returns a polygon as triangles, counter-clockwise; none if it has no area.
 
     Source: shapely's constrained Delaunay triangulation; an outline that crosses itself is made valid before.
     """
@@ -187,7 +187,7 @@ def triangles(outline: Sequence[Point]) -> list[list[Point]]:
 
 
 def is_convex(corners: Sequence[Point]) -> bool:
-    """Whether a polygon turns left, or not at all, at every corner, and so is convex and counter-clockwise."""
+    """Whether a polygon is convex and counter-clockwise, straight corners allowed."""
     n = len(corners)
     turns = (_doubled_area([corners[i - 1], corners[i], corners[(i + 1) % n]]) for i in range(n))
     return all(turn >= -ON_THE_EDGE_M2 for turn in turns)
@@ -245,7 +245,7 @@ class VehicleStart(BodyStart):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PedestrianStart(BodyStart):
-    """An actor that moves anywhere in the plane: a pedestrian, or a bicycle that crosses a road."""
+    """Actor that moves freely: a pedestrian, or a bicycle across a road."""
 
     role: Role
     x_m: float
@@ -257,7 +257,7 @@ class PedestrianStart(BodyStart):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StaticStart(BodyStart):
-    """A body that never moves, anywhere in the plane: parked, or in the way."""
+    """Body that never moves, anywhere in the plane: parked or an obstacle."""
 
     x_m: float  # of its centre
     y_m: float

@@ -39,7 +39,7 @@ _SCHEMA = "{http://www.w3.org/2001/XMLSchema-instance}noNamespaceSchemaLocation"
 
 
 def library() -> Path:
-    """The folder; it may not be there yet. Raises `ConfigError` where nothing says where it is."""
+    """Returns the library's folder, which may not exist; raises `ConfigError` if unknown."""
     told = os.environ.get(VARIABLE)
     if told:
         return Path(told)
@@ -50,7 +50,7 @@ def library() -> Path:
 
 
 def written(document: Scenario) -> str:
-    """Writes a document as YAML, or as JSON if it is long, without defaults."""
+    """Writes a document without defaults as YAML, or as JSON if long."""
     fields = document.model_dump(mode="json", exclude_defaults=True)
     as_json = json.dumps(fields)
     if len(as_json) > MOST_BYTES // 2:  # YAML of so much is slow to read
@@ -59,7 +59,7 @@ def written(document: Scenario) -> str:
 
 
 def own_files(document: Scenario, nets: Mapping[str, str]) -> dict[str, bytes]:
-    """Reads a document's own nets and road files, by its names for them; `nets` as `nets_of` returns them."""
+    """Reads a document's own nets and roads by name; `nets` from `nets_of`."""
     own = {name: Path(file) for name, file in nets.items() if Path(file).is_absolute()}
     folders = {file.parent for file in own.values()}
     own |= {name: folder / name for name in roads(document) for folder in folders if (folder / name).is_file()}
@@ -67,7 +67,7 @@ def own_files(document: Scenario, nets: Mapping[str, str]) -> dict[str, bytes]:
 
 
 def keep(document: Scenario, own: Mapping[str, bytes]) -> str:
-    """Puts a scenario into the library; returns its name, that of the document and a digest.
+    """Puts a scenario into the library; returns its name with a digest.
 
     `own` has the SUMO nets of its networks, without shipped ones, and the OpenDRIVE files of its roads.
 
@@ -81,7 +81,7 @@ def keep(document: Scenario, own: Mapping[str, bytes]) -> str:
 
 
 def put(name: str, files: Mapping[str, bytes]) -> None:
-    """Puts what `files_of` returned into the library, unless it is there and whole.
+    """Puts the result of `files_of` into the library, unless already whole there.
 
     Raises:
       ConfigError: the files are not those of the name, or the library cannot be written.
@@ -121,7 +121,7 @@ def put(name: str, files: Mapping[str, bytes]) -> None:
 
 
 def files_of(name: str) -> Mapping[str, bytes]:
-    """Reads the files of a kept scenario: its document first, then its nets.
+    """Reads a kept scenario's files: its document first, then its nets.
 
     Raises:
       ConfigError: there is none of this name.
@@ -144,7 +144,7 @@ def files_of(name: str) -> Mapping[str, bytes]:
 
 
 def kept(name: str) -> tuple[Scenario, Path]:
-    """Reads the document of a kept scenario, and its folder; raises what `files_of` does."""
+    """Reads a kept scenario's document, and its folder; raises as `files_of`."""
     return document_from(files_of(name)[DOCUMENT].decode()), (library() / name).absolute()
 
 
@@ -154,7 +154,7 @@ def listed() -> list[str]:
 
 
 def prune(folder: Path, named: Collection[str], unused_s: float, started_at: float) -> list[str]:
-    """Removes a service's scenarios that are old and not named; returns their names.
+    """Removes a service's old and unnamed scenarios; returns their names.
 
     Args:
       folder: the library; never that of a person, whose run folders are unknown.
@@ -175,7 +175,7 @@ def prune(folder: Path, named: Collection[str], unused_s: float, started_at: flo
 
 
 def _check(files: Mapping[str, bytes]) -> Scenario:
-    """Returns the document of files; raises a ConfigError for what is no document and its nets."""
+    """Returns the document of files; raises ConfigError if they do not fit."""
     document = document_from(files[DOCUMENT].decode()) if DOCUMENT in files else None
     if document is None:
         raise ConfigError("family", "a scenario without a document", DOCUMENT)
@@ -186,7 +186,7 @@ def _check(files: Mapping[str, bytes]) -> Scenario:
 
 
 def _check_net(net: bytes) -> None:
-    """Raises a ValueError, or a ParseError, for a net that has more than a piece of a map."""
+    """Raises a ValueError or ParseError for more than a map's elements."""
     for element in fromstring(net, forbid_dtd=True).iter():
         if element.tag == "param" and element.get("key") == _ORIGIN:
             continue

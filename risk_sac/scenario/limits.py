@@ -12,7 +12,7 @@ from risk_sac.scenario.space import Parameter, SceneSpace
 
 
 class PresetBounds(NamedTuple):
-    """Bounds of one field of `odd.dynamic` under each behaviour, and where they come from."""
+    """Bounds of an `odd.dynamic` field under each behaviour, with source."""
 
     ordinary: tuple[float, float]
     emergency: tuple[float, float]
@@ -126,7 +126,7 @@ class Limits:
     behaviour: Behaviour = "ordinary"
 
     def of(self, body: Body) -> "Limits":
-        """Returns the limits of a body: its row's, narrowed as the ODD narrows its behaviour's preset."""
+        """Returns a body's limits: its row's, narrowed as the ODD narrows presets."""
         own = {name: getattr(bound, self.behaviour) * self._narrowed(name) for name, bound in body.limits.items()}
         if "speed_mps" in own:
             own["speed_mps"] = min(own["speed_mps"], self.speed_mps)
@@ -153,23 +153,23 @@ class Limits:
 
     @cached_property
     def approach_mps2(self) -> float:
-        """Computes the braking left for a lane change in a curve driven as planned."""
+        """Computes the braking left for a lane change in a planned curve."""
         lateral = self.cornering_mps2 + self.lateral_accel_mps2
         return min(self.brake_mps2, math.sqrt(self.grip_mps2**2 - lateral**2))
 
     @cached_property
     def others_brake_mps2(self) -> float:
-        """Hardest braking that is expected of others on the same road, whose limits may be wider."""
+        """Hardest braking expected of others, whose limits may be wider."""
         return max(self.brake_mps2, min(FIRM_BRAKING_MPS2, self.grip_mps2))
 
     @cached_property
     def slip(self) -> float:
-        """Largest lateral speed as a share of the longitudinal; less where the hardest braking would outrun it."""
+        """Largest lateral speed as a share of longitudinal, bounded for hard braking."""
         return min(SLIP, self.lateral_accel_mps2 / self.brake_mps2)
 
 
 def limits_from_odd(odd: Odd, friction: float) -> Limits:
-    """The bounds of a complete ODD, with vehicle acceleration further bounded by friction · g."""
+    """Returns a complete ODD's bounds, vehicle acceleration at most friction · g."""
     dynamic = odd.dynamic
     accel, jerk = dynamic.vehicle_accel_mps2, dynamic.vehicle_jerk_mps3
     lateral, lateral_accel = dynamic.vehicle_lateral_speed_mps, dynamic.vehicle_lateral_accel_mps2
@@ -199,7 +199,7 @@ def limits_from_odd(odd: Odd, friction: float) -> Limits:
 
 
 def emergency_decel_mps2(friction: float) -> float:
-    """Computes the hardest braking of a car on a road of this friction."""
+    """Computes a car's hardest braking on a road of this friction."""
     return min(EMERGENCY_DECEL_MPS2, friction * GRAVITY_MPS2)
 
 
@@ -220,7 +220,7 @@ class Conditions(NamedTuple):
 
 
 def with_environment(space: SceneSpace, user: Odd, odd: Odd) -> SceneSpace:
-    """Returns a family's space with the parameters that a user's environment adds or widens.
+    """Adds or widens parameters of a family's space by a user's environment.
 
     The ego is no part of the rule, so that another ego can play the same scenes. `odd` is the user's and the family's.
     """
@@ -242,7 +242,7 @@ def with_environment(space: SceneSpace, user: Odd, odd: Odd) -> SceneSpace:
 
 
 def conditions(odd: Odd, scene: Mapping[str, float], *, sensor: bool) -> Conditions:
-    """Returns how far can be seen in a scene of a complete ODD.
+    """Returns how far can be seen in a complete ODD's scene.
 
     Where the user's ODD does not state the visibility, the default's low end bounds a sensor; an ego without a sensor
     then sees everything.

@@ -56,7 +56,7 @@ SIGNAL_OF: Mapping[str, SignalType] = {"zebra": "none", "signalised": "fixed_tim
 
 
 def intersect(default: Odd, user: Odd, space: SceneSpace | None = None) -> Odd:
-    """The ODD that a family's default and a user's both allow, field by field.
+    """Intersects a family's default ODD with the user's, field by field.
 
     The user's narrows the default, or widens a field of `EXTREME` up to that; a field left out keeps the default's.
     The default's limits of adversaries are those of the user's behaviour where that is the wider one.
@@ -82,12 +82,12 @@ def intersect(default: Odd, user: Odd, space: SceneSpace | None = None) -> Odd:
 
 
 def wider_behaviour(default: Odd, user: Odd) -> Behaviour:
-    """Returns the behaviour that allows more: a scenario's own, or that of a campaign."""
+    """Returns the behaviour that allows more: the scenario's or the campaign's."""
     return max((default.dynamic.behaviour, user.dynamic.behaviour), key=get_args(Behaviour).index)
 
 
 def widest(default: Odd) -> Odd:
-    """All that a user may ask of a family with this default: `intersect` keeps nothing beyond it."""
+    """Returns the most that users may ask of families with this default."""
     for path, extreme in EXTREME.items():
         branch, name = path.split(".")
         if name == "time_of_day" and "pedestrian" not in (default.dynamic.actor_kinds or ()):
@@ -121,7 +121,7 @@ def check(odd: Odd) -> None:
 
 
 def narrow(space: SceneSpace, odd: Odd) -> SceneSpace:
-    """The scenes that lie in the ODD; raises `OddError` if a parameter is left without a value."""
+    """Narrows a space to the ODD; raises `OddError` if nothing is left."""
     bounds = {}
     for parameter in space.parameters:
         allowed = field(odd, parameter.odd) if parameter.odd else None
@@ -141,13 +141,13 @@ def paths(odd: Odd) -> Iterator[str]:
 
 
 def field(odd: Odd, path: str) -> Any:
-    """The value of an ODD field by its dotted path, such as "dynamic.ego_speed_mps"."""
+    """Returns the value of an ODD field, such as "dynamic.ego_speed_mps"."""
     branch, name = path.split(".")
     return getattr(getattr(odd, branch), name)
 
 
 def _share(parameter: Parameter, allowed: tuple[str, ...]) -> Interval | None:
-    """The part of a parameter's bounds that stands for the allowed categories; None if there is none."""
+    """Returns the part of a parameter's bounds with allowed categories, or None."""
     middle = (parameter.low + parameter.high) / 2  # belongs to the upper half
     lower, upper = (category in allowed for category in parameter.categories)
     if not lower and not upper:
@@ -175,7 +175,7 @@ def _intersect_branch(branch: str, default: Odd, user: Odd, limits: Odd, space: 
 
 
 def _with_their_signals(scenery: Scenery) -> Scenery:
-    """Leaves the crossings whose signal the ODD allows: one for a signalised crossing, none for a zebra."""
+    """Keeps the crossings whose signal the ODD allows; a zebra has none."""
     signals, crossings = scenery.signal_types, scenery.crossing_types
     if signals is None or crossings is None:
         return scenery
@@ -210,7 +210,7 @@ def _friction_in(precipitation: Precipitation, friction: Interval, *, stated: bo
 
 
 def _common(ours: Any, theirs: Any) -> Any:
-    """Intersection of two intervals or two sets; None or () if it is empty."""
+    """Intersects two intervals or two sets; returns None or () if empty."""
     if isinstance(ours, Interval):
         low, high = max(ours.low, theirs.low), min(ours.high, theirs.high)
         return Interval(low=low, high=high) if low <= high else None
@@ -218,7 +218,7 @@ def _common(ours: Any, theirs: Any) -> Any:
 
 
 def _no_scene(path: str, got: Any, space: SceneSpace) -> OddError:
-    """Returns the error of a field that leaves a scene parameter no value."""
+    """Returns the error of a field that leaves a parameter no value."""
     names: dict[str, list[str]] = {}
     for parameter in space.parameters:
         if parameter.odd == path:

@@ -1,4 +1,4 @@
-"""Places of a story: positions become poses in the net's coordinates, and poses become places on lanes.
+"""Places of a story: positions become poses, and poses places on lanes.
 
 Source: ASAM OpenSCENARIO XML 1.3, class reference: positions, and its sections on coordinate systems and routes.
 """
@@ -43,10 +43,10 @@ class RouteLine(NamedTuple):
 
 
 class StoryPlaces:
-    """Places of one net and of the road file that it was converted from."""
+    """Places on a net and on the road file it comes from."""
 
     def __init__(self, net: Net, road: RoadFile | None, story: Story, value: Value) -> None:
-        """Prepares to find places; without a `road` only points, relative positions and SUMO's lanes are found."""
+        """Prepares; without `road` finds only points, relative positions and SUMO's lanes."""
         self._net, self._road, self._story, self._value = net, road, story, value
         self._open = list[str]()  # trajectories that are being resolved
 
@@ -128,7 +128,7 @@ class StoryPlaces:
         return round(number)
 
     def lane_pose(self, place: OnRoad) -> Pose:
-        """Returns the pose of a place on a lane, in the direction of its traffic."""
+        """Returns the pose of a lane place, facing along its traffic."""
         road = self._roads().road(place.road)
         s_m = _within(road, place.s_m)
         middle = road.middle(place.lane, s_m)
@@ -160,7 +160,7 @@ class StoryPlaces:
         return self.lane_pose(OnRoad(leg.road, lane, leg.to_m, offset_m if same else -offset_m))
 
     def _relative_spot(self, other: Pose, lanes: int, ds_m: float, offset_m: float) -> Pose:
-        """Returns the pose on SUMO's lanes; their direction is that of the reference line."""
+        """Returns the pose on SUMO's lanes; their direction replaces the reference line's."""
         spot = self.spot(other)
         there = lane_places.beside(self._net, spot, lanes) if spot is not None else None
         if there is None:
@@ -171,7 +171,7 @@ class StoryPlaces:
         return line.pose(ds_m, offset_m)
 
     def _along_road(self, here: OnRoad, ds_m: float) -> tuple[RoadLeg, bool]:
-        """Goes on along the reference lines; returns the last leg, and whether s still grows the same way."""
+        """Follows reference lines; returns the last leg and if its direction agrees."""
         leg = self._walk(here, abs(ds_m), forward=ds_m >= 0.0, by_lane=False)
         return leg, leg.forward == (ds_m >= 0.0)
 
@@ -194,11 +194,11 @@ class StoryPlaces:
         return lane_places.nearest_lane(self._net, pose.x_m, pose.y_m, pose.heading_rad, among)
 
     def beside(self, spot: lane_places.LanePlace, lanes: int) -> lane_places.LanePlace | None:
-        """Returns the place lanes to the left, at the same height, or None."""
+        """Returns the place `lanes` to the left, at equal height, or None."""
         return lane_places.beside(self._net, spot, lanes)
 
     def opendrive(self, pose: Pose) -> OnRoad:
-        """Returns road, lane, s and offset of a pose; raises `ConfigError` if no road is near.
+        """Returns a pose's road, lane, s and offset; raises `ConfigError` off roads.
 
         Of several roads the one is taken whose lane holds the pose, whose traffic goes its way, and is nearest.
         """
@@ -220,7 +220,7 @@ class StoryPlaces:
         return best[1]
 
     def across(self, place: OnRoad) -> tuple[float, float]:
-        """Returns the reference line's direction, rad, and how far left of it, m."""
+        """Returns the reference line's direction, rad, and distance left of it, m."""
         road = self._roads().road(place.road)
         t_m = road.middle(place.lane, place.s_m).t_m + place.offset_m
         return self._beside(road, place.s_m, t_m).heading_rad, t_m
@@ -248,7 +248,7 @@ class StoryPlaces:
             self._open.pop()
 
     def route(self, name: str, of: Of) -> RouteLine:
-        """Returns the way of a route: the line along lanes, and the edges of the net.
+        """Returns a route's way: the line along lanes, and the net's edges.
 
         Raises:
           ConfigError: there is none of this name, or no lane leads from one waypoint to the next.
@@ -267,7 +267,7 @@ class StoryPlaces:
         return RouteLine(line, self.edges(line))
 
     def way(self, here: Pose, there: Pose) -> RouteLine:
-        """Returns the shortest way along lanes between two poses; raises `ConfigError` if no lanes lead there."""
+        """Returns the shortest way along lanes between poses; raises `ConfigError` without one."""
         if self._road is not None:
             line = self._leg_lines(self._between([self.opendrive(here), self.opendrive(there)]))
             return RouteLine(line, self.edges(line))
@@ -280,7 +280,7 @@ class StoryPlaces:
         )
 
     def edges(self, line: TravelLine) -> tuple[str, ...]:
-        """Returns the edges of the net along a line, with those between them."""
+        """Returns the net's edges along a line, without gaps."""
         stations = np.linspace(0.0, line.length_m, max(2, math.ceil(line.length_m / EDGE_M) + 1))
         spots = (
             self.spot(line.pose(station)._replace(heading_rad=line.direction_rad(station))) for station in stations
@@ -304,7 +304,7 @@ class StoryPlaces:
         return self._between(places)
 
     def _between(self, places: Sequence[OnRoad]) -> list[RoadLeg]:
-        """Returns the legs of the shortest ways from each place to the next."""
+        """Returns legs of the shortest ways from each place to the next."""
         roads, legs = self._roads(), list[RoadLeg]()
         for here, there in itertools.pairwise(places):
             begin, goal = (LaneEnd(p.road, p.lane, not roads.road(p.road).backwards(p.lane)) for p in (here, there))
@@ -343,7 +343,7 @@ class StoryPlaces:
         return there if leg.forward else there._replace(heading_rad=there.heading_rad + math.pi)
 
     def ahead(self, spot: lane_places.LanePlace, length_m: float, edges: Sequence[str] = ()) -> TravelLine:
-        """Returns the way on from a place, without its offset, along the middles of lanes.
+        """Returns the way on from a place, without offset, along lanes' middles.
 
         It is shorter than `length_m` where no lane goes on; without edges, and after them, it is the straightest.
         """
@@ -377,7 +377,7 @@ class StoryPlaces:
 
 
 def lanes_beside(lane: int, lanes: int) -> int:
-    """Returns the lane id as many lanes on; there is no lane 0."""
+    """Returns the lane id `lanes` further on; there is no lane 0."""
     other = lane + lanes
     return other if lane * other > 0 or lanes == 0 else other + (1 if lanes > 0 else -1)
 

@@ -1,4 +1,4 @@
-"""Reads scenario documents, locates faults by path, and names those that ship with the package."""
+"""Reads scenario documents, locates faults by path, and lists the shipped ones."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +22,7 @@ EXPECTED = "a scenario document: fields such as `name`, `network`, `ego` and `ac
 
 
 def read_document(file: Path, field: str = "scenario") -> Scenario:
-    """Reads a document from a file; raises `ConfigError`, with `others` if more than one thing is wrong."""
+    """Reads a document file; raises `ConfigError`, with `others` for further faults."""
     if file.is_file() and file.stat().st_size > MOST_JSON_BYTES:
         raise too_long(file.stat().st_size, MOST_JSON_BYTES)
     return document_from(read_text(file, field))
@@ -96,7 +96,7 @@ def _once(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _nodes(node: yaml.Node, path: Location, depth: int) -> Iterator[yaml.Node]:
-    """All nodes below one, what aliases repeat included; raises `ConfigError` where a name is there twice."""
+    """Yields all nodes below one, aliases repeated; raises `ConfigError` for duplicate names."""
     if depth > DEEPEST:
         raise ConfigError(dotted(path[:5]), "a value that is nested too deep", f"at most {DEEPEST} levels")
     yield node
@@ -130,13 +130,13 @@ def _faults(error: ValidationError, fields: Any) -> list[ConfigError]:
 
 
 def _fault(items: Sequence[Mapping[str, Any]]) -> ConfigError:
-    """Of errors at one path, which are the alternatives of a field, the one that says most."""
+    """Chooses the most informative of the errors of a field's alternatives."""
     own = [item for item in items if isinstance(item.get("ctx", {}).get("error"), ConfigError)]
     return field_error((own or items)[-1 if not own else 0], Scenario)
 
 
 def _in_document(location: Location, fields: Any, *, missing: bool) -> Location:
-    """A location without the names that pydantic gives to the alternatives of a field."""
+    """Returns a location without pydantic's names of a field's alternatives."""
     path, here = list[int | str](), fields
     for i, part in enumerate(location):
         inner: Any = dict(enumerate(here)) if isinstance(here, list) else here
@@ -159,14 +159,14 @@ def scenario_file(name: str) -> Path:
 
 @cache
 def shipped_names() -> tuple[str, ...]:
-    """Names of the shipped scenarios: the three families of the paper, then the others by name."""
+    """Names of shipped scenarios: the paper's families, then others by name."""
     others = sorted(path.parent.name for path in FOLDER.glob("*/*.yaml") if path.parent.name == path.stem)
     return (*PAPER_FAMILIES, *(name for name in others if name not in PAPER_FAMILIES))
 
 
 @cache
 def shipped_document(name: str) -> Scenario:
-    """Reads a shipped document; raises `ConfigError` if there is none of this name."""
+    """Reads a shipped document; raises `ConfigError` for an unknown name."""
     if name not in shipped_names():
         known = shipped_names()
         raise ConfigError("scenario", repr(name), f"one of {', '.join(known)}", did_you_mean(name, known))
@@ -174,7 +174,7 @@ def shipped_document(name: str) -> Scenario:
 
 
 def shipped_net(name: str, remedy: str = "") -> str:
-    """Returns a shipped net's file below `sumo_nets/`; raises `ConfigError`, with a remedy, if there is none."""
+    """Returns a shipped net's file below `sumo_nets/`; raises `ConfigError` with the remedy."""
     known = sorted(path.parent.name for path in FOLDER.glob("*/*.net.xml"))
     if name not in known:
         raise ConfigError("network", repr(name), f"a net beside the document, or one of {', '.join(known)}", remedy)
@@ -193,7 +193,7 @@ def roads(document: Scenario) -> Iterator[str]:
 
 
 def alternatives(document: Scenario, name: str | Chosen[str]) -> tuple[str, ...]:
-    """All names that a field may stand for, over the words of parameters."""
+    """Returns all names that a field may have, over parameters' words."""
     return document.words.get(name, (name,)) if isinstance(name, str) else tuple(name.of.values())
 
 

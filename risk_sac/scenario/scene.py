@@ -1,4 +1,4 @@
-"""Layout of one scene: where the actors of a scenario document start, given the values of its parameters."""
+"""Layout of one scene: actors' starts at given values of the parameters."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -38,14 +38,14 @@ class OnTrack(NamedTuple):
 
 
 def steps_of(horizon_s: float) -> int:
-    """Steps of an episode; raises `ConfigError` if it is too short or too long."""
+    """Returns an episode's steps; raises `ConfigError` if too few or many."""
     if not 1.0 <= horizon_s <= LONGEST_HORIZON_S:
         raise ConfigError("horizon_s", f"{horizon_s:g}", f"1 to {LONGEST_HORIZON_S:g} s")
     return round(horizon_s / STEP_S)
 
 
 def body_named(name: str, path: str) -> BodyName:
-    """Returns a row's name in the table of bodies; raises `ConfigError` if there is none."""
+    """Checks a name against the table of bodies; raises `ConfigError` if unknown."""
     if name not in BODIES:
         raise ConfigError(path, repr(name), f"one of {', '.join(BODIES)}", did_you_mean(name, list(BODIES)))
     return name  # type: ignore[return-value] # mypy narrows no string by a mapping's keys
@@ -67,7 +67,7 @@ class SceneLayout:
     """One scene of a document while its layout is made."""
 
     def __init__(self, document: Scenario, value: Value, file: str, net: Net, longest_s: float) -> None:
-        """Prepares to make it; roads lead on for `longest_s`, the scenario's longest episode."""
+        """Prepares; roads lead on for `longest_s`, the scenario's longest episode."""
         self._value, self._document, self._file, self._net = value, document, file, net
         self._driven_s = longest_s + LEAD_IN_S
         self._placed: dict[str, OnTrack] = {}
@@ -80,7 +80,7 @@ class SceneLayout:
         return StoryScene(self._document, self._value, self._file, self._net)
 
     def layout(self) -> Layout:
-        """Places all actors; raises `ConfigError` with the path of what does not fit the net."""
+        """Places all actors; raises `ConfigError` with the path of a misfit."""
         document, value = self._document, self._value
         actors = {name: actor for name, actor in document.actors.items() if not actor.when or value.true(actor.when)}
         self._bodies = {EGO: body_named(value.word(document.ego.body), "ego.body")}
@@ -133,7 +133,7 @@ class SceneLayout:
         return self._story.plan(self._bodies, self._speeds | walking, moves, own[EGO])
 
     def _set_speed_mps(self, ego: VehicleStart) -> float:
-        """Speed that the ego keeps to; infinite where it drives as the limits allow."""
+        """Returns the ego's set speed; infinite if only the limits bound it."""
         document = self._document
         if document.set_speed is not None:
             speed_mps = self._value.of(document.set_speed, "set_speed")
@@ -150,7 +150,7 @@ class SceneLayout:
         return friction
 
     def _track(self, lane: str, driven: Driven, path: str, *, begin: bool) -> OnTrack:
-        """The track from a lane's beginning or its end, where an actor goes; `before_m` is 0."""
+        """Returns an actor's track from a lane's beginning or end; `before_m` 0."""
         value, net = self._value, self._net
         route, turn = value.choose(driven.route), value.word(driven.turn)
         if turn is not None and turn not in get_args(Turn):
@@ -167,7 +167,7 @@ class SceneLayout:
         return OnTrack(track, here, 0.0, True, begin)
 
     def _classes(self, driven: Driven) -> tuple[str, ...] | None:
-        """Returns SUMO's classes that a start's lane must admit one of, or None."""
+        """Returns SUMO's classes, one of which a start's lane must admit."""
         if isinstance(driven, Actor) and driven.role in ("adversary", "static"):
             return None
         body = self._value.word(driven.body)
@@ -249,7 +249,7 @@ class SceneLayout:
         return place._replace(before_m=before_m, lead_in=start.lead_in is not False and self._has_lead_in)
 
     def _beside(self, there: OnTrack, moving: Moving, path: str) -> OnTrack:
-        """The track from the lane of another actor's reference, or one beside it."""
+        """Returns the track from another actor's reference lane, or one beside it."""
         left = round(self._value.of(moving.start.lanes_left, f"{path}.start.lanes_left"))
         lane = self._net.lanes.get(f"{there.lane.edge}_{there.lane.index + left}")
         classes = self._classes(moving)
@@ -324,7 +324,7 @@ class SceneLayout:
         return StaticStart(id=name, x_m=x_m, y_m=y_m, heading_rad=heading_rad, body=body, size_m=self._size_m(name))
 
     def _facing(self, start: Start, path: str) -> tuple[float, float, float, float]:
-        """A point, and the unit vector of the direction that an actor faces there."""
+        """Returns a point, and the unit vector that an actor faces there."""
         of, path = self._value.of, f"{path}.start"
         turned = math.radians(of(start.heading_deg, f"{path}.heading_deg"))
         if start.crossing is not None:
@@ -373,7 +373,7 @@ class SceneLayout:
                 yield _started(f"{name}_{i}", Role.BACKGROUND, place, speed_mps, body)
 
     def _on(self, track: Track) -> Iterator[tuple[float, float]]:
-        """Vehicles that start on a lane of a track: how far before its reference, and their speed."""
+        """Yields the distance before reference, and speed, of vehicles on a track."""
         reach_m = {(piece.edge, piece.lane): piece.reach_m for piece in track.pieces}
         for name, place in self._placed.items():
             _, piece, _ = place.track.start(place.before_m)
@@ -408,7 +408,7 @@ def _started(name: str, role: Role, place: OnTrack, speed_mps: float, body: Body
 
 
 def _taken_m(other_m: float, other_mps: float, speed_mps: float, clear_m: float) -> tuple[float, float]:
-    """Returns the range where a stream's vehicle would be too close to another."""
+    """Returns the range where a stream's vehicle is too close to another."""
     least_m, gains_m = BODIES["car"].length_m + clear_m, LEAD_IN_S * (other_mps - speed_mps)
     return other_m - least_m + min(gains_m, 0.0), other_m + least_m + max(gains_m, 0.0)
 

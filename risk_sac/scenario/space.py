@@ -73,7 +73,7 @@ class SceneSpace:
         return np.array([parameter.high for parameter in self.parameters])
 
     def from_unit(self, point: Floats) -> Scene:
-        """The scene at a point of the unit cube, `d`; raises `SceneError` for any other point."""
+        """Returns the scene at a unit point, `d`; raises `SceneError` for others."""
         point = np.asarray(point, dtype=np.float64)
         if point.shape != (self.dimension,):
             raise SceneError(f"point has shape {point.shape}; the {self.family!r} family wants ({self.dimension},)")
@@ -83,11 +83,11 @@ class SceneSpace:
         return Scene(self.family, dict(zip(self.names, values.tolist(), strict=True)))
 
     def allows(self, point: Floats) -> bool:
-        """Whether the scene at a point of the unit cube, `d`, keeps the constraints."""
+        """Whether the scene at a unit point, `d`, keeps the constraints."""
         return self.holds is None or self.holds(self.from_unit(point).values)
 
     def nearest_allowed(self, point: Floats) -> Floats:
-        """Returns the point itself, `d`, or the nearest of a pool of points that keep the constraints.
+        """Returns the point, `d`, or the pool's nearest that keeps the constraints.
 
         Raises:
           SceneError: no point of the pool does.
@@ -106,7 +106,7 @@ class SceneSpace:
         return points[[self.allows(point) for point in points]]
 
     def to_unit(self, scene: Scene) -> Floats:
-        """Maps a scene into the unit cube, `d`; a parameter without room maps to 0."""
+        """Maps a scene to a unit point, `d`; constant parameters to 0."""
         self.check(scene)
         offset = np.array([scene.values[name] for name in self.names]) - self.low
         width = self.high - self.low
@@ -128,7 +128,7 @@ class SceneSpace:
                 )
 
     def narrow(self, bounds: Mapping[str, Interval]) -> "SceneSpace":
-        """The part of this space inside further bounds, by parameter; raises `SceneError` if none is left."""
+        """Narrows the space to bounds by parameter; raises `SceneError` if empty."""
         if unknown := sorted(bounds.keys() - set(self.names)):
             raise SceneError(f"unknown parameters {unknown}; the {self.family!r} family has {list(self.names)}")
         return replace(self, parameters=tuple(_narrowed(p, bounds.get(p.name)) for p in self.parameters))
@@ -153,18 +153,18 @@ class Value(NamedTuple):
     words: Mapping[str, str]
 
     def of(self, expression: Expression, path: str = "") -> float:
-        """The value of an expression; raises `ConfigError` with its path where it has none."""
+        """Evaluates an expression; raises `ConfigError` with its path if undefined."""
         try:
             return term(expression).value(self.numbers)
         except ConfigError as error:
             raise ConfigError(path, error.got, error.expected, error.remedy) from error
 
     def choose(self, choice: Any) -> Any:
-        """Resolves a choice by a parameter's word; anything else stays as it is."""
+        """Resolves a choice by a parameter's word; returns anything else unchanged."""
         return choice.of[self.words[choice.by]] if isinstance(choice, Chosen) else choice
 
     def word(self, name: Any) -> Any:
-        """The word of a parameter if one has this name, else the name."""
+        """Returns the word of a parameter of this name, or the name."""
         name = self.choose(name)
         return self.words.get(name, name)
 
@@ -216,11 +216,11 @@ class Grid:
         return math.prod(axis.size for axis in self.axes)
 
     def values(self, number: int) -> dict[str, float]:
-        """Parameter → value of the point with a number; raises `IndexError` beyond the last one."""
+        """Returns a numbered point's values by parameter; raises `IndexError` beyond the last."""
         return self.of_levels(self.levels(number))
 
     def levels(self, number: int) -> tuple[int, ...]:
-        """The levels of the point with a number, one for each axis; raises `IndexError` beyond the last one."""
+        """Returns a numbered point's level on each axis; raises `IndexError` beyond."""
         if not 0 <= number < self.size:
             raise IndexError(f"point {number} of a grid of {self.size}")
         levels = []

@@ -1,4 +1,4 @@
-"""Starts and the story of one scene, where a document states places by its road file."""
+"""Starts and story of one scene whose document states places by road."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -28,7 +28,7 @@ def road_of(file: str) -> RoadFile:
 
 
 class StoryScene:
-    """Places of one scene, found by the road file and the story of its document."""
+    """Places of one scene, by its document's road file and story."""
 
     def __init__(self, document: Scenario, value: Value, file: str, net: Net) -> None:
         """Reads the road file, which lies beside the net's `file`."""
@@ -86,7 +86,7 @@ class StoryScene:
         return ahead_of(self.pose(name), self.reach(name, body).ahead_m)
 
     def front_spot(self, name: str, body: BodyName) -> LanePlace:
-        """Place on a lane where the front of a vehicle starts; raises `ConfigError` if no lane is near."""
+        """Returns the lane place of a vehicle's front; raises `ConfigError` off lanes."""
         front = ahead_of(self.middle(name, body), self.reach(name, body).length_m / 2)
         spot = self.places.spot(front) or nearest_lane(self._net, front.x_m, front.y_m, None)
         if spot is None:
@@ -96,7 +96,7 @@ class StoryScene:
         return spot
 
     def route(self, name: str, lane: NetLane, metres: float) -> tuple[str, ...] | None:
-        """Returns the edges of an actor's first trajectory or route of the story, and straight on after it.
+        """Returns the edges of an actor's first way, and straight on after.
 
         The way may end after so many metres. None where the story states no way.
 
@@ -137,7 +137,7 @@ class StoryScene:
         free: Mapping[str, bool],
         ego: VehicleStart,
     ) -> StoryPlan:
-        """Everything that the engine needs; `free` says of each actor that moves whether it moves anywhere."""
+        """Returns the engine's plan; `free` says whether each actor moves freely."""
         actors, others = dict[str, StoryActor](), dict[str, StoryActor]()
         for name, body in bodies.items():
             start = StoryActor(self.pose(name), speeds_mps.get(name, 0.0), self.reach(name, body), free.get(name, True))
@@ -159,7 +159,7 @@ class StoryScene:
 
 
 def actions_of(story: Story, name: str) -> Iterator[Action]:
-    """Yields the actions of an actor: those of the start first, then in the order of the story."""
+    """Yields an actor's actions: those at the start, then in story order."""
     yield from (init.do for init in story.init if init.actor == name)
     for acts in story.stories.values():
         for group in (group for act in acts for group in act.groups if name in group.actors):

@@ -1,4 +1,4 @@
-"""Lines that actors travel along: points with headings and, where they are timed, times."""
+"""Lines that actors travel along: points with headings and, if timed, times."""
 
 import itertools
 import math
@@ -43,7 +43,7 @@ class TravelLine:
         return float(self.station_m[-1])
 
     def pose(self, station_m: float, left_m: float = 0.0) -> Pose:
-        """Returns the pose at a station, `left_m` of the line, which goes straight on before and beyond."""
+        """Returns the pose `left_m` of a station; the ends extend straight."""
         i = self._piece(station_m)
         (x0, y0), (x1, y1) = self.points[i], self.points[i + 1]
         length = self.station_m[i + 1] - self.station_m[i]
@@ -112,7 +112,7 @@ class TravelLine:
 
 
 def _side(left: float, beyond: float) -> float:
-    """Distance of a point that is beside a corner, with the sign of its side."""
+    """Returns the signed distance of a point beside a corner."""
     return math.copysign(math.hypot(left, beyond), left)
 
 
@@ -130,7 +130,7 @@ def line_of(points: Floats, heading: Floats | None = None, times_s: Floats | Non
 
 
 def directions(points: Floats) -> Floats:
-    """Returns the direction of a smooth line at its points, from the points beside them, `n`."""
+    """Returns a smooth line's directions at its points, `n`, by their neighbours."""
     steps = np.diff(points, axis=0)
     units = steps / np.hypot(*steps.T)[:, None]
     around = np.concatenate((units[:1], units[:-1] + units[1:], units[-1:]))
@@ -177,7 +177,7 @@ def trajectory_line(trajectory: Trajectory, resolve: Resolve, number: Number, st
 
 
 def _polyline(trajectory: Polyline, resolve: Resolve, number: Number) -> TravelLine:
-    """Returns straight pieces; a corner without a heading of its own faces the direction of travel."""
+    """Returns straight pieces; a corner without heading faces the direction of travel."""
     vertices = (*trajectory.vertices, trajectory.vertices[0]) if trajectory.closed else trajectory.vertices
     poses = [resolve(vertex.position) for vertex in vertices]
     facing = [
@@ -200,7 +200,7 @@ def _is_faced(position: Position) -> bool:
 
 
 def _times(times: Sequence[float | None], corners: Floats, field: str) -> Floats | None:
-    """Returns when corners are passed, those without a time at an even speed; None if none has one."""
+    """Returns corners' times, interpolated at even speed; None if none is stated."""
     known = [i for i, time in enumerate(times) if time is not None]
     if not known:
         return None

@@ -1,4 +1,4 @@
-"""Makes the map of an ego's boundary from the records of a run; a pure function of them."""
+"""Makes the map of an ego's boundary from a run's records alone."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -35,7 +35,7 @@ class Drive(NamedTuple):
 
 
 class Fitted(NamedTuple):
-    """A driver with posterior samples of where it fails, over the box's points."""
+    """Driver with posterior samples of where it fails in the box."""
 
     drive: Drive
     classifier: FailureClassifier | None  # None: all outcomes are alike
@@ -88,7 +88,7 @@ def _read(folder: Path) -> tuple[RunSpec, list[EpisodeRecord]]:
 def boundary_map(
     spec: RunSpec, records: Sequence[EpisodeRecord], beside: Mapping[str, Sequence[EpisodeRecord]] | None = None
 ) -> BoundaryMap:
-    """Maps where an ego fails, where competent drivers do, and where other egos do.
+    """Maps where an ego, competent drivers and other egos fail.
 
     Args:
       spec: of the run.
@@ -186,7 +186,7 @@ def _rounded(values: Floats) -> tuple[float, ...]:
 
 
 def _share(samples: Bools) -> BoxShare:
-    """Median and 95 % interval of the share of the box over posterior samples."""
+    """Median and 95 % interval of a box share over posterior samples."""
     low, middle, high = np.quantile(samples.mean(axis=1), (0.025, 0.5, 0.975)).tolist()
     return BoxShare(share=middle, low=low, high=high)
 
@@ -210,7 +210,7 @@ def _point(spec: RunSpec, record: EpisodeRecord, slice_: Slice) -> BoundaryPoint
 
 
 def _contradicted(fitted: Sequence[Fitted]) -> list[str]:
-    """Says of which drivers the map smooths over outcomes, such as those on an island of failures."""
+    """Names drivers whose outcomes contradict the map, such as islands of failures."""
     notes = []
     for each in fitted:
         if each.classifier is not None:

@@ -21,7 +21,7 @@ Layers = Sequence[NDArray[np.float32]]
 
 @dataclass(frozen=True, slots=True)
 class FrozenPolicy:
-    """tanh of a perceptron with ReLU between its layers: what each of the learners does without exploring.
+    """Policy without exploration: tanh of a perceptron with ReLU between layers.
 
     Attributes:
       normalised: whether each hidden layer is, see `respond`.

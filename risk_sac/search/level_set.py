@@ -1,4 +1,4 @@
-"""Gaussian-process classifier of passing and failing, and the acquisition that seeks its boundary.
+"""Gaussian-process classifier of passing and failing, with an acquisition for its boundary.
 
 Everything works in float64 and draws no random number but those that a seed names.
 
@@ -128,7 +128,7 @@ class FailureClassifier:
 
 
 def straddle(classifier: FailureClassifier, points: Floats, out: Floats | None = None) -> Floats:
-    """Ambiguity of points, `n`: largest where the boundary may pass, and outcomes are not awaited already.
+    """Ambiguity of points, `n`: largest near the boundary, away from awaited outcomes.
 
     a(x) = 1.96 σ(x) - |μ(x)|, with the deviation that is left at `out`; see `FailureClassifier.latent`.
 

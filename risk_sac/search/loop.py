@@ -27,7 +27,7 @@ class Observer(Protocol):
     """Receives each episode; may stop the run."""
 
     def episode(self, record: EpisodeRecord, metrics: RunMetrics, series: SeriesFile | None) -> None:
-        """Receives an episode; `series` is its file below `failures/` if the ego touched something.
+        """Receives an episode, with its file of `failures/` if it has one.
 
         A resumed run first repeats the episodes of its checkpoint, because the last of them may have been missed.
         """
@@ -71,7 +71,7 @@ def execute_run(spec: RunSpec, folder: Path, observer: Observer) -> RunOutcome:
 
 
 def episodes(run: RunState, folder: Path, observer: Observer) -> Iterator[RunMetrics]:
-    """Plays the rest of a run in this process; yields the metrics after each episode."""
+    """Plays the rest of a run here; yields metrics after each episode."""
     with CrashGuard(folder) as guard:
         env = GuardedEnv(run.env, guard)
         while not run.finished and not observer.should_stop():
@@ -91,7 +91,7 @@ def episode(run: RunState, env: GuardedEnv) -> RunMetrics:
 
 
 def rounds(run: RunState, folder: Path, observer: Observer, processes: int) -> Iterator[RunMetrics]:
-    """Plays the rest of a run in rounds; yields the metrics after each episode.
+    """Plays the rest of a run in rounds; yields metrics per episode.
 
     Round r + 1 is asked for once round r - 1 is told, and is played while round r is. So no process waits for the
     slowest episode of a round, and the result depends neither on their number nor on their speed. A learner learns from
@@ -137,7 +137,7 @@ def propose(run: RunState) -> Proposal:
 
 
 def tell(run: RunState, proposal: Proposal, played: PlayedEpisode) -> RunMetrics:
-    """Tells the searchers of an episode and adds its record: Algorithm 1, lines 21 and 22."""
+    """Tells the searchers an episode; adds its record: Alg. 1, l. 21-22."""
     sums, encounter, unplayable = played.sums, played.encounter, played.unplayable
     mean_return = sums.shaped_return / sums.steps if unplayable is None else None
     run.searchers.recall(guided=proposal.guided, origin=proposal.origin)
@@ -177,5 +177,5 @@ def tell(run: RunState, proposal: Proposal, played: PlayedEpisode) -> RunMetrics
 
 
 def episode_seed(run_seed: int, index: int) -> int:
-    """Returns the seed of one episode; all methods share it, so that they meet the same background traffic."""
+    """Returns an episode's seed, which all methods share for equal background traffic."""
     return int(np.random.SeedSequence((run_seed, index)).generate_state(1)[0] >> 1)

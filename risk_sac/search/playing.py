@@ -40,7 +40,7 @@ class EpisodeActor(Protocol):
         """Whether the rest of the episode is not worth playing."""
 
     def begin(self, genes: Floats) -> None:
-        """Begins an episode with the genes of its scripts, if it follows any."""
+        """Begins an episode with the genes of its scripts, if any."""
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
         """Returns the joint action."""
@@ -69,7 +69,7 @@ class Proposal:
     policy: PolicySnapshot | None = None  # that it is played with; None: this process plays it, or nothing learns
 
     def state(self) -> dict[str, Any]:
-        """Returns plain values that the proposal can be made of again, with its policy.
+        """Returns plain values that, with the policy, restore the proposal.
 
         The point has the scene and the genes.
         """
@@ -129,13 +129,13 @@ class PlayedEpisode:
 
 
 class GuardedEnv:
-    """Environment of a run that leaves out crashing episodes and truncates those of no further use."""
+    """Environment that leaves out crashing episodes and truncates those without further use."""
 
     def __init__(self, env: RiskSacEnv, guard: CrashGuard) -> None:
         self.env, self._guard = env, guard
 
     def begin(self, index: int) -> None:
-        """Notes for the crash guard that an episode begins, before its scene is chosen."""
+        """Notes an episode for the crash guard before its scene is chosen."""
         self._index, self._playable = index, self._guard.begin(index)
 
     def reset(self, seed: int, scene: Scene, actor: EpisodeActor) -> tuple[Observation, dict[str, Any]]:
@@ -181,7 +181,7 @@ class GuardedEnv:
 def play(
     guarded: GuardedEnv, proposal: Proposal, actor: EpisodeActor, agent: EpisodeActor, reward: TrainingReward
 ) -> PlayedEpisode:
-    """Plays a proposed episode, which the guard knows of: Algorithm 1, lines 5 to 20.
+    """Plays a proposed episode that the guard knows: Alg. 1, l. 5-20.
 
     Args:
       guarded: environment of the run.

@@ -22,7 +22,7 @@ def most_processes(spec: RunSpec) -> int:
 
 
 def processes_of(spec: RunSpec) -> int:
-    """Returns how many processes play a run here; logs why where its ego allows fewer than its rounds.
+    """Returns how many processes play a run; logs an ego's lower limit.
 
     Raises:
       ConfigError: the run's ego is not registered, or RISK_SAC_ROLLOUTS is no positive integer.

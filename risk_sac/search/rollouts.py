@@ -1,4 +1,4 @@
-"""Processes that play the episodes of one run in parallel, one simulation each.
+"""Processes that play a run's episodes in parallel, one simulation each.
 
     python -m risk_sac.search.rollouts CONNECTION FOLDER NUMBER
 
@@ -69,7 +69,7 @@ class RolloutProcess:
 
 
 class Rollouts:
-    """Plays proposals in processes; one that dies is started again, and its episode is played again.
+    """Player of proposals in processes; replays an episode whose process died.
 
     A thread receives what was played and sends what waits, so that no process idles while a learner learns.
     """
@@ -104,7 +104,7 @@ class Rollouts:
         self._wakes.send_bytes(b"")
 
     def wait_for(self, index: int, at_most_s: float) -> PlayedEpisode | None:
-        """Waits for an episode; returns None if it is not played after `at_most_s`.
+        """Waits for an episode; returns None if unplayed after `at_most_s`.
 
         Raises:
           SimulationError: a process failed, or died again and again.
@@ -197,7 +197,7 @@ class Rollouts:
             one.playing = None
 
     def _restart(self, one: RolloutProcess) -> None:
-        """Starts a process again in which the same episode is played; its crash guard leaves out what crashes."""
+        """Restarts a process on the same episode; its guard skips crashing ones."""
         if self._closing:
             return
         if one.process is None:
@@ -231,7 +231,7 @@ def processes_elsewhere() -> list[Connection]:
 
 
 def serve(connection: Connection, folder: Path, number: int) -> None:
-    """Plays what the connection proposes until it is closed, as the run's process of that number."""
+    """Plays proposals as process `number` of a run until the connection closes."""
     terms: Terms = connection.recv()
     os.nice(max(0, terms.niceness - os.nice(0)))
     if terms.memory_bytes is not None:

@@ -126,7 +126,7 @@ class RunState:
 
     @property
     def learning(self) -> bool:
-        """Whether the next episode belongs to the search; in the evaluation the policy is frozen."""
+        """Whether the next episode is of the search, not the frozen evaluation."""
         budget, played, points = self.spec.budget, self._search_episodes, self.searchers.points
         most = budget.episodes if points is None else min(budget.episodes, points)
         if played < budget.least_episodes or budget.cpu_s is None:
@@ -146,7 +146,7 @@ class RunState:
         return self.latest[-1].environment_steps if self.latest else 0
 
     def add(self, record: EpisodeRecord, played: PlayedEpisode) -> RunMetrics:
-        """Adds an episode that was played, and writes its record and the time series of a violation.
+        """Adds a played episode; writes its record and a violation's time series.
 
         Returns:
           The metrics of its phase.
@@ -181,7 +181,7 @@ class RunState:
             )
 
     def save(self) -> None:
-        """Writes the checkpoint if there is a new episode; called between episodes only."""
+        """Writes the checkpoint after a new episode; call between episodes only."""
         if self._saved == self.episodes:
             return
         for name in (EPISODES, PLAYED):
@@ -200,7 +200,7 @@ class RunState:
         self._saved = self.episodes
 
     def resume(self) -> list[tuple[EpisodeRecord, RunMetrics]]:
-        """Continues from the folder's newest intact checkpoint; without one the run starts from the beginning.
+        """Continues from the folder's newest intact checkpoint, or from the beginning.
 
         Either way the results are the same.
 
@@ -259,7 +259,7 @@ class RunState:
         return Proposal(**{**state, "scene": scene, "genes": genes, "driven_by": driven_by, "policy": policy})
 
     def _append(self, record: EpisodeRecord) -> None:
-        """Writes a record behind those of this run; what an interrupted run wrote there is cut off."""
+        """Appends a record; cuts off what an interrupted run wrote there."""
         line = stored(record).encode() + b"\n"
         _overwrite(self._folder / EPISODES, self._written, line)
         self._written += len(line)
@@ -273,7 +273,7 @@ class RunState:
         self._episode_cpu_s.append(spent_s)
 
     def _read_played(self, state: Mapping[str, Any], episodes: int) -> "tuple[Mapping[int, str], array[float]] | None":
-        """Reads what `_append_played` wrote of so many episodes; None if any of it is missing."""
+        """Reads what `_append_played` wrote of some episodes; None if incomplete."""
         if "episode_cpu_s" in state:  # of an earlier version, whose checkpoints held all
             known, none = state["series"], bytes(ROW.size - 8).hex()
             rows = [ROW.pack(s, bytes.fromhex(known.get(k, none))) for k, s in enumerate(state["episode_cpu_s"])]
@@ -301,7 +301,7 @@ def _overwrite(file: Path, start: int, content: bytes) -> None:
 
 
 def _beginning(file: Path, length: int) -> bytes:
-    """Reads so many bytes of a file; fewer where it is shorter or missing."""
+    """Reads up to `length` bytes of a file; none if missing."""
     try:
         with file.open("rb") as opened:
             return opened.read(length)
@@ -310,7 +310,7 @@ def _beginning(file: Path, length: int) -> bytes:
 
 
 def _series(folder: Path, records: list[EpisodeRecord], digests: Mapping[int, str]) -> dict[int, SeriesFile]:
-    """Time series by episode, with the digests they were written with; a damaged file is logged."""
+    """Returns intact time series with their digests; logs damaged files."""
     series = {}
     for record in records:
         if record.worst_violation is None:

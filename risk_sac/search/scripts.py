@@ -44,7 +44,7 @@ STAYING = 0.2  # signed steering gene up to which a leader stays before a standi
 
 
 class Genes(NamedTuple):
-    """Of one adversary, in [0, 1]; each motion says what they mean to it."""
+    """Genes of one adversary, in [0, 1]; each motion interprets them."""
 
     active: float
     place: float
@@ -73,7 +73,7 @@ class Seen(NamedTuple):
 
 
 class Act(NamedTuple):
-    """An action in [-1, 1]: acceleration and, of a vehicle, lateral speed, or, of a pedestrian, heading rate."""
+    """Action in ±1: acceleration; a vehicle's lateral speed, a pedestrian's heading rate."""
 
     drive: float
     steer: float
@@ -82,7 +82,7 @@ class Act(NamedTuple):
 def adversaries_seen(
     observation: NDArray[np.float32], adversaries: int, step: int, statics: int = 0
 ) -> list[Seen | None]:
-    """Each adversary, in the family's order; None for one that has left the net.
+    """Returns adversaries in the family's order; None for those off the net.
 
     Args:
       observation: see `risk_sac.env.observation`.

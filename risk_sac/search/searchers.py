@@ -1,4 +1,4 @@
-"""Pairs each method's scene sampler with its agent, and a learner with the archive search that warms it.
+"""Pairs samplers with agents, and learners with the warm-up archive search.
 
 Source: RISK-SAC, Algorithm 1, l. 1-2. Choice: warm start and turns are ours.
 """
@@ -78,7 +78,7 @@ class Searcher(NamedTuple):
 
 
 class Searchers:
-    """A method's own searcher and, beside a learner, its guide: an archive search.
+    """Searcher of a method and, beside a learner, its guide: archive search.
 
     Choice: a learner's memory is filled by an archive search until that has found failures enough, because uniform
     actions hardly find any. All learners are warmed alike.
@@ -126,7 +126,7 @@ class Searchers:
         return self._next
 
     def _warm(self, out: int) -> bool:
-        """Whether the guide has done its part; one that takes turns goes on until it has found enough.
+        """Whether the guide is done; with turns, once it has found enough.
 
         Args:
           out: number of episodes that are being played.
@@ -138,7 +138,7 @@ class Searchers:
         return spent or self._failures >= warm_start.failures
 
     def driven_by(self, *, learning: bool) -> DrivenBy | None:
-        """Returns what drives the adversaries of the point that was proposed last; None: nothing does."""
+        """Returns what drives the adversaries of the latest point, or None."""
         sampler, actor = self._next
         if actor.genes:
             return sampler.driven_by
@@ -146,7 +146,7 @@ class Searchers:
         return DrivenBy.POLICY if frozen else actor.driven_by
 
     def ask(self, out: Sequence[Floats] = ()) -> Floats:
-        """Returns the next point of the searcher chosen last; its scene keeps the scenario's constraints.
+        """Returns the chosen searcher's next point; its scene keeps the constraints.
 
         A sampler is asked again for a point whose scene does not, so that random scenes stay uniform among those that
         do; after `tries` the nearest scene of a pool takes its place. One without tries has its points refused. `out`
@@ -176,12 +176,12 @@ class Searchers:
         return isinstance(self.agent, Learner)
 
     def waits(self, out: int) -> bool:
-        """Whether the next point depends on one of so many that are out; see `SceneOptimizer.waits`."""
+        """Whether the next point depends on episodes out; see `SceneOptimizer.waits`."""
         return self._own.sampler.waits(out)
 
     @property
     def points(self) -> int | None:
-        """Number of scenes of a method that plays each once; None: it has no end."""
+        """Number of scenes of a method that plays each once, or None."""
         return self._own.sampler.points
 
     @property
@@ -204,7 +204,7 @@ class Searchers:
         return self.agent.snapshot().at(state)
 
     def recall(self, *, guided: bool, origin: Mapping[str, Any] | None = None) -> None:
-        """Chooses the searcher that has proposed an episode; `origin` where others were proposed since."""
+        """Chooses the searcher of an episode; `origin` if others were proposed since."""
         self._next = self._guide if guided and self._guide else self._own
         if origin is None:
             return
@@ -213,19 +213,19 @@ class Searchers:
             self._own.sampler.origin = {}  # it learns the guide's points, too
 
     def learn(self, transitions: Sequence[Transition], snapshot: PolicySnapshot, seed: int) -> None:
-        """Lets the learner learn from an episode that another process has played; see `Learner.learn`."""
+        """Learns from an episode of another process; see `Learner.learn`."""
         assert isinstance(self.agent, Learner)
         self.agent.learn(transitions, snapshot, seed, own=not self.guided)
 
     def begin(self, genes: Floats) -> Actor:
-        """Begins an episode for its actor, which it returns, and for the learner that observes it."""
+        """Begins an episode for the observing learner and the returned actor."""
         self._next.actor.begin(genes)
         if self._next is not self._own:
             self.agent.begin(genes)
         return self._next.actor
 
     def tell(self, point: Floats, mean_return: float | None, encounter: Encounter = NO_ENCOUNTER) -> float | None:
-        """Scores the scene of the episode; see `SceneOptimizer.tell`. The method's sampler also gets its guide's."""
+        """Scores an episode's scene; the method's sampler also learns its guide's."""
         if self._next is not self._own:
             self._own.sampler.tell(point[: self._space.dimension], mean_return, encounter)
         return self._next.sampler.tell(point, mean_return, encounter)
@@ -240,7 +240,7 @@ class Searchers:
             self._turns.tell(GUIDE if self.guided else OWN, record.steps, record.valid_violations)
 
     def state(self) -> dict[str, Any]:
-        """Returns all that the next episode depends on, except the records so far; see `load`."""
+        """Returns what the next episode depends on besides records; see `load`."""
         return {
             "optimizer": self._own.sampler.state(),
             "agent": self.agent.state(),
@@ -289,7 +289,7 @@ class Searchers:
 
 
 class Turns:
-    """Chooses between guide and policy by what each has found lately for its processor time.
+    """Chooser between guide and policy by recent finds per processor time.
 
     So a policy acts often once the scripts' failures run out, and not before. The same episodes in the same order lead
     to the same turns.
@@ -311,7 +311,7 @@ class Turns:
         return int(self._random.random() < self._bandit.probability)
 
     def tell(self, arm: int, steps: int, violations: Sequence[Collision | Violation]) -> None:
-        """Counts an episode and its valid violations; what either arm has found is new to neither."""
+        """Counts an episode; violations that either arm has found are not new."""
         self._bandit.tell(arm, self._finds.add(violations), steps)
 
     def state(self) -> dict[str, Any]:

@@ -1,1 +1,1 @@
-"""SUMO behind a small seam: simulation, adversary control, the ego's perception, the collision oracle."""
+"""SUMO behind a small interface: simulation, adversary control, perception, collision oracle."""

@@ -1,4 +1,4 @@
-"""The collision oracle: our own box test, swept over the step, and the contact's place and time.
+"""Collision oracle: box test swept over the step, contact place and time.
 
 Between two frames positions and headings are interpolated, so bodies that cross and part within a step are found, and
 the step length does not matter. SUMO's list is only a cross-check.
@@ -26,7 +26,7 @@ TOUCHING_M = 1e-5  # bodies no farther apart along any separating axis touch
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """Two bodies at the instant they first touch; geometry in the ego's frame."""
+    """Two bodies when they first touch; geometry in the ego's frame."""
 
     other: int  # index in the frame, >= 1
     time_s: float
@@ -44,7 +44,7 @@ class Contact:
 
 
 def find_contact(before: Frame | None, frame: Frame, view: RelativeView | None = None) -> Contact | None:
-    """The ego's first contact in the step from `before` to `frame`, or None.
+    """Finds the ego's first contact in the step from `before` to `frame`.
 
     Without a frame before, bodies that overlap touch at the frame's time; `view` is `relative_view(frame)`, if known.
     """
@@ -65,7 +65,7 @@ def find_contact(before: Frame | None, frame: Frame, view: RelativeView | None =
 
 
 def contact_with(before: Floats, now: Floats, other: int, time_s: float, step_s: float) -> Contact:
-    """Describes the contact with one actor in the step between two states, which ends at `time_s`.
+    """Describes the contact with one actor in a step ending at `time_s`.
 
     Bodies that do not touch in it are described at its end.
     """
@@ -75,7 +75,7 @@ def contact_with(before: Floats, now: Floats, other: int, time_s: float, step_s:
 
 @compiled
 def _first_contact(before: Floats, now: Floats) -> tuple[float, int]:
-    """Share of the step after which the ego first touches another actor, and its column; 0 for none."""
+    """Finds the ego's first contact: the step's share, and column or 0."""
     share, found = math.inf, 0
     for other in range(1, now.shape[1]):
         dx, dy = now[X, other] - now[X, 0], now[Y, other] - now[Y, 0]
@@ -90,7 +90,7 @@ def _first_contact(before: Floats, now: Floats) -> tuple[float, int]:
 
 @compiled
 def _first_touch(before: Floats, now: Floats, other: int) -> float:
-    """Computes the share of the step, in [0, 1], until the ego touches `other`.
+    """Computes the step's share, in [0, 1], until the ego touches `other`.
 
     It is inf if the ego does not.
 
@@ -142,7 +142,7 @@ def _between(before: Floats, now: Floats, other: int, share: float) -> Floats:
 
 
 def _describe(pair: Floats, other: int, time_s: float) -> Contact:
-    """Describes the contact of the ego and another actor, the two columns of `pair`; `other` is its index."""
+    """Describes the ego's contact with actor `other`, the second column of `pair`."""
     view = frame_view(pair)
     x, y = contact_point(view)
     cos, sin = float(view.cos[0]), float(view.sin[0])

@@ -27,7 +27,7 @@ from risk_sac.world.types import STEP_S, Frame, Role
 
 @dataclass(slots=True)
 class PedestrianControl:
-    """Integrates a pedestrian's motion; along and across its heading it accelerates on a disc.
+    """Integrator of a pedestrian's motion, with acceleration bounded by a disc.
 
     Source: that heading rate falls with about 1/speed, Wang et al., A kinematic constraint on pedestrian walking
     (arXiv 2506.15321).
@@ -120,7 +120,7 @@ class Adversaries:
     slots: NDArray[np.intp]
 
     def __init__(self, family: Family, limits: Limits, frame: Frame, story: StoryPlan | None = None) -> None:
-        """Starts from the motion in `frame`; those that follow a story deviate from it."""
+        """Starts from the motion in `frame`; story actors deviate from their story."""
         f, rows = frame, {id_: row for row, id_ in enumerate(frame.ids)}
         there = [id_ for id_ in family.adversaries if id_ in rows]  # a document may leave one out of a scene
         own = {id_: limits.of(body_of(int(frame.body[rows[id_]]))) for id_ in there}
@@ -148,7 +148,7 @@ class Adversaries:
         self._statics = int(np.count_nonzero(frame.role == int(Role.STATIC)))  # they never leave
 
     def command(self, action: Sequence[float], frame: Frame, sim: SumoSimulation) -> None:
-        """Sends one joint action, two entries per adversary in the family's order; `frame` is the latest."""
+        """Sends a joint action, two entries per adversary; `frame` is the latest."""
         first, second = action[::2], action[1::2]
         self.rows(frame)
         rows = self._row_of
@@ -175,7 +175,7 @@ class Adversaries:
         }
 
     def rows(self, frame: Frame) -> NDArray[np.intp]:
-        """Rows of the frame that hold adversaries; `slots` are then their places in the family's order."""
+        """Returns the frame's adversary rows; `slots` are their places in family order."""
         if frame.ids is not self._ids:
             self._ids = frame.ids
             self._row_of = {id_: row for row, id_ in enumerate(frame.ids)}
@@ -200,7 +200,7 @@ DRIVE = ("speed_mps", "lateral_mps")
 
 
 class RecordedAdversaries(Adversaries):
-    """Adversaries that move as recorded until the recording ends, and then as commanded.
+    """Adversaries that move as recorded, and as commanded once the recording ends.
 
     They keep clear of nothing meanwhile, and their limits are not checked again.
     """

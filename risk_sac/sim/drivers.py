@@ -45,7 +45,7 @@ class SumoDriver:
     def __init__(
         self, vehicle: str, reaction_s: float, emergency_mps2: float, cruise_mps: float = OWN_CHOICE_MPS
     ) -> None:
-        """Looks up the model of the vehicle, which can brake by at most `emergency_mps2`."""
+        """Looks up the vehicle's model; braking is at most `emergency_mps2`."""
         self._vehicle = vehicle
         self.cruise_mps = cruise_mps
         self.period = round(reaction_s / STEP_S)
@@ -58,7 +58,7 @@ class SumoDriver:
         self._accel, self._min_gap = get.getAccel(vehicle), get.getMinGap(vehicle)
 
     def tell(self, speed_mps: float, accel_mps2: float) -> None:
-        """Tells SUMO how fast the vehicle may drive in the next step, given its speed and acceleration."""
+        """Tells SUMO the vehicle's greatest next speed, given its speed and acceleration."""
         self.step += 1
         if self.wanted_mps2 is None:
             if self.telling:
@@ -78,7 +78,7 @@ class SumoDriver:
             self._hold_to(accel, speed_mps, accel_mps2)
 
     def _hold_to(self, wanted_mps2: float, speed_mps: float, accel_mps2: float) -> None:
-        """Tells SUMO the speed after a step of this acceleration, or of what the build-up leaves of it."""
+        """Tells SUMO the speed after a step of this acceleration, jerk limited."""
         self.telling = True
         accel = max(wanted_mps2, min(accel_mps2, 0.0) - JERK_MPS3 * STEP_S)
         libsumo.vehicle.setSpeedMode(self._vehicle, EMERGENCY_MODE if accel < -NORMAL_DECEL_MPS2 else SAFE_MODE)
@@ -87,7 +87,7 @@ class SumoDriver:
     def decide(
         self, own: int, speed: float, along: Along, state: Floats, vehicle: Bools, candidate: Bools
     ) -> float | None:
-        """The acceleration that its model wants for the nearest of its `targets`; None where none binds."""
+        """Returns its model's acceleration for the nearest of `targets`; None if unbound."""
         path, station_m, offset_m, _ = along
         obstacles = targets(path, station_m, offset_m, own, self._accel, state, vehicle, candidate)
         if not len(obstacles):
@@ -115,7 +115,7 @@ class Drivers:
     """
 
     def __init__(self, layout: Layout, reaction_time_s: float, roads: Roads) -> None:
-        """Makes a driver for every vehicle; all have been inserted. The reaction time is the ego's."""
+        """Makes drivers for all inserted vehicles; the reaction time is the ego's."""
         emergency = emergency_decel_mps2(layout.friction)
         cruise = {start.id: start.speed_mps for start in layout.vehicles if start.role is Role.ADVERSARY}
         self._others = {
@@ -175,7 +175,7 @@ class Drivers:
                 driver.tell(*reading.speed_and_accel[row])
 
     def _is_askew(self, reading: Reading, moved: MovedVehicle | None) -> bool:
-        """Whether the ego's body reaches elsewhere than the box along its lane that SUMO's models go by."""
+        """Whether the ego's body reaches beyond SUMO's box along its lane."""
         frame = reading.frame
         along = self._roads.along(self._ego_id) if moved is None else moved.along
         _, _, way_rad = project(along.path, float(frame.x_m[0]), float(frame.y_m[0]))
@@ -190,7 +190,7 @@ class Drivers:
             ego.brake(speed, accel, braking_mps2)
 
     def intended_accel(self, reading: Reading) -> dict[str, float]:
-        """Accelerations that the drivers of the released vehicles would choose without commands, m/s².
+        """Accelerations that released vehicles' drivers would choose without commands, m/s².
 
         They keep the speed they started with, or drive slower for SUMO's models or a pedestrian. SUMO's wish is that of
         the step before, the newest it tells.
@@ -229,7 +229,7 @@ ALONG_RAD = 0.35  # greatest angle to the lane of a body that a stand-in along t
 
 
 def stand_in_lanes(statics: Iterable[StaticStart]) -> frozenset[str]:
-    """Inserts the stand-ins of static bodies, and returns the ids of those that have one.
+    """Inserts stand-ins of static bodies, and returns the ids that have one.
 
     A static body is no vehicle of SUMO's. One that stands along a lane gets a stand-in there, so that SUMO's
     lane-change models know of it and drivers pass it. The stand-in is never read.
@@ -238,7 +238,7 @@ def stand_in_lanes(statics: Iterable[StaticStart]) -> frozenset[str]:
 
 
 def _stand_in(start: StaticStart) -> bool:
-    """Inserts a stand-in if the body reaches into a lane, and lies along it."""
+    """Inserts a stand-in if the body reaches into a lane along it."""
     body = start.shape
     edge, centre_m, index = libsumo.simulation.convertRoad(start.x_m, start.y_m, False, CAR)
     lane = f"{edge}_{index}"
@@ -268,7 +268,7 @@ def _stand_in(start: StaticStart) -> bool:
 
 
 def _inside(edge: str, index: int, offset_m: float, half_m: float) -> tuple[float, float]:
-    """Returns the right and left end of a body across its lane, without what is beside the carriageway."""
+    """Clips a body's lateral ends, right and left, to the carriageway."""
     lane_m, lanes = libsumo.lane.getWidth(f"{edge}_{index}") / 2, libsumo.edge.getLaneNumber(edge)
     drivable = [0 <= beside < lanes and car_may_use(f"{edge}_{beside}") for beside in (index - 1, index + 1)]
     right_m, left_m = offset_m - half_m, offset_m + half_m

@@ -1,4 +1,4 @@
-"""The ego's perception: a line-of-sight sensor, and a memory of the actors it saw."""
+"""The ego's perception: a line-of-sight sensor, and a memory of seen actors."""
 
 import math
 from typing import NamedTuple, Protocol
@@ -15,7 +15,7 @@ EVERYTHING = Sight(reach_m=math.inf, half_view_rad=math.pi, occlusion=False)
 
 
 def sight(sensor: SensorConfig | None, visibility_m: float, unlit_m: float = math.inf) -> Sight:
-    """Combines a sensor with the visibility; None sees everything that the visibility leaves.
+    """Combines a sensor with visibility; without a sensor visibility alone counts.
 
     Args:
       sensor: of the ego.
@@ -45,7 +45,7 @@ class Belief(NamedTuple):
 
 
 class Senses(Protocol):
-    """Perception of the ego; the simulation calls `look` once per frame of an episode."""
+    """Perception of the ego; the simulation calls `look` once per frame."""
 
     def reset(self) -> None:
         """Begins an episode."""
@@ -123,7 +123,7 @@ def _look(
     occlusion: bool,
     unlit_m: float,
 ) -> tuple[Bools, Bools, Floats]:
-    """Updates the memory; returns which of the others are in sight, and both parts of the belief."""
+    """Updates the memory; returns the others in sight, and both belief parts."""
     seen = bodies_in_sight(frame_view(state), conceals, lit, Sight(reach_m, half_view_rad, occlusion, unlit_m))
     n = state.shape[1]
     known, believed = np.ones(n, dtype=np.bool_), state.copy()

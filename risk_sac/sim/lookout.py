@@ -32,7 +32,7 @@ NEAR_S, NEAR_MPS2 = 0.5, 4.5  # the same at speed: what it drives before and whi
 
 @compiled
 def near_outsiders(state: Floats, outside: Bools) -> Bools:
-    """Tells which of the `n` actors are near one that SUMO does not know.
+    """Returns which of `n` actors are near one that SUMO lacks.
 
     Those have themselves.
     """
@@ -97,7 +97,7 @@ def stretch(points: Floats, first_m: float, last_m: float) -> Floats:
 
 @compiled
 def foreseen(points: Floats, front_m: float, speed_mps: float, accel_mps2: float) -> Floats:
-    """Predicts the stations of a front bumper at each tick of LOOK_S, `ticks`.
+    """Predicts a front bumper's stations at each tick of LOOK_S, `ticks`.
 
     It speeds up by `accel_mps2` and is slow in bends.
     """
@@ -118,7 +118,7 @@ def foreseen(points: Floats, front_m: float, speed_mps: float, accel_mps2: float
 
 @compiled
 def _turned(angle: float) -> tuple[float, float]:
-    """Computes the extent of a turned body of unit length, along and across."""
+    """Computes a turned unit-length body's extent, along and across."""
     return abs(math.cos(angle)), abs(math.sin(angle))
 
 
@@ -133,7 +133,7 @@ def targets(
     vehicle: Bools,
     candidate: Bools,
 ) -> Floats:
-    """Finds the actors that a driver has to stop for or to follow.
+    """Finds the actors that a driver stops for or follows.
 
     Args:
       points: of the path that it will drive.

@@ -1,4 +1,4 @@
-"""Paths of vehicles: the centre line of the lanes along a route, junctions included.
+"""Paths of vehicles: centre lines of lanes along a route, with junctions.
 
 A lane that does not lead to the route's next edge still has a path along the route: towards its end, the path leads
 over to the nearest lane that does. So a vehicle that has left the lanes of its route finds back.
@@ -100,7 +100,7 @@ def controlled_links() -> dict[tuple[str, str], tuple[str, int]]:
 
 
 def leading_lane(route: Sequence[str], lane: str) -> str:
-    """Returns the nearest lane of an edge that leads on along the route.
+    """Returns the edge's nearest lane that leads on along the route.
 
     It is the lane itself if none does.
     """
@@ -116,7 +116,7 @@ def car_may_use(lane: str) -> bool:
 
 
 def leads_on(route: Sequence[str], lane: str) -> bool:
-    """Whether cars may use a lane, and it leads to the route's next edge, if there is one."""
+    """Whether a car lane leads to the route's next edge, if any."""
     if not car_may_use(lane):
         return False
     edge = edge_of(lane)
@@ -127,7 +127,7 @@ def leads_on(route: Sequence[str], lane: str) -> bool:
 
 
 def _line(route: Sequence[str], lane: str) -> Floats:
-    """Returns the middle of a lane, `points x 2`, which leads over to its `leading_lane` at the end."""
+    """Returns a lane's middle, `points x 2`, that ends in its `leading_lane`."""
     line, leading = np.array(libsumo.lane.getShape(lane)), leading_lane(route, lane)
     if leading == lane:
         return line
@@ -154,7 +154,7 @@ def _length(line: Floats) -> float:
 
 
 def _lanes_ahead(route: Sequence[str], lane: str) -> list[str]:
-    """The lane and those that follow it, junctions included, for `AHEAD_M`, or farther where they are fast."""
+    """Returns the lane and those ahead for `AHEAD_M`, or farther if fast."""
     lanes, length_m, fastest_mps = [lane], 0.0, libsumo.lane.getMaxSpeed(lane)
     while length_m < max(AHEAD_M, AHEAD_S * fastest_mps):
         following = _next_lane(route, lanes[-1])
@@ -201,7 +201,7 @@ def edge_of(lane: str) -> str:
 
 
 def path_along(lines: Sequence[Floats], limits_mps: Sequence[float]) -> Path:
-    """The path along the lines of lanes that follow each other, `points x 2` each, and their limits."""
+    """Returns the path along consecutive lanes' lines, `points x 2`, with limits."""
     lines = joined(lines)
     points, limit = np.concatenate(lines), np.repeat(limits_mps, [len(line) for line in lines])
     # Where lanes meet there are two points; the one that stays is the first of the lane that follows.
@@ -219,7 +219,7 @@ def path_through(x_m: Floats, y_m: Floats, station_m: Floats, heading_rad: Float
 
 
 def joined(lines: Sequence[Floats]) -> list[Floats]:
-    """The lines of consecutive lanes, `points x 2` each, without the step from one to the next.
+    """Returns consecutive lanes' lines, `points x 2` each, without steps between them.
 
     Nets are rounded to centimetres, and some are drawn less exactly, so that a lane may begin beside the end of the one
     before. That step would be a segment of the path in any direction, across it or back; actors near it would be on the

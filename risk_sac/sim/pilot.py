@@ -45,14 +45,14 @@ class Pilot(Protocol):
     """Drives the ego from the adversaries' release on."""
 
     def begin(self, layout: Layout, seed: int, frame: Frame) -> Motion:
-        """Takes the ego over as it moves in the latest frame; raises `EgoFailed` if it cannot."""
+        """Takes over the ego as the latest frame has it; raises `EgoFailed`."""
 
     def drive(self, frame: Frame, belief: Belief, along: Along) -> Motion:
-        """The ego's motion after the next step, given where it is on its path; raises `EgoFailed`."""
+        """Returns the ego's motion after the next step; raises `EgoFailed`."""
 
 
 class MovedVehicle:
-    """A vehicle whose place SUMO is given, such as the ego of a pilot.
+    """Vehicle whose place SUMO is given, such as a pilot's ego.
 
     Attributes:
       motion: after its latest step.
@@ -86,7 +86,7 @@ class MovedVehicle:
         libsumo.vehicle.moveToXY(self._vehicle, "", -1, x, y, 90.0 - math.degrees(heading), ROUTE_OR_NOWHERE)
 
     def settle(self) -> None:
-        """Finds the vehicle after a step of SUMO, and corrects its speed there.
+        """Finds the vehicle after a step of SUMO, and corrects its speed.
 
         SUMO derives a speed from the way along the lane, 0 where a lane begins; followers go by it.
         """
@@ -156,7 +156,7 @@ STRAIGHT_RAD = 0.02  # between heading and direction of motion, up to which SUMO
 
 
 class OncomingVehicle(MovedVehicle):
-    """Adversary outside its own lanes, commanded by speeds along and across its path.
+    """Adversary outside its own lanes, commanded along and across its path.
 
     SUMO's `changeSublane` cannot take it to oncoming lanes. The middle of its front bumper follows the command, and the
     rear axle follows the front as that of a car does (kinematic bicycle model).
@@ -175,12 +175,12 @@ class OncomingVehicle(MovedVehicle):
         self.move(driven(self.motion, self._size_m[0], self.along, command))
 
     def settle(self) -> None:
-        """Finds it after a step of SUMO; its lateral speed is the commanded one."""
+        """Finds it after a step of SUMO, with the commanded lateral speed."""
         super().settle()
         self.placed = self.placed._replace(lateral_mps=self._command.lateral_mps)
 
     def is_back(self, own: LateralRoom) -> bool:
-        """Whether its body is straight and within its own lanes, given its room there."""
+        """Whether its body is straight and within its own lanes' room `own`."""
         turned = self.motion.heading_rad - float(self.along.path[HEADING, segment(self.along)])
         drifts = math.atan2(self._command.lateral_mps, max(self._command.speed_mps, 1e-3))
         straight = abs(math.remainder(turned - drifts, math.tau)) <= STRAIGHT_RAD
@@ -189,7 +189,7 @@ class OncomingVehicle(MovedVehicle):
 
 
 def driven(motion: Motion, length_m: float, along: Along, command: VehicleCommand) -> Motion:
-    """Computes a car's motion after a step in which the middle of its front bumper follows a command.
+    """Computes a car's motion after its front bumper's middle follows a command.
 
     ψ' = ψ + (d / l) sin(θ - ψ),   d the way of the front bumper, θ its direction, l its distance from the rear axle
 

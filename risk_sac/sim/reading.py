@@ -1,4 +1,4 @@
-"""Reads a frame from SUMO after a step. SUMO's conventions, front bumpers and compass degrees, end here."""
+"""Reads SUMO's frames; converts its front bumpers and compass degrees."""
 
 import math
 import re
@@ -122,7 +122,7 @@ class Reader:
             self._describe()
 
     def read(self, walkers: Mapping[str, Walker], moved: Mapping[str, PlacedState]) -> Reading:
-        """Reads all actors; `moved` is what SUMO would tell of the vehicles that it does not drive."""
+        """Reads all actors; `moved` has the states of vehicles driven elsewhere."""
         get_position, get_angle = libsumo.vehicle.getPosition, libsumo.vehicle.getAngle
         get_speed, get_lateral = libsumo.vehicle.getSpeed, libsumo.vehicle.getLateralSpeed
         get_accel = libsumo.vehicle.getAcceleration

@@ -39,7 +39,7 @@ ANYWHERE = "ignoring"  # class that SUMO refuses on no lane
 
 
 def road_around(route: Sequence[str]) -> Road:
-    """Returns the road around a route: its lanes, and all lanes of the junctions on it.
+    """Returns the road around a route: its lanes, and its junctions' lanes.
 
     Stop lines are those before the route's lanes: an ego does not see the signals of other directions.
     """
@@ -67,7 +67,7 @@ def signals_at(stop_lines: Sequence[StopLine]) -> tuple[Signal, ...]:
 
 
 def _edges_near(route: Sequence[str]) -> Iterable[str]:
-    """The route's edges, and all edges that meet them at junctions, through the junctions included."""
+    """Returns the route's edges, and those that meet them at junctions."""
     found, reached_m = dict.fromkeys(route[:1]), 0.0
     for edge in route:
         if reached_m > REACH_M:
@@ -84,7 +84,7 @@ def _lanes_of(edge: str) -> list[str]:
 
 
 def _on_route(route: Sequence[str], ids: Sequence[str], links: dict[str, list[str]]) -> set[str]:
-    """The lanes that lead on along the route, on its edges and through its junctions."""
+    """Returns lanes that lead along the route, on edges and through junctions."""
     found = {id_ for id_ in ids if edge_of(id_) in route and leads_on(route, id_)}
     for id_ in sorted(found):
         edge = edge_of(id_)
@@ -147,14 +147,14 @@ class RouteLane(NamedTuple):
 
 
 class Placed(Protocol):
-    """Place of a vehicle that SUMO does not drive, by lane and path."""
+    """Lane and path place of a vehicle that SUMO does not drive."""
 
     lane: str
     along: Along
 
 
 class Roads:
-    """Roads of an episode's vehicles; answers about a net are kept for the next episode on it.
+    """Roads of an episode's vehicles; answers are cached for the same net.
 
     Attributes:
       moved: the adversaries that SUMO does not drive.
@@ -189,7 +189,7 @@ class Roads:
         return self._lane(self._routes[vehicle], lane)
 
     def way_ahead(self, vehicle: str, x_m: float, y_m: float) -> tuple[Floats, Floats]:
-        """Points x and y of the way ahead of a vehicle, its centre first."""
+        """Returns x and y of a vehicle's way ahead, its centre first."""
         path, station_m, offset_m, _ = self.along(vehicle)
         ahead = path[:, path[STATION] > station_m]
         sin, cos = np.sin(ahead[HEADING]), np.cos(ahead[HEADING])
@@ -198,7 +198,7 @@ class Roads:
         return x, y
 
     def place(self, vehicle: str, offset_m: float, width_m: float) -> tuple[LateralRoom, Along]:
-        """Returns how far a vehicle may move sideways, and where it is on its path.
+        """Returns a vehicle's sideways room, and its place on its path.
 
         Of its edge, only lanes that its route continues from count: SUMO halts a vehicle at the end of any other. To
         their left come oncoming lanes, for a vehicle that uses them. `offset_m` is that of its centre from its lane's,
@@ -225,7 +225,7 @@ class Roads:
 
 
 def beside(room: LateralRoom, offset_m: float, width_m: float) -> LateralRoom:
-    """Returns the room beside a vehicle's body up to the edges of its own lanes, negative beyond them."""
+    """Returns a body's room to its lanes' edges, negative beyond them."""
     spare = -width_m / 2 - EDGE_M
     return LateralRoom(room.left_m + spare - offset_m, room.right_m + spare + offset_m)
 
@@ -235,7 +235,7 @@ def _route_lane(route: tuple[str, ...], lane: str) -> RouteLane:
 
 
 def _stretch(lane: str) -> float:
-    """Length of a lane's line / length of the lane; 1 where they differ by rounding."""
+    """Returns a lane's drawn length over its stated one; 1 within rounding."""
     drawn_m = float(np.hypot(*np.diff(libsumo.lane.getShape(lane), axis=0).T).sum())
     length_m: float = libsumo.lane.getLength(lane)
     return drawn_m / length_m if abs(drawn_m - length_m) > ROUNDED_M else 1.0
@@ -257,7 +257,7 @@ JOINED_M = 0.5  # gap between the lanes of two directions up to which they are o
 
 
 def _oncoming_m(route: tuple[str, ...], lane: str) -> float:
-    """Returns the width of the oncoming lanes to the left of a lane's edge, m.
+    """Returns the width of oncoming lanes left of a lane's edge, m.
 
     It is 0 inside junctions, where something lies between, and where a lane of the edge that `route` cannot use does.
     """
@@ -300,7 +300,7 @@ STEERED = {"lcAccelLat": "100", "lcMaxSpeedLatStanding": "5", "lcMaxSpeedLatFact
 
 
 def place(layout: Layout, ego: EgoConfig, settings: Mapping[str, float]) -> None:
-    """Places all vehicles of the layout; SUMO inserts them in its next step.
+    """Places the layout's vehicles; SUMO inserts them in its next step.
 
     Args:
       layout: of the episode.
@@ -341,7 +341,7 @@ def _limit(speed_mps: float) -> None:
 
 
 def hurry(layout: Layout) -> None:
-    """Has vehicles that start faster than the limit, as a story's may, drive so after their insertion."""
+    """Makes vehicles keep start speeds above the limit after their insertion."""
     for start in (layout.ego, *layout.vehicles):
         limit_mps = libsumo.lane.getMaxSpeed(f"{start.route[0]}_{start.lane}")
         if start.speed_mps > limit_mps:
@@ -359,14 +359,14 @@ def hand_over(start: VehicleStart) -> None:
 
 
 def _class_of(start: VehicleStart) -> str:
-    """Returns SUMO's class of a vehicle, one that its lane does not refuse."""
+    """Returns a SUMO class of a vehicle that its lane admits."""
     if car_may_use(f"{start.route[0]}_{start.lane}"):
         return CAR
     return ANYWHERE if start.role is Role.ADVERSARY else BODIES[start.body].sumo_class
 
 
 def _type(driven: str, start: VehicleStart, class_: str) -> str:
-    """Returns the id of a body's type; one that is not shipped is made from the car's."""
+    """Returns a body's type id; copies the car's type if not shipped."""
     size = () if start.size_m is None else (f"{start.size_m[0]:g}x{start.size_m[1]:g}",)
     id_ = "_".join((driven, start.body, *(() if class_ == CAR else (class_,)), *size))
     types = libsumo.vehicletype

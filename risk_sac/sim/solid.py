@@ -84,7 +84,7 @@ def drives_into(
     statics: int = 0,
     room_m: float = 0.0,
 ) -> int:
-    """Finds where a vehicle that takes a step and then brakes meets another body than the ego's.
+    """Finds where a vehicle, stepping then braking, meets bodies except the ego's.
 
     A static body that it passes by moving on across at this speed is not in its way: it may leave the lane too late to
     stop. Others may move or brake, so it stays able to stop for them.
@@ -146,7 +146,7 @@ def drives_into(
 
 @compiled
 def walks_into(state: Floats, own: int, walk: tuple[float, ...], braking: tuple[float, float, float]) -> bool:
-    """Whether a pedestrian that takes a step and then stops walks into another body than the ego's.
+    """Whether a pedestrian, stepping then stopping, meets bodies except the ego's.
 
     Args:
       state: of a frame, `rows x n`.
@@ -178,7 +178,7 @@ def walks_into(state: Floats, own: int, walk: tuple[float, ...], braking: tuple[
 
 @compiled
 def _segment(path: Floats, first: int, station_m: float) -> int:
-    """The segment of a path at a station, from the first one on."""
+    """Returns a path's segment at a station, searched from `first` on."""
     while first + 2 < path.shape[1] and path[STATION, first + 1] <= station_m:
         first += 1
     return first
@@ -186,7 +186,7 @@ def _segment(path: Floats, first: int, station_m: float) -> int:
 
 @compiled
 def _pose_at(path: Floats, first: int, station_m: float, offset_m: float, half_length: float, tilt: float) -> Pose:
-    """Computes the pose of a vehicle whose front is at a path's station."""
+    """Computes a vehicle's pose with its front at a path's station."""
     segment = _segment(path, first, station_m)
     ahead_m, cos, sin = station_m - path[STATION, segment], path[COS, segment], path[SIN, segment]
     heading = path[PATH_HEADING, segment] + tilt
@@ -197,7 +197,7 @@ def _pose_at(path: Floats, first: int, station_m: float, offset_m: float, half_l
 
 @compiled
 def _passes_s(state: Floats, own: int, statics: int, speed: float) -> float:
-    """Computes the time until a vehicle has passed all static bodies ahead, s; choice: straight on."""
+    """Computes the time to pass all static bodies straight ahead, s (choice)."""
     cos, sin, passes_m = math.cos(state[HEADING, own]), math.sin(state[HEADING, own]), 0.0
     for other in range(state.shape[1] - statics, state.shape[1]):
         ahead_m = (state[X, other] - state[X, own]) * cos + (state[Y, other] - state[Y, own]) * sin
@@ -238,7 +238,7 @@ def _foresee(state: Floats, own: int, speed: float, brake_mps2: float) -> Floats
 def _meets(
     state: Floats, foreseen: Floats, pose: Pose, size: Size, after_s: float, hardest_mps2: float, side: int
 ) -> int:
-    """Finds where the adversary, at `pose` after a time, meets another for the first time.
+    """Finds where the adversary, at `pose` after `after_s`, meets others first.
 
     A vehicle that comes from behind keeps its own distance, unless it is on the side to which the adversary moves.
     """

@@ -85,7 +85,7 @@ _PLAIN = re.compile(r"[^,;$%]*")
 
 @cache  # one link for each file
 def plain_name(file: str) -> str:
-    """The file's own path, or that of a link to it whose name SUMO takes for one file."""
+    """Returns the file's path, or a link's whose name SUMO accepts."""
     if _PLAIN.fullmatch(file):
         return file
     folder = Path(_links().name)
@@ -146,7 +146,7 @@ class SumoSimulation:
         self._roads = Roads()
 
     def reset(self, layout: Layout, seed: int) -> Frame:
-        """Sets up an episode and returns its first frame; the same seed and commands give the same episode.
+        """Starts an episode that seed and commands determine; returns its first frame.
 
         SUMO drives all vehicles until `release`. Adversaries keep the speed they start with, or drive slower where
         SUMO's models want that.
@@ -189,7 +189,7 @@ class SumoSimulation:
         return self._reading.frame
 
     def hand_over_ego(self) -> None:
-        """Hands the ego to its pilot, if it has one; raises `EgoFailed` if that cannot drive."""
+        """Hands the ego to its pilot, if any; raises `EgoFailed` on failure."""
         if self._pilot is None:
             return
         frame = self._reading.frame
@@ -199,7 +199,7 @@ class SumoSimulation:
         self._moved = MovedVehicle(self._layout.ego.id, motion, size_m, self._roads)
 
     def release(self) -> None:
-        """Hands the adversary vehicles over to commands; only they lose SUMO's safety checks."""
+        """Hands the adversary vehicles to commands; only they lose SUMO's safety checks."""
         for start in self._layout.vehicles:
             if start.role is Role.ADVERSARY and start.id in self._reading.row:
                 hand_over(start)
@@ -230,7 +230,7 @@ class SumoSimulation:
         self._walkers.update(walkers)
 
     def _is_beside_own_lanes(self, vehicle: str, command: VehicleCommand) -> bool:
-        """Whether an adversary leaves its own lanes; takes it from SUMO, or returns it."""
+        """Whether an adversary leaves its lanes; SUMO loses or regains control."""
         row, moved = self._reading.row[vehicle], self._oncoming.get(vehicle)
         frame, offset_m = self._reading.frame, self._reading.offset_m[row]
         lane = libsumo.vehicle.getLaneID(vehicle) if moved is None else moved.lane
@@ -268,7 +268,7 @@ class SumoSimulation:
 
     @property
     def running(self) -> bool:
-        """Whether libsumo runs this simulation: it was reset, and neither closed nor replaced since."""
+        """Whether libsumo runs this simulation, neither closed nor replaced since its reset."""
         return LIBSUMO.is_held_by(self)
 
     def step(self) -> Frame:
@@ -340,7 +340,7 @@ class SumoSimulation:
         return belief
 
     def _hide(self) -> None:
-        """Hides the vehicles that the ego does not know from its models; the lane-change model cannot ignore any."""
+        """Hides unknown vehicles from the ego's models, except the lane-change model."""
         ego, in_sumo = self._layout.ego.id, self._in_lanes.union(self._reading.vehicles)
         known = zip(self._reading.frame.ids, self._belief.known, strict=True)
         ignored = " ".join(id_ for id_, it_knows in known if id_ in in_sumo and not it_knows)
@@ -384,7 +384,7 @@ class SumoSimulation:
         return self._roads.place(vehicle, self._reading.offset_m[row], self._reading.frame.state.item(WIDTH, row))
 
     def lists_collision(self, other: str) -> bool | None:
-        """Whether SUMO lists a collision of the ego with a vehicle, now or within `LISTED_WITHIN_S`.
+        """Whether SUMO lists the ego's collision with a vehicle, within `LISTED_WITHIN_S`.
 
         Ends the episode: the simulation is past the contact afterwards. SUMO tests rectangles along their lanes, so it
         is a little late or early where a body is turned. None of static bodies, and if we tell SUMO the place of

@@ -133,7 +133,7 @@ def _drive_clear(
     stopping: tuple[Braking, Braking, float],
     statics: int,
 ) -> tuple[float, float]:
-    """`_drive` that keeps clear of others: it gives up steering, then driving, where it would meet one.
+    """Drives as `_drive`, but gives up steering, then driving, to avoid contact.
 
     The arguments up to `room` are those of `_drive`, but `motion` becomes that of the next step; `state`, `own`, `path`
     and `offset_m` are those of `drives_into`; `stopping` is how it brakes on a straight and in a bend, and how hard
@@ -163,7 +163,7 @@ def _drive_clear(
 
 @compiled
 def drove_as_commanded(state: Floats, rows: NDArray[np.intp], motions: Floats) -> bool:
-    """Whether vehicles drove as commanded, see `Adversaries.keep_limits`; they go on from what they drove.
+    """Whether vehicles drove as commanded (`Adversaries.keep_limits`); updates their motions.
 
     Args:
       state: of a frame, `rows x n`.
@@ -191,7 +191,7 @@ def _drive(
     wanted: tuple[float, float, float],
     room: tuple[float, ...],
 ) -> tuple[float, float, float]:
-    """Speed, acceleration and lateral speed of the next step, from those of this one; arguments as of `step`."""
+    """Computes next speed, acceleration and lateral speed; arguments as of `step`."""
     (speed, accel, lateral), (drive, steer, intended) = motion, wanted
     limits = Bounds(*bounds)
     at, soon = index(bends, station_m), index(bends, station_m + speed * limits.preview_s)
@@ -260,7 +260,7 @@ def _steer(
 
 
 def bends(path: Path, limits: Limits, ends_m: float = math.inf) -> Floats:
-    """Computes a path's bends, and the speeds to approach them; `3 x stations`.
+    """Computes a path's bends, and speeds to approach them; `3 x stations`.
 
     The stations are 0, GRID_M, 2·GRID_M …
 

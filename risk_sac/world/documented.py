@@ -12,7 +12,7 @@ from pydantic_core import CoreSchema
 
 
 class Documented(BaseModel):
-    """A frozen model; the string below a field describes it in the JSON schema.
+    """Frozen model; strings below its fields describe them in the JSON schema.
 
     pydantic's `use_attribute_docstrings` parses each class as it is made, which costs each start of a run a third of a
     second. Here the sources are parsed when a JSON schema is wanted, and a model is built when it is first used.
@@ -37,7 +37,7 @@ class Documented(BaseModel):
 
 @cache
 def _docstrings(module: str) -> dict[str, dict[str, str]]:
-    """Returns the strings below the fields of a module's classes, by class and field."""
+    """Returns the strings below a module's class fields, by class and field."""
     classes = ast.walk(ast.parse(inspect.getsource(sys.modules[module])))
     return {node.name: _of_fields(node.body) for node in classes if isinstance(node, ast.ClassDef)}
 

@@ -1,4 +1,4 @@
-"""Oriented boxes seen from the ego: overlap, gap, sweep and line of sight.
+"""Oriented boxes seen from the ego: overlap, gap, sweep, line of sight.
 
 Everything the risk measures need is expressed once per frame in the ego's frame (`relative_view`):
 x ahead of the ego's centre, y to its left. There the ego is an axis-aligned box at the origin, which
@@ -112,7 +112,7 @@ def _distance(x: float, y: float, cos: float, sin: float, a: float, b: float, eg
 
 @compiled
 def _outside(x: float, y: float, half_length: float, half_width: float) -> float:
-    """Square of the distance from a point to a box about the origin."""
+    """Squared distance from a point to a box about the origin."""
     along, across = max(abs(x) - half_length, 0.0), max(abs(y) - half_width, 0.0)
     return along * along + across * across
 
@@ -128,7 +128,7 @@ def along_axes(vx: float, vy: float, cos: float, sin: float) -> tuple[float, flo
 
 @compiled
 def time_to_contact(view: RelativeView) -> Floats:
-    """Computes the time until bodies touch at constant velocity, `n`, s; or inf.
+    """Computes the time to contact at constant velocity, `n`, s; or inf.
 
     Swept as oriented boxes, crossing and oncoming bodies count as much as a leader in the same lane, of which it is
     gap / closing speed (Hayward 1972).
@@ -152,7 +152,10 @@ def time_to_contact(view: RelativeView) -> Floats:
 
 @compiled
 def corners(view: RelativeView) -> tuple[Floats, Floats]:
-    """Corners of the others in the ego's frame, two arrays `4 x n`, counter-clockwise from the front left."""
+    """Computes others' corners in the ego's frame, two arrays `4 x n`.
+
+    They go counter-clockwise from the front left.
+    """
     n = len(view.x)
     corner_x, corner_y = np.empty((4, n)), np.empty((4, n))
     for i in range(n):
@@ -165,7 +168,7 @@ def corners(view: RelativeView) -> tuple[Floats, Floats]:
 
 @compiled
 def line_of_sight(view: RelativeView, occludes: Bools) -> Bools:
-    """Whether any of a body's corners or its centre can be seen from the ego's centre, `n`.
+    """Whether the ego's centre sees a body's centre or corner, `n`.
 
     Args:
       view: the scene.
@@ -205,7 +208,7 @@ def in_sight(view: RelativeView, vehicle: Bools, sight: Sight) -> Bools:
 
 @compiled
 def bodies_in_sight(view: RelativeView, conceals: Bools, lit: Bools, sight: Sight) -> Bools:
-    """Tells which of the `n` others are in reach, field of view and not hidden.
+    """Returns which of `n` others are in reach, in view, not hidden.
 
     Bodies that conceal hide what is behind them; those without lights are seen less far at night.
     """
@@ -220,7 +223,7 @@ def bodies_in_sight(view: RelativeView, conceals: Bools, lit: Bools, sight: Sigh
 
 @compiled
 def _crosses(view: RelativeView, wall: int, px: float, py: float) -> bool:
-    """Whether the ray from the ego's centre to (px, py) passes through a body."""
+    """Whether a body blocks the ego centre's ray to (px, py)."""
     cos, sin = view.cos[wall], view.sin[wall]
     ray_x, ray_y = px * cos + py * sin, py * cos - px * sin
     if abs(ray_x) < NO_MOTION:
@@ -235,7 +238,7 @@ def _crosses(view: RelativeView, wall: int, px: float, py: float) -> bool:
 
 @compiled
 def touches(pose0: Pose, size0: Size, pose1: Pose, size1: Size) -> bool:
-    """Whether two oriented boxes overlap (separating axes; circles around both first: most pairs are far apart)."""
+    """Whether two boxes overlap by separating axes; circles first exclude most pairs."""
     (x0, y0, heading0), (half_length0, half_width0) = pose0, size0
     (x1, y1, heading1), (half_length1, half_width1) = pose1, size1
     dx, dy = x1 - x0, y1 - y0
@@ -254,7 +257,7 @@ def touches(pose0: Pose, size0: Size, pose1: Pose, size1: Size) -> bool:
 
 @compiled
 def overlapping_pairs(state: Floats) -> list[tuple[int, int]]:
-    """Pairs i < j of the actors in a frame's state whose bodies touch or overlap."""
+    """Returns pairs i < j of actors whose bodies touch or overlap."""
     pairs = [(0, 0) for _ in range(0)]  # an empty list whose type the compiler can tell
     for i in range(state.shape[1]):
         for j in range(i + 1, state.shape[1]):
@@ -279,7 +282,7 @@ ZONE_MARGIN_M = 0.05  # a contact this close to an edge lies on it
 
 
 def contact_point(view: RelativeView) -> tuple[float, float]:
-    """Computes the middle of the corners of either box that lie in the other."""
+    """Computes the middle of all corners that lie in the other box."""
     margin = ZONE_MARGIN_M
     a, b = view.ego_half_length, view.ego_half_width
     corner_x, corner_y = (c[:, 0] for c in corners(view))
@@ -296,7 +299,7 @@ def contact_point(view: RelativeView) -> tuple[float, float]:
 
 
 def zone(x: float, y: float, half_length: float, half_width: float) -> str:
-    """Returns the side of a body that has the point; corners are front or rear."""
+    """Returns a point's side of a body; corners are front or rear."""
     depth = {
         "front": half_length - x,
         "rear": half_length + x,

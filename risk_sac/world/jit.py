@@ -24,7 +24,10 @@ IMPORT = re.compile(r"^ *from risk_sac\.([\w.]+) import", re.MULTILINE)
 
 
 def _sources() -> dict[Path, str]:
-    """The files with compiled functions, and all that these import: functions and constants are compiled into them."""
+    """Returns the files with compiled functions, and all that these import.
+
+    Functions and constants of the imports are compiled into them.
+    """
     texts = {path: path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
     sources: dict[Path, str] = {}
     pending = [path for path, text in texts.items() if "@compiled" in text]
@@ -40,7 +43,7 @@ def _sources() -> dict[Path, str]:
 
 
 def _cache_folder() -> str:
-    """A folder for what the sources of today compile to; empty where none can be written.
+    """Returns the compiled code's folder for the present sources; empty if unwritable.
 
     numba looks at a function's own file only: after a change in a file whose functions it calls, the function would be
     taken from disk with the old ones in it. The folders that it chooses by itself are not named by a digest either.
@@ -65,7 +68,7 @@ SETTINGS["CACHE_DIR"] = _cache_folder()
 
 
 class _Compilation(event.Listener):
-    """Processor time that numba has spent on compiling; one function's compilation compiles those that it calls."""
+    """Listener that counts processor time of compilation, once for nested functions."""
 
     def __init__(self) -> None:
         self.spent_s = 0.0
@@ -90,7 +93,7 @@ event.register("numba:compile", _COMPILATION)  # type: ignore[no-untyped-call]
 
 
 def cpu_s() -> float:
-    """Returns the processor time of this process, s, without what went into compilation."""
+    """Returns this process's processor time without that of compilation, s."""
     return time.process_time() - _COMPILATION.spent_s
 
 

@@ -52,7 +52,7 @@ class Program:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NetLane:
-    """A lane of a road, inside a junction, for walking, or a crossing."""
+    """Lane of a road, in a junction, for walking, or a crossing."""
 
     id: str
     edge: str
@@ -75,7 +75,7 @@ class NetLane:
         return np.array(self.line)
 
     def admits(self, classes: Collection[str] | None) -> bool:
-        """Whether it is a lane of a road, and for one of SUMO's classes if some are given."""
+        """Whether it is a road's lane, for one of `classes` if given."""
         return self.use == "lane" and (classes is None or not self.classes.isdisjoint(classes))
 
     @property
@@ -91,7 +91,7 @@ class NetLane:
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """A road in one direction; those inside junctions are kept by their lanes alone."""
+    """Road in one direction; junctions' inner edges are kept as lanes alone."""
 
     id: str
     start: str  # junctions
@@ -192,7 +192,7 @@ class Net:
         return crossings
 
     def are_foes(self, one: Link, other: Link) -> bool:
-        """Whether two links of a junction cross or meet, by what the net says."""
+        """Whether the net says that two links cross or meet."""
         if one.index is None or other.index is None:
             return False
         foes = self.junctions[self.edges[one.source.edge].end].foes
@@ -208,12 +208,12 @@ class Net:
         return lanes[int(index)]
 
     def neighbours(self, lane: NetLane) -> tuple[NetLane | None, NetLane | None]:
-        """The lanes of the same edge to its right and to its left."""
+        """The lanes of the same edge to its right and left."""
         right, left = (self.lanes.get(f"{lane.edge}_{lane.index + step}") for step in (-1, 1))
         return right, left
 
     def letters_by_signal(self, letters: bytes) -> Mapping[str, bytes]:
-        """Splits the letters of all signals, which are in the order of the signals' names."""
+        """Splits all signals' letters, which are in the order of names."""
         by_signal, begin = {}, 0
         for name, program in sorted(self.programs.items()):
             end = begin + len(program.phases[0][1])
@@ -222,7 +222,7 @@ class Net:
         return by_signal
 
     def heights_m(self, places: Floats) -> Floats:
-        """Returns the heights at places, `n x 2`: those of the nearest lanes' middles, `n`."""
+        """Returns heights at places, `n x 2`, of the nearest lanes, `n`."""
         lines = [np.column_stack((lane.centre, lane.height_m)) for lane in self.lanes.values()]
         starts, ends = (np.concatenate([line[cut] for line in lines]) for cut in (np.s_[:-1], np.s_[1:]))
         sides = ends - starts
@@ -277,7 +277,7 @@ def summary(net: Net) -> NetSummary:
 
 
 def net_remarks(net: Net) -> list[str]:
-    """Reasons why no pattern fits on a net, or only few places can be found."""
+    """Lists reasons why a net fits no pattern or few places."""
     remarks = []
     driven = {edge.id for edge in net.edges.values() if edge.drivable}
     if not driven:
@@ -294,7 +294,7 @@ def net_remarks(net: Net) -> list[str]:
 
 
 def _roads_meet(net: Net) -> bool:
-    """Tells whether any road leads to another, except back from a dead end."""
+    """Whether any road leads to another, except back from a dead end."""
     leaving = defaultdict(set)
     for edge in net.edges.values():
         if edge.drivable:
@@ -303,7 +303,7 @@ def _roads_meet(net: Net) -> bool:
 
 
 def _largest_part(driven: Set[str], net: Net) -> int:
-    """Edges in the largest part whose edges are connected, whichever way, or are two directions of one road."""
+    """Counts edges in the largest part connected by links or opposite directions."""
     pairs = [(link.source.edge, link.target.edge) for links in net.onward.values() for link in links]
     directions = {(net.edges[id_].start, net.edges[id_].end): id_ for id_ in driven}
     pairs += [(id_, directions[b, a]) for (a, b), id_ in directions.items() if (b, a) in directions]

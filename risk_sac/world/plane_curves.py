@@ -59,7 +59,7 @@ class Clothoid:
         return np.column_stack((x_m + dx, y_m + dy, heading, k0 + rate * s_m))
 
     def _integrals(self, s_m: Floats, rate: float) -> tuple[Floats, Floats]:
-        """Integrals of cos θ and sin θ from 0 to each arc length, by Gauss's quadrature."""
+        """Integrates cos θ and sin θ to arc lengths by Gauss's quadrature."""
         k0 = self.curvature_start
         turned = float(np.max(np.abs(s_m) * (abs(k0) + np.abs(rate * s_m)), initial=0.0))
         parts = max(1, math.ceil(turned / TURN_RAD))
@@ -95,7 +95,7 @@ def _row(rows: Floats) -> tuple[float, float, float, float]:
 
 @dataclass(frozen=True)
 class CubicCurve:
-    """Curve u(p), v(p) of cubic polynomials along and across its begin's heading, by its arc length.
+    """Cubic u(p), v(p) along and across the begin's heading, by arc length.
 
     The table of arc lengths is scaled to the stated length, so that a rounded length does not move the end.
     """
@@ -171,7 +171,7 @@ class Cubic(NamedTuple):
 
 
 class Across(NamedTuple):
-    """Lateral place on a road: t, m, and its change per metre of the reference line."""
+    """Lateral place on a road: t, m, and its change per metre."""
 
     t_m: float
     slope: float
@@ -184,6 +184,6 @@ def active(cubics: Sequence[Cubic], s_m: float) -> Cubic | None:
 
 
 def value_at(cubics: Sequence[Cubic], s_m: float) -> Across:
-    """Returns the value and the slope at a place, 0 before the first polynomial."""
+    """Returns value and slope at a place, 0 before the first polynomial."""
     cubic = active(cubics, s_m)
     return Across(0.0, 0.0) if cubic is None else Across(cubic.value(s_m), cubic.slope(s_m))

@@ -25,7 +25,7 @@ REPAIR = "run netconvert over it, or save it with netedit"
 
 
 def read_tree(path: Path) -> ET.Element:
-    """Reads the XML of a net that we or netconvert have written; raises `MapError` if it is none."""
+    """Reads the XML of our own or netconvert's net; raises `MapError`."""
     try:
         return ET.parse(path).getroot()
     except ET.ParseError as error:
@@ -47,7 +47,7 @@ def read_net(path: Path, root: ET.Element | None = None) -> Net:
 
 
 def parse_net(root: ET.Element) -> Net:
-    """Reads the XML of any net; raises `MapError` if it is none of the present format."""
+    """Reads the XML of any net; raises `MapError` for other formats."""
     if root.tag != "net":
         raise MapError("network", f"a file with the root <{root.tag}>", "<net>", "convert it first")
     try:

@@ -84,7 +84,7 @@ class Roadway:
     links: Mapping[End, LinkTo]
 
     def reference(self, s_m: Floats) -> Floats:
-        """Returns x, y, heading and curvature of the reference line at places, `n` → `n x 4`."""
+        """Returns the reference line's x, y, heading and curvature, `n x 4`."""
         rows = np.empty((len(s_m), 4))
         piece = np.clip(np.searchsorted(self.starts_m, s_m, side="right") - 1, 0, None)
         for i in np.unique(piece):
@@ -92,7 +92,7 @@ class Roadway:
         return rows
 
     def place(self, s_m: float) -> tuple[float, float, float, float]:
-        """Returns x, y, heading and curvature of the reference line at one place."""
+        """Returns the reference line's x, y, heading and curvature at one place."""
         i = max(bisect_right(self.starts_m, s_m) - 1, 0)
         return self.curves[i].place(s_m - self.starts_m[i])
 
@@ -106,7 +106,7 @@ class Roadway:
 
     @cached_property
     def breaks_m(self) -> tuple[float, ...]:
-        """Places where a piece of the reference line, a lane section, a width or an offset begins."""
+        """Places where a reference piece, lane section, width or offset begins."""
         lanes = [(section.start_m, lane) for section in self.sections for lane in section.lanes.values()]
         widths = [start + cubic.start_m for start, lane in lanes for cubic in (*lane.widths, *lane.borders)]
         starts = [cubic.start_m for cubic in self.offsets] + [section.start_m for section in self.sections]
@@ -129,7 +129,7 @@ class Roadway:
         return all(cubic.b == cubic.c == cubic.d == 0.0 for cubic in cubics if cubic is not None)
 
     def middle(self, lane: int, s_m: float) -> Across:
-        """Returns the middle of a lane; raises `ConfigError` if it is not there."""
+        """Returns a lane's middle; raises `ConfigError` if the lane is missing."""
         section, offset = self.section(s_m), value_at(self.offsets, s_m)
         if lane != 0 and lane not in section.lanes:
             known = ", ".join(map(str, sorted(section.lanes)))
@@ -143,7 +143,7 @@ class Roadway:
         return abs(section.outer(lane, s_m).t_m - section.outer(lane - (lane > 0) + (lane < 0), s_m).t_m)
 
     def point(self, s_m: float, across: Across) -> tuple[float, float, float]:
-        """Returns x, y, and the direction, in which s grows, of a line beside the reference line.
+        """Returns x, y and direction of increasing s beside the reference line.
 
         (1 - κ t) ds is the line's progress along the reference line's heading, dt across it.
         """
@@ -156,7 +156,7 @@ class Roadway:
         return (lane > 0) != self.keeps_left if lane else False
 
     def lane_at(self, s_m: float, t_m: float) -> int:
-        """Returns the lane at a lateral place, or the outermost one beside it."""
+        """Returns the lane at a lateral place, or the outermost beside it."""
         section, t_m = self.section(s_m), t_m - value_at(self.offsets, s_m).t_m
         side = 1 if t_m > 0 else -1
         ids = [id_ for id_ in section.lanes if id_ * side > 0] or [id_ for id_ in section.lanes if id_]
@@ -243,7 +243,7 @@ class RoadFile:
         return cls(roads, connections)
 
     def near(self, x_m: float, y_m: float) -> list[tuple[Roadway, float]]:
-        """Returns the roads near a point, each with the sample of its reference line that is nearest.
+        """Returns roads near a point, each with its reference line's nearest sample.
 
         Near are those whose reference line is within 60 m, or else the nearest one.
         """

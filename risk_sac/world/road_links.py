@@ -47,7 +47,7 @@ class RoadLeg(NamedTuple):
 
 
 def lane_through(road: Roadway, lane: int, from_m: float, to_m: float) -> int | None:
-    """Returns a lane's id at another place of its road; None if it ends before."""
+    """Returns a lane's id elsewhere on its road; None if it ends."""
     first, last = road.section_index(from_m), road.section_index(to_m)
     step: int = 1 if last >= first else -1
     end: End = "end" if step > 0 else "start"
@@ -59,7 +59,7 @@ def lane_through(road: Roadway, lane: int, from_m: float, to_m: float) -> int | 
 
 
 def following(file: RoadFile, road: Roadway, lane: int, *, forward: bool) -> list[LaneEnd]:
-    """Returns the lanes that a lane leads to at its road's end, or at its begin."""
+    """Returns lanes that follow at the road's end, or at its begin."""
     end: End = "end" if forward else "start"
     link = road.links.get(end)
     section = road.sections[-1 if forward else 0]
@@ -91,7 +91,7 @@ def _has(road: Roadway, lane: int, *, forward: bool) -> bool:
 
 
 def straightest(file: RoadFile, road: Roadway, lane: int, ways: list[LaneEnd], *, forward: bool) -> LaneEnd:
-    """Returns the way whose lane's direction at its end differs least; of equal ones that to the nearside."""
+    """Returns the way that turns least, or of equal ones the nearside's."""
     heading = direction_at(road, lane, road.length_m if forward else 0.0, forward=forward)
 
     def bend(way: LaneEnd) -> tuple[float, float]:
@@ -132,7 +132,7 @@ def onward(
     *,
     by_lane: bool = True,
 ) -> tuple[list[RoadLeg], float]:
-    """Returns the legs of a way along a lane, and its remaining length.
+    """Returns a way's legs along a lane, and its remaining length.
 
     Args:
       file: with the roads.
@@ -208,7 +208,7 @@ def _exits(file: RoadFile, road: Roadway, *, forward: bool) -> Iterator[LaneEnd]
 def _legs(
     file: RoadFile, path: list[tuple[str, bool]], begin: LaneEnd, from_m: float, goal: LaneEnd, to_m: float
 ) -> list[RoadLeg]:
-    """Chooses the lanes of a way, with the least changes on each road."""
+    """Chooses a way's lanes, with the fewest changes on each road."""
     legs, lane = list[RoadLeg](), begin.lane
     for (id_, forward), (after, after_forward) in itertools.pairwise(path):
         road = file.road(id_)
@@ -243,7 +243,7 @@ def _station(road: Roadway, lane: int, from_m: float, to_m: float, length_m: flo
 
 
 def _lengths(road: Roadway, lane: int, from_m: float, to_m: float) -> tuple[list[float], Floats]:
-    """Returns places along a lane, and the length of its middle up to each."""
+    """Returns places along a lane, and its middle's length to each."""
     out = lane_through(road, lane, from_m, to_m)
     points = leg_line(road, RoadLeg(road.id, to_m >= from_m, from_m, to_m, lane, lane if out is None else out))
     changes = out is None
@@ -252,7 +252,7 @@ def _lengths(road: Roadway, lane: int, from_m: float, to_m: float) -> tuple[list
 
 
 def leg_line(road: Roadway, leg: RoadLeg) -> Floats:
-    """Returns x, y and direction along the middle of a leg's lane, `n x 3`.
+    """Returns x, y and direction along a leg's middle, `n x 3`.
 
     Where the lane is changed, the line passes over evenly from one middle to the other.
     """
@@ -271,7 +271,7 @@ def leg_line(road: Roadway, leg: RoadLeg) -> Floats:
 
 
 def _across(road: Roadway, leg: RoadLeg, s_m: float) -> Across:
-    """Returns the lateral place of a leg, and its change per metre of the reference line."""
+    """Returns the lateral place of a leg, with its slope."""
     here = lane_through(road, leg.lane, leg.from_m, s_m) or _nearest(road, leg.lane, s_m)
     there = lane_through(road, leg.out, leg.to_m, s_m) or _nearest(road, leg.out, s_m)
     across = road.middle(here, s_m)
@@ -285,13 +285,13 @@ def _across(road: Roadway, leg: RoadLeg, s_m: float) -> Across:
 
 
 def _nearest(road: Roadway, lane: int, s_m: float) -> int:
-    """Returns the lane on the same side whose id is nearest, where a lane is not there."""
+    """Returns the lane on the same side whose id is nearest."""
     ids = [id_ for id_ in road.section(s_m).lanes if (id_ > 0) == (lane > 0)]
     return min(ids or [0], key=lambda id_: abs(id_ - lane))
 
 
 def _stations(road: Roadway, from_m: float, to_m: float, *, changes: bool = False) -> list[float]:
-    """Returns places along a road that are close where its lanes bend, from one place to another."""
+    """Returns places along a road, closer where its lanes bend."""
     low, high = sorted((from_m, to_m))
     inner = {s for s in road.breaks_m if low < s < high}
     stations = [low]

@@ -41,7 +41,7 @@ class Role(IntEnum):
 
 
 class Signal(IntEnum):
-    """Colour of the signal ahead of the ego; NONE where its road has none."""
+    """Colour of the signal ahead of the ego; NONE without a signal."""
 
     NONE = 0
     GREEN = 1
@@ -50,7 +50,7 @@ class Signal(IntEnum):
 
 
 class Lane(NamedTuple):
-    """A lane that cars may use, on a road or through a junction."""
+    """Lane that cars may use, on a road or through a junction."""
 
     id: str  # SUMO's
     line: Floats  # 2 x p: x and y of its middle, in its direction, m
@@ -65,7 +65,7 @@ class Lane(NamedTuple):
 
 
 class StopLine(NamedTuple):
-    """A signal's stop line, at the end of a lane, for one of its successors."""
+    """Stop line of a signal at a lane's end, for one successor."""
 
     lane: str
     leads_to: str  # the successor that the signal lets in
@@ -82,7 +82,7 @@ class Road(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Static parameters ξ of one episode: a point in its family's bounded space."""
+    """Static parameters ξ of an episode: a point in its family's space."""
 
     family: str
     values: Mapping[str, float]
@@ -123,7 +123,7 @@ class FrameFields(NamedTuple):
 
 
 class Frame(FrameFields):
-    """All actors after one simulation step; every array has `n` columns and the first is the ego's."""
+    """All actors after a simulation step, in `n` columns, the ego first."""
 
     __slots__ = ()
 
@@ -153,7 +153,7 @@ RealRows = list[list[OptionalReal]]
 
 
 class Series(Documented):
-    """Time series of an episode: `T` steps, `n` actors (the ego first), `M` requirements, `a` actions.
+    """Time series: `T` steps, `n` actors, ego first, `M` requirements, `a` actions.
 
     Entries of an actor that is absent are null.
     """

@@ -1,1 +1,1 @@
-"""The learners: soft actor-critic, replay, dual variable, and the control that learns nothing."""
+"""Learners: soft actor-critic, replay, dual variable, and controls without learning."""

@@ -34,7 +34,7 @@ class UpdateResult:
 
 
 class Agent(ABC):
-    """A policy, its critics, their optimisers, and the generator of all their noise.
+    """Policy, critics, their optimisers, and the generator of all their noise.
 
     Attributes:
       parts: networks and optimisers by their name in a checkpoint.
@@ -75,15 +75,15 @@ class Agent(ABC):
 
     @abstractmethod
     def _td_errors(self, batch: Batch, reward: Tensor) -> Tensor:
-        """Returns δ = y - Q_ψi(s, a), `critics x batch`; only Q has a gradient."""
+        """Returns y - Q_ψi(s, a), `critics x batch`; only Q has gradients."""
 
     @torch.no_grad()
     def td_errors(self, batch: Batch, reward: Tensor) -> Floats:
-        """Returns |δ| of transitions, `batch`, mean over the critics; arguments as for `update`."""
+        """Returns |δ|, `batch`, mean over critics; arguments as for `update`."""
         return mean_magnitude(self._td_errors(batch, reward))
 
     def frozen(self) -> FrozenPolicy:
-        """Returns a copy of the policy that acts without exploring and no longer learns."""
+        """Returns a copy of the policy that neither explores nor learns."""
         layers = tuple(layer.copy() for layer in self._policy.layers())
         return FrozenPolicy(layers, self._action_size, self._policy.normalised)
 
@@ -157,7 +157,7 @@ def actor_weights(batch: Batch, *, weighted: bool) -> Tensor:
 
 
 def mean_magnitude(td_errors: Tensor) -> Floats:
-    """|δ| as the replay takes it, `batch`, from those of each critic, `critics x batch`."""
+    """Returns |δ| for the replay, `batch`, from errors of `critics x batch`."""
     return td_errors.abs().mean(dim=0).double().cpu().numpy()
 
 
@@ -176,7 +176,7 @@ def all_finite(figures: list[float]) -> list[float]:
 
 
 def minimise(loss: Tensor, optimizer: Adam) -> None:
-    """One optimiser step on a loss; only the optimiser's parameters receive a gradient."""
+    """Makes one optimiser step; only the optimiser's parameters receive a gradient."""
     parameters = [each for group in optimizer.param_groups for each in group["params"]]
     for parameter, gradient in zip(parameters, torch.autograd.grad(loss, parameters), strict=True):
         parameter.grad = gradient
@@ -185,13 +185,13 @@ def minimise(loss: Tensor, optimizer: Adam) -> None:
 
 @torch.no_grad()
 def follow(targets: nn.Module, networks: nn.Module, rate: float) -> None:
-    """Moves target networks towards the learned ones: ψ̄ ← ψ̄ + τ (ψ - ψ̄)."""
+    """Moves targets towards networks: ψ̄ ← ψ̄ + τ (ψ - ψ̄)."""
     torch._foreach_lerp_(list(targets.parameters()), list(networks.parameters()), rate)
 
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """Turns torch's errors about a state that does not fit into a CheckpointError."""
+    """Turns torch's errors about a misfitting state into a CheckpointError."""
     try:
         yield
     except (KeyError, RuntimeError, ValueError) as error:

@@ -24,7 +24,7 @@ ALONG_COS = 0.9  # headings less than about 25 degrees apart
 
 
 class NonLearner:
-    """The learner's verbs for an agent that learns nothing and keeps no state; λ and α are 0.
+    """Learner's interface for agents that learn nothing; λ and α are 0.
 
     Attributes:
       driven_by: what chooses the actions; None: nothing does, or, where there are genes, the sampler knows.
@@ -123,7 +123,7 @@ STANDING_MPS, STANDING_STEPS = 0.5, 30  # an ego that stands for so long waits f
 
 
 class ScriptFollower(NonLearner):
-    """Drives each adversary by genes of its own; λ and α are 0.
+    """Driver of each adversary by genes of its own.
 
     An episode begins with the genes.
 
@@ -141,7 +141,7 @@ class ScriptFollower(NonLearner):
         self.begin(np.zeros(self.genes))
 
     def begin(self, genes: Floats) -> None:
-        """Begins an episode with these genes, in [0, 1]; `SIZE` for each adversary."""
+        """Begins an episode with genes in [0, 1], `SIZE` for each adversary."""
         rows: list[list[float]] = genes.reshape(-1, SIZE).tolist()
         threshold = min(PASSIVE, max(row[0] for row in rows))
         self._scripts = [Genes(*row) if row[0] >= threshold else None for row in rows]
@@ -193,7 +193,7 @@ CONTROLS: Mapping[str, type[IdleAgent | RandomAgent | ScriptedAgent]] = {
 
 
 def control(method: RunMethod, family: Family, seed: int) -> Control:
-    """Makes the agent of a method that does not learn, or of a peer that does."""
+    """Makes the agent of a method that has no learner of ours."""
     agent = method_of(method).agent
     if agent in ("stress-sac", "stress-ppo"):
         from risk_sac.search.agents.stress import StressPpo, StressSac  # here, because it is an extra
@@ -215,7 +215,7 @@ class Held:
         self._left = 0
 
     def act(self, decide: Callable[[], Vector]) -> Vector:
-        """The action of this step; `decide` is asked for one where the last was held for long enough."""
+        """Returns the held action; asks `decide` once its steps are over."""
         if self._action is None or not self._left:
             self._action, self._left = decide(), self._steps
         self._left -= 1
@@ -238,7 +238,7 @@ class Decision:
         self.begin()
 
     def begin(self) -> None:
-        """An episode begins; what the last one left unfinished, cut off by its horizon, is forgotten."""
+        """Begins an episode; forgets a decision that the last horizon cut off."""
         self._taken: list[Transition] = []
 
     def add(self, step: Transition) -> Transition | None:

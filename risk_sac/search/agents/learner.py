@@ -122,7 +122,10 @@ class Learner:
         self._begin(self._generator)
 
     def act(self, observation: Vector, explore: bool = True) -> Vector:
-        """Action in [-1, 1], `action_size`, held for `decision_steps`; uniformly random in the first `warmup_steps`."""
+        """Returns an action in [-1, 1], `action_size`, held for `decision_steps`.
+
+        It is uniformly random in the first `warmup_steps`.
+        """
         return self._held.act(partial(self._decide, observation, explore))
 
     def frozen(self) -> FrozenPolicy:
@@ -130,13 +133,13 @@ class Learner:
         return self._agent.frozen()
 
     def snapshot(self) -> PolicySnapshot:
-        """The policy as it is now, to play in another process; the same object until `learn` or `load`."""
+        """Returns the current policy for other processes; unchanged until `learn` or `load`."""
         if self._snapshot is None:
             self._snapshot = self._taken()
         return self._snapshot
 
     def learn(self, transitions: Sequence[Transition], snapshot: PolicySnapshot, seed: int, *, own: bool) -> None:
-        """Learns from an episode that another process has played, as if it had been played here.
+        """Learns from an episode of another process as from its own.
 
         Deviation: the policy, and λ in R̂, are those of the snapshot, which knows nothing of the two rounds before.
 
@@ -174,7 +177,7 @@ class Learner:
             self._replay.add(decided)  # Alg. 1, l. 12
 
     def update(self) -> "UpdateResult | None":
-        """Learn from memory at the pace of `updates_per_step`; None during the warm-up and between two updates.
+        """Learns from memory at `updates_per_step`; None in the warm-up and between updates.
 
         What the warm-up left undone is made up for, a step's share and at least one update at a time; so it never is if
         the pace is a whole number. Choice: what others do between its own episodes is learnt from, but calls for no
@@ -193,7 +196,7 @@ class Learner:
         return result
 
     def state(self) -> dict[str, Any]:
-        """Everything the next episode depends on, generators included; tensors, arrays and plain values."""
+        """Returns what the next episode depends on: tensors, arrays and plain values."""
         return {
             "agent": self._agent.state(),
             "replay": self._replay.state(),

@@ -15,7 +15,7 @@ from risk_sac.world.types import Vector
 
 
 class Mlp(nn.Module):
-    """Stacked perceptrons of equal shape with ReLU between layers; one product evaluates all."""
+    """Stacked perceptrons of equal shape with ReLU; one product evaluates all."""
 
     def __init__(
         self, sizes: Sequence[int], generator: torch.Generator, *, count: int = 1, normalised: bool = False
@@ -62,13 +62,13 @@ class Mlp(nn.Module):
         return torch.bmm(hidden, weight).add_(bias)
 
     def layers(self) -> Layers:
-        """Weights, `in x out`, and biases, `out`, of the first network; views of its parameters on the CPU."""
+        """The first network's weights, `in x out`, and biases, `out`: CPU views."""
         layers = [tensor.detach().cpu().numpy()[0] for layer in self._layers for tensor in layer]
         layers[1::2] = [bias[0] for bias in layers[1::2]]
         return layers
 
     def arrays(self) -> tuple[NDArray[np.float32], ...]:
-        """Copies weights, `count x in x out`, and biases, `count x 1 x out`, in turn."""
+        """Copies weights, `(count, in, out)`, and biases, `(count, 1, out)`, in turn."""
         return tuple(each.detach().cpu().numpy().copy() for each in chain.from_iterable(self._layers))
 
     @torch.no_grad()
@@ -83,7 +83,7 @@ class Mlp(nn.Module):
         self._layers[-1][1][..., first:] = value
 
     def respond(self, inputs: Vector) -> Tensor:
-        """Evaluates the first network for one input, `out`; numpy, which is faster than torch for one row.
+        """Evaluates the first network for one input, `out`, in numpy for speed.
 
         Args:
           inputs: `in`.
@@ -97,7 +97,7 @@ def bounded_log_std(raw: Tensor) -> Tensor:
 
 
 def raw_log_std(deviation: float) -> float:
-    """Output of a network that `bounded_log_std` turns into log of this σ, within its bounds."""
+    """Inverts `bounded_log_std`: returns the network output for a σ within bounds."""
     return math.atanh((math.log(deviation) - LOG_STD_MIDDLE) / LOG_STD_HALF)
 
 

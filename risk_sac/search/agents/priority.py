@@ -53,7 +53,7 @@ class SumTree:
         _sum(self._nodes, self._first)
 
     def find(self, fractions: Floats) -> Indices:
-        """The leaves at which the cumulative priority first exceeds the given fractions of the total.
+        """Finds leaves where cumulative priority first exceeds these fractions of the total.
 
         A leaf of priority 0 is never returned. The total must be positive.
 
@@ -117,7 +117,7 @@ class TermScales:
 
     @classmethod
     def of(cls, terms: Floats) -> Self:
-        """Scales of the stored terms, `3 x n` with n at least 1."""
+        """Returns scales of the stored terms, `3 x n`, n ≥ 1."""
         lowest = terms.min(axis=1)
         spread = terms.mean(axis=1) - lowest
         # Rounding in the mean of equal numbers is no spread.

@@ -65,7 +65,7 @@ class UniformReplay:
         return self._size
 
     def add(self, transition: Transition) -> int:
-        """Stores a transition over the oldest one once full, and returns its slot."""
+        """Stores a transition, over the oldest when full; returns its slot."""
         scalars = [getattr(transition, name) for name in SCALARS]
         parts = (transition.observation, transition.action, transition.next_observation, scalars)
         row = np.concatenate(parts, dtype=np.float32)
@@ -78,14 +78,14 @@ class UniformReplay:
         return slot
 
     def take_unmeasured(self, most: int) -> Batch | None:
-        """Returns new transitions, the oldest first, whose |δ| `update` is to be told before the next draw.
+        """Returns new transitions, oldest first, whose |δ| `update` needs before drawing.
 
         None once all were taken, or if |δ| makes no difference to what is drawn, as here.
         """
         return None
 
     def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
-        """Draws with replacement; at least one transition must be stored, and all of them measured."""
+        """Draws with replacement from one or more transitions, all measured."""
         return self.gather(generator.integers(len(self), size=batch_size), np.ones(batch_size))
 
     def update(self, indices: Indices, td_errors: Floats) -> None:
@@ -95,7 +95,7 @@ class UniformReplay:
         """
 
     def state(self) -> dict[str, Any]:
-        """Returns everything that sampling depends on, the filled part only; tensors and plain values."""
+        """Returns what sampling depends on, filled part only: tensors and plain values."""
         return {"rows": torch.from_numpy(self._rows[: self._size].copy()), "next": self._next}
 
     def load(self, state: dict[str, Any]) -> None:
@@ -173,7 +173,7 @@ class RiskPrioritizedReplay:
         return self._storage.gather(indices, np.ones(len(indices)))
 
     def sample(self, batch_size: int, generator: np.random.Generator) -> Batch:
-        """Draws in proportion to priority, one transition from each of `batch_size` equal slices of the total.
+        """Draws by priority, one transition per slice of `batch_size` equal ones.
 
         Choice: stratified, as Schaul et al. do; the expected count of a transition stays batch_size · P(i).
         """

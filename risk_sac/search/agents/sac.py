@@ -49,7 +49,7 @@ def soft_value(values: Tensor, log_prob: Tensor, temperature: Tensor) -> Tensor:
 
 
 def actor_loss(value: Tensor, weight: Tensor) -> Tensor:
-    """Negative soft value of the policy's own actions, the term in the sum of (4).
+    """Computes the negative soft value of the policy's actions, as in (4).
 
     J_π = E[w (α log π(a|s) - min_i Q_ψi(s, a))] = -E[w V(s)],  a ~ π(·|s) reparameterised
 
@@ -81,7 +81,7 @@ def temperature_loss(temperature: Tensor, entropy: Tensor, target_entropy: float
 
 
 class Temperature(nn.Module):
-    """α in (0, MOST_TEMPERATURE], learned as its logarithm so that it stays positive."""
+    """α in (0, MOST_TEMPERATURE], learned as its logarithm to stay positive."""
 
     def __init__(self, initial: float, device: torch.device) -> None:
         super().__init__()
@@ -93,12 +93,12 @@ class Temperature(nn.Module):
 
     @torch.no_grad()
     def clamp(self) -> None:
-        """Bounds α. Choice: an entropy that the policy cannot reach would make it grow without end."""
+        """Bounds α, which an unreachable entropy would make grow without end (choice)."""
         self.log.clamp_(max=math.log(MOST_TEMPERATURE))
 
 
 class SacAgent(Agent):
-    """Policy, twin critics with targets and learned temperature; one generator draws all noise.
+    """Policy, twin critics with targets and learned temperature, with one noise generator.
 
     Choice: the critics' hidden layers are normalised. Otherwise a memory of a few thousand transitions, replayed at the
     pace of the steps, makes them overrate untried actions. Source: Ball et al., "Efficient online reinforcement
@@ -158,7 +158,7 @@ class SacAgent(Agent):
         return self._temperature.log.detach().exp().item()
 
     def spread(self, deviation: float) -> None:
-        """Makes the policy begin with about this σ, instead of the 0.22 of a network drawn at random."""
+        """Gives the initial policy about this σ, not a random network's 0.22."""
         self._policy.set_last_bias(self._action_size, raw_log_std(deviation))
 
     def networks(self) -> tuple[Layers, Layers]:
@@ -186,7 +186,7 @@ class SacAgent(Agent):
         return self.result(*self.advance(batch, reward))
 
     def advance(self, batch: Batch, reward: Tensor) -> tuple[Tensor, Tensor]:
-        """Makes one step of all networks; returns what `result` reads, without waiting for the device."""
+        """Makes one step of all networks; returns `result`'s input without synchronising."""
         td_errors = self._td_errors(batch, reward)
         loss_q = critic_loss(td_errors, batch.weight, self._config.critic_loss)
         minimise(loss_q, self._critic_optimizer)
@@ -245,7 +245,7 @@ class GraphedUpdate:
         self._graph: torch.cuda.CUDAGraph | None = None
 
     def __call__(self, batch: Batch) -> UpdateResult:
-        """Makes one update with the risk reward of a batch, which lies on the CPU."""
+        """Makes one update with a CPU batch and its risk reward."""
         if self._made < WARM_UP:
             return self._warm_up(batch.on("cuda"))
         if self._graph is None:
@@ -256,7 +256,7 @@ class GraphedUpdate:
         return self._agent.result(*self._figures)
 
     def _warm_up(self, batch: Batch) -> UpdateResult:
-        """Makes an update without a graph, on another stream, as torch asks for it."""
+        """Makes an update without a graph, on another stream, as torch requires."""
         self._made += 1
         stream = torch.cuda.Stream()  # type: ignore[no-untyped-call]
         stream.wait_stream(torch.cuda.current_stream())
@@ -266,7 +266,7 @@ class GraphedUpdate:
         return self._agent.result(*figures)
 
     def _recorded(self, batch: Batch) -> torch.cuda.CUDAGraph:
-        """Records an update, without making it; later batches are copied to the memory of this one."""
+        """Records an update without making it; later batches reuse this one's memory."""
         self._given: dict[str, Tensor] = {f.name: getattr(batch, f.name) for f in fields(batch) if f.name != "indices"}
         graph = torch.cuda.CUDAGraph()
         graph.register_generator_state(self._agent.generator)

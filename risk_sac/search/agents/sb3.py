@@ -1,4 +1,4 @@
-"""Stable-Baselines3's SAC in the place of ours: a control that tells whether our learner is any good.
+"""Stable-Baselines3's SAC in place of ours, a control for our learner.
 
 Memory, warm start and pace stay the learner's, and so do widths, batch and rates, so that two rows differ in the update
 alone. SB3 has one learning rate for all networks; it gets the actor's, which is also its default. It stays on the
@@ -47,7 +47,7 @@ class _Given(NamedTuple):
 
 
 class Sb3Agent:
-    """`stable_baselines3.SAC`, which is handed its batches; it weights no transition, and measures no TD error."""
+    """`stable_baselines3.SAC` on batches given to it, without weights or TD errors."""
 
     exploration: Exploration = "clipped"
 

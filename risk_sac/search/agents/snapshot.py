@@ -1,4 +1,4 @@
-"""A learner's policy at one moment, which acts and explores without torch in another process."""
+"""Snapshot of a learner's policy that acts and explores without torch."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -66,7 +66,7 @@ def drawn_mirrored(random: np.random.Generator, mirror: Reflection | None) -> bo
 
 
 def explored(outputs: Vector, exploration: Exploration, random: np.random.Generator) -> Vector:
-    """Draws an action in [-1, 1] from a network's outputs, as the agent does that has learnt it.
+    """Draws an action in [-1, 1] from outputs, as its agent explores.
 
     a = tanh(μ + σ ε), or tanh(μ) + σ ε within the bounds where σ is a setting.
     """

@@ -1,4 +1,4 @@
-"""Adaptive stress testing with the agents of Stable-Baselines3: rows to compare a search with.
+"""Adaptive stress testing with Stable-Baselines3's agents, to compare a search with.
 
 The adversaries' policy learns from nothing, on scenes that are drawn without a model. All settings are SB3's defaults.
 

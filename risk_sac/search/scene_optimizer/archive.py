@@ -17,7 +17,7 @@ from risk_sac.world.types import Floats
 
 
 class DiscountedBandit:
-    """Two arms; the chance of each goes by the square of its discounted yield.
+    """Two arms, chosen in proportion to the square of their discounted yields.
 
     yield_i = (prior_yield · prior_cost + Σ discount^k worth) / (prior_cost + Σ discount^k cost),  p_i ∝ yield_i²
 
@@ -61,7 +61,7 @@ class DiscountedBandit:
         return min(max(second / (first + second), low), high)
 
     def tell(self, arm: int, worth: float, effort: float = 1.0) -> None:
-        """Counts a pull of arm 0 or 1, its worth and its effort."""
+        """Counts a pull of arm 0 or 1, with worth and effort."""
         self._worth[arm] = self._discount * self._worth[arm] + worth
         self._spent[arm] = self._discount * self._spent[arm] + self._unit_costs[arm] * effort
 
@@ -74,7 +74,7 @@ class DiscountedBandit:
         self._worth, self._spent = list(state["worth"]), list(state["spent"])
 
     def _probability_of(self, share: float) -> float:
-        """Chance of arm 1 with which it spends this share of all costs."""
+        """Returns the chance of arm 1 that spends this share of costs."""
         first, second = self._unit_costs
         return share * first / (share * first + (1.0 - share) * second)
 
@@ -107,7 +107,7 @@ class Elite:
 
 
 class Elites:
-    """One elite for each variant of violations, and a near miss for each adversary or requirement without one."""
+    """Best failure per variant, and near miss per target without one."""
 
     def __init__(self) -> None:
         self._failures: dict[str, Elite] = {}  # by variant: its niche
@@ -120,12 +120,12 @@ class Elites:
         return len(self._failures)
 
     def pool(self) -> list[Elite]:
-        """Returns all failures, and the near misses of the targets that have none."""
+        """Returns all failures, and near misses of targets without one."""
         hit = {elite.target for elite in self._failures.values()}
         return [*self._failures.values(), *(miss for name, miss in self._misses.items() if name not in hit)]
 
     def key(self, elite: Elite | None) -> tuple[str, str] | None:
-        """Names an elite's place: its set and its niche or target; None once it has lost it."""
+        """Names an elite's set and niche or target; None once replaced."""
         places = (("failures", self._failures), ("misses", self._misses))
         return next(((place, name) for place, held in places for name, one in held.items() if one is elite), None)
 
@@ -148,7 +148,7 @@ class Elites:
         return elite
 
     def add_failure(self, point: Floats, violation: Collision | Violation, parent: Elite | None) -> None:
-        """Adds a valid violation if it is the first in its niche, or worth more than that."""
+        """Adds a valid violation if it is its niche's first or best."""
         niche = variant_name(violation)
         known = self._failures.get(niche)
         worth = _worth(violation)
@@ -200,8 +200,9 @@ def _elite(plain: State) -> Elite:
 
 
 def _worth(violation: Collision | Violation) -> float:
-    """1 for what is preventable; of other contacts the more, the slower R157's driver would have touched.
+    """Computes a violation's worth: 1 if preventable, else less.
 
+    Of other contacts it is the larger, the slower R157's driver would have touched.
     Choice: a minor contact has a share of it, so that a niche prefers what the headline counts.
     """
     share = MINOR_SHARE if isinstance(violation, Collision) and violation.severity is Severity.MINOR else 1.0
@@ -218,7 +219,7 @@ def _worth_of_any(violation: Collision | Violation) -> float:
 
 
 class ArchiveOptimizer(SceneOptimizer):
-    """Breeds points from elites; scores them so that every method's records carry f_e.
+    """Optimiser that breeds points from elites, scored so that records have f_e.
 
     Attributes:
       reflect: returns mirror images of points, `n x d`; None where they are not points of the same space. Choice: half

@@ -152,7 +152,7 @@ class SceneOptimizer(ABC):
         """Learns from an episode; arguments as for `tell`, and its result."""
 
     def state(self) -> State:
-        """Returns all that is needed to continue exactly here; taken between two episodes."""
+        """Returns all that an exact continuation needs; taken between two episodes."""
         return {**self._identity(), "maximum": self._maximum.state()}
 
     def load(self, state: State) -> None:
@@ -172,7 +172,7 @@ class SceneOptimizer(ABC):
 
 
 def sobol_points(dimension: int, seed: int, skip: int = 0, count: int = 1) -> "Tensor":
-    """Returns points of a scrambled Sobol sequence, `count x d`, in [0, 1], after the first `skip`."""
+    """Returns scrambled Sobol points, `count x d`, in [0, 1], after `skip`."""
     import torch  # here, because loading it takes a second, and most samplers draw no such points
     from torch.quasirandom import SobolEngine
 
@@ -183,7 +183,7 @@ def sobol_points(dimension: int, seed: int, skip: int = 0, count: int = 1) -> "T
 
 
 class SobolOptimizer(SceneOptimizer):
-    """Scenes from a scrambled Sobol sequence; scores them so that every method's records carry f_e."""
+    """Sampler of scrambled Sobol scenes, scored so that records have f_e."""
 
     kind = "sobol"
 
@@ -210,7 +210,7 @@ class SobolOptimizer(SceneOptimizer):
 
 
 class IidSampler(SobolOptimizer):
-    """Points of the declared distribution, each drawn independently, so that bounds may be drawn from them.
+    """Independent points of the declared distribution, as statistical bounds need.
 
     A Sobol sequence would fill the cube more evenly, but its points depend on each other. No scene has a score.
     """

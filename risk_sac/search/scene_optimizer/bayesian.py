@@ -19,7 +19,7 @@ CHANGED = 10  # coordinates that differ from the best scene's, on average
 
 
 class BotorchOptimizer(SceneOptimizer):
-    """Sobol scenes first, then those of largest log expected improvement under a Gaussian process.
+    """Sobol scenes, then those of largest log expected improvement (Gaussian process).
 
     Choice: the policy changes under the optimiser, so only the newest `config.window` observations are kept, and a
     share `config.exploration` of scenes is drawn at random.
@@ -123,7 +123,7 @@ class BotorchOptimizer(SceneOptimizer):
         return maximise_expected_improvement(model, torch.cat((anywhere, near))).numpy()
 
     def _steps_from_one_of_the_best(self, values: Floats, random: np.random.Generator) -> Floats:
-        """Takes Gaussian steps in some coordinates from one of the best scenes, `NEAR_CANDIDATES x d`."""
+        """Takes sparse Gaussian steps from a best scene, `NEAR_CANDIDATES x d`."""
         best = np.argsort(-values, kind="stable")[:BEST]
         centre = self._points[best[random.integers(len(best), size=2).min()]]  # the better, the likelier
         step = random.choice(NEAR_DEVIATIONS) * random.standard_normal((NEAR_CANDIDATES, self._dimension))

@@ -16,7 +16,7 @@ OF_DRIVER = 4  # every so many points are the driver's; choice
 
 
 class BoundarySampler(SceneOptimizer):
-    """Sobol points of a slice first, then the most ambiguous ones of a classifier.
+    """Sampler of a slice's Sobol points, then a classifier's most ambiguous.
 
     Every `OF_DRIVER`th point is the most ambiguous one for R157's driver instead of the ego. A candidate whose nearest
     known neighbour was refused is left out. Where points are out, the ambiguity is what they leave.
@@ -56,7 +56,7 @@ class BoundarySampler(SceneOptimizer):
         return self._whole(self._most_ambiguous(outcomes, int(random.integers(2**31))), random)
 
     def _fill(self, random: np.random.Generator) -> Floats:
-        """The next Sobol point that keeps the constraints; one that does not if there is none among many."""
+        """Returns the next Sobol point, one that keeps the constraints if possible."""
         axes = self._points.shape[1]
         for _ in range(CANDIDATES):
             point = self._whole(sobol_points(axes, self._seed, self._filled)[0].numpy(), random)
@@ -77,7 +77,7 @@ class BoundarySampler(SceneOptimizer):
         return np.asarray(candidates[int(scores.argmax())])
 
     def _likely_playable(self, candidates: Floats) -> Bools:
-        """Whether the nearest point that was tried could be played, of candidates that keep the constraints."""
+        """Whether candidates keep the constraints and their nearest tried point was playable."""
         apart = ((candidates[:, None] - self._points[None]) ** 2).sum(axis=2).argmin(axis=1)
         played = np.array([fails is not None for fails in self._fails])[apart]
         if self._slice.space.holds is not None:

@@ -1,4 +1,4 @@
-"""The Gaussian process of scenes, fitted and searched with BoTorch; higher values are better.
+"""Gaussian process of scenes, fitted and searched with BoTorch; higher is better.
 
 Everything works in float64. What draws random numbers takes a seed, and leaves torch's global generator as it was.
 
@@ -63,7 +63,7 @@ def fit(points: Tensor, values: Tensor, start: Hyperparameters | None, seed: int
 def believe(
     model: SingleTaskGP, points: Tensor, values: Tensor, out: Tensor, hyperparameters: Hyperparameters
 ) -> SingleTaskGP:
-    """Returns the model with posterior means at points that are out, `m x d`.
+    """Returns the model with posterior means at points `out`, `m x d`.
 
     So the next point is elsewhere. Source: the kriging believer of Ginsbourger et al. 2010, Kriging is well-suited to
     parallelize optimization.

@@ -1,4 +1,4 @@
-"""Plays the points of a scenario's grid: all of them in order, or a stratified sample without repetition."""
+"""Plays a scenario's grid: all points in order, or a stratified sample."""
 
 import itertools
 
@@ -14,7 +14,7 @@ BATCH = 1024  # Sobol points drawn at a time
 
 
 class GridSampler(SceneOptimizer):
-    """Scenes of a grid, each once; after the last one the first comes again.
+    """Sampler of a grid's scenes, each once, then from the beginning.
 
     Attributes:
       points: number of scenes, at most the budget's.
@@ -40,13 +40,13 @@ class GridSampler(SceneOptimizer):
         self._drawn = 0
 
     def ask(self) -> Floats:
-        """Returns the middle of the next point's cell of the unit cube, `d`."""
+        """Returns the middle of the next point's cell, `d`, in [0, 1]."""
         levels = self._grid.levels(self._order[self._drawn % len(self._order)])
         self._drawn += 1
         return np.array([(level + 0.5) / axis.size for level, axis in zip(levels, self._grid.axes, strict=True)])
 
     def scene(self, point: Floats, space: SceneSpace) -> Scene:
-        """The scene of a point that `ask` returned; its values are exactly the grid's, within the space."""
+        """Returns the scene of an asked point, with exactly the grid's values."""
         levels = tuple(int(u * axis.size) for u, axis in zip(point, self._grid.axes, strict=True))
         bounds = {parameter.name: (parameter.low, parameter.high) for parameter in space.parameters}
         values = self._grid.of_levels(levels).items()
@@ -65,7 +65,7 @@ class GridSampler(SceneOptimizer):
 
 
 def grid_sample(grid: Grid, count: int, seed: int) -> list[int]:
-    """Numbers of some of a grid's points, each once; all of them in their order.
+    """Chooses points of a grid, each once; all of them in order.
 
     A sample is of the cells that a scrambled Sobol sequence falls into: each level of each axis gets its share of it.
     Of more than half of the points, those left out are drawn like this.

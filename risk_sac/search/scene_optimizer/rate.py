@@ -1,4 +1,4 @@
-"""Asks for scenes in stages, whose proposals are fitted to earlier failures, to estimate a rate.
+"""Asks for scenes in stages, fitted to earlier failures, to estimate rates.
 
 See `risk_sac.rates`.
 """
@@ -15,7 +15,7 @@ from risk_sac.world.types import Floats
 
 
 class RateSampler(SceneOptimizer):
-    """Scenes of a mixture of the declared distribution and of those where earlier scenes failed or nearly did.
+    """Sampler of the declared distribution mixed with scenes near earlier failures.
 
     No scene has a score. It draws no scene that the state of an earlier process did not know of.
     """

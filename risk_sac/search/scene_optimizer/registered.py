@@ -1,4 +1,4 @@
-"""Samplers of the user's: they propose scenes and scripts, and minimise a score."""
+"""Registered samplers that propose scenes and scripts, and minimise a score."""
 
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -82,7 +82,7 @@ class RegisteredSampler(SceneOptimizer):
         self._sampler = self._made()
 
     def waits(self, out: int) -> bool:
-        """See `SceneOptimizer.waits`: by default a sampler knows of one point at a time."""
+        """Whether it waits for results that are out: by default for any."""
         if out == 0:
             return False
         waits = getattr(self._sampler, "waits", None)
@@ -109,7 +109,7 @@ class RegisteredSampler(SceneOptimizer):
         self._call("tell", lambda: self._sampler.tell(point, score))
 
     def state(self) -> State:
-        """See `SceneOptimizer.state`: all calls, since a sampler need not be able to say where it is."""
+        """Returns all calls, since a sampler need not know its own state."""
         return {**super().state(), "calls": list(self._calls)}
 
     def load(self, state: State) -> None:

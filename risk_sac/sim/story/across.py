@@ -1,4 +1,4 @@
-"""Actions that control an actor's place across its line, or the line itself."""
+"""Actions that control an actor's line or its place across it."""
 
 import math
 
@@ -22,7 +22,7 @@ SLOPE_S = 1e-3  # over which the speed of a timed trajectory is taken
 
 
 class ChangeLane:
-    """Moves an actor to another lane, whose line it follows from now on."""
+    """Moves an actor to another lane, whose line it then follows."""
 
     controls = ACROSS
 
@@ -57,7 +57,7 @@ class ChangeLane:
 
 
 class ChangeOffset:
-    """Moves an actor to an offset from its lane's middle, or from its trajectory."""
+    """Moves an actor to an offset from its lane's middle or trajectory."""
 
     controls = ACROSS
 
@@ -148,7 +148,7 @@ class KeepBeside:
 
 
 class FollowTrajectory:
-    """Leads an actor along a trajectory, at its own speed or at the times of its points.
+    """Leads an actor along a trajectory, at own speed or stated times.
 
     It begins on the trajectory, wherever the actor was before.
     """
@@ -214,7 +214,7 @@ class AssignRoute:
 
 
 class AcquirePosition:
-    """Leads an actor to a place: along lanes, or straight to it if the actor moves freely."""
+    """Leads an actor to a place, along lanes or straight if free."""
 
     controls = NEITHER
 

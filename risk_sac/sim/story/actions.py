@@ -1,4 +1,4 @@
-"""All actions of a story: which class does each, and those that are over at once."""
+"""All actions of a story: their classes, and those over at once."""
 
 from collections.abc import Callable, Mapping
 from typing import Any

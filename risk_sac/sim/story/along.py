@@ -1,4 +1,4 @@
-"""Actions that control an actor's motion along its line: speeds, distances and times of arrival."""
+"""Actions that control motion along a line: speeds, distances and arrival times."""
 
 import math
 
@@ -55,7 +55,7 @@ class ChangeSpeed:
 
 
 def target_mps(target: "float | str | RelativeTarget", mover: Mover, stage: Stage) -> float:
-    """The speed that a target means now; the actor's own if the other actor is not there."""
+    """Returns the target speed now; without the other actor, the actor's own."""
     if not isinstance(target, RelativeTarget):
         return float(target)
     other = stage.present.get(target.to)
@@ -142,7 +142,7 @@ class KeepAhead:
         return False
 
     def _gap_m(self, other: Present, own: Present, ahead_m: float) -> float:
-        """Distance of the two on the side where the actor is to be."""
+        """Returns the distance of the two on the actor's intended side."""
         if not self._do.freespace:
             return self._side * ahead_m
         (low, high), (own_low, own_high) = extent(other.reach, 0.0)[0], extent(own.reach, 0.0)[0]
@@ -194,7 +194,7 @@ MOST_MPS2 = 3.0  # of an actor that walks; choice
 
 
 class Synchronise:
-    """Lets an actor arrive at its target when the master arrives at the master's.
+    """Lets an actor arrive when the master does, each at its target.
 
     The standard leaves the course of the speed open. Choice: the acceleration that changes linearly over the time that
     is left, and so the least sum of squares; it is computed again in each step from the master's present speed.
@@ -251,13 +251,13 @@ class Synchronise:
 
 
 def _reachable(wanted_mps: float, mover: Mover) -> float:
-    """The speed nearest to a wanted one that an actor can have after a step."""
+    """Returns the speed nearest to `wanted_mps` that a step allows."""
     most = MOST_MPS2 * STEP_S if mover.free else math.inf
     return clip(wanted_mps, mover.story_mps - most, mover.story_mps + most)
 
 
 def change_mps(way_m: float, time_s: float, speed_mps: float, last_mps: float) -> float:
-    """Change of speed in a step on the cubic course to a place, a time and a speed."""
+    """Computes a step's speed change on the cubic course to a goal."""
     first = 6 * way_m / time_s**2 - (4 * speed_mps + 2 * last_mps) / time_s
     jerk = (6 * (speed_mps + last_mps) * time_s - 12 * way_m) / time_s**3
     step_s = min(STEP_S, time_s)

@@ -1,4 +1,4 @@
-"""The storyboard: acts, groups, maneuvers, events and actions, and the state of each.
+"""Storyboard: acts, groups, maneuvers, events and actions, and their states.
 
 Source: ASAM OpenSCENARIO XML 1.3, "Storyboard and entities": states and transitions, priorities, execution counts.
 """
@@ -24,7 +24,7 @@ PATH = "::"  # between the names of nested elements
 
 
 class Running:
-    """The actions that run, at most one for each actor and what it controls."""
+    """Running actions, at most one per actor and thing that it controls."""
 
     def __init__(self, stage: Stage) -> None:
         """Nothing runs yet."""
@@ -32,7 +32,7 @@ class Running:
         self._by_actor: dict[str, list[Doing]] = {}
 
     def begin(self, actor: str, doing: Doing) -> bool:
-        """Starts an actor's action and ends those that control the same; returns whether it is over already."""
+        """Starts an action, ends conflicting ones; returns whether it is over already."""
         mover = self._stage.movers.get(actor)
         if mover is None or mover.gone:
             return True
@@ -85,7 +85,7 @@ class Element:
         self.state = {"start": "running", "end": "complete", "stop": "complete"}.get(transition, self.state)
 
     def is_in(self, state: str) -> bool:
-        """Whether it is in a state, or made a transition since the step before."""
+        """Whether it is in a state, or made this transition just now."""
         return self.state == state or (self._transition == state and self._board.tick - self._tick <= 1)
 
     def stand_by(self) -> None:
@@ -263,7 +263,7 @@ class ActionElement(Element):
         self.step()
 
     def step(self) -> None:
-        """See `Element.step`; it ends once none of its actors does it any more."""
+        """See `Element.step`; it ends once none of its actors does it."""
         if self.state == "running" and not any(self._board.running.runs(*pair) for pair in self._doings):
             self.enter("end")
 
@@ -311,7 +311,7 @@ class Storyboard:
         return watch.check(self.stage, self)
 
     def is_in(self, condition: StateCondition) -> bool:
-        """See `triggers.Board.is_in`; an element's name may have those of its parents in front."""
+        """See `triggers.Board.is_in`; parents' names may precede an element's name."""
         return any(
             element.is_in(condition.state)
             for element in self._elements

@@ -30,7 +30,7 @@ class Present(NamedTuple):
 
     @classmethod
     def moving(cls, pose: Pose, speed_mps: float, accel_mps2: float, reach: Reach, slip_rad: float = 0.0) -> "Present":
-        """An actor whose velocity is along its heading, or `slip_rad` to the left of it."""
+        """Makes an actor moving along its heading, or `slip_rad` left of it."""
         way = pose.heading_rad + slip_rad
         return cls(*pose, speed_mps * math.cos(way), speed_mps * math.sin(way), accel_mps2, reach)
 
@@ -110,7 +110,7 @@ class Mover:
         self.wanted_station_m: float | None = None
 
     def follow(self, line: TravelLine, station_m: float, left_m: float = 0.0) -> None:
-        """Puts it on a line, at a place that its drift is part of."""
+        """Puts it on a line, at a place that includes its drift."""
         self.line, self.station_m, self.story_left_m = line, station_m, left_m - self.drift.left_m
 
     @property
@@ -144,11 +144,11 @@ class Mover:
 
     @property
     def deviates(self) -> bool:
-        """Whether it is not where its story has it, or may not be because a trigger was shifted."""
+        """Whether it is off its story, or had a trigger shifted."""
         return self.drift != ON_STORY or self.furthest.trigger_s > 0.0
 
     def move(self, drift: Drift) -> None:
-        """Moves it by a step, at the end of which it has this drift from its story."""
+        """Moves it by a step, ending with this drift from its story."""
         before_mps, before_left_m, before = self.speed_mps, self.left_m, self.drift
         if self.wanted_station_m is not None:
             gone_m = self.wanted_station_m + drift.ahead_m - self.station_m

@@ -1,4 +1,4 @@
-"""Courses of a value from its present to its target: step, linear, cubic and sinusoidal."""
+"""Courses of a value to its target: step, linear, cubic and sinusoidal."""
 
 import math
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ STEEPEST = {"linear": 1.0, "cubic": 1.5, "sinusoidal": math.pi / 2}
 
 
 def share(shape: Shape, progress: float) -> float:
-    """Share of a change that is made, for a progress in [0, 1].
+    """Share of a change made at a progress in [0, 1].
 
     linear: u;  cubic: 3 u² - 2 u³;  sinusoidal: (1 - cos π u) / 2;  step: 1
     """
@@ -38,7 +38,7 @@ def length_of(dynamics: Dynamics, change: float) -> float:
 
 
 def lateral_time_s(shape: Shape, change_m: float, most_mps2: float | None) -> float:
-    """Time of a lateral move whose acceleration reaches a bound, s; 0 without one.
+    """Time for a lateral move at its acceleration bound, s; 0 unbounded.
 
     sinusoidal: a = π² d / 2 T²;  cubic: a = 6 d / T²
     Choice: linear takes as long as to accelerate and brake with the bound, a = 4 d / T².

@@ -1,4 +1,4 @@
-"""State that a story's conditions and actions read: actors, roads, variables and time."""
+"""State that story conditions and actions read: actors, roads, variables, time."""
 
 import math
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ STRAIGHT_M = 1000.0
 
 
 class Apart(NamedTuple):
-    """One actor seen from another: ahead and to the left, m, and how fast both grow."""
+    """One actor relative to another: ahead and left, m, and their rates."""
 
     ahead_m: float
     left_m: float
@@ -75,11 +75,11 @@ class Stage:
             self.stood_s[name] = self.stood_s.get(name, 0.0) + STEP_S if self.stands(name) and name in before else 0.0
 
     def look_again(self, name: str) -> None:
-        """Takes in that an actor of the story is elsewhere, which is no way that it travelled."""
+        """Updates an actor that was moved without travelling there."""
         self.present[name] = self.movers[name].present
 
     def after(self, seconds: float) -> "Stage":
-        """The stage after some time in which all actors keep their velocities; to look at only."""
+        """Returns a read-only stage after some time at constant velocities."""
         later = copy(self)
         later.time_s = self.time_s + seconds
         later.present = {name: actor.after(seconds) for name, actor in self.present.items()}
@@ -104,7 +104,7 @@ class Stage:
         return self.places.pose(position, self.of)
 
     def target(self, to: "str | Position") -> Present | None:
-        """An actor, or a place that stands; None if the actor is not there."""
+        """Returns an actor if present, or a standing place."""
         if isinstance(to, str):
             return self.present.get(to)
         return Present.moving(self.pose(to), 0.0, 0.0, A_POINT)
@@ -112,7 +112,7 @@ class Stage:
     # Roads
 
     def onto_road(self, mover: Mover, pose: Pose) -> None:
-        """Puts an actor on the way ahead of it: its lane's, or straight on."""
+        """Puts an actor on the way ahead: its lane's, or straight on."""
         spot = None if mover.free else self.places.spot(pose)
         if spot is None:
             mover.follow(straight(pose), 0.0)
@@ -121,12 +121,12 @@ class Stage:
         mover.follow(line, *line.project(pose.x_m, pose.y_m))
 
     def onto_way(self, mover: Mover) -> None:
-        """Puts an actor that left its line at an end on the way from there."""
+        """Puts an actor beyond either line end on the way from there."""
         if not mover.guided and not 0.0 <= mover.station_m < mover.line.length_m:
             self.onto_road(mover, mover.line.pose(mover.station_m, mover.left_m))
 
     def lane_line(self, spot: LanePlace, of: str = "") -> TravelLine:
-        """The way ahead from the beginning of a spot's lane, along an actor's route if it has one."""
+        """Returns the way from a lane's beginning on, along the actor's route."""
         edges = self.movers[of].edges if of in self.movers else self.plan.edges.get(of, ())
         key = spot.lane.id, edges
         if key not in self._lines:
@@ -146,14 +146,14 @@ class Stage:
         return line.project(*target[:2])[0] - line.project(*actor[:2])[0], actor.speed_mps
 
     def way_between(self, here: Pose, there: Pose) -> tuple[TravelLine, tuple[str, ...]] | None:
-        """Line along lanes from one place to another, and its edges; None if no lanes lead there."""
+        """Returns the line along lanes between places, and its edges, or None."""
         try:
             return self.places.way(here, there)
         except ConfigError:
             return None
 
     def lane_of(self, target: "float | str | LaneTarget", own: Pose) -> LanePlace | None:
-        """Spot beside a pose, on the lane that a lane change leads to; None if there is none."""
+        """Returns the spot that a lane change leads to, beside a pose."""
         here = self.places.spot(own)
         if here is None:
             return None
@@ -189,7 +189,7 @@ class Stage:
             return None
 
     def room(self, mover: Mover) -> DeviationRoom:
-        """Room beside an actor's body up to the edges of its road's lanes for cars."""
+        """Room beside an actor's body, up to its road's car lanes' edges."""
         spot = None if mover.free else self.places.spot(mover.pose)
         if spot is None:
             return ANYWHERE
@@ -215,7 +215,7 @@ class Stage:
         return self._since(self._off_s, name, spot is None or abs(spot.left_m) > spot.lane.width_m / 2)
 
     def at_end_s(self, name: str) -> float | None:
-        """Time of a story's actor at its way's end, s; None if not there."""
+        """Time of a story actor at its way's end, s, or None."""
         mover = self.movers.get(name)
         return self._since(self._end_s, name, mover is not None and mover.station_m >= mover.line.length_m)
 
@@ -227,7 +227,7 @@ class Stage:
     # Distances
 
     def apart(self, one: Present, other: Present, coordinates: Coordinates) -> Apart:
-        """Finds where one actor's reference point is, seen from another's, along its axes or along the lanes."""
+        """Finds one actor relative to another, along axes or lanes."""
         if coordinates == "road" and (found := self._along_road(one, other)) is not None:
             return found
         if coordinates != "entity" and (found := self._along_lanes(one, other)) is not None:
@@ -237,7 +237,7 @@ class Stage:
         return Apart(ahead, left, its[0] - own[0], its[1] - own[1])
 
     def _along_road(self, one: Present, other: Present) -> Apart | None:
-        """The same along the reference line of the road that both are on; None without one."""
+        """The same along the reference line of their common road, or None."""
         here, there = self.on_road(one.pose), self.on_road(other.pose)
         if here is None or there is None or here.road != there.road:
             return None
@@ -278,7 +278,7 @@ class Stage:
     def distance(
         self, one: Present, other: Present, along: Along, coordinates: Coordinates, *, freespace: bool
     ) -> tuple[float, float]:
-        """Distance of two actors, m, and how fast it falls, m/s; never negative.
+        """Computes two actors' distance, m, at least 0, and closing speed, m/s.
 
         Without `freespace` it is that of their reference points, else that of their boxes.
         """
@@ -336,7 +336,7 @@ def _turned(dx: float, dy: float, heading_rad: float) -> tuple[float, float]:
 
 
 def _lane_beside(lane: int, left: int) -> int:
-    """OpenDRIVE id of the lane some lanes to the left of another, without lane 0."""
+    """Returns the OpenDRIVE lane id `left` lanes to the left, without 0."""
     wanted = lane + left if lane < 0 else lane - left
     return wanted - int(math.copysign(1, lane)) if wanted == 0 or (wanted > 0) != (lane > 0) else wanted
 
@@ -358,4 +358,4 @@ class Doing(Protocol):
         """Starts now; returns whether it is over already."""
 
     def step(self, mover: Mover, stage: Stage) -> bool:
-        """Says what the actor does in the next step; returns whether the action is over then."""
+        """Sets the actor's next step; returns whether the action is then over."""

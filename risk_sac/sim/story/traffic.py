@@ -1,4 +1,4 @@
-"""Actors of a story in SUMO: vehicles that it puts where the story has them, and walkers.
+"""Story actors in SUMO: vehicles that it places as told, and walkers.
 
 SUMO maps such a vehicle onto the lane that it is on, so that its drivers follow it. Where the whole body is beside the
 lanes, SUMO keeps it where it is, on no lane.
@@ -25,7 +25,7 @@ TIME_DIGITS = 6  # of a time, which is a multiple of the step
 
 
 class StoryMotion(NamedTuple):
-    """An actor of the story at one moment; its place is its body's middle."""
+    """Momentary motion of a story's actor; its place is its body's middle."""
 
     x_m: float
     y_m: float
@@ -93,7 +93,7 @@ class StoryEngine:
         self._board.evaluate()
 
     def advance(self, leads: Mapping[str, Lead] = NO_LEADS) -> Mapping[str, StoryMotion]:
-        """Moves all actors of the story by a step, and returns where they are.
+        """Moves the story's actors by a step, and returns where they are.
 
         Args:
           leads: what leads actors away from the story.
@@ -167,7 +167,7 @@ class StoryTraffic:
         return PlacedState(x_m, y_m, angle, p.speed_mps, p.lateral_mps, p.accel_mps2, p.left_m, None)
 
     def insert(self) -> None:
-        """Has SUMO insert the vehicles, which it was given, where the story has them."""
+        """Makes SUMO insert its vehicles where the story has them."""
         for name in self.placed:
             self._put(name)
 
@@ -183,13 +183,13 @@ class StoryTraffic:
         libsumo.vehicle.moveToXY(name, "", -1, placed.front_x_m, placed.front_y_m, placed.angle_deg, ANYWHERE)
 
     def _correct_speed(self, name: str) -> None:
-        """Tells SUMO the speed, which it derives from the way along the lane."""
+        """Tells SUMO the speed, which it derives from positions on lanes."""
         speed_mps = max(self.placed[name].speed_mps, 0.0)
         libsumo.vehicle.setPreviousSpeed(name, speed_mps)
         libsumo.vehicle.setSpeed(name, speed_mps)
 
     def advance(self, leads: Mapping[str, Lead] = NO_LEADS) -> frozenset[str]:
-        """Plays the story's next step, and has SUMO put the vehicles there in its own.
+        """Plays the story's next step, and makes SUMO put its vehicles there.
 
         Returns:
           The actors that left the scenario.

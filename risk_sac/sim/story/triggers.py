@@ -108,7 +108,7 @@ class TriggerWatch:
         self._groups = [[Watch(condition) for condition in group] for group in trigger]
 
     def check(self, stage: Stage, board: StoryState) -> tuple[bool, frozenset[str]]:
-        """Evaluates all conditions now: whether all of one group hold, and the actors of these."""
+        """Evaluates all conditions: whether a group holds, and such groups' actors."""
         fires, actors = False, set[str]()
         for group in self._groups:
             checks = [watch.check(stage, board) for watch in group]
@@ -270,7 +270,7 @@ class EventStart:
         self._due_s: float | None = None
 
     def fires(self, stage: Stage, board: StoryState, actors: Iterable[str]) -> bool:
-        """Evaluates it now, for the event's actors; the shift is that of the first that has one."""
+        """Evaluates it now for the event's actors; the first shift counts."""
         if self._watch is None or self._early is None:
             return True
         fires = self._watch.check(stage, board)[0]
