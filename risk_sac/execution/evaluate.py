@@ -78,7 +78,7 @@ class Watcher:
 
 @contextmanager
 def stop_signal(numbers: Sequence[signal.Signals] = STOPPING) -> Iterator[Callable[[], bool]]:
-    """Yields whether a signal has come; the second acts as usual."""
+    """Yields a function: whether a signal came; a second one acts normally."""
     stopping = False
 
     def stop(number: int, frame: FrameType | None) -> None:

@@ -214,7 +214,7 @@ class StateChange(Record):
 
 
 class Total(Counts):
-    """Runs begun of one family and method: summed counts, mean other figures."""
+    """Begun runs of one family and method: sums of counts, means otherwise."""
 
     family: Family
     method: SearchMethod

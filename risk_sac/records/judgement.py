@@ -115,7 +115,7 @@ class ReferenceOutcome(Record):
 
 
 class EgoPart(Record):
-    """The ego's reaction to the striker: facts from frames before contact."""
+    """The ego's reaction to the striker: facts from frames up to contact."""
 
     seen_s: Real
     """How long it had seen the striker without a break."""

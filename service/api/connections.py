@@ -155,7 +155,7 @@ class Connection(H11Protocol):
         super().on_response_complete()
 
     def pause_writing(self) -> None:
-        """Sets a deadline for a client that reads more slowly than written."""
+        """Sets a deadline for a client that reads too slowly."""
         super().pause_writing()
         self._room.unread[self] = time.monotonic()
         self._await_reading()

@@ -19,7 +19,7 @@ HOUR_S = 3600.0
 
 
 def check_quota(usage: Usage, new_runs: int, settings: ServiceSettings) -> None:
-    """Raises QuotaError at too many queued runs or no worker hours."""
+    """Raises QuotaError for too many queued runs or spent worker hours."""
     if usage.queued_runs + new_runs > settings.quota_queued_runs:
         raise QuotaError(
             f"got {new_runs} runs with {usage.queued_runs} waiting already; wanted at most "

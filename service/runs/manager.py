@@ -247,7 +247,7 @@ class Manager:
 
     @contextmanager
     def _pausing(self, run: QueuedRun | None = None) -> Iterator[None]:
-        """Pauses if database or disk refuse; a named run waits without worker."""
+        """Pauses if database or disk refuse; `run` waits, its worker lost."""
         try:
             yield
         except StorageError as error:

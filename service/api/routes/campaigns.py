@@ -274,7 +274,7 @@ def get_log(
     "/{campaign_id}/runs/{run_id}/boundary", response_model=BoundaryMap, responses=UNKNOWN | TAGGED | NO_BOUNDARY
 )
 def get_boundary(campaign_id: str, run_id: str, request: Request, service: Service, caller: CurrentCaller) -> Response:
-    """Boundary between passing and failing, as a run of `boundary` found it."""
+    """Boundary between passing and failing that a run of `boundary` found."""
     content = _boundary(run_of(service.store.campaign(campaign_id, caller.sees), run_id), BOUNDARY, service)
     return Response(content, headers=cacheable(request, _digest(content)), media_type="application/json")
 

@@ -173,7 +173,7 @@ def put_triage(
     service: Service,
     caller: CurrentCaller,
 ) -> Triage:
-    """Store the triage of a failure, replacing an earlier one."""
+    """Store a failure's triage, replacing an earlier one; deleted with the campaign."""
     return service.manager.triage(campaign_id, failure_id, posted.state, posted.comment, caller.sees)
 
 
@@ -237,13 +237,13 @@ async def get_bundle(failure: Asked, headers: Headers, service: Service, caller:
 
 @router.get("/failures/{failure_id}/core.npz", response_class=Response, responses=made(ZIP) | PLAYED)
 async def get_core(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
-    """The failure reduced to what it needs; takes up to 150 episodes."""
+    """Failure reduced to what it needs; up to 150 episodes (10 s)."""
     return Response(await service.studies.get(Study(failure, "core"), caller.key_id), headers=headers, media_type=ZIP)
 
 
 @router.get("/failures/{failure_id}/most-plausible.npz", response_class=Response, responses=made(ZIP) | PLAYED)
 async def get_most_plausible(failure: Asked, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
-    """Least unlikely motion that still fails; takes up to 300 episodes."""
+    """Recording and least unlikely failing motion; up to 300 episodes (20 s)."""
     study = Study(failure, "most-plausible")
     return Response(await service.studies.get(study, caller.key_id), headers=headers, media_type=ZIP)
 
@@ -258,7 +258,7 @@ async def get_region(failure: Asked, headers: Headers, service: Service, caller:
 
 @router.get("/failures/{failure_id}/twins/{twin}.png", response_class=Response, responses=made(PNG) | PLAYED)
 async def get_twin(failure: Asked, twin: Twin, headers: Headers, service: Service, caller: CurrentCaller) -> Response:
-    """Picture of a failure beside its twin: no attack, or another ego."""
+    """Picture of a failure beside its twin: unattacked (`idle`) or another ego."""
     played = await service.studies.get(Study(failure, "twin", twin), caller.key_id)
     return Response(
         await service.pictures.get(Picture(failure, twin, played), caller.key_id), headers=headers, media_type=PNG
@@ -269,7 +269,7 @@ async def get_twin(failure: Asked, twin: Twin, headers: Headers, service: Servic
 async def get_twin_play(
     failure: Asked, twin: Twin, headers: Headers, service: Service, caller: CurrentCaller
 ) -> Response:
-    """Outcome and series of the scene without attack, or with another ego."""
+    """Outcome and series of a twin: unattacked (`idle`) or with another ego."""
     played = await service.studies.get(Study(failure, "twin", twin), caller.key_id)
     body = await run_in_threadpool(lambda: wire(twin_body(twin, played)))
     return Response(body, headers=headers, media_type=JSON)

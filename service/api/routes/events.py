@@ -71,7 +71,7 @@ async def get_events(
     last_event_id: LastEventId = None,
     newest: Newest = None,
 ) -> Response:
-    """Stream of server-sent events: all, or those after the last received."""
+    """Server-sent events (episodes, failures, states): all, or after the last received."""
     position, ended = await run_in_threadpool(_start, service.store, campaign_id, caller.sees, last_event_id, newest)
     if position is None:
         return Response(status_code=204)

@@ -131,7 +131,7 @@ async def get_figure(
 
 @router.get("/spec", response_model=CampaignSpec, responses=SPEC)
 def get_spec(campaign: AskedCampaign, format_: Annotated[SpecFormat, Query(alias="format")] = "json") -> Response:
-    """Spec of the campaign: JSON to post, or YAML for the CLI."""
+    """Spec of the campaign: JSON to post, or YAML for `--spec`."""
     return Response(SPECS[format_](campaign.spec), media_type=MEDIA_TYPES[format_])
 
 
@@ -270,7 +270,7 @@ async def post_regression(
     service: Service,
     caller: CurrentCaller,
 ) -> CampaignRegression:
-    """Play a campaign's distinct failures against another ego; posting twice changes nothing."""
+    """Play a campaign's distinct failures against another ego; idempotent."""
     campaign = await run_in_threadpool(service.store.campaign, posted.campaign_id, caller.sees)
     regression = await run_in_threadpool(service.regressions.post, campaign, posted.ego, caller.key_id)
     response.headers["Location"] = link(request, f"/v1/regressions/{regression.id}")
@@ -279,6 +279,6 @@ async def post_regression(
 
 @regressions_router.get("/{regression_id}", responses=UNKNOWN)
 def get_regression(regression_id: str, service: Service, caller: CurrentCaller) -> CampaignRegression:
-    """Verdict of each failure: fixed, failing, a new kind, flaky, not comparable."""
+    """Verdict of each failure: fixed, still failing, new kind, flaky, not comparable."""
     service.store.campaign(campaign_of(regression_id), caller.sees)  # which another project's caller does not see
     return service.regressions.get(regression_id)
