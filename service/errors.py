@@ -53,7 +53,7 @@ def disk_refusals(what: str) -> Iterator[None]:
 
 
 class OutdatedError(StorageError):
-    """Stored campaign of another version: listable and deletable, its runs fail."""
+    """Stored campaign of an incompatible version: listable, deletable; its runs fail."""
 
 
 class SeriesLost(StorageError):

@@ -128,7 +128,7 @@ class Budget(Settings):
 
 
 class Iid(Settings):
-    """Phase that estimates the failure rate in scenes that no search chose.
+    """Final phase that estimates the failure rate in scenes no search chose.
 
     They are drawn from the ODD independently, by the document's distributions and else uniformly. They are played with
     undisturbed traffic and with random adversaries, in runs of their own.
@@ -209,7 +209,7 @@ class RunSpec(Settings):
 
 
 def plain_url(text: str) -> str:
-    """Checks a URL; refuses what parsers read differently, such as a user."""
+    """Checks a URL; refuses parts that parsers read differently (user, backslash)."""
     try:
         parts = urlsplit(text)
         plain = text.isascii() and text.isprintable() and not set(text) & set(" \\@#") and parts.port != 0

@@ -114,7 +114,7 @@ class ScenarioParameter(Settings):
         return tuple(self.rows[0]) if self.rows else ()
 
     def words_of(self, name: str) -> tuple[str, ...]:
-        """Returns the words that a name may have, its own or rows'."""
+        """Returns the words of a name: its own, or those of rows."""
         if self.rows is None:
             return self.words or ()
         return tuple(dict.fromkeys(word for row in self.rows if isinstance(word := row.get(name), str)))

@@ -1,4 +1,4 @@
-"""Story of a scenario document: what actors do besides the search, when.
+"""Story of a scenario document: what its actors do, and when.
 
 The model follows OpenSCENARIO XML 1.3. A story has acts, an act has maneuver groups, a group has maneuvers, a maneuver
 has events, and an event has actions and a start trigger. Values are arithmetic over the document's parameters.

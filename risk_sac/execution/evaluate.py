@@ -78,7 +78,7 @@ class Watcher:
 
 @contextmanager
 def stop_signal(numbers: Sequence[signal.Signals] = STOPPING) -> Iterator[Callable[[], bool]]:
-    """Yields a function: whether a signal came; a second one acts normally."""
+    """Yields whether a signal came, as a function; a second acts normally."""
     stopping = False
 
     def stop(number: int, frame: FrameType | None) -> None:

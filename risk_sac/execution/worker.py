@@ -117,7 +117,7 @@ class Reporter:
 
 
 class LossyLog(io.FileIO):
-    """Log that a full disk truncates, without ending the run."""
+    """Log that a full disk leaves incomplete, without ending the run."""
 
     def write(self, data: "ReadableBuffer", /) -> int:
         """Bytes written, or given up."""

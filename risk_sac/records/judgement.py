@@ -144,7 +144,7 @@ class EgoPart(Record):
 
     @property
     def too_fast(self) -> bool:
-        """Whether it exceeded the speed of its sight by over 10 %."""
+        """Whether it was over 10 % faster than its sight allowed."""
         return self.sight_mps is not None and (self.sighted_mps or 0.0) > TOO_FAST * self.sight_mps
 
     @property

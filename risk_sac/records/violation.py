@@ -92,7 +92,7 @@ class Violated(Record, ABC):
 
     @property
     def prevention_in_words(self) -> str | None:
-        """Names the drivers that would have prevented it; None without any asked."""
+        """Names the drivers that prevent it; None if none was asked."""
         if not self.prevention:
             return None
         names = [name for name, prevents in self.prevention.items() if prevents and name != TTC_RULE]
@@ -117,7 +117,7 @@ class Violated(Record, ABC):
 
     @property
     def prevention(self) -> Mapping[str, bool]:
-        """Reference driver → whether it would have prevented it; empty if unasked."""
+        """Reference driver → whether it prevents it; empty if none was asked."""
         drivers = self.judged.drivers
         return {name: each if isinstance(each, bool) else each.avoids for name, each in drivers.items()}
 
@@ -136,7 +136,7 @@ class Violated(Record, ABC):
 
     @property
     def plausible(self) -> bool:
-        """Whether it is valid and its adversaries behave plausibly, perhaps rarely."""
+        """Whether it is valid and road users do what its adversaries did."""
         return self.behaviour is not None and self.behaviour.plausible
 
     @property

@@ -49,7 +49,7 @@ def scratch_folder() -> Iterator[Path]:
 
 
 def remove_abandoned(parent: Path) -> None:
-    """Removes folders of `claim` in `parent` whose processes have gone."""
+    """Removes folders made by `claim` in `parent` whose processes have gone."""
     for folder in parent.iterdir():
         if _SCRATCH.fullmatch(folder.name):
             with contextlib.suppress(OSError):  # its process lives, or it is another user's

@@ -58,7 +58,7 @@ class Server(uvicorn.Server):
 
 
 def page_addresses(server: uvicorn.Server) -> list[str]:
-    """Returns the page's addresses, with the loopback address for all addresses."""
+    """Returns the page's addresses; loopback stands for a server on all addresses."""
     bound = [each.getsockname()[:2] for listening in server.servers for each in listening.sockets]
     named = [("127.0.0.1" if host in ("0.0.0.0", "::") else host, port) for host, port in bound]
     path = f"{server.config.root_path}/page/"

@@ -125,7 +125,7 @@ class Gate:
 
 
 def _remote_clients(scope: Scope) -> list[str]:
-    """Returns a request's addresses that are not loopback: client's and stated ones.
+    """Returns a request's non-loopback addresses: its client's and those proxies state.
 
     A client may forge the first of them, and a proxy that is not trusted states the client's, too.
     """

@@ -165,7 +165,7 @@ def _of_cluster(cluster: ClusterState | None) -> Iterator[Metric]:
 
 
 class _Monotone:
-    """Counters made of sums over rows, which fall as rows are deleted."""
+    """Counters made of sums over rows; they never fall with deleted rows."""
 
     def __init__(self, labels: Sequence[str]) -> None:
         self._labels = labels

@@ -264,7 +264,7 @@ async def _left(request: Request, error: Exception) -> Response:
 
 
 def _methods(request: Request, of_first: str) -> set[str]:
-    """Returns the methods of all routes at this path, not only one.
+    """Returns the methods of all routes at this path, not the first's.
 
     A path without parameters takes precedence, as in OpenAPI: `check` is no campaign id.
     """

@@ -155,7 +155,7 @@ class KeyRing:
         return self._read() is None
 
     def find(self, token: str) -> Key | None:
-        """Returns the valid key of a token, else None; raises KeysError."""
+        """Returns a token's valid key or None; KeysError without a readable file."""
         keys, parts = self._read() or {}, _TOKEN.fullmatch(token)
         key = None if parts is None else keys.get(parts[1])
         return key if key is not None and parts is not None and key.opened_by(parts[2]) else None

@@ -54,7 +54,7 @@ class Scenarios:
         self._drawing, self._shipped = threading.Lock(), dict[str, bytes]()  # pictures of those that ship
 
     def list(self, project: str | None) -> list[ScenarioSummary]:
-        """Returns the shipped scenarios, then a project's or all, newest first."""
+        """Returns shipped scenarios, then a project's (None: all), newest first."""
         own = dict[str, ScenarioSummary]()
         for record in self._records(project):
             try:
@@ -65,7 +65,7 @@ class Scenarios:
         return [*(summary_of(name, shipped_document(name)) for name in shipped_names()), *newest]
 
     def get(self, name: str, project: str | None) -> ScenarioDetails:
-        """Returns a scenario with its document; raises `NotFoundError` if not visible."""
+        """Returns a scenario with document; raises `NotFoundError` if the project lacks it."""
         if name in shipped_names():
             row, text = summary_of(name, shipped_document(name)), scenario_file(name).read_text()
         else:

@@ -76,7 +76,7 @@ class StoragePause:
             logger.info("the pause itself cannot be written down; it is shown all the same")
 
     def try_again(self) -> None:
-        """Ends the pause or doubles the wait, once the wait is over."""
+        """Ends the pause if the disk has room, else doubles the wait."""
         if time.monotonic() - self._refused_at < self._wait_s:
             return
         try:

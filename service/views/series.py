@@ -240,7 +240,7 @@ class Studies(OnDemandCache[Study]):
         self._settings, self._helper = settings, helper
 
     async def get(self, subject: Study, key_id: str | None) -> bytes:
-        """Returns the study; refuses at once if it needs a valid failure."""
+        """Returns the study; cores, motions and regions require a valid failure."""
         if subject.subject in ("core", "most-plausible", "region"):
             episode = subject.failure.episode
             try:

@@ -88,7 +88,7 @@ async def get_events(
 def _start(
     store: Store, campaign_id: str, project: str | None, event_id: str | None, newest: int | None
 ) -> tuple[int | None, bool]:
-    """Returns the first position, None if all was sent, and whether ended."""
+    """Returns the start position, None if all sent, and whether it ended."""
     store.campaign(campaign_id, project)  # 404 unless the caller may see it
     position = _position(store, campaign_id, event_id, newest)
     if position is None:

@@ -171,6 +171,6 @@ async def _missing(request: Request) -> Response:
 
 
 def page_routes() -> list[Route | Mount]:
-    """Returns the routes of `/docs` and `/page/`, or how to build it."""
+    """Returns routes of `/docs` and `/page/`; unbuilt, it says how to build."""
     shown = Mount("/page", _Page(directory=BUILT, html=True)) if BUILT.is_dir() else Route("/page/", _missing)
     return [Mount("/docs", StaticFiles(directory=ASSETS)), Route("/page", _to_page), shown]
